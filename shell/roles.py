@@ -19,12 +19,21 @@ NO_ROLES: Mapping[str, str] = MappingProxyType({})
 """No bus plays a role."""
 
 
+DIFFERENCE = "difference"
+"""The word of a series: the measured minus the predicted position of a drive with a twin, steps."""
+
+
 class Series(NamedTuple):
     """A plotted drive: its position and velocity; with a `word`, the value of that word instead."""
 
     bus: str
     address: str
     word: str = ""
+
+    @property
+    def of_motion(self) -> bool:
+        """Whether it needs samples of position and velocity."""
+        return self.word in ("", DIFFERENCE)
 
     @property
     def text(self) -> str:

@@ -111,7 +111,7 @@ def _drives(session: SessionView, model: ScreenModel, plotted: Sequence[Series],
     wanted: Wanted[str] = {}
     for bus in _open(session):
         chosen = session.selected.address if bus.name == session.selected_bus and session.selected is not None else None
-        fast = {each.address for each in plotted if each.bus == bus.name and not each.word}
+        fast = {each.address for each in plotted if each.bus == bus.name and each.of_motion}
         by_period: dict[float, list[str]] = {}
         for address in bus.drives:
             busy = model.bus(bus.name).readout(address).busy(session.now())
@@ -144,7 +144,9 @@ def _values(session: SessionView, plotted: Sequence[Series]) -> Wanted[Value]:
     """The periods of values."""
     wanted: Wanted[Value] = {}
     for bus in _open(session):
-        values = tuple(Value(each.address, each.word) for each in plotted if each.bus == bus.name and each.word)
+        values = tuple(
+            Value(each.address, each.word) for each in plotted if each.bus == bus.name and not each.of_motion
+        )
         if values:
             wanted[bus.name, id(bus), values] = VALUES
     return wanted

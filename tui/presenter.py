@@ -164,9 +164,11 @@ class Presenter:
 
 def trouble_mark(facts: BusFacts | None, addresses: Sequence[str], lost: bool) -> str:
     """The mark of a tab whose bus has trouble that its state does not show."""
-    if facts is None or lost or bus_state(facts, list(addresses), lost) is State.TROUBLE:
+    if facts is None or lost or bus_state(facts, list(addresses), lost) in (State.TROUBLE, State.DIFFERS):
         return ""
     readouts = [facts.readout(address) for address in addresses]
     if any(each.silent_since is not None for each in readouts):
         return "" if bus_state(facts, list(addresses), lost) is State.SILENT else "?"
-    return "!" if any(trouble_of(axis) for each in readouts for axis in each.axes) else ""
+    if any(trouble_of(axis) for each in readouts for axis in each.axes):
+        return "!"
+    return State.DIFFERS.sign if any(each.differs for each in readouts) else ""

@@ -21,6 +21,8 @@ SHORTEST = 0.25
 """Seconds below which no value counts as old, however fast it is polled: people cannot read faster."""
 SWITCHES = ("lim-", "lim+")
 """Functions of lamps that end the travel."""
+BEHIND = 2.0
+"""Seconds between the last sample and the last prediction, after which the prediction counts as old."""
 LIVELY = 3.0
 """Seconds of faster polling after a line was sent to a drive."""
 
@@ -37,6 +39,8 @@ class State(Enum):
     LOST = ("✗", "lost", "error")
     TROUBLE = ("✗", "error", "error")
     """Of a line: a drive of it has an error or a limit."""
+    DIFFERS = ("≠", "twin", "error")
+    """Of a line: a drive of it differs from its twin."""
 
     @property
     def sign(self) -> str:
@@ -111,6 +115,10 @@ class Beside:
     predicted: Predicted | None = None
     diverged: Diverged | None = None
     """None: they agree."""
+
+    def behind(self, last: Point | None) -> bool:
+        """Whether samples came for which there is no prediction."""
+        return self.predicted is not None and last is not None and last.at - self.predicted.at > BEHIND
 
     def take(self, event: Predicted | Diverged | Agreed) -> None:
         """Take an event of this axis's twin."""
@@ -238,6 +246,11 @@ class Readout:
     def in_trouble(self) -> bool:
         """Whether an axis has an error or a limit, as last read."""
         return any(each.trouble or (each.conditions is not None and each.conditions.error) for each in self.axes)
+
+    @property
+    def differs(self) -> bool:
+        """Whether an axis differs from its twin."""
+        return any(each.twin is not None and each.twin.diverged is not None for each in self.axes)
 
     @property
     def _moves(self) -> bool:

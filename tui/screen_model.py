@@ -185,6 +185,8 @@ class ScreenModel:
                 mark = "!" if each.warning else "."
                 self.page(event.bus).append(Record(inner.at, inner.address, mark, each.text, help=each.help))
         elif isinstance(inner, TwinEvent):
+            if isinstance(inner, Predicted):
+                self.traces.predict(event.bus, inner)
             self.bus(event.bus).readout(inner.address).compare(inner)
         elif self.bus(event.bus).traffic.take(inner):
             return
@@ -227,6 +229,8 @@ def bus_state(facts: BusFacts | None, addresses: list[str], lost: bool) -> State
             return telling
     if any(facts.readout(address).in_trouble for address in addresses):
         return State.TROUBLE
+    if any(facts.readout(address).differs for address in addresses):
+        return State.DIFFERS
     return State.IDLE if all(state is State.STOPPED for state in states) else State.UNKNOWN
 
 

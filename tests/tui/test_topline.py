@@ -37,7 +37,7 @@ def test_the_top_line_fits_and_shows_the_selected_tab_and_all_trouble(
     assert re.search(rf" {chosen.number} {chosen.name}( |…)", text) or f" {chosen.number} {chosen.name[:9]}" in text
     own = text.split("● rec")[0]
     counted = sum(map(int, re.findall(r"✗(\d+)", own)))
-    seen = len(re.findall(r"\d[✗?]| [✗?] ", re.sub(r"✗\d+", "", own)))
+    seen = len(re.findall(r"\d[✗?≠]| [✗?≠] ", re.sub(r"✗\d+", "", own)))
     assert seen + counted >= sum(tab.state in TROUBLE for tab in tabs)
 
 

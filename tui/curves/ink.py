@@ -9,6 +9,13 @@ MARKS = "*+ox#%"
 PATTERNS = ((1, 1), (2, 1), (4, 2), (4, 1), (6, 4), (8, 6))
 """For each series, the period of its dashes in columns of dots, and the length of a dash."""
 
+TWINS = len(PATTERNS)
+"""The number of a series and this is that of its twin, whose line is of single dots."""
+TWIN_MARKS = ".,:;'~"
+"""The ASCII mark of each twin."""
+SPARSE = 5
+"""Dots of a line of which a twin shows one, in whatever direction the line goes."""
+
 
 @dataclass(frozen=True)
 class Ink:
@@ -22,22 +29,35 @@ class Ink:
 
     def glyph(self, dots: int, series: int) -> str:
         """The sign of a dot pattern."""
-        return self.glyphs[dots] if self.glyphs else MARKS[series % len(MARKS)]
+        return self.glyphs[dots] if self.glyphs else _mark(series)
 
-    def shows(self, series: int, x: int) -> bool:
-        """True if a series shows its flat parts in column `x` of dots; its marks tell it apart where it has any."""
+    def dots(self, series: int, x: int, top: int, bottom: int) -> range:
+        """The dots that a series shows in column `x` of dots, of those from `top` to `bottom`.
+
+        Flat parts are dashed; the marks of a series tell it apart where it has any.
+        """
+        if series >= TWINS and self.glyphs:
+            return range(top + (2 * x - top) % SPARSE, bottom + 1, SPARSE)
         period, length = PATTERNS[series % len(PATTERNS)]
-        return not self.glyphs or x % period < length
+        shown = not self.glyphs or x % period < length or bottom - top >= self.tall
+        return range(top, bottom + 1) if shown else range(0)
 
     def sample(self, series: int) -> str:
         """A piece of the line of a series, for a legend."""
         if not self.glyphs:
-            return MARKS[series % len(MARKS)] * 2
-        full = (1 << self.tall) - 1
-        flat = 1 << (self.tall // 2)
-        shown = [flat & full if self.shows(series, x) else 0 for x in range(2 * self.wide)]
+            return _mark(series) * 2
+        middle = self.tall // 2
+        if series >= TWINS:
+            shown = [1 << middle if x % 2 == 0 else 0 for x in range(2 * self.wide)]
+        else:
+            shown = [1 << middle if self.dots(series, x, middle, middle) else 0 for x in range(2 * self.wide)]
         cells = (shown[n : n + self.wide] for n in range(0, len(shown), self.wide))
         return "".join(self.glyphs[sum(dots << (self.tall * n) for n, dots in enumerate(cell))] for cell in cells)
+
+
+def _mark(series: int) -> str:
+    marks = TWIN_MARKS if series >= TWINS else MARKS
+    return marks[series % len(marks)]
 
 
 def _braille(dots: int) -> str:

@@ -105,9 +105,9 @@ class Raster:
                 at = x * ink.wide + side
                 column = columns.columns.get(at)
                 span = None if column is None else _span(column, frame.scale, rows * ink.tall)
-                if span is None or not (ink.shows(number, at) or span[1] - span[0] >= ink.tall):
+                if span is None:
                     continue
-                for y in range(span[0], span[1] + 1):
+                for y in ink.dots(number, at, *span):
                     dots[y // ink.tall] |= 1 << (side * ink.tall + y % ink.tall)
                     owners[y // ink.tall] = number
         signs = (ink.glyph(each, owner) if each else " " for each, owner in zip(dots, owners, strict=True))

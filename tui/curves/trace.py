@@ -8,6 +8,8 @@ from collections.abc import Iterator
 from typing import NamedTuple
 
 from drives.events import Sample, Valued
+from shell.events import Predicted
+from shell.roles import DIFFERENCE
 
 KEPT = 660.0
 """Seconds of samples that are kept: the longest span, and some more to look back."""
@@ -19,8 +21,12 @@ _SLACK = 1024
 """Samples that may be too old before they are dropped together."""
 
 
+PREDICTED = {"position": "predicted position", "velocity": "predicted velocity"}
+"""What a twin predicts, by what is measured."""
+
+
 class Quantity(NamedTuple):
-    """The quantity of a trace: `word` is `position`, `velocity`, or a word of the drive's language."""
+    """The quantity of a trace: `word` is `position`, `velocity`, one of a twin, or a word of the drive's language."""
 
     bus: str
     address: str
@@ -95,6 +101,13 @@ class Traces:
         else:
             self.add(Quantity(bus, event.address, event.axis, "position"), event.at, event.position)
             self.add(Quantity(bus, event.address, event.axis, "velocity"), event.at, event.velocity)
+
+    def predict(self, bus: str, event: Predicted) -> None:
+        """Take what the twin of a drive predicts."""
+        drive = (bus, event.address, event.axis)
+        self.add(Quantity(*drive, PREDICTED["position"]), event.at, event.position)
+        self.add(Quantity(*drive, PREDICTED["velocity"]), event.at, event.velocity)
+        self.add(Quantity(*drive, DIFFERENCE), event.at, event.difference)
 
     def get(self, quantity: Quantity) -> Trace | None:
         """The trace of a quantity; None before its first sample."""

@@ -9,6 +9,7 @@ from __future__ import annotations
 from tui.panels.glance import Glance, firmware_of, name_of
 from tui.panels.lamps import aged, error_span, facts_groups, flowing, lamp_groups
 from tui.panels.travel import LEARNT, LIMITS, SEEN, bar, phase, to_go_words, travel_of
+from tui.panels.twin import twin_rows
 from tui.panels.view import View
 from tui.readout import Readout, State
 from tui.text import fit, thousands
@@ -70,6 +71,7 @@ def axis_rows(glance: Glance, axis: Readout, now: float, width: int) -> list[Row
     togo = to_go_words(axis, now) if live else ""
     right: list[Span] = [(f"{togo} to go ", "text")] if togo else []
     rows.append(spread([(f" {position:>{NUMBER}} ", role), (unit, "dim"), (arrow, role)], right, width))
+    rows += twin_rows(axis, unit, NUMBER, width, dim=role == "dim")
     return [*rows, *_travel_rows(axis, role, width)[: 1 if name else 2]]
 
 

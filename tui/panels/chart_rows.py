@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from tui.curves.chart import Chart, Extent
+from tui.curves.ink import TWINS
 from tui.curves.look import Look
 from tui.curves.raster import CURSOR, EMPTY, with_cursor
 from tui.curves.scale import Scale, row_of, ticks
@@ -20,7 +21,7 @@ LEAST = {"velocity": 100.0, "position": 10.0}
 """The least width of a scale."""
 NAMES = 64
 """Width of a plot from which the names of its lines stand at their ends."""
-_ROLES = {EMPTY: "text", CURSOR: "strong", **dict(enumerate(SERIES))}
+_ROLES = {EMPTY: "text", CURSOR: "strong", **{n: SERIES[n % TWINS] for n in range(2 * TWINS)}}
 """The role of a cell by its owner."""
 STEPS = (0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 30.0, 60.0, 120.0, 300.0)
 """Seconds between two times below a chart."""
@@ -56,7 +57,7 @@ def chart_rows(view: View, shown: Shown, window: Window, width: int, height: int
         return []
     look = view.model.look
     scale = _scale(view, shown)
-    lines = [(line.quantity, line.number) for line in shown.moving]
+    lines = [(line.quantity, line.stroke) for line in shown.moving]
     drawn = shown.chart.draw(lines, window, height, scale, look.ink)
     marks = ticks(scale, height)
     zero = row_of(0.0, scale, height) if scale.low <= 0 <= scale.high else -1
@@ -96,7 +97,7 @@ def _scale(view: View, shown: Shown) -> Scale:
 def _line_ends(view: View, shown: Shown, scale: Scale, rows: int, room: int) -> dict[int, tuple[Span, ...]]:
     """The names of lines with their last values, or those at the cursor, beside the rows where the lines end."""
     look = view.model.look
-    found: list[tuple[int, Line, Span]] = []
+    found: list[tuple[tuple[int, float], Line, Span]] = []
     for line in shown.moving if room else ():
         trace = view.model.traces.get(line.quantity)
         at = look.cursor if look.cursor is not None else look.paused_at
@@ -105,14 +106,15 @@ def _line_ends(view: View, shown: Shown, scale: Scale, rows: int, room: int) -> 
         row = rows // 2 if value is None else row_of(min(max(value, scale.low), scale.high), scale, rows)
         missed = trace.overdue(view.now) if trace is not None and at is None else 0.0
         text = "–" if value is None else shown_number(value)
-        found.append((row, line, (f"{text} ({age(missed)})", "dim") if missed else (text, "strong")))
+        shown_value = (f"{text} ({age(missed)})", "dim") if missed else (text, "strong")
+        found.append(((row, -(value or 0.0)), line, shown_value))
     found.sort(key=lambda each: each[0])
     ends: dict[int, tuple[Span, ...]] = {}
-    for place, (row, line, value_span) in enumerate(found[:rows]):
+    for place, ((row, _), line, value_span) in enumerate(found[:rows]):
         free = min(max(row, max(ends, default=-1) + 1), rows - len(found[:rows]) + place)
         left = room - len(value_span[0]) - 5
-        name = line.name if len(line.name) <= left else fit(line.name.partition(" ")[0], left).rstrip()
-        ends[free] = ((f" {look.ink.sample(line.number)} {name} ", role_of(line.number)), value_span)
+        name = line.shown if len(line.shown) <= left else fit(line.short, left).rstrip()
+        ends[free] = ((f" {look.ink.sample(line.stroke)} {name} ", role_of(line.number)), value_span)
     return ends
 
 
@@ -151,7 +153,7 @@ def cursor_row(view: View, width: int) -> Row:
         chart = charts.get((group.word, group.key, columns_of(width)))
         for line in group.lines if chart is not None else ():
             value = None if chart is None else chart.value_at(line.quantity, at)
-            name = f"{line.name} {group.word} "
+            name = f"{line.shown} {group.word} "
             row += [
                 (name, role_of(line.number)),
                 ("not known" if value is None else shown_number(value), "strong"),

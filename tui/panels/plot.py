@@ -40,8 +40,16 @@ def _title(view: View, group: Group, width: int) -> list[Span]:
     row: list[Span] = [(f" {group.title} ", "strong"), (f"{unit} " if unit else "", "dim")]
     if len(group.lines) > 1 and not gutter(width):
         ink = view.model.look.ink
-        row += [(f"{ink.sample(line.number)} {line.name} ", role_of(line.number)) for line in group.lines]
+        names = _names(group)
+        row += [(f"{ink.sample(line.stroke)} {names[line]} ", role_of(line.number)) for line in group.lines]
     return row
+
+
+def _names(group: Group) -> dict[Line, str]:
+    """The names of the lines below a title that names the drive, if there is only one."""
+    if len({line.name for line in group.lines}) > 1:
+        return {line: line.short if line.twin else line.name for line in group.lines}
+    return {line: "twin" if line.twin else "drive" for line in group.lines}
 
 
 def _span_words(look: Look) -> str:
@@ -53,7 +61,7 @@ def rate_words(view: View) -> str:
     """The real rate of the samples: `28 Hz`, or the lowest and the highest of several."""
     if not view.polling:
         return "polling off"
-    traces = [view.model.traces.get(line.quantity) for group in groups(view) for line in group.lines]
+    traces = [view.model.traces.get(line.quantity) for group in groups(view) for line in group.lines if not line.twin]
     rates = [0.0 if trace is None else trace.rate(view.now) for trace in traces]
     low, high = min(rates, default=0.0), max(rates, default=0.0)
     if not high:
@@ -90,38 +98,47 @@ def _with_words(view: View, taken: Sequence[tuple[Group, Chart, dict[Line, Exten
     """Words for what does not move. A velocity of 0 is said by the position."""
     velocities = {
         line.quantity[:3]: extent for group, _, extents in taken for line, extent in extents.items()
-        if group.word == "velocity"
+        if group.word == "velocity" and not line.twin
     }  # fmt: skip
     positions = {line.quantity[:3] for group, _, _ in taken if group.word == "position" for line in group.lines}
     shown = []
     for group, chart, extents in taken:
         moving = {line: each for line, each in extents.items() if each.width > _slack(line, velocities)}
+        agreeing = {line.of_drive for line in group.lines if line.twin and _agree(line, extents)}
         words = []
         for line in group.lines:
-            if line in moving:
-                continue
             extent = extents.get(line)
-            if extent == (0, 0) and group.word == "velocity" and line.quantity[:3] in positions:
+            if line in moving or (line.twin and (extent is None or line.of_drive in agreeing)):
                 continue
-            if extent is None and group.word == "velocity" and line.quantity[:3] in positions:
+            if extent in (None, (0, 0)) and group.word == "velocity" and line.quantity[:3] in positions:
                 continue
-            words.append(_words(view, line, extent, velocities.get(line.quantity[:3])))
+            too: Row = ((", its twin too", "dim"),) if line in agreeing else ()
+            words.append((*_words(view, line, extent, velocities.get(line.quantity[:3])), *too))
         if len(words) > SAID:
             words[SAID - 1 :] = [((f" and {len(words) - SAID + 1} more that do not change", "dim"),)]
         shown.append(Shown(group, chart, moving, tuple(words)))
     return shown
 
 
+def _agree(twin: Line, extents: Mapping[Line, Extent]) -> bool:
+    """Whether a drive has the values of its twin."""
+    own, predicted = extents.get(twin.of_drive), extents.get(twin)
+    if own is None or predicted is None:
+        return False
+    return max(abs(own.low - predicted.low), abs(own.high - predicted.high)) <= REST
+
+
 def _slack(line: Line, velocities: Mapping[tuple[str, str, str], Extent]) -> float:
     """The change of a value that is no motion."""
     resting = velocities.get(line.quantity[:3]) == (0, 0)
-    return REST if line.quantity.word == "position" and resting else 0.0
+    return REST if line.of_drive.quantity.word == "position" and resting else 0.0
 
 
 def _words(view: View, line: Line, extent: Extent | None, velocity: Extent | None) -> Row:
     """`a gantry at rest at 51,300 steps`; what is not known is said."""
-    word = "" if line.quantity.word in PLOTTED else f"{line.quantity.word} "
-    name = f" {line.name} {word}"
+    measured = line.of_drive.quantity.word
+    word = "" if measured in PLOTTED else f"{measured} "
+    name = f" {line.shown} {word}"
     if extent is None:
         trace = view.model.traces.get(line.quantity)
         why = "no samples yet" if trace is None else "no samples in this time"
@@ -129,7 +146,7 @@ def _words(view: View, line: Line, extent: Extent | None, velocity: Extent | Non
     value = (
         shown_number(extent.low) if not extent.width else f"{shown_number(extent.low)} to {shown_number(extent.high)}"
     )
-    rests = line.quantity.word == "position" and (velocity is None or velocity == (0, 0))
+    rests = measured == "position" and (velocity is None or velocity == (0, 0))
     text = f"{'at rest' if rests else 'steady'} at {value} {line.unit}".rstrip()
     trace = view.model.traces.get(line.quantity)
     missed = trace.overdue(view.now) if trace is not None and view.model.look.paused_at is None else 0.0

@@ -4,13 +4,16 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from tui.curves.trace import Quantity
+from shell.roles import DIFFERENCE
+from tui.curves.ink import TWINS
+from tui.curves.trace import PREDICTED, Quantity
 from tui.panels.view import View
 from tui.polling import plotted
 from tui.widgets.lines import SERIES
 
 PLOTTED = {"velocity": "/s", "position": ""}
 """The quantities of every drive, and the end of their units."""
+_MEASURED = {predicted: measured for measured, predicted in PREDICTED.items()}
 
 
 class Line(NamedTuple):
@@ -20,6 +23,30 @@ class Line(NamedTuple):
     quantity: Quantity
     unit: str
     number: int
+    twin: bool = False
+    """What the drive's twin predicts."""
+
+    @property
+    def stroke(self) -> int:
+        """The number of its dashes or dots."""
+        return self.number + TWINS * self.twin
+
+    @property
+    def of_drive(self) -> Line:
+        """The line of what is measured."""
+        if not self.twin:
+            return self
+        return self._replace(twin=False, quantity=self.quantity._replace(word=_MEASURED[self.quantity.word]))
+
+    @property
+    def shown(self) -> str:
+        """`a gantry`, or `a gantry twin`."""
+        return f"{self.name} twin" if self.twin else self.name
+
+    @property
+    def short(self) -> str:
+        """The same without the name that a person gave."""
+        return self.name.partition(" ")[0] + " twin" * self.twin
 
 
 class Group(NamedTuple):
@@ -38,21 +65,30 @@ class Group(NamedTuple):
 
 
 def groups(view: View) -> list[Group]:
-    """The plotted lines by chart: velocities, positions, then values by their words."""
+    """The plotted lines by chart: velocities, positions, then values by their words. A twin's follow their drive's."""
     found: dict[tuple[str, str], list[Line]] = {}
     numbers: dict[tuple[str, str, str], int] = {}
     for bus, address, word in plotted(view.session):
-        for axis in view.model.traces.axes(bus, address) or [""] if not word else [""]:
+        axes = view.model.traces.axes(bus, address) if word in ("", DIFFERENCE) else []
+        for axis in axes or [""]:
             number = numbers.setdefault((bus, address, axis), len(numbers)) % len(SERIES)
             name = _name(view, bus, address, axis)
             for each in [word] if word else PLOTTED:
-                unit = "" if word else _unit(view, bus, address, axis) + PLOTTED[each]
-                line = Line(name, Quantity(bus, address, axis, each), unit, number)
-                found.setdefault((each, name if view.model.look.apart else ""), []).append(line)
+                unit = _unit(view, bus, address, axis) + PLOTTED.get(each, "") if word in ("", DIFFERENCE) else ""
+                lines = found.setdefault((each, name if view.model.look.apart else ""), [])
+                lines.append(Line(name, Quantity(bus, address, axis, each), unit, number))
+                if not word and _twinned(view, bus, address, axis):
+                    lines.append(Line(name, Quantity(bus, address, axis, PREDICTED[each]), unit, number, twin=True))
     order = sorted(found, key=lambda key: list(PLOTTED).index(key[0]) if key[0] in PLOTTED else 9)
     if view.model.look.apart:
         order = sorted(order, key=lambda key: min(line.number for line in found[key]))
     return [Group(*key, tuple(found[key])) for key in order if key[0] not in view.model.look.hidden]
+
+
+def _twinned(view: View, bus: str, address: str, axis: str) -> bool:
+    """Whether a twin of the axis runs."""
+    axes = view.model.bus(bus).readout(address).axes
+    return any(each.axis == axis and each.twin is not None and each.twin.predicted is not None for each in axes)
 
 
 def _name(view: View, bus: str, address: str, axis: str) -> str:

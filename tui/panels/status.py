@@ -12,6 +12,7 @@ from tui.panels.glance import Glance
 from tui.panels.lamps import aged, flowing, lamp_groups, program_words, trouble_of
 from tui.panels.spark import spark
 from tui.panels.travel import bar, to_go_words
+from tui.panels.twin import SIGN, difference_words, differs
 from tui.panels.view import View
 from tui.readout import Readout, State
 from tui.text import age, fit, thousands
@@ -44,7 +45,8 @@ def kept(glances: Sequence[Glance], most: int) -> list[Glance]:
 
 
 def _troubled(glance: Glance) -> bool:
-    return glance.state() in (State.SILENT, State.LOST) or any(map(trouble_of, glance.readout.axes))
+    in_trouble = any(map(trouble_of, glance.readout.axes)) or glance.readout.differs
+    return in_trouble or glance.state() in (State.SILENT, State.LOST)
 
 
 def _drive_rows(glance: Glance, now: float, width: int) -> list[Row]:
@@ -95,9 +97,11 @@ def short_words(glance: Glance, axis: Readout, now: float) -> str:
 
 
 def _besides(axis: Readout, now: float, *, live: bool) -> Span:
-    """The trouble of an axis, the way to its target, or its program."""
+    """The trouble of an axis, its difference from its twin, the way to its target, or its program."""
     if text := trouble_of(axis):
         return f"✗ {text}", "error"
+    if text := differs(axis):
+        return text, "error" if live else "dim"
     target = axis.conditions.target if axis.conditions is not None else None
     if live and target is not None and axis.last is not None and axis.last.velocity:
         return f"→ {thousands(target)}  {to_go_words(axis, now)}".rstrip(), "text"
@@ -107,7 +111,8 @@ def _besides(axis: Readout, now: float, *, live: bool) -> Span:
 def _lamp_row(glance: Glance, now: float, width: int, others: int, rate: str) -> Row:
     """The lamps of the selected drive, as many as there is room for; drives that are not shown, and the rate."""
     more = f"+{others} ^A   " if others else ""
-    right: list[Span] = [(f"{more}{rate} ", "dim")]
+    twin = difference_words(glance.readout)
+    right: list[Span] = [(f"{more}{twin}{'   ' if twin else ''}{rate} ", "dim")]
     groups: list[list[Span]] = []
     for axis in glance.readout.axes:
         if axis.conditions is not None:
@@ -132,6 +137,8 @@ def _panel_row(glance: Glance, now: float, width: int) -> Row:
     text, text_role = _besides(glance.readout, now, live=role != "dim")
     if text.startswith("→"):
         text = to_go_words(glance.readout, now)
+    elif text.startswith(SIGN):
+        text = differs(glance.readout, causes=False)
     row: list[Span] = [
         _name(glance, glance.readout, first=True),
         (f"{state.sign} ", _state_role(glance, now)),

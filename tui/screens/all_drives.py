@@ -14,6 +14,7 @@ from tui.panels.glance import Glance, glances_of
 from tui.panels.lamps import program_words, trouble_of
 from tui.panels.spark import spark
 from tui.panels.status import STATE, short_words
+from tui.panels.twin import differs
 from tui.panels.view import View
 from tui.readout import State
 from tui.screens.dialogs import Field
@@ -50,10 +51,17 @@ class Place(NamedTuple):
         return "; ".join(filter(None, map(trouble_of, self.glance.readout.axes)))
 
     @property
+    def differs(self) -> str:
+        """The differences of its axes from their twins."""
+        return "; ".join(filter(None, map(differs, self.glance.readout.axes)))
+
+    @property
     def besides(self) -> Span:
-        """The fact that matters most besides its state: trouble, its program, else its product."""
+        """The fact that matters most besides its state: trouble, its twin, its program, else its product."""
         if self.trouble:
             return f"✗ {self.trouble}", "error"
+        if self.differs:
+            return self.differs, "error"
         program = program_words(self.glance.readout)
         return (program, "motion") if program else (self.glance.product, "dim")
 
@@ -61,7 +69,8 @@ class Place(NamedTuple):
     def urgency(self) -> tuple[bool, int]:
         """Orders drives, the worst first."""
         state = self.glance.state()
-        return not (self.trouble and state is not State.LOST) and state not in URGENCY[:2], URGENCY.index(state)
+        troubled = bool(self.trouble or self.differs)
+        return not (troubled and state is not State.LOST) and state not in URGENCY[:2], URGENCY.index(state)
 
 
 def worst_first(view: View, filtered: str) -> list[Place]:
@@ -75,7 +84,7 @@ def worst_first(view: View, filtered: str) -> list[Place]:
 
 def _words(place: Place, now: float) -> str:
     sign, _ = place.glance.sign(now)
-    return f"{place.name} {sign} {place.trouble} {place.glance.product}".casefold()
+    return f"{place.name} {sign} {place.trouble} {place.differs} {place.glance.product}".casefold()
 
 
 def drive_row(place: Place, now: float, width: int, chosen: bool) -> Row:

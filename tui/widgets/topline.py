@@ -17,7 +17,7 @@ from tui.text import fit
 from tui.widgets.lines import Lines, Row, Span, width_of
 
 NAME = " multidrop  "
-TROUBLE = frozenset({State.LOST, State.SILENT, State.TROUBLE})
+TROUBLE = frozenset({State.LOST, State.SILENT, State.TROUBLE, State.DIFFERS})
 LONGEST = 24
 """Greatest width of a name in a tab."""
 SHORT = 10
@@ -35,7 +35,7 @@ class Tab:
     old: bool = False
     """The state may be outdated."""
     mark: str = ""
-    """Trouble besides the state: `?` a drive is silent, `!` an error or a limit; empty if there is none."""
+    """Trouble besides the state: `?` a drive is silent, `!` an error or a limit, `≠` a drive differs from its twin."""
 
     @property
     def in_trouble(self) -> bool:

@@ -1,0 +1,224 @@
+"""A drive beside its twin: the panel of the drive, rows of drives, tabs and plots, as functions of what was said."""
+
+from __future__ import annotations
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from drives.events import Sample
+from shell.events import Agreed, Diverged, OnBus, Predicted, SessionEvent, TwinEnded
+from shell.roles import DIFFERENCE, Series
+from tests.support.fake_session import FakeSession, demo_session, make_app
+from tui.curves.ink import ASCII, BLOCK, BRAILLE, TWINS, Ink
+from tui.panels.axis import drive_rows
+from tui.panels.glance import glances_of
+from tui.panels.plot import plot_rows, plot_title
+from tui.panels.status import drives_rows, kept, narrow_rows
+from tui.panels.view import View
+from tui.polling import Polling
+from tui.presenter import trouble_mark
+from tui.readout import State
+from tui.screen_model import ScreenModel, bus_state
+from tui.screens.all_drives import drive_row, worst_first
+from tui.widgets.lines import Row, width_of
+from tui.widgets.signs import Signs, shown_as
+
+CAUSES = ("stall", "load")
+
+
+def beside(at: float, position: int, velocity: int, ahead: int, address: str = "a", axis: str = "") -> list[OnBus]:
+    """A sample, and the twin that is ahead of it."""
+    return [
+        OnBus("press", Sample(at, address, position, velocity, axis)),
+        OnBus("press", Predicted(at, address, position + ahead, velocity + ahead, -ahead, axis)),
+    ]
+
+
+def apart(session: FakeSession, address: str = "a", axis: str = "") -> OnBus:
+    return OnBus("press", Diverged(session.time, address, -8112, 200, CAUSES, axis))
+
+
+def view(session: FakeSession, *events: SessionEvent) -> View:
+    model = ScreenModel(lambda: session.selected_bus, lambda: session.buses)
+    for event in events:
+        model.take(event)
+    glances = glances_of(session, model, session.buses[session.selected_bus])
+    return View(session, model, glances, session.now(), True)
+
+
+def plain(*rows: Row) -> str:
+    return "\n".join("".join(text for text, _ in row).rstrip() for row in rows)
+
+
+def roles(row: Row) -> set[str]:
+    return {role for text, role in row if text.strip()}
+
+
+# The panel of the drive
+
+
+def test_what_is_predicted_is_below_what_is_measured() -> None:
+    session = demo_session()
+    rows = drive_rows(view(session, *beside(session.time, 384_112, 600_000, -14)), 45, 20)
+    assert plain(*rows[:4]).splitlines() == [
+        " ▶ moving                    600,000 steps/s",
+        "        384,112 steps",
+        "        384,098 twin         599,986 steps/s",
+        "            +14 difference",
+    ]
+    assert "error" not in roles(rows[3])
+
+
+def test_a_divergence_has_a_sign_its_limit_and_its_causes() -> None:
+    session = demo_session()
+    rows = drive_rows(view(session, *beside(session.time, 0, 0, 8112), apart(session)), 45, 20)
+    assert plain(*rows[3:5]).splitlines() == [
+        " ≠       -8,112 difference         limit 200",
+        "   stall, load",
+    ]
+    assert "error" in roles(rows[3]) and roles(rows[4]) == {"error"}
+    after = view(session, *beside(session.time, 0, 0, 8112), apart(session), OnBus("press", Agreed(session.time, "a")))
+    assert "≠" not in plain(*drive_rows(after, 45, 20))
+
+
+def test_a_twin_that_ended_is_not_shown() -> None:
+    session = demo_session()
+    ended = OnBus("press", TwinEnded(session.time, "a"))
+    shown = view(session, *beside(session.time, 0, 0, 8112), apart(session), ended)
+    text = plain(*drive_rows(shown, 45, 20), *narrow_rows(shown, 80), *plot_rows(shown, 60, 20))
+    assert "twin" not in text and "≠" not in text and trouble_mark(shown.model.bus("press"), ["a"], False) == ""
+
+
+def test_a_prediction_that_is_not_renewed_is_dim() -> None:
+    session = demo_session()
+    old, new = beside(session.time - 3, 0, 0, 14), OnBus("press", Sample(session.time, "a", 0, 0))
+    twin = drive_rows(view(session, *old, new), 45, 20)[2]
+    assert roles(twin) == {"dim"} and roles(drive_rows(view(session, *old[:1], *old), 45, 20)[2]) == {"dim"}
+
+
+def test_each_axis_has_its_own_twin() -> None:
+    session = demo_session()
+    events = [*beside(session.time, 5, 0, 0, axis="x"), *beside(session.time, 7, 0, 9000, axis="y")]
+    text = plain(*drive_rows(view(session, *events, apart(session, axis="y")), 45, 20))
+    assert "+0 difference" in text and "≠       -9,000 difference" in text
+
+
+# Rows of drives, and tabs
+
+
+def test_rows_of_drives_have_a_sign_and_as_many_causes_as_fit() -> None:
+    session = demo_session()
+    shown = view(session, *beside(session.time, 0, 600_000, 8112), apart(session))
+    assert "600,000/s ≠ -8,112 stall, l…" in plain(*narrow_rows(shown, 80))
+    assert plain(drives_rows(shown, 45, 3)[0]).endswith("≠ -8,112")
+    agrees = view(session, *beside(session.time, 0, 0, 14))
+    assert plain(narrow_rows(agrees, 80)[-1]).endswith("twin -14   polls 0.5 Hz")
+
+
+@pytest.mark.parametrize("width", [60, 80, 120, 200])
+def test_a_drive_that_differs_comes_first_of_all_drives(width: int) -> None:
+    session = demo_session()
+    rests = OnBus("press", Sample(session.time, "c", 0, 0))
+    shown = view(session, rests, *beside(session.time, 0, 0, 8112, "b"), apart(session, "b"))
+    places = worst_first(shown, "≠")
+    assert [place.glance.address for place in places] == ["b"]
+    assert next(place for place in worst_first(shown, "") if place.bus == "press").glance.address == "b"
+    row = drive_row(places[0], shown.now, width, False)
+    assert "≠ -8,112" in plain(row) and width_of(row) <= width
+    assert kept(shown.glances, 1)[0].address == "a" and kept(shown.glances, 2)[1].address == "b"
+
+
+def test_a_tab_counts_a_drive_that_differs_as_trouble() -> None:
+    session = demo_session()
+    facts = view(session, *beside(session.time, 0, 0, 8112), apart(session)).model.bus("press")
+    assert bus_state(facts, ["a"], False) is State.DIFFERS and trouble_mark(facts, ["a"], False) == ""
+    facts = view(session, *beside(session.time, 0, 9, 8112), apart(session)).model.bus("press")
+    assert bus_state(facts, ["a"], False) is State.MOVING and trouble_mark(facts, ["a"], False) == "≠"
+    assert bus_state(facts, ["a"], True) is State.LOST and trouble_mark(facts, ["a"], True) == ""
+    tab = make_app(session).presenter.tabs(session.time)[0]
+    assert not tab.in_trouble and tab.__class__(1, "press", State.DIFFERS, False).in_trouble
+
+
+# Plots
+
+
+def a_run(session: FakeSession, address: str = "a", ahead: int = 400_000) -> list[SessionEvent]:
+    """Ten seconds in which the drive falls behind its twin."""
+    found: list[SessionEvent] = []
+    for n in range(200):
+        found += beside(session.time - 10 + n / 20, n * 30_000, 600_000 + 100 * n, ahead * n // 200, address)
+    return found
+
+
+def test_a_plot_has_a_curve_of_the_twin_beside_that_of_the_drive() -> None:
+    session = demo_session()
+    rows = plot_rows(view(session, *a_run(session)), 100, 30)
+    text = plain(*rows)
+    assert "a gantry 5,970,000" in text and "a twin 6,368,000" in text and "velocity a gantry" in text
+    assert text.index("a twin 6,368,000") < text.index("a gantry 5,970,000"), "the higher one is above"
+    assert {role for row in rows for part, role in row if "a twin" in part} == {"series1"}, "one colour a drive"
+    assert plain(plot_title(view(session, *a_run(session)))) == " plot last 20 s  20 Hz"
+
+
+def test_a_narrow_plot_names_its_lines_in_the_title() -> None:
+    session = demo_session()
+    assert "velocity a gantry steps/s ⠤⠤ drive ⠄⠄ twin" in plain(*plot_rows(view(session, *a_run(session)), 45, 20))
+    session.plotted = (Series("press", "a"), Series("press", "b"))
+    two = plain(*plot_rows(view(session, *a_run(session), *a_run(session, "b")), 60, 20))
+    assert "a gantry ⠄⠄ a twin" in two
+
+
+@pytest.mark.parametrize("ink", [BRAILLE, BLOCK, ASCII], ids=lambda ink: ink.name)
+def test_without_colours_a_twin_is_told_apart(ink: Ink) -> None:
+    assert len({ink.sample(number) for number in (0, TWINS)}) == 2
+    session = demo_session()
+    shown = view(session, *a_run(session, ahead=5_000_000))
+    shown.model.look.ink = ink
+    rows = plot_rows(shown, 60, 20)
+    curves = {"".join(text for text, role in row if role == "series1").strip() for row in rows}
+    assert len(curves) > 4
+
+
+@pytest.mark.parametrize("slope", [(0, 1), (1, 0), (1, 1), (1, -1), (2, 1), (1, 3)])
+def test_the_dots_of_a_twin_are_as_far_apart_in_every_direction(slope: tuple[int, int]) -> None:
+    line = [(100 + slope[0] * n, 500 + slope[1] * n) for n in range(100)]
+    seen = sum(len(BRAILLE.dots(TWINS, x, y, y)) for x, y in line)
+    assert seen in (20, 100 if (slope[0] + 2 * slope[1]) % 5 == 0 else 20, 0)
+
+
+def test_what_rests_where_its_twin_does_is_said_once() -> None:
+    session = demo_session()
+    agree = [event for n in range(100) for event in beside(session.time - 5 + n / 20, 51_300, 0, 0)]
+    assert plain(*plot_rows(view(session, *agree), 60, 20)) == " a gantry at rest at 51,300 steps, its twin too"
+    off = [event for n in range(100) for event in beside(session.time - 5 + n / 20, 51_300, 0, 0)[:1]]
+    off += [OnBus("press", Predicted(session.time - 5 + n / 20, "a", 60_000, 0, -8_700)) for n in range(100)]
+    assert plain(*plot_rows(view(session, *off), 60, 20)).splitlines() == [
+        " a gantry at rest at 51,300 steps",
+        " a gantry twin at rest at 60,000 steps",
+    ]
+
+
+def test_the_difference_is_plotted_as_a_value() -> None:
+    session = demo_session()
+    session.plotted = (Series("press", "a", DIFFERENCE),)
+    shown = view(session, *a_run(session))
+    text = plain(*plot_rows(shown, 100, 20))
+    assert "difference a gantry steps" in text and "velocity" not in text and "a gantry -398,000" in text
+    polling = Polling()
+    polling.update(session, shown.model, {"plot", "samples"})
+    assert session.buses["press"].telemetry.polled["a"] == 0.02, "it needs samples"
+    assert f"a.{DIFFERENCE}" not in session.buses["press"].telemetry.polled
+
+
+@given(st.integers(60, 200), st.integers(1, 40), st.lists(st.integers(-(2**31), 2**31 - 1), max_size=20), st.booleans())
+def test_rows_with_a_twin_stay_in_their_room(width: int, height: int, places: list[int], several: bool) -> None:
+    session = demo_session()
+    session.plotted = tuple(Series("press", each) for each in "abc"[: 1 + 2 * several])
+    events = [each for n, place in enumerate(places) for each in beside(50.0 + n / 2, place, place // 7, -place)]
+    shown = view(session, *events, apart(session))
+    rows = plot_rows(shown, width, height)
+    assert len(rows) <= height and all(width_of(row) <= width for row in rows)
+    assert all(width_of(row) <= max(width, 45) for row in drive_rows(shown, max(width, 39), height))
+    signs = shown_as(plain(*narrow_rows(shown, 80)), Signs.ASCII)
+    assert signs.isascii()

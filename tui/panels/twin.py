@@ -1,0 +1,50 @@
+"""The twin of an axis in rows and in few words: what it predicts, the difference, and why they may differ."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from tui.readout import Readout
+from tui.text import at_words, thousands
+from tui.widgets.lines import Row, Span, spread
+
+SIGN = "≠"
+"""The drive differs from its twin by more than the limit."""
+CAUSES = 3
+"""Most rows of causes."""
+
+
+def twin_rows(axis: Readout, unit: str, number: int, width: int, *, dim: bool) -> Iterator[Row]:
+    """The predicted position and velocity, and the difference, each below what was measured; `number`: their width."""
+    twin = axis.twin
+    if twin is None or twin.predicted is None:
+        return
+    predicted, diverged = twin.predicted, twin.diverged
+    role = "dim" if dim or twin.behind(axis.last) else "text"
+    velocity: list[Span] = [(thousands(predicted.velocity), role), (f" {unit}/s ", "dim")]
+    yield spread([(f" {predicted.position:>{number},} ", role), ("twin", "dim")], velocity, width)
+    if diverged is None:
+        yield ((f" {predicted.difference:>+{number},} ", role), ("difference", "dim"))
+        return
+    alarm = "dim" if role == "dim" else "error"
+    limit: list[Span] = [(f"limit {thousands(diverged.limit)} ", "dim")]
+    yield spread([(f" {SIGN} {predicted.difference:>+{number - 2},} ", alarm), ("difference", alarm)], limit, width)
+    for text in at_words(", ".join(diverged.causes), width - 4)[:CAUSES]:
+        yield ((f"   {text}", alarm),)
+
+
+def differs(axis: Readout, *, causes: bool = True) -> str:
+    """`≠ +8,112 stall, load`: the difference from the twin while it is above the limit, else nothing."""
+    twin = axis.twin
+    if twin is None or twin.diverged is None:
+        return ""
+    now = (twin.predicted or twin.diverged).difference
+    return f"{SIGN} {now:+,} {', '.join(twin.diverged.causes) if causes else ''}".rstrip()
+
+
+def difference_words(axis: Readout) -> str:
+    """`twin +14`, where a twin runs from which the drive does not differ."""
+    twin = axis.twin
+    if twin is None or twin.predicted is None or twin.diverged is not None:
+        return ""
+    return f"twin {twin.predicted.difference:+,}"
