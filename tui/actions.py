@@ -185,12 +185,12 @@ class Actions(ViewActions):
 
     async def action_page(self, name: str) -> None:
         """Show a page in front of the main screen; one page at a time. Raises Diagnostic."""
-        entry = page_entry(name)
+        page = page_entry(name).page()
         shown = next((each for each in self.screen_stack if isinstance(each, Page)), None)
         if shown is None:
-            await self.push_screen(entry.make(self))
-        elif shown is self.screen and type(shown) is not entry.make:
-            await self.switch_screen(entry.make(self))
+            await self.push_screen(page(self))
+        elif shown is self.screen and type(shown) is not page:
+            await self.switch_screen(page(self))
         self.model.changed = True
         self.frames.wake()
 

@@ -446,6 +446,6 @@ class MultidropApp(Actions):
 
 
 def bindings() -> list[BindingType]:
-    """The keys of all screens, those of the app first."""
-    screens: list[type[Framed]] = [Reading, MainScreen, Page, *(page.make for page in PAGES)]
+    """The keys of all screens that can be set, those of the app first; no page has one of its own."""
+    screens: list[type[Framed]] = [Reading, MainScreen, Page]
     return [*MultidropApp.BINDINGS, *(each for screen in screens for each in screen.BINDINGS)]

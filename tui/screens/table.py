@@ -1,18 +1,12 @@
-"""The pages by name: title, meaning, key, class."""
+"""The pages by name: title, meaning, key, and where its class is; the class is imported when the page is shown."""
 
 from __future__ import annotations
 
 from typing import NamedTuple
 
 from dialects import Diagnostic
-from tui.screens.all_drives import AllDrives
-from tui.screens.controls import ControlsPage
-from tui.screens.macros import MacrosPage
+from dialects.on_demand import imported
 from tui.screens.page import Page
-from tui.screens.parameters import ParametersPage
-from tui.screens.plot_page import PlotPage
-from tui.screens.program import ProgramPage
-from tui.screens.traffic import TrafficPage
 
 
 class PageEntry(NamedTuple):
@@ -22,19 +16,25 @@ class PageEntry(NamedTuple):
     title: str
     about: str
     """One line for the palette."""
-    make: type[Page]
+    place: str
+    """Module and class in `tui.screens`."""
     key: str = ""
     """The key that opens it, as Textual spells it."""
 
+    def page(self) -> type[Page]:
+        """Import the class."""
+        found: type[Page] = imported(f"tui.screens.{self.place}")
+        return found
+
 
 PAGES: tuple[PageEntry, ...] = (
-    PageEntry("drives", "All drives", "every drive of every line, the worst first", AllDrives, "ctrl+a"),
-    PageEntry("plot", "Plots", "position, velocity and values over time", PlotPage, "ctrl+g"),
-    PageEntry("macros", "Macros", "play, record, edit and put on keys", MacrosPage),
-    PageEntry("program", "Program", "edit, check, download, run, trace and step", ProgramPage, "ctrl+e"),
-    PageEntry("parameters", "Parameters", "every setting: search, compare, edit, save", ParametersPage),
-    PageEntry("controls", "Controls", "jog by steps, move, home, stop, enable", ControlsPage, "ctrl+n"),
-    PageEntry("traffic", "Traffic", "the bytes of the line, both ways, with times", TrafficPage),
+    PageEntry("drives", "All drives", "every drive of every line, the worst first", "all_drives:AllDrives", "ctrl+a"),
+    PageEntry("plot", "Plots", "position, velocity and values over time", "plot_page:PlotPage", "ctrl+g"),
+    PageEntry("macros", "Macros", "play, record, edit and put on keys", "macros:MacrosPage"),
+    PageEntry("program", "Program", "edit, check, download, run, trace and step", "program:ProgramPage", "ctrl+e"),
+    PageEntry("parameters", "Parameters", "every setting: search, compare, edit, save", "parameters:ParametersPage"),
+    PageEntry("controls", "Controls", "jog by steps, move, home, stop, enable", "controls:ControlsPage", "ctrl+n"),
+    PageEntry("traffic", "Traffic", "the bytes of the line, both ways, with times", "traffic:TrafficPage"),
 )
 
 
