@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 from textual.driver import Driver
 
 from dialects import Diagnostic
+from dialects.on_demand import importing
 from tui.app import MultidropApp
 from tui.assist import ShellAssist
 
@@ -37,9 +38,10 @@ def run(urls: Sequence[str], reconnect: bool = True, raw: bool = False) -> int:
 
 
 async def _run(urls: Sequence[str], settings: Settings, reconnect: bool, raw: bool) -> int:
-    from shell.front.collector import collected_at_rest
-    from shell.log.writer import begin
-    from shell.session import Session
+    with importing():
+        from shell.front.collector import collected_at_rest
+        from shell.log.writer import begin
+        from shell.session import Session
 
     session = Session(settings, reconnect=reconnect, raw=raw)
     try:
