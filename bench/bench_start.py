@@ -97,7 +97,7 @@ def _in_turn(figure: str, ours: Measure, peer: Measure, peer_name: str, rounds: 
 def whole(folder: Path, command: Sequence[str], code: int = 0) -> float:
     """Seconds from the start of a process to its end. Raises SystemExit for another exit code."""
     nowhere, begin = subprocess.DEVNULL, time.monotonic()
-    done = subprocess.run(command, cwd=folder, env=_compiling(folder), stdout=nowhere, stderr=nowhere)
+    done = subprocess.run(command, cwd=folder, env=environment(folder), stdout=nowhere, stderr=nowhere)
     if done.returncode != code:
         raise SystemExit(f"{' '.join(command)} has ended with {done.returncode}")
     return time.monotonic() - begin
@@ -127,7 +127,7 @@ def _end(folder: Path, url: str, rounds: int) -> Row:
 def last_line_to_end(folder: Path, command: Sequence[str]) -> float:
     """Seconds from the first line of output to the end of the process."""
     process = subprocess.Popen(
-        command, cwd=folder, env=_compiling(folder), stdout=subprocess.PIPE, stderr=subprocess.DEVNULL
+        command, cwd=folder, env=environment(folder), stdout=subprocess.PIPE, stderr=subprocess.DEVNULL
     )
     assert process.stdout is not None
     with process.stdout:
@@ -135,11 +135,6 @@ def last_line_to_end(folder: Path, command: Sequence[str]) -> float:
         begin = time.monotonic()
         process.wait()
     return time.monotonic() - begin
-
-
-def _compiling(folder: Path) -> dict[str, str]:
-    """The environment of an installed program, whose modules are compiled once."""
-    return {name: value for name, value in environment(folder).items() if name != "PYTHONDONTWRITEBYTECODE"}
 
 
 if __name__ == "__main__":

@@ -21,8 +21,9 @@ KEPT = 200_000
 
 
 def environment(folder: Path) -> dict[str, str]:
-    """A process's own configuration and a terminal with colours."""
-    return dict(os.environ) | {
+    """A process's own configuration, a terminal with colours, and modules that are compiled once, as if installed."""
+    inherited = {name: value for name, value in os.environ.items() if name != "PYTHONDONTWRITEBYTECODE"}
+    return inherited | {
         "PYTHONPATH": str(ROOT),
         "MULTIDROP_CONFIG_DIR": str(folder / "conf"),
         "MULTIDROP_STATE_DIR": str(folder / "state"),

@@ -166,6 +166,13 @@ class MultidropApp(Actions):
         """Colours for themes that are not ours."""
         return DEFAULTS
 
+    def refresh_css(self, animate: bool = True) -> None:
+        """Read the style sheet again, for other colours; at the start Textual reads it by itself."""
+        if self.main.is_attached:
+            super().refresh_css(animate)
+        else:
+            self.stylesheet.set_variables(self.get_css_variables())
+
     def check_action(self, action: str, parameters: tuple[object, ...]) -> bool | None:
         """Whether an action is possible: Escape ends the tour unless it closes something."""
         entry = self.main.entry
@@ -271,7 +278,7 @@ class MultidropApp(Actions):
         for trouble in self._troubles:
             self._warn(trouble)
         if self.urls:
-            self.tick()
+            self.frames.first()
             self.call_after_refresh(self._begin)  # the first frame is shown before anything is opened
         elif not self.session.buses:
             await self.opener.ask()

@@ -73,6 +73,11 @@ class Frames:
         self._beat += 1
         return True
 
+    def first(self) -> None:
+        """Paint all, as the first frame."""
+        self._beat = PANELS - 1
+        self.tick()
+
     def _frame(self) -> None:
         """Paint a frame, and another one until all is painted that has come."""
         self._due = self._hurried = self._owed = False

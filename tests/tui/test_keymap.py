@@ -3,6 +3,7 @@
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from textual.binding import Binding
 
 from shell.connect.look import Look
 from tests.support.fake_session import FakeAssist, demo_session, settle
@@ -10,6 +11,8 @@ from tui.app import MultidropApp, bindings
 from tui.keymap import keymap, read_key
 from tui.screens.all_drives import AllDrives
 from tui.screens.dialogs import Search
+from tui.screens.page import Page
+from tui.screens.table import PAGES, PageEntry
 from tui.widgets.signs import Signs
 
 
@@ -38,6 +41,12 @@ def test_no_two_functions_have_the_same_key_of_their_own() -> None:
     assert keymap(bindings(), {}).troubles == []
     keys = [key for keys in keymap(bindings(), {}).keys.values() for key in keys.split(",")]
     assert sorted(keys) == sorted(set(keys))
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+def test_a_page_has_no_key_that_can_be_set_as_it_is_imported_after_the_keys_are_read(page: PageEntry) -> None:
+    own = [each for each in page.page().BINDINGS if isinstance(each, Binding) and each not in Page.BINDINGS]
+    assert [each.id for each in own if each.id] == []
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,79 @@
+"""The first frame: what it does not wait for."""
+
+import subprocess
+import sys
+
+import pytest
+from textual.css.stylesheet import Stylesheet
+
+from tests.support.fake_session import demo_session, make_app
+from tests.support.processes import environment
+from tui.screens.table import PAGES
+
+CHILD = """
+import asyncio, sys
+from tui.app import MultidropApp
+from tui.assist import ShellAssist
+from tui.launch import driver
+from shell.connect.settings import load
+from shell.front.collector import collected_at_rest
+from shell.log.writer import begin
+from shell.session import Session
+from tui.opening import Opener
+
+driver()
+displayed = []
+display = MultidropApp._display
+def displays(self, screen, renderable):
+    display(self, screen, renderable)
+    displayed.append(self.main.lines("footer").plain)
+MultidropApp._display = displays
+
+async def opens(self, urls):
+    print(*sys.modules, flush=True)
+    print(displayed[-1], flush=True)
+    self._app.exit(0)
+Opener.open_all = opens
+
+async def main():
+    settings = load()
+    session = Session(settings)
+    with collected_at_rest(lambda: True):
+        app = MultidropApp(session, ["sim:"], ShellAssist(session, settings))
+        begin(session)
+        await app.run_async(headless=True, size=(120, 40))
+    await session.close()
+asyncio.run(main())
+"""
+LATER = {
+    *(f"tui.screens.{page.place.partition(':')[0]}" for page in PAGES),
+    *("tui.editor.widget", "shell.params.page", "shell.verbs.table", "shell.front.complete"),
+    *("dialects.mcode.family", "dialects.pmx.family", "dialects.tmcl.family", "dialects.modbus.family"),
+    *("simulator.floor", "simulator.lexium", "serial", "prompt_toolkit", "pymodbus", "tomlkit"),
+    *("rerun", "numpy", "pyarrow", "importlib.metadata"),
+}
+
+
+@pytest.mark.process
+def test_the_first_frame_imports_no_page_no_family_and_no_simulator(tmp_path):
+    child = [sys.executable, "-c", CHILD]
+    done = subprocess.run(child, capture_output=True, text=True, timeout=60, cwd=tmp_path, env=environment(tmp_path))
+    modules, footer = (done.stdout.splitlines() or [done.stderr, ""])[:2]
+    imported = set(modules.split())
+    assert "tui.app" in imported, done.stderr
+    assert sorted(imported & LATER) == []
+    assert "STOP ALL" in footer  # all was painted before anything was opened
+
+
+@pytest.mark.tui
+async def test_the_style_sheet_is_read_once_at_the_start_and_again_for_other_colours(monkeypatch):
+    read = []
+    again = Stylesheet.reparse
+    monkeypatch.setattr(Stylesheet, "reparse", lambda self: (read.append(1), again(self)))
+    app = make_app(demo_session())
+    async with app.run_test(size=(80, 24)) as pilot:
+        await pilot.pause()
+        assert read == []
+        app.theme = "multidrop-light"
+        await pilot.pause()
+        assert read == [1]
