@@ -15,6 +15,7 @@ from dialects import DriveError, End, NoAnswer, Priority, Refused
 from drives.conversations import Conversation, Outcome
 from drives.events import Transaction, Valued
 from drives.roster import Roster
+from drives.subscriptions import Subscription, Subscriptions
 from transports import TransportLost
 
 USUAL = 0.05
@@ -36,23 +37,9 @@ class Value(NamedTuple):
     word: str
 
 
-@dataclass(eq=False)
-class Reading:
-    """A request for values, until it is closed."""
-
-    readings: Readings
-    values: tuple[Value, ...]
-    period: float
-
-    def close(self) -> None:
-        """End it."""
-        self.readings.unsubscribe(self)
-
-
 @dataclass
 class _Due:
     at: float
-    period: float
     silences: int = 0
     refusals: int = 0
     """NAKs in a row: noise damages a request now and then, and a value that is gone is refused each time."""
@@ -65,29 +52,19 @@ class Readings:
 
     def __init__(self, roster: Roster) -> None:
         self._roster, self._link = roster, roster.link
-        self._subscriptions: list[Reading] = []
+        self._subscriptions = Subscriptions[Value](FASTEST, self._changed)
         self._due: dict[Value, _Due] = {}
         self._under_way: Conversation[float] | None = None
         self._busy = self._paused = False
         self._timer: asyncio.TimerHandle | None = None
 
-    def subscribe(self, values: Sequence[Value], period: float = USUAL) -> Reading:
+    def subscribe(self, values: Sequence[Value], period: float = USUAL) -> Subscription[Value]:
         """Read these values, each every `period` s as far as the wire allows. Their words were checked before."""
-        reading = Reading(self, tuple(values), max(period, FASTEST))
-        self._subscriptions.append(reading)
-        self._changed()
-        return reading
-
-    def unsubscribe(self, reading: Reading) -> None:
-        """End a subscription; the last one ends the reading."""
-        if reading in self._subscriptions:
-            self._subscriptions.remove(reading)
-            self._changed()
+        return self._subscriptions.add(values, period)
 
     def close(self) -> None:
         """End all reading."""
         self._subscriptions.clear()
-        self._changed()
         if self._under_way is not None:
             self._under_way.interrupt()
 
@@ -102,11 +79,7 @@ class Readings:
 
     def _changed(self) -> None:
         now, before = self._link.now(), self._due
-        self._due = {}
-        for each in self._subscriptions:
-            for value in each.values:
-                due = self._due.setdefault(value, before.get(value) or _Due(now, each.period))
-                due.period = min(due.period, each.period) if value in before else each.period
+        self._due = {value: before.get(value) or _Due(now) for value in self._subscriptions.periods}
         self._set_timer(now)
 
     def _set_timer(self, at: float) -> None:
@@ -127,7 +100,7 @@ class Readings:
         if drive.programming or drive.transferring or drive.family.readings is None:
             due.at = now + RETRY
             return self._set_timer(now)
-        due.at = max(due.at + due.period, now)
+        due.at = max(due.at + self._subscriptions.periods[value], now)
         self._begin(value, due)
 
     def _begin(self, value: Value, due: _Due) -> None:

@@ -17,9 +17,10 @@ from dialects import DriveError, Motion, NoAnswer, Priority
 from drives.apart import apart
 from drives.conversations import Conversation, Outcome
 from drives.events import Sample, Silent, Transaction
-from drives.readings import USUAL, Reading, Readings, Value
+from drives.readings import USUAL, Readings, Value
 from drives.roster import Roster
-from drives.watching import PERIOD, Watch, Watching
+from drives.subscriptions import Subscription, Subscriptions
+from drives.watching import PERIOD, Watching
 from transports import TransportLost
 
 MODEST = 0.02
@@ -38,19 +39,6 @@ RATE_OVER = 2.0
 """Time over which the rate is averaged, s."""
 
 
-@dataclass(eq=False)
-class Subscription:
-    """A request for samples of some drives, until it is closed."""
-
-    telemetry: Telemetry
-    addresses: tuple[str, ...]
-    period: float
-
-    def close(self) -> None:
-        """End it."""
-        self.telemetry.unsubscribe(self)
-
-
 @dataclass
 class _Poll:
     """The polling of one drive: when it is due, polls without an answer in a row, times of the samples."""
@@ -66,9 +54,7 @@ class Telemetry:
     def __init__(self, roster: Roster) -> None:
         self._roster = roster
         self._link = roster.link
-        self._subscriptions: list[Subscription] = []
-        self._periods: dict[str, float] = {}
-        """The shortest period requested for each drive, s."""
+        self._subscriptions = Subscriptions[str](FASTEST, self._changed)
         self._polls: dict[str, _Poll] = {}
         self._under_way: Conversation[tuple[Motion, ...]] | None = None
         self._busy = self._paused = False
@@ -76,26 +62,17 @@ class Telemetry:
         self._watching = Watching(roster)
         self._readings = Readings(roster)
 
-    def watch(self, addresses: Sequence[str], period: float = PERIOD) -> Watch:
+    def watch(self, addresses: Sequence[str], period: float = PERIOD) -> Subscription[str]:
         """Read the conditions of these drives every `period` s, between the polls."""
         return self._watching.watch(addresses, period)
 
-    def read(self, values: Sequence[Value], period: float = USUAL) -> Reading:
+    def read(self, values: Sequence[Value], period: float = USUAL) -> Subscription[Value]:
         """Read values by their words, which `dialects.readings` has checked, each every `period` s beside the polls."""
         return self._readings.subscribe(values, period)
 
-    def subscribe(self, addresses: Sequence[str], period: float = MODEST) -> Subscription:
+    def subscribe(self, addresses: Sequence[str], period: float = MODEST) -> Subscription[str]:
         """Poll these drives, each every `period` s as far as the wire allows; 0: as fast as it allows."""
-        subscription = Subscription(self, tuple(addresses), max(period, FASTEST))
-        self._subscriptions.append(subscription)
-        self._changed()
-        return subscription
-
-    def unsubscribe(self, subscription: Subscription) -> None:
-        """End a subscription; the last one ends the polling."""
-        if subscription in self._subscriptions:
-            self._subscriptions.remove(subscription)
-            self._changed()
+        return self._subscriptions.add(addresses, period)
 
     def rate(self, address: str) -> float:
         """Rate of a drive's samples, per second."""
@@ -106,24 +83,19 @@ class Telemetry:
 
     def period(self, address: str) -> float:
         """Shortest period requested for a drive, s; infinite without a subscription."""
-        return self._periods.get(address, float("inf"))
+        return self._subscriptions.periods.get(address, float("inf"))
 
     def close(self) -> None:
         """End all polling."""
         self._subscriptions.clear()
         self._watching.close()
         self._readings.close()
-        self._changed()
         if self._under_way is not None:
             self._under_way.interrupt()
 
     def _changed(self) -> None:
-        self._periods = {}
-        for each in self._subscriptions:
-            for address in each.addresses:
-                self._periods[address] = min(each.period, self.period(address))
         now = self._link.now()
-        for address, period in self._periods.items():  # one that was asked for at a slower rate
+        for address, period in self._subscriptions.periods.items():  # one that was asked for at a slower rate
             poll = self._polls.setdefault(address, _Poll())
             poll.due = max(now, min(poll.due, now + period)) if not poll.silences else poll.due
         self._set_timer(now)
@@ -133,14 +105,15 @@ class Telemetry:
     def _set_timer(self, at: float) -> None:
         if self._timer is not None:
             self._timer.cancel()
-        self._timer = asyncio.get_running_loop().call_at(at, self._next) if self._periods else None
+        self._timer = asyncio.get_running_loop().call_at(at, self._next) if self._subscriptions.periods else None
 
     def _next(self) -> None:
         """Poll the drive that is due for longest, or wait for the next one that is due."""
-        if self._busy or self._paused or self._link.away or not self._periods:
+        periods = self._subscriptions.periods
+        if self._busy or self._paused or self._link.away or not periods:
             return
         now = self._link.now()
-        address = min(self._periods, key=lambda each: self._polls[each].due)
+        address = min(periods, key=lambda each: self._polls[each].due)
         poll = self._polls[address]
         if poll.due > now:
             return self._set_timer(poll.due)
@@ -148,7 +121,7 @@ class Telemetry:
         if drive.programming or drive.transferring:
             poll.due = now + RETRY
             return self._set_timer(now)
-        poll.due = max(poll.due + self._periods[address], now)
+        poll.due = max(poll.due + periods[address], now)
         self._begin(address, poll)
 
     def pause(self) -> None:
@@ -189,7 +162,7 @@ class Telemetry:
             loop.call_soon(self._publish, sample)
 
     def _publish(self, sample: Sample) -> None:
-        if sample.address in self._periods:  # else the subscription has ended meanwhile
+        if sample.address in self._subscriptions.periods:  # else the subscription has ended meanwhile
             self._link.publish(sample)
 
     def _failed(self, address: str, poll: _Poll, outcome: Outcome[tuple[Motion, ...]]) -> None:

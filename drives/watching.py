@@ -21,6 +21,7 @@ from drives.apart import apart
 from drives.drive import Drive
 from drives.events import Conditioned
 from drives.roster import Roster
+from drives.subscriptions import Subscription, Subscriptions
 from transports import TransportLost
 
 PERIOD = 1.0
@@ -37,19 +38,6 @@ AFTER_FAILURE = 2.0
 PATIENCE = 5
 """Most failures that make the pause longer."""
 AFTER_DEFECT = 60.0
-
-
-@dataclass(eq=False)
-class Watch:
-    """A request for the conditions of some drives, until it is closed."""
-
-    watching: Watching
-    addresses: tuple[str, ...]
-    period: float
-
-    def close(self) -> None:
-        """End it."""
-        self.watching.forget(self)
 
 
 @dataclass
@@ -72,26 +60,18 @@ class Watching:
     def __init__(self, roster: Roster) -> None:
         self._roster = roster
         self._link = roster.link
-        self._watches: list[Watch] = []
+        self._watches = Subscriptions[str](SHORTEST, self._begin)
         self._watched: dict[str, _Watched] = {}
         self._task: asyncio.Task[None] | None = None
         self._paused = False
 
-    def watch(self, addresses: Sequence[str], period: float = PERIOD) -> Watch:
-        """Read the conditions of these drives every `period` s."""
-        watch = Watch(self, tuple(addresses), max(period, SHORTEST))
-        self._watches.append(watch)
+    def watch(self, addresses: Sequence[str], period: float = PERIOD) -> Subscription[str]:
+        """Read the conditions of these drives every `period` s; after the last such watch nothing more is read."""
         now = self._link.now()
         for each in (self._watched[address] for address in addresses if address in self._watched):
             if not each.failures:  # one that was asked for at a slower rate
                 each.due = min(each.due, now)
-        self._begin()
-        return watch
-
-    def forget(self, watch: Watch) -> None:
-        """End a watch; after the last one nothing more is read."""
-        if watch in self._watches:
-            self._watches.remove(watch)
+        return self._watches.add(addresses, period)
 
     def pause(self) -> None:
         """Begin no part until `resume`."""
@@ -109,20 +89,12 @@ class Watching:
             self._task.cancel()
 
     def _begin(self) -> None:
-        if self._watches and (self._task is None or self._task.done()):
+        if self._watches.periods and (self._task is None or self._task.done()):
             self._task = asyncio.get_running_loop().create_task(self._run())
-
-    @property
-    def _periods(self) -> dict[str, float]:
-        found: dict[str, float] = {}
-        for watch in self._watches:
-            for address in watch.addresses:
-                found[address] = min(watch.period, found.get(address, watch.period))
-        return found
 
     async def _run(self) -> None:
         """Read what is due, until no watch is left."""
-        while periods := self._periods:
+        while periods := self._watches.periods:
             listed = [address for address in periods if address in self._roster.drives]
             if self._paused or self._link.away is not None or not listed:
                 await asyncio.sleep(AWAY)
@@ -177,7 +149,7 @@ class Watching:
     def _barred(self, drive: Drive) -> bool:
         """Whether nothing may be read of a drive now: it stores lines, or its settings are to be found out first."""
         unsure = drive.programming or drive.transferring or drive.state.settings_unknown
-        return unsure or self._paused or self._link.away is not None or drive.address not in self._periods
+        return unsure or self._paused or self._link.away is not None or drive.address not in self._watches.periods
 
     async def _part(self, watched: _Watched, part: Part[Any]) -> bool:
         """Read one part; whether the next may follow."""

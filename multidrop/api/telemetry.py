@@ -14,7 +14,7 @@ from shell.events import OnBus, SessionEvent
 
 if TYPE_CHECKING:
     from drives.drive import Drive
-    from drives.telemetry import Subscription
+    from drives.subscriptions import Subscription
     from multidrop.api.owner import Owner
 
 RATE = 50.0
@@ -41,7 +41,7 @@ class AsyncTelemetry:
         self._subscriptions = [self._subscribe(bus, period) for bus in dict.fromkeys(bus for bus, _ in self._names)]
         self._open = True
 
-    def _subscribe(self, bus: str, period: float) -> Subscription:
+    def _subscribe(self, bus: str, period: float) -> Subscription[str]:
         return self._shell.buses[bus].telemetry.subscribe([own for name, own in self._names if name == bus], period)
 
     def _take(self, event: SessionEvent) -> None:

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING
 from dialects import Diagnostic
 from drives.events import Conditioned, Lost, Sample, Unsolicited, Valued
 from drives.readings import USUAL, Value
+from drives.subscriptions import Subscription
 from drives.telemetry import MODEST, Telemetry
-from drives.watching import Watch
 from shell.events import Entered, Failed, Notified, OnBus, Printed, SessionEvent
 from shell.plots.plot import Plot
 from shell.plots.rate import shown
@@ -136,7 +136,7 @@ def _polls(telemetry: Telemetry, series: Sequence[Series], period: float) -> Ite
 def _sparing(telemetry: Telemetry, addresses: Sequence[str]) -> Iterator[Callable[[], None]]:
     """Begin to read the states of one drive after the other, as a first reading takes the time of many samples."""
     loop, pause = asyncio.get_running_loop(), SPARING * len(addresses)
-    watches: list[Watch] = []
+    watches: list[Subscription[str]] = []
     for place, address in enumerate(addresses, 1):
         yield loop.call_later(
             place * SPARING, lambda each: watches.append(telemetry.watch([each], pause)), address

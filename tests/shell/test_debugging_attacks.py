@@ -51,7 +51,7 @@ async def test_nothing_but_step_and_continue_presses_a_key(tmp_path: Path) -> No
             except DriveError:
                 continue
         await asyncio.sleep(2)
-        telemetry.unsubscribe(polling)
+        polling.close()
         it.world("unplug line")
         await asyncio.sleep(0.5)
         it.world("plug line")
