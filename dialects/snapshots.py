@@ -22,6 +22,21 @@ class TakeSnapshot(Protocol[S_contra]):
 
 
 @dataclass(frozen=True)
+class Levels:
+    """The word that reads all inputs of a drive at once, and the place of each in it."""
+
+    word: str
+    bits: tuple[tuple[int, int], ...]
+    """For each input its number and its bit."""
+    inverted: bool = False
+    """A 1 is ground."""
+
+    def of(self, value: int) -> tuple[tuple[int, int], ...]:
+        """The level of each input, by number; 1 is +V."""
+        return tuple((number, (value >> bit & 1) ^ self.inverted) for number, bit in self.bits)
+
+
+@dataclass(frozen=True)
 class Snapshot:
     """One drive: its identity, its settings, its program, and its state at the moment of reading."""
 
@@ -45,6 +60,10 @@ class Snapshot:
     """Values for each axis, by the keys of a cell file."""
     inputs: tuple[tuple[int, int], ...] = ()
     """Inputs that were read: number, and level (1 is +V)."""
+    levels: Levels | None = None
+    """How its inputs are read again; None where the family reads none."""
+    active: bool = False
+    """It moved, or a program ran, while it was read."""
     analog: tuple[int, ...] = ()
     """Analog inputs, one for each axis."""
     remarks: tuple[str, ...] = ()

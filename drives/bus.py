@@ -8,6 +8,7 @@ from typing import TypeVar
 
 from dialects import DriveState, Hints, Procedure
 from dialects.families import DEFAULT, FAMILIES
+from drives.conclusions import Witness
 from drives.conversations import Conversations
 from drives.drive import Drive
 from drives.events import BusEvent, Changed
@@ -69,6 +70,10 @@ class Bus:
     def watch(self, watcher: Callable[[BusEvent], None]) -> Callable[[], None]:
         """Publish everything to `watcher` from now on; the function returned ends that."""
         return self.link.watch(watcher)
+
+    def witness(self, witness: Witness) -> Callable[[], None]:
+        """Report every conversation to `witness` once it is over; the function returned ends that."""
+        return self._conversations.witnesses.add(witness)
 
     def notify(self, text: str, address: str = "", warning: bool = False) -> None:
         """Publish a message for the user."""

@@ -10,11 +10,12 @@ from __future__ import annotations
 import asyncio
 from collections import deque
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any, Generic, TypeVar
 from weakref import WeakKeyDictionary
 
 from dialects import DriveState, End, Kind, Owed, Procedure, Request, Stopped
+from drives.conclusions import Concluded, Outcome, Witnesses
 from drives.events import Transaction
 from drives.keeping import Keeper
 from drives.link import Link, LostInFlight
@@ -26,20 +27,6 @@ OnEnded = Callable[[Transaction], None]
 """Called with each transaction of a conversation once it has ended."""
 ASKING = {Kind.PRINT, Kind.LIST, Kind.QUIET}
 """Requests that only ask and move nothing."""
-
-
-@dataclass(frozen=True)
-class Outcome(Generic[T]):
-    """The end of a conversation: what it returned, or the error that it raised."""
-
-    result: tuple[T, ...] = ()
-    error: BaseException | None = None
-
-    def value(self) -> T:
-        """Return the result, or raise the error."""
-        if self.error is not None:
-            raise self.error
-        return self.result[0]
 
 
 OnOver = Callable[[Outcome[T]], None]
@@ -56,6 +43,7 @@ class Conversations:
         self._turns: WeakKeyDictionary[DriveState, deque[Conversation[Any]]] = WeakKeyDictionary()
         """The conversations with each drive: the one under way, and those that wait for it."""
         self._passing_on: set[DriveState] = set()
+        self.witnesses = Witnesses(link.name)
         self._stops = 0
         self._stops_by_drive: WeakKeyDictionary[DriveState, int] = WeakKeyDictionary()
 
@@ -165,6 +153,8 @@ class Conversation(Generic[T]):
         """The ticket of the request that is queued or in flight; 0: none is."""
         self._keeping: asyncio.Task[None] | None = None
         self._outcome: Outcome[T] | None = None
+        self._taken: list[Transaction] = []
+        """Its transactions, where they are witnessed."""
         self._cleaning_up = self._interrupted = False
         self.over: asyncio.Future[None] = asyncio.get_running_loop().create_future()
 
@@ -191,6 +181,7 @@ class Conversation(Generic[T]):
         elif self._ticket:
             ticket, self._ticket = self._ticket, 0
             self._link.withdraw(ticket)
+            self._doubts(self._runner)
             self._state.reply_outstanding()
             self._fail(self._interruption())
         else:
@@ -244,12 +235,16 @@ class Conversation(Generic[T]):
         self._all.publish_notes(self._state)
         self._go_on(runner)
 
+    def _doubts(self, runner: ProcedureRunner[T] | None) -> None:
+        """Note that the command that is queued or in flight may be executed."""
+        if runner is not None and runner.request is not None and runner.request.kind not in ASKING:
+            self._unproven = runner.request.text
+
     def _lost(self, request: Request, error: TransportLost) -> None:
         """Fail with what the loss leaves open: whether the last command was executed."""
         if isinstance(error, LostInFlight):
             self._state.reply_outstanding()
-            if request.kind not in ASKING:
-                self._unproven = request.text
+            self._doubts(self._runner)
         error = (self._link.away or error).again()
         if self._unproven and not self._cleaning_up:
             done = "stored" if request.kind is Kind.PROGRAM else "executed"
@@ -263,6 +258,8 @@ class Conversation(Generic[T]):
     def _take(self, runner: ProcedureRunner[T], transaction: Transaction) -> None:
         if self._on_ended:
             self._on_ended(transaction)
+        if self._all.witnesses:
+            self._taken.append(transaction)
         if transaction.request.kind not in ASKING:
             self._unproven = "" if transaction.reply.acknowledged else transaction.request.text
         if transaction.reply.end is not End.STOPPED:
@@ -294,6 +291,9 @@ class Conversation(Generic[T]):
         if not self.over.done():
             self.over.set_result(None)
         assert self._outcome is not None
+        if self._all.witnesses:
+            unproven = self._unproven if self._outcome.error is not None else ""
+            self._all.witnesses.report(Concluded(self._state, tuple(self._taken), self._outcome, unproven))
         self._on_over(self._outcome)
 
     def _keep(self, then: Callable[[], None]) -> None:

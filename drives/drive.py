@@ -23,7 +23,8 @@ from dialects.families import family_of, program_languages
 from dialects.family import Programs
 from dialects.held import Held
 from dialects.program_files import ProgramFiles
-from drives.conversations import ASKING, Conversation, Conversations, OnEnded, OnOver, Outcome, awaited
+from drives.conclusions import Outcome
+from drives.conversations import ASKING, Conversation, Conversations, OnEnded, OnOver, awaited
 from drives.events import Changed, Transaction
 from drives.keeping import GLOBAL
 from drives.link import Link

@@ -12,7 +12,8 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from dialects import DriveError, End, NoAnswer, Priority, Refused
-from drives.conversations import Conversation, Outcome
+from drives.conclusions import Outcome
+from drives.conversations import Conversation
 from drives.events import Transaction, Valued
 from drives.roster import Roster
 from drives.subscriptions import Subscription, Subscriptions

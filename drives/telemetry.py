@@ -15,7 +15,8 @@ from dataclasses import dataclass, field
 
 from dialects import DriveError, Motion, NoAnswer, Priority
 from drives.apart import apart
-from drives.conversations import Conversation, Outcome
+from drives.conclusions import Outcome
+from drives.conversations import Conversation
 from drives.events import Sample, Silent, Transaction
 from drives.readings import USUAL, Readings, Value
 from drives.roster import Roster

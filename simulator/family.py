@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from importlib.resources.abc import Traversable
 from typing import Protocol
 
+from dialects.family import Motion
 from dialects.parameters import Value
 from dialects.snapshots import Snapshot
 from simulator.cell.spec import DriveSpec
@@ -47,6 +48,18 @@ class Place:
 
 
 @dataclass(frozen=True)
+class Shadow:
+    """The operations of a simulated drive that runs beside a real one: they need no wire."""
+
+    rest: Callable[[], None]
+    """End what power-up has begun, and take lines as a drive that a host has talked to; at time 0."""
+    motion: Callable[[float], tuple[Motion, ...]]
+    """Position and velocity of each axis at a time, as the drive reports them."""
+    align: Callable[[str, int, float], None]
+    """Set the position counter of an axis at rest."""
+
+
+@dataclass(frozen=True)
 class Unit:
     """A simulated drive with its port and its surroundings.
 
@@ -62,6 +75,8 @@ class Unit:
     counts: int = 0
     single_supply: bool = False
     connect: Callable[[], Connection] | None = None
+    shadow: Shadow | None = None
+    """None: it cannot run beside a real drive."""
 
 
 @dataclass(frozen=True)

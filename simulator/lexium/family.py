@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from dialects.family import Motion
 from simulator.cell.spec import DriveSpec
-from simulator.family import Family, Place, Unit
+from simulator.family import Family, Place, Shadow, Unit
 from simulator.lexium import drive_table, drive_text
 from simulator.lexium.device import MCodeDevice
 from simulator.lexium.ports.mcode import MCodePort
@@ -26,15 +27,32 @@ def build(spec: DriveSpec, place: Place) -> Unit:
     device = MCodeDevice(_at_baud(spec, place.baud), world)
     device.prints()  # no client can be connected at its sign-on
     model, ethernet = device.model, spec.personality in ETHERNET
+    port = MCodePort(device, serial=not ethernet, baud=0 if model.waits_to_print else place.baud)
     return Unit(
         device=device,
-        port=MCodePort(device, serial=not ethernet, baud=0 if model.waits_to_print else place.baud),
+        port=port,
         worlds={"": world},
+        shadow=_shadow(device, port),
         inputs=model.points.inputs,
         counts=model.points.analog,
         single_supply=model.single_supply,
         connect=(lambda: _connect(device)) if ethernet else None,
     )
+
+
+def _shadow(device: MCodeDevice, port: MCodePort) -> Shadow:
+    def rest() -> None:
+        device.escape(0.0)
+        port.receive(b"\n", 0.0)  # the line feed without which party mode is not in force (5.1.105)
+        port.sent(0.0)
+
+    def motion(now: float) -> tuple[Motion, ...]:
+        return (Motion(device.position(now), device.velocity(now)),)
+
+    def align(_: str, position: int, now: float) -> None:
+        device.execute(f"P={position}", now, immediate=True)
+
+    return Shadow(rest, motion, align)
 
 
 def _at_baud(spec: DriveSpec, baud: int) -> DriveSpec:

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from dialects.family import Motion
 from dialects.tmcl.manual.parameters import BAUDS
 from simulator.cell.spec import DriveSpec
-from simulator.family import Family, Place, Unit
+from simulator.family import Family, Place, Shadow, Unit
 from simulator.tmcl import drive_text
 from simulator.tmcl.drive_table import read_drive, split_settings
 from simulator.tmcl.module import VERSION, TmclModule
@@ -20,7 +21,14 @@ def build(spec: DriveSpec, place: Place) -> Unit:
     position = own.counters.get("position", (0,))[0]
     device = TmclModule(int(spec.name), world, axis, module, place.baud, own.version or VERSION, position)
     port = TmclPort(device, any_baud=place.baud not in BAUDS.values())
-    return Unit(device=device, port=port, worlds={"": world}, single_supply=True)
+    return Unit(device=device, port=port, worlds={"": world}, shadow=_shadow(device), single_supply=True)
+
+
+def _shadow(device: TmclModule) -> Shadow:
+    def motion(now: float) -> tuple[Motion, ...]:
+        return (Motion(*device.motion(now)),)
+
+    return Shadow(lambda: None, motion, lambda _, position, now: device.stand_at(position, now))
 
 
 TMCL = Family(

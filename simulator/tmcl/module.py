@@ -100,6 +100,14 @@ class TmclModule:
         at = self._next_event(self._now)
         return None if at == inf else at
 
+    def motion(self, now: float) -> tuple[int, int]:
+        """Actual position and velocity at a time that it has lived up to."""
+        return self._motor.read(Axis.ACTUAL_POSITION, now), self._motor.read(Axis.ACTUAL_VELOCITY, now)
+
+    def stand_at(self, position: int, now: float) -> None:
+        """Give the present place of the motor this position."""
+        self._motor.stand_at(position, now)
+
     def notices(self) -> list[tuple[float, int]]:
         """Times and motor masks of targets reached since this was last asked (command 138)."""
         notices, self._notices = self._notices, []

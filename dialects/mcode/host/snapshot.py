@@ -20,7 +20,7 @@ from dialects.mcode.manual.parameters import exact
 from dialects.mcode.manual.status import EXPANDED_INPUTS, INPUTS
 from dialects.mcode.manual.table import words
 from dialects.parameters import Progress, Readings
-from dialects.snapshots import Snapshot
+from dialects.snapshots import Levels, Snapshot
 from dialects.state import DriveState
 
 BAUDS = {48: 4800, 96: 9600, 19: 19200, 38: 38400, 11: 115200}
@@ -56,6 +56,7 @@ def made(state: DriveState, readings: Readings, now: Mapping[str, int]) -> Snaps
         remarks.append(f"moving at V={now['V']} while it was read: its position is one of that moment")
     if now["BY"]:
         remarks.append("a program ran while it was read")
+    levels = _levels(state.product, readings)
     return Snapshot(
         kind="mcode",
         product=state.product,
@@ -65,7 +66,9 @@ def made(state: DriveState, readings: Readings, now: Mapping[str, int]) -> Snaps
         name=UNNAMED,
         readings=readings,
         counters=_counters(readings, now),
-        inputs=_inputs(state.product, readings, now["IN"]),
+        inputs=levels.of(now["IN"]),
+        levels=levels,
+        active=bool(now["V"] or now["BY"]),
         analog=(now["I5"],) if "I5" in now else (),
         remarks=tuple(remarks),
     )
@@ -103,11 +106,11 @@ def _counters(readings: Readings, now: Mapping[str, int]) -> Mapping[str, tuple[
     return {"position": (now["P"],)} | ({other: (now[other],)} if other in now else {})
 
 
-def _inputs(product: str, readings: Readings, levels: int) -> tuple[tuple[int, int], ...]:
+def _levels(product: str, readings: Readings) -> Levels:
     points = EXPANDED_INPUTS if product == EXPANDED else INPUTS
     types = {name: held for name, held in readings.values.items() if isinstance(held, tuple)}
     outputs = {n for n in points if types.get(f"S{n}", (0,))[0] in OUTPUT_TYPES}
-    return tuple((n, levels >> bit & 1) for bit, n in enumerate(points) if n not in outputs)
+    return Levels("IN", tuple((n, bit) for bit, n in enumerate(points) if n not in outputs))
 
 
 def _whole(readings: Readings, name: str) -> int:

@@ -12,7 +12,7 @@ from dialects.pmx.host.state import PmxState
 from dialects.pmx.manual import status as words
 from dialects.pmx.manual.program_file import RAW
 from dialects.pmx.manual.table import AXES
-from dialects.snapshots import Snapshot
+from dialects.snapshots import Levels, Snapshot
 
 BAUDS = {1: 9600, 2: 19200, 3: 38400, 4: 57600, 5: 115200}
 """By DB (table 6.1)."""
@@ -32,6 +32,7 @@ def take(state: PmxState, progress: Progress) -> Procedure[Snapshot]:
         counters[key] = (yield from number(state, f"{word}X")), (yield from number(state, f"{word}Y"))
     analog = (yield from number(state, "AI1")), (yield from number(state, "AI2"))
     values = readings.values
+    levels = _levels(_whole(values.get("POLX")))
     return Snapshot(
         kind="pmx",
         product="PMX",
@@ -42,7 +43,9 @@ def take(state: PmxState, progress: Progress) -> Procedure[Snapshot]:
         readings=readings,
         program=(yield from _program(state)),
         counters=counters,
-        inputs=(yield from _inputs(state, _whole(values.get("POLX")))),
+        inputs=levels.of((yield from number(state, levels.word))),
+        levels=levels,
+        active=bool(remarks),
         analog=analog,
         remarks=tuple(remarks),
     )
@@ -64,11 +67,9 @@ def _program(state: PmxState) -> Procedure[tuple[tuple[int, str], ...]]:
     return tuple((int(row[1]), row[2]) for line in listed if (row := RAW.fullmatch(line)))
 
 
-def _inputs(state: PmxState, polarity: int) -> Procedure[tuple[tuple[int, int], ...]]:
-    """The level of each input: a bit of DI is 1 if the input is at ground, or with the other polarity if it is not."""
-    bits = yield from number(state, "DI")
-    inverted = bool(polarity & POLARITY)
-    return tuple((n, int(bool(bits >> n - 1 & 1) == inverted)) for n in INPUTS)
+def _levels(polarity: int) -> Levels:
+    """A bit of DI is 1 if the input is at ground, or with the other polarity if it is not."""
+    return Levels("DI", tuple((n, n - 1) for n in INPUTS), inverted=not polarity & POLARITY)
 
 
 def _whole(held: object) -> int:

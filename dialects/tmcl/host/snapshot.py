@@ -18,7 +18,7 @@ def take(state: TmclState, progress: Progress) -> Procedure[Snapshot]:
     """Read a module. Raises NoAnswer."""
     readings = yield from settings.read(state, progress)
     remarks = []
-    if (yield from moving(state)):
+    if active := (yield from moving(state)):
         remarks.append("moving while it was read: its position is one of that moment")
     if (count := (yield from motors(state))) > 1:
         remarks.append(f"it has {count} motors; a simulated module has one")
@@ -31,6 +31,7 @@ def take(state: TmclState, progress: Progress) -> Procedure[Snapshot]:
         baud=BAUDS.get(code, 0) if isinstance(code, int) else 0,
         readings=readings,
         counters={"position": ((yield from read(state, Call(Command.GAP, Axis.ACTUAL_POSITION, 0))),)},
+        active=active,
         remarks=tuple(remarks),
     )
 
