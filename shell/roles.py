@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, NamedTuple, Protocol
@@ -127,3 +127,30 @@ class RunningPlot(Protocol):
 
     async def end(self) -> str:
         """End the plot; one line about the result. Raises Diagnostic where the plot could not be written."""
+
+
+class RunningTwins(Protocol):
+    """The simulated twins of drives."""
+
+    wanted: bool
+    """Each bus whose drives are found gets twins."""
+    limit: int
+    """The limit of a difference at rest, steps."""
+
+    def running(self, bus: Bus) -> bool:
+        """Whether a drive of a bus has a twin."""
+
+    async def start(self, bus: Bus, addresses: Sequence[str] | None = None) -> None:
+        """Read drives of a bus (None: all), and run a twin beside each; one that runs is set anew."""
+
+    def stop(self, bus: Bus) -> None:
+        """End the twins of a bus."""
+
+    def rows(self) -> Iterator[str]:
+        """A line for each twin that runs."""
+
+    def identified(self, bus: Bus) -> None:
+        """Note that the drives of a bus are found."""
+
+    def changed(self, bus: Bus) -> None:
+        """Note that a bus has changed."""

@@ -26,6 +26,7 @@ from shell.motion import in_motion
 from shell.openings import Openings
 from shell.playing import played_by
 from shell.roles import NO_ROLES
+from shell.twins import Twins
 from shell.workspace import LATCHED, Workspace
 
 if TYPE_CHECKING:
@@ -58,7 +59,7 @@ class Session(Workspace):
         lost is tried again until it is back or closed. `raw`: `open_all` looks for no drives.
         """
         super().__init__(settings or Settings(), reconnect)
-        self.automations = Automations(self)
+        self.automations, self.twins = Automations(self), Twins(self)
         self._openings = Openings(self, opener or partial(open_buses, state=self.settings.state), lazy, raw)
         self._background: set[asyncio.Task[Any]] = set()
 

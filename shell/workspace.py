@@ -37,7 +37,7 @@ if TYPE_CHECKING:
     from drives.halt import Halt
     from shell.connect.opening import Opened
     from shell.raw import RawLine, Watched
-    from shell.roles import Observer, OpenLog, RunningPlot, Series
+    from shell.roles import Observer, OpenLog, RunningPlot, RunningTwins, Series
     from shell.transcripts import Transcripts
     from simulator.serving.running import RunningFloor
 
@@ -85,6 +85,8 @@ class Workspace(Asking):
         """The labels and variables that were read, for completion."""
         self.log: OpenLog | None = None
         self.plots: list[RunningPlot] = []
+        self.twins: RunningTwins | None = None
+        """The twins of drives; the session sets it."""
         self.plotted: tuple[Series, ...] = ()
         """What the screen plots; empty: the selected drive."""
         self.raw: dict[str, RawLine] = {}
@@ -145,6 +147,8 @@ class Workspace(Asking):
         for drive in bus.all_drives:
             if observer := self.debuggers.pop(drive, None):
                 observer.close()
+        if self.twins is not None:
+            self.twins.stop(bus)
         self.buses.pop(bus.name, None)
         self.cells.pop(bus.name, None)
         self._selected.pop(bus, None)
@@ -219,6 +223,8 @@ class Workspace(Asking):
         """Note that the drives of a bus are found; its first one is selected there."""
         self._selected[bus] = next(iter(bus.drives.values()), None)
         self.changed()
+        if self.twins is not None:
+            self.twins.identified(bus)
 
     def select_first(self, bus: Bus) -> None:
         """Select a bus where no other one is selected."""
@@ -340,6 +346,8 @@ class Workspace(Asking):
             self.publish(Notified(event.at, text, name, event.warning))
         elif isinstance(event, Changed):
             self.publish(StateChanged(event.at))
+            if self.twins is not None:
+                self.twins.changed(bus)
 
     def _lost(self, name: str, event: Lost) -> None:
         """Publish the loss of a bus, and begin to try it again where that is wanted and possible."""

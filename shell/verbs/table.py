@@ -24,6 +24,7 @@ from shell.verbs import (
     snapshot,
     tabs,
     transcript,
+    twin,
     waiting,
 )
 from shell.verbs.registry import VERBS, Call, Verb
@@ -49,6 +50,7 @@ GROUPS = (
     snapshot,
     tabs,
     transcript,
+    twin,
     waiting,
 )
 

@@ -1,0 +1,93 @@
+"""A simulated drive in the time of a real one: the bytes that the real one took go in, positions come out.
+
+It has no clock: it lives up to the time of what it is given. The host's clock counts from the moment of its making.
+"""
+
+from __future__ import annotations
+
+from dialects import Diagnostic
+from dialects.family import Motion
+from dialects.snapshots import Levels, Snapshot
+from simulator import cells
+from simulator.cell.writer import BusText, write
+from simulator.families import FAMILIES, family_of, snapshots_of
+from simulator.family import Place, Shadow, Unit
+from simulator.wire.wire import Transmission
+
+NAME = "twin"
+
+
+class Twin:
+    """The simulated drive. `modbus`: the real one is reached over Modbus/TCP."""
+
+    def __init__(self, unit: Unit, shadow: Shadow, levels: Levels | None, begun: float, modbus: bool) -> None:
+        self.levels = levels
+        self._unit, self._shadow, self._begun = unit, shadow, begun
+        self._connection = unit.connect() if modbus and unit.connect is not None else None
+        self._world = next(iter(unit.worlds.values()))
+        self._now = 0.0
+        self._inputs: dict[int, int] = {}
+        self._overheard: list[Transmission] = []
+        shadow.rest()
+
+    def live(self, at: float) -> float:
+        """Live up to a time of the host's clock; return the drive's own time."""
+        self._now = max(self._now, at - self._begun)
+        self._overheard += [each for each in self._unit.port.sent(self._now) if each.overheard]
+        return self._now
+
+    def hear(self, data: bytes, at: float) -> None:
+        """Take bytes of the host; the replies go nowhere."""
+        now = self.live(at)
+        if self._connection is not None:
+            self._connection.receive(data, now)
+        else:
+            self._unit.port.receive(data, now)
+        self.live(at)
+
+    def overhear(self, data: bytes, at: float) -> None:
+        """Take bytes that another drive has sent."""
+        self._unit.port.overhear(data, self.live(at))
+
+    def printed(self) -> list[bytes]:
+        """What it has sent that other drives of its line overhear, since this was last asked."""
+        printed, self._overheard = self._overheard, []
+        return [each.data for each in printed]
+
+    def put(self, value: int, at: float) -> bool:
+        """Set the inputs as they were read; return whether one has changed."""
+        if self.levels is None:
+            return False
+        levels = dict(self.levels.of(value))
+        changed, self._inputs = levels != self._inputs and bool(self._inputs), levels
+        now = self.live(at)
+        for number, level in levels.items():
+            if self._world.level(number, now) != level:
+                self._world.set_input(number, level, now)
+        self._unit.device.advance(now)
+        return changed
+
+    def motion(self, at: float) -> dict[str, Motion]:
+        """Position and velocity of each axis at a time, by the axis."""
+        return {each.axis: each for each in self._shadow.motion(self.live(at))}
+
+    def align(self, axis: str, position: int, at: float) -> None:
+        """Set the position of an axis at rest."""
+        self._shadow.align(axis, position, self.live(at))
+        self.live(at)
+
+
+def make(snapshot: Snapshot, begun: float, modbus: bool, alone: bool) -> tuple[Twin, list[str]]:
+    """Make the twin of a drive that was read, and say what it lacks. Raises Diagnostic where none can be made.
+
+    `begun`: the time of the host's clock from which it lives. `alone`: no other drive is on the line.
+    """
+    described = snapshots_of(FAMILIES[snapshot.kind]).describe(snapshot)
+    spec = cells.read(write([BusText(NAME, [described])]), NAME).buses[0].drives[0]
+    unit = family_of(spec.personality).build(spec, Place(alone=alone))
+    if unit.shadow is None:
+        raise Diagnostic(f"the simulator has no twin of an {spec.personality}")
+    lacks = [*described.remarks]
+    if described.unread:
+        lacks.append(f"not read: {', '.join(name for name, _ in described.unread)}")
+    return Twin(unit, unit.shadow, snapshot.levels, begun, modbus), lacks

@@ -1,0 +1,158 @@
+"""The twins of a session: begun, ended, read anew after a loss; and what is said of them."""
+
+from __future__ import annotations
+
+import asyncio
+from typing import TYPE_CHECKING
+
+from dialects import Diagnostic, DriveError
+from shell.events import FAILURES, Agreed, Diverged, OnBus, TwinEvent
+from shell.twins.comparing import LIMIT
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+
+    from drives.bus import Bus
+    from drives.drive import Drive
+    from shell.twins.on_bus import BusTwins
+    from shell.workspace import Workspace
+
+
+class Twins:
+    """The twins of all buses. Nothing of them is loaded, and nothing is read, before the first one begins."""
+
+    def __init__(self, workspace: Workspace) -> None:
+        self.wanted = False
+        """Each bus whose drives are found gets twins."""
+        self._workspace = workspace
+        self._rest = LIMIT
+        self._buses: dict[Bus, BusTwins] = {}
+        self._paused: dict[Bus, list[str]] = {}
+        """The addresses of the twins that a loss has ended, by bus."""
+        self._tasks: dict[Bus, asyncio.Task[None]] = {}
+
+    @property
+    def limit(self) -> int:
+        """The limit at rest, steps."""
+        return self._rest
+
+    @limit.setter
+    def limit(self, steps: int) -> None:
+        self._rest = steps
+        for each in self._buses.values():
+            each.rest = steps
+
+    def running(self, bus: Bus) -> bool:
+        """Whether a drive of a bus has a twin."""
+        return bus in self._buses and bool(self._buses[bus].besides)
+
+    async def start(self, bus: Bus, addresses: Sequence[str] | None = None) -> None:
+        """Read drives of a bus (None: all), and run a twin beside each; one that runs is set anew.
+
+        Raises DriveError, Diagnostic or TransportLost for the first that fails, once all have been tried.
+        """
+        failures: list[Exception] = []
+        for address in list(bus.drives) if addresses is None else addresses:
+            try:
+                await self._start(bus, bus.drives[address])
+            except (DriveError, Diagnostic) as failure:
+                failures.append(failure)
+        if not self.running(bus):
+            self._end(bus)
+        if failures:
+            raise failures[0]
+
+    def stop(self, bus: Bus) -> None:
+        """End the twins of a bus."""
+        if task := self._tasks.pop(bus, None):
+            task.cancel()
+        self._paused.pop(bus, None)
+        self._end(bus)
+
+    def _end(self, bus: Bus) -> None:
+        if (twins := self._buses.pop(bus, None)) is not None:
+            twins.close()
+
+    async def _start(self, bus: Bus, drive: Drive) -> None:
+        from shell import snapshots
+        from shell.twins.beside import Beside
+        from shell.twins.on_bus import BusTwins
+        from shell.twins.twin import make
+
+        name = self._workspace.display_name(drive)
+        if bus not in self._buses:
+            self._buses[bus] = BusTwins(bus, lambda event: self._publish(bus, event), lambda: self._lost(bus))
+            self._buses[bus].rest = self._rest
+        twins = self._buses[bus]
+        twins.expect(drive)
+        try:
+            snapshot = await snapshots.read(self._workspace, drive)
+            if snapshot.active:
+                hint = "/twin on once it stands and no program runs"
+                raise Diagnostic("it moves or a program runs, and a twin begins at rest", name, hint)
+            begun = bus.now()
+            twin, lacks = make(snapshot, begun, drive.family.name == "modbus", len(bus.drives) == 1)
+            twins.begin(Beside(drive, twin, begun))
+        finally:
+            twins.forgo(drive)
+        self._workspace.notify(f"{name}: a twin runs beside it", bus=bus.name, outcome=True)
+        for each in lacks:
+            self._workspace.notify(f"{name}: its twin: {each}", bus=bus.name, warning=True)
+
+    # Losses
+
+    def identified(self, bus: Bus) -> None:
+        """Note that the drives of a bus are found: begin their twins where they are wanted."""
+        if self.wanted:
+            self._begin(bus, None)
+
+    def changed(self, bus: Bus) -> None:
+        """Note that a bus has changed: a lost one that is back is read anew."""
+        if bus.lost is None and bus in self._paused:
+            found = [each for each in self._paused.pop(bus) if each in bus.drives]
+            self._begin(bus, found)
+
+    def _begin(self, bus: Bus, addresses: Sequence[str] | None) -> None:
+        task = asyncio.get_running_loop().create_task(self._try(bus, addresses))
+        self._tasks[bus] = task
+        task.add_done_callback(lambda done: self._tasks.pop(bus) if self._tasks.get(bus) is done else None)
+
+    async def _try(self, bus: Bus, addresses: Sequence[str] | None) -> None:
+        try:
+            await self.start(bus, addresses)
+        except FAILURES as failure:
+            self._workspace.notify(f"{bus.name}: no twin: {failure}", bus=bus.name, warning=True)
+
+    def _lost(self, bus: Bus) -> None:
+        addresses = [each.address for each in self._buses[bus].besides]
+        self.stop(bus)
+        self._paused[bus] = addresses
+        self._workspace.notify(
+            f"{bus.name}: its twins end with the line; they are set anew once it is back", bus=bus.name
+        )
+
+    # What is said
+
+    def rows(self) -> Iterator[str]:
+        """A line for each twin that runs."""
+        for twins in self._buses.values():
+            for drive, beside in twins.besides.items():
+                apart = [f"{axis} {steps}".strip() for axis, steps in beside.differences.items()]
+                began = f"{self._workspace.wall(beside.begun):%H:%M:%S}"
+                said = f"apart by {', '.join(apart)} steps" if apart else "not compared yet"
+                yield f"{self._workspace.display_name(drive)}: a twin since {began}, {said}"
+
+    def _publish(self, bus: Bus, event: TwinEvent) -> None:
+        self._workspace.publish(OnBus(bus.name, event))
+        if not isinstance(event, Diverged | Agreed):
+            return
+        name = self._workspace.display_name(bus.at(event.address))
+        name = f"{name}.{event.axis}" if event.axis else name
+        when = f"{self._workspace.wall(event.at):%H:%M:%S.%f}"[:-5]
+        if isinstance(event, Agreed):
+            self._workspace.notify(f"{name}: agrees with its twin again, {when}", bus=bus.name)
+            return
+        text = f"{name}: {abs(event.difference)} steps from its twin since {when} (limit {event.limit})"
+        place = self._workspace.qualified_address(bus.at(event.address))
+        hint = f"/twin on {place} sets it anew".replace("  ", " ")
+        self._workspace.notify(f"{text}: {', '.join(event.causes)}; {hint}", bus=bus.name, warning=True)

@@ -1,0 +1,97 @@
+"""A twin beside a drive: a second simulated cell is the real one, which stalls, slips or is set otherwise."""
+
+from __future__ import annotations
+
+import asyncio
+from pathlib import Path
+
+import pytest
+
+from drives.events import Traffic
+from shell.events import Agreed, Diverged, OnBus, Predicted, TwinEnded
+from tests.support.cell_session import CellSession, bus, party
+
+pytestmark = pytest.mark.virtual
+
+
+def encoder(name: str = "a", world: str = "", **settings: int) -> str:
+    """A drive whose P counts what its shaft does."""
+    drive = party(name, EE=1, VM=8000, A=40000, D=40000, MT=50, **settings)
+    return f"{drive}\n[bus.drive.world]\n{world}" if world else drive
+
+
+def of(cell: CellSession, kind: type) -> list:
+    return [event.event for event in cell.events if isinstance(event, OnBus) and isinstance(event.event, kind)]
+
+
+async def run(cell: CellSession, *lines: str) -> None:
+    for line in lines:
+        await cell.session.run(line)
+
+
+MOVES = ("@a MR 100000", "@b MA -51200", "@a SL 50000", "@a VM=100000", "@a SL 0", "@a MA 0")
+
+
+async def test_a_drive_that_does_what_its_twin_does_agrees_to_the_step(tmp_path: Path) -> None:
+    async with CellSession(tmp_path, bus("press", party("a", VM=200000), party("b"), baud=0)) as cell:
+        await run(cell, "@a P=1234", "/twin on")
+        for line in MOVES:
+            await run(cell, line, "/sleep 1.3")
+        await run(cell, "/sleep 2")
+        assert len(of(cell, Predicted)) > 100
+        assert {each.difference for each in of(cell, Predicted)} <= {-1, 0, 1}
+
+
+async def test_bytes_that_take_their_time_are_no_reason_for_a_warning(tmp_path: Path) -> None:
+    async with CellSession(tmp_path, bus("press", party("a", VM=200000), party("b"))) as cell:
+        await run(cell, "/twin on")
+        for line in MOVES:
+            await run(cell, line, "/sleep 1.3")
+        await run(cell, "/sleep 2")
+        assert of(cell, Diverged) == []
+        assert [each.difference for each in of(cell, Predicted)][-2:] == [0, 0], "after an absolute move"
+        await run(cell, "@a SL 200000", "/sleep 1", "@a SL 0", "/sleep 1")
+        assert [each.difference for each in of(cell, Predicted)][-2:] == [0, 0], "the twin took the place of the drive"
+
+
+async def test_a_stall_is_named_first(tmp_path: Path) -> None:
+    async with CellSession(tmp_path, bus("press", encoder(world="stall_at = 20000"))) as cell:
+        await run(cell, "/twin on", "MR 16000", "/sleep 3")
+        (diverged,) = of(cell, Diverged)
+        assert diverged.causes[0] == "stall"
+        assert diverged.difference < -50
+
+
+async def test_a_push_is_named_a_slip(tmp_path: Path) -> None:
+    async with CellSession(tmp_path, bus("press", encoder())) as cell:
+        await run(cell, "/twin on", "MR 16000", "/sleep 0.7")
+        cell.world("push a -20000")
+        await asyncio.sleep(1.0)
+        (diverged,) = of(cell, Diverged)
+        assert diverged.causes[0] == "slip"
+
+
+async def test_a_push_at_rest_is_named_a_slip(tmp_path: Path) -> None:
+    async with CellSession(tmp_path, bus("press", encoder())) as cell:
+        await run(cell, "/twin on")
+        cell.world("push a 20000")
+        await asyncio.sleep(1.0)
+        (diverged,) = of(cell, Diverged)
+        assert diverged.causes[0] == "slip"
+
+
+async def test_a_load_that_the_motor_does_not_turn_is_named_first(tmp_path: Path) -> None:
+    async with CellSession(tmp_path, bus("press", encoder(world="load = 1.2", SF=60000))) as cell:
+        await run(cell, "/twin on", "MR 16000", "/sleep 3")
+        (diverged,) = of(cell, Diverged)
+        assert diverged.causes[0] == "load"
+
+
+async def test_another_acceleration_is_named_a_setting(tmp_path: Path) -> None:
+    async with CellSession(tmp_path, bus("press", party("a", VM=200000, A=400000))) as cell:
+        await run(cell, "/twin on")
+        cell.device("press:a").execute("A=150000", cell._floor().now())
+        await run(cell, "MR 200000", "/sleep 3")
+        diverged, *more = of(cell, Diverged)
+        assert diverged.causes[0] == "settings changed"
+        assert more == [] and len(of(cell, Agreed)) == 1
