@@ -15,8 +15,8 @@ from drives.conclusions import Concluded
 from drives.drive import Drive
 from drives.events import BusEvent, Conditioned, Lost, Sample, Sent, Traffic, Valued
 from drives.keeping import GLOBAL
-from drives.readings import Reading, Value
-from drives.telemetry import Subscription
+from drives.readings import Value
+from drives.subscriptions import Subscription
 from shell.events import TwinEnded, TwinEvent
 from shell.twins.beside import Beside
 
@@ -41,8 +41,8 @@ class BusTwins:
         self._departing = False
         """The bytes of a request are written next."""
         self._ends: list[Callable[[], None]] = [bus.watch(self._take), bus.witness(self._concluded)]
-        self._samples: Subscription | None = None
-        self._inputs: Reading | None = None
+        self._samples: Subscription[str] | None = None
+        self._inputs: Subscription[Value] | None = None
 
     # Drives
 

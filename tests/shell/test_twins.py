@@ -7,8 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from drives.events import Traffic
-from shell.events import Agreed, Diverged, OnBus, Predicted, TwinEnded
+from shell.events import Agreed, Diverged, OnBus, Predicted
 from tests.support.cell_session import CellSession, bus, party
 
 pytestmark = pytest.mark.virtual
