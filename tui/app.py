@@ -79,6 +79,7 @@ def is_stop(message: Message) -> bool:
 class MultidropApp(Actions):
     """The screen of one Session."""
 
+    typist: Typist
     CSS_PATH = "multidrop.tcss"
     TITLE = "multidrop"
     ENABLE_COMMAND_PALETTE = False
@@ -111,7 +112,7 @@ class MultidropApp(Actions):
             self.assist.complete,
             self.assist.history,
             self._clock,
-            lambda line: self.typist.typed(line),
+            lambda line, empty: self.typist.typed(line, empty),
             lambda lines: self.typist.pasted(lines),
         )
         self.main.times = look.times
@@ -239,7 +240,7 @@ class MultidropApp(Actions):
 
     def _drop_typed(self) -> None:
         """Drop what was typed before a stop, from whatever source the stop came."""
-        self.unsent.stopped(self.main.entry.value if self.focused is self.main.entry else None)
+        self.unsent.stopped(self.main.entry.unsent if self.focused is self.main.entry else None)
         self.outbox.drop()
         if asyncio.current_task() is self._own_task:
             self._cancel()  # a key stopped: the keys that wait were typed after it

@@ -78,6 +78,6 @@ class Selection:
             self.follow()
             self._main.entry.take_in(draft)
             return
-        if self.shown.bus and self._main.entry.value:
+        if self.shown.bus and self._main.entry.unsent:
             self._turn_deaf()
         self.follow()

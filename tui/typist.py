@@ -6,7 +6,7 @@ A line is for the drive that was shown when it was typed. `/stop` waits for noth
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Awaitable
+from collections.abc import Callable
 
 from tui.assist import Assist
 from tui.outbox import Outbox
@@ -51,8 +51,8 @@ class Typist:
         waits = f"{waiting} lines wait" if waiting > 1 else "a line waits"
         self._main.set_hint(self._meaning, f"{waits} for the one before" if waiting else "")
 
-    def typed(self, text: str) -> Awaitable[None] | None:
-        """Send a line on behalf of a person; what is returned follows once the input line is empty.
+    async def typed(self, text: str, empty: Callable[[], object]) -> None:
+        """Send a line on behalf of a person; `empty` empties the input line, which waits until the line is sent.
 
         In raw mode a line goes out with its spaces, and Enter alone sends the end of a line.
         """
@@ -60,15 +60,22 @@ class Typist:
         if self._session.selected_bus in self._session.raw and not line.startswith("/"):
             line = text
         if not line:
-            return None
-        if self._selection.changed or line == "/stop":
-            return self._typed_meanwhile(line)
-        self._outbox.type(line)
-        return self._sent(line)
+            empty()
+        elif self._selection.changed or line == "/stop":
+            empty()
+            await self._typed_meanwhile(line)
+        else:
+            await self._send(line)
+            empty()
+            self._follow(line)
 
-    async def _sent(self, line: str) -> None:
+    async def _send(self, line: str) -> None:
+        """Send a line, and let it take its first step: it is written, it has its drive, what is immediate is done."""
+        self._outbox.type(line)
+        await asyncio.sleep(0)
+
+    def _follow(self, line: str) -> None:
         """Follow a line that was sent."""
-        await asyncio.sleep(0)  # its first step: now it has its drive, and what is immediate is done
         self._assist.keep(line)
         self._main.page(self._main.current).look_end(newest=True)
         self._selection.follow()
@@ -86,8 +93,8 @@ class Typist:
             self._assist.keep(line)
             await self._session.run(line)
             return
-        self._outbox.type(line)
-        await self._sent(line)
+        await self._send(line)
+        self._follow(line)
 
     async def pasted(self, lines: list[str]) -> None:
         """Ask before several lines are sent one after the other."""

@@ -119,7 +119,7 @@ async def test_an_enter_that_comes_as_the_selection_changes_by_itself_sends_noth
     async with demo() as (screen, session, assist):
         await screen.type(b"MR 512")
         session.select("", "eth")
-        await screen.app.typist.typed("MR 512")
+        await screen.app.typist.typed("MR 512", screen.app.main.entry.exchange)
         assert session.sent == []
         assert assist.history()[-1] == "MR 512"
         await screen.shows("not sent: MR 512")

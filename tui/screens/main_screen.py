@@ -19,7 +19,7 @@ from tui.screens.reading import Reading
 from tui.text import fit, shorter
 from tui.widgets.banner import Banner
 from tui.widgets.beside import Beside
-from tui.widgets.entry import Complete, Draft, Entry, Menu
+from tui.widgets.entry import Complete, Draft, Entry, Menu, Typed
 from tui.widgets.lines import Lines, Roles, Row, width_of
 from tui.widgets.topline import rule_row
 from tui.widgets.transcript import Transcript
@@ -79,7 +79,7 @@ class MainScreen(Reading):
         complete: Complete,
         history: Callable[[], Sequence[str]],
         clock: Callable[[float], str],
-        typed: Callable[[str], Awaitable[None] | None],
+        typed: Typed,
         pasted: Callable[[list[str]], Awaitable[None]],
     ) -> None:
         super().__init__()

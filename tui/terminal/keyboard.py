@@ -18,6 +18,7 @@ from contextlib import suppress
 
 from textual import events
 from textual.app import App
+from textual.binding import Binding
 from textual.css.query import NoMatches
 from textual.dom import DOMNode
 from textual.errors import NoWidget
@@ -166,9 +167,26 @@ class Keyboard:
         return "".join(run)
 
     async def _bound(self, key: str) -> None:
-        active = self._app.screen.active_bindings.get(key)
-        if active is not None and active.enabled:
-            await self._app.run_action(active.binding.action, active.node)
+        found = self._binding(key)
+        if found is not None:
+            binding, node, enabled = found
+            if enabled:
+                await self._app.run_action(binding.action, node)
+
+    def _binding(self, key: str) -> tuple[Binding, DOMNode, bool] | None:
+        """The binding of a key, and whether its action is possible now.
+
+        `Screen.active_bindings` has it, too, after asking for each key whether its action is possible: that takes
+        longer than all else between Enter and the wire.
+        """
+        found: tuple[Binding, DOMNode, bool] | None = None
+        for node, bindings in self._app.screen._modal_binding_chain:
+            for binding in bindings.key_to_bindings.get(key, ()):
+                possible = self._app._check_action_state(binding.action, node)
+                first = found is None or (binding.priority and not found[0].priority)
+                if possible is not False and first:
+                    found = binding, node, bool(possible)
+        return found
 
     async def _click(self, event: events.MouseDown | events.MouseUp) -> None:
         app = self._app

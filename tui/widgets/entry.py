@@ -39,6 +39,13 @@ class Complete(Protocol):
         """Return the completions. `learned`: a person asks for them; it is called when there are more."""
 
 
+class Typed(Protocol):
+    """Takes a submitted line. It calls `empty`, which empties the input line, once the line is on its way."""
+
+    async def __call__(self, line: str, empty: Callable[[], object], /) -> None:
+        """Send the line."""
+
+
 class Recall:
     """A walk through earlier lines that begin with the typed text."""
 
@@ -121,7 +128,7 @@ class Draft:
 
 
 class Entry(Input):
-    """The input line. It calls `typed` with each line, an empty one too, clears itself, and awaits the rest of it.
+    """The input line. It awaits `typed` with each line, an empty one too, and with the function that empties it.
 
     It awaits `pasted` with several pasted lines.
     It posts `Edited` when its list or its text changes.
@@ -145,7 +152,7 @@ class Entry(Input):
         self,
         complete: Complete,
         lines: Callable[[], Sequence[str]],
-        typed: Callable[[str], Awaitable[None] | None],
+        typed: Typed,
         pasted: Callable[[list[str]], Awaitable[None]],
         *,
         id: str | None = None,
@@ -156,6 +163,8 @@ class Entry(Input):
         self._complete, self._lines = complete, lines
         self._typed, self._pasted = typed, pasted
         self._recall = Recall(lines)
+        self._submitted = False
+        """The text was handed on, and is still in the line."""
 
     def put(self, text: str) -> None:
         """Put text into the line without looking up completions for it."""
@@ -167,12 +176,18 @@ class Entry(Input):
         self.cursor_position = len(text)
         self.post_message(self.Edited())
 
+    @property
+    def unsent(self) -> str:
+        """The text that was not submitted."""
+        return "" if self._submitted else self.value
+
     def exchange(self, draft: Draft | None = None) -> Draft:
         """Take up another line, an empty one by default, and return the current one."""
-        before = Draft(self._recall, self.value, self.selection, self.listing)
+        before = Draft(self._recall, self.unsent, self.selection, self.listing)
         draft = draft or Draft(Recall(self._lines))
         self._recall, self.listing = draft.recall, draft.listing
         self.value, self.selection = draft.text, draft.selection
+        self._submitted = False
         self.post_message(self.Edited())
         return before
 
@@ -200,11 +215,9 @@ class Entry(Input):
         return Listing(text, found)
 
     async def action_submit(self) -> None:
-        """Send the line. It is on its way before the screen changes."""
-        rest = self._typed(self.value)
-        self.exchange()
-        if rest is not None:
-            await rest
+        """Send the line."""
+        self._submitted = True
+        await self._typed(self.value, self.exchange)
 
     def action_recall(self, direction: int) -> None:
         """Step through history on Up and Down; in the list while one of it is chosen."""

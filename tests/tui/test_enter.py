@@ -1,0 +1,57 @@
+"""Enter: the line is on its way before the screen changes, and each key finds its binding."""
+
+import pytest
+from textual import events
+
+from tests.support.fake_session import demo_session, make_app
+
+pytestmark = pytest.mark.tui
+
+
+async def test_a_line_takes_its_first_step_before_the_input_line_is_emptied() -> None:
+    session = demo_session()
+    app, seen = make_app(session), []
+    async with app.run_test(size=(80, 24)) as pilot:
+        run = session.run
+
+        async def noting(line: str, *more: object) -> None:
+            seen.append((line, app.main.entry.value, app.main.entry.unsent))
+            await run(line, *more)  # type: ignore[arg-type]
+
+        session.run = noting  # type: ignore[method-assign]
+        await pilot.press(*"MR 5", "enter", *"PR P")
+        assert seen == [("MR 5", "MR 5", "")]
+        assert (app.main.entry.value, app.main.entry.unsent) == ("PR P", "PR P")
+
+
+async def test_a_line_that_is_written_as_the_stop_comes_is_not_said_to_be_unsent() -> None:
+    session = demo_session()
+    app = make_app(session)
+    async with app.run_test(size=(80, 24)) as pilot:
+        run = session.run
+
+        async def stopping(line: str, *more: object) -> None:
+            await run(line, *more)  # type: ignore[arg-type]
+            for key in "PR":
+                app.post_message(events.Key(key, key))
+            app.stop_all()
+
+        session.run = stopping  # type: ignore[method-assign]
+        await pilot.press(*"MR 5", "enter")
+        await pilot.pause()
+        app.tick()
+        assert ([line for line, _ in session.lines], session.stops, app.main.entry.value) == (["MR 5"], 1, "")
+        assert "stopped; not sent: PR" in app.main.page("press").plain
+        assert set(app.assist.history()) >= {"MR 5", "PR"}
+
+
+@pytest.mark.parametrize("keys", [[], ["ctrl+e"], ["ctrl+p"], ["ctrl+f"]])
+async def test_a_key_finds_the_binding_that_is_active(keys: list[str]) -> None:
+    app = make_app()
+    async with app.run_test(size=(80, 24)) as pilot:
+        await pilot.press(*keys)
+        active = app.screen.active_bindings
+        assert "escape" in active
+        for key in {key for _, bindings in app.screen._binding_chain for key in bindings.key_to_bindings}:
+            found, expected = app.keyboard._binding(key), active.get(key)
+            assert found == (expected and (expected.binding, expected.node, expected.enabled)), key
