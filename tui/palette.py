@@ -41,6 +41,7 @@ class Switches(NamedTuple):
 
     polling: bool
     mouse: bool
+    twin: bool
 
 
 class Recent:
@@ -82,6 +83,8 @@ def all_commands(
     yield Command(log, about, "app.log", keys.shown("log") or "/log")
     yield from _pages_and_panels(keys)
     yield from _choices(session, macros, keys)
+    about = "simulated drives that run beside those of this line; every difference shows"
+    yield Command(f"Twin {_other(switches.twin)}", about, "app.twin", keys.shown("twin"))
     yield Command("Search history", "the lines typed before", "app.search_history", keys.shown("history"))
     yield from _view(keys, switches)
     for name, _, meaning in verbs:

@@ -125,6 +125,11 @@ class ScreenModel:
         """The place for records of a bus; those of a bus that is not open go to the current page."""
         return self.bus(name if name in self._opened() else "").fresh
 
+    def twinned(self, name: str) -> bool:
+        """Whether a drive of a bus has a twin."""
+        readouts = self.bus(name).readouts.values()
+        return any(axis.twin is not None for readout in readouts for axis in readout.axes)
+
     def rename(self, before: str, now: str) -> None:
         """Know a bus by another name."""
         self.buses[now] = self.buses.pop(before, BusFacts())

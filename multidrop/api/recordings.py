@@ -9,21 +9,26 @@ from typing import Any
 from dialects import Diagnostic
 from dialects.files import why
 from multidrop.api.samples import Sample, Samples
+from shell.plots.layout import TWIN
 from shell.plots.sink import load
 
 QUANTITIES = ("position", "velocity")
+"""Both are in every sample of a drive, and of its twin."""
 Key = tuple[float, str, str]
 """Seconds since the plot began, drive, axis."""
 
 
-def read_rrd(file: str | Path) -> Samples:
-    """Read the samples of a plot that multidrop wrote. Raises Diagnostic for another file, and without rerun."""
+def read_rrd(file: str | Path, *, twin: bool = False) -> Samples:
+    """Read the samples of a plot that multidrop wrote; `twin`: those that the twins of its drives predicted.
+
+    Raises Diagnostic for another file, for one without such samples, and without rerun.
+    """
     load()
     path = Path(file)
     if not path.exists():
         raise Diagnostic("cannot be read: there is no such file", str(path))
     rows: dict[Key, dict[str, float]] = {}
-    for drive, axis, what, elapsed, wall, value in _values(path):
+    for drive, axis, what, elapsed, wall, value in _values(path, twin):
         rows.setdefault((elapsed, drive, axis), {"time": wall})[what] = value
     whole = (each for each in sorted(rows.items()) if all(what in each[1] for what in QUANTITIES))
     found = Samples(
@@ -31,19 +36,22 @@ def read_rrd(file: str | Path) -> Samples:
         for (elapsed, drive, axis), row in whole
     )
     if not found:
-        raise Diagnostic(
-            "has no samples of multidrop", str(path), "multidrop plot URL --to FILE.rrd writes such a file"
+        missing, hint = (
+            ("twins", "/twin on, then /plot --to FILE.rrd")
+            if twin
+            else ("multidrop", "multidrop plot URL --to FILE.rrd")
         )
+        raise Diagnostic(f"has no samples of {missing}", str(path), f"{hint} writes such a file")
     return found
 
 
-def _values(path: Path) -> Iterator[tuple[str, str, str, float, float, float]]:
+def _values(path: Path, twin: bool) -> Iterator[tuple[str, str, str, float, float, float]]:
     """Drive, axis, quantity, elapsed, time of day and value of each entry."""
     from rerun.chunk import RrdReader
 
     try:
         for chunk in RrdReader(str(path)).stream():
-            series = _series(chunk.entity_path)
+            series = _series(chunk.entity_path, twin)
             if series is not None and "elapsed" in chunk.timeline_names:
                 yield from ((*series, *row) for row in _column(chunk.to_record_batch()))
     except (OSError, RuntimeError, ValueError) as problem:
@@ -51,13 +59,17 @@ def _values(path: Path) -> Iterator[tuple[str, str, str, float, float, float]]:
         raise Diagnostic(f"cannot be read: {reason}", str(path)) from None
 
 
-def _series(entity: str) -> tuple[str, str, str] | None:
-    """The drive, axis and quantity of an entity `/BUS/ADDRESS/AXIS/position`; None for another one."""
-    parts = entity.strip("/").replace("\\", "").split("/")
-    if len(parts) < 2 or parts[-1] not in QUANTITIES:
+def _series(entity: str, twin: bool) -> tuple[str, str, str] | None:
+    """The drive, axis and quantity of an entity `/BUS/ADDRESS/AXIS/position`; None for another one.
+
+    `twin`: of `/BUS/ADDRESS/AXIS/twin/position`.
+    """
+    *parts, what = entity.strip("/").replace("\\", "").split("/")
+    of_twin = len(parts) > 1 and parts[-1] == TWIN
+    if not parts or what not in QUANTITIES or of_twin is not twin:
         return None
-    bus, address, axis = (*parts[:-1], "", "")[:3]
-    return f"{bus}:{address}" if address else bus, axis, parts[-1]
+    bus, address, axis = (*(parts[:-1] if twin else parts), "", "")[:3]
+    return f"{bus}:{address}" if address else bus, axis, what
 
 
 def _column(batch: Any) -> Iterator[tuple[float, float, float]]:

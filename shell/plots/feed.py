@@ -12,12 +12,24 @@ from drives.events import Conditioned, Lost, Sample, Unsolicited, Valued
 from drives.readings import USUAL, Value
 from drives.subscriptions import Subscription
 from drives.telemetry import MODEST, Telemetry
-from shell.events import Entered, Failed, Notified, OnBus, Printed, SessionEvent
+from shell.events import (
+    Diverged,
+    Entered,
+    Failed,
+    Notified,
+    OnBus,
+    Predicted,
+    Printed,
+    SessionEvent,
+    TwinEnded,
+    TwinEvent,
+)
+from shell.plots.layout import AGREES, DIFFERS, TWIN
 from shell.plots.plot import Plot
 from shell.plots.rate import shown
 from shell.plots.states import states_of
 from shell.plots.target import PlotTarget
-from shell.roles import Series
+from shell.roles import DIFFERENCE, Series
 from transports.exposure import exposed
 
 if TYPE_CHECKING:
@@ -89,6 +101,8 @@ def attach(workspace: Workspace, plot: Plot, series: Sequence[Series], period: f
         if not isinstance(event, OnBus):
             return _log(plot, buses, event)
         bus, inner = event
+        if isinstance(inner, TwinEvent):
+            return _twin(plot, wanted, bus, inner)
         if isinstance(inner, Sample) and Series(bus, inner.address) in wanted:
             plot.sample(bus, inner)
         elif isinstance(inner, Valued) and Series(bus, inner.address, inner.word) in wanted:
@@ -123,13 +137,13 @@ def attach(workspace: Workspace, plot: Plot, series: Sequence[Series], period: f
 
 def _polls(telemetry: Telemetry, series: Sequence[Series], period: float) -> Iterator[Callable[[], None]]:
     """Begin to poll drives and values of a bus; the functions that end that."""
-    if addresses := [each.address for each in series if not each.word]:
+    if addresses := list(dict.fromkeys(each.address for each in series if each.of_motion)):
         yield telemetry.subscribe(addresses, period).close
         if period:
             yield telemetry.watch(addresses, len(addresses) * STATES).close
         else:
             yield from _sparing(telemetry, addresses)
-    if values := [Value(each.address, each.word) for each in series if each.word]:
+    if values := [Value(each.address, each.word) for each in series if not each.of_motion]:
         yield telemetry.read(values, max(period, USUAL)).close
 
 
@@ -147,6 +161,20 @@ def _sparing(telemetry: Telemetry, addresses: Sequence[str]) -> Iterator[Callabl
             watch.close()
 
     yield close
+
+
+def _twin(plot: Plot, wanted: set[Series], bus: str, event: TwinEvent) -> None:
+    """Plot what the twin of a wanted drive predicts, or only the difference, and whether they agree."""
+    whole = Series(bus, event.address) in wanted
+    if not whole and Series(bus, event.address, DIFFERENCE) not in wanted:
+        return
+    if isinstance(event, Predicted):
+        plot.predicted(bus, event, alone=not whole)
+    elif isinstance(event, TwinEnded):
+        plot.twin_ended(bus, event.address, event.at)
+    else:
+        said = DIFFERS if isinstance(event, Diverged) else AGREES
+        plot.state(bus, event.address, event.axis, TWIN, event.at, said)
 
 
 def _log(plot: Plot, buses: set[str], event: SessionEvent) -> None:

@@ -1,6 +1,7 @@
 """The views of a plot in the viewer: velocities, positions, values, states, and the log of commands and replies.
 
-Time axes are linked. A view of one drive bears its name, and has no legend that could cover a curve.
+Time axes are linked. A view of one drive bears its name, and has no legend that could cover a curve, unless it has a
+twin. A twin's position and velocity share the charts of its drive; the difference has a chart of its own.
 """
 
 from __future__ import annotations
@@ -8,16 +9,31 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Set
 from typing import Any
 
-UNITS = {"position": "steps", "velocity": "steps/s"}
-"""The quantities of every drive, with their units."""
+from shell.roles import DIFFERENCE
+
+UNITS = {"position": "steps", "velocity": "steps/s", DIFFERENCE: "steps"}
+"""The quantities of every drive, and the difference from its twin, with their units."""
+TWIN = "twin"
+"""The part of a path before the quantities of a twin; also its lane of states."""
+RUNS, AGREES, DIFFERS = "runs", "agrees", "differs"
+"""The states of a twin: it runs, it agrees with its drive again, or the two differ."""
 STATE = "state"
 """The part of a path after which the name of a lane of states follows."""
 COLOURS = {"command": 0x2F8FD0FF, "reply": 0x808A90FF, "error": 0xE04848FF, "note": 0xB07D10FF}
 """The colour of a log line, by level; each can be read on a dark and on a light ground."""
 LINES = (0x3FA0E0FF, 0x009E73FF, 0xCC79A7FF, 0xD08C00FF, 0x7A6FD0FF, 0x808A90FF, 0x40B0A8FF, 0xA07850FF)
 """The colours of drives, which people with any colour vision can tell apart. None is that of an error."""
-SHADES = {"on": 0x3FA0E0FF, "off": 0x80808050, "none": 0x80808050}
+SHADES = {
+    "on": 0x3FA0E0FF,
+    "off": 0x80808050,
+    "none": 0x80808050,
+    RUNS: 0x80808050,
+    AGREES: 0x80808050,
+    DIFFERS: 0xE04848FF,
+}
 """The colours of states that need no attention, and of what is on; the viewer chooses those of others."""
+BAND, PALE = 4.0, 0x70
+"""The width of a twin's line, and its opacity: a pale band in the colour of its drive, whose thin line lies in it."""
 SIDE_BY_SIDE = 4
 """The greatest number of drives that open with views of their own."""
 
@@ -69,7 +85,7 @@ def _column(rrb: Any, curves: Iterable[str], drive: str) -> Any:
             name=" ".join(filter(None, (drive.lstrip("/"), word, f"({UNITS[word]})" if word in UNITS else ""))),
             contents=found,
             axis_x=_linked(rrb),
-            plot_legend=rrb.PlotLegend(visible=not drive),
+            plot_legend=rrb.PlotLegend(visible=not drive or len(found) > 1),
         )
         for word, found in words.items()
         if found
@@ -92,7 +108,8 @@ def _curves(paths: Set[str]) -> list[str]:
 
 
 def _drive(path: str) -> str:
-    return path.rpartition("/")[0]
+    parent = path.rpartition("/")[0]
+    return parent.removesuffix(f"/{TWIN}") or parent  # a line of drives may have that name
 
 
 def drives_of(paths: Set[str]) -> list[str]:

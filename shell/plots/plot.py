@@ -16,10 +16,12 @@ from typing import TypeVar
 
 from dialects import Diagnostic
 from drives.events import Sample, Valued
+from shell.events import Predicted
 from shell.plots.file import SinkBroken
-from shell.plots.layout import COLOURS
+from shell.plots.layout import COLOURS, RUNS, TWIN
 from shell.plots.sink import Batch, Curve, Sink, State
 from shell.plots.target import PlotTarget
+from shell.roles import DIFFERENCE
 
 T = TypeVar("T")
 FILE_PERIOD, LIVE_PERIOD = 0.4, 0.1
@@ -92,6 +94,26 @@ class Plot:
         if not self._done:
             self.samples += 1
             self._point(Curve(bus, read.address, "", read.word), read.at, read.value)
+
+    def predicted(self, bus: str, twin: Predicted, *, alone: bool = False) -> None:
+        """Take what the twin of a drive predicts; `alone`: the difference only. Never blocks."""
+        if not self._done:
+            self.samples += alone
+            drive = (bus, twin.address, twin.axis)
+            for word, value in [("position", twin.position), ("velocity", twin.velocity)] if not alone else []:
+                self._point(Curve(*drive, word, twin=True), twin.at, value)
+            self._point(Curve(*drive, DIFFERENCE, twin=True), twin.at, twin.difference)
+            if self._states.get(State(*drive, TWIN), "") == "":
+                self.state(*drive, TWIN, twin.at, RUNS)
+
+    def twin_ended(self, bus: str, address: str, at: float) -> None:
+        """End the curves of a twin. Never blocks."""
+        for curve in self._curves if not self._done else ():
+            if curve.twin and curve[:2] == (bus, address):
+                self._batch.gaps.setdefault(curve, []).append(self._times(at))
+        for lane in list(self._states):
+            if (*lane[:2], lane.name) == (bus, address, TWIN):
+                self.state(*lane, at, "")
 
     def _point(self, curve: Curve, at: float, value: float) -> None:
         self._curves.add(curve)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from dialects import Diagnostic
 from shell.lines import EVERYONE, split_target
-from shell.roles import Series
+from shell.roles import DIFFERENCE, Series
 
 if TYPE_CHECKING:
     from drives.drive import Drive
@@ -76,6 +76,8 @@ def _value(workspace: Workspace, bus: str, address: str, word: str, text: str) -
     readings = drive.family.readings
     if not word:
         raise Diagnostic(f"no value in {text!r}", hint=FORMS)
+    if word.lower() == DIFFERENCE:
+        return Series(bus, address, DIFFERENCE)
     if readings is None:
         raise Diagnostic(f"{drive.shown}: its values are not plotted; position and velocity are", hint=FORMS)
     return Series(bus, address, readings.check(drive.state, word))
@@ -84,6 +86,8 @@ def _value(workspace: Workspace, bus: str, address: str, word: str, text: str) -
 def _is_own(workspace: Workspace, series: Series) -> bool:
     """Whether a word belongs to the drive's language, and is no name that a person gave."""
     drive = workspace.buses[series.bus].drives[series.address]
+    if series.word == DIFFERENCE:
+        return True
     return drive.family.readings is not None and drive.family.readings.own(drive.state, series.word)
 
 
@@ -91,5 +95,5 @@ async def read_first(workspace: Workspace, series: Sequence[Series]) -> None:
     """Read each value once, as a person would, before it is polled. Raises the refusal of a drive that lacks it."""
     for bus, address, word in series:
         drive = workspace.buses[bus].drives[address]
-        if word and drive.family.readings is not None:
+        if word != DIFFERENCE and word and drive.family.readings is not None:
             await drive.run(drive.family.readings.first(drive.state, word))

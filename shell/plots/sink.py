@@ -19,20 +19,43 @@ from typing import Any, NamedTuple
 from dialects import Diagnostic
 from dialects.files import why
 from shell.plots.file import APPLICATION, FLUSH, GAP, RecordingFile, SinkBroken
-from shell.plots.layout import COLOURS, LINES, SHADES, STATE, UNITS, drives_of, entity_path, is_state, layout
+from shell.plots.layout import (
+    BAND,
+    COLOURS,
+    LINES,
+    PALE,
+    SHADES,
+    STATE,
+    TWIN,
+    UNITS,
+    drives_of,
+    entity_path,
+    is_state,
+    layout,
+)
 from shell.plots.target import PlotTarget, bracketed
+from shell.roles import DIFFERENCE
 from transports import Unreachable
 
 _INSTALL = "pip install 'multidrop[rerun]'"
 
 
 class Curve(NamedTuple):
-    """One curve: `axis` is empty for a drive with one axis, `word` is `position`, `velocity` or a word of the drive."""
+    """One curve: `axis` is empty for a drive with one axis, `word` is `position`, `velocity` or a word of the drive.
+
+    `twin`: of its twin.
+    """
 
     bus: str
     address: str
     axis: str
     word: str
+    twin: bool = False
+
+    @property
+    def place(self) -> tuple[str, ...]:
+        """The parts of its path."""
+        return (*self[:3], *(TWIN,) * self.twin, self.word)
 
     @property
     def drive(self) -> tuple[str, ...]:
@@ -212,13 +235,16 @@ class Sink:
                 shades = self._rr.StateConfiguration(values=list(SHADES), colors=list(SHADES.values()))
                 self._recording.log(path, shades, static=True, strict=True)
         for curve in batch.curves:
-            path = entity_path(self._rr, *curve)
+            path = entity_path(self._rr, *curve.place)
             if path not in self._paths:
                 new.add(path)
                 unit = f"({UNITS[curve.word]})" if curve.word in UNITS else ""
                 named = self._names.get(entity_path(self._rr, *curve[:2]), " ".join(curve.drive[:2]))
-                name = " ".join((named, curve.axis, curve.word, unit))
-                lines = self._rr.SeriesLines(names=" ".join(name.split()), colors=self._colour(curve), widths=1.5)
+                predicted = curve.twin and curve.word != DIFFERENCE
+                name = " ".join((named, curve.axis, TWIN if predicted else "", curve.word, unit))
+                colour = self._colour(curve) & ~0xFF | PALE if predicted else self._colour(curve)
+                width = BAND if predicted else 1.5
+                lines = self._rr.SeriesLines(names=" ".join(name.split()), colors=colour, widths=width)
                 self._recording.log(path, lines, static=True, strict=True)
         if new:
             self._paths |= new
@@ -240,13 +266,13 @@ class Sink:
     def _send_samples(self, curve: Curve, rows: list[tuple[float, float, float]]) -> None:
         times = self._times([row[0] for row in rows], [row[1] for row in rows])
         values = self._rr.Scalars.columns(scalars=[row[2] for row in rows])
-        self._recording.send_columns(entity_path(self._rr, *curve), times, values, strict=True)
+        self._recording.send_columns(entity_path(self._rr, *curve.place), times, values, strict=True)
 
     def _send_gaps(self, curve: Curve, gaps: list[tuple[float, float]]) -> None:
         for elapsed, wall in gaps:
             self._recording.set_time("elapsed", duration=elapsed)
             self._recording.set_time("time", timestamp=wall)
-            self._recording.log(entity_path(self._rr, *curve), self._rr.Clear(recursive=False), strict=True)
+            self._recording.log(entity_path(self._rr, *curve.place), self._rr.Clear(recursive=False), strict=True)
         self._recording.reset_time()
 
     def _send_states(self, state: State, rows: list[tuple[float, float, str]]) -> None:

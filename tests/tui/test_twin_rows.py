@@ -7,9 +7,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from drives.events import Sample
-from shell.events import Agreed, Diverged, OnBus, Predicted, SessionEvent, TwinEnded
+from shell.events import Agreed, By, OnBus, Predicted, SessionEvent, TwinEnded
 from shell.roles import DIFFERENCE, Series
-from tests.support.fake_session import FakeSession, demo_session, make_app
+from tests.support.fake_session import FakeSession, demo_session, make_app, settle
+from tests.support.fake_twin import apart, beside
 from tui.curves.ink import ASCII, BLOCK, BRAILLE, TWINS, Ink
 from tui.panels.axis import drive_rows
 from tui.panels.glance import glances_of
@@ -23,20 +24,6 @@ from tui.screen_model import ScreenModel, bus_state
 from tui.screens.all_drives import drive_row, worst_first
 from tui.widgets.lines import Row, width_of
 from tui.widgets.signs import Signs, shown_as
-
-CAUSES = ("stall", "load")
-
-
-def beside(at: float, position: int, velocity: int, ahead: int, address: str = "a", axis: str = "") -> list[OnBus]:
-    """A sample, and the twin that is ahead of it."""
-    return [
-        OnBus("press", Sample(at, address, position, velocity, axis)),
-        OnBus("press", Predicted(at, address, position + ahead, velocity + ahead, -ahead, axis)),
-    ]
-
-
-def apart(session: FakeSession, address: str = "a", axis: str = "") -> OnBus:
-    return OnBus("press", Diverged(session.time, address, -8112, 200, CAUSES, axis))
 
 
 def view(session: FakeSession, *events: SessionEvent) -> View:
@@ -222,3 +209,43 @@ def test_rows_with_a_twin_stay_in_their_room(width: int, height: int, places: li
     assert all(width_of(row) <= max(width, 45) for row in drive_rows(shown, max(width, 39), height))
     signs = shown_as(plain(*narrow_rows(shown, 80)), Signs.ASCII)
     assert signs.isascii()
+
+
+# Keys
+
+
+@pytest.mark.tui
+async def test_a_key_begins_and_ends_the_twins_of_the_line_as_typed_lines_do() -> None:
+    session = demo_session()
+    app = make_app(session)
+    async with app.run_test(size=(200, 50)) as pilot:
+        await pilot.press("alt+t")
+        session.emit(*beside(session.time, 0, 0, 8112), apart(session))
+        await settle(pilot)
+        assert "≠" in app.main.lines("side").plain + app.main.lines("far").plain
+        assert "≠ twin" in app.main.lines("top").plain and "Alt+T twin" in app.main.lines("footer").plain
+        assert "Twin off" in {each.title for each in app.commands()}
+        await pilot.press("alt+t")
+        session.emit(OnBus("press", TwinEnded(session.time, "a")))
+        await pilot.press("ctrl+pagedown", "alt+t")
+        await settle(pilot)
+        assert session.sent == ["press:a /twin on", "press:a /twin off", "eth: /twin on"]
+        assert "≠" not in app.main.lines("top").plain and "Twin on" in {each.title for each in app.commands()}
+
+
+@pytest.mark.tui
+async def test_d_plots_the_difference_and_plots_it_no_longer() -> None:
+    session = demo_session()
+    app = make_app(session)
+    async with app.run_test(size=(100, 30)) as pilot:
+        await pilot.press("ctrl+g", "d")
+        await settle(pilot)
+        session.plotted = (Series("press", "a"), Series("press", "a", DIFFERENCE), Series("press", "b", "VM"))
+        await pilot.press("d")
+        session.plotted = (Series("press", "a", DIFFERENCE),)
+        await pilot.press("d")
+        await settle(pilot)
+        assert session.lines == [
+            ("/plot press:a press:a.difference", By.OPERATOR),
+            ("/plot press:a press:b.VM", By.OPERATOR),
+        ]

@@ -7,6 +7,7 @@ from typing import ClassVar
 from textual.app import ComposeResult
 from textual.binding import Binding, BindingType
 
+from shell.roles import DIFFERENCE
 from tui.curves.look import Look
 from tui.panels.chart_rows import columns_of, cursor_row
 from tui.panels.plot import plot_rows, plot_title
@@ -39,6 +40,7 @@ class PlotPage(Page):
         Binding("p", "hide('position')", show=False),
         *(Binding(str(n), f"drive({n})", show=False) for n in range(1, 10)),
         Binding("a", "all_drives", show=False),
+        Binding("d", "difference", show=False),
         Binding("r", "stream", show=False),
         Binding("c", "copy", show=False),
     ]
@@ -53,6 +55,7 @@ class PlotPage(Page):
         ("V", "velocity"),
         ("P", "position"),
         ("A", "all"),
+        ("D", "difference"),
         ("0", "reset"),
     )
     WANTS = frozenset({"motion", "plot", "samples"})
@@ -152,6 +155,15 @@ class PlotPage(Page):
     def action_all_drives(self) -> None:
         """Plot all drives of the selected line."""
         self._type(f"/plot {self.host.session.selected_bus}:*")
+
+    def action_difference(self) -> None:
+        """Plot the differences of the plotted drives from their twins, or plot them no longer."""
+        named = list(plotted(self.host.session))
+        texts = [each.text for each in named if each.word != DIFFERENCE]
+        if len(texts) == len(named):
+            texts += [each._replace(word=DIFFERENCE).text for each in named if not each.word]
+        if texts:  # one stays
+            self._type(f"/plot {' '.join(texts)}")
 
     def action_stream(self) -> None:
         """Serve what is plotted for viewers of rerun, or end all such plots."""

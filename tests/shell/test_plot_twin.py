@@ -1,0 +1,123 @@
+"""A twin in a plot to rerun: its curves beside those of its drive, the difference, the state; and what reads back."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from dialects import Diagnostic
+from drives.events import Sample
+from multidrop import read_rrd
+from shell.events import Predicted
+from shell.plots.layout import DIFFERS, LINES, PALE, RUNS, TWIN, drives_of, layout
+from shell.plots.plot import Plot
+from shell.plots.target import PlotTarget
+from tests.shell.test_plot_layout import contents
+
+
+@pytest.fixture
+def rerun() -> Iterator[Any]:
+    os.environ["RUST_LOG"] = "off"
+    yield pytest.importorskip("rerun")
+
+
+async def plotted(path: Path) -> dict[str, dict[str, list[Any]]]:
+    """Two drives, of which `b` falls behind its twin, and an axis of a third one."""
+    plot = await Plot.open(
+        PlotTarget(file=path), clock=lambda: 0.0, wall=lambda at: datetime.fromtimestamp(1.8e9 + at, UTC)
+    )
+    plot.label("press", "a", "")
+    plot.label("press", "b", "clamp")
+    for n in range(4):
+        plot.sample("press", Sample(1.0 + n, "a", n, 0))
+        plot.sample("press", Sample(1.0 + n, "b", 100 * n, 100))
+        plot.predicted("press", Predicted(1.0 + n, "b", 150 * n, 150, -50 * n))
+        plot.sample("pmx", Sample(1.0 + n, "00", n, 0, "y"))
+        plot.predicted("pmx", Predicted(1.0 + n, "00", n, 0, 0, "y"))
+    plot.state("press", "b", "", TWIN, 3.0, DIFFERS)
+    plot.twin_ended("press", "b", 5.0)
+    assert await plot.close() == f"12 samples in {path}"
+    return contents(path)
+
+
+async def test_a_twin_has_the_colour_of_its_drive_as_a_pale_band_and_a_name(rerun: Any, tmp_path: Path) -> None:
+    found = await plotted(tmp_path / "run.rrd")
+    own, twin = found["/press/b/position"], found["/press/b/twin/position"]
+    assert own["SeriesLines:colors"][0] == [LINES[1]]
+    assert twin["SeriesLines:colors"][0] == [LINES[1] & ~0xFF | PALE]
+    assert twin["SeriesLines:widths"][0][0] > 2 * own["SeriesLines:widths"][0][0]
+    assert twin["SeriesLines:names"][0] == ["press:b clamp twin position (steps)"]
+    difference = found["/press/b/twin/difference"]
+    assert difference["SeriesLines:names"][0] == ["press:b clamp difference (steps)"]
+    assert difference["SeriesLines:colors"][0] == [LINES[1]]
+    assert "/press/a/twin/position" not in found and "/pmx/00/y/twin/velocity" in found
+
+
+async def test_the_state_of_a_twin_is_a_lane_that_ends_with_it(rerun: Any, tmp_path: Path) -> None:
+    lane = (await plotted(tmp_path / "run.rrd"))["/press/b/state/twin"]
+    assert [each for each in lane["StateChange:state"] if each is not None] == [[RUNS], [DIFFERS], [""]]
+    assert [at / 1e9 for at in lane["elapsed"] if at is not None] == [1.0, 3.0, 5.0]
+
+
+async def test_a_run_with_a_twin_reads_back(rerun: Any, tmp_path: Path) -> None:
+    await plotted(tmp_path / "run.rrd")
+    measured, predicted = read_rrd(tmp_path / "run.rrd"), read_rrd(tmp_path / "run.rrd", twin=True)
+    assert {(each.drive, each.axis) for each in measured} == {("press:a", ""), ("press:b", ""), ("pmx:00", "y")}
+    assert {(each.drive, each.axis) for each in predicted} == {("press:b", ""), ("pmx:00", "y")}
+    assert [each.position for each in measured.of("press:b")] == [0, 100, 200, 300]
+    assert [(each.position, each.velocity) for each in predicted.of("press:b")] == [
+        (0, 150),
+        (150, 150),
+        (300, 150),
+        (450, 150),
+    ]
+    assert [each.elapsed for each in measured.of("press:b")] == [each.elapsed for each in predicted.of("press:b")]
+
+
+async def test_a_run_without_a_twin_says_so(rerun: Any, tmp_path: Path) -> None:
+    plot = await Plot.open(PlotTarget(file=tmp_path / "a.rrd"), clock=lambda: 0.0, wall=lambda at: datetime.now(UTC))
+    plot.sample("press", Sample(1.0, "a", 1, 2))
+    await plot.close()
+    with pytest.raises(Diagnostic, match=r"no samples of twins; /twin on"):
+        read_rrd(tmp_path / "a.rrd", twin=True)
+
+
+async def test_the_difference_alone_is_a_plot(rerun: Any, tmp_path: Path) -> None:
+    plot = await Plot.open(PlotTarget(file=tmp_path / "a.rrd"), clock=lambda: 0.0, wall=lambda at: datetime.now(UTC))
+    plot.predicted("press", Predicted(1.0, "a", 5, 6, -7), alone=True)
+    assert (await plot.close()).startswith("1 samples in")
+    found = contents(tmp_path / "a.rrd")
+    assert found["/press/a/twin/difference"]["Scalars:scalars"] == [[-7.0]] and "/press/a/twin/position" not in found
+
+
+def views(part: Any) -> Iterator[tuple[str, list[str], Any]]:
+    """The charts below a part of a layout: name, contents, legend."""
+    for each in getattr(part, "contents", None) or []:
+        if isinstance(each, str):
+            continue
+        if type(each).__name__ == "TimeSeriesView":
+            yield each.name, list(each.contents), each.properties["PlotLegend"].visible.as_arrow_array().to_pylist()[0]
+        else:
+            yield from views(each)
+
+
+def test_a_twin_shares_the_charts_of_its_drive_and_the_difference_has_its_own(rerun: Any) -> None:
+    own = {"/press/b/position", "/press/b/velocity", "/press/log", "/press/b/state/twin"}
+    paths = own | {f"/press/b/twin/{word}" for word in ("position", "velocity", "difference")}
+    assert drives_of(paths) == ["/press/b"]
+    assert list(views(layout(paths, {}).root_container)) == [
+        ("press/b position (steps)", ["/press/b/position", "/press/b/twin/position"], True),
+        ("press/b velocity (steps/s)", ["/press/b/twin/velocity", "/press/b/velocity"], True),
+        ("press/b difference (steps)", ["/press/b/twin/difference"], False),
+    ]
+    assert [visible for _, _, visible in views(layout(own, {}).root_container)] == [False, False]
+
+
+@pytest.mark.parametrize("path", ["/twin/position", "/twin/twin/position"])
+def test_a_line_of_drives_may_be_called_twin(path: str, rerun: Any) -> None:
+    assert drives_of({path}) == ["/twin"]
