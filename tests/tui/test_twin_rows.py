@@ -219,15 +219,15 @@ async def test_a_key_begins_and_ends_the_twins_of_the_line_as_typed_lines_do() -
     session = demo_session()
     app = make_app(session)
     async with app.run_test(size=(200, 50)) as pilot:
-        await pilot.press("alt+t")
+        await pilot.press("ctrl+f2")
         session.emit(*beside(session.time, 0, 0, 8112), apart(session))
         await settle(pilot)
         assert "≠" in app.main.lines("side").plain + app.main.lines("far").plain
-        assert "≠ twin" in app.main.lines("top").plain and "Alt+T twin" in app.main.lines("footer").plain
+        assert "≠ twin" in app.main.lines("top").plain and "^F2 twin" in app.main.lines("footer").plain
         assert "Twin off" in {each.title for each in app.commands()}
-        await pilot.press("alt+t")
+        await pilot.press("ctrl+f2")
         session.emit(OnBus("press", TwinEnded(session.time, "a")))
-        await pilot.press("ctrl+pagedown", "alt+t")
+        await pilot.press("ctrl+pagedown", "ctrl+f2")
         await settle(pilot)
         assert session.sent == ["press:a /twin on", "press:a /twin off", "eth: /twin on"]
         assert "≠" not in app.main.lines("top").plain and "Twin on" in {each.title for each in app.commands()}

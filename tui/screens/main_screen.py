@@ -59,7 +59,7 @@ class MainScreen(Reading):
         named_key("palette", "ctrl+p", "app.palette", "everything by name: type some letters of it"),
         named_key("drive", "ctrl+o", "app.choose_drive", "choose the drive that plain text goes to"),
         named_key("log", "", "app.log", "begin the session log, or end it"),
-        named_key("twin", "alt+t", "app.twin", "a twin beside each drive of the line, or none"),
+        named_key("twin", "ctrl+f2", "app.twin", "a twin beside each drive of the line, or none"),
         named_key("history", "ctrl+r", "app.search_history", "search the lines typed before; again: older"),
         *(
             named_key(f"panel-{each.name}", each.key, f"app.panel('{each.name}')", f"panel: {each.about}")
