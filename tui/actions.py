@@ -145,7 +145,7 @@ class Actions(ViewActions):
 
     async def action_twin(self) -> None:
         """Run a twin beside each drive of the selected bus, or end the twins."""
-        await self.action_run_line("/twin off" if self.model.twinned(self.session.selected_bus) else "/twin on")
+        await self.action_run_line("/twin off" if self.model.bus("").twinned else "/twin on")
 
     async def action_log(self) -> None:
         """Begin the session log, or end it."""
@@ -157,7 +157,7 @@ class Actions(ViewActions):
 
     def commands(self) -> list[Command]:
         """The commands of the palette."""
-        switches = Switches(self.polling.on, self.mouse_on, self.model.twinned(self.session.selected_bus))
+        switches = Switches(self.polling.on, self.mouse_on, self.model.bus("").twinned)
         found = list(all_commands(self.session, self.macros, self.assist.verbs(), self.keymap, switches))
         return self.recent.first(found)
 

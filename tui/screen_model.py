@@ -69,6 +69,11 @@ class BusFacts:
         """The readout of a drive, empty at first."""
         return self.readouts.setdefault(address, Readout())
 
+    @property
+    def twinned(self) -> bool:
+        """Whether a drive has a twin."""
+        return any(axis.twin is not None for readout in self.readouts.values() for axis in readout.axes)
+
 
 class ScreenModel:
     """All facts on the screen, by bus.
@@ -124,11 +129,6 @@ class ScreenModel:
     def page(self, name: str) -> deque[Record]:
         """The place for records of a bus; those of a bus that is not open go to the current page."""
         return self.bus(name if name in self._opened() else "").fresh
-
-    def twinned(self, name: str) -> bool:
-        """Whether a drive of a bus has a twin."""
-        readouts = self.bus(name).readouts.values()
-        return any(axis.twin is not None for readout in readouts for axis in readout.axes)
 
     def rename(self, before: str, now: str) -> None:
         """Know a bus by another name."""
