@@ -45,7 +45,7 @@ def rows(full: bool) -> Iterator[Row]:
             for _ in range(5 if full else 3):
                 ours.append(asyncio.run(searched(port, baud, Path(folder))))
                 peer.append(waited(port, baud))
-        yield compared(f"scan, nobody replies, {baud}", "s", ours, peer, "the silence", aim=1.3, aim_of="ratio")
+        yield compared(f"scan without a reply, {baud}", "s", ours, peer, "the silence", aim=1.3, aim_of="ratio")
 
 
 async def searched(port: str, baud: int, folder: Path) -> float:

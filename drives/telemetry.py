@@ -189,5 +189,5 @@ class Telemetry:
             poll.silences += 1
             poll.due = now + AFTER_SILENCE * min(poll.silences, LONGEST_SILENCE)
             self._link.publish(Silent(now, address))
-        except DriveError:  # a stop or program mode kept it from being asked: that is no silence
+        except DriveError:  # a stop or program mode kept it from being asked: that is not a silence
             poll.due = now + RETRY

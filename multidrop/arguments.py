@@ -389,7 +389,7 @@ def _value(text: str) -> tuple[str, str]:
 def _role_url(text: str) -> tuple[str, str]:
     name, url = _value(text)
     if not (name.replace("-", "").replace("_", "").isalnum() and name.isascii()):
-        raise argparse.ArgumentTypeError(f"{name} is no name of letters, digits, - and _")
+        raise argparse.ArgumentTypeError(f"{name} is not a name of letters, digits, - and _")
     return name, url
 
 

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 PERIOD = 0.1
 """The time between two looks at a running program, s."""
 LONG_QUIET = 5.0
-"""The time without a traced line after which a person is told, s."""
+"""The time without a traced line after which a message says so, s."""
 QUIET = 0.5
 """The time without a traced line after which a break point may be the reason, s."""
 LONGEST_HOLD = 65.0
@@ -132,7 +132,7 @@ class Debugger:
         self._waits = False
         self._sight.seen(None)
         note = ", and shows no lines: /break now breaks it where it is" if self.break_point else ""
-        self.say(f"its program was told to run on at normal speed{note}")
+        self.say(f"its program runs on at normal speed{note}")
 
     # Following
 

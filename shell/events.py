@@ -223,7 +223,7 @@ class Phase(Enum):
 
     @property
     def waits(self) -> bool:
-        """Whether the program goes on only when it is told to."""
+        """Whether the program goes on only at a command."""
         return self is not Phase.EXECUTES
 
 

@@ -29,7 +29,7 @@ class SerialEndpoint:
         self.name = port
         # The "inter byte timeout" of 0 is pyserial's way to VMIN=1: a read with nothing to read is then EAGAIN,
         # and an empty one can only mean that the line was hung up.
-        try:  # pyserial passes on an error of termios, which is no OSError, where a port goes at this moment
+        try:  # pyserial passes on an error of termios, which is not an OSError, where a port goes at this moment
             self._port = serial.Serial(port, baud, timeout=0, exclusive=True, inter_byte_timeout=0)
         except termios.error as error:
             raise OSError(*error.args) from error

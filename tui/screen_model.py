@@ -112,7 +112,7 @@ class ScreenModel:
         self._takers[type(event)](event)
 
     def quiet(self, event: SessionEvent) -> bool:
-        """True if an event alone is no reason to paint: bytes on the wire, or values that are those before."""
+        """True if an event alone is not a reason to paint: bytes on the wire, or values that are those before."""
         if not isinstance(event, OnBus):
             return False
         inner = event.event

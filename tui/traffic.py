@@ -19,7 +19,7 @@ LONGEST = 256
 
 
 class Piece(NamedTuple):
-    """Bytes that were written or read at once. `poll`: a request of ours that nobody typed, or its reply."""
+    """Bytes that were written or read at once. `poll`: a request of ours that was not typed, or its reply."""
 
     at: float
     outgoing: bool

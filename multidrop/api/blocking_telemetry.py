@@ -28,7 +28,7 @@ class Telemetry:
 
     @property
     def missed(self) -> int:
-        """The number of samples that were dropped because nobody took them."""
+        """The number of samples that were dropped because the program did not take them."""
         return self._telemetry.missed
 
     def __enter__(self) -> Telemetry:

@@ -29,7 +29,7 @@ class AsyncTelemetry:
     def __init__(self, owner: Owner, drives: Sequence[Drive], rate: float = RATE) -> None:
         """Begin to read. A rate of `math.inf` is as fast as the line allows."""
         self.missed = 0
-        """The number of samples that were dropped because nobody took them."""
+        """The number of samples that were dropped because the program did not take them."""
         self._shell = owner.shell
         self._names = {(drive.link.name, drive.address): self._shell.display_name(drive) for drive in drives}
         self._rows: deque[Sample] = deque()

@@ -224,7 +224,7 @@ class Prompt:
     def _accepted(self, buffer: Buffer) -> bool:
         """Handle Enter."""
         if self._question.takes(buffer.text):
-            buffer.reset()  # an answer is no line: the history does not keep it
+            buffer.reset()  # an answer is not a line: the history does not keep it
             return True
         self._lines.enter(buffer.text or self._session.enter_alone())
         if self._input is not None:

@@ -124,7 +124,7 @@ def _check_place(path: Path) -> None:
     if not path.exists():
         return
     if not path.is_file():
-        raise Diagnostic("is no file", str(path), "name a new file for the report")
+        raise Diagnostic("is not a file", str(path), "name a new file for the report")
     begin = bytes_of(path)[:400]
     if begin and b"<testsuite" not in begin:
-        raise Diagnostic("exists already and is no JUnit report", str(path), "name a new file for the report")
+        raise Diagnostic("exists already and is not a JUnit report", str(path), "name a new file for the report")

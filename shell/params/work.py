@@ -57,7 +57,7 @@ def check_new(name: str, target: str) -> None:
     path = Path(name)
     if is_all(target):
         if name == STANDARD_OUTPUT or (path.exists() and not path.is_dir()):
-            raise Diagnostic("is no folder", name, "all drives need a folder: each gets a file in it")
+            raise Diagnostic("is not a folder", name, "all drives need a folder: each gets a file in it")
     elif name != STANDARD_OUTPUT:
         new_file.check(name)
 

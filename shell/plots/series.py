@@ -84,7 +84,7 @@ def _value(workspace: Workspace, bus: str, address: str, word: str, text: str) -
 
 
 def _is_own(workspace: Workspace, series: Series) -> bool:
-    """Whether a word belongs to the drive's language, and is no name that a person gave."""
+    """Whether a word belongs to the drive's language, and is not a name that a person gave."""
     drive = workspace.buses[series.bus].drives[series.address]
     if series.word == DIFFERENCE:
         return True

@@ -331,7 +331,7 @@ def _free(target: PlotTarget) -> PlotTarget:
 def _unserved(target: PlotTarget, error: OSError | UnicodeError) -> Diagnostic:
     where = f"{bracketed(target.host)}:{target.port}"
     if isinstance(error, UnicodeError):
-        return Diagnostic(f"cannot serve at {where}: that is no host name", hint="valid: PORT or HOST:PORT, as 9876")
+        return Diagnostic(f"cannot serve at {where}: that is not a host name", hint="valid: PORT or HOST:PORT, as 9876")
     return Diagnostic(
         f"cannot serve at {where} ({error.strerror})", hint="use another port, or end the program that uses it"
     )

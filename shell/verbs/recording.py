@@ -82,7 +82,7 @@ async def _keep(call: Call, waits: bool) -> None:
 
 
 def keep_unended(workspace: Workspace) -> str:
-    """Save a recording that nobody ended under a name that no macro has; return what was done, in one line."""
+    """Save a recording that was not ended under a name that no macro has; return what was done, in one line."""
     recorder, store = workspace.recorder, workspace.macros
     if not recorder.name:
         return ""
@@ -101,7 +101,7 @@ def keep_unended(workspace: Workspace) -> str:
 
 
 async def _offer(workspace: Workspace, macro: Macro, found: list[Offer]) -> None:
-    """Ask whether waits go in place of the pauses; say how where nobody can be asked, and after a no."""
+    """Ask whether waits go in place of the pauses; say how where no person can be asked, and after a no."""
     store, saved = workspace.macros, workspace.macros.contents(macro.name)
     changes = "; ".join(offer.text for offer in found)
     if await workspace.agrees(f"macro {macro.name}: put waits in place of pauses: {changes}"):

@@ -15,7 +15,7 @@ def _on_screen(workspace: Workspace) -> bool:
 async def page(call: Call) -> None:
     """Show a page of the screen: /page drives shows all drives of all lines.
 
-    Escape goes back. A name that is no page is answered with the names of all.
+    Escape goes back. A name that is not a page is answered with the names of all.
     """
     (name,) = call.words(1, 1)
     await _show(call, name)

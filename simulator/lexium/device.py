@@ -171,7 +171,7 @@ class MCodeDevice(CommSettings):
         self._loop.advance(now, program=program)
 
     def quiet(self, now: float, running: bool) -> bool:
-        """Whether there is no news of it up to `now`, if it was `running` before. Quick to ask."""
+        """Whether nothing changes up to `now`, if it was `running` before. Quick to ask."""
         return self._loop.quiet(now, running)
 
     # Lines.

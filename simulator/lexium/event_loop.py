@@ -83,7 +83,7 @@ class EventLoop:
         return None if due == inf else max(due, self._timeline.now)
 
     def quiet(self, now: float, running: bool) -> bool:
-        """Whether there is no news of it up to `now`, if it was `running` before. Quick to ask.
+        """Whether nothing changes up to `now`, if it was `running` before. Quick to ask.
 
         It has power and has printed nothing, nothing happens by itself, and its program has neither begun nor ended.
         """

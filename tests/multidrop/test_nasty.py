@@ -142,8 +142,8 @@ def test_a_nasty_url_is_one_line(told: Callable[..., str], url: str) -> None:
 def test_a_plot_is_refused_where_it_cannot_be(told: Callable[..., str]) -> None:
     pytest.importorskip("rerun")
     assert "cannot write" in told("plot", "sim:#pmx", "--to", f"{'a' * 300}.rrd")
-    assert "no host name" in told("plot", "sim:#pmx", "--serve", "a..b:1")
-    assert "no host name" in told("plot", "sim:#pmx", "--serve", f"{'a' * 70}:1")
+    assert "not a host name" in told("plot", "sim:#pmx", "--serve", "a..b:1")
+    assert "not a host name" in told("plot", "sim:#pmx", "--serve", f"{'a' * 70}:1")
 
 
 NASTY_FILES = {

@@ -66,7 +66,7 @@ def test_all_drives_against_the_defaults(params):
         (("diff", URL, "--defaults", "--drive", "x"), 3, "x does not reply"),
         (("backup", URL, "cell.toml"), 2, "exists already"),
         (("backup", URL, "no/folder.toml"), 2, "its folder does not exist"),
-        (("backup", URL, "cell.toml", "--drive", "all"), 2, "is no folder"),
+        (("backup", URL, "cell.toml", "--drive", "all"), 2, "is not a folder"),
         (("backup", URL, "x.toml", "--drive", "x"), 1, "x does not reply"),
         (("restore", URL, "x.toml", "--yes"), 2, "x.toml: cannot be read"),
         (

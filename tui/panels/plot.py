@@ -129,7 +129,7 @@ def _agree(twin: Line, extents: Mapping[Line, Extent]) -> bool:
 
 
 def _slack(line: Line, velocities: Mapping[tuple[str, str, str], Extent]) -> float:
-    """The change of a value that is no motion."""
+    """The change of a value other than a motion."""
     resting = velocities.get(line.quantity[:3]) == (0, 0)
     return REST if line.of_drive.quantity.word == "position" and resting else 0.0
 

@@ -16,7 +16,7 @@ from tui.widgets.lines import Row, Span, spread
 
 NAME, VALUE, UNIT = 8, 16, 10
 TOLD = ("range", "value", "values", "note")
-"""The rows of help that are told of the chosen setting, besides its title and meaning."""
+"""The rows of help for the chosen setting, besides its title and meaning."""
 
 
 @dataclass

@@ -156,7 +156,7 @@ def step(state: MCodeState, program: Sequence[Row]) -> Procedure[Stepped]:
     row = traced(reply.text) if reply.end is End.DONE and not reply.doubtful else None
     if row is None or (program and row not in program):
         state.reply_lost()
-        came = f"'{reply.text}' came, which is no line of its program" if reply.text else "no line came"
+        came = f"'{reply.text}' came, which is not a line of its program" if reply.text else "no line came"
         raise NoAnswer(f"{who(state)}: {came}: it is not known whether it stepped; the key was sent once")
     state.steps()
     return Stepped(row, (yield from _hold(state, row.text)))

@@ -123,11 +123,11 @@ def _look_around(hints: Hints) -> Procedure[list[MCodeState]]:
         hints = replace(hints, em=found[-1].codec.em if found[-1].product else hints.em)  # the next is likely set alike
     present = [state for state in found if state.product]
     if not present:
-        raise NoAnswer(_nobody(hints, party))
+        raise NoAnswer(_no_reply(hints, party))
     return [state if state.product else _absent(state, present[0]) for state in found]
 
 
-def _nobody(hints: Hints, party: bool | None) -> str:
+def _no_reply(hints: Hints, party: bool | None) -> str:
     """Say what was tried, and what to do."""
     names = ", ".join(hints.drives)
     tried = f"none of the drives {names} replies" if names else "no drive replies"

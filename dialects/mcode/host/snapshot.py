@@ -95,7 +95,7 @@ def _program(
         return (), ["its program was not read: it runs, and its prints came between the lines"]
     found = [_LISTED.fullmatch(line.strip()) for line in first]
     lost = [line for line, row in zip(first, found, strict=True) if row is None]
-    doubts = [f"its listing has a line that is no program line: {line!r}" for line in lost]
+    doubts = [f"its listing has a line that is not a program line: {line!r}" for line in lost]
     return tuple((int(row[1]), row[2]) for row in found if row is not None), doubts
 
 

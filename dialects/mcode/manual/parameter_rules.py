@@ -84,7 +84,7 @@ def checked(name: str, value: Value, product: str, counts: bool, labels: Collect
     if (count := _fields_of(name)) is not None:
         return _setup(name, value, count)
     if row.access != "RW" or row.kind not in ("variable", "flag"):
-        raise Diagnostic(f"{name}: is no setting ({row.title})")
+        raise Diagnostic(f"{name}: is not a setting ({row.title})")
     if name == "DN":
         if not (isinstance(value, str) and len(value) == 1 and value.isascii() and value.isalnum()):
             raise Diagnostic(f"DN = {value}: takes one letter or digit")

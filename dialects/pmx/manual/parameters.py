@@ -123,7 +123,7 @@ def _risk(name: str, value: Value, now: Mapping[str, Value], allowed: Permission
 def _check(name: str, value: Value) -> None:
     """Raise Diagnostic for an unknown setting, or a value out of range."""
     if name not in names():
-        raise Diagnostic(f"{name}: is no setting of the controller")
+        raise Diagnostic(f"{name}: is not a setting of the controller")
     if name == "DN":
         if not re.fullmatch(r"2ED\d\d", str(value)):
             raise Diagnostic(f"DN = {value}: valid: 2ED00 to 2ED99")

@@ -70,7 +70,7 @@ def _row(name: str) -> Parameter:
 def _checked(name: str, value: Value, motors: int) -> int:
     """Return the value as a whole number. Raises Diagnostic."""
     if name not in names(motors):
-        raise Diagnostic(f"{name}: is no setting of the module")
+        raise Diagnostic(f"{name}: is not a setting of the module")
     limits = _row(name).limits
     if isinstance(value, (str, tuple)) or not float(value).is_integer() or int(value) not in limits:
         raise Diagnostic(f"{name} = {value}: valid: {limits.start} to {limits.stop - 1}")

@@ -140,7 +140,7 @@ def test_jog_inputs_are_restored_where_jogging_is_off():
         ({"LS0": (5, 1), "LS1": (5, 1)}, "the minus limit must be below"),
         ({"VERY": 5}, "VERY: is neither a word of the drive nor a name for a variable"),
         ({"G1": 5}, "G1: is a label of the program"),
-        ({"V": 5}, "V: is no setting"),
+        ({"V": 5}, "V: is not a setting"),
         ({"SA": 1.8}, "SA: an LMDCM lacks it"),
         ({"VM": "fast"}, "VM = fast: valid"),
         ({"IS1": 5}, "IS1 = 5: takes 2 whole numbers"),
