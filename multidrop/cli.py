@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from _typeshed import SupportsWrite
 
 URLS = """A URL is {}; sim: alone is the demo cell. Keys after a ?: dialect, drives=a,b,c, baud,
-party=0|1, checksum=0|1|2, em=0..3, echo=local, address=none, timeout=SECONDS."""
+party=0|1, checksum=0|1|2, em=0..3, echo=local, address=none, timeout=SECONDS, relay=multidrop|socat."""
 WIDTH = 79
 DESCRIPTION = "A terminal and a scripting shell for motion drives on a shared line."
 EPILOG = (

@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 from types import MappingProxyType
 from typing import NamedTuple
 
-from multidrop import arguments, macro_arguments
+from multidrop import arguments, macro_arguments, relay_arguments
 
 
 class Command(NamedTuple):
@@ -276,6 +276,12 @@ COMMANDS: Mapping[str, Command] = {
         ["ports", "ports --json"],
         "ports.run",
         arguments.ports,
+    ),
+    "relay": Command(
+        "lend a serial port of this machine to ssh://HOST/PORT elsewhere, which starts this by itself",
+        ["relay /dev/ttyUSB0", "relay /dev/ttyUSB0 --baud 115200"],
+        "relay.run",
+        relay_arguments.relay,
     ),
     "scan": Command(
         "find the drives on a port: baud rates, names, modes; ask before what another drive may take for an error",

@@ -8,7 +8,7 @@ from typing import Any
 
 from dialects import DriveState
 from dialects.families import DEFAULT
-from shell.connect.opening import port_name
+from shell.connect.opening import far_port, port_name
 from shell.connect.urls import Connection
 
 
@@ -70,6 +70,8 @@ def url_of(found: Sequence[FoundDrive]) -> str:
         keys.append(f"drives={','.join(names)}")
     elif party is None:
         keys.append("address=none")
+    if connection.relay:
+        keys.append(f"relay={connection.relay}")
     if connection.local_echo:
         keys.append("echo=local")
     base = f"serial:{port_name(connection)}" if connection.scheme == "serial" else found[0].port
@@ -83,5 +85,7 @@ def port_of(connection: Connection, bus: str) -> str:
         return connection.target
     if connection.scheme == "sim":
         return f"sim:{connection.target}" + (f"#{connection.bus or bus}" if connection.bus or bus else "")
+    if connection.scheme == "ssh":
+        return far_port(connection).name
     host = f"[{connection.host}]" if ":" in connection.host else connection.host
     return f"{connection.scheme}://{host}:{connection.port}"

@@ -199,6 +199,8 @@ class _Opening:
                 failing.push_async_callback(workspace.forget, each.bus)
             for each in found:
                 workspace.adopt(replace(each, warnings=()) if raw else each, self._place)
+                if each.limits:
+                    workspace.notify(f"{each.bus.name}: {each.limits}", bus=each.bus.name, warning=True)
             late = [self._stop(each.bus) for each in found if self._stops != workspace.stops]
             for each in found:
                 port = self._workspace.ports[each.bus.name] = port_name(connection)

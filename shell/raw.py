@@ -190,7 +190,7 @@ class RawLine(ByteView):
         transport = self.bus.link.transport
         found = transport.control if isinstance(transport, Controllable) else None
         if found is None:
-            hint = "valid on a serial port and on rfc2217://"
+            hint = "valid on a serial port, on rfc2217:// and on ssh:// with multidrop there"
             raise Diagnostic("has no baud rate, DTR, RTS or break", transport.name, hint)
         return found
 

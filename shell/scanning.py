@@ -16,6 +16,7 @@ from dialects import Diagnostic, DriveState, Procedure
 from dialects.families import FAMILIES
 from dialects.scanning import WINDOW, Reach, Scan
 from shell import jobs
+from shell.connect.opening import BAUDED
 from shell.connect.urls import Connection
 from shell.found import FoundDrive, port_of
 from transports import TransportLost
@@ -25,10 +26,10 @@ if TYPE_CHECKING:
     from shell.connect.opening import Opened, Opener
     from shell.workspace import Workspace
 
-BAUDED = ("serial", "rfc2217")
-"""The schemes of ports that have a baud rate."""
 SLOWEST = 0.2
 """The longest time for which a network's reply is waited, s; `timeout=` in the URL replaces it."""
+TURNS = {"tcp": 1.0, "ssh": 0.25}
+"""The part of the time of an opening that a question and its reply take, at most, over a network."""
 PLACE = 0
 BYTES = 20
 """The mean size of the questions to one address, bytes; for the estimate."""
@@ -219,8 +220,8 @@ class Scanning:
     def _reach(self, took: float = 0.0, hasty: bool = False) -> Reach:
         """The manner of the search. `took`: the time that the port took to open, s: over a network, replies do too."""
         scheme, window = self._connection.scheme, self._connection.timeout or WINDOW
-        if scheme == "tcp" and self._connection.timeout is None:
-            window += min(took, SLOWEST)
+        if self._connection.timeout is None:
+            window += min(took * TURNS.get(scheme, 0.0), SLOWEST)
         return Reach(window=window, alone=scheme == "udp", hasty=hasty)
 
     # One stage

@@ -1,7 +1,8 @@
-"""Byte pipes: serial, TCP, UDP, RFC 2217. They carry bytes and interpret none."""
+"""Byte pipes: serial, TCP, UDP, RFC 2217, ssh. They carry bytes and interpret none."""
 
 from transports.base import (
     Controllable,
+    Limited,
     Lost,
     PortControl,
     Preemptible,
@@ -13,6 +14,7 @@ from transports.base import (
 
 __all__ = [
     "Controllable",
+    "Limited",
     "Lost",
     "PortControl",
     "Preemptible",

@@ -96,3 +96,12 @@ class Controllable(Protocol):
     @property
     def control(self) -> PortControl | None:
         """Its settings; None: it is not a serial port."""
+
+
+@runtime_checkable
+class Limited(Protocol):
+    """A transport that cannot keep a promise that others keep."""
+
+    @property
+    def limits(self) -> str:
+        """What it cannot do, for a person who opens it."""

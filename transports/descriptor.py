@@ -70,7 +70,7 @@ class DescriptorPipe(Pipe):
                 return False
             self._pending.append(memoryview(bytes(data)))
             problem = None if self._writing else self._push()
-        if self._pending or problem is not None:
+        if problem is not None or self._wants_room():
             self._after_push(problem)
         return True
 
@@ -80,7 +80,7 @@ class DescriptorPipe(Pipe):
             return 0
         with self._guard:
             dropped = self._drop(whole)
-        self._watch_writable(bool(self._pending))
+        self._watch_writable(self._wants_room())
         return dropped
 
     def _drop(self, whole: bool) -> int:
@@ -155,7 +155,11 @@ class DescriptorPipe(Pipe):
         if problem is not None:
             self._break(problem)
         elif self._usable:
-            self._watch_writable(bool(self._pending))
+            self._watch_writable(self._wants_room())
+
+    def _wants_room(self) -> bool:
+        """True if the rest can leave once the descriptor is writable."""
+        return bool(self._pending)
 
     def _watch_writable(self, wanted: bool) -> None:
         if wanted and not self._writing:

@@ -10,7 +10,7 @@ _shtab_multidrop_params_subparsers=(backup diff restore)
 _shtab_multidrop_macro_subparsers=(list show play edit describe rename copy delete key import export)
 _shtab_multidrop_log_subparsers=(show follow grep replay)
 _shtab_multidrop_config_subparsers=(path show check)
-_shtab_multidrop_subparsers=(demo tui shell send run sim program params macro plot snapshot ports scan rescue log config report completion)
+_shtab_multidrop_subparsers=(demo tui shell send run sim program params macro plot snapshot ports relay scan rescue log config report completion)
 
 _shtab_multidrop_demo_option_strings=(-h --help)
 _shtab_multidrop_tui_option_strings=(-h --help --raw --no-reconnect)
@@ -43,6 +43,7 @@ _shtab_multidrop_macro_option_strings=(-h --help)
 _shtab_multidrop_plot_option_strings=(-h --help --drive --rate --to --serve --no-reconnect)
 _shtab_multidrop_snapshot_option_strings=(-h --help -o --output)
 _shtab_multidrop_ports_option_strings=(-h --help --json)
+_shtab_multidrop_relay_option_strings=(-h --help --baud)
 _shtab_multidrop_scan_option_strings=(-h --help --baud --dialect --json --all --yes --save)
 _shtab_multidrop_rescue_option_strings=(-h --help --baud --dialect --json --all --plain --erase --yes)
 _shtab_multidrop_log_show_option_strings=(-h --help --drive --all --json)
@@ -107,7 +108,7 @@ _shtab_multidrop_rescue___dialect_choices=(mcode pmx)
 _shtab_multidrop_log_pos_0_choices=(show follow grep replay)
 _shtab_multidrop_config_pos_0_choices=(path show check)
 _shtab_multidrop_completion_pos_0_choices=(bash zsh fish)
-_shtab_multidrop_pos_0_choices=(demo tui shell send run sim program params macro plot snapshot ports scan rescue log config report completion)
+_shtab_multidrop_pos_0_choices=(demo tui shell send run sim program params macro plot snapshot ports relay scan rescue log config report completion)
 
 _shtab_multidrop_demo__h_nargs=0
 _shtab_multidrop_demo___help_nargs=0
@@ -215,6 +216,8 @@ _shtab_multidrop_snapshot___help_nargs=0
 _shtab_multidrop_ports__h_nargs=0
 _shtab_multidrop_ports___help_nargs=0
 _shtab_multidrop_ports___json_nargs=0
+_shtab_multidrop_relay__h_nargs=0
+_shtab_multidrop_relay___help_nargs=0
 _shtab_multidrop_scan__h_nargs=0
 _shtab_multidrop_scan___help_nargs=0
 _shtab_multidrop_scan___json_nargs=0
@@ -272,7 +275,7 @@ _shtab_multidrop___version_nargs=0
 
 _multidrop_urls() {
   local each file
-  printf '%s\n' sim: 'sim:#press' 'sim:#eth' 'sim:#pmx' tcp:// udp:// modbus:// rfc2217://
+  printf '%s\n' sim: 'sim:#press' 'sim:#eth' 'sim:#pmx' tcp:// udp:// modbus:// rfc2217:// ssh://
   for each in /dev/serial/by-id/* /dev/ttyUSB* /dev/ttyACM*; do [ -e "$each" ] && printf '%s\n' "$each"; done
   file="${MULTIDROP_CONFIG_DIR:-${XDG_CONFIG_HOME:-$HOME/.config}/multidrop}/multidrop.toml"
   [ -r "$file" ] && sed -n 's/^ *\[connections\.\([A-Za-z0-9_-]*\)\].*/\1/p' "$file"

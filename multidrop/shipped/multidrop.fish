@@ -7,7 +7,7 @@
 # Custom Preamble
 
 function _multidrop_url
-  printf '%s\n' sim: 'sim:#press' 'sim:#eth' 'sim:#pmx' tcp:// udp:// modbus:// rfc2217://
+  printf '%s\n' sim: 'sim:#press' 'sim:#eth' 'sim:#pmx' tcp:// udp:// modbus:// rfc2217:// ssh://
   find /dev/serial/by-id -type l 2>/dev/null
   find /dev -maxdepth 1 '(' -name 'ttyUSB*' -o -name 'ttyACM*' ')' 2>/dev/null
   set -l folder $MULTIDROP_CONFIG_DIR
@@ -65,7 +65,7 @@ function _shtab_multidrop_using
   test "$_shtab_multidrop_cmdpath" = "$argv"
 end
 
-set -g _shtab_multidrop_commands demo tui shell send run sim program 'program check' 'program test' 'program list' 'program upload' 'program download' params 'params backup' 'params diff' 'params restore' macro 'macro list' 'macro show' 'macro play' 'macro edit' 'macro describe' 'macro rename' 'macro copy' 'macro delete' 'macro key' 'macro import' 'macro export' plot snapshot ports scan rescue log 'log show' 'log follow' 'log grep' 'log replay' config 'config path' 'config show' 'config check' report completion
+set -g _shtab_multidrop_commands demo tui shell send run sim program 'program check' 'program test' 'program list' 'program upload' 'program download' params 'params backup' 'params diff' 'params restore' macro 'macro list' 'macro show' 'macro play' 'macro edit' 'macro describe' 'macro rename' 'macro copy' 'macro delete' 'macro key' 'macro import' 'macro export' plot snapshot ports relay scan rescue log 'log show' 'log follow' 'log grep' 'log replay' config 'config path' 'config show' 'config check' report completion
 set -g _shtab_multidrop_opts_with_value --against --baud --break --cell --dialect --drive --junit --language --on --other --output --page --personality --rate --role --run --save --serve --set --speed --times --to --until --watch --with -o
 
 complete -c multidrop -e
@@ -225,6 +225,9 @@ complete -c multidrop -n '_shtab_multidrop_using snapshot; and test $_shtab_mult
 complete -c multidrop -n '_shtab_multidrop_using; and test $_shtab_multidrop_npos -eq 0' -a ports -d 'List the serial ports of this machine, with their stable names.'
 complete -c multidrop -n '_shtab_multidrop_using ports' -s h -l help -d 'show this help message and exit'
 complete -c multidrop -n '_shtab_multidrop_using ports' -l json -d 'print one JSON object a line'
+complete -c multidrop -n '_shtab_multidrop_using; and test $_shtab_multidrop_npos -eq 0' -a relay -d 'Lend a serial port of this machine to ssh://HOST/PORT elsewhere, which starts this by itself.'
+complete -c multidrop -n '_shtab_multidrop_using relay' -s h -l help -d 'show this help message and exit'
+complete -c multidrop -n '_shtab_multidrop_using relay' -l baud -x -d 'bits/s (default: 9600)'
 complete -c multidrop -n '_shtab_multidrop_using; and test $_shtab_multidrop_npos -eq 0' -a scan -d 'Find the drives on a port: baud rates, names, modes; ask before what another drive may take for an error.'
 complete -c multidrop -n '_shtab_multidrop_using scan' -s h -l help -d 'show this help message and exit'
 complete -c multidrop -n '_shtab_multidrop_using scan' -l baud -x -d 'this baud rate only'

@@ -14,8 +14,10 @@ from dialects import Diagnostic, Family, Hints
 from dialects.families import DEFAULT, FAMILIES
 from drives.bus import Bus
 from shell.connect.port_state import PortState
-from shell.connect.reopening import HostAgain, Reopen, SerialAgain, simulated, timed
+from shell.connect.reopening import HostAgain, LoginAgain, Reopen, SerialAgain, simulated, timed
 from shell.connect.urls import Connection
+from transports import Limited
+from transports.far_port import FarPort
 
 if TYPE_CHECKING:
     from drives.keeping import Keeper
@@ -35,10 +37,14 @@ class Opened:
     floor: RunningFloor | None = None
     warnings: tuple[str, ...] = ()
     """Notices for a person before the search for drives."""
+    limits: str = ""
+    """What its transport cannot do."""
     reopen: Reopen | None = None
     """Opens its port again after a loss; None: it cannot be found again."""
 
 
+BAUDED = ("serial", "rfc2217", "ssh")
+"""The schemes of ports with a baud rate."""
 Opener = Callable[[Connection, Naming], Awaitable[list[Opened]]]
 
 
@@ -54,15 +60,16 @@ async def open_buses(connection: Connection, naming: Naming, state: Path | None 
         await asyncio.to_thread(family.prepare)  # a stop of another bus must not wait for it
     transport, took = await timed(_transport(connection))
     reopen = _reopen(connection, took)
+    limits = transport.limits if isinstance(transport, Limited) else ""
     hints, name = connection.hints, naming(connection.short)
     if state is None or not family.repairs:
-        return [Opened(_bus(name, transport, connection, hints.family), hints, reopen=reopen)]
+        return [Opened(_bus(name, transport, connection, hints.family), hints, limits=limits, reopen=reopen)]
     kept = PortState(state, port_name(connection))
     bus = _bus(name, transport, connection, hints.family, kept)
     kept.notify = partial(bus.notify, warning=True)
     warnings = (*kept.remarks, *([CUT.format(kept.cut)] if kept.cut else []))
     found = replace(hints, cut=kept.cut, owed=kept.owed, remembered=kept.memory.drives, first_mark=_first_mark())
-    return [Opened(bus, found, warnings=warnings, reopen=reopen)]
+    return [Opened(bus, found, warnings=warnings, limits=limits, reopen=reopen)]
 
 
 def _first_mark() -> int:
@@ -83,11 +90,18 @@ def port_name(connection: Connection) -> str:
     """One name for a port, whichever of its names is given; empty for a simulated bus."""
     if connection.scheme == "sim":
         return ""
+    if connection.scheme == "ssh":
+        return replace(far_port(connection), user="", host=connection.host.lower()).name
     if connection.scheme != "serial":
         return f"{connection.host.lower()}:{connection.port}"
     from transports.listing import stable_name
 
     return stable_name(connection.target)
+
+
+def far_port(connection: Connection) -> FarPort:
+    """The port of a connection through ssh."""
+    return FarPort(connection.host, connection.target, connection.user, connection.port)
 
 
 def _family(connection: Connection) -> Family[Any]:
@@ -99,7 +113,7 @@ def _family(connection: Connection) -> Family[Any]:
 
 
 def _bus(name: str, transport: Transport, connection: Connection, family: str, keeper: Keeper | None = None) -> Bus:
-    serial = connection.scheme in ("serial", "rfc2217")
+    serial = connection.scheme in BAUDED
     baud = connection.baud or (_family(connection).baud if serial else 0)
     timeout = connection.timeout or DEFAULT_TIMEOUT
     echo = connection.local_echo
@@ -109,9 +123,11 @@ def _bus(name: str, transport: Transport, connection: Connection, family: str, k
 DEFAULT_TIMEOUT = 1.0
 
 
-async def _transport(connection: Connection, port: str = "", within: float | None = None) -> Transport:
+async def _transport(
+    connection: Connection, port: str = "", within: float | None = None, baud: int | None = None
+) -> Transport:
     """Open a transport; a serial port by another name than it was given, a host within a time, s."""
-    baud = connection.baud or _family(connection).baud
+    baud = baud or connection.baud or _family(connection).baud
     if connection.scheme == "serial":
         from transports.serial_port import open_serial
 
@@ -120,6 +136,10 @@ async def _transport(connection: Connection, port: str = "", within: float | Non
         from transports.rfc2217 import open_rfc2217
 
         return await open_rfc2217(connection.host, connection.port, baud)
+    if connection.scheme == "ssh":
+        from transports.ssh import open_ssh
+
+        return await open_ssh(far_port(connection), baud, within, connection.relay)
     from transports.sockets import open_tcp, open_udp
 
     if connection.scheme == "udp":
@@ -128,6 +148,8 @@ async def _transport(connection: Connection, port: str = "", within: float | Non
 
 
 def _reopen(connection: Connection, took: float) -> Reopen | None:
+    if connection.scheme == "ssh":
+        return LoginAgain(lambda within, baud: _transport(connection, within=within, baud=baud), took)
     if connection.scheme != "serial":
         return HostAgain(lambda within: _transport(connection, within=within), took)
     again = SerialAgain(connection.target, partial(_transport, connection))

@@ -26,6 +26,10 @@ SHORTEST = 0.9
 """The shortest attempt to connect, s: each attempt asks once, so a host that is back is asked within that time."""
 PATIENCE = 4.0
 """An attempt to connect may take this many times as long as the first one took."""
+LOGIN = 4.0
+"""The shortest attempt to log in, s: after a connection that others shared, a new one takes longer."""
+SLOWEST_LOGIN = 20.0
+"""The longest attempt to log in, s."""
 TERMINALS = "/dev/pts/"
 
 
@@ -80,6 +84,20 @@ class HostAgain:
         """Connect to it."""
         await old.close()
         return await _at_the_same_baud(await self._open(self._within), old)
+
+
+class LoginAgain:
+    """A port behind a login, opened at the baud rate that it had. `took` is how long the first login took, s."""
+
+    def __init__(self, open_: Callable[[float, int | None], Awaitable[Transport]], took: float) -> None:
+        self._open = open_
+        self._within = min(max(LOGIN, PATIENCE * took), SLOWEST_LOGIN)
+
+    async def __call__(self, old: Transport) -> Transport:
+        """Log in, and open it."""
+        await old.close()
+        control = old.control if isinstance(old, Controllable) else None
+        return await self._open(self._within, control.baud if control else None)
 
 
 async def _at_the_same_baud(opened: Transport, old: Transport) -> Transport:

@@ -23,6 +23,7 @@ URL_FORMS: Mapping[str, UrlForm] = {
     "udp": UrlForm("udp://", "udp://HOST:503", "an Ethernet drive over UDP", 503),
     "modbus": UrlForm("modbus://", "modbus://HOST:502", "an Ethernet drive's registers", 502),
     "rfc2217": UrlForm("rfc2217://", "rfc2217://HOST:PORT", "a serial port of a terminal server", 0),
+    "ssh": UrlForm("ssh://", "ssh://HOST/dev/ttyUSB0", "a serial port of another machine, through ssh"),
     "sim": UrlForm("sim:", "sim:CELL.toml#BUS", "simulated drives; sim: alone is the demo cell"),
 }
 """By scheme."""

@@ -16,6 +16,7 @@ from dialects import Diagnostic, Hints
 from dialects.families import TABLE
 from dialects.numbers import whole
 from shell.connect.url_forms import URL_FORMS, sentence
+from transports.far_port import WAYS, wrong_path
 
 if TYPE_CHECKING:
     from shell.connect.settings import SavedConnection
@@ -26,6 +27,10 @@ DIALECTS = tuple(name for name, row in TABLE.items() if not row.scheme)
 """The families that `dialect=` names."""
 IMPLIED = {row.scheme: name for name, row in TABLE.items() if row.scheme}
 """The families that a scheme implies."""
+
+
+_WORD = r"[A-Za-z0-9_.][A-Za-z0-9_.-]*"
+"""The name of a user or a host for ssh, which takes a first `-` for an option."""
 
 
 @dataclass(frozen=True)
@@ -42,6 +47,10 @@ class Connection:
     """The one bus of a cell; empty for all."""
     host: str = ""
     port: int = 0
+    """0, for ssh: as the user's own configuration of ssh says."""
+    user: str = ""
+    relay: str = ""
+    """The program on the far side of ssh; empty: whichever is there."""
     name: str = ""
     """The name of the saved connection; empty if it is not saved."""
     labels: Mapping[str, str] = field(default_factory=dict)
@@ -56,6 +65,8 @@ class Connection:
     @property
     def short(self) -> str:
         """The default name of its bus: the saved name, the port's name, the host."""
+        if self.scheme == "ssh" and not self.name:
+            return f"{self.host}-{PurePath(self.target).name}"
         return self.name or (PurePath(self.target).name if self.target else self.host) or self.scheme
 
 
@@ -75,10 +86,26 @@ def parse(text: str, saved: Mapping[str, SavedConnection] | None = None) -> Conn
         if not body:
             raise Diagnostic("serial: without a port", text, "as in serial:/dev/ttyUSB0?baud=9600")
         base = replace(base, target=body)
+    elif scheme == "ssh":
+        base = _ssh(base, body)
     else:
         host, port = _host(body, scheme, text)
         base = replace(base, host=host, port=port)
     return _with_query(base, query)
+
+
+def _ssh(base: Connection, body: str) -> Connection:
+    """A host as `ssh` takes it, never one of its options, and the path of a port there."""
+    example = "as in ssh://user@host/dev/ttyUSB0"
+    found = re.fullmatch(rf"//(?:({_WORD})@)?(\[[0-9A-Fa-f:.]+\]|{_WORD})(?::(\d+))?(/.*)?", body, re.DOTALL)
+    if found is None:
+        raise Diagnostic("ssh: needs //[USER@]HOST[:PORT] and the path of a port there", base.text, example)
+    if (port := whole(found[3], 1, 65535) if found[3] else 0) is None:
+        raise Diagnostic(f"no port {found[3]}; valid: 1 to 65535", base.text, example)
+    path = unquote(found[4] or "")
+    if wrong := wrong_path(path):
+        raise Diagnostic(f"{wrong}, on {found[2]}", base.text, example)
+    return replace(base, user=found[1] or "", host=found[2].strip("[]"), port=port, target=path)
 
 
 def _saved(saved: SavedConnection) -> Connection:
@@ -156,6 +183,7 @@ KEYS: dict[str, tuple[str, Callable[[str], Any], str]] = {
     "echo": ("local_echo", *_choice("local")),
     "address": ("addressed", *_choice("none")),
     "timeout": ("timeout", *_number(0.01, 600, float)),
+    "relay": ("relay", *_choice(*WAYS)),
 }
 """Query key: the field of a Connection, the parser of its value (None: invalid), and the valid values."""
 HINTED = {"family", "drives", "party", "checksum", "em", "addressed"}
@@ -184,6 +212,8 @@ def _with_query(connection: Connection, query: str) -> Connection:
         values[name] = CONVERT.get(name, lambda same: same)(found)
     if not values.get("addressed", True) and len(values.get("drives", ())) > 1:
         raise Diagnostic("address=none allows one drive only", connection.text, "drop one of the keys")
+    if "relay" in values and connection.scheme != "ssh":
+        raise Diagnostic("relay= is valid only with ssh://", connection.text, "drop relay=")
     if own := IMPLIED.get(connection.scheme):
         if "family" in values:
             raise Diagnostic(f"dialect= is not valid with {connection.scheme}://", connection.text, "drop dialect=")

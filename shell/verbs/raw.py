@@ -57,7 +57,7 @@ async def raw(call: Call) -> None:
     with @. Bytes are shown as text and in hex. /bytes sends any bytes: /bytes ESC 0D "PR P" ^C. No drive is asked
     anything, polled or recognised. Ctrl+X sends the stop of the family of the URL (MCode unless it says dialect=).
     /raw off finds the drives. /raw open URL opens a port in raw mode and selects it. baud, dtr, rts and break need a
-    serial port or rfc2217://. MS is 250 unless given.
+    serial port, rfc2217:// or ssh://. MS is 250 unless given.
     """
     what, *rest = call.words(0, 2) or ["on"]
     action = ACTIONS.get(what)

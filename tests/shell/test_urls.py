@@ -3,8 +3,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from dialects import Diagnostic, Hints
+from shell.connect.opening import port_name
 from shell.connect.settings import SavedConnection
 from shell.connect.urls import KEYS, SCHEMES, parse
+from shell.found import port_of
 
 
 @pytest.mark.parametrize(
@@ -41,6 +43,28 @@ def test_a_port_or_a_cell_is_a_target(url, scheme, target):
 def test_network_urls_give_host_and_port(url, host, port):
     found = parse(url)
     assert (found.host, found.port) == (host, port)
+
+
+@pytest.mark.parametrize(
+    ("url", "user", "host", "port", "target", "short"),
+    [
+        ("ssh://pc3/dev/ttyUSB0", "", "pc3", 0, "/dev/ttyUSB0", "pc3-ttyUSB0"),
+        ("ssh://fitter@pc3.plant:2222/dev/ttyUSB0?drives=a,b", "fitter", "pc3.plant", 2222, "/dev/ttyUSB0", None),
+        ("ssh://[::1]/dev/serial/by-path/pci-0000:00:14.0-port0", "", "::1", 0, None, None),
+        ("SSH://pc3/dev/a%20port", "", "pc3", 0, "/dev/a port", None),
+    ],
+)
+def test_a_port_of_another_machine_has_a_login_and_a_path(url, user, host, port, target, short):
+    found = parse(url)
+    assert (found.scheme, found.user, found.host, found.port) == ("ssh", user, host, port)
+    assert target in (None, found.target) and short in (None, found.short)
+    again = parse(port_of(found, ""))
+    assert (again.user, again.host, again.port) == (user, host, port)
+
+
+def test_a_port_of_another_machine_is_one_port_whoever_logs_in():
+    assert port_name(parse("ssh://fitter@PC3/dev/ttyUSB0")) == port_name(parse("ssh://pc3/dev/ttyUSB0?baud=19200"))
+    assert port_name(parse("ssh://pc3/dev/ttyUSB1")) != port_name(parse("ssh://pc3/dev/ttyUSB0"))
 
 
 def test_a_bus_of_a_cell_stands_behind_a_hash_before_or_after_the_keys():
@@ -83,6 +107,16 @@ def test_what_is_not_given_is_left_to_be_found_out():
         ("tcp:10.0.0.5", ["//HOST:PORT", "tcp://10.0.0.5:503"]),
         ("tcp://h:99999", ["99999", "65535"]),
         ("rfc2217://h", ["no port"]),
+        ("ssh://pc3", ["no port, on pc3", "ssh://user@host/dev/ttyUSB0"]),
+        ("ssh://pc3/", ["no port, on pc3"]),
+        ("ssh://-oProxyCommand=x/dev/ttyUSB0", ["[USER@]HOST[:PORT]"]),
+        ("ssh://-l@pc3/dev/ttyUSB0", ["[USER@]HOST[:PORT]"]),
+        ("ssh://pc3;reboot/dev/ttyUSB0", ["[USER@]HOST[:PORT]"]),
+        ("ssh://pc3:99999/dev/ttyUSB0", ["99999", "65535"]),
+        ("ssh://pc3/dev/tty%0aUSB0", ["control character"]),
+        ("ssh://pc3/dev/ttyUSB0\\", ["backslash"]),
+        ("ssh://pc3/dev/ttyUSB0?relay=nc", ["relay nc", "multidrop or socat"]),
+        ("/dev/ttyUSB0?relay=socat", ["relay=", "ssh://"]),
         ("http://h", ["http", "tcp://"]),
         ("press", ["press", "saved connection"]),
         ("", ["empty"]),

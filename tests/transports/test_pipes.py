@@ -20,7 +20,9 @@ import pytest
 import serial
 from serial import rfc2217
 
+from tests.support.lent_port import lent
 from transports import Controllable, Transport, TransportLost
+from transports.relay_pipe import RelayPipe
 from transports.rfc2217 import open_rfc2217
 from transports.serial_port import SerialDevice, open_serial
 from transports.sockets import SocketDevice, open_tcp, open_udp, set_socket_options
@@ -251,12 +253,28 @@ async def rfc2217_pair() -> AsyncIterator[Opened]:
         os.close(master)
 
 
+@contextlib.asynccontextmanager
+async def relay_pair() -> AsyncIterator[Opened]:
+    master, slave = os.openpty()
+    open_ends = {master}
+    try:
+        with lent(os.ttyname(slave), 19200) as connection:
+            os.close(slave)
+            transport = RelayPipe(connection, 19200)
+            yield transport, FarEnd(master, lambda: os.close(open_ends.pop()) if open_ends else None)
+            await transport.close()
+    finally:
+        for end in open_ends:
+            os.close(end)
+
+
 KINDS: dict[str, Callable[[], contextlib.AbstractAsyncContextManager[Opened]]] = {
     "serial": lambda: pty_pair(open_serial),
     "serial by threads": lambda: pty_pair(threaded_serial),
     "tcp": lambda: tcp_pair(open_tcp),
     "tcp by threads": lambda: tcp_pair(threaded_tcp),
     "rfc2217": rfc2217_pair,
+    "relay": relay_pair,
     "udp": lambda: udp_pair(open_udp),
     "udp by threads": lambda: udp_pair(threaded_udp),
 }
@@ -392,7 +410,7 @@ async def test_discard_drops_nothing_that_is_written_after_it(kind: str) -> None
         assert await each.far.receive(5) == b"after"
 
 
-@pytest.mark.parametrize("kind", ["serial", "tcp", "udp"])
+@pytest.mark.parametrize("kind", ["serial", "tcp", "udp", "relay"])
 async def test_a_thread_writes_its_stop_while_the_loop_is_held_up_and_nothing_follows_until_the_loop_knows(kind: str):
     async with rig(kind) as each:
         each.start()
@@ -415,7 +433,7 @@ async def test_a_thread_writes_its_stop_while_the_loop_is_held_up_and_nothing_fo
         assert await each.far.receive(5) == b"after"
 
 
-@pytest.mark.parametrize("kind", ["serial", "tcp"])
+@pytest.mark.parametrize("kind", ["serial", "tcp", "relay"])
 @pytest.mark.parametrize("whole", [False, True])
 async def test_what_preempts_the_loop_drops_what_is_unsent_and_follows_what_has_begun(kind: str, whole: bool):
     large = 1_000_000

@@ -16,7 +16,8 @@ import serial
 
 from transports import Controllable, Unreachable
 from transports.pipe import in_thread
-from transports.serial_port import open_error, open_serial
+from transports.serial_open import open_error
+from transports.serial_port import open_serial
 
 if sys.platform == "win32":
     pytest.skip("the ports are pseudo-terminals", allow_module_level=True)

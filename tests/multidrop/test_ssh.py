@@ -1,0 +1,159 @@
+"""A port of another machine: a real sshd on loopback, and a program `ssh` that fails in every way."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import os
+import shutil
+import signal
+import tty
+from collections.abc import Iterator
+from functools import partial
+from pathlib import Path
+
+import pytest
+
+import multidrop
+from multidrop.__main__ import main
+from shell.connect.settings import Settings
+from shell.session import Session
+from tests.support.ssh_server import fake_ssh, far_programs, needs_sshd, ssh_server
+from tests.support.until import until
+from transports import Limited, Transport, TransportLost, Unreachable
+from transports.far_port import FarPort
+from transports.serial_posix import lock_owner
+from transports.ssh import open_ssh
+
+CELL = """
+[[bus]]
+name = "press"
+baud = 0
+[[bus.drive]]
+personality = "LMDCM"
+name = "a"
+party = true
+set = { EM = 1, CK = 1 }
+"""
+
+
+def pid_of(owner: str) -> int:
+    return int(owner.rpartition("pid ")[2].rstrip(")") or 0)
+
+
+def ssh_here() -> int:
+    """The process of ssh that this one has started."""
+    children = (each.read_text().split() for each in Path("/proc/self/task").glob("*/children"))
+    found = [int(child) for each in children for child in each if Path(f"/proc/{child}/comm").read_text() == "ssh\n"]
+    return found[0]
+
+
+@pytest.mark.process
+@needs_sshd
+async def test_a_drive_behind_a_real_sshd_moves_and_comes_back_after_each_kill_without_an_orphan(
+    tmp_path: Path,
+) -> None:
+    with ssh_server(tmp_path) as server, multidrop.simulate(text=CELL) as cell:
+        port = cell.url(scheme="pty")
+        session = Session(Settings({}, tmp_path / "conf", tmp_path / "state"), reconnect=True)
+        (bus,) = await session.open(f"ssh://127.0.0.1:{server}{port}?drives=a")
+        await session.run("MR 5120")
+        await session.run("/wait stopped")
+        with pytest.raises(Unreachable, match=r"in use by .* \(pid"):
+            await open_ssh(FarPort("127.0.0.1", port, port=server))
+        for victim in (lambda: pid_of(lock_owner(port)), ssh_here):
+            relay = pid_of(lock_owner(port))
+            os.kill(victim(), signal.SIGKILL)
+            await until(lambda: bus.lost, 5.0)
+            await until(lambda: not bus.link.away)
+            assert pid_of(lock_owner(port)) not in (0, relay)
+            assert [each.position for each in await bus.drives["a"].motion()] == [5120]
+        await session.close()
+        assert not lock_owner(port)
+
+
+FAILURES = [
+    (
+        "echo 'ssh: connect to host pc port 22: Connection refused' >&2; exit 255",
+        ["not reached: ", "refused", "no ssh"],
+    ),
+    ("echo 'Host key verification failed.' >&2; exit 255", ["`ssh -p 22 me@pc` once by hand"]),
+    ("echo 'me@pc: Permission denied (publickey).' >&2; exit 255", ["publickey", "ssh-copy-id"]),
+    ("exit 255", ["not reached: ssh ended without a word"]),
+    ("kill -9 $$", ["ended by signal 9"]),
+    ("exit 127", ["neither multidrop nor socat is installed on pc"]),
+    ("echo 'multidrop-relay 2'; exec cat >/dev/null", ["'multidrop-relay 2'", "'multidrop-relay 1'", "one version"]),
+    ("echo 'This account is not available.'; exit 1", ["This account is not available."]),
+    ("echo 'multidrop: no port /dev/tty9; plug it in' >&2; exit 3", ["/dev/tty9: no port /dev/tty9; plug it in"]),
+    ("yes | head -c 100000", ["y"]),
+    ("exec sleep 60", ["not reached within 0.3 s", "ssh -p 22 me@pc"]),
+]
+
+
+@pytest.mark.process
+async def test_what_goes_wrong_before_the_greeting_is_one_line_that_quotes_it(tmp_path: Path, monkeypatch) -> None:
+    before = len(os.listdir("/dev/fd"))
+    for body, words in FAILURES:
+        monkeypatch.setenv("PATH", fake_ssh(tmp_path / "bin", body))
+        with pytest.raises(Unreachable) as caught:
+            await open_ssh(FarPort("pc", "/dev/tty9", "me", 22), within=0.3 if "sleep" in body else None)
+        text = str(caught.value)
+        assert text.startswith("ssh://me@pc:22/dev/tty9: ") and "\n" not in text
+        assert [word for word in words if word not in text] == [], text
+    monkeypatch.setenv("PATH", str(tmp_path))
+    with pytest.raises(Unreachable, match="the program ssh cannot be started"):
+        await open_ssh(FarPort("pc", "/dev/tty9"))
+    assert len(os.listdir("/dev/fd")) == before
+
+
+@contextlib.contextmanager
+def pty(folder: Path) -> Iterator[tuple[int, str]]:
+    """A port whose other side reads only when the test says, with a name that no shell may execute."""
+    master, slave = os.openpty()
+    tty.setraw(slave)
+    name = folder / f'a\'b $(touch {folder.name}) ; "x", 0:1'
+    name.symlink_to(os.ttyname(slave))
+    os.close(slave)
+    try:
+        yield master, str(name)
+    finally:
+        os.close(master)
+
+
+async def opened(far: FarPort) -> tuple[Transport, bytearray, list[TransportLost]]:
+    transport, data, losses = await open_ssh(far), bytearray(), []
+    transport.start(data.extend, losses.append)
+    return transport, data, losses
+
+
+@pytest.mark.process
+@pytest.mark.skipif(not shutil.which("socat"), reason="needs socat")
+async def test_multidrop_is_started_there_and_without_it_socat_which_says_less(tmp_path: Path, monkeypatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    programs = {name: far_programs(tmp_path / name, name, "readlink") for name in ("multidrop", "socat")}
+    for name, far in programs.items():
+        body = f'HOME=/nowhere PATH={far} exec /bin/sh -c "$last"'
+        monkeypatch.setenv("PATH", fake_ssh(tmp_path / "bin", body))
+        with pytest.raises(Unreachable, match="(?i)no such|no port"):
+            await open_ssh(FarPort("pc", "/dev/does-not-exist"))
+        with pty(tmp_path / "multidrop" if name == "socat" else tmp_path) as (master, port):
+            transport, data, losses = await opened(FarPort("pc", port))
+            assert isinstance(transport, Limited) == (name == "socat")
+            transport.write(bytes(range(256)))
+            received = b""
+            while len(received) < 256:
+                received += await asyncio.to_thread(os.read, master, 256)
+            assert received == bytes(range(256))
+            os.write(master, b"51200\r\n")
+            await until(partial(data.endswith, b"51200\r\n"))
+            with pytest.raises(Unreachable):
+                await open_ssh(FarPort("pc", port))
+            await transport.close()
+            assert not losses
+    assert not (tmp_path / tmp_path.name).exists()
+
+
+def test_a_terminal_is_told_what_the_relay_is_for(monkeypatch, capsys) -> None:
+    monkeypatch.setattr("sys.stdin.isatty", lambda: True, raising=False)
+    assert main(["relay", "/dev/ttyUSB0"]) == 2
+    assert "open ssh://THIS-HOST/dev/ttyUSB0 on the other machine" in capsys.readouterr().err

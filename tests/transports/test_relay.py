@@ -1,0 +1,315 @@
+"""The relay's two sides in memory: frames, credit, and the drop that goes ahead of what was sent before it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from transports.relay import Relay
+from transports.relay_frames import CREDIT, GREETING, MOST, Frames, Garbled, Kind, Setting, frame
+from transports.relay_pipe import RelayEndpoint
+
+FRAMES = st.lists(st.tuples(st.sampled_from(Kind), st.binary(max_size=40)), max_size=20)
+HELD = 16
+"""Bytes that the driver of the port holds."""
+
+
+@given(FRAMES, st.integers(1, 7))
+def test_frames_come_out_as_they_went_in_whole_and_in_pieces(made: list[tuple[Kind, bytes]], size: int) -> None:
+    data = b"".join(frame(*each) for each in made)
+    assert list(Frames().take(data)) == made
+    pieces = Frames()
+    found = [each for at in range(0, len(data), size) for each in pieces.take(data[at : at + size])]
+    assert found == made
+
+
+@given(st.binary(min_size=3, max_size=30))
+def test_what_is_no_frame_is_refused_and_never_waited_for(data: bytes) -> None:
+    known = data[0] in set(Kind) and int.from_bytes(data[1:3]) <= MOST
+    if known:
+        list(Frames().take(data[:3]))
+    else:
+        with pytest.raises(Garbled):
+            list(Frames().take(data))
+
+
+@dataclass
+class Port:
+    """A port whose driver holds a few bytes, and sends when the test says."""
+
+    sent: bytearray = field(default_factory=bytearray)
+    held: bytearray = field(default_factory=bytearray)
+    arrived: list[bytes | None] = field(default_factory=list)
+    settings: list[tuple[str, int]] = field(default_factory=list)
+    baud = 9600
+
+    @property
+    def control(self) -> Port:
+        return self
+
+    def fileno(self) -> int:
+        raise NotImplementedError
+
+    def read(self) -> bytes | None:
+        if not self.arrived:
+            raise BlockingIOError
+        return self.arrived.pop(0)
+
+    def write(self, data: bytes | memoryview) -> int:
+        taken = data[: HELD - len(self.held)]
+        if not taken:
+            raise BlockingIOError
+        self.held += taken
+        return len(taken)
+
+    def send(self, count: int) -> None:
+        self.sent += self.held[:count]
+        del self.held[:count]
+
+    def unsent(self) -> int:
+        return len(self.held)
+
+    def drop(self) -> int:
+        count = len(self.held)
+        self.held.clear()
+        return count
+
+    def explain(self, error: OSError | None) -> str:
+        return "the port is gone"
+
+    def close(self) -> None: ...
+
+    def set_baud(self, baud: int) -> None:
+        if baud == 7:
+            raise OSError(22, "Invalid argument")
+        self.settings.append(("baud", baud))
+
+    def set_dtr(self, on: bool) -> None:
+        self.settings.append(("dtr", on))
+
+    def set_rts(self, on: bool) -> None:
+        self.settings.append(("rts", on))
+
+    def set_break(self, on: bool) -> None:
+        self.settings.append(("break", on))
+
+
+class Way:
+    """What ssh does: takes all that it is given, and delivers it when the test says."""
+
+    name = "ssh://pc/dev/ttyS0"
+
+    def __init__(self) -> None:
+        self.there, self.back = bytearray(), bytearray()
+        self.full = False
+
+    def fileno(self) -> int:
+        raise NotImplementedError
+
+    def read(self, most: int) -> bytes:
+        if not self.back:
+            raise BlockingIOError
+        data = bytes(self.back[:most])
+        del self.back[:most]
+        return data
+
+    def write(self, data: bytes | bytearray | memoryview) -> int:
+        if self.full:
+            raise BlockingIOError
+        self.there += data
+        return len(data)
+
+    def last_words(self) -> str:
+        return "client_loop: send disconnect: Broken pipe"
+
+    def close(self, lost: bool) -> None: ...
+
+
+class Both:
+    """Two sides of a relay, a way between them, and a port."""
+
+    def __init__(self) -> None:
+        self.port, self.way = Port(), Way()
+        self.far = Relay(self.port)
+        assert bytes(self.far.out) == f"{GREETING}\n".encode()
+        self.far.out.clear()
+        self.near = RelayEndpoint(self.way, b"")
+
+    def write(self, data: bytes) -> int:
+        try:
+            return self.near.write(data)
+        except BlockingIOError:
+            return 0
+
+    def deliver(self, count: int = 10**6) -> None:
+        """Deliver bytes to the far side."""
+        data = bytes(self.way.there[:count])
+        del self.way.there[:count]
+        self.far.receive(data)
+
+    def answer(self, count: int = 10**6) -> bytes:
+        """Deliver bytes to the near side."""
+        self.far.push()
+        self.way.back += self.far.out[:count]
+        del self.far.out[:count]
+        arrived = b""
+        while self.way.back:
+            arrived += self.near.read() or b""
+        return arrived
+
+    def send_all(self) -> None:
+        """Let the port send, until nothing waits."""
+        while self.port.held or self.far.queue:
+            self.port.send(HELD)
+            self.far.push()
+
+
+def test_no_more_leaves_than_the_credit_until_the_port_has_sent() -> None:
+    both = Both()
+    assert both.write(b"x" * 1000) == CREDIT
+    assert both.write(b"x") == 0
+    both.deliver()
+    both.answer()
+    assert both.write(b"x") == 0, "the driver holds 16 bytes, which are not sent"
+    both.port.send(10)
+    both.answer()
+    assert both.write(b"x" * 1000) == 10
+    both.deliver()
+    both.send_all()
+    both.answer()
+    assert both.near.unsent() == 0
+    assert bytes(both.port.sent) == b"x" * (CREDIT + 10)
+
+
+def test_the_stop_is_the_next_that_a_blocked_port_sends() -> None:
+    both = Both()
+    both.write(b"MR 51200\r" * 100)
+    both.deliver()
+    assert len(both.port.held) == HELD and both.far.queue
+    assert both.near.drop() == CREDIT
+    stop = b"\x1b" * (2 * CREDIT)
+    assert both.write(stop) == len(stop), "a stop needs no credit"
+    both.deliver()
+    both.send_all()
+    assert bytes(both.port.sent) == stop
+
+
+def test_a_drop_is_obeyed_ahead_of_what_came_with_it() -> None:
+    both = Both()
+    both.write(b"MR 51200\r")
+    both.near.drop()
+    both.write(b"\x1b")
+    both.deliver()
+    both.send_all()
+    assert bytes(both.port.sent) == b"\x1b"
+
+
+@given(st.data())
+@settings(max_examples=60)
+def test_whatever_is_on_its_way_a_stop_follows_only_what_was_sent_before_it(data: st.DataObject) -> None:
+    both, clean = Both(), b""
+    for number in range(data.draw(st.integers(1, 12))):
+        step = data.draw(st.sampled_from(["write", "deliver", "answer", "send", "stop"]))
+        size = data.draw(st.integers(1, 400))
+        if step == "write":
+            both.write(b"c" * size)
+        elif step == "deliver":
+            both.deliver(size)
+        elif step == "answer":
+            both.answer(size)
+        elif step == "send":
+            both.port.send(size)
+        else:
+            both.near.drop()
+            stop = bytes([number]) * size
+            assert both.write(stop) == size
+            both.deliver()
+            before = bytes(both.port.sent)
+            both.send_all()
+            assert bytes(both.port.sent) == before + stop
+            clean = stop
+        assert len(both.far.queue) + len(both.port.held) <= CREDIT + len(clean)
+    both.deliver()
+    both.send_all()
+    both.answer()
+    assert both.near.unsent() == 0 and both.near.room == CREDIT
+
+
+def test_a_way_that_is_full_gets_the_rest_of_a_frame_first() -> None:
+    both = Both()
+    both.way.full = True
+    assert both.write(b"PR P\r") == 5
+    assert both.near.blocked
+    both.near.drop()
+    assert both.write(b"\x1b") == 0
+    both.way.full = False
+    assert both.write(b"\x1b") == 1
+    both.deliver()
+    both.send_all()
+    assert bytes(both.port.sent) == b"\x1b"
+
+
+def test_bytes_of_the_port_come_back_in_order_and_its_loss_is_named() -> None:
+    both = Both()
+    both.port.arrived += [bytes(range(256)) * 40, b"51200\r\n"]
+    assert both.far.read() and both.far.read() and both.far.read()
+    assert both.answer(1) == b""
+    assert both.answer() == bytes(range(256)) * 40 + b"51200\r\n"
+    both.port.arrived.append(None)
+    assert not both.far.read()
+    both.far.lost(None)
+    both.answer()
+    assert both.near.over and both.near.explain(None) == "the port is gone"
+
+
+def test_an_end_without_a_word_of_the_relay_quotes_ssh() -> None:
+    assert Both().near.explain(None) == "client_loop: send disconnect: Broken pipe"
+
+
+@pytest.mark.parametrize(
+    ("setting", "value", "done", "outcome"),
+    [
+        (Setting.BAUD, 115200, [("baud", 115200)], ""),
+        (Setting.BREAK, 1, [("break", True)], ""),
+        (Setting.RTS, 0, [("rts", False)], ""),
+        (Setting.DTR, 1, [("dtr", True)], ""),
+        (Setting.BAUD, 7, [], "Invalid argument"),
+        (99, 7, [], "no setting 99"),
+    ],
+)
+def test_settings_of_the_port_change_and_a_refusal_is_named(
+    setting: int, value: int, done: list[tuple[str, int]], outcome: str
+) -> None:
+    both = Both()
+    both.near.send(frame(Kind.SET, bytes([3, setting]) + value.to_bytes(4)))
+    both.deliver()
+    both.answer()
+    assert both.port.settings == done
+    assert both.near.outcome(3) == outcome
+
+
+def test_a_sign_of_life_is_replied_to_and_no_outcome_is_waited_for_at_the_end() -> None:
+    both = Both()
+    both.near.send(frame(Kind.BEAT))
+    both.deliver()
+    both.answer()
+    assert both.near.answered == 1
+    both.near.end()
+    with pytest.raises(OSError, match="the connection has ended"):
+        both.near.outcome(1)
+
+
+@pytest.mark.parametrize("data", [b"GET / HTTP/1.1\r\n", frame(Kind.LOST), frame(Kind.SET, b"\x01")])
+def test_input_that_is_not_of_multidrop_ends_the_relay(data: bytes) -> None:
+    with pytest.raises(Garbled):
+        Both().far.receive(data)
+
+
+def test_output_that_is_not_of_a_relay_is_a_loss() -> None:
+    both = Both()
+    both.way.back += b"bash: warning\n"
+    with pytest.raises(OSError, match="not of a relay"):
+        both.near.read()

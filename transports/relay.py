@@ -1,0 +1,247 @@
+"""The far side of `ssh://`: a port here, lent to one multidrop elsewhere through standard input and output.
+
+Theory of operation. One loop waits for three descriptors, and none of them is ever waited for in a write: a relay that
+blocked on its port would never see the end of its input, and stay behind as the holder of the port. All input that has
+arrived is taken in before the port gets a byte. So a drop is obeyed ahead of the bytes that came before it.
+
+A byte counts as sent when it has left the driver, as far as the driver reports that. It is reported at once, because
+this side's credit and its knowledge of half-sent lines depend on it. The relay ends with its input, and after a silence
+of `SILENCE` seconds. It then gives the driver a second to send what it holds, because the last of it may be a stop.
+"""
+
+from __future__ import annotations
+
+import os
+import select
+import time
+from collections.abc import Callable
+from typing import Protocol
+
+from transports.base import PortControl, TransportLost
+from transports.relay_frames import GREETING, SILENCE, Frames, Garbled, Kind, Setting, data_frames, frame
+
+_READ = 65536
+_FULL = 65536
+"""Bytes that wait for a slow reader, from which on the port is not read."""
+_LINGER = 1.0
+"""Seconds that the end waits for the driver, and for the reader of what was said last."""
+_LOOK = 0.002
+"""Seconds between two looks at what the driver holds."""
+
+
+class Port(Protocol):
+    """An open port, which never blocks: `read` and `write` raise BlockingIOError instead."""
+
+    @property
+    def control(self) -> PortControl:
+        """Its settings."""
+
+    def fileno(self) -> int:
+        """The descriptor."""
+
+    def read(self) -> bytes | None:
+        """Bytes that arrived; None: the port was hung up."""
+
+    def write(self, data: bytes | memoryview) -> int:
+        """Write, and return how many bytes the driver took."""
+
+    def unsent(self) -> int:
+        """Bytes that the driver holds."""
+
+    def drop(self) -> int:
+        """Empty the driver's output queue; return how many bytes that was."""
+
+    def explain(self, error: OSError | None) -> str:
+        """Reason of a loss."""
+
+    def close(self) -> None:
+        """Close the port."""
+
+
+class Relay:
+    """What the relay does with bytes; the loop that waits is `serve`."""
+
+    def __init__(self, port: Port) -> None:
+        self.port = port
+        self.out = bytearray(f"{GREETING}\n".encode())
+        """What the reader has not taken yet."""
+        self.queue = bytearray()
+        """What the port has not taken yet."""
+        self._frames = Frames()
+        self._settled = self._taken = self._reported = 0
+        """Bytes for the port since the beginning: dropped or taken by the driver; reported as sent."""
+        self._dropped = False
+
+    def receive(self, data: bytes) -> None:
+        """Take in what arrived, and pass it on. Raises Garbled; OSError where the port is lost."""
+        for kind, payload in self._frames.take(data):
+            if kind is Kind.DATA:
+                self.queue += payload
+            elif kind is Kind.DROP:
+                self._drop()
+            elif kind is Kind.BEAT:
+                self.out += frame(Kind.BEAT)
+            elif kind is Kind.SET:
+                self._set(payload)
+            else:
+                raise Garbled(f"a frame {kind.name}, which only the far side sends")
+        self.push()
+
+    def push(self) -> None:
+        """Pass on to the port what it takes, and report what it has sent. Raises OSError where it is lost."""
+        while self.queue:
+            try:
+                taken = self.port.write(bytes(self.queue))
+            except (BlockingIOError, InterruptedError):
+                break
+            if not taken:
+                break
+            self._settled += taken
+            del self.queue[:taken]
+        self.report()
+
+    def report(self) -> None:
+        """Report what the port has sent since the last report."""
+        sent = self._settled - self.port.unsent()
+        if sent > self._reported:
+            self._reported = sent
+            self.out += frame(Kind.DONE, sent.to_bytes(8))
+
+    @property
+    def held(self) -> bool:
+        """True while the driver holds bytes that it has not sent."""
+        return self._reported < self._settled
+
+    def read(self) -> bool:
+        """Pass on what the port has received; False where it was hung up. Raises OSError where it is lost."""
+        try:
+            data = self.port.read()
+        except (BlockingIOError, InterruptedError):
+            return True
+        if data is None:
+            return False
+        self.out += data_frames(data)
+        return True
+
+    def lost(self, error: OSError | None) -> str:
+        """Report the loss of the port; return the reason."""
+        reason = self.port.explain(error)
+        self.out += frame(Kind.LOST, reason.encode()[:1000])
+        return reason
+
+    def _drop(self) -> None:
+        self._settled += len(self.queue)
+        self.queue.clear()
+        self.port.drop()
+
+    def _set(self, payload: bytes) -> None:
+        if len(payload) != 6:
+            raise Garbled("a change of a setting that is not 6 bytes long")
+        self.out += frame(Kind.OUTCOME, payload[:1] + _changed(self.port.control, payload[1], payload[2:]).encode())
+
+
+def _changed(control: PortControl, setting: int, value: bytes) -> str:
+    """Change a setting; return the reason why it is refused, or an empty text."""
+    number = int.from_bytes(value)
+    changes: dict[int, Callable[[], None]] = {
+        Setting.BAUD: lambda: control.set_baud(number),
+        Setting.DTR: lambda: control.set_dtr(bool(number)),
+        Setting.RTS: lambda: control.set_rts(bool(number)),
+        Setting.BREAK: lambda: control.set_break(bool(number)),
+    }
+    if setting not in changes:
+        return f"no setting {setting}"
+    try:
+        changes[setting]()
+    except OSError as problem:
+        return problem.strerror or str(problem) or "refused"
+    return ""
+
+
+def serve(port: Port, source: int = 0, sink: int = 1, silence: float = SILENCE) -> None:
+    """Lend an open port to whoever is at the other end of these descriptors; return when that end is gone.
+
+    Raises TransportLost where the port is lost, or where the input is not that of multidrop. Closes the port.
+    """
+    for descriptor in (source, sink):
+        os.set_blocking(descriptor, False)
+    try:
+        _Loop(Relay(port), source, sink, silence).run()
+    finally:
+        port.close()
+
+
+class _Loop:
+    """The loop that waits for the input, the port and the reader."""
+
+    def __init__(self, relay: Relay, source: int, sink: int, silence: float) -> None:
+        self._relay, self._source, self._sink, self._silence = relay, source, sink, silence
+        self._port = relay.port.fileno()
+        self._last = time.monotonic()
+        """When something arrived from the other end."""
+
+    def run(self) -> None:
+        """Pass bytes on, until the other end is gone. Raises TransportLost."""
+        try:
+            while self._turn():
+                pass
+        except Garbled as problem:
+            raise TransportLost(f"standard input is not from multidrop: {problem}") from None
+        finally:
+            self._linger()
+
+    def _turn(self) -> bool:
+        """Wait, and do what can be done; False at the end."""
+        readable, writable = self._wait()
+        if time.monotonic() - self._last > self._silence and self._source not in readable:
+            raise TransportLost(f"nothing has come from the other end for {self._silence:g} s")
+        if self._source in readable and not self._take():
+            return False
+        try:
+            hung_up = self._port in readable and not self._relay.read()
+            self._relay.push()
+        except OSError as error:
+            raise TransportLost(self._relay.lost(error)) from error
+        if hung_up:
+            raise TransportLost(self._relay.lost(None))
+        return self._sink not in writable or self._write()
+
+    def _wait(self) -> tuple[list[int], list[int]]:
+        relay = self._relay
+        reads = [self._source] + ([self._port] if len(relay.out) < _FULL else [])
+        writes = ([self._sink] if relay.out else []) + ([self._port] if relay.queue else [])
+        patience = _LOOK if relay.held else self._silence
+        readable, writable, _ = select.select(reads, writes, [], patience)
+        return readable, writable
+
+    def _take(self) -> bool:
+        """Take in what arrived from the other end; False where that is gone."""
+        self._last = time.monotonic()
+        try:
+            data = os.read(self._source, _READ)
+        except (BlockingIOError, InterruptedError):
+            return True
+        except OSError:
+            return False
+        try:
+            self._relay.receive(data)
+        except OSError as error:
+            raise TransportLost(self._relay.lost(error)) from error
+        return bool(data)
+
+    def _write(self) -> bool:
+        """Pass on what the reader takes; False where that is gone."""
+        try:
+            del self._relay.out[: os.write(self._sink, self._relay.out)]
+        except (BlockingIOError, InterruptedError):
+            return True
+        except OSError:
+            return False
+        return True
+
+    def _linger(self) -> None:
+        """Give the driver and the reader a moment for what they hold."""
+        deadline, reader = time.monotonic() + _LINGER, True
+        while time.monotonic() < deadline and (self._relay.port.unsent() or (reader and self._relay.out)):
+            reader = reader and self._write()
+            time.sleep(_LOOK)

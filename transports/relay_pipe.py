@@ -1,0 +1,293 @@
+"""The near side of a relay: a pipe over a connection whose other end speaks the frames of `transports.relay_frames`.
+
+No more than `CREDIT` bytes are on the way or in the far driver. The rest waits here, where a stop drops it. A stop's
+drop is followed by the stop whatever the credit, because the far side obeys the drop ahead of its queue.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import threading
+from collections.abc import Callable
+from typing import Protocol
+
+from transports.descriptor import DescriptorPipe
+from transports.relay_frames import BEAT, CREDIT, MISSED, MOST, Frames, Garbled, Kind, Setting, frame
+
+_READ = 4096
+_PATIENCE = 5.0
+"""Seconds to wait for the outcome of a change of a setting."""
+
+
+class Connection(Protocol):
+    """A stream to the other end, as a descriptor that never blocks."""
+
+    @property
+    def name(self) -> str:
+        """The name for a person."""
+
+    def fileno(self) -> int:
+        """The descriptor."""
+
+    def read(self, most: int) -> bytes:
+        """Read what arrived; empty at the end. Raises BlockingIOError where nothing did."""
+
+    def write(self, data: bytes | bytearray | memoryview) -> int:
+        """Write, and return how many bytes were taken. Raises BlockingIOError where none are."""
+
+    def last_words(self) -> str:
+        """What is known of the reason of its end; empty if nothing is."""
+
+    def close(self, lost: bool) -> None:
+        """End it; may block."""
+
+
+class RelayEndpoint:
+    """The frames and the credit. `read` is called by the loop, all that writes under the lock of the pipe."""
+
+    def __init__(self, connection: Connection, early: bytes) -> None:
+        """`early`: bytes that arrived behind the greeting."""
+        self.name = connection.name
+        self.answered = 0
+        """Number of signs of life that the far side has replied to."""
+        self.outcomes: dict[int, str] = {}
+        self.news = threading.Condition()
+        """Notified at an outcome, and at the end."""
+        self._connection = connection
+        self._frames = Frames()
+        self._early = early
+        self._rest = bytearray()
+        """Frames that the system has not taken."""
+        self._sent = self._done = self._base = 0
+        """Bytes for the port: sent; reported as sent by the port or dropped; sent before the last drop."""
+        self._urgent = self._ended = self._lost = False
+        self._reason = ""
+
+    def fileno(self) -> int:
+        """The descriptor."""
+        return self._connection.fileno()
+
+    @property
+    def blocked(self) -> bool:
+        """True while the system does not take what has to leave."""
+        return bool(self._rest)
+
+    @property
+    def over(self) -> bool:
+        """True once the far side has said that its port is lost."""
+        return bool(self._reason)
+
+    @property
+    def room(self) -> int:
+        """The number of bytes that may leave now."""
+        return CREDIT - (self._sent - max(self._done, self._base))
+
+    def read(self) -> bytes | None:
+        """Bytes from the port; empty: other news; None: the end."""
+        data = self._early or self._connection.read(_READ)
+        self._early = b""
+        if not data:
+            return None
+        arrived = bytearray()
+        try:
+            for kind, payload in self._frames.take(data):
+                self._obey(kind, payload, arrived)
+        except Garbled as problem:
+            self._reason = f"the other end sends what is not of a relay ({problem})"
+            raise OSError(self._reason) from problem
+        return bytes(arrived)
+
+    def _obey(self, kind: Kind, payload: bytes, arrived: bytearray) -> None:
+        if kind is Kind.DATA:
+            arrived += payload
+        elif kind is Kind.DONE:
+            self._done = int.from_bytes(payload)
+        elif kind is Kind.BEAT:
+            self.answered += 1
+        elif kind is Kind.OUTCOME and payload:
+            with self.news:
+                self.outcomes[payload[0]] = payload[1:].decode(errors="replace")
+                self.news.notify_all()
+        elif kind is Kind.LOST:
+            self._reason = payload.decode(errors="replace")
+
+    def write(self, data: bytes | memoryview) -> int:
+        """Write, and return how many bytes the credit allowed."""
+        if not data:
+            return 0
+        self.flush()
+        allowed = len(data) if self._urgent else min(len(data), self.room)
+        if self._rest or allowed <= 0:
+            raise BlockingIOError
+        self._urgent = False
+        for at in range(0, allowed, MOST):
+            self._rest += frame(Kind.DATA, data[at : min(at + MOST, allowed)])
+        self._sent += allowed
+        self.flush()
+        return allowed
+
+    def send(self, made: bytes) -> None:
+        """Send a frame that needs no credit."""
+        self._rest += made
+        self.flush()
+
+    def flush(self) -> None:
+        """Write what has to leave, as far as the system takes it."""
+        try:
+            while self._rest:
+                del self._rest[: self._connection.write(self._rest)]
+        except (BlockingIOError, InterruptedError):
+            return
+
+    def unsent(self) -> int:
+        """Bytes on the way, and in the far driver."""
+        return max(0, self._sent - self._done)
+
+    def drop(self) -> int:
+        """Have the far side drop what its port has not sent; what is written next leaves at once and whole."""
+        held = self.unsent()
+        self._base, self._urgent = self._sent, True
+        self._rest += frame(Kind.DROP)
+        return held
+
+    def explain(self, error: OSError | None) -> str:
+        """Reason of a break in one line for a person."""
+        self._lost = True
+        why = "" if error is None else error.strerror or str(error)
+        return self._reason or self._connection.last_words() or why or "the connection has ended; check the network"
+
+    def end(self) -> None:
+        """Have nobody wait for an outcome any more."""
+        with self.news:
+            self._ended = True
+            self.news.notify_all()
+
+    def outcome(self, number: int) -> str:
+        """Wait for the outcome of a change. Raises OSError where none comes."""
+        with self.news:
+            self.news.wait_for(lambda: self._ended or number in self.outcomes, _PATIENCE)
+            if number not in self.outcomes:
+                raise OSError("the far side does not reply" if not self._ended else "the connection has ended")
+            return self.outcomes.pop(number)
+
+    def close(self) -> None:
+        """Close the connection."""
+        self._connection.close(self._lost)
+
+
+class RelayPipe(DescriptorPipe):
+    """A transport over a relay. Room comes with a report of the far side, not with the descriptor."""
+
+    def __init__(self, connection: Connection, baud: int, early: bytes = b"") -> None:
+        self._relay = RelayEndpoint(connection, early)
+        super().__init__(self._relay, RelayControl(self._relay, self._send_frame, baud))
+        self._asked = 0
+        """Number of signs of life sent."""
+        self._beat: asyncio.TimerHandle | None = None
+        self._show_life()
+
+    def _show_life(self) -> None:
+        """Send a sign of life, or break the pipe where the far side has stopped to reply."""
+        if not self._usable:
+            return
+        if self._reading and self._asked - self._relay.answered >= MISSED:
+            self._break(OSError(f"the far side has not replied for {MISSED * BEAT:g} s"))
+            return
+        self._asked += 1
+        self._beat = self._loop.call_later(BEAT, self._show_life)
+        self._send_frame(frame(Kind.BEAT))
+
+    def _send_frame(self, made: bytes) -> None:
+        """Send a frame that needs no credit; any thread."""
+        with self._guard:
+            if not self._usable:
+                return
+            try:
+                self._relay.send(made)
+                problem = None
+            except OSError as error:
+                problem = error
+        self._loop.call_soon_threadsafe(self._after_push, problem)
+
+    def discard(self, whole: bool = False) -> int:
+        """Drop what waits here and, unless `whole`, what the far port has not sent."""
+        dropped = super().discard(whole)
+        if self._usable:
+            self._send()
+        return dropped
+
+    def _begin(self) -> None:
+        super()._begin()
+        self._loop.call_soon(self._read_early)
+
+    def _read_early(self) -> None:
+        """Read what came with the greeting, of which the descriptor knows nothing."""
+        if self._usable:
+            self._read()
+
+    def _read(self) -> bool:
+        more = super()._read()
+        if self._relay.over and self._usable:
+            self._break(None)
+        if self._pending and self._usable:
+            self._send()
+        return more
+
+    def _push(self) -> OSError | None:
+        try:
+            self._relay.flush()
+        except OSError as error:
+            return error
+        return super()._push()
+
+    def _wants_room(self) -> bool:
+        return self._relay.blocked
+
+    def _idle(self) -> bool:
+        return super()._idle() and not self._relay.blocked
+
+    def _halt(self) -> None:
+        super()._halt()
+        if self._beat is not None:
+            self._beat.cancel()
+        self._relay.end()
+
+
+class RelayControl:
+    """The settings of the far port. Each call waits for the far side, so it is made in a thread."""
+
+    def __init__(self, relay: RelayEndpoint, send: Callable[[bytes], None], baud: int) -> None:
+        self._relay, self._send = relay, send
+        self._baud = baud
+        self._turn = threading.Lock()
+        self._number = 0
+
+    @property
+    def baud(self) -> int:
+        """The baud rate, bits/s."""
+        return self._baud
+
+    def set_baud(self, baud: int) -> None:
+        """Change the baud rate; a refused one leaves the present one."""
+        self._set(Setting.BAUD, baud)
+        self._baud = baud
+
+    def set_dtr(self, on: bool) -> None:
+        """Switch the DTR line."""
+        self._set(Setting.DTR, on)
+
+    def set_rts(self, on: bool) -> None:
+        """Switch the RTS line."""
+        self._set(Setting.RTS, on)
+
+    def set_break(self, on: bool) -> None:
+        """Begin or end a break."""
+        self._set(Setting.BREAK, on)
+
+    def _set(self, setting: Setting, value: int) -> None:
+        with self._turn:
+            self._number = (self._number + 1) % 256
+            self._relay.outcomes.pop(self._number, None)
+            self._send(frame(Kind.SET, bytes([self._number, setting]) + value.to_bytes(4)))
+            if refusal := self._relay.outcome(self._number):
+                raise OSError(refusal)

@@ -1,0 +1,34 @@
+"""A serial port of another machine, through the user's own `ssh` program: its keys, configuration, and jump hosts."""
+
+from __future__ import annotations
+
+import asyncio
+import sys
+
+from transports.base import Transport, Unreachable
+from transports.far_port import FarPort
+from transports.pipe import in_thread
+
+OPENING = 20.0
+"""Seconds until the greeting: several hosts on the way, a slow machine."""
+
+
+async def open_ssh(far: FarPort, baud: int = 9600, within: float | None = None, way: str = "") -> Transport:
+    """Open a port of another machine within a time, s; `way`: see `far_port.WAYS`. Raises Unreachable."""
+    if sys.platform == "win32":
+        raise Unreachable(f"{far.name}: ssh:// needs multidrop on Linux or macOS here")
+    else:
+        from transports.ssh_session import SshSession, greeted
+
+        patience = within or OPENING
+        session = await in_thread(lambda: SshSession(far, baud, way), lambda late: late.close(True))
+        try:
+            async with asyncio.timeout(patience):
+                return await greeted(session, far, baud, way)
+        except TimeoutError:
+            why = session.last_words() or "no reply"
+            await asyncio.to_thread(session.close, True)
+            raise Unreachable(f"{far.name}: not reached within {patience:g} s: {why}; try `ssh {far.login}`") from None
+        except BaseException:
+            await asyncio.shield(asyncio.to_thread(session.close, True))
+            raise

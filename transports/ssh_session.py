@@ -1,0 +1,191 @@
+"""A running `ssh` and what is behind it: `multidrop relay` or `socat` on another machine.
+
+`ssh` has one socket as its standard input and output. It runs in a session of its own, so a Ctrl+C at the terminal
+does not end it ahead of the stop. Its messages go to a file, of which the last line is the reason of an end.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import os
+import re
+import socket
+import subprocess
+import sys
+import tempfile
+import time
+from typing import IO
+
+from transports.base import Transport, Unreachable
+from transports.descriptor import DescriptorPipe
+from transports.far_port import FarPort
+from transports.relay_frames import GREETING
+from transports.relay_pipe import RelayPipe
+from transports.ssh_command import SOCAT_WORD, arguments, reason, unknown_greeting
+
+if sys.platform != "win32":
+    from transports.output_queue import output_queue
+
+assert sys.platform != "win32"
+
+LIMITS = (
+    "on {host} socat passes the bytes on instead of multidrop: a stop waits there behind what was sent before it, and "
+    "the baud rate does not change while the port is open"
+)
+_PREAMBLE = 65536
+"""The largest number of bytes that a far shell may print before the greeting."""
+_SETTLE = 0.3
+"""Seconds in which socat ends if it cannot open the port."""
+_ENDING = 2.5
+"""Seconds that ssh gets for its end once its input has ended."""
+_READ = 4096
+_PREFIX = re.compile(r"multidrop: |\S+ \S+ socat\[\d+\] [A-Z] ")
+"""What a line of the far side begins with."""
+
+
+class SshSession:
+    """A running `ssh` with a socket to it. Its start may block; raises Unreachable."""
+
+    def __init__(self, far: FarPort, baud: int, way: str) -> None:
+        self.name = far.name
+        self._socket, theirs = socket.socketpair()
+        self._words: IO[bytes] = tempfile.TemporaryFile()  # noqa: SIM115
+        try:
+            with theirs:
+                self._process = subprocess.Popen(
+                    arguments(far, baud, way),
+                    stdin=theirs.fileno(),
+                    stdout=theirs.fileno(),
+                    stderr=self._words,
+                    start_new_session=True,
+                )
+        except OSError as error:
+            self._release()
+            why = "install OpenSSH's client" if isinstance(error, FileNotFoundError) else error.strerror
+            raise Unreachable(f"{far.name}: the program ssh cannot be started; {why}") from error
+        self._socket.setblocking(False)
+
+    async def read_some(self) -> bytes:
+        """Wait for bytes; empty at the end."""
+        try:
+            return await asyncio.get_running_loop().sock_recv(self._socket, _READ)
+        except OSError:
+            return b""
+
+    def fileno(self) -> int:
+        """The descriptor."""
+        return self._socket.fileno()
+
+    def read(self, most: int) -> bytes:
+        """Read what arrived; empty at the end."""
+        return self._socket.recv(most)
+
+    def write(self, data: bytes | bytearray | memoryview) -> int:
+        """Write, and return how many bytes were taken."""
+        return self._socket.send(data)
+
+    def unsent(self) -> int:
+        """Bytes that ssh has not taken."""
+        return output_queue(self._socket.fileno())
+
+    def last_words(self) -> str:
+        """The last line that ssh or the far side has printed."""
+        size = os.fstat(self._words.fileno()).st_size
+        text = os.pread(self._words.fileno(), _READ, max(0, size - _READ)).decode(errors="replace")
+        lines = [" ".join(line.split()) for line in text.splitlines() if line.strip()]
+        return _PREFIX.sub("", lines[-1])[:400] if lines else ""
+
+    def status(self, within: float) -> int | None:
+        """Wait for the exit status; None: it runs on."""
+        with contextlib.suppress(subprocess.TimeoutExpired):
+            return self._process.wait(within)
+        return None
+
+    def close(self, lost: bool) -> None:
+        """End it: the far side sees the end of its input. What is `lost` gets no time for that."""
+        with contextlib.suppress(OSError):
+            self._socket.shutdown(socket.SHUT_WR)
+        self._drain(time.monotonic() + (0.0 if lost else _ENDING))
+        for end in (self._process.terminate, self._process.kill):
+            if self._process.poll() is None:
+                end()
+                with contextlib.suppress(subprocess.TimeoutExpired):
+                    self._process.wait(1.0)
+        self._release()
+
+    def _drain(self, deadline: float) -> None:
+        """Read until the end, so that nothing holds ssh up."""
+        with contextlib.suppress(OSError):
+            while (left := deadline - time.monotonic()) > 0:
+                self._socket.settimeout(left)
+                if not self._socket.recv(_READ):
+                    break
+        with contextlib.suppress(subprocess.TimeoutExpired):
+            self._process.wait(max(0.05, deadline - time.monotonic()))
+
+    def _release(self) -> None:
+        self._socket.close()
+        self._words.close()
+
+
+class SocatEndpoint:
+    """The bytes of a far socat, which knows no frames and gives nothing back."""
+
+    def __init__(self, session: SshSession) -> None:
+        self.name = session.name
+        self._session = session
+        self._lost = False
+        self.fileno, self.write, self.unsent = session.fileno, session.write, session.unsent
+
+    def read(self) -> bytes | None:
+        """Bytes that arrived; None: the end."""
+        return self._session.read(_READ) or None
+
+    def drop(self) -> int:
+        """Return 0: what has left cannot be taken back."""
+        return 0
+
+    def explain(self, error: OSError | None) -> str:
+        """Reason of a break in one line for a person."""
+        self._lost = True
+        return self._session.last_words() or "the connection has ended; check the network"
+
+    def close(self) -> None:
+        """End ssh."""
+        self._session.close(self._lost)
+
+
+class SocatPipe(DescriptorPipe):
+    """A transport that keeps less than others; `limits` says what it does not."""
+
+    def __init__(self, endpoint: SocatEndpoint, limits: str) -> None:
+        super().__init__(endpoint)
+        self.limits = limits
+
+
+async def greeted(session: SshSession, far: FarPort, baud: int, way: str) -> Transport:
+    """Wait for the greeting, and make the transport that it asks for. Raises Unreachable."""
+    line, early = await _greeting(session, far, way)
+    if line == GREETING:
+        return RelayPipe(session, baud, early)
+    if (status := await asyncio.to_thread(session.status, _SETTLE)) is not None:
+        raise Unreachable(f"{far.name}: {reason(far, status, session.last_words(), way)}")
+    return SocatPipe(SocatEndpoint(session), LIMITS.format(host=far.host))
+
+
+async def _greeting(session: SshSession, far: FarPort, way: str) -> tuple[str, bytes]:
+    """The first line that is a greeting, and the bytes behind it; a far shell may print others before."""
+    held, count, said = b"", 0, ""
+    while count < _PREAMBLE and (data := await session.read_some()):
+        count += len(data)
+        *lines, held = (held + data).split(b"\n")
+        for number, line in enumerate(lines):
+            text = line.decode(errors="replace").strip()
+            if text in (GREETING, SOCAT_WORD):
+                return text, b"\n".join([*lines[number + 1 :], held])
+            if wrong := unknown_greeting(text):
+                raise Unreachable(f"{far.name}: {wrong}")
+            said = text or said
+    status = await asyncio.to_thread(session.status, _ENDING)
+    raise Unreachable(f"{far.name}: {reason(far, status, session.last_words() or said, way)}")
