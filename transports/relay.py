@@ -13,12 +13,15 @@ from __future__ import annotations
 
 import os
 import select
+import sys
 import time
 from collections.abc import Callable
 from typing import Protocol
 
 from transports.base import PortControl, TransportLost
 from transports.relay_frames import GREETING, SILENCE, Frames, Garbled, Kind, Setting, data_frames, frame
+
+assert sys.platform != "win32"
 
 _READ = 65536
 _FULL = 65536
