@@ -103,7 +103,7 @@ def run(chosen: argparse.Namespace) -> int:
     return command(chosen)
 
 
-EXTRAS = {"pytest": "pytest", "rerun": "rerun"}
+EXTRAS = {"cluster": "distributed", "lsp": "pygls", "mqtt": "paho", "pytest": "pytest", "rerun": "rerun"}
 """The modules of the extras in pyproject.toml, by extra."""
 
 

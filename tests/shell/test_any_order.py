@@ -61,7 +61,9 @@ class AnyOrder(RuleBasedStateMachine):
         self.run(self.shop.__aenter__())
         self.floor = self.shop._floor()
         self.devices = {placed.spec.name: placed.device for placed in self.floor.floor.drives}
-        self.witnesses = {name: Witness(device, MCodeLanguage.asks) for name, device in self.devices.items()}
+        self.witnesses = {
+            name: Witness(device, MCodeLanguage.asks, MCodeLanguage.refused) for name, device in self.devices.items()
+        }
         self.numbers = itertools.count(1000)
         self.plugged = True
 
