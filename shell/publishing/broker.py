@@ -190,12 +190,25 @@ def _log_in(client: Client, target: Target, settings: MqttSettings) -> None:
         client.tls_set_context(_context(settings))
 
 
+class _Socket(ssl.SSLSocket):
+    """A socket that is closed where its handshake fails; paho leaves it open."""
+
+    def do_handshake(self, block: bool = False) -> None:
+        """Agree on a key. Raises OSError."""
+        try:
+            super().do_handshake(block)
+        except OSError:
+            self.close()
+            raise
+
+
 def _context(settings: MqttSettings) -> ssl.SSLContext:
     for problem in settings.unreadable():
         raise Diagnostic(problem)
     place = "mqtt.ca"
     try:
         context = ssl.create_default_context(cafile=settings.ca or None)
+        context.sslsocket_class = _Socket
         place = "mqtt.cert"
         if settings.cert:  # an encrypted key is refused: nobody is there to be asked
             context.load_cert_chain(settings.cert, settings.key or None, password=lambda: "")
