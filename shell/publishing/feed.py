@@ -9,7 +9,7 @@ from datetime import datetime
 from functools import partial
 from typing import TYPE_CHECKING
 
-from drives.events import BusEvent, Changed, Conditioned, Lost, Sample, Silent, Unsolicited
+from drives.events import Changed, Conditioned, Lost, Sample, Silent, Unsolicited
 from shell.events import Entered, Failed, Notified, OnBus, Printed, SessionEvent
 from shell.log.entries import Entry
 from shell.publishing import messages
@@ -147,7 +147,7 @@ class _Line:
         self._word = ""
         self._look()
 
-    def take(self, event: BusEvent) -> None:
+    def take(self, event: object) -> None:
         """Publish what an event says about a drive, or about the line."""
         if isinstance(event, Lost):
             self._say(messages.LOST)
