@@ -30,12 +30,24 @@ class Row(NamedTuple):
 TABLE: Mapping[str, Row] = {
     "mcode": Row(
         "dialects.mcode.family:MCODE",
-        files=ProgramFiles("MCode", (".mxt", ".txt"), "dialects.mcode.manual.program_checker"),
+        files=ProgramFiles(
+            "MCode",
+            (".mxt", ".txt"),
+            "dialects.mcode.manual.program_checker",
+            "dialects.mcode.manual.editing",
+            ("mcode", "mxt"),
+        ),
     ),
     "modbus": Row("dialects.modbus.family:MODBUS", scheme="modbus"),
     "pmx": Row(
         "dialects.pmx.family:PMX",
-        files=ProgramFiles("A-SCRIPT", (".prg", ".asc"), "dialects.pmx.manual.program_file"),
+        files=ProgramFiles(
+            "A-SCRIPT",
+            (".prg", ".asc"),
+            "dialects.pmx.manual.program_file",
+            "dialects.pmx.manual.editing",
+            ("ascript", "a-script", "pmx"),
+        ),
     ),
     "tmcl": Row("dialects.tmcl.family:TMCL"),
 }

@@ -12,6 +12,8 @@ from dialects.problems import Problem
 if TYPE_CHECKING:
     from pathlib import Path
 
+    from dialects.program_editing import EditingLanguage
+
 
 class Part(NamedTuple):
     """A part of a line, by columns from 0. `kind`: word, starts, label, text, remark or wrong.
@@ -66,8 +68,17 @@ class ProgramFiles(NamedTuple):
     """The endings of the files' names."""
     module: str
     """The module that is the `FileLanguage`."""
+    editing_module: str
+    """The module that is the `EditingLanguage`."""
+    ids: tuple[str, ...]
+    """The names by which editors know the language."""
 
     @property
     def language(self) -> FileLanguage:
         """Load, check, format and measure."""
         return cast(FileLanguage, importlib.import_module(self.module))
+
+    @property
+    def editing(self) -> EditingLanguage:
+        """Names, help and completion of a text under editing."""
+        return cast("EditingLanguage", importlib.import_module(self.editing_module))

@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 from types import MappingProxyType
 from typing import NamedTuple
 
-from multidrop import arguments, macro_arguments, publish_arguments, relay_arguments
+from multidrop import arguments, lsp_arguments, macro_arguments, relay_arguments
 
 
 class Command(NamedTuple):
@@ -263,16 +263,6 @@ COMMANDS: Mapping[str, Command] = {
         arguments.plot,
         urls=True,
     ),
-    "publish": Command(
-        "publish samples, states, errors and transcripts of all drives to an MQTT broker until interrupted",
-        [
-            "publish press --to mqtt://broker/plant/hall-2",
-            "publish press eth --to mqtts://shop-7@broker/plant/hall-2 --rate 5",
-        ],
-        "publish.run",
-        publish_arguments.publish,
-        urls=True,
-    ),
     "snapshot": Command(
         "read every drive into a new cell file, which the simulator opens as the same machine",
         ["snapshot press -o machine.toml", "snapshot sim: -o machine.toml", *SNAPSHOT["apply"].examples],
@@ -316,6 +306,12 @@ COMMANDS: Mapping[str, Command] = {
         "show and check the configuration: saved connections, keys, colours",
         [each.examples[-1] for each in CONFIG.values()],
         parts=CONFIG,
+    ),
+    "lsp": Command(
+        "serve an editor: check, help, completion and renaming in program files (Language Server Protocol)",
+        ["lsp", "lsp --personality MDI", "lsp --tcp 9257"],
+        "lsp.run",
+        lsp_arguments.add,
     ),
     "report": Command(
         "show what a bug report needs, and write it to a file",

@@ -10,6 +10,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import NamedTuple
 
+from dialects.pmx.manual.script_words import KEPT_VARIABLES
+
 AXES = ("X", "Y")
 INT32 = 2**31
 FASTEST = 6_000_000
@@ -17,7 +19,6 @@ FASTEST = 6_000_000
 LONGEST = 10_000_000
 """The longest acceleration time that is accepted, ms; no more is used than appendix A allows."""
 VARIABLES = 64
-KEPT_VARIABLES = range(32, 64)
 SCALE = 1000
 """StepNLoop ratios are kept in thousandths."""
 

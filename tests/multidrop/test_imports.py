@@ -13,7 +13,8 @@ from tests.support.processes import environment
 
 SCREENS = {"textual", "rich", "prompt_toolkit"}
 PLOTS = {"rerun", "numpy", "pyarrow"}
-HEAVY = SCREENS | PLOTS | {"pymodbus", "tomlkit", "importlib.metadata"}
+EDITORS = {"pygls", "lsprotocol", "attrs", "cattrs"}
+HEAVY = SCREENS | PLOTS | EDITORS | {"pymodbus", "tomlkit", "importlib.metadata"}
 LOOP = {"asyncio", "socket", "ssl", "logging", "subprocess", "concurrent.futures"}
 HOSTS = {place.record.partition(":")[0] for place in FAMILIES.values()} | {"drives.bus", "shell.session"}
 SIMULATORS = {place.record.partition(":")[0] for place in SIMULATED.values()} | {"simulator.floor"}
@@ -32,6 +33,7 @@ TABLE = {
     | {"dialects.mcode.host", "simulator.pmx", "simulator.tmcl", "simulator.lexium.ports", "simulator.wire.wire"},
     ("program", "check", "a.prg"): NO_LINE | {"simulator.lexium", "dialects.mcode", "dialects.pmx.host"},
     ("program", "test", "a.mxt"): NO_LINE | {"platformdirs", "dialects.pmx", "dialects.mcode.host", "simulator.pmx"},
+    ("lsp", "--help"): NO_LINE,
     ("ports",): NO_LINE - {"serial"} | {"json", "platformdirs", "dialects.mcode"},
     ("completion", "bash"): NO_LINE | {"platformdirs", "dialects.mcode"},
     ("macro", "list"): HEAVY | LOOP | HOSTS | SIMULATORS | {"serial"},
@@ -40,7 +42,6 @@ TABLE = {
     ("send", "sim:a.toml", "PR P"): HEAVY | OTHERS | {"serial", "simulator.pmx", "simulator.tmcl"},
     ("send", "ssh://-h/dev/x", "PR P"): HEAVY | OTHERS | SIMULATORS | VERBS | {"serial", "transports.ssh"},
     ("relay", "/dev/does-not-exist"): HEAVY | LOOP | HOSTS | SIMULATORS | VERBS | {"json", "platformdirs"},
-    ("publish", "sim:", "--to", "http://broker"): HEAVY | SIMULATORS | VERBS | {"serial", "paho"},
     ("sim", "gone.toml"): HEAVY | HOSTS | {"serial", "simulator.pmx.family", "simulator.lexium.family"},
 }
 """For each command the modules that it must not import."""

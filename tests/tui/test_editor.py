@@ -13,8 +13,9 @@ from dialects import Diagnostic
 from dialects.families import program_languages
 from dialects.program_files import Part
 from shell.drafts import Drafts
+from shell.program_text import ProgramGrammar
 from tui.editor.alignment import aligned
-from tui.editor.grammar import MacroGrammar, ProgramGrammar, grammar_of
+from tui.editor.grammar import MacroGrammar, grammar_of
 from tui.editor.texts import Texts
 from tui.screens.dialogs import Match
 from tui.screens.program_choices import UPLOAD, Finder, files_in

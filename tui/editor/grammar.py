@@ -7,10 +7,10 @@ from collections.abc import Sequence
 from typing import Protocol
 
 from dialects import Diagnostic
-from dialects.families import program_language_of, program_languages
 from dialects.problems import Problem, in_order
-from dialects.program_files import Entry, FileLanguage, Part
+from dialects.program_files import Entry, Part
 from macros import parse_macro
+from shell.program_text import ProgramGrammar
 
 _LINE = re.compile(r":(\d+)(?::(\d+))?\Z")
 _TOML = re.compile(
@@ -33,33 +33,6 @@ class Grammar(Protocol):
 
     def entries(self, text: str) -> Sequence[Entry]:
         """Return the places at which a program can begin."""
-
-
-class ProgramGrammar:
-    """Program files; the name of the file gives the language."""
-
-    def __init__(self, file: str) -> None:
-        self._file = file
-        self.language = program_language_of(file)
-        files = program_languages()[self.language]
-        self.title = files.title
-        self._source: FileLanguage = files.language
-
-    def parts(self, line: str) -> Sequence[Part]:
-        """See `Grammar`."""
-        return self._source.parts(line)
-
-    def check(self, text: str, product: str) -> Sequence[Problem]:
-        """See `Grammar`: the check of `multidrop program check`."""
-        from shell.checking import examine_text, personality_of
-
-        if not text.strip():
-            return ()
-        return examine_text(text, self._file, personality_of(self.language, product), self.language).problems
-
-    def entries(self, text: str) -> Sequence[Entry]:
-        """See `Grammar`."""
-        return self._source.entries(text)
 
 
 class MacroGrammar:

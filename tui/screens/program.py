@@ -14,7 +14,7 @@ from textual.binding import Binding, BindingType
 
 from dialects.program_files import Entry
 from shell.checking import ending_of
-from tui.editor.grammar import ProgramGrammar
+from shell.program_text import ProgramGrammar
 from tui.panels.column import column_rows
 from tui.panels.program import SIGNS, index_of, spot_of, state_words
 from tui.panels.table import panel

@@ -9,11 +9,7 @@ from dialects.mcode.host.listing import LABEL, Called, names_of
 from dialects.mcode.host.parameters import GLOBAL, listed
 from dialects.mcode.host.state import MCodeState
 from dialects.mcode.host.wording import who
-from dialects.mcode.manual import help
-
-JUMPS = frozenset({"EX", "CL", "BR", "OE"})
-"""The words that a label follows."""
-PRINTS = "PR"
+from dialects.mcode.manual import help, name_places
 
 
 def read(state: MCodeState) -> Procedure[Held]:
@@ -25,13 +21,13 @@ def read(state: MCodeState) -> Procedure[Held]:
 
 
 def offered(held: Held, line: str) -> list[tuple[str, str]]:
-    """The names that may end a line: labels after a jump, variables elsewhere, both after PR."""
+    """The names that may end a line: labels where a line takes one, variables elsewhere, both after PR."""
     word = help.typing(line)
     head = line[: len(line) - len(word)]
-    first = (head.split() or [""])[0].upper()
-    if head.count('"') % 2 or not (word or head.endswith((" ", ",", "=")) and first):
+    place = name_places.expected(head)
+    if head.count('"') % 2 or place == name_places.NEW or not (word or head.endswith((" ", ",", "=")) and head.strip()):
         return []
-    kinds = (True,) if first in JUMPS and "," not in head else (False, True) if first == PRINTS else (False,)
+    kinds = (True,) if place == name_places.LABEL else (False, True) if place == name_places.PRINTED else (False,)
     names = names_of(held)
     return [
         (name, _meaning(called))

@@ -47,6 +47,7 @@ _TOKEN = re.compile(
       | (?P<bad>.)""",
     re.VERBOSE | re.DOTALL | re.ASCII,
 )
+NAME_FORM = "a name is a letter, alone or with a letter, a digit or two digits"
 _NAME = re.compile(r"[A-Z](?:[A-Z0-9]|[0-9]{2})?\Z")
 _SWAPPED = {"=<": "<=", "=>": ">="}
 
@@ -172,21 +173,28 @@ def strip(line: str) -> str:
     return line.strip()
 
 
+def statement_tokens(line: str, names: Container[str] = ()) -> list[Token]:
+    """Return the tokens of a statement without its remark; a head that touches its argument is divided. Never fails."""
+    return divided([token for token in tokens(line) if token.kind != "remark"], names)
+
+
 def parse(line: str, names: Container[str] = ()) -> Statement | None:
     """Parse a line; None if it is blank. `names` are the user's labels and variables, in capitals.
 
     Raises LineError.
     """
-    found = [token for token in tokens(line) if token.kind != "remark"]
+    found = statement_tokens(line, names)
     if not found:
         return None
     if len(found) > MOST_TOKENS:
         raise LineError(ErrorNumber.ILLEGAL_DATA, found[MOST_TOKENS].start, "the line is too long")
-    return _Parser(_split_head(found, names), len(line), names).statement()
+    return _Parser(found, len(line), names).statement()
 
 
-def _split_head(found: list[Token], names: Container[str]) -> list[Token]:
-    """Split `MR512` and `VAQ1` into two tokens, where the head is not a known word."""
+def divided(found: list[Token], names: Container[str]) -> list[Token]:
+    """Divide the head of a statement's tokens (`MR512`, `VAQ1`), where it is not a known word."""
+    if not found:
+        return found
     head = found[0]
     word = head.text.upper()
     if head.kind != "word" or word in names or lookup(word):

@@ -79,8 +79,13 @@ def describe_error(code: int, product: str = "") -> list[str]:
 
 def complete(prefix: str, product: str = "") -> list[tuple[str, str]]:
     """Mnemonics that begin with the prefix, each with its meaning; no operators, no reserved words."""
+    return [(row.name, row.meaning) for row in offered(prefix, product)]
+
+
+def offered(prefix: str, product: str = "") -> list[Mnemonic]:
+    """The rows that `complete` offers."""
     head, rows = prefix.strip().upper(), words(product)
-    return [(row.name, row.meaning) for row in rows.values() if row.name.startswith(head) and _offered(row, product)]
+    return [row for row in rows.values() if row.name.startswith(head) and _offered(row, product)]
 
 
 def typing(text: str) -> str:

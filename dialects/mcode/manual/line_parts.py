@@ -11,7 +11,7 @@ from dialects.mcode.manual.table_motion import MOTION
 from dialects.program_files import Entry, Part
 
 _DECLARE = ("LB", "VA")
-_MOVES = frozenset(row.name for row in MOTION if row.starts and row.kind == "instruction")
+MOVES = frozenset(row.name for row in MOTION if row.starts and row.kind == "instruction")
 
 
 def parts(line: str) -> list[Part]:
@@ -38,7 +38,7 @@ def _kind(token: Token, number: int, declares: bool) -> str:
     row = lookup(token.text.upper())
     if row is None:
         return ""
-    return "starts" if number == 0 and row.name in _MOVES else "word"
+    return "starts" if number == 0 and row.name in MOVES else "word"
 
 
 def entries(text: str) -> list[Entry]:

@@ -13,7 +13,7 @@ from dialects.mcode.manual import (
     program_trips,
 )
 from dialects.mcode.manual.conditions import condition_of, is_mixed, reading
-from dialects.mcode.manual.grammar import LineError, Name, Statement, is_name, parse, words
+from dialects.mcode.manual.grammar import NAME_FORM, LineError, Name, Statement, is_name, parse, words
 from dialects.mcode.manual.mnemonic import EVERY
 from dialects.mcode.manual.program_file import ProgramLine
 from dialects.mcode.manual.program_flow import Flow
@@ -24,7 +24,6 @@ from dialects.problems import Problem, errors, in_order
 
 TARGETS = {"BR": 0, "CL": 0, "OE": 0, "TA": 1}
 """Words with a target, and the position of the target among their arguments."""
-NAMES = "a name is a letter, alone or with a letter, a digit or two digits"
 load = program_file.load
 read = program_file.read
 formatted = program_file.formatted
@@ -119,7 +118,7 @@ class _Reader:
         self.statements[line.number] = statement
         word = statement.word
         if word and word not in self.names and lookup(word, self.product) is None:
-            hint = _elsewhere(word) or ("is VA or LB missing?" if is_name(word) else NAMES)
+            hint = _elsewhere(word) or ("is VA or LB missing?" if is_name(word) else NAME_FORM)
             yield Problem(line.number, line.column + statement.column, f"unknown name {word}", hint)
             return
         yield from self.label(line, statement)

@@ -5,10 +5,11 @@ from __future__ import annotations
 import re
 
 from dialects.pmx.manual.script_words import AXES, BLOCKS, WORDS
+from dialects.program_editing import Word
 from dialects.program_files import Entry, Part
 
 _WORD = re.compile(r"[A-Za-z]\w*[+-]?", re.ASCII)
-_MOVE = re.compile(rf"([{AXES}](V?\d+)?)+", re.ASCII)
+MOVE = re.compile(rf"([{AXES}](V?\d+)?)+", re.ASCII)
 _PROGRAM = re.compile(r"PRG\s*(\d+)", re.ASCII)
 _STARTS = re.compile(r"(HOME|HLHOME|LHOME|ZHOME|ZOME|JOG)[XY]|SR\d|JOYENA", re.ASCII)
 _NUMBERED = ("PRG", "SUB", "GOSUB")
@@ -17,17 +18,26 @@ _NUMBERED = ("PRG", "SUB", "GOSUB")
 def parts(line: str) -> list[Part]:
     """Return the parts of a line that differ from plain text. Never fails."""
     code, semicolon, _ = line.partition(";")
-    found: list[Part] = []
-    for match in _WORD.finditer(code):
-        first = not code[: match.start()].strip()
-        text = match[0] if match[0] in WORDS else match[0].rstrip("+-")
-        if kind := _kind(text, first):
-            found.append(Part(match.start(), match.start() + len(text), kind))
+    found = [
+        Part(word.start, word.stop, kind)
+        for word in words(line)
+        if (kind := kind_of(word.text, not code[: word.start].strip()))
+    ]
     return [*found, Part(len(code), len(line), "remark")] if semicolon else found
 
 
-def _kind(word: str, first: bool) -> str:
-    if first and (_STARTS.match(word) or _MOVE.fullmatch(word)):
+def words(line: str) -> list[Word]:
+    """Return the words of a line; a sign at the end belongs to the words that have one."""
+    found = []
+    for match in _WORD.finditer(line.partition(";")[0]):
+        text = match[0] if match[0] in WORDS else match[0].rstrip("+-")
+        found.append(Word(match.start(), match.start() + len(text), text))
+    return found
+
+
+def kind_of(word: str, first: bool) -> str:
+    """Return the kind of a word; `first`: it begins its line. Empty for an unknown word."""
+    if first and (_STARTS.match(word) or MOVE.fullmatch(word)):
         return "starts"
     if word in BLOCKS:
         return "label" if word in _NUMBERED else "word"

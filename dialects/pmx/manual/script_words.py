@@ -13,6 +13,8 @@ AXES = "XY"
 PROGRAMS = 2
 SUBROUTINES = 32
 VARIABLES = 64
+KEPT_VARIABLES = range(32, VARIABLES)
+"""The variables that STORE keeps; a start of a program sets the others to 0."""
 HANDLER = 31
 """The subroutine that runs after a failure."""
 INT32 = (-(2**31), 2**31 - 1)

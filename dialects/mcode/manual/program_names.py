@@ -1,0 +1,116 @@
+"""The labels and variables of an MCode program file: where each is, and the check of another name for one.
+
+A rename keeps the program: every line has the tokens that it had, but for that name. A line may be divided differently
+once a name exists or is gone (`H5` is `H 5` unless H5 is a variable), so all lines are compared.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Container, Iterator, Mapping, Sequence
+from functools import lru_cache
+
+from dialects.errors import Diagnostic
+from dialects.mcode.manual.grammar import NAME_FORM, Token, divided, is_name, statement_tokens, tokens
+from dialects.mcode.manual.mnemonic import EVERY
+from dialects.mcode.manual.program_file import LONGEST, bare, remark_at, scan
+from dialects.mcode.manual.program_products import AT_POWER_UP
+from dialects.mcode.manual.table import lookup
+from dialects.program_editing import Span, UserName, lines_of, replaced
+
+
+def names(text: str) -> list[UserName]:
+    """Return the labels and variables of a file."""
+    lines = scan(text)[0]
+    words = frozenset(line.declares for line in lines if line.declares)
+    places: dict[str, list[Span]] = {}
+    declared: dict[str, list[Span]] = {}
+    labels = {line.declares for line in lines if line.text[:2].upper() == "LB"}
+    for line in lines:
+        for number, token in _uses(line.text, words):
+            word, start = token.text.upper(), line.column - 1 + token.start
+            place = Span(line.number - 1, start, start + len(token.text))
+            places.setdefault(word, []).append(place)
+            if number == 1 and word == line.declares:
+                declared.setdefault(word, []).append(place)
+    sources = lines_of(text)
+
+    def named(word: str) -> UserName:
+        kind, there = "label" if word in labels else "variable", declared.get(word, [])
+        return UserName(word, kind, tuple(there), tuple(places[word]), remark(sources[there[0].line]) if there else "")
+
+    return [named(word) for word in places]
+
+
+def remark(line: str) -> str:
+    """Return the text of the remark of a line; empty if it has none."""
+    return line[remark_at(line) + 1 :].strip()
+
+
+@lru_cache(maxsize=8192)
+def _read(line: str) -> list[Token]:
+    """Return the tokens of a line: an editor asks for all lines again after every key."""
+    return tokens(line)
+
+
+def _uses(line: str, words: Container[str]) -> Iterator[tuple[int, Token]]:
+    """Yield the tokens of a line that are one of the words, each with its number; the letter after DN is none."""
+    found = divided(_read(line), words)
+    names_device = bool(found) and found[0].text.upper() == "DN"
+    for number, token in enumerate(found):
+        if token.kind == "word" and token.text.upper() in words and not (names_device and number):
+            yield number, token
+
+
+def fixed(name: UserName) -> str:
+    """Return why a name cannot be another one; empty if it can."""
+    if name.word == AT_POWER_UP:
+        return f"{AT_POWER_UP} is the label of the program that runs at power-up: by another name it would not run"
+    return ""
+
+
+def renamed(text: str, name: UserName, new: str, product: str) -> str:
+    """Return the new name as given. Raises Diagnostic where it is no name, is in use, or changes the program."""
+    if reason := fixed(name):
+        raise Diagnostic(reason)
+    word = new.upper()
+    if not is_name(new):
+        raise Diagnostic(f"{new!r} is not a name", "", NAME_FORM)
+    if word == name.word:
+        return new
+    if lookup(word) is not None:
+        raise Diagnostic(_taken(word, product), "", "choose another name")
+    lines = lines_of(text)
+    for number, line in enumerate(lines, 1):
+        if any(_uses(bare(line), (word,))):
+            raise Diagnostic(f"{word} is in use already, in line {number}", "", "choose another name")
+    _compare(lines, replaced(lines, name.places, new), name.word, word)
+    return new
+
+
+def _taken(word: str, product: str) -> str:
+    """Say whose word this is."""
+    row = lookup(word, product)
+    if row is not None:
+        return f"{word} is a word of the drive: {row.title}"
+    return f"{word} is a word of {', '.join(sorted(each for each in EVERY if lookup(word, each)))}"
+
+
+def _compare(before: Sequence[str], after: Sequence[str], old: str, new: str) -> None:
+    """Raise Diagnostic for a line that a rename makes too long, or that the drive would divide differently."""
+    words = frozenset(line.declares for line in scan("\n".join(before))[0] if line.declares)
+    others = words - {old} | {new}
+    for number, (line, other) in enumerate(zip(map(bare, before), map(bare, after), strict=True), 1):
+        if len(other) > LONGEST >= len(line):
+            what = f"line {number} would have {len(other)} characters; a drive takes {LONGEST}"
+            raise Diagnostic(what, "", "choose a shorter name, or split the line")
+        if _tokens(line, words, {old: new}) != _tokens(other, others, {}):
+            raise Diagnostic(f"line {number} would mean something else with {new}", "", "choose another name")
+
+
+def _tokens(line: str, words: frozenset[str], new: Mapping[str, str]) -> list[str]:
+    """Return the tokens of a line, its names in capitals and renamed."""
+    found = [token.text for token in statement_tokens(line, words)]
+    for number, token in _uses(line, words):
+        upper = token.text.upper()
+        found[number] = new.get(upper, upper)
+    return found

@@ -1,0 +1,105 @@
+"""The names of an A-SCRIPT file: variables (V0 to V63), subroutines, programs; and the check of another number."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+
+from dialects.errors import Diagnostic
+from dialects.pmx.manual.line_parts import MOVE, words
+from dialects.pmx.manual.script_help import VARIABLE_NAMES
+from dialects.pmx.manual.script_words import HANDLER, KEPT_VARIABLES, SUBROUTINES, VARIABLES
+from dialects.program_editing import Span, UserName, lines_of
+
+_VARIABLE = re.compile(r"V\d+", re.ASCII)
+_NUMBERED = re.compile(r"\s*(PRG|SUB|GOSUB)\s*(\d{1,4})\s*", re.ASCII)
+_SETS = re.compile(r"\s*(V\d+)\s*=", re.ASCII)
+_NUMBER = re.compile(r"(?:SUB)?\s*(\d{1,4})\s*", re.ASCII)
+_KINDS = {"PRG": ("PRG", "program"), "SUB": ("SUB", "subroutine"), "GOSUB": ("SUB", "subroutine")}
+
+
+def names(text: str) -> list[UserName]:
+    """Return the names of a file. A variable has no declaration: the first line that sets it counts as one."""
+    lines = lines_of(text)
+    kinds: dict[str, str] = {}
+    places: dict[str, list[Span]] = {}
+    declared: dict[str, Span] = {}
+    for number, line in enumerate(lines):
+        code = line.partition(";")[0]
+        for word, kind, start, stop in _found(code):
+            place = Span(number, start, stop)
+            kinds[word] = kind
+            places.setdefault(word, []).append(place)
+            if _declares(code, kind, start):
+                declared.setdefault(word, place)
+
+    def named(word: str) -> UserName:
+        first = (declared[word],) if word in declared else ()
+        remark = lines[first[0].line].partition(";")[2].strip() if first else ""
+        return UserName(word, kinds[word], first, tuple(places[word]), remark)
+
+    return [named(word) for word in places]
+
+
+def _found(code: str) -> Iterator[tuple[str, str, int, int]]:
+    """Yield the names of a line: word, kind, and columns."""
+    if numbered := _NUMBERED.fullmatch(code):
+        head, kind = _KINDS[numbered[1]]
+        yield f"{head} {int(numbered[2])}", kind, *numbered.span(2)
+        return
+    for word in words(code):
+        if word.text in VARIABLE_NAMES:
+            yield word.text, "variable", word.start, word.stop
+        elif MOVE.fullmatch(word.text):
+            for found in _VARIABLE.finditer(word.text):
+                if found[0] in VARIABLE_NAMES:
+                    yield found[0], "variable", word.start + found.start(), word.start + found.end()
+
+
+def _declares(code: str, kind: str, start: int) -> bool:
+    if kind == "variable":
+        found = _SETS.match(code)
+        return found is not None and found.start(1) == start
+    return "GOSUB" not in code
+
+
+def fixed(name: UserName) -> str:
+    """Return why a name cannot be another one; empty if it can."""
+    if name.kind == "program":
+        return f"the host starts {name.word} by its number (SR{name.word[4:]}=1)"
+    if name.word == f"SUB {HANDLER}":
+        return f"{name.word} is the subroutine that runs after an error, by its number"
+    return ""
+
+
+def renamed(text: str, name: UserName, new: str, product: str) -> str:  # noqa: ARG001
+    """Return the variable, or the number of the subroutine. Raises Diagnostic where that is none, or is in use."""
+    if reason := fixed(name):
+        raise Diagnostic(reason)
+    word = _variable(name, new) if name.kind == "variable" else _subroutine(new)
+    taken = next((each for each in names(text) if each.word == word and each.word != name.word), None)
+    if taken is not None:
+        raise Diagnostic(f"{word} is in use already, in line {taken.places[0].line + 1}", "", "choose another number")
+    return word.removeprefix("SUB ")
+
+
+def _variable(name: UserName, new: str) -> str:
+    word = new.strip()
+    if word not in VARIABLE_NAMES:
+        raise Diagnostic(f"{new!r} is not a variable", "", f"variables are V0 to V{VARIABLES - 1}")
+    old_kept, new_kept = (int(each[1:]) in KEPT_VARIABLES for each in (name.word, word))
+    if old_kept != new_kept:
+        kept, other = (name.word, word) if old_kept else (word, name.word)
+        first = KEPT_VARIABLES.start
+        hint = f"V0 to V{first - 1} are 0 at each start, V{first} to V{VARIABLES - 1} are kept"
+        raise Diagnostic(f"STORE keeps {kept} and does not keep {other}", "", hint)
+    return word
+
+
+def _subroutine(new: str) -> str:
+    found = _NUMBER.fullmatch(new.strip())
+    if found is None or int(found[1]) >= SUBROUTINES:
+        raise Diagnostic(f"{new!r} is not a subroutine", "", f"subroutines are 0 to {SUBROUTINES - 1}")
+    if int(found[1]) == HANDLER:
+        raise Diagnostic(f"SUB {HANDLER} is the subroutine that runs after an error", "", "choose another number")
+    return f"SUB {int(found[1])}"

@@ -1,0 +1,37 @@
+"""The arguments of `multidrop lsp`."""
+
+from __future__ import annotations
+
+import argparse
+
+from dialects.numbers import whole
+
+HOST = "127.0.0.1"
+
+
+def add(parser: argparse.ArgumentParser) -> None:
+    """Add the drive that programs are for, and the port."""
+    from multidrop.commands.languages import DEFAULT_PERSONALITY, Checked
+
+    parser.add_argument(
+        "--personality",
+        metavar="P",
+        type=str.upper,
+        choices=Checked(),
+        default=DEFAULT_PERSONALITY,
+        help=f"the drive that programs are for, unless the editor names one (default: {DEFAULT_PERSONALITY})",
+    )
+    parser.add_argument(
+        "--tcp",
+        metavar="[HOST:]PORT",
+        type=_address,
+        help="serve one client there (default: standard input and output)",
+    )
+
+
+def _address(text: str) -> tuple[str, int]:
+    host, _, port = text.rpartition(":")
+    number = whole(port, 0, 65535)
+    if number is None:
+        raise argparse.ArgumentTypeError(f"no port {text!r}; valid: PORT or HOST:PORT")
+    return host.removeprefix("[").removesuffix("]") or HOST, number
