@@ -12,7 +12,9 @@ def none(parser: argparse.ArgumentParser) -> None:
 def urls(parser: argparse.ArgumentParser) -> None:
     """Add any number of URLs, and how to open them."""
     parser.add_argument("urls", metavar="URL", nargs="*", help="what to open")
-    parser.add_argument("--raw", action="store_true", help="look for no drives: bytes both ways, with times and in hex")
+    way = parser.add_mutually_exclusive_group()
+    way.add_argument("--raw", action="store_true", help="look for no drives: bytes both ways, with times and in hex")
+    way.add_argument("--twin", action="store_true", help="run a simulated twin beside each drive; warn of differences")
     _no_reconnect(parser)
 
 

@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 from types import MappingProxyType
 from typing import NamedTuple
 
-from multidrop import arguments, lsp_arguments, macro_arguments, relay_arguments
+from multidrop import arguments, lsp_arguments, macro_arguments, publish_arguments, relay_arguments
 
 
 class Command(NamedTuple):
@@ -261,6 +261,16 @@ COMMANDS: Mapping[str, Command] = {
         ],
         "plot.run",
         arguments.plot,
+        urls=True,
+    ),
+    "publish": Command(
+        "publish samples, states, errors and transcripts of all drives to an MQTT broker until interrupted",
+        [
+            "publish press --to mqtt://broker/plant/hall-2",
+            "publish press eth --to mqtts://shop-7@broker/plant/hall-2 --rate 5",
+        ],
+        "publish.run",
+        publish_arguments.publish,
         urls=True,
     ),
     "snapshot": Command(

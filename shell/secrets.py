@@ -6,9 +6,10 @@ import re
 
 HIDDEN = "***"
 _USER = re.compile(r"(?<=//)[^\s/@\"']+@")
-_KEY = re.compile(
-    r"(?im)^(?P<key>\s*(?:@\S+\s+)?[\"']?[\w.-]*(?:password|passwd|passphrase|secret|token|credential)[\w-]*[\"']?\s*=\s*).*$"
-)
+_NAME = r"[\"']?[\w.-]*(?:password|passwd|passphrase|secret|token|credential)[\w-]*[\"']?"
+_TEXT = r"\"{3}[\s\S]*?(?:\"{3}|\Z)|'{3}[\s\S]*?(?:'{3}|\Z)|.*$"
+"""A value of several lines in TOML, or the rest of the line."""
+_KEY = re.compile(rf"(?im)(?P<key>(?:^\s*(?:@\S+\s+)?|[{{,]\s*){_NAME}\s*=\s*)(?:{_TEXT})")
 _QUERY = re.compile(r"(?i)(?P<key>[?&][\w-]*(?:password|passwd|secret|token)[\w-]*=)[^&\s\"']*")
 
 

@@ -56,6 +56,9 @@ class BeingOpened:
 class Workspace(Asking):
     """What is open. Needs a running event loop, and belongs to its thread."""
 
+    twins: RunningTwins
+    """The twins of drives, which the session makes."""
+
     def __init__(self, settings: Settings, reconnect: bool = False) -> None:
         """Open nothing yet. `reconnect`: a bus that is lost is tried again until it is back or closed."""
         super().__init__()
@@ -85,8 +88,6 @@ class Workspace(Asking):
         """The labels and variables that were read, for completion."""
         self.log: OpenLog | None = None
         self.plots: list[RunningPlot] = []
-        self.twins: RunningTwins | None = None
-        """The twins of drives; the session sets it."""
         self.plotted: tuple[Series, ...] = ()
         """What the screen plots; empty: the selected drive."""
         self.raw: dict[str, RawLine] = {}
@@ -147,8 +148,7 @@ class Workspace(Asking):
         for drive in bus.all_drives:
             if observer := self.debuggers.pop(drive, None):
                 observer.close()
-        if self.twins is not None:
-            self.twins.stop(bus)
+        self.twins.stop(bus)
         self.buses.pop(bus.name, None)
         self.cells.pop(bus.name, None)
         self._selected.pop(bus, None)
@@ -223,8 +223,7 @@ class Workspace(Asking):
         """Note that the drives of a bus are found; its first one is selected there."""
         self._selected[bus] = next(iter(bus.drives.values()), None)
         self.changed()
-        if self.twins is not None:
-            self.twins.identified(bus)
+        self.twins.identified(bus)
 
     def select_first(self, bus: Bus) -> None:
         """Select a bus where no other one is selected."""
@@ -346,8 +345,7 @@ class Workspace(Asking):
             self.publish(Notified(event.at, text, name, event.warning))
         elif isinstance(event, Changed):
             self.publish(StateChanged(event.at))
-            if self.twins is not None:
-                self.twins.changed(bus)
+            self.twins.changed(bus)
 
     def _lost(self, name: str, event: Lost) -> None:
         """Publish the loss of a bus, and begin to try it again where that is wanted and possible."""

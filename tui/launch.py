@@ -21,10 +21,10 @@ if TYPE_CHECKING:
     from shell.session import Session
 
 
-def run(urls: Sequence[str], reconnect: bool = True, raw: bool = False) -> int:
+def run(urls: Sequence[str], reconnect: bool = True, raw: bool = False, twin: bool = False) -> int:
     """Show the URLs, a tab for each bus; without URLs, show the start page. Return the exit code.
 
-    `reconnect`: lost buses are tried again. `raw`: the URLs are opened in raw mode.
+    `reconnect`: lost buses are tried again. `raw`: the URLs are opened in raw mode. `twin`: each drive gets a twin.
 
     Raises Diagnostic if there is no terminal, or if the configuration is wrong.
     """
@@ -34,16 +34,17 @@ def run(urls: Sequence[str], reconnect: bool = True, raw: bool = False) -> int:
     if not (sys.stdin.isatty() and sys.stdout.isatty()):
         raise Diagnostic("the screen needs a terminal", "tui", "multidrop shell reads lines from standard input")
     sys.setswitchinterval(SWITCH)
-    return asyncio.run(_run(urls, load(), reconnect, raw))
+    return asyncio.run(_run(urls, load(), reconnect, raw, twin))
 
 
-async def _run(urls: Sequence[str], settings: Settings, reconnect: bool, raw: bool) -> int:
+async def _run(urls: Sequence[str], settings: Settings, reconnect: bool, raw: bool, twin: bool) -> int:
     with importing():
         from shell.front.collector import collected_at_rest
         from shell.log.writer import begin
         from shell.session import Session
 
     session = Session(settings, reconnect=reconnect, raw=raw)
+    session.twins.wanted = twin
     try:
         with collected_at_rest(lambda: session.at_rest):
             app = MultidropApp(session, urls, ShellAssist(session, settings), driver(), settings.look)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import sys
 from collections.abc import Collection, Mapping
+from dataclasses import asdict
 from pathlib import Path
 
 from dialects import Diagnostic
@@ -12,6 +13,7 @@ from multidrop.commands.failure import fail
 from shell.connect import settings
 from shell.connect.settings import Settings
 from shell.output import write
+from shell.secrets import HIDDEN
 
 REFUSED = "   # default; the file's does not count"
 WRONG = 2
@@ -60,6 +62,8 @@ def shown(found: Settings, keys: dict[str, str], text: str) -> list[str]:
     lines += rows("screen", {"theme": theme, "signs": look.signs, "times": look.times}, wrong)
     lines += rows("keys", keys, {name for name, text in look.keys.items() if keys.get(name) != text})
     lines += rows("log", {"always": log.always, "megabytes": log.size / 1e6, "files": log.files})
+    login = {key: HIDDEN if key == "password" and value else value for key, value in asdict(found.mqtt).items()}
+    lines += rows("mqtt", login)
     return lines + rows("guards", {"off": sorted(guards.off), "also": sorted(guards.also)})
 
 
@@ -80,12 +84,13 @@ def check(chosen: argparse.Namespace) -> int:
 
 
 def _troubles(found: Settings) -> list[str]:
-    """The errors in keys and theme, which only the screen knows."""
+    """The errors in keys and theme, which only the screen knows, and files that cannot be read."""
     from tui.app import bindings
     from tui.keymap import keymap
     from tui.widgets.theme import wrong_theme
 
-    return [*keymap(bindings(), found.look.keys).troubles, *wrong_theme(found.look.theme)]
+    look = found.look
+    return [*keymap(bindings(), look.keys).troubles, *wrong_theme(look.theme), *found.mqtt.unreadable()]
 
 
 def _keys(found: Settings) -> dict[str, str]:

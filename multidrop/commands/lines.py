@@ -22,11 +22,16 @@ def shell(chosen: argparse.Namespace) -> int:
     if sys.stdin.isatty():
         with importing():
             from shell.front.prompt import run
-        return run(chosen.urls, reconnect=not chosen.no_reconnect, agreed=chosen.yes, raw=chosen.raw)
+        return run(chosen.urls, reconnect=not chosen.no_reconnect, agreed=chosen.yes, raw=chosen.raw, twin=chosen.twin)
     from shell.front import batch
     from shell.front.stream import run_stream
 
-    lines = partial(run_stream, descriptor=sys.stdin.fileno())
+    async def lines(session: Session) -> None:
+        if chosen.twin:
+            for bus in list(session.buses.values()):
+                await session.twins.start(bus)
+        await run_stream(session, descriptor=sys.stdin.fileno())
+
     return batch.run(chosen.urls, lines, watch_keys=False, agreed=chosen.yes, asks=False, raw=chosen.raw)
 
 

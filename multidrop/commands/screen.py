@@ -22,16 +22,16 @@ def demo(chosen: argparse.Namespace) -> int:
 
 def tui(chosen: argparse.Namespace) -> int:
     """Show what the URLs name."""
-    return _screen(chosen.urls, reconnect=not chosen.no_reconnect, raw=chosen.raw)
+    return _screen(chosen.urls, reconnect=not chosen.no_reconnect, raw=chosen.raw, twin=chosen.twin)
 
 
-def _screen(urls: list[str], reconnect: bool = True, raw: bool = False) -> int:
+def _screen(urls: list[str], reconnect: bool = True, raw: bool = False, twin: bool = False) -> int:
     if not (sys.stdin.isatty() and sys.stdout.isatty()):
         return fail(Diagnostic("the screen needs a terminal", hint="multidrop shell reads lines from anywhere"))
     with importing():
         from tui.launch import run
 
     try:
-        return run(urls, reconnect, raw)
+        return run(urls, reconnect, raw, twin)
     except Diagnostic as wrong:  # the configuration
         return fail(wrong)

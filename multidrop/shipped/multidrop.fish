@@ -65,7 +65,7 @@ function _shtab_multidrop_using
   test "$_shtab_multidrop_cmdpath" = "$argv"
 end
 
-set -g _shtab_multidrop_commands demo tui shell send run sim program 'program check' 'program test' 'program list' 'program upload' 'program download' params 'params backup' 'params diff' 'params restore' macro 'macro list' 'macro show' 'macro play' 'macro edit' 'macro describe' 'macro rename' 'macro copy' 'macro delete' 'macro key' 'macro import' 'macro export' plot snapshot ports relay scan rescue log 'log show' 'log follow' 'log grep' 'log replay' config 'config path' 'config show' 'config check' lsp report completion
+set -g _shtab_multidrop_commands demo tui shell send run sim program 'program check' 'program test' 'program list' 'program upload' 'program download' params 'params backup' 'params diff' 'params restore' macro 'macro list' 'macro show' 'macro play' 'macro edit' 'macro describe' 'macro rename' 'macro copy' 'macro delete' 'macro key' 'macro import' 'macro export' plot publish snapshot ports relay scan rescue log 'log show' 'log follow' 'log grep' 'log replay' config 'config path' 'config show' 'config check' lsp report completion
 set -g _shtab_multidrop_opts_with_value --against --baud --break --cell --dialect --drive --junit --language --on --other --output --page --personality --rate --role --run --save --serve --set --speed --tcp --times --to --until --watch --with -o
 
 complete -c multidrop -e
@@ -78,11 +78,13 @@ complete -c multidrop -n '_shtab_multidrop_using demo' -s h -l help -d 'show thi
 complete -c multidrop -n '_shtab_multidrop_using; and test $_shtab_multidrop_npos -eq 0' -a tui -d 'Show the screen, with a tab for each bus.'
 complete -c multidrop -n '_shtab_multidrop_using tui' -s h -l help -d 'show this help message and exit'
 complete -c multidrop -n '_shtab_multidrop_using tui' -l raw -d 'look for no drives: bytes both ways, with times and in hex'
+complete -c multidrop -n '_shtab_multidrop_using tui' -l twin -d 'run a simulated twin beside each drive; warn of differences'
 complete -c multidrop -n '_shtab_multidrop_using tui' -l no-reconnect -d 'give up a lost connection, and do not try again'
 complete -c multidrop -n '_shtab_multidrop_using tui; and test $_shtab_multidrop_npos -ge 0' -ka "(_multidrop_url)" -d 'what to open'
 complete -c multidrop -n '_shtab_multidrop_using; and test $_shtab_multidrop_npos -eq 0' -a shell -d 'Show the prompt; read lines from standard input if that is not a terminal.'
 complete -c multidrop -n '_shtab_multidrop_using shell' -s h -l help -d 'show this help message and exit'
 complete -c multidrop -n '_shtab_multidrop_using shell' -l raw -d 'look for no drives: bytes both ways, with times and in hex'
+complete -c multidrop -n '_shtab_multidrop_using shell' -l twin -d 'run a simulated twin beside each drive; warn of differences'
 complete -c multidrop -n '_shtab_multidrop_using shell' -l no-reconnect -d 'give up a lost connection, and do not try again'
 complete -c multidrop -n '_shtab_multidrop_using shell' -l yes -d 'answer every question with yes beforehand'
 complete -c multidrop -n '_shtab_multidrop_using shell; and test $_shtab_multidrop_npos -ge 0' -ka "(_multidrop_url)" -d 'what to open'
@@ -218,6 +220,12 @@ complete -c multidrop -n '_shtab_multidrop_using plot' -l to -xka "(__fish_compl
 complete -c multidrop -n '_shtab_multidrop_using plot' -l serve -x -d 'serve a viewer'"'"'s data here'
 complete -c multidrop -n '_shtab_multidrop_using plot' -l no-reconnect -d 'give up a lost connection, and do not try again'
 complete -c multidrop -n '_shtab_multidrop_using plot; and test $_shtab_multidrop_npos -eq 0' -ka "(_multidrop_url)" -d 'what to open'
+complete -c multidrop -n '_shtab_multidrop_using; and test $_shtab_multidrop_npos -eq 0' -a publish -d 'Publish samples, states, errors and transcripts of all drives to an MQTT broker until interrupted.'
+complete -c multidrop -n '_shtab_multidrop_using publish' -s h -l help -d 'show this help message and exit'
+complete -c multidrop -n '_shtab_multidrop_using publish' -l to -x -d 'the broker, and the topic above all others; mqtts:// is encrypted'
+complete -c multidrop -n '_shtab_multidrop_using publish' -l rate -x -d 'samples a second of each drive, at most (default: 2)'
+complete -c multidrop -n '_shtab_multidrop_using publish' -l no-reconnect -d 'give up a lost line, and do not try again'
+complete -c multidrop -n '_shtab_multidrop_using publish; and test $_shtab_multidrop_npos -ge 0' -ka "(_multidrop_url)" -d 'what to open'
 complete -c multidrop -n '_shtab_multidrop_using; and test $_shtab_multidrop_npos -eq 0' -a snapshot -d 'Read every drive into a new cell file, which the simulator opens as the same machine.'
 complete -c multidrop -n '_shtab_multidrop_using snapshot' -s h -l help -d 'show this help message and exit'
 complete -c multidrop -n '_shtab_multidrop_using snapshot' -s o -l output -x -d 'the new file'

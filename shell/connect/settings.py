@@ -11,6 +11,9 @@
     [log]                       # the session log (`shell.connect.log_settings`)
     always = true
 
+    [mqtt]                      # the login for a broker (`shell.connect.mqtt_settings`)
+    username = "shop-7"
+
     [screen]                    # colours and signs, and [keys] (`shell.connect.look`)
     theme = "multidrop-light"
 
@@ -29,10 +32,11 @@ from typing import Any
 from dialects import Diagnostic
 from dialects.files import toml_of
 from dialects.visible import visible
-from shell.connect import guards, log_settings, look
+from shell.connect import guards, log_settings, look, mqtt_settings
 from shell.connect.guards import Guarding
 from shell.connect.log_settings import LogSettings
 from shell.connect.look import Look
+from shell.connect.mqtt_settings import MqttSettings
 from shell.connect.toml_lines import line_of
 
 
@@ -55,6 +59,7 @@ class Settings:
     guards: Guarding = Guarding()
     log: LogSettings = LogSettings()
     look: Look = look.DEFAULT
+    mqtt: MqttSettings = MqttSettings()
 
     @property
     def macros(self) -> Path:
@@ -130,7 +135,7 @@ def placed(message: str, text: str, where: str, hint: str = "") -> Diagnostic:
 
 
 def _read(document: Mapping[str, Any], where: str) -> Settings:
-    _only(document, {"connections", "guards", "keys", "log", "screen"}, where, "")
+    _only(document, {"connections", "guards", "keys", "log", "mqtt", "screen"}, where, "")
     tables = document.get("connections", {})
     if not isinstance(tables, dict):
         raise Diagnostic("connections is not a table", where, "write [connections.NAME]")
@@ -140,6 +145,7 @@ def _read(document: Mapping[str, Any], where: str) -> Settings:
         guards=guards.read(document.get("guards", {}), where),
         log=log_settings.read(document.get("log", {}), where),
         look=look.read(document.get("screen", {}), document.get("keys", {}), where),
+        mqtt=mqtt_settings.read(document.get("mqtt", {}), where),
     )
 
 

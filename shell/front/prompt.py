@@ -48,11 +48,13 @@ FIRST_FRAME = 0.05
 """The longest wait for the first frame, s."""
 
 
-def run(urls: Sequence[str], reconnect: bool = True, agreed: bool = False, raw: bool = False) -> int:
+def run(
+    urls: Sequence[str], reconnect: bool = True, agreed: bool = False, raw: bool = False, twin: bool = False
+) -> int:
     """Open the URLs and prompt until the end; return the exit code.
 
     `reconnect`: lost buses are tried again. `agreed`: every question is answered with yes. `raw`: the URLs
-    are opened in raw mode.
+    are opened in raw mode. `twin`: each drive gets a twin.
     """
     try:
         found = settings.load()
@@ -60,15 +62,15 @@ def run(urls: Sequence[str], reconnect: bool = True, agreed: bool = False, raw: 
         write(sys.stderr, report(failure))
         return exit_code(failure)
     try:
-        return asyncio.run(_run(partial(Session, found, reconnect=reconnect, raw=raw), urls, agreed))
+        return asyncio.run(_run(partial(Session, found, reconnect=reconnect, raw=raw), urls, agreed, twin))
     except KeyboardInterrupt:
         return INTERRUPTED
 
 
-async def _run(make: Callable[[], Session], urls: Sequence[str], agreed: bool) -> int:
+async def _run(make: Callable[[], Session], urls: Sequence[str], agreed: bool, twin: bool) -> int:
     with nonblocking() as streams, ExitStack() as stack:
         session = make()
-        session.agreed = agreed
+        session.agreed, session.twins.wanted = agreed, twin
         session.subscribe(Printer(talkative=True).show)
         begin_log(session)
         stack.enter_context(collected_at_rest(lambda: session.at_rest))

@@ -9,10 +9,8 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-import threading
 from collections.abc import Callable
 from datetime import datetime
-from typing import TypeVar
 
 from dialects import Diagnostic
 from drives.events import Sample, Valued
@@ -22,8 +20,8 @@ from shell.plots.layout import COLOURS, RUNS, TWIN
 from shell.plots.sink import Batch, Curve, Sink, State
 from shell.plots.target import PlotTarget
 from shell.roles import DIFFERENCE
+from shell.threads import in_thread
 
-T = TypeVar("T")
 FILE_PERIOD, LIVE_PERIOD = 0.4, 0.1
 """The time between batches, s: longer makes a smaller file, shorter a smoother view."""
 BATCH_TIMEOUT = 8.0
@@ -68,7 +66,7 @@ class Plot:
         writable, or the port is in use. Raises Unreachable where no viewer listens. The target is unchanged then.
         """
         try:
-            sink = await _in_thread(lambda: Sink(target), _timeout(target))
+            sink = await in_thread(lambda: Sink(target), _timeout(target))
         except TimeoutError:
             raise Diagnostic(f"cannot plot to {target.text}: it does not respond") from None
         return cls(sink, clock, wall)
@@ -175,7 +173,7 @@ class Plot:
                     await asyncio.wait_for(self._closing.wait(), period)
                 await self._flush()
             await self._flush()
-            await _in_thread(self._sink.close, _timeout(self.target))
+            await in_thread(self._sink.close, _timeout(self.target))
         except (SinkBroken, TimeoutError) as error:
             await self._break(error)
         finally:
@@ -184,7 +182,7 @@ class Plot:
     async def _flush(self) -> None:
         batch, self._batch, self._epoch = self._batch, Batch(), self._at_zero()
         if batch:
-            await _in_thread(lambda: self._sink.send(batch), BATCH_TIMEOUT)
+            await in_thread(lambda: self._sink.send(batch), BATCH_TIMEOUT)
 
     async def _break(self, error: SinkBroken | TimeoutError) -> None:
         reason = str(error) if isinstance(error, SinkBroken) else self._sink.why(error)
@@ -194,40 +192,9 @@ class Plot:
         for callback in self._on_failure:
             callback(self.failure)
         with contextlib.suppress(TimeoutError):
-            await _in_thread(self._sink.abandon, ABANDON_TIMEOUT)
+            await in_thread(self._sink.abandon, ABANDON_TIMEOUT)
         self._sink.let_go()
 
 
 def _timeout(target: PlotTarget) -> float:
     return BATCH_TIMEOUT if target.file is None else FILE_TIMEOUT
-
-
-async def _in_thread(work: Callable[[], T], timeout: float) -> T:
-    """Run blocking work in a thread that the process does not wait for. Raises TimeoutError, and abandons the thread.
-
-    Not `to_thread`: the interpreter joins its threads at the end, and a thread that waits for a frozen viewer never
-    ends.
-    """
-    loop = asyncio.get_running_loop()
-    future: asyncio.Future[T] = loop.create_future()
-
-    def settle(result: T | None, error: BaseException | None) -> None:
-        if future.done():
-            return
-        if error is not None:
-            future.set_exception(error)
-        else:
-            future.set_result(result)  # type: ignore[arg-type]
-
-    def thread() -> None:
-        result: T | None = None
-        failure: BaseException | None = None
-        try:
-            result = work()
-        except BaseException as error:  # raised again by the future
-            failure = error
-        with contextlib.suppress(RuntimeError):  # the loop was closed meanwhile
-            loop.call_soon_threadsafe(settle, result, failure)
-
-    threading.Thread(target=thread, name="plot", daemon=True).start()
-    return await asyncio.wait_for(future, timeout)

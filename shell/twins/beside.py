@@ -12,7 +12,7 @@ from drives.events import Sample
 from shell.events import Agreed, Diverged, Predicted, TwinEvent
 from shell.twins.causes import Known, Pair, causes
 from shell.twins.comparing import Comparison, Verdict
-from shell.twins.taken import taken
+from shell.twins.taken import reading_took, taken
 from shell.twins.twin import Twin
 
 SWITCHES = {"lim+": "limit+", "lim-": "limit-"}
@@ -30,12 +30,16 @@ class Beside:
         self.differences: dict[str, int] = {}
         """The last difference of each axis."""
         self._read_at = begun
+        self._took = 0.0
+        """Seconds from the first to the last request of the last sample."""
         self._limits: dict[str, tuple[str, ...]] = {}
 
     # What reaches the twin
 
     def concluded(self, concluded: Concluded) -> None:
         """Take a conversation with the drive, or with all drives."""
+        if (took := reading_took(concluded)) is not None:
+            self._took = took
         for each in taken(concluded):
             data = each.request.codec.encode(each.request)
             self._acts(data, each.transmitted_at, each.request.kind not in ASKING)
@@ -84,6 +88,7 @@ class Beside:
         axis = self._comparison(sample.axis)
         self.differences[sample.axis] = pair.difference
         yield Predicted(sample.at, sample.address, expected.position, expected.velocity, pair.difference, sample.axis)
+        axis.took = self._took
         verdict = axis.take(pair, rest)
         if verdict is not None:
             yield self.news(verdict, axis, sample.address, sample.axis, rest)

@@ -1,9 +1,10 @@
 """One axis beside its twin: when the two diverge, and when they agree again.
 
 Theory of operation. The limit at rest is in steps. A move adds `SKEW` seconds of the faster velocity: requests and
-replies take a time on their way that nobody measures. A command or an input that acts in the middle of a move adds as
-much once more, until both stand (`slack`): the place of the end depends on the moment then. A difference beyond the
-limit counts once it has lasted for `LASTING`, and is over in the same way.
+replies take a time on their way that nobody measures. A reading in several requests adds the time that it takes. A
+command or an input that acts in the middle of a move adds as much once more, until both stand (`slack`): the place of
+the end depends on the moment then. A difference beyond the limit counts once it has lasted for `LASTING`, and is over
+in the same way.
 """
 
 from __future__ import annotations
@@ -45,6 +46,8 @@ class Comparison:
     """Steps by which the end of the present move is uncertain."""
     lag: float = 0.0
     """Seconds by which an input that started the present move was seen late, at most."""
+    took: float = 0.0
+    """Seconds that the last reading took: its parts are of different times."""
     pairs: deque[Pair] = field(default_factory=lambda: deque(maxlen=KEPT))
     """From the last that agreed well to the present one."""
     _doubted: Pair | None = None
@@ -54,7 +57,7 @@ class Comparison:
 
     def limit(self, pair: Pair, rest: int) -> int:
         """The limit for a pair, steps. `rest`: the limit at rest."""
-        return round(rest + self.slack + pair.fastest * (SKEW + self.lag))
+        return round(rest + self.slack + pair.fastest * (SKEW + self.took + self.lag))
 
     def take(self, pair: Pair, rest: int) -> Verdict | None:
         """Take a pair; return the news."""

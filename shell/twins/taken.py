@@ -10,11 +10,20 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from dialects import End, Priority
+from dialects.family import Motion
 from drives.conclusions import Concluded
 from drives.conversations import ASKING
 from drives.events import Transaction
 
 NOT_TAKEN = (End.REFUSED, End.NAK, End.STOPPED)
+
+
+def reading_took(concluded: Concluded) -> float | None:
+    """The time between the first and the last request of a reading of motion, s; None for another conversation."""
+    result = concluded.outcome.result[0] if concluded.outcome.result else None
+    if not (isinstance(result, tuple) and result and isinstance(result[0], Motion) and concluded.transactions):
+        return None
+    return concluded.transactions[-1].transmitted_at - concluded.transactions[0].transmitted_at
 
 
 def taken(concluded: Concluded) -> Iterator[Transaction]:

@@ -97,7 +97,7 @@ class Twins:
             twins.forgo(drive)
         self._workspace.notify(f"{name}: a twin runs beside it", bus=bus.name, outcome=True)
         for each in lacks:
-            self._workspace.notify(f"{name}: its twin: {each}", bus=bus.name, warning=True)
+            self._workspace.notify(f"{name}: its twin: {each}", bus=bus.name)
 
     # Losses
 

@@ -26,7 +26,6 @@ async def twin(call: Call) -> None:
     rest; a move adds 30 ms of its velocity. Only position, velocity and inputs are read. `/twin` alone lists the twins.
     """
     twins = call.workspace.twins
-    assert twins is not None
     match call.words():
         case []:
             _list(call, twins)

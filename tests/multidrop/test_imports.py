@@ -42,6 +42,7 @@ TABLE = {
     ("send", "sim:a.toml", "PR P"): HEAVY | OTHERS | {"serial", "simulator.pmx", "simulator.tmcl"},
     ("send", "ssh://-h/dev/x", "PR P"): HEAVY | OTHERS | SIMULATORS | VERBS | {"serial", "transports.ssh"},
     ("relay", "/dev/does-not-exist"): HEAVY | LOOP | HOSTS | SIMULATORS | VERBS | {"json", "platformdirs"},
+    ("publish", "sim:", "--to", "http://broker"): HEAVY | SIMULATORS | VERBS | {"serial", "paho"},
     ("sim", "gone.toml"): HEAVY | HOSTS | {"serial", "simulator.pmx.family", "simulator.lexium.family"},
 }
 """For each command the modules that it must not import."""

@@ -7,25 +7,11 @@ from pathlib import Path
 
 import pytest
 
-from shell.events import Agreed, Diverged, OnBus, Predicted
+from shell.events import Agreed, Diverged, Predicted
 from tests.support.cell_session import CellSession, bus, party
+from tests.support.twin_cell import encoder, of, run
 
 pytestmark = pytest.mark.virtual
-
-
-def encoder(name: str = "a", world: str = "", **settings: int) -> str:
-    """A drive whose P counts what its shaft does."""
-    drive = party(name, EE=1, VM=8000, A=40000, D=40000, MT=50, **settings)
-    return f"{drive}\n[bus.drive.world]\n{world}" if world else drive
-
-
-def of(cell: CellSession, kind: type) -> list:
-    return [event.event for event in cell.events if isinstance(event, OnBus) and isinstance(event.event, kind)]
-
-
-async def run(cell: CellSession, *lines: str) -> None:
-    for line in lines:
-        await cell.session.run(line)
 
 
 MOVES = ("@a MR 100000", "@b MA -51200", "@a SL 50000", "@a VM=100000", "@a SL 0", "@a MA 0")

@@ -1,0 +1,119 @@
+"""`multidrop publish`: publish all drives of all lines until a signal."""
+
+from __future__ import annotations
+
+import asyncio
+import sys
+from collections.abc import Sequence
+from ipaddress import ip_address
+from typing import TYPE_CHECKING
+
+from dialects import Diagnostic
+from shell.events import SessionEvent, StateChanged
+from shell.front import batch
+from shell.output import report, write
+from shell.publishing import broker, messages
+from shell.publishing.backlog import Message
+from shell.publishing.feed import Feed
+from shell.publishing.limits import parse_rate
+from shell.publishing.publisher import Publisher
+from shell.publishing.target import Target, parse_target
+from shell.publishing.topics import Topics
+
+if TYPE_CHECKING:
+    from shell.connect.mqtt_settings import MqttSettings
+    from shell.workspace import Workspace
+    from transports import TransportLost
+
+
+def run(urls: Sequence[str], *, to: str, rate: str, reconnect: bool = True) -> int:
+    """Publish until a signal, which ends it well; return the exit code. `reconnect`: a lost line is tried again."""
+    try:
+        target, period = parse_target(to), parse_rate(rate)
+        broker.load()
+    except Diagnostic as problem:
+        write(sys.stderr, report(problem))
+        return 2
+    return batch.run(
+        urls,
+        lambda workspace: _until_ended(workspace, target, period),
+        interrupted=0,
+        reconnect=reconnect,
+        replies=False,
+    )
+
+
+async def _until_ended(workspace: Workspace, target: Target, period: float) -> None:
+    topics, settings = Topics(target.prefix), workspace.settings.mqtt
+    if warning := _readable(target, settings):
+        workspace.notify(warning, warning=True)
+    publisher = Publisher(
+        lambda: broker.Connection(target, settings, Message(topics.status, messages.LOST, retain=True)),
+        Message(topics.status, messages.ONLINE, retain=True),
+        lambda text: workspace.notify(text, warning=True),
+        lambda numbers: feed.dropped(numbers),
+    )
+    feed = Feed(workspace, publisher, topics, period)
+    await publisher.begin()
+    write(sys.stderr, f"publishing {_counted(workspace)} to {target.text}; Ctrl+C ends it")
+    feed.begin()
+    try:
+        await _all_lost(workspace)
+    finally:
+        feed.end()
+        await publisher.end(Message(topics.status, messages.BYE, retain=True))
+        write(sys.stderr, _summary(publisher))
+
+
+def _readable(target: Target, settings: MqttSettings) -> str:
+    """A warning where others on the way to the broker can read the password."""
+    if target.encrypted or not (settings.password or settings.password_file) or _here(target.host):
+        return ""
+    return f"the password goes to {target.host} unencrypted; mqtts:// encrypts it"
+
+
+def _here(host: str) -> bool:
+    try:
+        return ip_address(host).is_loopback
+    except ValueError:
+        return host == "localhost"
+
+
+def _counted(workspace: Workspace) -> str:
+    drives = sum(len(bus.drives) for bus in workspace.buses.values())
+    lines = len(workspace.buses)
+    return f"{drives} {'drive' if drives == 1 else 'drives'} on {lines} {'line' if lines == 1 else 'lines'}"
+
+
+def _summary(publisher: Publisher) -> str:
+    parts = [f"{publisher.sent} messages published"]
+    if publisher.lost:
+        parts.append(f"{publisher.lost} dropped, as they had no room")
+    if publisher.waiting:
+        parts.append(f"{publisher.waiting} not sent: the broker is away")
+    return "; ".join(parts)
+
+
+async def _all_lost(workspace: Workspace) -> None:
+    """Wait until every line is lost for good. Raises the last loss."""
+    broken = asyncio.Event()
+
+    def noticed(event: SessionEvent) -> None:
+        if isinstance(event, StateChanged) and _lost(workspace):
+            broken.set()
+
+    leave = workspace.subscribe(noticed)
+    try:
+        await broken.wait()
+    finally:
+        leave()
+    loss = _lost(workspace)
+    assert loss is not None
+    raise loss
+
+
+def _lost(workspace: Workspace) -> TransportLost | None:
+    """The loss of a line, if every line is lost and none of them is tried again."""
+    trying = workspace.reconnections.trying
+    losses = [bus.lost if bus.name not in trying else None for bus in workspace.buses.values()]
+    return losses[-1] if losses and None not in losses else None

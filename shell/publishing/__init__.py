@@ -1,0 +1,1 @@
+"""What drives do and say, published to an existing MQTT broker. Nothing is commanded through it."""

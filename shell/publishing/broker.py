@@ -1,0 +1,217 @@
+"""A connection to an MQTT broker, by paho, which is imported with the first one.
+
+Theory of operation. Each connection is a client of its own: paho's own reconnection gives no reason for a failure. paho
+has a thread; what it notes is handed to the event loop. Every message is sent at QoS 1. Those that the broker has not
+acknowledged are known, so that the next connection sends them again. A client here subscribes to nothing.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import os
+import ssl
+from collections import deque
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
+
+from dialects import Diagnostic
+from dialects.files import why
+from dialects.on_demand import importing
+from shell.connect.mqtt_settings import MqttSettings
+from shell.publishing.backlog import Message
+from shell.publishing.target import Target
+from shell.threads import in_thread
+from transports import Unreachable
+
+if TYPE_CHECKING:
+    from paho.mqtt.client import Client, MQTTMessageInfo
+
+INSTALL = "pip install 'multidrop[mqtt]'"
+KEEPALIVE = 15
+"""Seconds; after one and a half of them in silence the broker publishes the will."""
+WINDOW = 100
+"""Messages that may wait for their acknowledgement."""
+TIMEOUT = 15.0
+"""The longest time to connect, and to be accepted, s."""
+LEAVE = 1.0
+"""The longest time to disconnect, s."""
+
+
+def load() -> Any:
+    """Import paho. Raises Diagnostic where it is missing."""
+    try:
+        with importing():
+            from paho.mqtt import client
+    except ImportError:
+        raise Diagnostic("publish needs paho-mqtt, which is not installed", hint=INSTALL) from None
+    return client
+
+
+class Connection:
+    """One connection to a broker. `connect` makes it; it ends once, by `close` or by a loss."""
+
+    def __init__(self, target: Target, settings: MqttSettings, will: Message) -> None:
+        """Connect nothing yet."""
+        self._target, self._settings, self._will = target, settings, will
+        self._where = f"{target.host}:{target.port}"
+        self._loop = asyncio.get_running_loop()
+        self._accepted: asyncio.Future[None] = self._loop.create_future()
+        self._client: Client | None = None
+        self._sent: deque[tuple[Message, MQTTMessageInfo]] = deque()
+        self._full = False
+        self.lost = asyncio.Event()
+        """Set at the end of the connection."""
+        self.on_room: Callable[[], None] = lambda: None
+        """Called in the event loop once there is room after `publish` has refused a message."""
+
+    async def connect(self) -> None:
+        """Connect and log in. Raises Unreachable, and Diagnostic for what the configuration has wrong."""
+        connected = False
+        try:
+            await in_thread(self._begin, TIMEOUT, "broker")
+            await asyncio.wait_for(asyncio.shield(self._accepted), TIMEOUT)
+            connected = True
+        except (OSError, UnicodeError) as error:
+            raise Unreachable(_reason(self._where, error)) from None
+        finally:
+            if not connected:
+                await self.close()
+
+    def _begin(self) -> None:
+        """Open the socket, and begin the thread. Blocks."""
+        paho = load()
+        client = paho.Client(
+            paho.CallbackAPIVersion.VERSION2,
+            client_id=f"multidrop-{os.urandom(6).hex()}",
+            reconnect_on_failure=False,
+        )
+        _log_in(client, self._target, self._settings)
+        client.will_set(self._will.topic, self._will.text, 1, retain=True)
+        client.max_inflight_messages_set(WINDOW)
+        client.on_connect = lambda _client, _data, _flags, reason, _properties: self._call(self._answered, reason)
+        client.on_disconnect = lambda *_: self._call(self._ended)
+        client.on_publish = lambda *_: self._acknowledged()
+        client.connect(self._target.host, self._target.port, KEEPALIVE)
+        if self.lost.is_set():  # nobody waits for it any more
+            client.disconnect()
+            return
+        client.loop_start()
+        self._client = client
+
+    def _call(self, function: Callable[..., None], *arguments: Any) -> None:
+        """Call in the event loop, from paho's thread."""
+        with contextlib.suppress(RuntimeError):  # the loop was closed meanwhile
+            self._loop.call_soon_threadsafe(function, *arguments)
+
+    def _answered(self, reason: Any) -> None:
+        if self._accepted.done():
+            return
+        if reason.is_failure:
+            hint = "see username and password under [mqtt]"
+            self._accepted.set_exception(
+                Unreachable(f"the broker at {self._where} refuses the login: {reason}; {hint}")
+            )
+        else:
+            self._accepted.set_result(None)
+
+    def _ended(self) -> None:
+        self.lost.set()
+        if not self._accepted.done():
+            hint = "mqtts:// is the encrypted form of mqtt://"
+            self._accepted.set_exception(Unreachable(f"{self._where} hung up before the login; {hint}"))
+
+    def _acknowledged(self) -> None:
+        """Note an acknowledgement, in paho's thread; wake the loop only where it waits for room."""
+        if self._full:
+            self._full = False
+            self._call(self._room)
+
+    def _room(self) -> None:
+        self.on_room()
+
+    def publish(self, message: Message) -> bool:
+        """Send a message; False where that is not possible now. Never blocks."""
+        self._full = True  # before the count, which an acknowledgement may change meanwhile
+        if self._client is None or self.lost.is_set() or len(self._unacknowledged()) >= WINDOW:
+            return False
+        info = self._client.publish(message.topic, message.text, 1, message.retain)
+        if info.rc:
+            return False
+        self._sent.append((message, info))
+        self._full = False
+        return True
+
+    def _unacknowledged(self) -> deque[tuple[Message, MQTTMessageInfo]]:
+        """The messages in flight; a broker acknowledges in the order of sending."""
+        while self._sent and self._sent[0][1].is_published():
+            self._sent.popleft()
+        return self._sent
+
+    def in_flight(self) -> list[Message]:
+        """The messages that the broker has not acknowledged, oldest first."""
+        return [message for message, _ in self._unacknowledged()]
+
+    async def close(self) -> None:
+        """Disconnect, so that the broker does not publish the will. May be called again."""
+        client, self._client = self._client, None
+        self.lost.set()
+        self._accepted.cancel()
+        if client is not None:
+            with contextlib.suppress(TimeoutError):
+                await in_thread(lambda: _leave(client), LEAVE, "broker")
+
+
+def _reason(where: str, error: OSError | UnicodeError) -> str:
+    """Why there is no connection, in a line for a person."""
+    if isinstance(error, TimeoutError):
+        return f"the broker at {where} does not answer"
+    if isinstance(error, ssl.SSLCertVerificationError):
+        hint = "ca under [mqtt] names the authority that signed it"
+        return f"the certificate of {where} is not trusted: {error.verify_message}; {hint}"
+    if isinstance(error, ssl.SSLError):
+        return f"no encrypted connection with {where} ({error.reason}); mqtt:// is the form without encryption"
+    return f"no broker at {where} ({why(error)})"
+
+
+def _leave(client: Client) -> None:
+    client.disconnect()
+    client.loop_stop()
+
+
+def _log_in(client: Client, target: Target, settings: MqttSettings) -> None:
+    """Give a client its login and certificates. Raises Diagnostic."""
+    user, secret = target.user or settings.username, settings.secret()
+    if secret and not user:
+        raise Diagnostic("mqtt.password needs mqtt.username", hint="or --to mqtt://USER@BROKER/PREFIX")
+    if user:
+        client.username_pw_set(user, secret or None)
+    if target.encrypted:
+        client.tls_set_context(_context(settings))
+
+
+class _Socket(ssl.SSLSocket):
+    """A socket that is closed where its handshake fails; paho leaves it open."""
+
+    def do_handshake(self, block: bool = False) -> None:
+        """Agree on a key. Raises OSError."""
+        try:
+            super().do_handshake(block)
+        except OSError:
+            self.close()
+            raise
+
+
+def _context(settings: MqttSettings) -> ssl.SSLContext:
+    for problem in settings.unreadable():
+        raise Diagnostic(problem)
+    place = "mqtt.ca"
+    try:
+        context = ssl.create_default_context(cafile=settings.ca or None)
+        context.sslsocket_class = _Socket
+        place = "mqtt.cert"
+        if settings.cert:  # an encrypted key is refused: nobody is there to be asked
+            context.load_cert_chain(settings.cert, settings.key or None, password=lambda: "")
+    except (OSError, ValueError) as error:
+        raise Diagnostic(f"{place}: not a certificate that can be used ({why(error)})") from None
+    return context

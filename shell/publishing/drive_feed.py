@@ -1,0 +1,70 @@
+"""The feed of one drive: its samples and conditions as values, each published when it changes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from drives.events import Conditioned, Sample, Silent
+from shell.publishing import messages
+from shell.publishing.limits import Curve, Point, SampleLimit
+from shell.publishing.messages import Fields
+
+Put = Callable[[str, float, bool, Fields], None]
+"""Publishes a value: `position`, its time, whether it is retained, and its facts."""
+
+
+class DriveFeed:
+    """The values of a drive that were published, and what is published next."""
+
+    def __init__(self, put: Put, period: float) -> None:
+        """`period`: between two samples, s."""
+        self._put, self._period = put, period
+        self._limits: dict[str, SampleLimit] = {}
+        self._curves: dict[tuple[str, str], Curve] = {}
+        """By what, and axis."""
+        self._moving: dict[str, bool] = {}
+        """By axis."""
+        self._program: str | None = None
+        """None: not known."""
+        self._state: Fields = {}
+        self._error: Fields = {}
+
+    def take(self, event: Sample | Silent | Conditioned) -> None:
+        """Publish what has changed."""
+        if isinstance(event, Sample):
+            self._sample(event)
+        elif isinstance(event, Silent):
+            self._say_state(event.at, messages.SILENT)
+        else:
+            self._conditions(event)
+
+    def lost(self, at: float) -> None:
+        """Publish that nothing is known of the drive while its line is away."""
+        self._program = None
+        self._moving.clear()
+        self._say_state(at, messages.LOST)
+
+    def _sample(self, sample: Sample) -> None:
+        at, axis = sample.at, sample.axis
+        self._moving[axis] = sample.velocity != 0
+        self._say_state(at, messages.MOVING if any(self._moving.values()) else messages.AT_REST)
+        if not self._limits.setdefault(axis, SampleLimit(self._period)).passes(at):
+            return
+        for what, value in (("position", sample.position), ("velocity", sample.velocity)):
+            for point in self._curves.setdefault((what, axis), Curve()).take(Point(at, value)):
+                self._put(what, point.at, False, {"value": point.value, "axis": axis})
+
+    def _conditions(self, event: Conditioned) -> None:
+        self._program = messages.program(event.conditions)
+        if self._state:
+            self._say_state(event.at, str(self._state["value"]))
+        error = messages.error(event.conditions)
+        if error != self._error:
+            self._error = error
+            self._put("error", event.at, True, error)
+
+    def _say_state(self, at: float, word: str) -> None:
+        state: Fields = {"value": word} if self._program is None else {"value": word, "program": self._program}
+        if state != self._state:
+            self._state = state
+            self._put("state", at, True, state)

@@ -1,0 +1,183 @@
+"""The way of messages to a broker that may be away: a bounded backlog, and attempts to connect with back-off.
+
+Theory of operation. `put` adds a message to the backlog, and the pump sends as many as the connection takes. After a
+loss the messages that were not acknowledged go back to the front of the backlog. Once the broker is back, the state of
+this program is the first message, and every retained message follows those that waited.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+from collections import Counter
+from collections.abc import Callable
+from typing import Protocol
+
+from dialects import Diagnostic
+from shell.publishing.backlog import Backlog, Message
+from transports import TransportLost
+
+FIRST, LONGEST = 1.0, 30.0
+"""The pause before the first attempt to connect again, s; each further one is twice as long, up to the longest."""
+DRAIN = 2.0
+"""The longest time for the last messages at the end, s."""
+LOOK = 0.02
+REMIND = 60.0
+"""The time between two reports of what is dropped while it goes on, s."""
+
+
+class Connection(Protocol):
+    """One connection to a broker."""
+
+    lost: asyncio.Event
+    on_room: Callable[[], None]
+
+    async def connect(self) -> None:
+        """Connect. Raises TransportLost or Diagnostic."""
+
+    def publish(self, message: Message) -> bool:
+        """Send a message; False where there is no room now."""
+
+    def in_flight(self) -> list[Message]:
+        """The messages that are not acknowledged, oldest first."""
+
+    async def close(self) -> None:
+        """End it."""
+
+
+class Publisher:
+    """Messages on their way to a broker. `begin` connects, `end` says goodbye."""
+
+    def __init__(
+        self,
+        make: Callable[[], Connection],
+        online: Message,
+        notify: Callable[[str], None],
+        dropped: Callable[[Counter[str]], None],
+        backlog: Backlog | None = None,
+    ) -> None:
+        """Connect nothing yet. `online`: the message that opens each connection.
+
+        `notify` takes warnings for a person. `dropped` takes the numbers of messages that were dropped, by bus.
+        """
+        self._make, self._online, self._notify, self._dropped = make, online, notify, dropped
+        self._backlog = Backlog() if backlog is None else backlog
+        self._connection: Connection | None = None
+        """None while the broker is away."""
+        self._task: asyncio.Task[None] | None = None
+        self._said_dropped = float("-inf")
+        self.sent = 0
+        """The number of messages that a connection took."""
+        self.lost = 0
+        """The number of messages that were dropped."""
+
+    async def begin(self) -> None:
+        """Connect for the first time. Raises TransportLost or Diagnostic."""
+        connection = await self._connected()
+        self._begun(connection)
+        self._task = asyncio.get_running_loop().create_task(self._keep(connection))
+
+    def put(self, message: Message) -> None:
+        """Send a message as soon as possible. Never blocks."""
+        self._backlog.put(message)
+        self.pump()
+
+    def pump(self) -> None:
+        """Send what the connection takes."""
+        connection = self._connection
+        while connection is not None and (message := self._backlog.first()) is not None:
+            if not connection.publish(message):
+                return
+            self._backlog.sent()
+            self.sent += 1
+        if connection is not None and self._backlog.dropped:
+            self._say_dropped()
+            self._backlog.renew()  # a retained message may be among those
+            self.pump()
+
+    def look(self) -> None:
+        """Send what the connection takes; now and then, report what is being dropped. Call it every second."""
+        self.pump()
+        now = asyncio.get_running_loop().time()
+        if self._backlog.dropped and now > self._said_dropped + REMIND:
+            self._say_dropped()
+
+    def _say_dropped(self) -> None:
+        self._said_dropped = asyncio.get_running_loop().time()
+        dropped = self._backlog.take_dropped()
+        self.lost += dropped.total()
+        self._notify(f"{dropped.total()} messages for the broker were dropped, the oldest of those that waited")
+        self._dropped(dropped)
+
+    async def end(self, goodbye: Message) -> None:
+        """Send what waits, and the goodbye, within a limit; then disconnect."""
+        self._backlog.put(goodbye)
+        with contextlib.suppress(TimeoutError):
+            await asyncio.wait_for(self._drained(), DRAIN)
+        if self._task is not None:
+            self._task.cancel()
+            await asyncio.wait([self._task])
+        if self._connection is not None:
+            await self._connection.close()
+        self._give_back()
+
+    @property
+    def connected(self) -> bool:
+        """Whether the broker is there."""
+        return self._connection is not None
+
+    @property
+    def waiting(self) -> int:
+        """The number of messages that are not sent."""
+        return len(self._backlog)
+
+    async def _drained(self) -> None:
+        while self._connection is not None and (len(self._backlog) or self._connection.in_flight()):
+            self.pump()
+            await asyncio.sleep(LOOK)
+
+    async def _connected(self) -> Connection:
+        connection = self._make()
+        await connection.connect()
+        return connection
+
+    def _begun(self, connection: Connection) -> None:
+        """Use a new connection."""
+        connection.on_room = self.pump
+        self.sent += connection.publish(self._online)
+        self._backlog.renew()
+        self._connection = connection
+        self.pump()
+
+    def _give_back(self) -> None:
+        """Take messages that were not acknowledged from a connection that has ended."""
+        connection, self._connection = self._connection, None
+        if connection is not None:
+            unsent = connection.in_flight()
+            self.sent -= len(unsent)
+            self._backlog.give_back(unsent)
+
+    async def _keep(self, connection: Connection) -> None:
+        """Connect again after each loss, until cancelled."""
+        while True:
+            await connection.lost.wait()
+            begin = asyncio.get_running_loop().time()
+            self._give_back()
+            self._notify("the broker is lost; messages wait for it, and it is tried again")
+            await connection.close()
+            connection = await self._again()
+            self._notify(f"the broker is back after {asyncio.get_running_loop().time() - begin:.1f} s")
+            self._begun(connection)
+
+    async def _again(self) -> Connection:
+        """Try until there is a connection; say each reason once."""
+        pause, said = FIRST, ""
+        while True:
+            await asyncio.sleep(pause)
+            pause = min(2 * pause, LONGEST)
+            try:
+                return await self._connected()
+            except (TransportLost, Diagnostic) as failure:
+                if str(failure) != said:
+                    said = str(failure)
+                    self._notify(f"the broker is still lost: {said}")

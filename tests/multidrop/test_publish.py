@@ -1,0 +1,180 @@
+"""`multidrop publish` to a real mosquitto on loopback, plain and encrypted; one line for what is wrong."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import signal
+import socket
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from shell.connect.mqtt_settings import MqttSettings
+from shell.publishing import broker as broker_module
+from shell.publishing import publisher as publisher_module
+from shell.publishing.backlog import Message
+from shell.publishing.broker import Connection
+from shell.publishing.publisher import Publisher
+from shell.publishing.target import parse_target
+from shell.publishing.topics import Topics
+from tests.support.mosquitto import PASSWORD, USER, Mosquitto, Subscriber, free_port, retained
+from tests.support.processes import Running
+from transports import Unreachable
+
+WILL = Message("t/status", "lost", True)
+
+
+@pytest.fixture(scope="module")
+def mosquitto(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Mosquitto]:
+    broker = Mosquitto(tmp_path_factory.mktemp("broker"))
+    yield broker
+    broker.stop()
+
+
+@pytest.mark.process
+def test_a_cell_is_published_nothing_is_commanded_and_the_will_says_a_kill(
+    mosquitto: Mosquitto, tmp_path: Path
+) -> None:
+    seen = Subscriber(mosquitto.plain)
+    to = f"mqtt://127.0.0.1:{mosquitto.plain}/plant/hall"
+    running = Running("publish", "sim:", "--to", to, "--rate", "5", folder=tmp_path)
+    try:
+        drives = ["press/a", "press/b", "press/c", "eth/!", "pmx/00"]
+        topics = {
+            f"plant/hall/{drive}/{what}" for drive in drives for what in ("state", "position", "velocity", "error")
+        }
+        seen.until(lambda: topics <= {topic for topic, _, _ in seen.messages})
+        for word in ("PR P", "SL 1000", "position", "set"):
+            for topic in ("press/a/set", "press/a/position", "press/transcript", "press/a/command"):
+                seen.client.publish(f"plant/hall/{topic}", word, 1).wait_for_publish(5)
+        found = retained(mosquitto.plain, "plant/hall/status", *(f"plant/hall/{drive}/state" for drive in drives))
+        assert found["plant/hall/status"] == found["plant/hall/press/status"] == "online"
+        assert json.loads(found["plant/hall/press/a/state"])["value"] == "at rest"
+        assert not any(topic.endswith(("position", "velocity", "transcript")) for topic in found)
+        running.process.send_signal(signal.SIGKILL)
+        seen.until(lambda: seen.texts("plant/hall/status")[-1] == "lost")
+        assert retained(mosquitto.plain, "plant/hall/status")["plant/hall/status"] == "lost"
+        subscriptions = [line for line in mosquitto.log.read_text().splitlines() if "SUBSCRIBE from" in line]
+        assert subscriptions and not [line for line in subscriptions if "multidrop" in line]
+    finally:
+        running.kill()
+        seen.close()
+    assert running.errors == [f"publishing 5 drives on 3 lines to {to}; Ctrl+C ends it"]
+    assert running.lines.empty()
+
+
+@pytest.mark.process
+@pytest.mark.skipif(sys.platform == "win32", reason="signals")
+def test_the_encrypted_form_needs_the_right_authority_and_login_and_sigterm_says_bye(
+    mosquitto: Mosquitto, tmp_path: Path, multidrop: Any
+) -> None:
+    conf, to = tmp_path / "conf" / "multidrop.toml", f"mqtts://{USER}@127.0.0.1:{mosquitto.tls}/p"
+    conf.parent.mkdir()
+    (conf.parent / "word").write_text(f"{PASSWORD}\n")
+
+    def wrong(text: str, to: str = to) -> tuple[int, str]:
+        conf.write_text(text)
+        done = multidrop("publish", "sim:#eth", "--to", to)
+        assert done.stderr.count("\n") == 1 and PASSWORD not in done.stderr and done.stdout == ""
+        return done.returncode, done.stderr
+
+    ca = f'[mqtt]\nca = "{mosquitto.folder}/cert.pem"\n'
+    assert wrong("")[0] == 3 and "is not trusted: self-signed certificate; ca under [mqtt]" in wrong("")[1]
+    code, text = wrong(ca + 'password_file = "word"\n', to.replace("127.0.0.1", "localhost"))
+    assert code == 3 and "is not trusted" in text and "localhost" in text
+    code, text = wrong(f'{ca}password = "no"\n')
+    assert code == 3 and "refuses the login: Not authorized" in text
+    code, text = wrong(f'{ca}password_file = "word"\n', to.replace(str(mosquitto.tls), str(mosquitto.plain)))
+    assert code == 3 and "no encrypted connection" in text or "no broker" in text
+    assert wrong(f'{ca}password_file = "word"\n', to.replace("mqtts", "mqtt"))[0] == 3
+    assert wrong('[mqtt]\nca = "gone.pem"\n') == (
+        2,
+        f"mqtt.ca: {conf.parent}/gone.pem cannot be read: No such file or directory\n",
+    )
+    assert wrong(f'[mqtt]\nca = "{conf}"\n')[0] == 2
+    assert wrong(f'{ca}password = "{PASSWORD}"\n', to.replace(f"{USER}@", ""))[0] == 2
+
+    conf.write_text(f'{ca}password_file = "word"\n')
+    seen = Subscriber(mosquitto.plain)
+    running = Running("publish", "sim:#eth", "--to", to, folder=tmp_path)
+    seen.until(lambda: bool(seen.texts("p/eth/!/position")))
+    running.process.send_signal(signal.SIGTERM)
+    assert running.end() == 0
+    seen.until(lambda: seen.texts("p/status") == ["online", "bye"])
+    seen.close()
+    assert running.errors[-1].endswith("messages published")
+
+
+@pytest.mark.process
+async def test_a_broker_that_was_away_gets_what_waited_and_its_retained_states_again(
+    mosquitto: Mosquitto, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(publisher_module, "FIRST", 0.05)
+    monkeypatch.setattr(publisher_module, "LONGEST", 0.1)
+    target, said = parse_target(f"mqtt://127.0.0.1:{mosquitto.plain}/t"), []
+    made: list[Connection] = []
+
+    def make() -> Connection:
+        made.append(Connection(target, MqttSettings(), WILL))
+        return made[-1]
+
+    publisher = Publisher(make, Message("t/status", "online", True), said.append, lambda _: None)
+    await publisher.begin()
+    name = Topics("t").drive("a/b+c#", "$\x01%", "state")
+    publisher.put(Message(name, "moving", True))
+    for number in range(500):
+        publisher.put(Message("t/n", str(number)))
+    mosquitto.stop()
+    await asyncio.wait_for(made[0].lost.wait(), 10)
+    for number in range(500, 1000):
+        publisher.put(Message("t/n", str(number)))
+    await asyncio.sleep(0.2)
+    await asyncio.to_thread(mosquitto.start)
+    seen = await asyncio.to_thread(Subscriber, mosquitto.plain)
+    await asyncio.to_thread(seen.until, lambda: seen.texts("t/n")[-1:] == ["999"])
+    await asyncio.to_thread(seen.until, lambda: (name, "moving", False) in seen.messages or len(seen.texts(name)) > 0)
+    numbers = [int(text) for text in seen.texts("t/n")]
+    assert numbers == sorted(numbers) and set(range(500, 1000)) <= set(numbers)
+    assert said[0].startswith("the broker is lost") and said[-1].startswith("the broker is back after")
+    assert any("the broker is still lost: no broker at 127.0.0.1:" in each for each in said)
+    await publisher.end(Message("t/status", "bye", True))
+    await asyncio.to_thread(seen.until, lambda: seen.texts("t/status")[-1] == "bye")
+    await asyncio.to_thread(seen.close)
+
+
+async def test_a_server_that_never_answers_is_given_up_and_nothing_stays(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(broker_module, "TIMEOUT", 0.2)
+    server = socket.create_server(("127.0.0.1", 0))
+    port = server.getsockname()[1]
+    connection = Connection(parse_target(f"mqtt://127.0.0.1:{port}/t"), MqttSettings(), WILL)
+    with pytest.raises(Unreachable, match=f"the broker at 127.0.0.1:{port} does not answer"):
+        await connection.connect()
+    assert connection.lost.is_set() and not connection.publish(WILL)
+    server.close()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code", "says"),
+    [
+        (["--to", "mqtt://127.0.0.1:{free}/p"], 3, "no broker at 127.0.0.1:"),
+        (["--to", "mqtt://127.0.0.1:1/p", "--rate", "max"], 2, "--rate: invalid rate 'max'"),
+        (["--to", "mqtt://me:hunter2@127.0.0.1/p"], 2, "--to: a password in a URL"),
+        ([], 2, "--to"),
+    ],
+)
+def test_what_is_wrong_at_the_start_is_one_line(arguments: list[str], code: int, says: str, multidrop: Any) -> None:
+    typed = [each.format(free=free_port()) for each in arguments]
+    done = multidrop("publish", "sim:#eth", *typed)
+    assert (done.returncode, done.stderr.count("\n"), done.stdout) == (code, 1, "")
+    assert says in done.stderr and "hunter2" not in done.stderr
+
+
+def test_without_paho_it_says_what_to_install(multidrop: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "paho.mqtt", None)
+    done = multidrop("publish", "sim:#eth", "--to", "mqtt://h/p")
+    assert done.returncode == 2
+    assert done.stderr == "publish needs paho-mqtt, which is not installed; pip install 'multidrop[mqtt]'\n"
