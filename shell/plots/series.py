@@ -77,6 +77,9 @@ def _value(workspace: Workspace, bus: str, address: str, word: str, text: str) -
     if not word:
         raise Diagnostic(f"no value in {text!r}", hint=FORMS)
     if word.lower() == DIFFERENCE:
+        twins = workspace.twins
+        if twins is None or not twins.running(workspace.buses[bus]):
+            raise Diagnostic(f"{drive.shown}: no twin runs that it could differ from", hint="/twin on begins one")
         return Series(bus, address, DIFFERENCE)
     if readings is None:
         raise Diagnostic(f"{drive.shown}: its values are not plotted; position and velocity are", hint=FORMS)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import warnings
 from collections.abc import Iterator
 from datetime import UTC, datetime
 from pathlib import Path
@@ -15,6 +14,7 @@ from drives.events import Sample, Valued
 from shell.plots.layout import LINES, drives_of
 from shell.plots.plot import Plot
 from shell.plots.target import PlotTarget, parse_target
+from tests.support.plot_file import contents
 
 PATHS = {
     "/press/a/position",
@@ -30,24 +30,6 @@ PATHS = {
 def rerun() -> Iterator[Any]:
     os.environ["RUST_LOG"] = "off"
     yield pytest.importorskip("rerun")
-
-
-def contents(path: Path) -> dict[str, dict[str, list[Any]]]:
-    """The values of each component, by entity."""
-    from rerun.chunk import RrdReader
-
-    found: dict[str, dict[str, list[Any]]] = {}
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        reader = RrdReader(str(path))
-    for chunk in reader.stream():
-        batch = chunk.to_record_batch()
-        for name in batch.schema.names:
-            if name.startswith("log_") or "start_time" in name:
-                continue
-            values = [each.value if name in ("elapsed", "time") else each.as_py() for each in batch.column(name)]
-            found.setdefault(str(chunk.entity_path), {}).setdefault(name, []).extend(values)
-    return found
 
 
 async def plotted(path: Path) -> None:

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from drives.events import Sample
+from drives.events import Conditioned, Sample
 from shell.events import Agreed, By, OnBus, Predicted, SessionEvent, TwinEnded
 from shell.roles import DIFFERENCE, Series
-from tests.support.fake_session import FakeSession, demo_session, make_app, settle
+from tests.support.fake_session import AT_LIMIT, FakeSession, demo_session, make_app, settle
 from tests.support.fake_twin import apart, beside
 from tui.curves.ink import ASCII, BLOCK, BRAILLE, TWINS, Ink
 from tui.panels.axis import drive_rows
@@ -21,7 +23,7 @@ from tui.polling import Polling
 from tui.presenter import trouble_mark
 from tui.readout import State
 from tui.screen_model import ScreenModel, bus_state
-from tui.screens.all_drives import drive_row, worst_first
+from tui.screens.all_drives import drive_row, summary, worst_first
 from tui.widgets.lines import Row, width_of
 from tui.widgets.signs import Signs, shown_as
 
@@ -114,6 +116,18 @@ def test_a_drive_that_differs_comes_first_of_all_drives(width: int) -> None:
     row = drive_row(places[0], shown.now, width, False)
     assert "≠ -8,112" in plain(row) and width_of(row) <= width
     assert kept(shown.glances, 1)[0].address == "a" and kept(shown.glances, 2)[1].address == "b"
+
+
+def test_trouble_and_a_difference_are_both_said() -> None:
+    session = demo_session()
+    error = OnBus("press", Conditioned(session.time, "a", (replace(AT_LIMIT, lamps=()),)))
+    shown = view(session, *beside(session.time, 0, 0, 8112), apart(session), error)
+    assert plain(narrow_rows(shown, 80)[0]).endswith(" ✗ error ≠ -8,112")
+    assert plain(drives_rows(shown, 45, 3)[0]).endswith(" ✗ error ≠ -8,112")
+    assert plain(drives_rows(shown, 39, 3)[0]).endswith(" ✗ error ≠")
+    places = worst_first(shown, "press")
+    assert plain(drive_row(places[0], shown.now, 120, False)).endswith(" ✗ error ≠ -8,112")
+    assert summary(places).startswith("1 ≠ twin · ")
 
 
 def test_a_tab_counts_a_drive_that_differs_as_trouble() -> None:

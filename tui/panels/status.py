@@ -12,7 +12,7 @@ from tui.panels.glance import Glance
 from tui.panels.lamps import aged, flowing, lamp_groups, program_words, trouble_of
 from tui.panels.spark import spark
 from tui.panels.travel import bar, to_go_words
-from tui.panels.twin import SIGN, difference_words, differs
+from tui.panels.twin import SIGN, alarm_words, difference_words, differs
 from tui.panels.view import View
 from tui.readout import Readout, State
 from tui.text import age, fit, thousands
@@ -66,8 +66,9 @@ def _axis_row(glance: Glance, axis: Readout, now: float, width: int, *, first: b
         (f"{thousands(None if axis.last is None else axis.last.position):>{NUMBER}}", role),
         (f"{f'{velocity}/s' if moves else '':>{VELOCITY}} ", role),
     ]
-    text, text_role = _besides(axis, now, live=role != "dim")
-    return (*row, (fit(text, width - width_of(row)), text_role))
+    room = width - width_of(row)
+    text, text_role = _besides(axis, now, room, live=role != "dim")
+    return (*row, (fit(text, room), text_role))
 
 
 def _name(glance: Glance, axis: Readout, *, first: bool) -> Span:
@@ -96,12 +97,11 @@ def short_words(glance: Glance, axis: Readout, now: float) -> str:
     return fit(f"{state.sign} {'not read' if state is State.UNKNOWN else state.word}", STATE)
 
 
-def _besides(axis: Readout, now: float, *, live: bool) -> Span:
-    """The trouble of an axis, its difference from its twin, the way to its target, or its program."""
-    if text := trouble_of(axis):
-        return f"✗ {text}", "error"
-    if text := differs(axis):
-        return text, "error" if live else "dim"
+def _besides(axis: Readout, now: float, room: int, *, live: bool) -> Span:
+    """The trouble of an axis and its difference from its twin, the way to its target, or its program."""
+    trouble = trouble_of(axis)
+    if text := alarm_words(trouble, [axis], room):
+        return text, "error" if live or trouble else "dim"
     target = axis.conditions.target if axis.conditions is not None else None
     if live and target is not None and axis.last is not None and axis.last.velocity:
         return f"→ {thousands(target)}  {to_go_words(axis, now)}".rstrip(), "text"
@@ -134,17 +134,17 @@ def drives_rows(view: View, width: int, height: int) -> list[Row]:
 def _panel_row(glance: Glance, now: float, width: int) -> Row:
     position, _, role = glance.values(now)
     state = glance.state()
-    text, text_role = _besides(glance.readout, now, live=role != "dim")
-    if text.startswith("→"):
-        text = to_go_words(glance.readout, now)
-    elif text.startswith(SIGN):
-        text = differs(glance.readout, causes=False)
     row: list[Span] = [
         _name(glance, glance.readout, first=True),
         (f"{state.sign} ", _state_role(glance, now)),
         (f"{position:>{NUMBER}} ", "text" if role == "strong" else role),
     ]
     room = width - width_of(row)
+    text, text_role = _besides(glance.readout, now, room, live=role != "dim")
+    if text.startswith("→"):
+        text = to_go_words(glance.readout, now)
+    elif text.startswith(SIGN):
+        text = differs(glance.readout, causes=False)
     stale = role == "dim" and state is not State.UNKNOWN and not text
     if state in (State.SILENT, State.LOST, State.STORING) or stale:
         text, text_role = short_words(glance, glance.readout, now)[2:].strip(), _state_role(glance, now)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 from tui.readout import Readout
 from tui.text import at_words, thousands
@@ -40,6 +40,15 @@ def differs(axis: Readout, *, causes: bool = True) -> str:
         return ""
     now = (twin.predicted or twin.diverged).difference
     return f"{SIGN} {now:+,} {', '.join(twin.diverged.causes) if causes else ''}".rstrip()
+
+
+def alarm_words(trouble: str, axes: Sequence[Readout], room: int) -> str:
+    """`≠ +8,112 stall, load`, or `✗ error ≠ +8,112`, or `✗ error ≠` where there is no room; empty without an alarm."""
+    if not trouble:
+        return "; ".join(filter(None, map(differs, axes)))
+    found = "; ".join(filter(None, (differs(each, causes=False) for each in axes)))
+    whole = f"✗ {trouble} {found}".rstrip()
+    return whole if len(whole) <= room or not found else f"✗ {trouble} {SIGN}"
 
 
 def difference_words(axis: Readout) -> str:

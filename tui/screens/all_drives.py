@@ -14,7 +14,7 @@ from tui.panels.glance import Glance, glances_of
 from tui.panels.lamps import program_words, trouble_of
 from tui.panels.spark import spark
 from tui.panels.status import STATE, short_words
-from tui.panels.twin import differs
+from tui.panels.twin import SIGN, alarm_words
 from tui.panels.view import View
 from tui.readout import State
 from tui.screens.dialogs import Field
@@ -50,18 +50,14 @@ class Place(NamedTuple):
         """The trouble of its axes, in words."""
         return "; ".join(filter(None, map(trouble_of, self.glance.readout.axes)))
 
-    @property
-    def differs(self) -> str:
-        """The differences of its axes from their twins."""
-        return "; ".join(filter(None, map(differs, self.glance.readout.axes)))
+    def alarm(self, room: int = 200) -> str:
+        """Its trouble, and the differences of its axes from their twins."""
+        return alarm_words(self.trouble, self.glance.readout.axes, room)
 
-    @property
-    def besides(self) -> Span:
-        """The fact that matters most besides its state: trouble, its twin, its program, else its product."""
-        if self.trouble:
-            return f"✗ {self.trouble}", "error"
-        if self.differs:
-            return self.differs, "error"
+    def besides(self, room: int) -> Span:
+        """The fact that matters most besides its state: trouble and its twin, its program, else its product."""
+        if alarm := self.alarm(room):
+            return alarm, "error"
         program = program_words(self.glance.readout)
         return (program, "motion") if program else (self.glance.product, "dim")
 
@@ -69,8 +65,7 @@ class Place(NamedTuple):
     def urgency(self) -> tuple[bool, int]:
         """Orders drives, the worst first."""
         state = self.glance.state()
-        troubled = bool(self.trouble or self.differs)
-        return not (troubled and state is not State.LOST) and state not in URGENCY[:2], URGENCY.index(state)
+        return not (self.alarm() and state is not State.LOST) and state not in URGENCY[:2], URGENCY.index(state)
 
 
 def worst_first(view: View, filtered: str) -> list[Place]:
@@ -84,7 +79,7 @@ def worst_first(view: View, filtered: str) -> list[Place]:
 
 def _words(place: Place, now: float) -> str:
     sign, _ = place.glance.sign(now)
-    return f"{place.name} {sign} {place.trouble} {place.differs} {place.glance.product}".casefold()
+    return f"{place.name} {sign} {place.alarm()} {place.glance.product}".casefold()
 
 
 def drive_row(place: Place, now: float, width: int, chosen: bool) -> Row:
@@ -97,13 +92,15 @@ def drive_row(place: Place, now: float, width: int, chosen: bool) -> Row:
         (f"{position:>{POSITION}}", role),
     ]
     if width < NARROW:
-        text, text_role = place.besides
-        return (*row, (fit(f"  {text}", width - width_of(row)), text_role))
+        room = width - width_of(row) - 2
+        text, text_role = place.besides(room)
+        return (*row, (fit(f"  {text}", room + 2), text_role))
     row.append((f"{velocity:>{VELOCITY}} ", role))
     cells = SPARK if width >= ROOMY else FEW
     row.append((f"{spark(place.glance.readout, now, cells)}  ", "dim" if role == "dim" else "accent"))
-    text, text_role = place.besides
-    return (*row, (fit(text, width - width_of(row)), text_role))
+    room = width - width_of(row)
+    text, text_role = place.besides(room)
+    return (*row, (fit(text, room), text_role))
 
 
 def columns_row(width: int) -> Row:
@@ -117,7 +114,9 @@ def columns_row(width: int) -> Row:
 def summary(places: Sequence[Place]) -> str:
     """`2 moving · 1 silent`, the worst first."""
     counts = Counter(place.glance.state() for place in places)
-    return " · ".join(f"{counts[state]} {state.word}" for state in URGENCY if counts[state])
+    differ = sum(place.glance.readout.differs for place in places)
+    said = [f"{differ} {SIGN} twin"] if differ else []
+    return " · ".join([*said, *(f"{counts[state]} {state.word}" for state in URGENCY if counts[state])])
 
 
 class AllDrives(Page):
