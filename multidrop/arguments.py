@@ -233,7 +233,7 @@ def program_test(parser: argparse.ArgumentParser) -> None:
         "--cell", metavar="CELL", help="a drive of a cell file and its world: CELL, CELL#BUS or CELL#BUS:NAME"
     )
     parser.add_argument(
-        "--until", metavar="SECONDS", type=_duration, help="virtual seconds at most, for a program without an end"
+        "--until", metavar="SECONDS", type=duration, help="virtual seconds at most, for a program without an end"
     )
     parser.add_argument(
         "--run", metavar="LABEL", default="", help="the label or program to execute (default: its own start)"
@@ -416,7 +416,8 @@ def _speed(text: str) -> float:
     return number
 
 
-def _duration(text: str) -> float:
+def duration(text: str) -> float:
+    """Read a number of seconds."""
     number = _number(text)
     if not 0 < number <= 1e7:
         raise argparse.ArgumentTypeError(f"{text} is not a number of seconds above 0")

@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 from types import MappingProxyType
 from typing import NamedTuple
 
-from multidrop import arguments, lsp_arguments, macro_arguments, publish_arguments, relay_arguments
+from multidrop import arguments, lsp_arguments, macro_arguments, publish_arguments, relay_arguments, sweep_arguments
 
 
 class Command(NamedTuple):
@@ -41,6 +41,16 @@ PROGRAM = {
         ],
         "program_test.run",
         arguments.program_test,
+    ),
+    "sweep": Command(
+        "run a program file in many simulated worlds, and show those in which a condition does not hold",
+        [
+            'program sweep shuttle.mxt --cell press.toml --vary "b.load=0..1.2:0.1" --expect "errors == []"',
+            'program sweep shuttle.mxt --cell press.toml --vary "b.stall_at=1..90000" --random 500 --junit sweep.xml',
+            'program sweep shuttle.mxt --vary VM=20000..80000:5000 --expect "virtual_s < 2" --cluster tcp://pc:8786',
+        ],
+        "program_sweep.run",
+        sweep_arguments.sweep,
     ),
     "list": Command(
         "print the program in a drive",

@@ -1,11 +1,17 @@
-"""Cell files with drives of every simulated family."""
+"""Cell files with drives of every simulated family, and single drives of them."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from importlib import resources
+from pathlib import Path
+from typing import Any, NamedTuple
 
-from simulator.cell.reader import Reader
-from simulator.cell.spec import Cell
+from dialects import Diagnostic
+from dialects.files import toml_of
+from simulator.cell.reader import Reader, text_of
+from simulator.cell.spec import Cell, DriveSpec
+from simulator.cell.table import Table
 from simulator.families import BY_PERSONALITY
 
 _READER = Reader(BY_PERSONALITY)
@@ -15,5 +21,60 @@ read = _READER.read
 
 def demo() -> Cell:
     """Read the cell that comes with the program."""
-    folder = resources.files("simulator")
-    return read(folder.joinpath("demo.toml").read_text(encoding="utf-8"), "demo cell", folder)
+    return read(_demo_text(), "demo cell", resources.files("simulator"))
+
+
+def _demo_text() -> str:
+    return resources.files("simulator").joinpath("demo.toml").read_text(encoding="utf-8")
+
+
+class Placed(NamedTuple):
+    """A drive of a cell, and its table. `cell` is the path of the file, empty for the demo cell."""
+
+    cell: str
+    bus: str
+    spec: DriveSpec
+    table: Mapping[str, Any]
+
+    @property
+    def place(self) -> str:
+        """The drive as `placed` finds it."""
+        return f"{self.cell}#{self.bus}:{self.spec.name}"
+
+
+def placed(cell: str) -> Placed:
+    """Find a drive: `CELL` if it has only one, else `CELL#BUS` or `CELL#BUS:NAME`. Raises Diagnostic.
+
+    No CELL before the # means the demo cell, as in `sim:#press`.
+    """
+    found = matching(cell)
+    if len(found) == 1:
+        return found[0]
+    path, _, place = cell.partition("#")
+    where = path or "demo cell"
+    names = ", ".join(each.place for each in found or matching(path))
+    what = f"{len(found)} drives match" if found else "no such drive"
+    raise Diagnostic(what, f"{where}#{place}" if place else where, f"valid for --cell: {names}" if names else "")
+
+
+def matching(cell: str) -> Sequence[Placed]:
+    """All drives that `CELL`, `CELL#BUS` or `CELL#BUS:NAME` means. Raises Diagnostic."""
+    path, _, place = cell.partition("#")
+    bus, _, name = place.partition(":")
+    return [each for each in _drives(path) if bus in ("", each.bus) and name in ("", each.spec.name)]
+
+
+def _drives(path: str) -> list[Placed]:
+    text = text_of(path) if path else _demo_text()
+    shop = read(text, path, Path(path).absolute().parent) if path else demo()
+    tables = toml_of(text, path).get("bus", [])
+    return [
+        Placed(path, bus.name, spec, table)
+        for bus, rows in zip(shop.buses, tables, strict=True)
+        for spec, table in zip(bus.drives, rows.get("drive", []), strict=True)
+    ]
+
+
+def read_drive(table: Mapping[str, Any], where: str) -> DriveSpec:
+    """Read the table of a drive, of which no file is read. Raises Diagnostic."""
+    return BY_PERSONALITY[table["personality"]].read_drive(Table(table, where), Path())

@@ -66,15 +66,20 @@ class ProgramRun(Protocol):
         """Run it from `start`, for `until` virtual seconds at most. Raises Diagnostic if there is nothing to run."""
 
 
+Load = Callable[[DriveSpec], ProgramRun]
+"""Loads a program file, which was read once, into a simulated drive, as often as it is called. Raises Diagnostic."""
+
+
 class Programs(NamedTuple):
     """The runs of a family's program files on a simulated drive, in virtual time.
 
-    `drive` is the default drive, `run` loads a file into a drive. `refusals` finds the lines that a drive refuses: of a
-    text, its file's name, the personality, and the problems found already; None: the text alone shows all of them.
+    `drive` is the default drive. `read` reads a text, of a file of this name. `refusals` finds the lines that a drive
+    refuses: of a text, its file's name, the personality, and the problems found already; None: the text alone shows
+    all of them.
     """
 
     drive: DriveSpec
-    run: Callable[[DriveSpec, str], ProgramRun]
+    read: Callable[[str, str], Load]
     refusals: Callable[[str, str, str, Sequence[Problem]], list[Problem]] | None = None
 
 

@@ -15,6 +15,7 @@ from dataclasses import replace
 
 from dialects import Diagnostic
 from dialects.families import program_language_of
+from dialects.files import text_of
 from multidrop.commands.failure import fail
 from shell.output import write
 from simulator import cells
@@ -40,22 +41,8 @@ def drive(cell: str | None, personality: str | None) -> DriveSpec:
 
     No CELL before the # means the demo cell, as in `sim:#press`. No cell means an LMDCM in empty surroundings.
     """
-    spec = DriveSpec() if cell is None else _placed(cell)
+    spec = DriveSpec() if cell is None else cells.placed(cell).spec
     return spec if personality is None else replace(spec, personality=personality)
-
-
-def _placed(cell: str) -> DriveSpec:
-    path, _, place = cell.partition("#")
-    bus, _, name = place.partition(":")
-    shop = cells.load(path) if path else cells.demo()
-    where = path or "demo cell"
-    drives = [(each.name, spec) for each in shop.buses for spec in each.drives]
-    found = [spec for of, spec in drives if bus in ("", of) and name in ("", spec.name)]
-    if len(found) == 1:
-        return found[0]
-    names = ", ".join(f"{path}#{of}:{spec.name}" for of, spec in drives if not found or spec in found)
-    what = f"{len(found)} drives match" if found else "no such drive"
-    raise Diagnostic(what, f"{where}#{place}" if place else where, f"valid for --cell: {names}" if drives else "")
 
 
 def _test(file: str, chosen: argparse.Namespace, given: DriveSpec | None, several: bool) -> int:
@@ -65,7 +52,7 @@ def _test(file: str, chosen: argparse.Namespace, given: DriveSpec | None, severa
     debugging = Debugging(chosen.trace, chosen.breaks, chosen.watch)
     failed = False
     try:
-        loaded = programs.run(given or programs.drive, file)
+        loaded = programs.read(text_of(file), file)(given or programs.drive)
         if several and not chosen.json:
             write(sys.stdout, f"{file}:")
         for event in loaded.run(chosen.run, chosen.until, debugging):

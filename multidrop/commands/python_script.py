@@ -24,10 +24,11 @@ from multidrop.api.blocking import Session
 from multidrop.commands.failure import fail
 from multidrop.commands.python_report import HOME, ReportedSession, place, replaced, result_of, traceback_of
 from shell.events import FAILURES
-from shell.front.interrupts import SIGNALS, on_stop_key
+from shell.front.interrupts import on_stop_key
 from shell.front.report import Report
 from shell.output import INTERRUPTED, exit_code, write
 from shell.scripts.results import Result
+from shell.signals import SIGNALS
 
 
 def run(chosen: argparse.Namespace, report: Report) -> int:

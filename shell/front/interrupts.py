@@ -9,8 +9,7 @@ import sys
 from collections.abc import Callable, Iterator
 
 from shell.front.keyboard import Keyboard, foreground_terminal
-
-SIGNALS = tuple(getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name))
+from shell.signals import SIGNALS
 
 
 @contextlib.contextmanager

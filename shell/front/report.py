@@ -8,13 +8,11 @@ import json
 import sys
 from collections.abc import Iterator
 from datetime import datetime
-from pathlib import Path
 
 from dialects import Diagnostic
-from dialects.files import bytes_of, why
-from macros.atomic import write_atomically
 from shell.events import FAILURES
-from shell.front.junit import Case, junit
+from shell.front.junit import Case
+from shell.front.junit_file import JUnitFile
 from shell.output import report as described
 from shell.output import write
 from shell.scripts.results import Ending, Result
@@ -27,8 +25,8 @@ class Report:
     def __init__(self, name: str, *, as_json: bool = False, junit: str = "") -> None:
         self._name = name
         self._json = as_json
-        self._junit = Path(junit) if junit else None
         self._begun = datetime.now().astimezone()
+        self._junit = JUnitFile(junit, name, self._begun)
         self._cases: list[Case] = []
         self._lines = self._checks = self._failed = 0
         self._failure = ""
@@ -39,14 +37,7 @@ class Report:
 
         Raises Diagnostic where it cannot be written, and for another file in its place, which stays: then and later.
         """
-        if self._junit is None:
-            return
-        try:
-            _check_place(self._junit)
-            self._write([Case(self._name, self._name, error="the run did not end")])
-        except Diagnostic:
-            self._junit = None
-            raise
+        self._junit.begin()
 
     def executed(self, result: Result, *, counts: bool = True) -> None:
         """Take the result of a line. `counts`: its failure is one of the script."""
@@ -55,7 +46,7 @@ class Report:
         self._failed += not result.ok
         if self._json:
             write(sys.stdout, json.dumps(result.fact()))
-        if counts and self._junit is not None and (result.check or not result.ok):
+        if counts and self._junit.wanted and (result.check or not result.ok):
             self._cases.append(Case.of(result))
 
     def ended(self, ending: Ending) -> None:
@@ -77,12 +68,12 @@ class Report:
             write(sys.stdout, json.dumps({"summary": summary}))
         elif self._checks:
             write(sys.stderr, self._summary(seconds))
-        if self._junit is None:
+        if not self._junit.wanted:
             return code
         if code and not any(case.error or case.failure for case in self._cases):
             self._cases.append(Case(self._name, self._name, error=self._failure or f"exit code {code}"))
         try:
-            self._write(self._cases, seconds)
+            self._junit.write(self._cases, seconds)
         except Diagnostic as problem:
             write(sys.stderr, str(problem))
             return code or 2
@@ -110,21 +101,3 @@ class Report:
     def _summary(self, seconds: float) -> str:
         words = f"{self._lines} lines, {self._checks} checks, {self._failed} failed"
         return f"{self._name}: {self._begun.isoformat(' ', 'seconds')}: {words}, {seconds:.1f} s"
-
-    def _write(self, cases: list[Case], seconds: float = 0.0) -> None:
-        assert self._junit is not None
-        try:
-            write_atomically(self._junit, junit(self._name, cases, self._begun, seconds))
-        except OSError as error:
-            raise Diagnostic(f"the report cannot be written: {why(error)}", str(self._junit)) from None
-
-
-def _check_place(path: Path) -> None:
-    """Check that a report may be written to a path: it replaces a report only. Raises Diagnostic."""
-    if not path.exists():
-        return
-    if not path.is_file():
-        raise Diagnostic("is not a file", str(path), "name a new file for the report")
-    begin = bytes_of(path)[:400]
-    if begin and b"<testsuite" not in begin:
-        raise Diagnostic("exists already and is not a JUnit report", str(path), "name a new file for the report")

@@ -121,9 +121,9 @@ def parse(text: str, names: Container[str]) -> Expression:
     return _Parser(text, names).whole()
 
 
-def parse_check(text: str, names: Container[str]) -> Comparison:
-    """Parse the one comparison of a check. Raises Diagnostic."""
-    tree = parse(text, names)
+def parse_check(text: str, names: Container[str], *, lists: bool = False) -> Comparison:
+    """Parse the one comparison of a check. `lists`: brackets hold a list, or nothing. Raises Diagnostic."""
+    tree = _Parser(text, names, lists).whole()
     if not isinstance(tree, Comparison):
         raise Diagnostic(f"{text.strip()} is not one comparison", hint="valid: [@ADDR] EXPR OP EXPR [+- N]")
     return tree
@@ -137,7 +137,7 @@ class _Token(NamedTuple):
 _TOKEN = re.compile(
     r"""\s*(?:(?P<number>\d+(?:\.\d*)?|\.\d+)
     |(?P<text>"[^"]*")
-    |(?P<line>\[[^\]]*\])
+    |(?P<line>\[(?:"[^"]*"|[^\]"])*\])
     |(?P<address>@\S*)
     |(?P<word>[A-Za-z_][A-Za-z0-9_]*)
     |(?P<sign>\+-|==|!=|<=|>=|[-+*/%()<>])
@@ -172,7 +172,8 @@ _END = _Token("end", "")
 
 
 class _Parser:
-    def __init__(self, text: str, names: Container[str]) -> None:
+    def __init__(self, text: str, names: Container[str], lists: bool = False) -> None:
+        self._lists = lists
         self._text = text.strip()
         self._tokens = [*_tokens(text), _END]
         self._names = names
@@ -252,7 +253,7 @@ class _Parser:
             self._target = _target(token.text)
             return self._operand()
         if token.kind == "line":
-            return Word(_line(token.text), self._target, line=True)
+            return Word(token.text[1:-1].strip() if self._lists else _line(token.text), self._target, line=True)
         if token.kind == "word":
             return Name(token.text) if token.text in self._names else Word(token.text, self._target)
         raise Diagnostic(f"a value is missing at the end of {self._text}" if self._text else "a value is missing")

@@ -56,11 +56,7 @@ class Reader:
     def load(self, path: str | Path) -> Cell:
         """Read a cell file. Raises Diagnostic."""
         path = Path(path)
-        try:
-            text = bytes_of(path).decode("utf-8")
-        except UnicodeDecodeError:
-            raise Diagnostic("is not UTF-8 text", str(path)) from None
-        cell = self.read(text, str(path), path.absolute().parent)
+        cell = self.read(text_of(path), str(path), path.absolute().parent)
         if not cell.buses:
             raise Diagnostic("has no bus", str(path), "each begins with [[bus]]")
         return cell
@@ -127,6 +123,14 @@ class Reader:
         if not (drive.party or self._rules[drive.personality].addressed):
             what = "without party mode it replies to every line of the bus"
             raise Diagnostic(what, where, "add party = true")
+
+
+def text_of(path: str | Path) -> str:
+    """Read the text of a cell file. Raises Diagnostic."""
+    try:
+        return bytes_of(path).decode("utf-8")
+    except UnicodeDecodeError:
+        raise Diagnostic("is not UTF-8 text", str(path)) from None
 
 
 def common_keys(table: Table, folder: Traversable) -> dict[str, Any]:

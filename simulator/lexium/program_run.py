@@ -13,7 +13,6 @@ from dataclasses import replace
 from math import inf
 
 from dialects import Diagnostic
-from dialects.files import text_of
 from dialects.mcode.manual import program_file
 from dialects.mcode.manual.grammar import Name, Number, words
 from dialects.mcode.manual.program_file import ProgramLine
@@ -27,7 +26,7 @@ from simulator.lexium.program_watch import Subject, Watcher
 from simulator.lexium.state.errors import Failure, Fault
 from simulator.lexium.state.models import MODELS
 from simulator.lexium.state.printer import CRLF
-from simulator.program_run import LONGEST, MOST_LINES, NO_DEBUGGING, SLICE, Debugging, Programs
+from simulator.program_run import LONGEST, MOST_LINES, NO_DEBUGGING, SLICE, Debugging, Load, Programs
 from simulator.program_watch import Followed, source_lines
 from simulator.world import World
 
@@ -203,10 +202,10 @@ class ProgramRun:
         )
 
 
-def load(spec: DriveSpec, file: str) -> ProgramRun:
-    """Load a file into a simulated drive. Raises Diagnostic."""
-    text = text_of(file)
-    return ProgramRun(spec, program_file.read(text, file), file, source_lines(text))
+def read(text: str, file: str) -> Load:
+    """Read the text of a file. Raises Diagnostic."""
+    lines, source = program_file.read(text, file), source_lines(text)
+    return lambda spec: ProgramRun(spec, lines, file, source)
 
 
 def refusals(text: str, file: str, personality: str, found: Sequence[Problem]) -> list[Problem]:
@@ -228,4 +227,4 @@ def refusals(text: str, file: str, personality: str, found: Sequence[Problem]) -
     return problems
 
 
-RUNS = Programs(drive=DriveSpec(), run=load, refusals=refusals)
+RUNS = Programs(drive=DriveSpec(), read=read, refusals=refusals)

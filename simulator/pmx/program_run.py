@@ -12,14 +12,14 @@ from dataclasses import replace
 from math import inf
 
 from dialects import Diagnostic
-from dialects.files import SourceLine, text_of
+from dialects.files import SourceLine
 from dialects.pmx.manual import program_file, script_compiler
 from dialects.pmx.manual.script_words import PROGRAMS
 from simulator.cell.spec import DriveSpec
 from simulator.pmx.device import PmxDevice
 from simulator.pmx.program_events import Failed, Output, Summary
 from simulator.pmx.program_watch import Watcher
-from simulator.program_run import LONGEST, MOST_LINES, NO_DEBUGGING, SLICE, Debugging, Programs
+from simulator.program_run import LONGEST, MOST_LINES, NO_DEBUGGING, SLICE, Debugging, Load, Programs
 from simulator.program_watch import Followed, Traced, source_lines
 
 _MOTION = re.compile(r"X-?\d+(?:Y-?\d+)?|Y-?\d+|(?:J|HL?|L|ZH?)[XY][+-]", re.ASCII)
@@ -138,10 +138,10 @@ class ProgramRun:
         return "until" if running else "error" if self._errors else "END"
 
 
-def load(spec: DriveSpec, file: str) -> ProgramRun:
-    """Load a file into a simulated controller. Raises Diagnostic."""
-    text = text_of(file)
-    return ProgramRun(spec, program_file.read(text, file), file, source_lines(text))
+def read(text: str, file: str) -> Load:
+    """Read the text of a file. Raises Diagnostic."""
+    lines, source = program_file.read(text, file), source_lines(text)
+    return lambda spec: ProgramRun(spec, lines, file, source)
 
 
-RUNS = Programs(drive=DriveSpec(personality="PMX", name="00"), run=load)
+RUNS = Programs(drive=DriveSpec(personality="PMX", name="00"), read=read)

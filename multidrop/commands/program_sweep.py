@@ -1,0 +1,59 @@
+"""`multidrop program sweep`: a program test in many worlds, and a report of those in which a condition does not hold.
+
+A signal ends the sweep: what is done is reported, with exit code 130.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Iterator
+
+from dialects import Diagnostic
+from multidrop.commands.failure import fail
+from multidrop.commands.sweep_report import Report
+from shell.output import INTERRUPTED
+from shell.sweeps import plan as planning
+from shell.sweeps import workers
+from shell.sweeps.interruption import Interruption
+from shell.sweeps.plan import Asked, Plan
+from shell.sweeps.trial import Result
+from transports import TransportLost
+
+
+def run(chosen: argparse.Namespace) -> int:
+    """Check everything, run the cases, report; return the exit code."""
+    asked = Asked(
+        chosen.file,
+        chosen.cell,
+        chosen.language or "",
+        chosen.vary,
+        chosen.expect,
+        chosen.run,
+        chosen.until,
+        chosen.random,
+        chosen.seed,
+    )
+    try:
+        plan = planning.make(asked)
+        report = Report(plan, as_json=chosen.json, junit=chosen.junit)
+    except Diagnostic as problem:
+        return fail(problem)
+    with Interruption() as interruption:
+        try:
+            report.take_all(_results(plan, chosen, interruption))
+        except KeyboardInterrupt:
+            return report.finish(interruption, INTERRUPTED)
+        except (Diagnostic, TransportLost) as problem:
+            report.erase()
+            return report.finish(interruption, fail(problem))
+        return report.finish(interruption, 0)
+
+
+def _results(plan: Plan, chosen: argparse.Namespace, interruption: Interruption) -> Iterator[list[Result]]:
+    cases = (plan.case(number) for number in range(1, plan.count + 1))
+    if chosen.cluster:
+        from shell.sweeps import cluster
+
+        return cluster.results(plan.job, cases, chosen.cluster, interruption)
+    jobs = chosen.jobs or workers.cores()
+    return workers.results(plan.job, cases, plan.count, jobs, interruption)

@@ -1,0 +1,166 @@
+"""The reports of a sweep: progress, a table of what failed, JSON objects, a JUnit file. Cases come in their order."""
+
+from __future__ import annotations
+
+import json
+import sys
+import time
+from collections.abc import Iterator
+from datetime import datetime
+
+from dialects import Diagnostic
+from multidrop.commands.failure import fail
+from shell.front.junit import Case as JUnitCase
+from shell.front.junit_file import JUnitFile
+from shell.output import write
+from shell.status_line import StatusLine
+from shell.sweeps.failures import Failures, command, grouped, rows
+from shell.sweeps.interruption import Interruption
+from shell.sweeps.plan import Plan
+from shell.sweeps.trial import Case, Result, bench
+from shell.sweeps.values import spelled
+from shell.sweeps.variation import SEED
+
+FAILED = 1
+PERIOD = 0.1
+"""The shortest time between two reports of progress, s."""
+SEARCH = 10.0
+"""The time in which simpler worlds are looked for, s."""
+
+
+class Report:
+    """The reports of one sweep. Raises Diagnostic for a JUnit file that cannot be written."""
+
+    def __init__(self, plan: Plan, *, as_json: bool, junit: str) -> None:
+        self._plan, self._json = plan, as_json
+        self._begun, self._began = datetime.now().astimezone(), time.perf_counter()
+        self._junit = JUnitFile(junit, plan.asked.file, self._begun)
+        self._junit.begin()
+        self._status = StatusLine()
+        self._shown_at = 0.0
+        self._early: dict[int, Result] = {}
+        """Results of which a case before them is not done."""
+        self._next = 1
+        self._reported: list[int] = []
+        self._failed: dict[int, Result] = {}
+        if not as_json:
+            self._note()
+
+    def _note(self) -> None:
+        asked = self._plan.asked
+        if asked.draws is not None:
+            write(sys.stderr, f"{asked.draws} draws with --seed {asked.seed}")
+        if any(key.part == SEED for key in self._plan.job.keys):
+            write(sys.stderr, "seed changes the faults of a wire only, and a program test has no wire")
+
+    def take_all(self, results: Iterator[list[Result]]) -> None:
+        """Take results as they come; report each once all before it are done."""
+        for chunk in results:
+            self._early.update((each.number, each) for each in chunk)
+            while self._next in self._early:
+                self._take(self._early.pop(self._next))
+                self._next += 1
+            self._progress()
+
+    def _take(self, result: Result) -> None:
+        self._reported.append(result.number)
+        if not result.ok:
+            self._failed[result.number] = result
+        if self._json:
+            settings = self._plan.settings(self._plan.case(result.number))
+            fact = {"case": result.number, "set": settings, "ok": result.ok, "why": result.why}
+            write(sys.stdout, json.dumps(fact))
+
+    def _progress(self) -> None:
+        now = time.perf_counter()
+        done, count = len(self._reported) + len(self._early), self._plan.count
+        if now - self._shown_at < PERIOD or done == count:
+            return
+        self._shown_at = now
+        left = (now - self._began) / done * (count - done)
+        failed = sum(not each.ok for each in self._early.values()) + len(self._failed)
+        self._status.show(f"{done} of {count} cases, {failed} failed, {_time(left)} left")
+
+    def erase(self) -> None:
+        """Erase the progress."""
+        self._status.erase()
+
+    def finish(self, interruption: Interruption, code: int) -> int:
+        """Report the rest; return the exit code, `code` unless that is 0 and a case failed."""
+        for number in sorted(self._early):
+            self._take(self._early.pop(number))
+        seconds = time.perf_counter() - self._began
+        failures = self._failures(interruption, search=not code)
+        self.erase()
+        if self._json:
+            summary = {"cases": len(self._reported), "failed": len(self._failed), "seconds": round(seconds, 3)}
+            write(sys.stdout, json.dumps({"summary": summary}))
+        else:
+            self._write_text(failures, seconds)
+        if code:
+            write(sys.stderr, f"ended after {self._counted} of {self._plan.count}; the others were not run")
+        elif interruption.came:
+            write(sys.stderr, "interrupted while simpler worlds were looked for")
+        return self._finish_junit(failures, seconds, code or (FAILED if self._failed else 0))
+
+    @property
+    def _counted(self) -> str:
+        return f"{len(self._reported)} case{'' if len(self._reported) == 1 else 's'}"
+
+    def _failures(self, interruption: Interruption, *, search: bool) -> Failures:
+        """Put failures into groups; `search` for simpler worlds, as long as there is time and no signal."""
+        ready, until = bench(self._plan.job), time.perf_counter() + SEARCH
+
+        def run(case: Case) -> Result | None:
+            if not search or time.perf_counter() > until:
+                return None
+            self._status.show(f"{len(self._failed)} of {self._counted} failed; looking for the simplest worlds")
+            try:
+                with interruption.open():
+                    return ready.tried(case)
+            except KeyboardInterrupt:
+                return None
+
+        return grouped(self._plan, self._failed.values(), run)
+
+    def _write_text(self, failures: Failures, seconds: float) -> None:
+        if failures.groups:
+            write(sys.stdout, *rows(self._plan, failures))
+        write(sys.stdout, f"{self._counted}, {len(self._failed)} failed, {seconds:.1f} s")
+
+    def _finish_junit(self, failures: Failures, seconds: float, code: int) -> int:
+        if not self._junit.wanted:
+            return code
+        commands = {
+            number: command(self._plan, group.world, group.failed)
+            for group in failures.groups
+            for number in group.numbers
+        }
+        cases = [self._junit_case(number, commands) for number in self._reported]
+        if len(cases) < self._plan.count:
+            file = self._plan.asked.file
+            cases.append(JUnitCase(file, file, error=f"ended after {self._counted} of {self._plan.count}"))
+        try:
+            self._junit.write(cases, seconds)
+        except Diagnostic as problem:
+            return code or fail(problem)
+        return code
+
+    def _junit_case(self, number: int, commands: dict[int, str]) -> JUnitCase:
+        case = self._plan.case(number)
+        values = " ".join(f"{name}={spelled(value)}" for name, value in self._plan.settings(case).items())
+        name = f"case {number}: {values}".removesuffix(": ")
+        result = self._failed.get(number)
+        if result is None:
+            return JUnitCase(name, self._plan.asked.file)
+        repeat = commands.get(number) or command(self._plan, tuple(case[1]), result.failed)
+        failure, error = (result.why, "") if result.failed >= 0 else ("", result.why)
+        return JUnitCase(name, self._plan.asked.file, failure=failure, error=error, printed=(repeat,))
+
+
+def _time(seconds: float) -> str:
+    """A time as a person reads it."""
+    whole = round(seconds)
+    if whole < 60:
+        return f"{whole} s"
+    return f"{whole // 60} min {whole % 60} s" if whole < 3600 else f"{whole // 3600} h {whole % 3600 // 60} min"

@@ -1,0 +1,124 @@
+"""The cases of a sweep on an existing Dask cluster: the chunks of `trial`, nothing else, and no scheduler of our own.
+
+A worker that dies takes results along; the cluster runs those chunks again. A chunk that has killed several workers is
+divided, so that the case is named.
+"""
+
+from __future__ import annotations
+
+import logging
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from typing import TYPE_CHECKING, Any
+
+from dialects import Diagnostic
+from shell.sweeps import trial
+from shell.sweeps.interruption import Interruption
+from shell.sweeps.trial import DIED, Case, Job, Result
+from shell.sweeps.workers import CHUNK, chunks
+from transports import TransportLost, Unreachable
+
+if TYPE_CHECKING:
+    from distributed import Client
+
+PATIENCE = 3.0
+"""Time for the scheduler to reply, s."""
+INSTALL = "pip install 'multidrop[cluster]'"
+
+
+def results(job: Job, cases: Iterator[Case], address: str, interruption: Interruption) -> Iterator[list[Result]]:
+    """Run cases on the cluster of a scheduler; yield the results of each chunk as it ends.
+
+    Raises Unreachable, TransportLost, and Diagnostic for workers that have another multidrop or none.
+    """
+    with _client(address, interruption) as client:
+        with interruption.open():
+            _check_workers(client, address)
+            first = next(cases)
+            begin = time.perf_counter()
+            found = trial.chunk(job, [first])
+        size = max(1, round(CHUNK / max(time.perf_counter() - begin, 1e-6)))
+        yield found
+        if todo := list(chunks(cases, size)):
+            yield from _Work(client, job, address, interruption).results(todo)
+
+
+@contextmanager
+def _client(address: str, interruption: Interruption) -> Iterator[Client]:
+    if not address.startswith(("tcp://", "tls://", "ws://", "wss://")) or not address.rpartition(":")[2].isdecimal():
+        raise Diagnostic("is not the address of a scheduler", f"--cluster {address}", "as in tcp://HOST:8786")
+    try:
+        from distributed import Client
+    except ImportError:
+        raise Diagnostic("--cluster needs distributed, which is not installed", hint=INSTALL) from None
+    logging.getLogger("distributed").setLevel(logging.CRITICAL)
+    try:
+        with interruption.open():
+            client = Client(address, timeout=PATIENCE, set_as_default=False)
+    except (OSError, ValueError) as problem:
+        raise Unreachable(f"{address}: no scheduler replies: {' '.join(str(problem).split())}") from None
+    try:
+        yield client
+    finally:
+        with suppress(OSError, TimeoutError):
+            client.close(timeout=PATIENCE)
+
+
+def _check_workers(client: Client, address: str) -> None:
+    """Refuse a cluster without workers, and workers with another multidrop."""
+    try:
+        found: dict[str, Any] = client.run(trial.version, on_error="return")
+    except ImportError as problem:
+        raise Diagnostic(
+            f"a worker has no multidrop ({problem})", address, f"install {trial.version()} there"
+        ) from None
+    if not found:
+        raise Unreachable(f"{address}: the cluster has no workers")
+    ours = trial.version()
+    for worker, theirs in found.items():
+        if theirs != ours:
+            what = "has no multidrop" if isinstance(theirs, BaseException) else f"has multidrop {theirs}"
+            raise Diagnostic(f"{what}, and this is {ours}", f"worker {worker}", "install the same there")
+
+
+class _Work:
+    """The chunks of a sweep on a cluster, and what becomes of them."""
+
+    def __init__(self, client: Client, job: Job, address: str, interruption: Interruption) -> None:
+        self._client, self._job, self._address, self._interruption = client, job, address, interruption
+
+    def results(self, todo: list[list[Case]]) -> Iterator[list[Result]]:
+        """Run chunks; those that killed their workers again, case by case."""
+        suspects: list[list[Case]] = []
+        for cases, found in self._run(todo):
+            if found is not None:
+                yield found
+            elif len(cases) > 1:
+                suspects += [[each] for each in cases]
+            else:
+                yield [Result(cases[0][0], DIED, "the workers that ran it died: killed, or out of memory")]
+        if suspects:
+            yield from self.results(suspects)
+
+    def _run(self, todo: list[list[Case]]) -> Iterator[tuple[list[Case], list[Result] | None]]:
+        """Submit chunks; yield each with its results as it ends; None: it killed several workers."""
+        from distributed import KilledWorker, as_completed
+
+        futures = self._client.map(trial.chunk, [self._job] * len(todo), todo, pure=False)
+        of = dict(zip(futures, todo, strict=True))
+        done = as_completed(futures, loop=self._client.loop)
+        del futures  # the cluster drops results that nobody holds
+        try:
+            while of:
+                with self._interruption.open():
+                    future = next(done)
+                cases = of.pop(future)
+                if future.status in ("cancelled", "lost"):
+                    raise TransportLost(f"{self._address}: the scheduler was lost")
+                killed = isinstance(future.exception(), KilledWorker)
+                yield cases, None if killed else future.result()
+        finally:
+            if of:
+                with suppress(OSError, TimeoutError):
+                    self._client.cancel(list(of))

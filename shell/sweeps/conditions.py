@@ -1,0 +1,150 @@
+"""The CONDITION of `--expect`: one comparison, as `/assert` has it, over the results of a run in place of words.
+
+Lists stand in brackets, compare with `==` and `!=`, and take no part in calculations: `errors == [86]`. A number in a
+list equals a print that is this number. `ended` is a text, and beside a number 1 or 0: ended by itself, or not.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+
+from dialects import Diagnostic
+from shell.scripts.expression import Comparison, Expression, Known, Name, Word, evaluate, parse_check, unknowns
+from shell.scripts.values import EQUAL, Value, compared, number, quoted, value_of
+from shell.sweeps.outcome import BY_ITSELF, ENDS, Outcome
+
+NAMES = Outcome._fields
+LISTS = ("errors", "prints")
+POSITION, ENDED = "position", "ended"
+List = tuple[Value, ...]
+Side = Value | List
+_SINGLE = re.compile(r"\"[^\"]*\"|'([^'\"]*)'")
+_ITEMS = re.compile(r"\s*(?:\"([^\"]*)\"|'([^']*)'|([^,\"'\[\]]+?))\s*(?:,|$)")
+
+
+@dataclass(frozen=True)
+class Condition:
+    """One comparison. `text` is what was written."""
+
+    text: str
+    tree: Comparison
+
+    def holds(self, outcome: Outcome) -> bool:
+        """Whether it is true of a result. Raises Diagnostic for a calculation without a result."""
+        known: Known = {each: _known(each.name, outcome) for each in unknowns(self.tree) if isinstance(each, Name)}
+        left, right = (_side(each, outcome, known) for each in (self.tree.left, self.tree.right))
+        if not (isinstance(left, tuple) or isinstance(right, tuple)):
+            left, right = _beside(self.tree, left, right)
+        return _compared(self.tree.sign, left, right, number(evaluate(self.tree.within, known)))
+
+    def seen(self, outcome: Outcome) -> str:
+        """Describe the results that it is about, as `errors == [86]`."""
+        found = (each.name for each in unknowns(self.tree) if isinstance(each, Name))
+        names = dict.fromkeys(each for each in found if each in NAMES)
+        return ", ".join(f"{name} == {_shown(getattr(outcome, name))}" for name in names)
+
+
+def parse(text: str, example: Outcome) -> Condition:
+    """Parse a condition; `example` is a result of the family's programs. Raises Diagnostic."""
+    tree = _parsed(text)
+    found = tuple(unknowns(tree))
+    for each in found:
+        if isinstance(each, Word) and (each.target or not each.line):
+            raise Diagnostic(f"{each.shown} is not a result", f"--expect {text}", f"valid: {', '.join(NAMES)}")
+    if not any(isinstance(each, Name) and each.name in NAMES for each in found):
+        raise Diagnostic("is not about a result", f"--expect {text}", f"valid: {', '.join(NAMES)}")
+    _check_lists(text, tree, example)
+    return Condition(text, tree)
+
+
+def _parsed(text: str) -> Comparison:
+    try:
+        return parse_check(_SINGLE.sub(_in_double, text), (*NAMES, *ENDS), lists=True)
+    except Diagnostic as problem:
+        raise Diagnostic(problem.message, f"--expect {text}", problem.hint.replace("[@ADDR] ", "")) from None
+
+
+def _in_double(match: re.Match[str]) -> str:
+    return match[0] if match[1] is None else f'"{match[1]}"'
+
+
+def _check_lists(text: str, tree: Comparison, example: Outcome) -> None:
+    """Refuse a list in a calculation, beside a number, or in an order. Raises Diagnostic."""
+    sides = [_is_list(each, example) for each in (tree.left, tree.right)]
+    inner = [each for part in _inside(tree, example) for each in unknowns(part) if _is_list(each, example)]
+    if inner or any(sides) != all(sides) or (any(sides) and tree.sign not in EQUAL):
+        hint = 'as in errors == [], errors == [86], prints == ["done"]'
+        raise Diagnostic("compares a list, which has == and != with a list only", f"--expect {text}", hint)
+    for each in unknowns(tree):
+        if isinstance(each, Word):
+            _items(each.text)
+
+
+def _inside(tree: Comparison, example: Outcome) -> list[Expression]:
+    """The parts in which no list may be."""
+    return [tree.within, *(each for each in (tree.left, tree.right) if not _is_list(each, example))]
+
+
+def _is_list(tree: Expression, example: Outcome) -> bool:
+    if isinstance(tree, Name):
+        return isinstance(getattr(example, tree.name, None), tuple)
+    return isinstance(tree, Word)
+
+
+def _known(name: str, outcome: Outcome) -> Value:
+    """The value of a name in a calculation; a list has none."""
+    value = getattr(outcome, name, name)
+    return "" if isinstance(value, tuple) else value
+
+
+def _side(tree: Expression, outcome: Outcome, known: Known) -> Side:
+    if isinstance(tree, Word):
+        return _items(tree.text)
+    if isinstance(tree, Name):
+        value: Side = getattr(outcome, tree.name, tree.name)
+        return value
+    return evaluate(tree, known)
+
+
+def _beside(tree: Comparison, left: Value, right: Value) -> tuple[Value, Value]:
+    """The two sides; `ended` beside a number is one, too."""
+    if tree.left == Name(ENDED) and not isinstance(right, str):
+        return int(left in BY_ITSELF), right
+    if tree.right == Name(ENDED) and not isinstance(left, str):
+        return left, int(right in BY_ITSELF)
+    return left, right
+
+
+def _compared(sign: str, left: Side, right: Side, within: float) -> bool:
+    if isinstance(left, tuple) and isinstance(right, tuple):
+        pairs = zip(left, right, strict=False)
+        equal = len(left) == len(right) and all(_alike(*pair, within) for pair in pairs)
+        return equal == (sign == "==")
+    assert not isinstance(left, tuple) and not isinstance(right, tuple)
+    return compared(sign, left, right, within)
+
+
+def _alike(left: Value, right: Value, within: float) -> bool:
+    """Whether two items are equal; a text equals a number that it is."""
+    if isinstance(left, str) != isinstance(right, str):
+        left, right = (value_of(each) if isinstance(each, str) else each for each in (left, right))
+    return compared("==", left, right, within)
+
+
+def _items(text: str) -> List:
+    """Read the items of a list. Raises Diagnostic."""
+    found: list[Value] = []
+    at = 0
+    while at < len(text):
+        match = _ITEMS.match(text, at)
+        if match is None:
+            raise Diagnostic(f"[{text}] is not a list", hint='as in [], [86], ["done", "at 51200"]')
+        double, single, bare = match.groups()
+        found.append(value_of(bare) if bare is not None else double if double is not None else single)
+        at = match.end()
+    return tuple(found)
+
+
+def _shown(value: Side) -> str:
+    return f"[{', '.join(map(quoted, value))}]" if isinstance(value, tuple) else quoted(value)

@@ -1,0 +1,184 @@
+"""A sweep as it is asked for: the drive that runs the program, and its cases, numbered from 1.
+
+The cases of a grid are in the order of `--vary`: the values of the last key change fastest. Draws are independent.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from math import prod
+from random import Random
+
+from dialects import Diagnostic
+from dialects.families import program_language_of
+from dialects.files import text_of
+from shell.sweeps import values, variation
+from shell.sweeps.trial import Case, Job, bench
+from shell.sweeps.values import Value, Values
+from shell.sweeps.variation import OWN_KEYS, Drive, Key
+from simulator import cells
+from simulator.cells import Placed
+from simulator.families import PROGRAMS
+
+MOST = 100_000
+"""The largest number of cases."""
+EXPECTED = ("errors == []",)
+"""The condition where none is given."""
+
+
+@dataclass(frozen=True)
+class Asked:
+    """The arguments of a sweep. `cell` None: a drive in empty surroundings. `draws` None: all cases of the grid."""
+
+    file: str
+    cell: str | None = None
+    language: str = ""
+    vary: Sequence[tuple[str, str]] = ()
+    expect: Sequence[str] = ()
+    run: str = ""
+    until: float | None = None
+    draws: int | None = None
+    seed: int = 1
+
+
+@dataclass(frozen=True)
+class Plan:
+    """A checked sweep. `place` is what `--cell` needs to name the drive; empty: no cell is given."""
+
+    asked: Asked
+    job: Job
+    place: str
+    values: tuple[Values, ...]
+    drive: Drive
+
+    @property
+    def count(self) -> int:
+        """The number of cases."""
+        return prod(each.count for each in self.values) if self.asked.draws is None else self.asked.draws
+
+    @cached_property
+    def _drawn(self) -> list[tuple[Value, ...]]:
+        rng = Random(self.asked.seed)
+        return [tuple(each.draw(rng) for each in self.values) for _ in range(self.asked.draws or 0)]
+
+    def case(self, number: int) -> Case:
+        """The case of a number."""
+        if self.asked.draws is not None:
+            return number, self._drawn[number - 1]
+        index, found = number - 1, []
+        for each in reversed(self.values):
+            index, rest = divmod(index, each.count)
+            found.append(each.at(rest))
+        return number, tuple(reversed(found))
+
+    def settings(self, case: Case) -> dict[str, Value]:
+        """The values of a case by their keys, as they are written; the cell's own ones are left out."""
+        return {key.text: value for key, value in zip(self.job.keys, case[1], strict=True) if value is not None}
+
+
+def make(asked: Asked) -> Plan:
+    """Read the files and check everything, before anything runs. Raises Diagnostic."""
+    language = asked.language or program_language_of(asked.file)
+    program = text_of(asked.file)
+    candidates = [] if asked.cell is None else cells.matching(asked.cell)
+    names = {name for each in candidates for name in (each.spec.name, f"{each.bus}:{each.spec.name}")}
+    parsed = [(*_parsed(key, names, asked.cell), _values(key, text, asked)) for key, text in asked.vary]
+    chosen = _chosen(asked.cell, candidates, {drive for drive, _, _ in parsed} - {""}, language)
+    keys = tuple(key for _, key, _ in parsed)
+    _check_keys(keys)
+    for named, key, _ in parsed:
+        _check_drive(named, key, chosen)
+    drive = {name: each for name, each in chosen.table.items() if name not in OWN_KEYS}
+    expects = tuple(asked.expect) or EXPECTED
+    where = f"drive {chosen.spec.name}"
+    job = Job(asked.file, program, language, json.dumps(drive), where, keys, expects, asked.run, asked.until)
+    made = Plan(asked, job, _place(asked.cell, chosen), tuple(each for _, _, each in parsed), drive)
+    _check(made)
+    return made
+
+
+def _parsed(text: str, names: set[str], cell: str | None) -> tuple[str, Key]:
+    try:
+        return variation.parse(text, names)
+    except Diagnostic as problem:
+        hint = problem.hint or f"valid: {', '.join(sorted(names, key=lambda name: (len(name), name))) or 'KEY'}"
+        raise Diagnostic(problem.message, problem.where, hint) from None
+
+
+def _values(key: str, text: str, asked: Asked) -> Values:
+    try:
+        return values.parse(text, drawn=asked.draws is not None)
+    except Diagnostic as problem:
+        raise Diagnostic(problem.message, f"--vary {key}", problem.hint) from None
+
+
+def _chosen(cell: str | None, candidates: Sequence[Placed], named: set[str], language: str) -> Placed:
+    """The drive that runs the program: the only one, or else the only one that a key names. Raises Diagnostic."""
+    if cell is None:
+        spec = PROGRAMS[language].drive
+        return Placed("", "", spec, {"personality": spec.personality, "name": spec.name})
+    if len(candidates) > 1:
+        chosen = [each for each in candidates if {each.spec.name, f"{each.bus}:{each.spec.name}"} & named]
+        if len(chosen) == 1:
+            return chosen[0]
+    return cells.placed(cell)
+
+
+def _place(cell: str | None, chosen: Placed) -> str:
+    """The shortest `--cell` that means the drive."""
+    if cell is None:
+        return ""
+    return cell if len(cells.matching(cell)) == 1 else chosen.place
+
+
+def _check_keys(keys: Sequence[Key]) -> None:
+    seen: dict[tuple[str, str, str], str] = {}
+    for each in keys:
+        place = (each.part, each.axis, each.name)
+        if place in seen:
+            raise Diagnostic("is varied twice", f"--vary {each.text}", f"see --vary {seen[place]}")
+        seen[place] = each.text
+
+
+def _check_drive(drive: str, key: Key, chosen: Placed) -> None:
+    """Refuse a key of a drive that does not run the program: it would change nothing. Raises Diagnostic."""
+    name = chosen.spec.name
+    if drive and drive not in (name, f"{chosen.bus}:{name}"):
+        what = f"drive {name} runs the program, so drive {drive} changes nothing"
+        raise Diagnostic(what, f"--vary {key.text}", f"--cell {chosen.cell}#BUS:{drive} lets drive {drive} run it")
+
+
+def _check(plan: Plan) -> None:
+    """Refuse too many cases, and any value that the world or the drive refuses. Raises Diagnostic."""
+    if plan.count > MOST:
+        hint = "take larger steps or fewer values, or draw some with --random N"
+        raise Diagnostic(f"{plan.count} cases are too many; a sweep has {MOST} at most", "--vary", hint)
+    bench(plan.job)
+    for index, (key, each) in enumerate(zip(plan.job.keys, plan.values, strict=True)):
+        for value in each.samples():
+            try:
+                _check_value(plan, index, key, value)
+            except Diagnostic as problem:
+                where = f"--vary {key.text}={values.spelled(value)}"
+                raise Diagnostic(f"{problem.where}: {problem.message}", where, problem.hint) from None
+
+
+def _check_value(plan: Plan, index: int, key: Key, value: Value) -> None:
+    """Refuse a value that the drive refuses beside its own ones, and beside the first and last of the other keys."""
+    if key.part == variation.SEED:
+        if not isinstance(value, int):
+            raise Diagnostic("must be a whole number", "seed")
+        return
+    ready = bench(plan.job)
+    others: list[list[Value | None]] = [[None, *each.samples()] for each in plan.values]
+    refusals = []
+    for at in (0, 1, -1):
+        try:
+            ready.loaded([value if n == index else each[at] for n, each in enumerate(others)])
+            return
+        except Diagnostic as problem:
+            refusals.append(problem)
+    raise refusals[0]

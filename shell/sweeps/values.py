@@ -1,0 +1,185 @@
+"""The VALUES of `--vary KEY=VALUES`: `a,b,c`, `A..B`, `A..B:STEP`, and all of them with commas between.
+
+Numbers are exact decimals until the last moment, so that ten steps of 0.1 are ten decimals. A text that has a comma or
+two dots is written in quotation marks, a list of TOML in its brackets.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from decimal import Decimal
+from random import Random
+from typing import Any
+
+from dialects import Diagnostic
+from dialects.files import toml_of
+
+Value = int | float | str | list[Any]
+FINE = 5
+"""Decimals more than the ends of a range have, for draws from a range without a step."""
+LARGEST = 10**15
+"""The largest number of values in a range."""
+MOST = 2000
+"""The largest number of listed values that are looked at for a simpler one."""
+_NUMBER = r"[+-]?(?:\d{1,15}(?:\.\d{1,9})?|\.\d{1,9})(?:[eE][+-]?\d)?"
+_NUMERIC = re.compile(_NUMBER, re.ASCII)
+_RANGE = re.compile(rf"({_NUMBER})\.\.({_NUMBER})(?::({_NUMBER}))?", re.ASCII)
+_ITEM = re.compile(r'\s*(?P<item>"(?:[^"\\]|\\.)*"|\[(?:[^\]"\[]|"[^"]*"|\[[^\]]*\])*\]|[^,"\[]*)\s*(?P<end>,|$)')
+_VALID = "valid: a,b,c or A..B or A..B:STEP"
+
+
+@dataclass(frozen=True)
+class Single:
+    """One value."""
+
+    value: Value
+    count = 1
+
+    def at(self, index: int) -> Value:
+        """The value of an index."""
+        return self.value
+
+
+@dataclass(frozen=True)
+class Steps:
+    """The values of a range: `low`, `low + step` and so on, `count` of them."""
+
+    low: Decimal
+    step: Decimal
+    count: int
+
+    def at(self, index: int) -> Value:
+        """The value of an index."""
+        return _plain(self.low + self.step * index)
+
+    def nearest(self, value: float) -> int:
+        """The index of the value that is nearest to a number."""
+        index = int(((Decimal(str(value)) - self.low) / self.step).to_integral_value())
+        return min(max(index, 0), self.count - 1)
+
+
+Piece = Single | Steps
+
+
+@dataclass(frozen=True)
+class Values:
+    """The values of one key, in the order in which they are written."""
+
+    pieces: tuple[Piece, ...]
+
+    @property
+    def count(self) -> int:
+        """How many there are."""
+        return sum(each.count for each in self.pieces)
+
+    def at(self, index: int) -> Value:
+        """The value of an index."""
+        for piece in self.pieces:
+            if index < piece.count:
+                return piece.at(index)
+            index -= piece.count
+        raise IndexError(index)
+
+    def draw(self, rng: Random) -> Value:
+        """Draw one of them; each is as likely."""
+        return self.at(rng.randrange(self.count))
+
+    def samples(self) -> Iterator[Value]:
+        """Yield each single value, and the two ends of each range."""
+        for piece in self.pieces:
+            yield piece.at(0)
+            if piece.count > 1:
+                yield piece.at(piece.count - 1)
+
+
+def parse(text: str, *, drawn: bool = False) -> Values:
+    """Parse values. `drawn`: a range of fractions without a step has fine ones. Raises Diagnostic."""
+    return Values(tuple(_piece(item, drawn) for item in _items(text)))
+
+
+def spelled(value: Value) -> str:
+    """Write a value, so that `parse` reads it again."""
+    if isinstance(value, str):
+        bare = value and value == value.strip() and not set(value) & set(',"[\\') and ".." not in value
+        return value if bare and not _NUMERIC.fullmatch(value) else json.dumps(value, ensure_ascii=False)
+    return format(Decimal(repr(value)), "f") if isinstance(value, float) else json.dumps(value)
+
+
+def _items(text: str) -> Iterator[str]:
+    at, end = 0, ","
+    while end:
+        match = _ITEM.match(text, at)
+        if match is None:
+            raise Diagnostic(f"{text} has a bracket or a quotation mark without its end", hint=_VALID)
+        if not match["item"].strip():
+            raise Diagnostic(f"{text} has an empty value" if text.strip() else "has no values", hint=_VALID)
+        yield match["item"].strip()
+        at, end = match.end(), match["end"]
+
+
+def _piece(item: str, drawn: bool) -> Piece:
+    if item[0] in '"[':
+        return Single(toml_of(f"value = {item}", item)["value"])
+    if _NUMERIC.fullmatch(item):
+        return Single(_plain(Decimal(item)))
+    if ".." not in item:
+        return Single(item)
+    match = _RANGE.fullmatch(item)
+    if match is None:
+        raise Diagnostic(f"{item} is not a range", hint="valid: A..B or A..B:STEP; a text in quotation marks")
+    low, high, step = match.groups()
+    return _steps(item, Decimal(low), Decimal(high), Decimal(step) if step else None, drawn)
+
+
+def _steps(item: str, low: Decimal, high: Decimal, step: Decimal | None, drawn: bool) -> Steps:
+    places = max(0, -int(low.as_tuple().exponent), -int(high.as_tuple().exponent))
+    if step is None:
+        if places and not drawn and high - low < 1:
+            raise Diagnostic(f"{item} has no step", hint=f"as in {item}:0.1")
+        step = Decimal(1).scaleb(-places - FINE) if places and drawn else Decimal(1)
+    if not step:
+        raise Diagnostic(f"{item} has a step of 0", hint=_VALID)
+    count = int((high - low) / step) + 1 if (high - low) / step >= 0 else 0
+    if count > LARGEST:
+        raise Diagnostic(f"{item} has too many values", hint=f"valid: up to {LARGEST:.0e}, with a larger step")
+    if not count:
+        raise Diagnostic(f"{item} is an empty range", hint="the smaller end comes first, or the step is negative")
+    return Steps(low, step, count)
+
+
+def _plain(number: Decimal) -> int | float:
+    """The number as TOML has it; a whole one is an int."""
+    return int(number) if number == number.to_integral_value() else float(number)
+
+
+def simpler(values: Values, value: Value, origin: Value | None) -> Sequence[Value]:
+    """The values nearer to `origin` than `value` is, nearest first; of texts and lists, those written before it.
+
+    `origin` None is 0. Of a range, these are the values between.
+    """
+    origin = 0 if origin is None else origin
+    if not (isinstance(value, int | float) and isinstance(origin, int | float)):
+        listed = [each.value for each in values.pieces if isinstance(each, Single)]
+        return listed[: listed.index(value)] if value in listed else []
+    if len(values.pieces) == 1 and isinstance(piece := values.pieces[0], Steps):
+        first, last = piece.nearest(origin), piece.nearest(value)
+        return _Between(piece, range(first, last, 1 if last > first else -1))
+    far = abs(value - origin)
+    listed = [values.at(index) for index in range(min(values.count, MOST))]
+    near = {abs(each - origin): each for each in listed if isinstance(each, int | float)}
+    return [near[gap] for gap in sorted(near) if gap < far]
+
+
+@dataclass(frozen=True)
+class _Between(Sequence[Value]):
+    piece: Steps
+    indices: range
+
+    def __len__(self) -> int:
+        return len(self.indices)
+
+    def __getitem__(self, index: Any) -> Any:
+        return self.piece.at(self.indices[index])
