@@ -141,13 +141,12 @@ class _Pools:
         try:
             yield pool
         except BaseException:
-            pool.shutdown(wait=False, cancel_futures=True)
             for each in multiprocessing.active_children():
                 if each not in before:
                     each.terminate()
             raise
         finally:
-            pool.shutdown()
+            pool.shutdown(cancel_futures=True)
 
 
 def _context() -> BaseContext:
