@@ -92,6 +92,8 @@ class Report:
         seconds = time.perf_counter() - self._began
         failures = self._failures(interruption, search=not code)
         self.erase()
+        if code and not interruption.came and not self._reported:
+            return self._finish_junit(failures, seconds, code)
         if self._json:
             summary = {"cases": len(self._reported), "failed": len(self._failed), "seconds": round(seconds, 3)}
             write(sys.stdout, json.dumps({"summary": summary}))

@@ -1,7 +1,7 @@
 """The cases of a sweep on an existing Dask cluster: the chunks of `trial`, nothing else, and no scheduler of our own.
 
-A worker that dies takes results along; the cluster runs those chunks again. A chunk that has killed several workers is
-divided, so that the case is named.
+A worker that dies takes results along; the cluster runs those chunks again. The cases of a chunk whose workers died
+four times run alone, so that the one that kills them is named.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from shell.sweeps.workers import CHUNK, chunks
 from transports import TransportLost, Unreachable
 
 if TYPE_CHECKING:
-    from distributed import Client
+    from distributed import Client, Future
 
 PATIENCE = 3.0
 """Time for the scheduler to reply, s."""
@@ -52,7 +52,8 @@ def _client(address: str, interruption: Interruption) -> Iterator[Client]:
         from distributed import Client
     except ImportError:
         raise Diagnostic("--cluster needs distributed, which is not installed", hint=INSTALL) from None
-    logging.getLogger("distributed").setLevel(logging.CRITICAL)
+    for name in [each for each in logging.root.manager.loggerDict if each.startswith("distributed")]:
+        logging.getLogger(name).setLevel(logging.CRITICAL)
     try:
         with interruption.open():
             client = Client(address, timeout=PATIENCE, set_as_default=False)
@@ -87,23 +88,23 @@ class _Work:
 
     def __init__(self, client: Client, job: Job, address: str, interruption: Interruption) -> None:
         self._client, self._job, self._address, self._interruption = client, job, address, interruption
+        self._again: list[list[Case]] = []
+        """Chunks whose result was lost with a worker."""
+        self._alone = False
+        self._suspects: list[Case] = []
+        """Cases of chunks whose workers died. The cluster counts against all that waited there, too."""
 
     def results(self, todo: list[list[Case]]) -> Iterator[list[Result]]:
-        """Run chunks; those that killed their workers again, case by case."""
-        suspects: list[list[Case]] = []
-        for cases, found in self._run(todo):
-            if found is not None:
-                yield found
-            elif len(cases) > 1:
-                suspects += [[each] for each in cases]
-            else:
-                yield [Result(cases[0][0], DIED, "the workers that ran it died: killed, or out of memory")]
-        if suspects:
-            yield from self.results(suspects)
+        """Run chunks; then each case whose workers died, with nothing beside it."""
+        while todo:
+            yield from self._run(todo)
+            todo, self._again = self._again, []
+            if not todo and self._suspects:
+                self._alone, todo = True, [[self._suspects.pop()]]
 
-    def _run(self, todo: list[list[Case]]) -> Iterator[tuple[list[Case], list[Result] | None]]:
-        """Submit chunks; yield each with its results as it ends; None: it killed several workers."""
-        from distributed import KilledWorker, as_completed
+    def _run(self, todo: list[list[Case]]) -> Iterator[list[Result]]:
+        """Submit chunks; yield the results of each as it ends."""
+        from distributed import as_completed
 
         futures = self._client.map(trial.chunk, [self._job] * len(todo), todo, pure=False)
         of = dict(zip(futures, todo, strict=True))
@@ -113,12 +114,28 @@ class _Work:
             while of:
                 with self._interruption.open():
                     future = next(done)
-                cases = of.pop(future)
-                if future.status in ("cancelled", "lost"):
-                    raise TransportLost(f"{self._address}: the scheduler was lost")
-                killed = isinstance(future.exception(), KilledWorker)
-                yield cases, None if killed else future.result()
+                    found = self._result(future, of[future])
+                del of[future]
+                yield found
         finally:
             if of:
                 with suppress(OSError, TimeoutError):
                     self._client.cancel(list(of))
+
+    def _result(self, future: Future, cases: list[Case]) -> list[Result]:
+        """The results of a chunk; none if it is to run again. Raises TransportLost."""
+        from distributed import KilledWorker
+        from distributed.client import FutureCancelledError
+
+        try:
+            found: list[Result] = future.result()
+            return found
+        except FutureCancelledError:
+            if self._client.status != "running":
+                raise TransportLost(f"{self._address}: the scheduler was lost") from None
+            self._again.append(cases)
+        except KilledWorker:
+            if self._alone:
+                return [Result(cases[0][0], DIED, "the workers that ran it died: killed, or out of memory")]
+            self._suspects += cases
+        return []
