@@ -5,7 +5,7 @@
 #    source ~/.local/share/bash_completion/multidrop
 # See also: https://github.com/scop/bash-completion/blob/main/doc/configuration.md
 
-_shtab_multidrop_program_subparsers=(check test list upload download)
+_shtab_multidrop_program_subparsers=(check test sweep list upload download)
 _shtab_multidrop_params_subparsers=(backup diff restore)
 _shtab_multidrop_macro_subparsers=(list show play edit describe rename copy delete key import export)
 _shtab_multidrop_log_subparsers=(show follow grep replay)
@@ -20,6 +20,7 @@ _shtab_multidrop_run_option_strings=(-h --help --on --set --role --json --junit 
 _shtab_multidrop_sim_option_strings=(-h --help --json --speed)
 _shtab_multidrop_program_check_option_strings=(-h --help --language --personality --format --json)
 _shtab_multidrop_program_test_option_strings=(-h --help --language --personality --cell --until --run --trace --break --watch --json)
+_shtab_multidrop_program_sweep_option_strings=(-h --help --language --cell --vary --expect --random --seed --run --until --jobs --cluster --json --junit)
 _shtab_multidrop_program_list_option_strings=(-h --help --drive)
 _shtab_multidrop_program_upload_option_strings=(-h --help --drive --raw)
 _shtab_multidrop_program_download_option_strings=(-h --help --drive --save --run --only-changed --no-verify)
@@ -71,6 +72,9 @@ _shtab_multidrop_sim_pos_0_COMPGEN=_shtab_compgen_files
 _shtab_multidrop_program_check_pos_0_COMPGEN=_shtab_compgen_files
 _shtab_multidrop_program_test_pos_0_COMPGEN=_shtab_compgen_files
 _shtab_multidrop_program_test___cell_COMPGEN=_shtab_compgen_files
+_shtab_multidrop_program_sweep_pos_0_COMPGEN=_shtab_compgen_files
+_shtab_multidrop_program_sweep___cell_COMPGEN=_shtab_compgen_files
+_shtab_multidrop_program_sweep___junit_COMPGEN=_shtab_compgen_files
 _shtab_multidrop_program_list_pos_0_COMPGEN=_multidrop_url
 _shtab_multidrop_program_upload_pos_0_COMPGEN=_multidrop_url
 _shtab_multidrop_program_upload_pos_1_COMPGEN=_shtab_compgen_files
@@ -103,7 +107,8 @@ _shtab_multidrop_program_check___language_choices=(mcode pmx)
 _shtab_multidrop_program_check___personality_choices=(LMDOM LMDCM LMDOE LMDCE LMM MDI MDIE MDIX)
 _shtab_multidrop_program_test___language_choices=(mcode pmx)
 _shtab_multidrop_program_test___personality_choices=(LMDOM LMDCM LMDOE LMDCE LMM MDI MDIE MDIX PMX)
-_shtab_multidrop_program_pos_0_choices=(check test list upload download)
+_shtab_multidrop_program_sweep___language_choices=(mcode pmx)
+_shtab_multidrop_program_pos_0_choices=(check test sweep list upload download)
 _shtab_multidrop_params_pos_0_choices=(backup diff restore)
 _shtab_multidrop_macro_pos_0_choices=(list show play edit describe rename copy delete key import export)
 _shtab_multidrop_scan___dialect_choices=(mcode pmx)
@@ -151,6 +156,9 @@ _shtab_multidrop_program_test__h_nargs=0
 _shtab_multidrop_program_test___help_nargs=0
 _shtab_multidrop_program_test___trace_nargs=0
 _shtab_multidrop_program_test___json_nargs=0
+_shtab_multidrop_program_sweep__h_nargs=0
+_shtab_multidrop_program_sweep___help_nargs=0
+_shtab_multidrop_program_sweep___json_nargs=0
 _shtab_multidrop_program_list__h_nargs=0
 _shtab_multidrop_program_list___help_nargs=0
 _shtab_multidrop_program_upload__h_nargs=0

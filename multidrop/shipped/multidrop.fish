@@ -65,8 +65,8 @@ function _shtab_multidrop_using
   test "$_shtab_multidrop_cmdpath" = "$argv"
 end
 
-set -g _shtab_multidrop_commands demo tui shell send run sim program 'program check' 'program test' 'program list' 'program upload' 'program download' params 'params backup' 'params diff' 'params restore' macro 'macro list' 'macro show' 'macro play' 'macro edit' 'macro describe' 'macro rename' 'macro copy' 'macro delete' 'macro key' 'macro import' 'macro export' plot publish snapshot ports relay scan rescue log 'log show' 'log follow' 'log grep' 'log replay' config 'config path' 'config show' 'config check' lsp report completion
-set -g _shtab_multidrop_opts_with_value --against --baud --break --cell --dialect --drive --junit --language --on --other --output --page --personality --rate --role --run --save --serve --set --speed --tcp --times --to --until --watch --with -o
+set -g _shtab_multidrop_commands demo tui shell send run sim program 'program check' 'program test' 'program sweep' 'program list' 'program upload' 'program download' params 'params backup' 'params diff' 'params restore' macro 'macro list' 'macro show' 'macro play' 'macro edit' 'macro describe' 'macro rename' 'macro copy' 'macro delete' 'macro key' 'macro import' 'macro export' plot publish snapshot ports relay scan rescue log 'log show' 'log follow' 'log grep' 'log replay' config 'config path' 'config show' 'config check' lsp report completion
+set -g _shtab_multidrop_opts_with_value --against --baud --break --cell --cluster --dialect --drive --expect --jobs --junit --language --on --other --output --page --personality --random --rate --role --run --save --seed --serve --set --speed --tcp --times --to --until --vary --watch --with -o
 
 complete -c multidrop -e
 complete -c multidrop -f
@@ -128,6 +128,21 @@ complete -c multidrop -n '_shtab_multidrop_using program test' -l break -x -d 'e
 complete -c multidrop -n '_shtab_multidrop_using program test' -l watch -x -d 'print a variable whenever a line has changed it; may be repeated'
 complete -c multidrop -n '_shtab_multidrop_using program test' -l json -d 'print one JSON object a line'
 complete -c multidrop -n '_shtab_multidrop_using program test; and test $_shtab_multidrop_npos -ge 0' -ka "(__fish_complete_path (commandline -ct))" -d 'MCode (.mxt, .txt) or A-SCRIPT (.prg, .asc)'
+complete -c multidrop -n '_shtab_multidrop_using program; and test $_shtab_multidrop_npos -eq 0' -a sweep -d 'Run a program file in many simulated worlds, and show those in which a condition does not hold.'
+complete -c multidrop -n '_shtab_multidrop_using program sweep' -s h -l help -d 'show this help message and exit'
+complete -c multidrop -n '_shtab_multidrop_using program sweep' -l language -xka "mcode pmx" -d 'default: pmx for .prg, .asc; else mcode'
+complete -c multidrop -n '_shtab_multidrop_using program sweep' -l cell -xka "(__fish_complete_path (commandline -ct))" -d 'the drive that runs the program, and its world: CELL, CELL#BUS or CELL#BUS:NAME (default: the only drive, or the one that --vary names)'
+complete -c multidrop -n '_shtab_multidrop_using program sweep' -l vary -x -d 'KEY: DRIVE.KEY, KEY with one drive (of its world, else a parameter), or seed; VALUES: a,b,c or A..B or A..B:STEP; may be repeated'
+complete -c multidrop -n '_shtab_multidrop_using program sweep' -l expect -x -d 'a comparison with position, errors, prints, virtual_s or ended; all must hold; may be repeated (default: errors == [])'
+complete -c multidrop -n '_shtab_multidrop_using program sweep' -l random -x -d 'draw N cases, in place of all'
+complete -c multidrop -n '_shtab_multidrop_using program sweep' -l seed -x -d 'the seed of these draws (default: 1)'
+complete -c multidrop -n '_shtab_multidrop_using program sweep' -l run -x -d 'the label or program to execute (default: its own start)'
+complete -c multidrop -n '_shtab_multidrop_using program sweep' -l until -x -d 'virtual seconds of a case at most; without it, a case that still runs after 60 s has failed'
+complete -c multidrop -n '_shtab_multidrop_using program sweep' -l jobs -x -d 'processes (default: as many as there are cores)'
+complete -c multidrop -n '_shtab_multidrop_using program sweep' -l cluster -x -d 'the scheduler of a Dask cluster, which runs the cases'
+complete -c multidrop -n '_shtab_multidrop_using program sweep' -l json -d 'print one JSON object a case, and a summary'
+complete -c multidrop -n '_shtab_multidrop_using program sweep' -l junit -xka "(__fish_complete_path (commandline -ct))" -d 'write the cases to a JUnit XML file'
+complete -c multidrop -n '_shtab_multidrop_using program sweep; and test $_shtab_multidrop_npos -eq 0' -ka "(__fish_complete_path (commandline -ct))" -d 'MCode (.mxt, .txt) or A-SCRIPT (.prg, .asc)'
 complete -c multidrop -n '_shtab_multidrop_using program; and test $_shtab_multidrop_npos -eq 0' -a list -d 'Print the program in a drive.'
 complete -c multidrop -n '_shtab_multidrop_using program list' -s h -l help -d 'show this help message and exit'
 complete -c multidrop -n '_shtab_multidrop_using program list' -l drive -x -d 'the drive (default: the first)'

@@ -5,10 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import datetime
+from typing import TYPE_CHECKING
 from xml.etree import ElementTree
 
 from dialects.visible import visible
-from shell.scripts.results import Result
+
+if TYPE_CHECKING:
+    from shell.scripts.results import Result
 
 
 @dataclass(frozen=True)

@@ -34,6 +34,10 @@ TABLE = {
     ("program", "check", "a.prg"): NO_LINE | {"simulator.lexium", "dialects.mcode", "dialects.pmx.host"},
     ("program", "test", "a.mxt"): NO_LINE | {"platformdirs", "dialects.pmx", "dialects.mcode.host", "simulator.pmx"},
     ("lsp", "--help"): NO_LINE,
+    ("program", "sweep", "a.mxt"): HEAVY
+    | {"socket", "ssl", "asyncio", "serial", "dialects.pmx", "simulator.pmx"}
+    | {"concurrent.futures", "distributed", "dask"}
+    | HOSTS,
     ("ports",): NO_LINE - {"serial"} | {"json", "platformdirs", "dialects.mcode"},
     ("completion", "bash"): NO_LINE | {"platformdirs", "dialects.mcode"},
     ("macro", "list"): HEAVY | LOOP | HOSTS | SIMULATORS | {"serial"},

@@ -74,7 +74,10 @@ def test_the_example_of_the_contract(sweep) -> None:
 def test_a_stall_is_seen_with_an_encoder_only(sweep) -> None:
     vary = ("--vary", "EE=0,1", "--vary", "stall_at=10000")
     *cases, _ = objects(sweep("--cell", "cell.toml#:b", *vary, "--expect", "errors == []", "--json"))
-    assert [(each["set"]["EE"], each["ok"], each["why"]) for each in cases] == [(0, True, ""), (1, False, "errors == [86]")]
+    assert [(each["set"]["EE"], each["ok"], each["why"]) for each in cases] == [
+        (0, True, ""),
+        (1, False, "errors == [86]"),
+    ]
 
 
 def test_the_table_has_one_row_for_each_cause_and_its_command_repeats_it(sweep, multidrop: Command) -> None:
@@ -187,7 +190,7 @@ def test_interrupted_it_keeps_what_is_done(sweep, tmp_path: Path, monkeypatch: p
         (("--vary", "b.load=0", "--expect", "errors = []"), "--expect errors = []: "),
         (("--vary", "b.load=0", "--run", "nowhere"), "nothing to run at nowhere"),
         (("--vary", "b.load=0", "--random", "0"), "0 is not a number from 1 to 100000"),
-        (("--vary", "b.load=0", "--junit", "cell.toml"), "is no JUnit report"),
+        (("--vary", "b.load=0", "--junit", "cell.toml"), "is not a JUnit report"),
         (("--vary", "b.load=0", "--jobs", "2", "--cluster", "tcp://a:1"), "not allowed with"),
     ],
 )
@@ -198,7 +201,11 @@ def test_wrong_usage_is_one_line_before_anything_runs(sweep, arguments: tuple[st
 
 
 def test_files_that_cannot_be_read_are_one_line(sweep, tmp_path: Path) -> None:
-    for arguments, file in (((), "gone.mxt"), (("--cell", "gone.toml"), "go.mxt"), (("--cell", "cell.toml#x"), "go.mxt")):
+    for arguments, file in (
+        ((), "gone.mxt"),
+        (("--cell", "gone.toml"), "go.mxt"),
+        (("--cell", "cell.toml#x"), "go.mxt"),
+    ):
         done = sweep(*arguments, file=file)
         assert done.returncode == 2 and done.stderr.count("\n") == 1, done
     done = sweep("--cell", "cell.toml#:a", "--vary", "b.load=1")

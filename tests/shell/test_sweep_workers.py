@@ -1,4 +1,4 @@
-"""The cases of a sweep in several processes: all of them, once; a process that dies names its case; a signal ends all."""
+"""The cases of a sweep in several processes: all run, once; one that ends its process is named; a signal ends all."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from collections.abc import Callable, Sequence
 
 import pytest
 
-from shell.sweeps import workers
+from shell.sweeps import pools, workers
 from shell.sweeps.interruption import Interruption
 from shell.sweeps.trial import DIED, Case, Job, Result
 
@@ -52,7 +52,7 @@ def test_little_work_needs_no_processes(monkeypatch: pytest.MonkeyPatch) -> None
         return [Result(number) for number, _ in cases]
 
     monkeypatch.setattr(workers.time, "perf_counter", lambda: clock[0])
-    monkeypatch.setattr(workers, "ProcessPoolExecutor", None)
+    monkeypatch.setattr(pools, "ProcessPoolExecutor", None)
     assert len(found(timed, 40, 2)) == 40 and len(found(timed, 150, 1)) == 150
     with pytest.raises(TypeError):
         found(timed, 150, 2)

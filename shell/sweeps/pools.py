@@ -1,0 +1,148 @@
+"""Pools of processes that run the chunks of a sweep.
+
+They are forked with all that this process has read; where it has threads, a server of processes forks them.
+"""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+import signal
+import sys
+import threading
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import contextmanager
+from multiprocessing import connection
+from multiprocessing.context import BaseContext
+
+from shell.signals import SIGNALS
+from shell.sweeps import trial
+from shell.sweeps.interruption import Interruption
+from shell.sweeps.trial import DIED, Case, Job, Result
+
+AHEAD = 3
+"""Chunks for each process that are submitted and not done."""
+Run = Callable[[Job, Sequence[Case]], list[Result]]
+
+
+class Pools:
+    """Pools of processes, one after the other: one in which a process dies is at its end."""
+
+    def __init__(self, job: Job, jobs: int, interruption: Interruption, run: Run) -> None:
+        self._job, self._jobs, self._interruption, self._run = job, jobs, interruption, run
+        self._context = _context()
+        self._suspects: list[Case] = []
+        """The cases that the end of a pool cut off: one of them was the cause."""
+
+    def results(self, todo: Iterator[list[Case]]) -> Iterator[list[Result]]:
+        """Run chunks; yield the results of each as it ends."""
+        yield from self._in_a_pool(todo)
+        while self._suspects:
+            suspects, self._suspects = self._suspects, []
+            for case in suspects:
+                yield self._alone(case)
+            yield from self._in_a_pool(todo)
+
+    def _in_a_pool(self, todo: Iterator[list[Case]]) -> Iterator[list[Result]]:
+        """Run chunks to the end, or until a process dies."""
+        running: dict[Future[list[Result]], list[Case]] = {}
+        with self._pool(self._jobs) as pool:
+            self._submit(pool, todo, running)
+            while running:
+                for future in self._done(running):
+                    cases = running.pop(future)
+                    if isinstance(future.exception(), BrokenProcessPool):
+                        self._suspects += cases
+                    else:
+                        yield future.result()
+                if self._interruption.came:
+                    raise KeyboardInterrupt
+                self._submit(pool, todo, running)
+
+    def _submit(
+        self, pool: ProcessPoolExecutor, todo: Iterator[list[Case]], running: dict[Future[list[Result]], list[Case]]
+    ) -> None:
+        while len(running) < self._jobs * AHEAD and not self._suspects:
+            cases = next(todo, None)
+            if cases is None:
+                return
+            try:
+                with _signals_blocked():
+                    running[pool.submit(self._run, self._job, cases)] = cases
+            except BrokenProcessPool:
+                self._suspects += cases
+
+    def _done(self, running: Iterable[Future[list[Result]]]) -> set[Future[list[Result]]]:
+        try:
+            with self._interruption.open():
+                return wait(running, return_when=FIRST_COMPLETED).done
+        except KeyboardInterrupt:
+            return {each for each in running if each.done()}
+
+    def _alone(self, case: Case) -> list[Result]:
+        """Run a case in a process of its own."""
+        with self._pool(1) as pool:
+            with _signals_blocked():
+                future = pool.submit(self._run, self._job, [case])
+            with self._interruption.open():
+                wait([future])
+            if isinstance(future.exception(), BrokenProcessPool):
+                return [Result(case[0], DIED, "the process that ran it died: killed, or out of memory")]
+            return future.result()
+
+    @contextmanager
+    def _pool(self, size: int) -> Iterator[ProcessPoolExecutor]:
+        """A pool of processes; they are ended where the block is."""
+        before = multiprocessing.active_children()
+        pool = ProcessPoolExecutor(size, mp_context=self._context, initializer=_begin)
+        try:
+            yield pool
+        except BaseException:
+            for each in multiprocessing.active_children():
+                if each not in before:
+                    each.terminate()
+            raise
+        finally:
+            pool.shutdown(cancel_futures=True)
+
+
+def _context() -> BaseContext:
+    """How processes begin: as forks of this one, unless it has threads, whose locks would be copied, too."""
+    if sys.platform != "linux" or threading.active_count() > 1:
+        if "forkserver" not in multiprocessing.get_all_start_methods():
+            return multiprocessing.get_context("spawn")
+        context = multiprocessing.get_context("forkserver")
+        context.set_forkserver_preload([trial.__name__])
+        return context
+    return multiprocessing.get_context("fork")
+
+
+@contextmanager
+def _signals_blocked() -> Iterator[None]:
+    """Hold signals back: a new process would take them before it can ignore them."""
+    if sys.platform == "win32":
+        yield
+        return
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, SIGNALS)
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+def _begin() -> None:
+    """Begin a process: the signals of a terminal are its parent's, and it ends with its parent."""
+    for each in SIGNALS:
+        signal.signal(each, signal.SIG_DFL if each == signal.SIGTERM else signal.SIG_IGN)
+    if sys.platform != "win32":
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, SIGNALS)
+    threading.Thread(target=_end_with_parent, daemon=True).start()
+
+
+def _end_with_parent() -> None:
+    parent = multiprocessing.parent_process()
+    if parent is not None:
+        connection.wait([parent.sentinel])
+        os._exit(1)
