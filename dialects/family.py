@@ -5,6 +5,7 @@ Conversations belong here, not to the codec: each takes the `DriveState` of its 
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Generic, Protocol, TypeVar
@@ -254,6 +255,8 @@ class Family(Generic[S]):
     """Return the memory of a drive, None where it is not certain. The field is None where that saves nothing."""
     guards: Guards[S] | None = None
     """None: the family has no line that a person must agree to."""
+    stop_bytes: re.Pattern[bytes] | None = None
+    """Matches each piece of a stop, however its drives are set; None: several programs cannot share a line of them."""
     prepare: Callable[[], object] | None = None
     """Slow work before the first message, safe in any thread; None: there is none."""
 

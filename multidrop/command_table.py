@@ -7,7 +7,15 @@ from collections.abc import Callable, Mapping, Sequence
 from types import MappingProxyType
 from typing import NamedTuple
 
-from multidrop import arguments, lsp_arguments, macro_arguments, publish_arguments, relay_arguments, sweep_arguments
+from multidrop import (
+    arguments,
+    lsp_arguments,
+    macro_arguments,
+    publish_arguments,
+    relay_arguments,
+    share_arguments,
+    sweep_arguments,
+)
 
 
 class Command(NamedTuple):
@@ -281,6 +289,13 @@ COMMANDS: Mapping[str, Command] = {
         ],
         "publish.run",
         publish_arguments.publish,
+        urls=True,
+    ),
+    "share": Command(
+        "lend a port to several clients over the network (RFC 2217), of which one writes; a stop passes from any",
+        ["share /dev/ttyUSB0 --rfc2217 2217", "share 'sim:#press' --rfc2217 0 --json"],
+        "share.run",
+        share_arguments.share,
         urls=True,
     ),
     "snapshot": Command(

@@ -66,6 +66,15 @@ class Preemptible(Protocol):
         """Let the loop write again, once it has taken note of what preempted it."""
 
 
+@runtime_checkable
+class Queueing(Protocol):
+    """A transport that says how much waits in it."""
+
+    @property
+    def pending(self) -> int:
+        """Number of bytes that were written and wait in this program."""
+
+
 class PortControl(Protocol):
     """The settings of a serial port that change while it is open.
 

@@ -74,6 +74,11 @@ class DescriptorPipe(Pipe):
             self._after_push(problem)
         return True
 
+    @property
+    def pending(self) -> int:
+        """Number of bytes that the system has not taken yet."""
+        return sum(map(len, self._pending))
+
     def discard(self, whole: bool = False) -> int:
         """Drop what waits here and what the system can give back; `whole`: only writes that have not begun."""
         if not self._usable:

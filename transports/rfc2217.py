@@ -1,143 +1,308 @@
-"""Serial ports of a device server, over the network (RFC 2217), through pyserial's client for it."""
+"""Serial ports of a device server, over the network (RFC 2217): a pipe in a TCP pipe.
+
+Opening asks for the settings that a line needs: baud rate, 8N1. A server must confirm each of them. It also asks for
+what is only a wish: no flow control, DTR, RTS, empty buffers. A server that ignores a wish is used all the same.
+"""
 
 from __future__ import annotations
 
-import contextlib
-import queue
-import socket
-import threading
-from typing import cast
+import asyncio
+from collections.abc import Callable, Iterable
 
-from serial import rfc2217
+from transports import telnet
+from transports.base import Lost, Preemptible, Queueing, Received, Transport, TransportLost, Unreachable
+from transports.com_port import (
+    BREAK,
+    FLOW,
+    NAMES,
+    NEEDED,
+    OPTION,
+    PURGE_BOTH,
+    PURGE_UNSENT,
+    REPLY,
+    Control,
+    Setting,
+    group_of,
+    message,
+    parsed,
+)
+from transports.sockets import open_tcp
 
-from transports.base import Transport, Unreachable
-from transports.control import SerialControl
-from transports.pipe import in_thread
-from transports.sockets import check, explain, host_port, set_socket_options
-from transports.threaded import ThreadedPipe
+CONFIRM = 3.0
+"""Seconds that a server has to confirm a setting."""
+GRACE = 0.3
+"""Seconds that a server has to confirm wishes, once it has confirmed what is needed."""
+PIECE = 256
+"""The bytes of a write that leave whole. A longer one counts as several; no message of a drive is."""
+QUOTED = 80
+"""Characters of what a server says as it refuses a client."""
+_HELLO = b"".join(
+    telnet.option(verb, number)
+    for verb, number in (
+        (telnet.WILL, OPTION),
+        (telnet.WILL, telnet.BINARY),
+        (telnet.DO, telnet.BINARY),
+        (telnet.WILL, telnet.SGA),
+        (telnet.DO, telnet.SGA),
+    )
+)
+_OURS = (OPTION, telnet.BINARY, telnet.SGA)
+_THEIRS = (telnet.BINARY, telnet.SGA)
+_WISHES = {
+    FLOW: (Setting.CONTROL, Control.NO_FLOW),
+    "DTR": (Setting.CONTROL, Control.DTR_ON),
+    "RTS": (Setting.CONTROL, Control.RTS_ON),
+    "a purge": (Setting.PURGE, PURGE_BOTH),
+}
 
-_PATIENCE = 1.0
-_READ = 4096
+
+async def open_rfc2217(host: str, port: int, baud: int = 9600, within: float | None = None) -> Rfc2217Pipe:
+    """Open the port that `host:port` serves, at `baud` bits/s, 8N1. Raises Unreachable.
+
+    `within`: time to connect, s.
+    """
+    inner = await open_tcp(host, port, "rfc2217", within)
+    return await negotiated(inner, baud)
 
 
-async def open_rfc2217(host: str, port: int, baud: int = 9600) -> Transport:
-    """Open the port that `host:port` serves, at `baud` bits/s, 8N1; takes about 0.35 s. Raises Unreachable."""
-    name = f"rfc2217://{host_port(host, port)}"
-    check(name, host, port)
-    device = await in_thread(lambda: _open(name, baud), Rfc2217Device.close)
-    return ThreadedPipe(device, device.control)
-
-
-def _open(name: str, baud: int) -> Rfc2217Device:
+async def negotiated(inner: Transport, baud: int) -> Rfc2217Pipe:
+    """Agree with the server at the other end of a pipe, or close it. Raises Unreachable."""
+    pipe = Rfc2217Pipe(inner)
     try:
-        return Rfc2217Device(name, baud)
-    except OSError as error:
-        raise Unreachable(f"{name}: {_reason(error)}") from error
-    except ValueError as error:
-        raise Unreachable(f"{name}: invalid settings {baud} baud, 8N1 ({error})") from error
+        await pipe.agree(baud)
+    except BaseException:
+        await pipe.close()
+        raise
+    return pipe
 
 
-def _reason(error: OSError) -> str:
-    """Reason for a person: pyserial's error has only a text, and the real error as its context."""
-    met = error.__context__
-    if isinstance(met, TimeoutError):
-        return "no reply within 5 s; check the address, its power and the network"
-    if isinstance(met, UnicodeError):
-        return "invalid host name"
-    if isinstance(met, OSError):
-        return explain(met)
-    text = str(error)
-    if "does not seem to support" in text:
-        return "the server does not support RFC 2217; if it passes bytes on unchanged, use tcp://"
-    if "parameter change" in text or "timeout while waiting" in text:
-        return "the server refuses the settings of the port (8N1 at this baud rate)"
-    return text
+class Rfc2217Pipe:
+    """One port of a device server."""
 
-
-class _Port(rfc2217.Serial):
-    """pyserial's client, which leaves its socket open if the other end closed first."""
-
-    def close(self) -> None:
-        link = self.link
-        super().close()
-        if link is not None:
-            link.close()
+    def __init__(self, inner: Transport) -> None:
+        self._inner = inner
+        self._loop = asyncio.get_running_loop()
+        self._decoder = telnet.Decoder()
+        self._received: Received | None = None
+        self._lost: Lost | None = None
+        self._loss: TransportLost | None = None
+        self._early = bytearray()
+        self._delivers = False
+        self._farewell = ""
+        """The signature that the server sent last: a server that refuses a client gives its reason there."""
+        self._agreed = asyncio.Event()
+        """The server supports RFC 2217, or the pipe is lost."""
+        self._asked: dict[str, tuple[int, asyncio.Future[int]]] = {}
+        """What is to be confirmed, with the value asked for."""
+        self.control = Rfc2217Control(self, self._loop)
+        self.limits = ""
+        """What the server did not confirm, for a person; empty: nothing."""
 
     @property
-    def link(self) -> socket.socket | None:
-        """The connection; None after it is closed."""
-        return cast("socket.socket | None", vars(self).get("_socket"))
+    def name(self) -> str:
+        """The URL."""
+        return self._inner.name
 
-    @property
-    def arrived(self) -> queue.Queue[bytes | None]:
-        """Bytes that arrived, one by one; None is the end.
+    # Opening
 
-        pyserial's own `read` refuses to return what is left here once the connection has ended.
-        """
-        return cast("queue.Queue[bytes | None]", vars(self)["_read_buffer"])
-
-    @property
-    def alive(self) -> bool:
-        """True if pyserial's reading thread still runs."""
-        thread = cast("threading.Thread | None", vars(self)["_thread"])
-        return thread is not None and thread.is_alive()
-
-
-class Rfc2217Device:
-    """One port of a device server. Opening blocks; raises what pyserial raises."""
-
-    piece = 256
-
-    def __init__(self, name: str, baud: int) -> None:
-        self.name = name
-        self._port = _Port(name, baud)
-        self.control = SerialControl(self._port)
-        self._ended = False
-        link = self._port.link
-        if link is not None:
-            set_socket_options(link)
-
-    def read(self) -> bytes | None:
-        """Wait up to a second for the first byte, then take all that arrived."""
-        if self._ended:
-            return None
-        data = bytearray()
+    async def agree(self, baud: int) -> None:
+        """Agree on RFC 2217 and on the settings. Raises Unreachable."""
+        self._inner.start(self._take, self._break)
+        self._inner.write(_HELLO)
         try:
-            first = self._port.arrived.get(timeout=_PATIENCE)
-            while first is not None:
-                data += first
-                if len(data) >= _READ:
-                    return bytes(data)
-                first = self._port.arrived.get_nowait()
-            self._ended = True
-        except queue.Empty:
-            self._ended = not data and not self._port.alive
-        return bytes(data) or (None if self._ended else b"")
+            async with asyncio.timeout(CONFIRM):
+                await self._agreed.wait()
+        except TimeoutError:
+            raise self._refused(
+                "the server does not support RFC 2217; if it passes bytes on unchanged, use tcp://"
+            ) from None
+        self._check()
+        needed = {NAMES[each]: (int(each), value) for each, value in {Setting.BAUD: baud, **NEEDED}.items()}
+        answers = {what: self._ask(what, *each) for what, each in (needed | _WISHES).items()}
+        await self._settled(answers[what] for what in needed)
+        wrong = [what for what, (_, value) in needed.items() if _answer(answers[what]) != value]
+        if wrong:
+            raise self._refused(_refusal(wrong, baud, _answer(answers[NAMES[Setting.BAUD]])))
+        self.control.note(baud)
+        await self._settled((answers[what] for what in _WISHES), GRACE)
+        if ignored := [what for what in _WISHES if _answer(answers[what]) is None]:
+            self.limits = f"the server does not confirm {', '.join(ignored)}; a party line does not need it"
+        self._asked.clear()
 
-    def write(self, data: bytes) -> None:
-        """Write all bytes; pyserial doubles IAC."""
-        self._port.write(data)
+    async def _settled(self, answers: Iterable[asyncio.Future[int]], within: float = CONFIRM) -> None:
+        """Wait until all are confirmed, or for this time. Raises Unreachable where the server closes the pipe."""
+        await asyncio.wait([*answers], timeout=within)
+        self._check()
 
-    def purge(self) -> None:
-        """Tell the server to drop what it has not sent; do not wait for its confirmation."""
-        self._port.rfc2217_send_subnegotiation(rfc2217.PURGE_DATA, rfc2217.PURGE_TRANSMIT_BUFFER)
+    def _check(self) -> None:
+        if self._loss is not None:
+            raise self._refused(str(self._loss).removeprefix(f"{self.name} was lost: "))
 
-    def abort(self) -> int:
-        """Return 0: the system gives nothing back."""
-        return 0
+    def _refused(self, reason: str) -> Unreachable:
+        said = self._early.decode("latin-1").strip()[:QUOTED]
+        return Unreachable(f"{self.name}: the server said {said!r}; {reason}" if said else f"{self.name}: {reason}")
 
-    def cancel(self) -> None:
-        """End a `read` and a `write` that wait."""
-        link = self._port.link
-        if link is not None:
-            with contextlib.suppress(OSError):
-                link.shutdown(socket.SHUT_RDWR)
+    def _ask(self, what: str, setting: int, value: int) -> asyncio.Future[int]:
+        """Ask for a setting; the future has the value that the server confirms."""
+        answer: asyncio.Future[int] = self._loop.create_future()
+        self._asked[what] = value, answer
+        self._inner.write(message(setting, value))
+        return answer
 
-    def explain(self, error: OSError | None) -> str:
-        """Reason of a break in one line for a person."""
-        met = error.__context__ if error else None
-        return explain(met if isinstance(met, OSError) else error)
+    async def ask(self, what: str, setting: int, value: int) -> int:
+        """Ask for a setting, and return the value that the server confirms. Raises OSError if it confirms none."""
+        if self._loss is not None:
+            raise OSError(str(self._loss))
+        answer = self._ask(what, setting, value)
+        await asyncio.wait([answer], timeout=CONFIRM)
+        if (found := _answer(answer)) is None:
+            raise OSError(f"the server does not confirm {what}")
+        return found
 
-    def close(self) -> None:
-        """Close the port; takes 0.3 s."""
-        self._port.close()
+    # Receiving
+
+    def _take(self, data: bytes) -> None:
+        for event in self._decoder.receive(data):
+            if isinstance(event, telnet.Data):
+                self._farewell = ""
+                self._deliver(event.data)
+            elif isinstance(event, telnet.Option):
+                self._option(event)
+            elif isinstance(event, telnet.Subnegotiation) and (found := parsed(event.body)):
+                self._confirmed(*found)
+
+    def _deliver(self, data: bytes) -> None:
+        if self._delivers and self._received is not None:
+            self._received(data)
+        else:
+            self._early += data
+
+    def _option(self, event: telnet.Option) -> None:
+        """Take an option. What was offered above needs no reply, anything else that the server wants is refused."""
+        if event.option == OPTION and event.verb in (telnet.DO, telnet.WILL):
+            self._agreed.set()
+        elif event.verb in telnet.REFUSAL and event.option not in (_OURS if event.verb == telnet.DO else _THEIRS):
+            self._inner.write(telnet.option(telnet.REFUSAL[event.verb], event.option))
+
+    def _confirmed(self, number: int, value: bytes) -> None:
+        setting = number - REPLY
+        if setting == Setting.SIGNATURE:
+            self._farewell = value.decode("utf-8", "replace")
+            return
+        found = int.from_bytes(value)
+        what = group_of(found) if setting == Setting.CONTROL else _NAMED.get(setting, "")
+        if what in self._asked and not self._asked[what][1].done():
+            self._asked[what][1].set_result(found)
+
+    def _break(self, error: TransportLost) -> None:
+        self._loss = TransportLost(f"{self.name} was lost: {self._farewell}") if self._farewell else error
+        self._agreed.set()
+        for _, answer in self._asked.values():
+            answer.cancel()
+        if self._delivers and self._lost is not None:
+            self._lost(self._loss)
+
+    # The pipe
+
+    def start(self, received: Received, lost: Lost) -> None:
+        """Begin to deliver bytes, first those that came before."""
+        self._received, self._lost = received, lost
+        self._loop.call_soon(self._begin)
+
+    def _begin(self) -> None:
+        self._delivers = True
+        early, self._early = bytes(self._early), bytearray()
+        if early and self._received is not None:
+            self._received(early)
+        if self._loss is not None and self._lost is not None:
+            self._lost(self._loss)
+
+    def write(self, data: bytes) -> bool:
+        """Queue bytes in pieces; False where they were dropped."""
+        pieces = [data[at : at + PIECE] for at in range(0, len(data), PIECE)]
+        return all([self._inner.write(telnet.escaped(piece)) for piece in pieces])
+
+    @property
+    def pending(self) -> int:
+        """Number of bytes that wait in this program."""
+        return self._inner.pending if isinstance(self._inner, Queueing) else 0
+
+    def discard(self, whole: bool = False) -> int:
+        """Drop what has not left, and unless `whole` tell the server to drop the same. No message is cut in two."""
+        dropped = self._inner.discard(whole=True)
+        if not whole:
+            self._inner.write(_PURGE)
+        return dropped
+
+    def preempt(self, whole: bool, make: Callable[[int], bytes]) -> bool:
+        """Drop what is unsent and write `make(bytes dropped)` at once, from any thread; False on a broken pipe."""
+        purge = b"" if whole else _PURGE
+        inner = self._inner
+        return isinstance(inner, Preemptible) and inner.preempt(True, lambda n: purge + telnet.escaped(make(n)))
+
+    def yielded(self) -> None:
+        """Let the loop write again."""
+        if isinstance(self._inner, Preemptible):
+            self._inner.yielded()
+
+    async def close(self) -> None:
+        """Close the pipe."""
+        self._lost = self._received = None
+        await self._inner.close()
+
+
+_PURGE = message(Setting.PURGE, PURGE_UNSENT)
+_NAMED = {int(setting): name for setting, name in NAMES.items()} | {int(Setting.PURGE): "a purge"}
+
+
+def _answer(answer: asyncio.Future[int]) -> int | None:
+    """The value that a server confirmed; None: it confirmed none."""
+    return answer.result() if answer.done() and not answer.cancelled() else None
+
+
+def _refusal(wrong: list[str], baud: int, found: int | None) -> str:
+    kept = f" (it has {found})" if NAMES[Setting.BAUD] in wrong and found else ""
+    named = ", ".join(f"{each} {baud}{kept}" if each == NAMES[Setting.BAUD] else each for each in wrong)
+    return f"the server does not accept {named}; check the settings of its port"
+
+
+class Rfc2217Control:
+    """The settings of the port at the server. Each call waits for its confirmation, in a thread that is not the loop's.
+
+    Each raises OSError where the server refuses the value or does not reply.
+    """
+
+    def __init__(self, pipe: Rfc2217Pipe, loop: asyncio.AbstractEventLoop) -> None:
+        self._pipe, self._loop = pipe, loop
+        self._baud = 0
+
+    def note(self, baud: int) -> None:
+        """Note the baud rate of the opening."""
+        self._baud = baud
+
+    @property
+    def baud(self) -> int:
+        """The baud rate, bits/s, also of a port that is closed by now."""
+        return self._baud
+
+    def set_baud(self, baud: int) -> None:
+        """Change the baud rate; a refused one leaves the present one."""
+        found = self._ask(NAMES[Setting.BAUD], Setting.BAUD, baud)
+        if found != baud:
+            raise OSError(f"the server does not accept {baud} baud (it has {found})")
+        self._baud = baud
+
+    def set_dtr(self, on: bool) -> None:
+        """Switch the DTR line."""
+        self._ask("DTR", Setting.CONTROL, Control.DTR_ON if on else Control.DTR_OFF)
+
+    def set_rts(self, on: bool) -> None:
+        """Switch the RTS line."""
+        self._ask("RTS", Setting.CONTROL, Control.RTS_ON if on else Control.RTS_OFF)
+
+    def set_break(self, on: bool) -> None:
+        """Begin or end a break."""
+        self._ask(BREAK, Setting.CONTROL, Control.BREAK_ON if on else Control.BREAK_OFF)
+
+    def _ask(self, what: str, setting: int, value: int) -> int:
+        return asyncio.run_coroutine_threadsafe(self._pipe.ask(what, setting, value), self._loop).result()

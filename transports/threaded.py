@@ -74,6 +74,11 @@ class ThreadedPipe(Pipe):
             self._turn.notify()
         return True
 
+    @property
+    def pending(self) -> int:
+        """Number of bytes that the writing thread has not taken yet."""
+        return sum(map(len, tuple(self._queue)))
+
     def discard(self, whole: bool = False) -> int:
         """Drop what is queued and what this machine holds, and tell the other end to do the same if it can.
 

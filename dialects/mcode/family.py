@@ -7,7 +7,7 @@ from functools import partial
 from dialects.family import Family, Guards, Sentences
 from dialects.guards import Guard
 from dialects.mcode.host import classify, operations
-from dialects.mcode.host.codec import MCode
+from dialects.mcode.host.codec import STOP_BYTES, MCode
 from dialects.mcode.host.identify import identify, remember
 from dialects.mcode.host.state import MCodeState
 from dialects.mcode.manual import guards, help, sentences
@@ -43,4 +43,5 @@ MCODE = Family(
     scan_at="dialects.mcode.host.scan:SCAN",
     conditions_at="dialects.mcode.host.conditions:READER",
     controls_at="dialects.mcode.manual.controls:controls",
+    stop_bytes=STOP_BYTES,
 )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dialects.family import Family, Guards, Sentences
 from dialects.pmx.host import operations
-from dialects.pmx.host.codec import Pmx
+from dialects.pmx.host.codec import STOP_BYTES, Pmx
 from dialects.pmx.host.identify import identify
 from dialects.pmx.host.state import PmxState
 from dialects.pmx.manual import guards, help, sentences
@@ -32,4 +32,5 @@ PMX = Family(
     debugging_at="dialects.pmx.host.debugging:DEBUGGING",
     conditions_at="dialects.pmx.host.conditions:READER",
     controls_at="dialects.pmx.manual.controls:controls",
+    stop_bytes=STOP_BYTES,
 )

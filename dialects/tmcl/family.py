@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from dialects.family import Family, Guards, Sentences
 from dialects.tmcl.host import operations
-from dialects.tmcl.host.codec import Tmcl
+from dialects.tmcl.host.codec import STOP_BYTES, Tmcl
 from dialects.tmcl.host.identify import identify
 from dialects.tmcl.host.state import TmclState
 from dialects.tmcl.manual import guards, help, sentences
@@ -32,4 +32,5 @@ TMCL = Family(
     no_programs="TMCL's direct mode runs no programs",
     conditions_at="dialects.tmcl.host.conditions:READER",
     controls_at="dialects.tmcl.manual.controls:controls",
+    stop_bytes=STOP_BYTES,
 )

@@ -65,8 +65,8 @@ function _shtab_multidrop_using
   test "$_shtab_multidrop_cmdpath" = "$argv"
 end
 
-set -g _shtab_multidrop_commands demo tui shell send run sim program 'program check' 'program test' 'program sweep' 'program list' 'program upload' 'program download' params 'params backup' 'params diff' 'params restore' macro 'macro list' 'macro show' 'macro play' 'macro edit' 'macro describe' 'macro rename' 'macro copy' 'macro delete' 'macro key' 'macro import' 'macro export' plot publish snapshot ports relay scan rescue log 'log show' 'log follow' 'log grep' 'log replay' config 'config path' 'config show' 'config check' lsp report completion
-set -g _shtab_multidrop_opts_with_value --against --baud --break --cell --cluster --dialect --drive --expect --jobs --junit --language --on --other --output --page --personality --random --rate --role --run --save --seed --serve --set --speed --tcp --times --to --until --vary --watch --with -o
+set -g _shtab_multidrop_commands demo tui shell send run sim program 'program check' 'program test' 'program sweep' 'program list' 'program upload' 'program download' params 'params backup' 'params diff' 'params restore' macro 'macro list' 'macro show' 'macro play' 'macro edit' 'macro describe' 'macro rename' 'macro copy' 'macro delete' 'macro key' 'macro import' 'macro export' plot publish share snapshot ports relay scan rescue log 'log show' 'log follow' 'log grep' 'log replay' config 'config path' 'config show' 'config check' lsp report completion
+set -g _shtab_multidrop_opts_with_value --against --baud --break --cell --cluster --dialect --drive --expect --jobs --junit --language --on --other --output --page --personality --random --rate --rfc2217 --role --run --save --seed --serve --set --speed --tcp --times --to --until --vary --watch --with -o
 
 complete -c multidrop -e
 complete -c multidrop -f
@@ -241,6 +241,11 @@ complete -c multidrop -n '_shtab_multidrop_using publish' -l to -x -d 'the broke
 complete -c multidrop -n '_shtab_multidrop_using publish' -l rate -x -d 'samples a second of each drive, at most (default: 2)'
 complete -c multidrop -n '_shtab_multidrop_using publish' -l no-reconnect -d 'give up a lost line, and do not try again'
 complete -c multidrop -n '_shtab_multidrop_using publish; and test $_shtab_multidrop_npos -ge 0' -ka "(_multidrop_url)" -d 'what to open'
+complete -c multidrop -n '_shtab_multidrop_using; and test $_shtab_multidrop_npos -eq 0' -a share -d 'Lend a port to several clients over the network (RFC 2217), of which one writes; a stop passes from any.'
+complete -c multidrop -n '_shtab_multidrop_using share' -s h -l help -d 'show this help message and exit'
+complete -c multidrop -n '_shtab_multidrop_using share' -l rfc2217 -x -d 'serve it here (host: 127.0.0.1 unless given; port 0: a free one)'
+complete -c multidrop -n '_shtab_multidrop_using share' -l json -d 'print the endpoint and the events as JSON objects, a line each'
+complete -c multidrop -n '_shtab_multidrop_using share; and test $_shtab_multidrop_npos -eq 0' -ka "(_multidrop_url)" -d 'the port to lend'
 complete -c multidrop -n '_shtab_multidrop_using; and test $_shtab_multidrop_npos -eq 0' -a snapshot -d 'Read every drive into a new cell file, which the simulator opens as the same machine.'
 complete -c multidrop -n '_shtab_multidrop_using snapshot' -s h -l help -d 'show this help message and exit'
 complete -c multidrop -n '_shtab_multidrop_using snapshot' -s o -l output -x -d 'the new file'

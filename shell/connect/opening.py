@@ -86,6 +86,36 @@ CUT = (
 )
 
 
+@dataclass(frozen=True)
+class OpenedPort:
+    """An open byte pipe without a bus, for a front end that passes bytes on."""
+
+    name: str
+    transport: Transport
+    family: str
+    """The family that its URL names; empty: it names none."""
+    baud: int
+    reopen: Reopen | None = None
+    """As for `Opened`."""
+
+
+async def open_port(connection: Connection) -> OpenedPort:
+    """Open the byte pipe of a connection. Raises Unreachable, Diagnostic for a URL of several pipes or of none."""
+    family, baud = connection.hints.family, connection.baud or _family(connection).baud
+    if connection.scheme == "sim":
+        from simulator.serving.in_process import connect
+
+        found = await connect(connection.target + (f"#{connection.bus}" if connection.bus else ""))
+        first, *others = found
+        if others:
+            for each in found:
+                await each.transport.close()
+            raise Diagnostic(f"{len(found)} buses", connection.text, f"name one of them, as in sim:#{first.name}")
+        return OpenedPort(first.name, first.transport, family or first.dialect, first.baud or baud, simulated(first))
+    transport, took = await timed(_transport(connection))
+    return OpenedPort(connection.short, transport, family, baud, _reopen(connection, took))
+
+
 def port_name(connection: Connection) -> str:
     """One name for a port, whichever of its names is given; empty for a simulated bus."""
     if connection.scheme == "sim":
@@ -135,7 +165,7 @@ async def _transport(
     if connection.scheme == "rfc2217":
         from transports.rfc2217 import open_rfc2217
 
-        return await open_rfc2217(connection.host, connection.port, baud)
+        return await open_rfc2217(connection.host, connection.port, baud, within)
     if connection.scheme == "ssh":
         from transports.ssh import open_ssh
 

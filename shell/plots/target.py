@@ -10,9 +10,7 @@ from pathlib import Path
 from urllib.parse import urlsplit
 
 from dialects import Diagnostic
-from dialects.numbers import whole
-
-HOST = "127.0.0.1"
+from shell.connect.listening import listening
 
 
 @dataclass(frozen=True)
@@ -85,12 +83,8 @@ def _file(text: str) -> PlotTarget:
 
 
 def _server(text: str) -> PlotTarget:
-    host, _, port = text.rpartition(":")
-    host = host.removeprefix("[").removesuffix("]") or HOST
-    number = whole(port, 0, 65535)
-    if number is None:
-        raise Diagnostic(f"no port {text!r} to serve at", hint="valid: PORT or HOST:PORT, as 9876")
-    return PlotTarget(host=host, port=number)
+    host, port = listening(text)
+    return PlotTarget(host=host, port=port)
 
 
 def _viewer(text: str) -> PlotTarget:

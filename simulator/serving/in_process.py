@@ -159,6 +159,11 @@ class SimPipe:
             self._floor.write(self._bus, data, self._source)
         return usable
 
+    @property
+    def pending(self) -> int:
+        """Number of bytes that have not arrived at the drives yet."""
+        return self._floor.floor.wires[self._bus].queued(self._source)
+
     def discard(self, whole: bool = False) -> int:
         """Take back what has not begun to go out; nothing with `whole`, since that may be part of a message."""
         return self._floor.retract(self._bus, self._source) if self._open and not whole else 0

@@ -47,6 +47,7 @@ TABLE = {
     ("send", "ssh://-h/dev/x", "PR P"): HEAVY | OTHERS | SIMULATORS | VERBS | {"serial", "transports.ssh"},
     ("relay", "/dev/does-not-exist"): HEAVY | LOOP | HOSTS | SIMULATORS | VERBS | {"json", "platformdirs"},
     ("publish", "sim:", "--to", "http://broker"): HEAVY | SIMULATORS | VERBS | {"serial", "paho"},
+    ("share", "/dev/does-not-exist", "--rfc2217", "0"): HEAVY | OTHERS | SIMULATORS | {"shell.session"},
     ("sim", "gone.toml"): HEAVY | HOSTS | {"serial", "simulator.pmx.family", "simulator.lexium.family"},
 }
 """For each command the modules that it must not import."""

@@ -9,9 +9,8 @@ import sys
 from collections.abc import Iterator
 
 import pytest
-import serial.rfc2217
 
-from transports import TransportLost, Unreachable, sockets
+from transports import TransportLost, Unreachable, rfc2217, sockets
 from transports.descriptor import DescriptorPipe
 from transports.rfc2217 import open_rfc2217
 from transports.sockets import open_tcp, open_udp
@@ -216,8 +215,7 @@ async def test_unsent_datagrams_are_dropped_by_discard() -> None:
 async def test_a_server_that_does_not_speak_rfc2217_is_told_from_one_that_does(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    patience = serial.rfc2217.Timeout  # type: ignore[attr-defined]
-    monkeypatch.setattr(serial.rfc2217, "Timeout", lambda seconds: patience(min(seconds, 0.1)))
+    monkeypatch.setattr(rfc2217, "CONFIRM", 0.05)
     refused = pytest.raises(Unreachable, match="does not support RFC 2217; .* use tcp://")
     with socket.create_server(("127.0.0.1", 0)) as listener, refused:
         await open_rfc2217("127.0.0.1", listener.getsockname()[1], 9600)

@@ -29,6 +29,9 @@ LIST_PROMPT = re.compile(rb"[\n\x06\x15][>?]|[>?]\Z")
 NOBODY = "~"
 """A character that no drive has as its name."""
 
+STOP_BYTES = re.compile(rb"(?<![ -~])(?:[!-~][\x05\x1b])+\n?|[\x03\x05\x1b]|~{%d}[\r\n]" % (LONGEST + 1))
+"""Any key that stops, alone or after names, Ctrl+C, which resets, and what makes a half-sent line overflow."""
+
 
 @dataclass(frozen=True)
 class MCode:

@@ -28,6 +28,9 @@ MARKED = re.compile(r"\?Q(\d\d)?\d{3}", re.ASCII)
 NO_TEXT = b"\n\0"
 """Bytes that some gateways and drivers add."""
 
+STOP_BYTES = re.compile(rb"(?:@\d\d)?(?:ABORT|SR[01]=0)\r|~~~\r")
+"""The commands of a stop, and the end of a half-sent one."""
+
 
 @dataclass(frozen=True)
 class Pmx:

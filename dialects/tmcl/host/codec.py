@@ -8,6 +8,7 @@ ends after a second of silence, in which host and modules drop an unfinished mes
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import ClassVar
@@ -31,6 +32,9 @@ RESYNC = 1.0
 """Seconds of silence after which a module has dropped an unfinished message."""
 QUIET = 0.1
 """Seconds of quiet that end a request without a reply."""
+
+STOP_BYTES = re.compile(rb"[\x01-\xff]\x03\x00[\x00-\x05]\x00{4}[\x00-\xff]")
+"""MST for any motor of any module, with any checksum: a module refuses a wrong one."""
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,17 @@
+"""The address at which a command listens, as a person gives it: PORT or HOST:PORT."""
+
+from __future__ import annotations
+
+from dialects import Diagnostic
+from dialects.numbers import whole
+
+HOST = "127.0.0.1"
+
+
+def listening(text: str) -> tuple[str, int]:
+    """Host and port (0: a free one). Raises Diagnostic."""
+    host, _, port = text.rpartition(":")
+    number = whole(port, 0, 65535)
+    if number is None:
+        raise Diagnostic(f"no port {text!r} to serve at", hint="valid: PORT or HOST:PORT, as 9876")
+    return host.removeprefix("[").removesuffix("]") or HOST, number

@@ -1,0 +1,1 @@
+"""`multidrop share`: a port for several clients, of which one writes."""

@@ -1,0 +1,155 @@
+"""One client of a shared port as bytes: raw, or telnet with the com port option (RFC 2217).
+
+The first byte that a client sends decides: IAC begins telnet, any other one means that it negotiates nothing. Such a
+client is sent no byte that is not a drive's, except for the reason as it is refused.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from transports import telnet
+from transports.com_port import OPTION, PURGE_BOTH, REPLY, Setting, message, parsed
+
+HELD = 1 << 16
+"""Bytes that are kept for a client that has suspended the flow to it."""
+INTERRUPTS = (b"\xff\xf4\xff\xfd\x06", b"\xff\xf4")
+"""Ctrl+C of a telnet program that has negotiated nothing: IAC IP, mostly with a request to mark the time."""
+_TAKEN = (telnet.BINARY, telnet.SGA)
+_LENGTHS = {Setting.BAUD: 4}
+
+
+@dataclass(frozen=True)
+class Request:
+    """A client's request for a setting."""
+
+    setting: int
+    value: int
+
+
+class Client:
+    """What one client sends, divided into bytes for the line and requests; and the form of what it is sent."""
+
+    def __init__(self, name: str, text: bool) -> None:
+        """`text`: the line's language is text."""
+        self.name = name
+        self.com_port = False
+        """It has agreed on RFC 2217."""
+        self.refused = False
+        """Only stops are taken from it."""
+        self.replies = bytearray()
+        """Replies to its negotiation that are to be sent to it."""
+        self._text = text
+        self._telnet: telnet.Decoder | None = None
+        self._begun = False
+        self._offered: set[tuple[int, int]] = set()
+        self._suspended = False
+        self._held = bytearray()
+
+    # From the client
+
+    def receive(self, data: bytes) -> list[bytes | Request]:
+        """Divide what came."""
+        if not self._begun and data:
+            self._begun = True
+            self._telnet = telnet.Decoder() if data[0] == telnet.IAC else None
+        if self._telnet is None:
+            return [self._interrupted(data)]
+        found: list[bytes | Request] = []
+        for event in self._telnet.receive(data):
+            if isinstance(event, telnet.Data):
+                found.append(self._plain(event.data))
+            elif isinstance(event, telnet.Interrupt):
+                found.append(b"\x03")
+            elif isinstance(event, telnet.Option):
+                self._option(event)
+            elif request := self._request(event.body):
+                found.append(request)
+        return [each for each in found if each]
+
+    def _interrupted(self, data: bytes) -> bytes:
+        for each in INTERRUPTS if self._text else ():
+            data = data.replace(each, b"\x03")
+        return data
+
+    def _plain(self, data: bytes) -> bytes:
+        """The data of a telnet terminal, without the NUL that follows its CR."""
+        return data if self.com_port or not self._text else data.translate(None, b"\0")
+
+    def _option(self, event: telnet.Option) -> None:
+        if event.verb not in telnet.OPPOSITE:
+            return
+        if event.option == OPTION:
+            self._agree()
+        elif event.option in _TAKEN:
+            self._offer(telnet.OPPOSITE[event.verb], event.option)
+        else:
+            self._offer(telnet.REFUSAL[event.verb], event.option)
+
+    def _agree(self) -> None:
+        self.com_port = True
+        for verb, option in ((telnet.DO, OPTION), (telnet.WILL, telnet.BINARY), (telnet.DO, telnet.BINARY)):
+            self._offer(verb, option)
+        self.reply(Setting.MODEM_STATE, 0)  # no modem lines are read
+
+    def _offer(self, verb: int, option: int) -> None:
+        """Send an option once: an answer to each answer would never end."""
+        if (verb, option) not in self._offered:
+            self._offered.add((verb, option))
+            self.replies += telnet.option(verb, option)
+
+    def _request(self, body: bytes) -> Request | None:
+        """The request in a subnegotiation; None: it is answered here, or has no meaning."""
+        found = parsed(body)
+        if found is None or not self.com_port:
+            return None
+        setting, value = found
+        if setting in (Setting.SUSPEND, Setting.RESUME):
+            self._suspended = setting == Setting.SUSPEND
+            self.replies += b"" if self._suspended else self._resumed()
+        elif setting == Setting.SIGNATURE and not value:
+            self.replies += message(setting + REPLY, b"multidrop share")
+        elif setting in (Setting.LINE_MASK, Setting.MODEM_MASK) and len(value) == 1:
+            self.replies += message(setting + REPLY, value)
+        elif setting == Setting.PURGE and len(value) == 1 and 0 < value[0] <= PURGE_BOTH:
+            return Request(setting, value[0])
+        elif Setting.BAUD <= setting <= Setting.CONTROL and len(value) == _LENGTHS.get(Setting(setting), 1):
+            return Request(setting, int.from_bytes(value))
+        return None
+
+    # To the client
+
+    def reply(self, setting: int, value: int) -> None:
+        """Reply to a request with the value that holds now."""
+        self.replies += message(setting + REPLY, value)
+
+    def taken(self) -> bytes:
+        """Take the replies to its negotiation."""
+        replies = bytes(self.replies)
+        self.replies.clear()
+        return replies
+
+    def data(self, data: bytes) -> bytes:
+        """Bytes of the line as this client is sent them; none while it has suspended them."""
+        if self._telnet is not None:
+            data = telnet.escaped(data)
+        if not self._suspended:
+            return data
+        self._held += data
+        return b""
+
+    @property
+    def overflowed(self) -> bool:
+        """Whether it has suspended the flow for too long."""
+        return len(self._held) > HELD
+
+    def _resumed(self) -> bytes:
+        held = bytes(self._held)
+        self._held.clear()
+        return held
+
+    def farewell(self, reason: str) -> bytes:
+        """The reason as the connection is closed: a signature with RFC 2217, else a line."""
+        if self.com_port:
+            return message(Setting.SIGNATURE + REPLY, reason.encode())
+        return f"multidrop share: {reason}\r\n".encode()

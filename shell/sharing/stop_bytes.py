@@ -1,0 +1,65 @@
+"""The stops in what a client sends, for the languages that may be on a line.
+
+A line whose URL names no language may have any of those that are text: their stops differ, and none is a command of
+another one. Where messages carry their length, a byte says nothing by itself: only whole messages are looked at.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+
+from dialects import Diagnostic
+from dialects.families import DEFAULT, FAMILIES, TABLE
+
+KEYS = rb"[\x03\x1b]"
+"""Ctrl+C and ESC, which stop on every line of text."""
+_ENDS = b"\r\n"
+_TEXT = bytes(range(0x20, 0x7F)) + b"\t" + _ENDS
+
+
+@dataclass(frozen=True)
+class StopBytes:
+    """How the stops of a line look, and what makes a half-sent line harmless."""
+
+    pattern: re.Pattern[bytes]
+    framed: bool
+    invalidate: bytes = b""
+
+    def found(self, data: bytes) -> tuple[bytes, bytes, bytes]:
+        """Divide what came in one read: what is before the first stop, the stops, and what follows the last one.
+
+        Bytes between two stops belong to neither, and are left out.
+        """
+        if self.framed:
+            return (b"", data, b"") if self.pattern.fullmatch(data) else (data, b"", b"")
+        matches = [*self.pattern.finditer(data)]
+        if not matches:
+            return data, b"", b""
+        return data[: matches[0].start()], b"".join(each[0] for each in matches), data[matches[-1].end() :]
+
+    def binary(self, data: bytes) -> bool:
+        """Whether bytes of no language of text came in the same read: then no byte of the writer's is a stop."""
+        return not self.framed and bool(self.pattern.sub(b"", data).translate(None, _TEXT))
+
+    def mended(self, stop: bytes) -> bytes:
+        """The stop to write where a line was cut in two: no byte of it may end that line before it is harmless."""
+        if not self.invalidate:
+            return stop
+        keys = any(byte < 0x20 and byte not in _ENDS for byte in stop)
+        return (stop.translate(None, _ENDS) if keys else b"") + self.invalidate + stop
+
+
+def stop_bytes(family: str) -> StopBytes:
+    """The stops of a family's lines; empty: of any language that is text. Raises Diagnostic."""
+    names = [family] if family else [name for name, row in TABLE.items() if not row.scheme]
+    shared = [each for name in names if (each := FAMILIES[name]).stop_bytes is not None]
+    if not shared:
+        valid = "an Ethernet drive takes several clients itself"
+        raise Diagnostic(f"a line of {family} cannot be shared", hint=valid)
+    framed = bool(family) and shared[0].codec.framed
+    found = [each.stop_bytes.pattern for each in shared if each.stop_bytes and each.codec.framed == framed]
+    if framed:
+        return StopBytes(re.compile(b"(?:" + found[0] + b")+", re.DOTALL), True)
+    pattern = re.compile(b"|".join([*found, KEYS]))
+    return StopBytes(pattern, False, FAMILIES[family or DEFAULT].codec.invalidate())

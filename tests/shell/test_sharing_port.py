@@ -1,0 +1,223 @@
+"""A shared pseudo-terminal over real sockets, with plain clients, pyserial's and our own."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import os
+import socket
+import sys
+import termios
+import tty
+from collections.abc import AsyncIterator
+from functools import partial
+from pathlib import Path
+
+import pytest
+import serial
+
+from shell.connect.opening import open_port
+from shell.connect.urls import parse
+from shell.sharing import server
+from shell.sharing.exchange import Say
+from shell.sharing.server import SharedPort
+from shell.sharing.stop_bytes import stop_bytes
+from tests.support.until import until
+from transports import TransportLost
+from transports.rfc2217 import open_rfc2217
+
+pytestmark = [
+    pytest.mark.skipif(sys.platform == "win32", reason="the port is a pseudo-terminal"),
+    pytest.mark.filterwarnings(r"ignore:set(Daemon|Name)\(\):DeprecationWarning"),
+]
+
+
+class Line:
+    """A pseudo-terminal at a link, whose far end a test reads and writes."""
+
+    def __init__(self, link: Path) -> None:
+        self.link = link
+        self.arrived = bytearray()
+        self.open()
+
+    def open(self) -> None:
+        self.far, near = os.openpty()
+        tty.setraw(near)
+        os.set_blocking(self.far, False)
+        self.link.unlink(missing_ok=True)
+        self.link.symlink_to(os.ttyname(near))
+        self._near = near
+
+    def close(self) -> None:
+        os.close(self.far)
+        os.close(self._near)
+
+    async def got(self, data: bytes) -> None:
+        """Wait for bytes at the far end."""
+
+        def read() -> bool:
+            with contextlib.suppress(BlockingIOError):
+                self.arrived += os.read(self.far, 4096)
+            return data in self.arrived
+
+        await until(read, 10)
+        self.arrived.clear()
+
+    @property
+    def baud(self) -> int:
+        return int(termios.tcgetattr(self.far)[4])
+
+
+class Shared:
+    """A shared port, what it has said, and its clients."""
+
+    def __init__(self, port: SharedPort, line: Line, said: list[Say], number: int) -> None:
+        self.port, self.line, self.said, self.number = port, line, said, number
+        self._writers: list[asyncio.StreamWriter] = []
+
+    def events(self) -> list[str]:
+        return [each.event for each in self.said]
+
+    async def client(self) -> tuple[asyncio.StreamReader, asyncio.StreamWriter]:
+        reader, writer = await asyncio.open_connection("127.0.0.1", self.number)
+        self._writers.append(writer)
+        return reader, writer
+
+    async def close(self) -> None:
+        await self.port.close()
+        for each in self._writers:
+            each.close()
+            with contextlib.suppress(OSError):
+                await each.wait_closed()
+        self.line.close()
+
+
+@pytest.fixture
+async def shared(tmp_path: Path) -> AsyncIterator[Shared]:
+    line, said = Line(tmp_path / "tty"), list[Say]()
+    port = SharedPort(await open_port(parse(str(line.link))), stop_bytes(""), said.append)
+    url = await port.open("127.0.0.1", 0)
+    made = Shared(port, line, said, int(url.rpartition(":")[2]))
+    yield made
+    await made.close()
+
+
+async def test_one_writes_all_hear_and_another_is_refused_but_for_its_stop(shared: Shared) -> None:
+    (hears, ada), (listens, bob) = await shared.client(), await shared.client()
+    ada.write(b"PR P\r")
+    await shared.line.got(b"PR P\r")
+    os.write(shared.line.far, b"51200\r\n")
+    assert await hears.readexactly(7) == await listens.readexactly(7) == b"51200\r\n"
+    bob.write(b"\x1b")
+    await shared.line.got(b"\x1b")
+    bob.write(b"MR 1\r")
+    assert b"refused" in await listens.read()  # to the end of the stream
+    bob.write(b"\x1b")
+    await shared.line.got(b"\x1b")
+    ada.close()
+    await until(lambda: shared.events().count("left") == 1)
+    _, eve = await shared.client()
+    eve.write(b"PR V\r")
+    await shared.line.got(b"PR V\r")
+
+
+async def test_pyserial_reads_writes_and_changes_the_baud_rate(shared: Shared) -> None:
+    def work() -> bytes:
+        with serial.serial_for_url(f"rfc2217://127.0.0.1:{shared.number}", baudrate=9600, timeout=5) as port:
+            port.write(bytes(range(256)))
+            port.baudrate = 19200
+            port.send_break(0.001)
+            port.reset_output_buffer()
+            os.write(shared.line.far, bytes(range(256)))
+            assert port.cts is False
+            return bytes(port.read(256))
+
+    assert await asyncio.to_thread(work) == bytes(range(256))
+    await shared.line.got(bytes(range(256)))
+    assert shared.line.baud == termios.B19200
+
+
+async def test_our_own_client_is_told_why_it_is_refused(shared: Shared) -> None:
+    first = await open_rfc2217("127.0.0.1", shared.number)
+    second = await open_rfc2217("127.0.0.1", shared.number)
+    losses, got = list[TransportLost](), bytearray()
+    first.start(got.extend, losses.append)
+    second.start(got.extend, losses.append)
+    assert first.limits == ""
+    await asyncio.to_thread(first.control.set_baud, 38400)
+    assert shared.line.baud == termios.B38400
+    first.write(b"PR P\r")
+    await shared.line.got(b"PR P\r")
+    with pytest.raises(OSError, match=r"does not accept 19200 baud \(it has 38400\)"):
+        await asyncio.to_thread(second.control.set_baud, 19200)
+    second.discard()
+    second.write(b"\x1b")
+    await shared.line.got(b"\x1b")
+    second.write(b"PR V\r")
+    await until(lambda: losses)
+    assert str(losses[0]).startswith(f"{second.name} was lost: refused: 127.0.0.1:")
+    await first.close()
+    await second.close()
+
+
+async def test_a_client_that_does_not_read_is_dropped_and_the_others_are_served(
+    shared: Shared, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(server, "UNREAD", 4096)
+    with socket.create_connection(("127.0.0.1", shared.number)) as deaf:
+        deaf.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 1024)
+        hears, ada = await shared.client()
+        await until(lambda: shared.events().count("connected") == 2)
+        while "dropped" not in shared.events():
+            with contextlib.suppress(BlockingIOError):
+                os.write(shared.line.far, b"x" * 4096)
+            await hears.read(65536)
+        ada.write(b"PR P\r")
+        await shared.line.got(b"PR P\r")
+
+
+async def test_a_writer_that_is_too_far_ahead_of_the_line_is_dropped_and_a_stop_still_passes(
+    shared: Shared, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(server, "AHEAD", 4096)
+    (_, ada), (_, bob) = await shared.client(), await shared.client()
+    ada.write(b"x" * 100_000)
+    await until(lambda: "writes" in shared.events())
+    ada.write(b"x" * 100_000)
+    await until(lambda: "dropped" in shared.events())
+    bob.write(b"\x1b")
+    await shared.line.got(b"\x1b")
+
+
+async def test_a_lost_port_closes_its_clients_and_comes_back(shared: Shared) -> None:
+    hears, _ = await shared.client()
+    shared.line.close()
+    assert b"multidrop share: lost: " in await hears.read()
+    hears, late = await shared.client()
+    assert b"was lost" in await hears.read()
+    late.close()
+    shared.line.open()
+    await until(lambda: "back" in shared.events())
+    _, ada = await shared.client()
+    ada.write(b"PR P\r")
+    await shared.line.got(b"PR P\r")
+
+
+async def test_a_port_that_cannot_be_found_again_ends_it(tmp_path: Path) -> None:
+    line = Line(tmp_path / "tty")
+    port = SharedPort(await open_port(parse(os.ttyname(line._near))), stop_bytes(""), lambda said: None)
+    await port.open("127.0.0.1", 0)
+    line.close()
+    loss = await asyncio.wait_for(port.lost_for_good, 10)
+    assert "was lost" in str(loss)
+    await port.close()
+
+
+async def test_our_stop_from_another_thread_passes_while_the_loop_is_held_up(shared: Shared) -> None:
+    client = await open_rfc2217("127.0.0.1", shared.number)
+    client.start(lambda data: None, lambda loss: None)
+    assert await asyncio.to_thread(partial(client.preempt, False, lambda dropped: b"\x1b"))
+    assert not client.write(b"MR 1\r")
+    client.yielded()
+    await shared.line.got(b"\x1b")
+    await client.close()

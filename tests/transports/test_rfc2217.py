@@ -1,0 +1,217 @@
+"""The client of RFC 2217 against a server in memory that confirms some requests and ignores or refuses others."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable
+
+import pytest
+
+from tests.support.virtual import in_virtual_time
+from transports import Lost, Received, TransportLost, Unreachable, telnet
+from transports.com_port import OPTION, REPLY, Control, Setting, message, parsed
+from transports.rfc2217 import Rfc2217Pipe, negotiated
+
+DTR = (Setting.CONTROL, Control.DTR_ON)
+RTS = (Setting.CONTROL, Control.RTS_ON)
+
+
+class Server:
+    """A server at the other end of a pipe in memory. `late`: replies wait until there are so many, last one first."""
+
+    name = "rfc2217://gateway:2217"
+
+    def __init__(
+        self,
+        ignores: tuple[tuple[int, int] | int, ...] = (),
+        keeps: dict[int, int] | None = None,
+        late: int = 0,
+        option: bytes = telnet.option(telnet.DO, OPTION),
+    ) -> None:
+        self.ignores, self.keeps, self.late, self.option = ignores, keeps or {}, late, option
+        self.data = bytearray()
+        self.asked: list[tuple[int, int]] = []
+        self.options: list[telnet.Option] = []
+        self.unsent = 0
+        self.closed = False
+        self._decoder = telnet.Decoder()
+        self._replies: list[bytes] = []
+
+    def start(self, received: Received, lost: Lost) -> None:
+        self.received, self.lost = received, lost
+
+    def send(self, data: bytes) -> None:
+        """Send to the client byte by byte, in turns of their own."""
+        for each in data:
+            asyncio.get_running_loop().call_soon(self.received, bytes([each]))
+
+    def hang_up(self) -> None:
+        asyncio.get_running_loop().call_soon(self.lost, TransportLost(f"{self.name} was lost: closed"))
+
+    def write(self, data: bytes) -> bool:
+        for event in self._decoder.receive(data):
+            if isinstance(event, telnet.Data):
+                self.data += event.data
+            elif isinstance(event, telnet.Option):
+                self.options.append(event)
+                if (event.verb, event.option) == (telnet.WILL, OPTION):
+                    self.send(self.option)
+            elif isinstance(event, telnet.Subnegotiation) and (found := parsed(event.body)):
+                self._ask(found[0], int.from_bytes(found[1]))
+        return True
+
+    def _ask(self, setting: int, value: int) -> None:
+        self.asked.append((setting, value))
+        if setting in self.ignores or (setting, value) in self.ignores:
+            return
+        self._replies.append(message(setting + REPLY, self.keeps.get(setting, value)))
+        if len(self._replies) >= self.late:
+            self.send(b"".join(reversed(self._replies)))
+            self._replies.clear()
+
+    def discard(self, whole: bool = False) -> int:
+        assert whole, "a cut could be within a message of telnet"
+        dropped, self.unsent = self.unsent, 0
+        return dropped
+
+    async def close(self) -> None:
+        self.closed = True
+
+
+async def opened(server: Server) -> Rfc2217Pipe:
+    return await negotiated(server, 9600)
+
+
+@in_virtual_time
+async def test_opening_takes_no_longer_than_the_replies() -> None:
+    server = Server()
+    pipe = await opened(server)
+    assert asyncio.get_running_loop().time() == 0.0
+    needed = {(Setting.BAUD, 9600), (Setting.DATA_SIZE, 8), (Setting.PARITY, 1), (Setting.STOP_SIZE, 1)}
+    assert needed | {DTR, RTS} <= set(server.asked)
+    assert pipe.limits == "" and pipe.control.baud == 9600
+
+
+@pytest.mark.parametrize(
+    ("ignores", "named"),
+    [((DTR, RTS), "DTR, RTS"), ((DTR,), "DTR"), ((Setting.PURGE,), "a purge"), ((Setting.CONTROL,), "flow control")],
+)
+def test_a_wish_without_an_answer_is_said_once_and_the_port_is_open(
+    ignores: tuple[tuple[int, int] | int, ...], named: str
+) -> None:
+    @in_virtual_time
+    async def test() -> None:
+        pipe = await opened(Server(ignores))
+        remark = pipe.limits
+        assert remark.startswith("the server does not confirm") and named in remark
+
+    test()
+
+
+@pytest.mark.parametrize("late", range(1, 9))
+def test_replies_may_come_in_any_order_and_byte_by_byte(late: int) -> None:
+    @in_virtual_time
+    async def test() -> None:
+        pipe = await opened(Server(late=late))
+        assert bool(pipe.limits) == (8 % late > 0)  # the last replies of some never come
+
+    test()
+
+
+@pytest.mark.parametrize(
+    ("server", "reason"),
+    [
+        (lambda: Server(keeps={Setting.BAUD: 19200}), "the baud rate 9600 (it has 19200); "),
+        (lambda: Server(keeps={Setting.PARITY: 3}), "no parity; "),
+        (lambda: Server((Setting.STOP_SIZE, Setting.DATA_SIZE)), "8 data bits, 1 stop bit; "),
+        (lambda: Server((Setting.BAUD,)), "the baud rate 9600; "),
+    ],
+)
+def test_a_needed_setting_that_is_refused_is_named(server: Callable[[], Server], reason: str) -> None:
+    @in_virtual_time
+    async def test() -> None:
+        refusing = server()
+        with pytest.raises(Unreachable) as caught:
+            await opened(refusing)
+        assert str(caught.value).startswith(f"{refusing.name}: the server does not accept {reason}")
+        assert refusing.closed
+
+    test()
+
+
+@in_virtual_time
+async def test_a_server_of_another_kind_is_said_to_be_one() -> None:
+    server = Server(option=telnet.option(telnet.DONT, OPTION))
+    with pytest.raises(Unreachable, match="does not support RFC 2217; .* use tcp://"):
+        await opened(server)
+
+
+@in_virtual_time
+async def test_what_a_server_says_as_it_closes_the_pipe_is_quoted() -> None:
+    server = Server(option=telnet.option(telnet.DO, OPTION) + b"Port already in use\r\n")
+    server.late = 99
+    opening = asyncio.create_task(opened(server))
+    await asyncio.sleep(0.1)
+    server.hang_up()
+    with pytest.raises(Unreachable, match="the server said 'Port already in use'; closed"):
+        await opening
+
+
+@in_virtual_time
+async def test_options_that_were_not_offered_are_refused_once_each_and_ours_need_no_answer() -> None:
+    echo = telnet.option(telnet.WILL, 1) + telnet.option(telnet.DO, 24) + telnet.option(telnet.WILL, telnet.BINARY)
+    server = Server(option=echo + telnet.option(telnet.WILL, OPTION))
+    await opened(server)
+    answers = [each for each in server.options if each.verb in (telnet.DONT, telnet.WONT)]
+    assert answers == [telnet.Option(telnet.DONT, 1), telnet.Option(telnet.WONT, 24)]
+
+
+@in_virtual_time
+async def test_bytes_go_both_ways_and_those_before_the_start_are_kept() -> None:
+    server, got = Server(), bytearray()
+    pipe = await opened(server)
+    server.send(telnet.escaped(bytes(range(256))))
+    await asyncio.sleep(1)
+    pipe.start(got.extend, lambda loss: None)
+    assert pipe.write(bytes(range(256)) * 3)
+    server.send(b"after")
+    await asyncio.sleep(1)
+    assert got == bytes(range(256)) + b"after"
+    assert server.data == bytes(range(256)) * 3
+
+
+@in_virtual_time
+async def test_a_stop_drops_what_is_unsent_here_and_at_the_server() -> None:
+    server = Server()
+    pipe = await opened(server)
+    server.asked.clear()
+    server.unsent = 7
+    assert pipe.discard() == 7
+    assert pipe.discard(whole=True) == 0
+    assert server.asked == [(Setting.PURGE, 2)]
+
+
+@in_virtual_time
+async def test_a_setting_that_is_refused_or_not_confirmed_is_an_error() -> None:
+    server = Server()
+    pipe = await opened(server)
+    assert await pipe.ask("the baud rate", Setting.BAUD, 19200) == 19200
+    server.ignores = (Setting.CONTROL,)
+    with pytest.raises(OSError, match="does not confirm DTR"):
+        await pipe.ask("DTR", *DTR)
+    server.hang_up()
+    await asyncio.sleep(1)
+    with pytest.raises(OSError, match="was lost"):
+        await pipe.ask("DTR", *DTR)
+
+
+@in_virtual_time
+async def test_a_loss_names_the_reason_that_the_server_gave_last() -> None:
+    server, losses = Server(), list[TransportLost]()
+    pipe = await opened(server)
+    pipe.start(lambda data: None, losses.append)
+    await asyncio.sleep(1)
+    server.send(message(Setting.SIGNATURE + REPLY, b"refused: pc:5000 writes"))
+    server.hang_up()
+    await asyncio.sleep(1)
+    assert list(map(str, losses)) == [f"{server.name} was lost: refused: pc:5000 writes"]

@@ -1,0 +1,125 @@
+"""Telnet as bytes (RFC 854): data, options and subnegotiations, in and out. It has no clock and no socket.
+
+Both ends of RFC 2217 use it: `transports.rfc2217` and `shell.sharing`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+IAC = 0xFF
+SE, IP, SB = 0xF0, 0xF4, 0xFA
+WILL, WONT, DO, DONT = 0xFB, 0xFC, 0xFD, 0xFE
+BINARY, SGA = 0x00, 0x03
+LONGEST = 256
+"""The bytes of a subnegotiation that are kept: no known one is longer, and the other end must not fill the memory."""
+OPPOSITE = {WILL: DO, DO: WILL}
+REFUSAL = {WILL: DONT, DO: WONT}
+
+
+@dataclass(frozen=True)
+class Data:
+    """Bytes of the line."""
+
+    data: bytes
+
+
+@dataclass(frozen=True)
+class Option:
+    """WILL, WONT, DO or DONT, and the option."""
+
+    verb: int
+    option: int
+
+
+@dataclass(frozen=True)
+class Subnegotiation:
+    """The bytes between IAC SB and IAC SE; the first one is the option."""
+
+    body: bytes
+
+
+@dataclass(frozen=True)
+class Interrupt:
+    """IAC IP: a telnet client sends it for Ctrl+C."""
+
+
+Event = Data | Option | Subnegotiation | Interrupt
+
+
+def escaped(data: bytes) -> bytes:
+    """Data as it is sent: each IAC twice."""
+    return data.replace(b"\xff", b"\xff\xff")
+
+
+def option(verb: int, number: int) -> bytes:
+    """The bytes of WILL, WONT, DO or DONT for an option."""
+    return bytes((IAC, verb, number))
+
+
+def subnegotiation(body: bytes) -> bytes:
+    """The bytes of a subnegotiation."""
+    return bytes((IAC, SB)) + escaped(body) + bytes((IAC, SE))
+
+
+class Decoder:
+    """The receiving end, however the bytes are grouped in reads."""
+
+    def __init__(self) -> None:
+        self._plain = bytearray()
+        self._body: bytearray | None = None
+        """The subnegotiation that has begun; None: data."""
+        self._iac = False
+        self._verb = 0
+        self._events: list[Event] = []
+
+    def receive(self, data: bytes) -> list[Event]:
+        """Decode bytes; what is incomplete waits for its rest. Data that came together stays together."""
+        if not (self._iac or self._verb or self._body is not None or IAC in data):
+            return [Data(data)] if data else []
+        for byte in data:
+            self._take(byte)
+        self._flush()
+        events, self._events = self._events, []
+        return events
+
+    def _take(self, byte: int) -> None:
+        if self._verb:
+            self._event(Option(self._verb, byte))
+            self._verb = 0
+        elif self._iac:
+            self._iac = False
+            self._command(byte)
+        elif byte == IAC:
+            self._iac = True
+        else:
+            self._keep(byte)
+
+    def _command(self, byte: int) -> None:
+        """Take the byte after IAC. Commands without a meaning on a line of drives are passed over."""
+        if byte == IAC:
+            self._keep(byte)
+        elif byte == SB:
+            self._body = bytearray()
+        elif byte == SE and self._body is not None:
+            self._event(Subnegotiation(bytes(self._body)))
+            self._body = None
+        elif WILL <= byte <= DONT:
+            self._verb = byte
+        elif byte == IP:
+            self._event(Interrupt())
+
+    def _keep(self, byte: int) -> None:
+        if self._body is None:
+            self._plain.append(byte)
+        elif len(self._body) < LONGEST:
+            self._body.append(byte)
+
+    def _event(self, event: Event) -> None:
+        self._flush()
+        self._events.append(event)
+
+    def _flush(self) -> None:
+        if self._plain:
+            self._events.append(Data(bytes(self._plain)))
+            self._plain.clear()
