@@ -182,8 +182,14 @@ def log_replay(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("file", metavar="FILE", help="a session log; its last session is replayed")
     where = parser.add_mutually_exclusive_group(required=True)
     where.add_argument("--to", metavar="URL", default="", help="what to open")
-    where.add_argument("--against", metavar="CELL", default="", help="a cell file (TOML), which is simulated")
+    where.add_argument(
+        "--against",
+        metavar="CELL",
+        default="",
+        help="a cell file (TOML), in virtual time",
+    )
     parser.add_argument("--fast", action="store_true", help="leave out the pauses between lines")
+    parser.add_argument("--json", action="store_true", help="print one JSON object a difference, and a summary")
     yes(parser)
 
 

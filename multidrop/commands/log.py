@@ -72,12 +72,15 @@ def replay(chosen: argparse.Namespace) -> int:
         return fail(problem)
     from shell.front import batch
     from shell.front.replay import replay as run
+    from shell.front.replay_report import ReplayReport
+    from shell.front.virtual import VirtualLoop
 
     async def body(session: Session) -> None:
-        await run(session, found, fast=chosen.fast)
+        await run(session, found, fast=chosen.fast, positions=bool(chosen.against), report=ReplayReport(chosen.json))
 
-    url = chosen.to or f"sim:{chosen.against}"
-    return batch.run([url], body, agreed=chosen.yes, unsolicited=False, replies=False)
+    url = chosen.to or f"sim:{chosen.against.removeprefix('sim:')}"
+    loop = VirtualLoop if chosen.against else None
+    return batch.run([url], body, agreed=chosen.yes, unsolicited=False, replies=False, loop=loop)
 
 
 def _reported(work: Callable[[], None]) -> int:

@@ -39,6 +39,7 @@ def run(
     unsolicited: bool = True,
     replies: bool = True,
     raw: bool = False,
+    loop: Callable[[], asyncio.AbstractEventLoop] | None = None,
 ) -> int:
     """Open the URLs, await the body, close, and return the exit code (`interrupted` after a signal).
 
@@ -46,7 +47,7 @@ def run(
     with it. `agreed`: every question is answered with yes. `asks`: a question is put to the terminal; otherwise, and
     where there is none, what needs an answer is refused. `unsolicited`: what drives send by themselves is printed.
     `replies`: standard output shows replies; otherwise the body writes there itself. `raw`: the URLs are opened
-    in raw mode. A failure is one line on standard error.
+    in raw mode. `loop` makes the event loop, where it is not the usual one. A failure is one line on standard error.
     """
     try:
         found = settings.load()
@@ -55,9 +56,9 @@ def run(
         return exit_code(failure)
     try:
         make = partial(_session, partial(Session, found, lazy=lazy, reconnect=reconnect, raw=raw), agreed)
-        return asyncio.run(
-            _run(make, Printer(unsolicited=unsolicited, replies=replies), urls, body, watch_keys, interrupted, asks)
-        )
+        printer = Printer(unsolicited=unsolicited, replies=replies)
+        with asyncio.Runner(loop_factory=loop) as runner:
+            return runner.run(_run(make, printer, urls, body, watch_keys, interrupted, asks))
     except KeyboardInterrupt:
         return interrupted
 

@@ -1,13 +1,15 @@
 """A session log, taken again on other drives: the same lines, and where the answers differ.
 
 A number that a drive prints while it may move (after a line that can start it, until a wait or a stop) may be another
-number. It ends at the first difference in an error, and stops at its end what it moved.
+number. It ends at the first difference in an error, and stops at its end what it moved. Against a cell, it compares the
+positions in the log, too, with those of the simulated drives at the same times.
 """
 
 from __future__ import annotations
 
-import sys
-from collections.abc import Mapping, Sequence
+import asyncio
+import contextlib
+from collections.abc import AsyncIterator, Mapping, Sequence
 from datetime import datetime
 from typing import TYPE_CHECKING
 
@@ -15,28 +17,33 @@ from dialects import Diagnostic, DriveError, Stopped
 from shell import waits
 from shell.automation import outcome, settled
 from shell.events import By, Printed, SessionEvent
+from shell.front.replay_report import ReplayReport
 from shell.lines import EVERYONE, join_target
 from shell.log.steps import WORLD, Step, Steps, compared, errors_differ
 from shell.naming import model
-from shell.output import write
 from shell.workspace import LATCHED
 
 if TYPE_CHECKING:
     from drives.bus import Bus
     from drives.drive import Drive
     from shell.session import Session
+    from shell.twins.after import Positions, Reading
 
 
-async def replay(session: Session, found: Steps, *, fast: bool) -> None:
+async def replay(
+    session: Session, found: Steps, *, fast: bool, positions: bool = False, report: ReplayReport | None = None
+) -> None:
     """Take the steps on the open buses; `fast`: without the pauses of the log.
+
+    `positions`: also compare the positions in the log; the drives are simulated.
 
     Raises Diagnostic where the drives do not fit or the person does not agree, DriveError where an answer differs.
     """
-    work = Replay(session, found)
+    work = Replay(session, found, report or ReplayReport())
     await work.agree()
-    differences = await work.run(fast)
+    differences = await work.run(fast, positions and not fast)
     if differences:
-        raise DriveError(f"{differences} of {len(work.steps)} lines gave another answer than in the log")
+        raise DriveError(differences)
     session.automations.interrupt()
     await settled(session)
     for text in outcome(session, session.automations.interrupted):
@@ -46,10 +53,9 @@ async def replay(session: Session, found: Steps, *, fast: bool) -> None:
 class Replay:
     """The steps of a log with the drives that they are for."""
 
-    def __init__(self, session: Session, found: Steps) -> None:
+    def __init__(self, session: Session, found: Steps, report: ReplayReport) -> None:
         """Find the drives. Raises Diagnostic where a bus or a drive of the log has no counterpart."""
-        self._session = session
-        self._found = found
+        self._session, self._found, self._report = session, found, report
         self._simulated = all(name in session.cells for name in session.buses)
         self.steps = [step for step in found.steps if self._simulated or step.text.split()[:1] != [WORLD]]
         self._targets = _targets(session, self.steps)
@@ -89,24 +95,38 @@ class Replay:
                 number += 1
         return number
 
-    async def run(self, fast: bool) -> int:
-        """Take the steps; return the number of differences. Raises DriveError at a difference in an error."""
+    async def run(self, fast: bool, positions: bool) -> str:
+        """Take the steps; return what differs, in words. Raises DriveError at a difference in an error."""
         leave = self._session.subscribe(self._note)
+        measured = self._positions() if positions and self.steps else None
         differences = 0
         began = self._session.now()
         try:
-            for step in self.steps:
-                if not fast:
-                    await waits.sleep(max(0.0, began + _after(self.steps[0].at, step.at) - self._session.now()))
-                differences += await self._step(step)
+            async with _beside(measured, began):
+                for step in self.steps:
+                    if not fast:
+                        await waits.sleep(max(0.0, began + _after(self.steps[0].at, step.at) - self._session.now()))
+                    differences += await self._step(step)
         finally:
             leave()
-        self._session.notify(self._summary(differences), outcome=True)
-        return differences
+            self._report.summary(self._session, len(self.steps), differences, self._uncompared, measured)
+        return self._report.words(len(self.steps), differences, measured)
 
-    def _summary(self, differences: int) -> str:
-        uncompared = f"; {self._uncompared} in motion printed another number" if self._uncompared else ""
-        return f"{len(self.steps)} lines replayed, {differences} differ{uncompared}"
+    def _positions(self) -> Positions:
+        from shell.twins.after import Positions
+
+        targets = {place: drive for place, drive in self._targets.items() if drive.address not in EVERYONE}
+        polls = [each for each in self._found.polls if (each.bus, each.drive) in targets]
+        return Positions(targets, polls, self.steps, self._read, self._report.diverged)
+
+    def _read(self, drive: Drive) -> Reading:
+        """The simulated drive in the part of one, and its time. Raises Diagnostic."""
+        bus = self._session.buses[drive.link.name]
+        cell = self._session.cells[bus.name]
+        shadow = cell.shadow(bus.link.transport.name.rpartition("#")[2], drive.address)
+        if shadow is None:
+            raise Diagnostic("the simulator does not tell where it is", _name(drive))
+        return shadow, cell.now()
 
     async def _step(self, step: Step) -> bool:
         """Take a step; whether its answer differs, which is shown."""
@@ -125,7 +145,7 @@ class Replay:
         text = f"{step.where}: {_name(drive) + ' ' if drive else ''}{step.text}: {difference}"
         if errors_differ(step.failed, failed):
             raise DriveError(text)
-        write(sys.stdout, text)
+        self._report.differs(step, text, difference)
         return True
 
     def _may_move(self, drive: Drive | None, text: str) -> bool:
@@ -160,6 +180,21 @@ class Replay:
     def _note(self, event: SessionEvent) -> None:
         if isinstance(event, Printed):
             self._printed.append(event.text)
+
+
+@contextlib.asynccontextmanager
+async def _beside(positions: Positions | None, began: float) -> AsyncIterator[None]:
+    """Compare positions meanwhile, to the end of the log; an early end ends that, too."""
+    if positions is None:
+        yield
+        return
+    comparing = asyncio.create_task(positions.run(began))
+    try:
+        yield
+        await comparing
+    finally:
+        comparing.cancel()
+        await asyncio.wait([comparing])
 
 
 def _after(first: datetime, at: datetime) -> float:

@@ -14,7 +14,7 @@ from pathlib import Path
 from dialects import Diagnostic
 from dialects.visible import visible
 from shell.lines import WAITS
-from shell.log.entries import BEGIN, Entry
+from shell.log.entries import BEGIN, TRAFFIC, Entry
 from shell.log.files import Line
 from shell.log.show import whole
 from shell.secrets import HIDDEN
@@ -48,6 +48,18 @@ class Step:
 
 
 @dataclass
+class Exchange:
+    """A poll: the bytes that were sent, and those that were received until the next request of the bus."""
+
+    where: str
+    at: datetime
+    bus: str
+    drive: str
+    sent: bytes
+    received: bytes = b""
+
+
+@dataclass
 class Steps:
     """The steps of a session, and what is left out."""
 
@@ -56,6 +68,7 @@ class Steps:
     """Verbs and others that are no steps."""
     unsent: int = 0
     """The lines that were never sent."""
+    polls: list[Exchange] = field(default_factory=list)
 
 
 def read(path: Path) -> Steps:
@@ -82,9 +95,14 @@ class _Reader:
         self._last: dict[tuple[str, str], Step] = {}
         self._newest: Step | None = None
         self._skipped: dict[str, None] = {}
+        self._polls: list[Exchange] = []
+        self._polled: dict[str, Exchange] = {}
+        """The last request of each bus, where that is a poll."""
 
     def take(self, where: str, entry: Entry) -> None:
         place = (entry.bus, entry.drive)
+        if entry.kind in TRAFFIC:
+            self._traffic(where, entry)
         if entry.kind == "typed":
             self._typed(where, entry)
         elif entry.kind == "stop":
@@ -117,6 +135,18 @@ class _Reader:
         elif verb not in RUNS_LINES:
             self._skipped[verb] = None
 
+    def _traffic(self, where: str, entry: Entry) -> None:
+        """Note a poll, and what is received after it."""
+        data = entry.text.encode("latin-1")
+        if entry.kind == "received":
+            if (poll := self._polled.get(entry.bus)) is not None:
+                poll.received += data
+            return
+        self._polled.pop(entry.bus, None)
+        if entry.poll:
+            self._polled[entry.bus] = poll = Exchange(where, entry.time, entry.bus, entry.drive, data)
+            self._polls.append(poll)
+
     def _failed(self, entry: Entry) -> None:
         step = self._last.get((entry.bus, entry.drive)) if entry.drive else self._newest
         if step is not None and not step.printed and not step.failed:
@@ -127,7 +157,7 @@ class _Reader:
         for step in sent:
             if HIDDEN in step.text:
                 raise Diagnostic("holds a secret that the log does not have", step.where, "the log ends before it")
-        return Steps(sent, self._skipped, len(self._steps) - len(sent))
+        return Steps(sent, self._skipped, len(self._steps) - len(sent), self._polls)
 
 
 def compared(step: Step, printed: list[str], failed: str, moving: bool) -> str:

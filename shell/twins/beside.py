@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import Generic, Protocol, TypeVar
 
 from dialects.conditions import Conditions
+from dialects.family import Motion
 from drives.conclusions import Concluded
 from drives.conversations import ASKING
 from drives.drive import Drive
@@ -19,20 +21,94 @@ SWITCHES = {"lim+": "limit+", "lim-": "limit-"}
 """Limits by the function of their lamps."""
 
 
-class Beside:
-    """One drive with its twin. Times are those of the host's clock."""
+class Predicts(Protocol):
+    """The part of a twin that a sample is compared with."""
 
-    def __init__(self, drive: Drive, twin: Twin, begun: float) -> None:
-        self.drive, self.twin, self.begun = drive, twin, begun
+    def motion(self, at: float) -> dict[str, Motion]:
+        """Position and velocity of each axis at a time."""
+
+    def align(self, axis: str, position: int, at: float) -> None:
+        """Set the position of an axis at rest."""
+
+
+T = TypeVar("T", bound=Predicts)
+
+
+class Compared(Generic[T]):
+    """A drive and what predicts its motion, axis by axis."""
+
+    def __init__(self, twin: T) -> None:
+        self.twin = twin
         self.doubtful = ""
         """The last line of which it is not known whether the drive executed it."""
         self.axes: dict[str, Comparison] = {}
         self.differences: dict[str, int] = {}
         """The last difference of each axis."""
-        self._read_at = begun
         self._took = 0.0
         """Seconds from the first to the last request of the last sample."""
         self._limits: dict[str, tuple[str, ...]] = {}
+
+    def velocities(self, at: float) -> dict[str, int]:
+        """The predicted velocity of each axis."""
+        return {axis: motion.velocity for axis, motion in self.twin.motion(at).items()}
+
+    def comparison(self, axis: str) -> Comparison:
+        """The comparison of an axis."""
+        return self.axes.setdefault(axis, Comparison())
+
+    def disturbed(self, at: float) -> None:
+        """Note that something acts on the drive now: the end of a move that is under way depends on the moment."""
+        for axis, velocity in self.velocities(at).items():
+            self.comparison(axis).disturbed(velocity)
+
+    def conditions(self, found: tuple[Conditions, ...]) -> None:
+        """Take the lamps of the drive, which others read."""
+        for each in found:
+            lit = [SWITCHES[lamp.function] for lamp in each.lamps if lamp.on and lamp.function in SWITCHES]
+            self._limits[each.axis] = tuple(lit)
+
+    def sample(self, sample: Sample, rest: int) -> Iterator[TwinEvent]:
+        """Compare a sample with the twin. `rest`: the limit at rest, steps."""
+        expected = self.twin.motion(sample.at).get(sample.axis)
+        if expected is None:  # a motor that the simulated module does not have
+            return
+        pair = Pair(sample.at, sample.position, sample.velocity, expected.position, expected.velocity)
+        axis = self.comparison(sample.axis)
+        self.differences[sample.axis] = pair.difference
+        yield Predicted(sample.at, sample.address, expected.position, expected.velocity, pair.difference, sample.axis)
+        axis.took = self._took
+        verdict = axis.take(pair, rest)
+        if verdict is not None:
+            yield self.news(verdict, axis, sample.address, sample.axis, rest)
+        if axis.rests(rest):
+            self._settle(axis, pair, sample)
+
+    def news(self, verdict: Verdict, comparison: Comparison, address: str, axis: str, rest: int) -> Diverged | Agreed:
+        """Make the event of a verdict; an agreement shows that nothing was lost."""
+        pairs = list(comparison.pairs)
+        if verdict is Verdict.AGREED:
+            self.doubtful = ""
+            return Agreed(pairs[-1].at, address, axis)
+        known = Known(self.doubtful, self._limits.get(axis, ()))
+        first = next((each for each in pairs if abs(each.difference) > comparison.limit(each, rest)), pairs[-1])
+        last = pairs[-1]
+        return Diverged(first.at, address, last.difference, comparison.limit(last, rest), causes(pairs, known), axis)
+
+    def _settle(self, axis: Comparison, pair: Pair, sample: Sample) -> None:
+        """Have the twin take the place of the drive after a move whose end could not be known to the step."""
+        if axis.slack and pair.difference:
+            self.twin.align(sample.axis, sample.position, sample.at)
+        axis.calm()
+
+
+class Beside(Compared[Twin]):
+    """One drive with its twin. Times are those of the host's clock."""
+
+    def __init__(self, drive: Drive, twin: Twin, begun: float) -> None:
+        super().__init__(twin)
+        self.drive, self.begun = drive, begun
+        self._read_at = begun
+        """When the inputs were last read."""
 
     # What reaches the twin
 
@@ -52,61 +128,13 @@ class Beside:
 
     def inputs(self, value: int, at: float) -> None:
         """Take the inputs as they were read; they may have changed at any time since the reading before."""
-        before = self._velocities(at)
+        before = self.velocities(at)
         if self.twin.put(value, at):
             for axis, velocity in before.items():
-                self._comparison(axis).disturbed(velocity, at - self._read_at)
+                self.comparison(axis).disturbed(velocity, at - self._read_at)
         self._read_at = at
 
     def _acts(self, data: bytes, at: float, disturbs: bool = True) -> None:
-        before = self._velocities(at) if disturbs else {}
+        if disturbs:
+            self.disturbed(at)
         self.twin.hear(data, at)
-        for axis, velocity in before.items():
-            if velocity:
-                self._comparison(axis).disturbed(velocity)
-
-    def _velocities(self, at: float) -> dict[str, int]:
-        return {axis: motion.velocity for axis, motion in self.twin.motion(at).items()}
-
-    def _comparison(self, axis: str) -> Comparison:
-        return self.axes.setdefault(axis, Comparison())
-
-    # What is compared
-
-    def conditions(self, found: tuple[Conditions, ...]) -> None:
-        """Take the lamps of the drive, which others read."""
-        for each in found:
-            lit = [SWITCHES[lamp.function] for lamp in each.lamps if lamp.on and lamp.function in SWITCHES]
-            self._limits[each.axis] = tuple(lit)
-
-    def sample(self, sample: Sample, rest: int) -> Iterator[TwinEvent]:
-        """Compare a sample with the twin. `rest`: the limit at rest, steps."""
-        expected = self.twin.motion(sample.at).get(sample.axis)
-        if expected is None:  # a motor that the simulated module does not have
-            return
-        pair = Pair(sample.at, sample.position, sample.velocity, expected.position, expected.velocity)
-        axis = self._comparison(sample.axis)
-        self.differences[sample.axis] = pair.difference
-        yield Predicted(sample.at, sample.address, expected.position, expected.velocity, pair.difference, sample.axis)
-        axis.took = self._took
-        verdict = axis.take(pair, rest)
-        if verdict is not None:
-            yield self.news(verdict, axis, sample.address, sample.axis, rest)
-        if axis.rests(rest):
-            self._settle(axis, pair, sample)
-
-    def news(self, verdict: Verdict, comparison: Comparison, address: str, axis: str, rest: int) -> Diverged | Agreed:
-        """Make the event of a verdict, and forget the doubt that it has settled."""
-        pairs = list(comparison.pairs)
-        if verdict is Verdict.AGREED:
-            return Agreed(pairs[-1].at, address, axis)
-        known = Known(self.doubtful, self._limits.get(axis, ()))
-        first = next((each for each in pairs if abs(each.difference) > comparison.limit(each, rest)), pairs[-1])
-        last = pairs[-1]
-        return Diverged(first.at, address, last.difference, comparison.limit(last, rest), causes(pairs, known), axis)
-
-    def _settle(self, axis: Comparison, pair: Pair, sample: Sample) -> None:
-        """Have the twin take the place of the drive after a move whose end could not be known to the step."""
-        if axis.slack and pair.difference:
-            self.twin.align(sample.axis, sample.position, sample.at)
-        axis.calm()

@@ -10,7 +10,7 @@ import asyncio
 from collections.abc import Callable
 from typing import Protocol
 
-from simulator.family import Connection
+from simulator.family import Connection, Shadow
 from simulator.floor import Floor
 from simulator.wire.baud import BITS_A_BYTE
 
@@ -133,6 +133,13 @@ class RunningFloor:
             return self.floor.command(text, self.now())
         finally:
             self._turn()
+
+    def shadow(self, bus: str, name: str) -> Shadow | None:
+        """The reading of a drive without its wire, up to date; None where the cell has no such drive."""
+        self._turn()
+        found = [each for each in self.floor.drives if each.bus == bus]
+        named = [each for each in found if each.spec.name == name] or (found if len(found) == 1 else [])
+        return named[0].unit.shadow if named else None
 
     def close(self) -> None:
         """Stop the time."""

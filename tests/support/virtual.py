@@ -4,47 +4,13 @@ from __future__ import annotations
 
 import asyncio
 import functools
-import selectors
 from collections.abc import Callable, Coroutine
-from concurrent.futures import Executor, ThreadPoolExecutor, wait
 from typing import Any
+
+from shell.front.virtual import VirtualLoop
 
 LONGEST = 1e6
 """Virtual seconds after which a test has failed."""
-
-
-class _Impatient(selectors.DefaultSelector):
-    """Takes what is ready, and counts how long it would have waited."""
-
-    def __init__(self) -> None:
-        super().__init__()
-        self.skipped = 0.0
-
-    def select(self, timeout: float | None = None) -> list[Any]:
-        ready = super().select(0)
-        if ready or timeout is None:
-            return ready or super().select(timeout)
-        self.skipped += max(0.0, timeout)
-        return ready
-
-
-class VirtualLoop(asyncio.SelectorEventLoop):
-    """Runs an hour of timers in no time. A call in a thread takes none either. Not for sockets."""
-
-    def __init__(self) -> None:
-        self._impatient = _Impatient()
-        super().__init__(self._impatient)
-
-    def time(self) -> float:
-        """Virtual seconds, from 0."""
-        return self._impatient.skipped
-
-    def run_in_executor(self, executor: Executor | None, func: Callable[..., Any], *arguments: Any) -> Any:
-        """Wait for a thread's end here, so that time does not run on meanwhile."""
-        with ThreadPoolExecutor(1) as threads:
-            done = threads.submit(func, *arguments)
-            wait([done])
-        return asyncio.wrap_future(done, loop=self)
 
 
 def in_virtual_time(test: Callable[..., Coroutine[Any, Any, None]]) -> Callable[..., None]:

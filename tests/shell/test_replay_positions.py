@@ -1,0 +1,111 @@
+"""`log replay --against`: the positions in a log beside those of simulated drives."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+from datetime import UTC, datetime, timedelta
+from pathlib import Path
+
+import pytest
+
+from dialects import DriveError
+from shell.front.replay import replay
+from shell.front.replay_report import ReplayReport
+from shell.log.steps import read
+from shell.log.writer import SessionLog
+from tests.support.cell_session import ETHERNET, CellSession, bus, party, pmx
+from tests.support.twin_cell import encoder, run
+
+pytestmark = pytest.mark.virtual
+AT = datetime(2026, 11, 22, tzinfo=UTC)
+
+
+async def recorded(folder: Path, real: str, *lines: str, polled: bool = True) -> Path:
+    """The log of a session on a cell, as the time of its loop has it."""
+    (folder / "then").mkdir()
+    async with CellSession(folder / "then", real) as cell:
+        cell.session.wall = lambda at: AT + timedelta(seconds=at)  # type: ignore[method-assign]
+        cell.session.log = SessionLog(cell.session, folder / "day.log")
+        (line,) = cell.session.buses.values()
+        polls = line.telemetry.subscribe(list(line.drives), 0.1) if polled else None
+        await run(cell, *lines)
+        if polls is not None:
+            polls.close()
+        await asyncio.sleep(0.5)
+    return folder / "day.log"
+
+
+async def replayed(folder: Path, log: Path, simulated: str, as_json: bool = False) -> list[str]:
+    """What a replay against another cell said; it ends with what it raised."""
+    (folder / "now").mkdir()
+    async with CellSession(folder / "now", simulated) as cell:
+        try:
+            await replay(cell.session, read(log), fast=False, positions=True, report=ReplayReport(as_json))
+        except DriveError as failure:
+            return [*cell.told(), str(failure)]
+        return cell.told()
+
+
+MOVES = (
+    "/sleep 0.5",
+    "@a MR 100000",
+    "/sleep 2",
+    "@a SL -30000",
+    "/sleep 1",
+    "@a SL 0",
+    "/sleep 1",
+    "@a MA 0",
+    "/sleep 2",
+)
+
+
+async def test_an_equal_cell_gives_equal_positions(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    real = bus("press", party("a", VM=200000), party("b"))
+    log = await recorded(tmp_path, real, "@a P=777", *MOVES)
+    told = await replayed(tmp_path, log, real)
+    assert capsys.readouterr().out == ""
+    assert any(" lines replayed, 0 differ" in each for each in told)
+    (a,) = [each for each in told if each.startswith("press:a: ")]
+    assert int(a.split()[1]) > 50 and "positions compared, largest difference" in a
+
+
+async def test_a_stall_in_a_log_is_found_with_its_time(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    log = await recorded(tmp_path, bus("press", encoder(world="stall_at = 20000")), "MR 16000", "/sleep 3")
+    told = await replayed(tmp_path, log, bus("press", encoder()), as_json=True)
+    diverged, summary = map(json.loads, capsys.readouterr().out.splitlines())
+    assert diverged["diverged"]["drive"] == "press:a"
+    assert diverged["diverged"]["causes"][0] == "stall"
+    assert AT < datetime.fromisoformat(diverged["diverged"]["time"]) < AT + timedelta(seconds=3)
+    assert summary["summary"]["diverged"] == 1 and summary["summary"]["largest"]["press:a"] > 10000
+    assert told[-1] == "1 of 1 axes were not where the log has them"
+
+
+async def test_typed_positions_are_compared_without_polls(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    lines = ("MR 16000", "/wait stopped", "/sleep 0.3", "PR P", "/sleep 0.3")
+    log = await recorded(tmp_path, bus("press", encoder(world="stall_at = 20000")), *lines, polled=False)
+    told = await replayed(tmp_path, log, bus("press", encoder()))
+    assert "steps from the simulated drive since" in capsys.readouterr().out
+    assert told[-1].endswith("1 of 1 axes were not where the log has them")
+
+
+@pytest.mark.parametrize(
+    ("real", "lines"),
+    [
+        (
+            bus("line", pmx("00")),
+            ("HSPD=20000", "LSPD=1000", "ACC=300", "EO=3", "X30000", "/sleep 3", "Y-5000", "/sleep 2"),
+        ),
+        (bus("eth", ETHERNET, baud=0), ("MR 51200", "/sleep 2")),
+        (bus("mods", 'personality = "TMCM"\nname = "1"'), ("MVP REL, 0, 100000", "/sleep 8")),
+    ],
+    ids=["pmx", "modbus", "tmcl"],
+)
+async def test_polls_of_every_family_are_decoded(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], real: str, lines: tuple[str, ...]
+) -> None:
+    log = await recorded(tmp_path, real, *lines)
+    told = await replayed(tmp_path, log, real)
+    assert capsys.readouterr().out == ""
+    compared = [each for each in told if "positions compared" in each]
+    assert compared and all(int(each.split()[1]) > 10 for each in compared)
