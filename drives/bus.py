@@ -8,7 +8,6 @@ from typing import TypeVar
 
 from dialects import DriveState, Hints, Procedure
 from dialects.families import DEFAULT, FAMILIES
-from drives.conclusions import Witness
 from drives.conversations import Conversations
 from drives.drive import Drive
 from drives.events import BusEvent, Changed
@@ -44,6 +43,8 @@ class Bus:
         self.line = Line(assumed.codec, baud=baud, local_echo=local_echo, timeout=timeout)
         self.link = Link(name, transport, self.line, keeper)
         self._conversations = Conversations(self.link, keeper)
+        self.witnesses = self._conversations.witnesses
+        """Those who hear of every conversation once it is over."""
         self.roster = Roster(self._conversations, assumed)
         self.telemetry = Telemetry(self.roster)
         self._stopping = Stopping(self.roster)
@@ -70,10 +71,6 @@ class Bus:
     def watch(self, watcher: Callable[[BusEvent], None]) -> Callable[[], None]:
         """Publish everything to `watcher` from now on; the function returned ends that."""
         return self.link.watch(watcher)
-
-    def witness(self, witness: Witness) -> Callable[[], None]:
-        """Report every conversation to `witness` once it is over; the function returned ends that."""
-        return self._conversations.witnesses.add(witness)
 
     def notify(self, text: str, address: str = "", warning: bool = False) -> None:
         """Publish a message for the user."""

@@ -49,7 +49,7 @@ class Comparison:
     took: float = 0.0
     """Seconds that the last reading took: its parts are of different times."""
     pairs: deque[Pair] = field(default_factory=lambda: deque(maxlen=KEPT))
-    """From the last that agreed well to the present one."""
+    """From the last two that agreed well to the present one."""
     _doubted: Pair | None = None
     """The first pair that contradicts the state."""
     furthest: Pair | None = None
@@ -65,7 +65,8 @@ class Comparison:
         if self.furthest is None or abs(pair.difference) > abs(self.furthest.difference):
             self.furthest = pair
         if not beyond and self.state is State.AGREE and 2 * abs(pair.difference) <= rest:
-            self.pairs.clear()
+            while len(self.pairs) > 1:
+                self.pairs.popleft()
         self.pairs.append(pair)
         if beyond == (self.state is State.APART):
             self._doubted = None

@@ -40,7 +40,7 @@ class BusTwins:
         self._publish, self._lost = publish, lost
         self._departing = False
         """The bytes of a request are written next."""
-        self._ends: list[Callable[[], None]] = [bus.watch(self._take), bus.witness(self._concluded)]
+        self._ends: list[Callable[[], None]] = [bus.watch(self._take), bus.witnesses.add(self._concluded)]
         self._samples: Subscription[str] | None = None
         self._inputs: Subscription[Value] | None = None
 

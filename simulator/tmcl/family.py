@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dialects.family import Motion
-from dialects.tmcl.manual.parameters import BAUDS
+from dialects.tmcl.manual.parameters import BAUDS, Axis
 from simulator.cell.spec import DriveSpec
 from simulator.family import Family, Place, Shadow, Unit
 from simulator.tmcl import drive_text
@@ -25,10 +25,12 @@ def build(spec: DriveSpec, place: Place) -> Unit:
 
 
 def _shadow(device: TmclModule) -> Shadow:
-    def motion(now: float) -> tuple[Motion, ...]:
-        return (Motion(*device.motion(now)),)
+    motor = device.motor
 
-    return Shadow(lambda: None, motion, lambda _, position, now: device.stand_at(position, now))
+    def motion(now: float) -> tuple[Motion, ...]:
+        return (Motion(motor.read(Axis.ACTUAL_POSITION, now), motor.read(Axis.ACTUAL_VELOCITY, now)),)
+
+    return Shadow(lambda: None, motion, lambda _, position, now: motor.stand_at(position, now))
 
 
 TMCL = Family(

@@ -56,7 +56,7 @@ class TmclModule:
         self.world = world
         self._version_text = version
         self.powered = False
-        self._motor = Motor(world)
+        self.motor = Motor(world)
         self._search: ReferenceSearch | None = None
         self._notify = 0
         self._notices: list[tuple[float, int]] = []
@@ -66,7 +66,7 @@ class TmclModule:
         self._global = {number: row.fresh for number, row in GLOBAL.items()}
         self._global |= {Global.BAUD: code, **module, Global.ADDRESS: address}
         self.power(True, 0.0)
-        self._motor.stand_at(position, 0.0)
+        self.motor.stand_at(position, 0.0)
 
     # -- what the port needs ----------------------------------------------------------------------------------------
 
@@ -99,14 +99,6 @@ class TmclModule:
             return self._notices[0][0]
         at = self._next_event(self._now)
         return None if at == inf else at
-
-    def motion(self, now: float) -> tuple[int, int]:
-        """Actual position and velocity at a time that it has lived up to."""
-        return self._motor.read(Axis.ACTUAL_POSITION, now), self._motor.read(Axis.ACTUAL_VELOCITY, now)
-
-    def stand_at(self, position: int, now: float) -> None:
-        """Give the present place of the motor this position."""
-        self._motor.stand_at(position, now)
 
     def notices(self) -> list[tuple[float, int]]:
         """Times and motor masks of targets reached since this was last asked (command 138)."""
@@ -148,8 +140,8 @@ class TmclModule:
         self._notices.clear()
         if on:
             self.world.powered_up(now)
-            self._motor.parameters.update(self._axis)
-        self._motor.power(on, now)
+            self.motor.parameters.update(self._axis)
+        self.motor.power(on, now)
 
     def supply(self, on: bool, now: float) -> None:
         """Do nothing: the module has one supply."""
@@ -195,17 +187,17 @@ class TmclModule:
         """Set a parameter that starts a motion; it ends a reference search."""
         _in_range(AXIS[parameter], value)
         self._search = None
-        self._motor.write(parameter, value, now)
+        self.motor.write(parameter, value, now)
 
     def _move(self, call: Call, now: float) -> int:
         if call.type not in (Move.ABS, Move.REL):
             raise Refused(Status.WRONG_TYPE)
         self._search = None
         if call.type == Move.ABS:
-            self._motor.go(call.value, now)
+            self.motor.go(call.value, now)
         else:
-            self._motor.go_by(call.value, now)
-        return self._motor.read(Axis.TARGET_POSITION, now)
+            self.motor.go_by(call.value, now)
+        return self.motor.read(Axis.TARGET_POSITION, now)
 
     def _reference(self, call: Call, now: float) -> int:
         if call.type not in tuple(Search):
@@ -213,10 +205,10 @@ class TmclModule:
         if call.type == Search.STATUS:
             return int(self._search is not None)
         if call.type == Search.START:
-            self._search = ReferenceSearch(self._motor, self._motor.parameters[Axis.SEARCH_MODE], now)
+            self._search = ReferenceSearch(self.motor, self.motor.parameters[Axis.SEARCH_MODE], now)
         elif self._search is not None:
             self._search = None
-            self._motor.rotate(0, now)
+            self.motor.rotate(0, now)
         return 0
 
     def _axis_parameter(self, call: Call, now: float) -> int:
@@ -225,21 +217,21 @@ class TmclModule:
             raise Refused(Status.WRONG_TYPE)
         match call.command:
             case Command.GAP:
-                return self._motor.read(call.type, now)
+                return self.motor.read(call.type, now)
             case Command.SAP:
                 if not row.writable:
                     raise Refused(Status.WRONG_TYPE)
                 _in_range(row, call.value)
                 if call.type in STARTERS:
                     self._search = None
-                self._motor.write(call.type, call.value, now)
+                self.motor.write(call.type, call.value, now)
                 return call.value
         if call.type not in self._axis:
             raise Refused(Status.WRONG_TYPE)
         if call.command == Command.STAP:
-            self._axis[call.type] = self._motor.parameters[call.type]
+            self._axis[call.type] = self.motor.parameters[call.type]
         else:
-            self._motor.write(call.type, self._axis[call.type], now)
+            self.motor.write(call.type, self._axis[call.type], now)
         return 0
 
     def _global_parameter(self, call: Call) -> int:
@@ -279,19 +271,19 @@ class TmclModule:
     # -- time -------------------------------------------------------------------------------------------------------
 
     def _next_event(self, after: float) -> float:
-        return min((at for at in self._motor.events(after) if at > after), default=inf)
+        return min((at for at in self.motor.events(after) if at > after), default=inf)
 
     def _live(self, t: float) -> None:
         if not self.powered:
             return
         if self._search is None:
-            self._motor.live(t)
+            self.motor.live(t)
         else:
-            self._motor.shaft.settle(t)
+            self.motor.shaft.settle(t)
             self._search.live(t)
             if not self._search.running:
                 self._search = None
-        if self._notify and self._motor.positioning and self._motor.reached(t):
+        if self._notify and self.motor.positioning and self.motor.reached(t):
             self._notices.append((t, self._notify))
             self._notify = 0
 

@@ -111,7 +111,7 @@ def test_a_search_ends_at_the_edge_of_its_switch(mode, world):
     module.rest()
     assert (module.ask("RFS STATUS, 0"), module.ask("GAP 1, 0"), module.ask("GAP 0, 0")) == (0, 0, 0)
     edge = 300 if mode == 3 else -20000
-    assert abs(module.device._motor.shaft.position(module.now) - edge) < 2
+    assert abs(module.device.motor.shaft.position(module.now) - edge) < 2
     if mode == 2:
         assert abs(module.ask("GAP 196, 0") - 30000) < 3
 
