@@ -283,10 +283,15 @@ class MultidropApp(Actions):
             self.call_after_refresh(self._begin)  # the first frame is shown before anything is opened
         elif not self.session.buses:
             await self.opener.ask()
+            self.run_worker(self.assist.prepare())
         self.keyboard.start()
 
     def _begin(self) -> None:
-        self.run_worker(self.opener.open_all(self.urls))
+        self.run_worker(self._open())
+
+    async def _open(self) -> None:
+        await self.opener.open_all(self.urls)
+        await self.assist.prepare()
 
     def on_unmount(self) -> None:
         """Keep copies of texts that are not saved, and end the subscriptions of the screen."""
@@ -371,8 +376,9 @@ class MultidropApp(Actions):
     def _raise_banner(self) -> None:
         row = self.presenter.banner(self.size.width)
         for screen in self.screen_stack:
-            for banner in screen.query(Banner):
-                banner.show(row)
+            for part in screen.children:
+                if isinstance(part, Banner):
+                    part.show(row)
 
     def on_resize(self, event: events.Resize) -> None:
         """Report a terminal that is too small; poll again, as a wide one has a panel."""

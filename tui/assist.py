@@ -9,6 +9,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple, Protocol
 
+from dialects.on_demand import imported
 from shell.drafts import Drafts
 from tui.text import ago
 
@@ -17,6 +18,8 @@ if TYPE_CHECKING:
     from shell.session import Session
 
 
+ANY_LETTER = "P"
+"""A text to complete and to explain, which imports what that needs."""
 LATELY = 5
 """Number of URLs opened lately that are offered."""
 
@@ -90,6 +93,9 @@ class Assist:
     def drafts(self) -> Drafts | None:
         """The copies of texts that were not saved; None: none are kept."""
         return None
+
+    async def prepare(self) -> None:
+        """Import what the first typed letter needs, before it is typed."""
 
 
 class ShellAssist(Assist):
@@ -172,6 +178,12 @@ class ShellAssist(Assist):
     def drafts(self) -> Drafts | None:
         """The copies in the folder of the state."""
         return Drafts(self._settings.state)
+
+    async def prepare(self) -> None:
+        """Import it in a thread; the rest depends on the drive and is less."""
+        await asyncio.to_thread(imported, "shell.front.complete:complete")
+        self.hint(ANY_LETTER)
+        self.complete(ANY_LETTER)
 
 
 def _ports(state: Path) -> list[StartEntry]:

@@ -13,7 +13,7 @@ FRAMES = 30
 """Paints a second, at most."""
 PANELS = 3
 """Frames of which one paints all."""
-AGEING = 0.5
+AGEING = 1.0
 """Seconds between two paints while nothing happens."""
 
 

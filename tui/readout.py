@@ -197,6 +197,11 @@ class Readout:
             if axis.last is not None and axis.last.velocity == 0:
                 axis.travel.learn(each, axis.last.position)
 
+    def recurs(self, event: Conditioned) -> bool:
+        """True if conditions say what those before said, which were not outdated yet."""
+        known = [axis.conditions for axis in self.axes if axis.conditions is not None]
+        return known == list(event.conditions) and event.at - self.conditioned_at < 2 * max(self.watched, 1.0)
+
     def note(self, event: Sample | Silent | Conditioned) -> None:
         """Take what a bus has read."""
         if isinstance(event, Sample):

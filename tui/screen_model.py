@@ -118,6 +118,8 @@ class ScreenModel:
         inner = event.event
         if isinstance(inner, Sample):
             return self.bus(event.bus).readout(inner.address).repeats(inner)
+        if isinstance(inner, Conditioned):
+            return self.bus(event.bus).readout(inner.address).recurs(inner)
         if isinstance(inner, Predicted):
             return self.bus(event.bus).readout(inner.address).predicted(inner)
         return isinstance(inner, Traffic | Sent | Ended)

@@ -42,6 +42,12 @@ async def main():
         app = MultidropApp(session, ["sim:"], ShellAssist(session, settings))
         begin(session)
         await app.run_async(headless=True, size=(120, 40))
+    await session.open("sim:#press")
+    await app.assist.prepare()
+    before = set(sys.modules)
+    for text in ("M", "PR V", "/"):
+        app.assist.hint(text), app.assist.complete(text)
+    print(*set(sys.modules) - before)
     await session.close()
 asyncio.run(main())
 """
@@ -55,14 +61,15 @@ LATER = {
 
 
 @pytest.mark.process
-def test_the_first_frame_imports_no_page_no_family_and_no_simulator(tmp_path):
+def test_the_first_frame_imports_no_page_no_family_and_no_simulator_and_the_first_letter_nothing(tmp_path):
     child = [sys.executable, "-c", CHILD]
     done = subprocess.run(child, capture_output=True, text=True, timeout=60, cwd=tmp_path, env=environment(tmp_path))
-    modules, footer = (done.stdout.splitlines() or [done.stderr, ""])[:2]
+    modules, footer, *letter = done.stdout.splitlines() or [done.stderr, ""]
     imported = set(modules.split())
     assert "tui.app" in imported, done.stderr
     assert sorted(imported & LATER) == []
     assert "STOP ALL" in footer  # all was painted before anything was opened
+    assert letter == [""], done.stderr
 
 
 @pytest.mark.tui
@@ -77,3 +84,22 @@ async def test_the_style_sheet_is_read_once_at_the_start_and_again_for_other_col
         app.theme = "multidrop-light"
         await pilot.pause()
         assert read == [1]
+
+
+@pytest.mark.tui
+async def test_what_the_first_letter_needs_is_made_ready_once_lines_are_open(monkeypatch):
+    ready = []
+    app = make_app(demo_session(), "sim:")
+
+    async def opened(urls):
+        ready.append("opened")
+
+    async def prepare():
+        ready.append("prepared")
+
+    monkeypatch.setattr(app.opener, "open_all", opened)
+    monkeypatch.setattr(app.assist, "prepare", prepare)
+    async with app.run_test(size=(80, 24)) as pilot:
+        await pilot.pause()
+        await app.workers.wait_for_complete()
+        assert ready == ["opened", "prepared"]

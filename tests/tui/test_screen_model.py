@@ -3,7 +3,7 @@
 import pytest
 
 from dialects.conditions import Conditions
-from drives.events import Sample, Silent, Traffic, Unsolicited
+from drives.events import Conditioned, Sample, Silent, Traffic, Unsolicited
 from shell.events import (
     Agreed,
     By,
@@ -186,6 +186,17 @@ def test_only_what_shows_something_new_is_a_reason_to_paint(model: ScreenModel) 
     assert not screen.quiet(OnBus("press", Unsolicited(1.5, ("tick",))))
     screen.take(Entered(1.6, "MR 5", By.OPERATOR, "press", "a"))
     assert not screen.quiet(OnBus("press", at_rest._replace(at=1.7))), "it is known to stand again"
+
+
+def test_conditions_that_recur_are_not_a_reason_to_paint_unless_they_were_outdated(model: ScreenModel) -> None:
+    read = Conditioned(1.0, "a", (Conditions("x"), Conditions("y")))
+    assert not model.quiet(OnBus("press", read))
+    model.take(OnBus("press", read))
+    assert model.quiet(OnBus("press", read._replace(at=2.0)))
+    assert not model.quiet(OnBus("press", read._replace(at=9.0)))
+    assert not model.quiet(
+        OnBus("press", read._replace(at=2.0, conditions=(Conditions("x"), Conditions("y", error=84))))
+    )
 
 
 def predicted(at: float, velocity: int, difference: int, axis: str = "") -> OnBus:

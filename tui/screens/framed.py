@@ -7,6 +7,7 @@ from typing import ClassVar
 
 from textual.screen import Screen
 
+from tui.widgets.compositor import FrontCompositor
 from tui.widgets.footer import Footer
 from tui.widgets.lines import Lines
 from tui.widgets.topline import TopLine
@@ -22,6 +23,7 @@ class Framed(Screen[None]):
 
     def __init__(self) -> None:
         super().__init__()
+        self._compositor = FrontCompositor()
         # Stored, not looked up: they are painted thirty times a second, and also while the app ends.
         self._parts: dict[str, Lines] = {"top": TopLine(id="top"), "footer": Footer(id="footer")}
 

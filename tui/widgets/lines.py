@@ -106,7 +106,10 @@ class Lines(Widget):
 
     def _make_strip(self, row: Row, width: int) -> Strip:
         segments = [Segment(visible(text), self.style_of(role)) for text, role in row]
-        return Strip(segments).adjust_cell_length(width, self.style_of("text"))
+        room = width - sum(cell_len(segment.text) for segment in segments)
+        if room < 0:
+            return Strip(segments).crop(0, width)
+        return Strip([*segments, Segment(" " * room, self.style_of("text"))] if room else segments, width)
 
     def shown(self) -> Sequence[Row]:
         """The rows, from the top of the widget. Other rows are another object."""
