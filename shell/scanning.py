@@ -19,7 +19,7 @@ from shell import jobs
 from shell.connect.opening import BAUDED
 from shell.connect.urls import Connection
 from shell.found import FoundDrive, port_of
-from transports import TransportLost
+from transports import Remote, Transport, TransportLost
 
 if TYPE_CHECKING:
     from drives.bus import Bus
@@ -30,6 +30,8 @@ SLOWEST = 0.2
 """The longest time for which a network's reply is waited, s; `timeout=` in the URL replaces it."""
 TURNS = {"tcp": 1.0, "ssh": 0.25}
 """The part of the time of an opening that a question and its reply take, at most, over a network."""
+SPREAD, JITTER = 2.0, 0.02
+"""Over a network, a reply may take this many times as long as the measured one, and this time, s, more."""
 PLACE = 0
 BYTES = 20
 """The mean size of the questions to one address, bytes; for the estimate."""
@@ -217,11 +219,11 @@ class Scanning:
         reach = self._reach()
         return stage.scan.places(reach) * (reach.window + BYTES * 10 / (stage.baud or 1_000_000))
 
-    def _reach(self, took: float = 0.0, hasty: bool = False) -> Reach:
-        """The manner of the search. `took`: the time that the port took to open, s: over a network, replies do too."""
+    def _reach(self, distance: float = 0.0, hasty: bool = False) -> Reach:
+        """The manner of the search. `distance`: the time of the network to a drive and back, s."""
         scheme, window = self._connection.scheme, self._connection.timeout or WINDOW
         if self._connection.timeout is None:
-            window += min(took * TURNS.get(scheme, 0.0), SLOWEST)
+            window += distance
         return Reach(window=window, alone=scheme == "udp", hasty=hasty)
 
     # One stage
@@ -233,7 +235,8 @@ class Scanning:
         for connection in self._forms(stage):
             began = self._workspace.now()
             buses = await self._opener(connection, self._named)
-            reach = self._reach(self._workspace.now() - began, hasty)
+            took = self._workspace.now() - began
+            reach = self._reach(_distance(buses[0].bus.link.transport, connection.scheme, took), hasty)
             async with AsyncExitStack() as open_:
                 for each in buses:
                     await open_.enter_async_context(self._adopted(each))
@@ -324,3 +327,10 @@ def listed(stages: Iterable[Stage]) -> str:
         by_family.setdefault(each.scan.title, []).extend([str(each.baud)] if each.baud else [])
     parts = [f"{title} at {', '.join(bauds)} baud" if bauds else title for title, bauds in by_family.items()]
     return " and ".join(parts)
+
+
+def _distance(transport: Transport, scheme: str, took: float) -> float:
+    """The time that a network takes to a drive and back, s; `took`: the time of the opening, s."""
+    if isinstance(transport, Remote):
+        return SPREAD * transport.round_trip + JITTER
+    return min(took * TURNS.get(scheme, 0.0), SLOWEST)

@@ -114,3 +114,12 @@ class Limited(Protocol):
     @property
     def limits(self) -> str:
         """What it cannot do, for a person who opens it."""
+
+
+@runtime_checkable
+class Remote(Protocol):
+    """A transport that has measured how far its port is."""
+
+    @property
+    def round_trip(self) -> float:
+        """The time to the far side and back, s."""

@@ -153,8 +153,11 @@ class RelayEndpoint:
     def explain(self, error: OSError | None) -> str:
         """Reason of a break in one line for a person."""
         self._lost = True
-        why = "" if error is None else error.strerror or str(error)
-        return self._reason or self._connection.last_words() or why or "the connection has ended; check the network"
+        ours = str(error) if error is not None and error.errno is None else ""
+        why = error.strerror if error is not None and error.strerror else "the connection has ended"
+        return (
+            self._reason or ours or self._connection.last_words() or f"{why}; check the network and the other machine"
+        )
 
     def end(self) -> None:
         """Have nobody wait for an outcome any more."""
@@ -178,11 +181,14 @@ class RelayEndpoint:
 class RelayPipe(DescriptorPipe):
     """A transport over a relay. Room comes with a report of the far side, not with the descriptor."""
 
-    def __init__(self, connection: Connection, baud: int, early: bytes = b"") -> None:
+    def __init__(self, connection: Connection, baud: int, early: bytes = b"", round_trip: float = 0.0) -> None:
+        """`early`: bytes that arrived behind the greeting."""
+        self.round_trip = round_trip
+        """The time to the far side and back, s."""
         self._relay = RelayEndpoint(connection, early)
         super().__init__(self._relay, RelayControl(self._relay, self._send_frame, baud))
-        self._asked = 0
-        """Number of signs of life sent."""
+        self._answered = self._missed = 0
+        """Replies to signs of life by the last one, and signs of life in turn that had none."""
         self._beat: asyncio.TimerHandle | None = None
         self._show_life()
 
@@ -190,10 +196,11 @@ class RelayPipe(DescriptorPipe):
         """Send a sign of life, or break the pipe where the far side has stopped to reply."""
         if not self._usable:
             return
-        if self._reading and self._asked - self._relay.answered >= MISSED:
-            self._break(OSError(f"the far side has not replied for {MISSED * BEAT:g} s"))
+        replied = self._relay.answered > self._answered or not self._reading
+        self._answered, self._missed = self._relay.answered, 0 if replied else self._missed + 1
+        if self._missed >= MISSED:
+            self._break(OSError(f"the far side has not replied for {MISSED * BEAT:g} s; check the network"))
             return
-        self._asked += 1
         self._beat = self._loop.call_later(BEAT, self._show_life)
         self._send_frame(frame(Kind.BEAT))
 

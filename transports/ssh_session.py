@@ -20,7 +20,7 @@ from typing import IO
 from transports.base import Transport, Unreachable
 from transports.descriptor import DescriptorPipe
 from transports.far_port import FarPort
-from transports.relay_frames import GREETING
+from transports.relay_frames import GREETING, Frames, Garbled, Kind, frame
 from transports.relay_pipe import RelayPipe
 from transports.ssh_command import SOCAT_WORD, arguments, reason, unknown_greeting
 
@@ -50,6 +50,7 @@ class SshSession:
     def __init__(self, far: FarPort, baud: int, way: str) -> None:
         self.name = far.name
         self._socket, theirs = socket.socketpair()
+        self._heard = 0
         self._words: IO[bytes] = tempfile.TemporaryFile()  # noqa: SIM115
         try:
             with theirs:
@@ -92,9 +93,13 @@ class SshSession:
     def last_words(self) -> str:
         """The last line that ssh or the far side has printed."""
         size = os.fstat(self._words.fileno()).st_size
-        text = os.pread(self._words.fileno(), _READ, max(0, size - _READ)).decode(errors="replace")
+        text = os.pread(self._words.fileno(), _READ, max(self._heard, size - _READ)).decode(errors="replace")
         lines = [" ".join(line.split()) for line in text.splitlines() if line.strip()]
         return _PREFIX.sub("", lines[-1])[:400] if lines else ""
+
+    def mark(self) -> None:
+        """Count what was printed until now as no reason of an end."""
+        self._heard = os.fstat(self._words.fileno()).st_size
 
     def status(self, within: float) -> int | None:
         """Wait for the exit status; None: it runs on."""
@@ -149,7 +154,7 @@ class SocatEndpoint:
     def explain(self, error: OSError | None) -> str:
         """Reason of a break in one line for a person."""
         self._lost = True
-        return self._session.last_words() or "the connection has ended; check the network"
+        return self._session.last_words() or "the connection has ended; check the network and the other machine"
 
     def close(self) -> None:
         """End ssh."""
@@ -168,10 +173,25 @@ async def greeted(session: SshSession, far: FarPort, baud: int, way: str) -> Tra
     """Wait for the greeting, and make the transport that it asks for. Raises Unreachable."""
     line, early = await _greeting(session, far, way)
     if line == GREETING:
-        return RelayPipe(session, baud, early)
+        early, took = await _measured(session, early)
+        return RelayPipe(session, baud, early, took)
     if (status := await asyncio.to_thread(session.status, _SETTLE)) is not None:
         raise Unreachable(f"{far.name}: {reason(far, status, session.last_words(), way)}")
+    session.mark()
     return SocatPipe(SocatEndpoint(session), LIMITS.format(host=far.host))
+
+
+async def _measured(session: SshSession, early: bytes) -> tuple[bytes, float]:
+    """Ask for a sign of life; return all bytes that have arrived by its reply, and the time that it took, s."""
+    frames, began = Frames(), time.monotonic()
+    session.mark()
+    session.write(frame(Kind.BEAT))
+    with contextlib.suppress(Garbled):  # which the pipe reports
+        replied = any(kind is Kind.BEAT for kind, _ in frames.take(early))
+        while not replied and (data := await session.read_some()):
+            early += data
+            replied = any(kind is Kind.BEAT for kind, _ in frames.take(data))
+    return early, time.monotonic() - began
 
 
 async def _greeting(session: SshSession, far: FarPort, way: str) -> tuple[str, bytes]:

@@ -33,7 +33,7 @@ PasswordAuthentication no
 KbdInteractiveAuthentication no
 PermitRootLogin yes
 SetEnv PATH={path}
-LogLevel DEBUG1
+LogLevel ERROR
 """
 
 

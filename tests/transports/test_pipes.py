@@ -567,6 +567,20 @@ async def test_rfc2217_sets_the_rate_of_the_far_port() -> None:
         await asyncio.to_thread(each.transport.control.set_break, False)
 
 
+async def test_a_relay_sets_the_rate_of_the_far_port_and_names_a_refusal() -> None:
+    async with rig("relay") as each:
+        each.start()
+        assert isinstance(each.transport, Controllable) and (control := each.transport.control) is not None
+        await asyncio.to_thread(control.set_baud, 38400)
+        assert termios.tcgetattr(each.far.descriptor)[4:6] == [termios.B38400] * 2
+        assert control.baud == 38400
+        with pytest.raises(OSError):
+            await asyncio.to_thread(control.set_baud, 2**32 - 1)
+        assert control.baud == 38400
+        await asyncio.to_thread(control.set_break, True)
+        await asyncio.to_thread(control.set_break, False)
+
+
 async def test_a_socket_has_no_settings_of_a_serial_port() -> None:
     async with rig("tcp") as each:
         assert isinstance(each.transport, Controllable) and each.transport.control is None
