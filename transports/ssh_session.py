@@ -15,7 +15,6 @@ import subprocess
 import sys
 import tempfile
 import time
-from typing import IO
 
 from transports.base import Transport, Unreachable
 from transports.descriptor import DescriptorPipe
@@ -49,22 +48,24 @@ class SshSession:
 
     def __init__(self, far: FarPort, baud: int, way: str) -> None:
         self.name = far.name
-        self._socket, theirs = socket.socketpair()
         self._heard = 0
-        self._words: IO[bytes] = tempfile.TemporaryFile()  # noqa: SIM115
-        try:
-            with theirs:
-                self._process = subprocess.Popen(
-                    arguments(far, baud, way),
-                    stdin=theirs.fileno(),
-                    stdout=theirs.fileno(),
-                    stderr=self._words,
-                    start_new_session=True,
-                )
-        except OSError as error:
-            self._release()
-            why = "install OpenSSH's client" if isinstance(error, FileNotFoundError) else error.strerror
-            raise Unreachable(f"{far.name}: the program ssh cannot be started; {why}") from error
+        with contextlib.ExitStack() as failing:
+            try:
+                self._socket, theirs = socket.socketpair()
+                failing.enter_context(self._socket)
+                self._words = failing.enter_context(tempfile.TemporaryFile())
+                with theirs:
+                    self._process = subprocess.Popen(
+                        arguments(far, baud, way),
+                        stdin=theirs.fileno(),
+                        stdout=theirs.fileno(),
+                        stderr=self._words.fileno(),
+                        start_new_session=True,
+                    )
+            except OSError as error:
+                why = "install OpenSSH's client" if error.filename == "ssh" else error.strerror or str(error)
+                raise Unreachable(f"{far.name}: the program ssh cannot be started; {why}") from error
+            failing.pop_all()
         self._socket.setblocking(False)
 
     async def read_some(self) -> bytes:
@@ -95,7 +96,7 @@ class SshSession:
         size = os.fstat(self._words.fileno()).st_size
         text = os.pread(self._words.fileno(), _READ, max(self._heard, size - _READ)).decode(errors="replace")
         lines = [" ".join(line.split()) for line in text.splitlines() if line.strip()]
-        return _PREFIX.sub("", lines[-1])[:400] if lines else ""
+        return _PREFIX.sub("", lines[-1])[:400].rstrip(".") if lines else ""
 
     def mark(self) -> None:
         """Count what was printed until now as no reason of an end."""
