@@ -143,9 +143,9 @@ class Actions(ViewActions):
         else:
             await self.questions.macro_name(lambda name: self.action_run_line(f"/record {name}"))
 
-    async def action_twin(self) -> None:
-        """Run a twin beside each drive of the selected bus, or end the twins."""
-        await self.action_run_line("/twin off" if self.model.bus("").twinned else "/twin on")
+    def action_twin(self) -> None:
+        """Type the line that runs a twin beside each drive of the selected bus, or ends the twins."""
+        self.outbox.type("/twin off" if self.model.bus("").twinned else "/twin on")
 
     async def action_log(self) -> None:
         """Begin the session log, or end it."""

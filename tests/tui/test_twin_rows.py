@@ -75,8 +75,11 @@ def test_a_twin_that_ended_is_not_shown() -> None:
     session = demo_session()
     ended = OnBus("press", TwinEnded(session.time, "a"))
     shown = view(session, *beside(session.time, 0, 0, 8112), apart(session), ended)
-    text = plain(*drive_rows(shown, 45, 20), *narrow_rows(shown, 80), *plot_rows(shown, 60, 20))
+    text = plain(*drive_rows(shown, 45, 20), *narrow_rows(shown, 80))
     assert "twin" not in text and "≠" not in text and trouble_mark(shown.model.bus("press"), ["a"], False) == ""
+    assert "a gantry twin at rest at 8,112" in plain(*plot_rows(shown, 60, 20)), "it was there in the time shown"
+    session.time += 21
+    assert "twin" not in plain(*plot_rows(view(session, *beside(session.time - 21, 0, 0, 8112)), 60, 20))
 
 
 def test_a_prediction_that_is_not_renewed_is_dim() -> None:
@@ -164,15 +167,15 @@ def test_a_plot_has_a_curve_of_the_twin_beside_that_of_the_drive() -> None:
 
 def test_a_narrow_plot_names_its_lines_in_the_title() -> None:
     session = demo_session()
-    assert "velocity a gantry steps/s ⠤⠤ drive ⠄⠄ twin" in plain(*plot_rows(view(session, *a_run(session)), 45, 20))
+    assert "velocity a gantry steps/s ⠤⠤ drive ⠄ ⠠ twin" in plain(*plot_rows(view(session, *a_run(session)), 45, 20))
     session.plotted = (Series("press", "a"), Series("press", "b"))
     two = plain(*plot_rows(view(session, *a_run(session), *a_run(session, "b")), 60, 20))
-    assert "a gantry ⠄⠄ a twin" in two
+    assert "velocity steps/s ⠤⠤ a gantry ⠄⠄ b clamp ⠄ ⠠ twins" in two
 
 
 @pytest.mark.parametrize("ink", [BRAILLE, BLOCK, ASCII], ids=lambda ink: ink.name)
 def test_without_colours_a_twin_is_told_apart(ink: Ink) -> None:
-    assert len({ink.sample(number) for number in (0, TWINS)}) == 2
+    assert ink.sample(TWINS) not in {ink.sample(number) for number in range(TWINS)}
     session = demo_session()
     shown = view(session, *a_run(session, ahead=5_000_000))
     shown.model.look.ink = ink

@@ -48,7 +48,8 @@ class Ink:
             return _mark(series) * 2
         middle = self.tall // 2
         if series >= TWINS:
-            shown = [1 << middle if x % 2 == 0 else 0 for x in range(2 * self.wide)]
+            ends = (0, 3 * self.wide - 1)
+            shown = [1 << middle if x in ends else 0 for x in range(3 * self.wide)]
         else:
             shown = [1 << middle if self.dots(series, x, middle, middle) else 0 for x in range(2 * self.wide)]
         cells = (shown[n : n + self.wide] for n in range(0, len(shown), self.wide))

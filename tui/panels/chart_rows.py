@@ -112,9 +112,10 @@ def _line_ends(view: View, shown: Shown, scale: Scale, rows: int, room: int) -> 
     ends: dict[int, tuple[Span, ...]] = {}
     for place, ((row, _), line, value_span) in enumerate(found[:rows]):
         free = min(max(row, max(ends, default=-1) + 1), rows - len(found[:rows]) + place)
-        left = room - len(value_span[0]) - 5
+        sample = look.ink.sample(line.stroke)
+        left = room - len(value_span[0]) - len(sample) - 3
         name = line.shown if len(line.shown) <= left else fit(line.short, left).rstrip()
-        ends[free] = ((f" {look.ink.sample(line.stroke)} {name} ", role_of(line.number)), value_span)
+        ends[free] = ((f" {sample} {name} ", role_of(line.number)), value_span)
     return ends
 
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from tui.curves.chart import Chart, Extent
+from tui.curves.ink import Ink
 from tui.curves.look import Look
 from tui.curves.window import Window
 from tui.panels.chart_rows import AXIS, Shown, chart_rows, columns_of, gutter, shown_number, time_row
@@ -39,17 +40,21 @@ def _title(view: View, group: Group, width: int) -> list[Span]:
     unit = group.lines[0].unit
     row: list[Span] = [(f" {group.title} ", "strong"), (f"{unit} " if unit else "", "dim")]
     if len(group.lines) > 1 and not gutter(width):
-        ink = view.model.look.ink
-        names = _names(group)
-        row += [(f"{ink.sample(line.stroke)} {names[line]} ", role_of(line.number)) for line in group.lines]
+        row += _legend(view.model.look.ink, group)
     return row
 
 
-def _names(group: Group) -> dict[Line, str]:
-    """The names of the lines below a title that names the drive, if there is only one."""
-    if len({line.name for line in group.lines}) > 1:
-        return {line: line.short if line.twin else line.name for line in group.lines}
-    return {line: "twin" if line.twin else "drive" for line in group.lines}
+def _legend(ink: Ink, group: Group) -> list[Span]:
+    """Pieces of the lines with their names; under a title that names the only drive: `drive` and `twin`."""
+    own = [line for line in group.lines if not line.twin]
+    twins = [line for line in group.lines if line.twin]
+    names = [line.name for line in own] if len(own) > 1 else ["drive"]
+    row = [(f"{ink.sample(line.stroke)} {name} ", role_of(line.number)) for line, name in zip(own, names, strict=True)]
+    if twins:
+        samples = " ".join(dict.fromkeys(ink.sample(line.stroke) for line in twins))
+        role = role_of(twins[0].number) if len(own) == 1 else "dim"
+        row.append((f"{samples} {'twin' if len(twins) == 1 else 'twins'} ", role))
+    return row
 
 
 def _span_words(look: Look) -> str:

@@ -46,7 +46,8 @@ class Line(NamedTuple):
     @property
     def short(self) -> str:
         """The same without the name that a person gave."""
-        return self.name.partition(" ")[0] + " twin" * self.twin
+        where, axis = self.name.partition(" ")[0], self.quantity.axis
+        return " ".join(filter(None, (where, axis if axis != where else "", "twin" if self.twin else "")))
 
 
 class Group(NamedTuple):
@@ -77,18 +78,19 @@ def groups(view: View) -> list[Group]:
                 unit = _unit(view, bus, address, axis) + PLOTTED.get(each, "") if word in ("", DIFFERENCE) else ""
                 lines = found.setdefault((each, name if view.model.look.apart else ""), [])
                 lines.append(Line(name, Quantity(bus, address, axis, each), unit, number))
-                if not word and _twinned(view, bus, address, axis):
-                    lines.append(Line(name, Quantity(bus, address, axis, PREDICTED[each]), unit, number, twin=True))
+                if not word and _recent(view, predicted := Quantity(bus, address, axis, PREDICTED[each])):
+                    lines.append(Line(name, predicted, unit, number, twin=True))
     order = sorted(found, key=lambda key: list(PLOTTED).index(key[0]) if key[0] in PLOTTED else 9)
     if view.model.look.apart:
         order = sorted(order, key=lambda key: min(line.number for line in found[key]))
     return [Group(*key, tuple(found[key])) for key in order if key[0] not in view.model.look.hidden]
 
 
-def _twinned(view: View, bus: str, address: str, axis: str) -> bool:
-    """Whether a twin of the axis runs."""
-    axes = view.model.bus(bus).readout(address).axes
-    return any(each.axis == axis and each.twin is not None and each.twin.predicted is not None for each in axes)
+def _recent(view: View, predicted: Quantity) -> bool:
+    """Whether a twin has predicted in the time that is shown, also one that has ended since."""
+    look, trace = view.model.look, view.model.traces.get(predicted)
+    end = view.now if look.paused_at is None else look.paused_at
+    return trace is not None and trace.at[-1] >= end - look.span
 
 
 def _name(view: View, bus: str, address: str, axis: str) -> str:

@@ -140,7 +140,7 @@ def _panel_row(glance: Glance, now: float, width: int) -> Row:
         (f"{position:>{NUMBER}} ", "text" if role == "strong" else role),
     ]
     room = width - width_of(row)
-    text, text_role = _besides(glance.readout, now, room, live=role != "dim")
+    text, text_role = _besides(glance.readout, now, room - 1, live=role != "dim")
     if text.startswith("→"):
         text = to_go_words(glance.readout, now)
     elif text.startswith(SIGN):
