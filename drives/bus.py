@@ -154,6 +154,7 @@ class Bus:
         """
         if self.link.reserved and not release:
             self.link.resumed()
+            self._stopping.unasked()
             self.link.publish(Changed(self.now()))
             return
         if ends := [each.over for each in self._conversations.under_way]:

@@ -71,6 +71,12 @@ class Stopping:
         self._publish(halt)
         if not self._link.away:
             self._begin_to_confirm(halt)
+        elif self._link.reserved:
+            self.unasked()
+
+    def unasked(self) -> None:
+        """Count the stops as done, on a line where no drive can be asked: a later loss writes none of them again."""
+        self._unconfirmed.clear()
 
     # After a loss
 

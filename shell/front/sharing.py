@@ -25,7 +25,8 @@ from transports.sockets import explain
 
 AGAIN = 10.0
 """Seconds for which a client that tries again and again is refused without another line."""
-_REPEATED = ("connected", "left", "refused")
+_SENT_AWAY = ("refused", "lost")
+_REPEATED = ("connected", "left", *_SENT_AWAY)
 EXPOSED = "other computers can move the drives at {}; they need no password. 127.0.0.1 keeps them out"
 
 
@@ -93,7 +94,7 @@ class Narrator:
     def __init__(self, as_json: bool) -> None:
         self._as_json = as_json
         self._refused: dict[str, float] = {}
-        """The hosts whose clients were refused, and when that was said."""
+        """The hosts whose clients were sent away, and when that was said."""
 
     def ready(self, name: str, endpoint: str) -> None:
         """Print where clients connect, as `multidrop sim` does."""
@@ -119,9 +120,9 @@ class Narrator:
         write(sys.stdout, json.dumps(fields))
 
     def _repeated(self, event: Say, now: float) -> bool:
-        """Whether a client is refused again and again, as one that connects again by itself is."""
+        """Whether clients of a host are sent away again and again, as one that connects again by itself is."""
         host = event.client.rpartition(":")[0]
-        again = event.event in _REPEATED and now < self._refused.get(host, -AGAIN) + AGAIN
-        if event.event == "refused" and not again:
+        again = bool(host) and event.event in _REPEATED and now < self._refused.get(host, -AGAIN) + AGAIN
+        if host and event.event in _SENT_AWAY and not again:
             self._refused = {host: now, **{each: at for each, at in self._refused.items() if now < at + AGAIN}}
         return again

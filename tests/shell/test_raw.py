@@ -97,6 +97,32 @@ async def test_the_stop_is_that_of_the_family_in_the_url_and_says_so(tmp_path):
 
 
 @in_virtual_time
+async def test_a_stop_that_was_written_is_not_written_again_when_the_line_comes_back(tmp_path):
+    async with opened(tmp_path, reconnect=True) as shop:
+        for when in ("before the loss", "during the loss"):
+            if when == "before the loss":
+                shop.session.stop("Ctrl+X")
+                await asyncio.sleep(1.0)
+            await replugged(shop, stop=when == "during the loss")
+            owed = shop.written("line").count(b"\x1b\x05") > 0
+            assert owed == (when == "during the loss")
+        await replugged(shop)
+        assert shop.written("line") == b""
+
+
+async def replugged(shop, stop=False):
+    """Unplug the line, and plug it in; forget what was written before."""
+    shop.world("/sim unplug line")
+    await asyncio.sleep(1.0)
+    shop.events.clear()
+    if stop:
+        shop.session.stop("Ctrl+X")
+    shop.world("/sim plug line")
+    await asyncio.sleep(5.0)
+    assert shop.session.buses["line"].lost is None
+
+
+@in_virtual_time
 async def test_raw_off_finds_the_drives_and_raw_on_takes_the_line_back(tmp_path):
     async with opened(tmp_path, party("a"), party("b"), query="?drives=a,b") as shop:
         await say(shop, "/raw end lf")
