@@ -136,7 +136,8 @@ class Rfc2217Pipe:
 
     def _check(self) -> None:
         if self._loss is not None:
-            raise self._refused(str(self._loss).removeprefix(f"{self.name} was lost: "))
+            reason = str(self._loss).removeprefix(f"{self.name} was lost: ")
+            raise self._refused("try again once it is free" if self._early else reason)
 
     def _refused(self, reason: str) -> Unreachable:
         said = self._early.decode("latin-1").strip()[:QUOTED]

@@ -1,7 +1,7 @@
 """One client of a shared port as bytes: raw, or telnet with the com port option (RFC 2217).
 
 The first byte that a client sends decides: IAC begins telnet, any other one means that it negotiates nothing. Such a
-client is sent no byte that is not a drive's, except for the reason as it is refused.
+client is sent no byte that is not a drive's: a program would take a reason for a reply.
 """
 
 from __future__ import annotations
@@ -149,7 +149,7 @@ class Client:
         return held
 
     def farewell(self, reason: str) -> bytes:
-        """The reason as the connection is closed: a signature with RFC 2217, else a line."""
+        """The reason as the connection is closed: a signature with RFC 2217, a line for a telnet terminal."""
         if self.com_port:
             return message(Setting.SIGNATURE + REPLY, reason.encode())
-        return f"multidrop share: {reason}\r\n".encode()
+        return f"multidrop share: {reason}\r\n".encode() if self._telnet is not None else b""

@@ -104,6 +104,8 @@ class Exchange:
         """The last stop came from another client within a line of the writer."""
         self._skipping = False
         """What is left of that line is dropped."""
+        self._away = ""
+        """The reason why the port is lost; empty: it is open."""
         self._actions: list[Action] = []
 
     @property
@@ -156,6 +158,17 @@ class Exchange:
             self._say(self.writer, "silent", "another client may write")
             self.writer = None
 
+    def lose(self, reason: str) -> list[Action]:
+        """Close all connections: the port is lost. Until `back`, a client is closed as soon as it sends anything."""
+        self._away = reason
+        for client in tuple(self.clients):
+            self._close(client, "lost", reason)
+        return self._done()
+
+    def back(self) -> None:
+        """Take clients again."""
+        self._away = ""
+
     # From the drives
 
     def printed(self, data: bytes) -> list[Action]:
@@ -174,10 +187,14 @@ class Exchange:
         self._release(now)
         known = self.clients[client]
         for each in known.receive(data):
+            if self._away:
+                continue
             if isinstance(each, Request):
                 self._request(client, each)
             else:
                 self._bytes(client, each, now)
+        if self._away:
+            self._close(client, "lost", self._away)
         if not known.refused and (replies := known.taken()):
             self._actions.append(Send(client, replies))
         return self._done()
@@ -189,8 +206,8 @@ class Exchange:
             before, stop, rest = data, b"", b""
         if stop:
             self._cut = others and self._mid_line and not self.framed
-            self._say(client, "stop", stop.hex(" "))
             self._actions.append(Stop(stop, self._stops.mended(stop)))
+            self._say(client, "stop", stop.hex(" "))
             if others:
                 before, rest = before.strip(_ENDS), rest.strip(_ENDS)
             elif lost := len(data) - len(stop) - len(rest):

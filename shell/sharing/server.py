@@ -89,9 +89,7 @@ class SharedPort:
         self._connections[self._number] = connection
         self._left.clear()
         self._do(self._exchange.connect(self._number, name))
-        if self._loss is not None:
-            self._do(self._exchange.close(self._number, "lost", str(self._loss)))
-        elif len(self._exchange.clients) > CLIENTS:
+        if len(self._exchange.clients) > CLIENTS:
             self._do(self._exchange.close(self._number, "refused", f"{CLIENTS} clients are connected"))
         return self._number
 
@@ -175,8 +173,7 @@ class SharedPort:
 
     def _broke(self, loss: TransportLost) -> None:
         self._loss = loss
-        for number in tuple(self._exchange.clients):
-            self._do(self._exchange.close(number, "lost", str(loss)))
+        self._do(self._exchange.lose(str(loss)))
         self._narrate(Say("", "lost", str(loss)))
         if self._port.reopen is not None:
             self._begin(self._return())
@@ -198,6 +195,7 @@ class SharedPort:
             else:
                 self._loss, self._purged = None, 0
         self._transport.start(self._received, self._broke)
+        self._exchange.back()
         self._narrate(Say("", "back", self._transport.name))
 
     def _begin(self, work: Coroutine[Any, Any, None]) -> None:

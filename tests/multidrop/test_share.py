@@ -31,10 +31,7 @@ def test_it_serves_says_who_writes_and_ends_well_on_a_signal(tmp_path: Path) -> 
             writer.sendall(b"\naPR VM\n")
             assert writer.recv(1) == other.recv(1)  # of a checksummed drive's NAK
             other.sendall(b"MR 51200\r")
-            said = b""
-            while data := other.recv(999):
-                said += data
-            assert b"refused: 127.0.0.1:" in said
+            assert other.recv(999) == b""
         running.process.send_signal(signal.SIGINT)
         assert running.end() == 0
     finally:

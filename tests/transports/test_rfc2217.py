@@ -153,7 +153,7 @@ async def test_what_a_server_says_as_it_closes_the_pipe_is_quoted() -> None:
     opening = asyncio.create_task(opened(server))
     await asyncio.sleep(0.1)
     server.hang_up()
-    with pytest.raises(Unreachable, match="the server said 'Port already in use'; closed"):
+    with pytest.raises(Unreachable, match="the server said 'Port already in use'; try again once it is free"):
         await opening
 
 
