@@ -21,12 +21,9 @@ def add(parser: argparse.ArgumentParser) -> None:
         default=DEFAULT_PERSONALITY,
         help=f"the drive that programs are for, unless the editor names one (default: {DEFAULT_PERSONALITY})",
     )
-    parser.add_argument(
-        "--tcp",
-        metavar="[HOST:]PORT",
-        type=_address,
-        help="serve one client there (default: standard input and output)",
-    )
+    where = parser.add_mutually_exclusive_group()
+    where.add_argument("--tcp", metavar="[HOST:]PORT", type=_address, help="serve one client there")
+    where.add_argument("--stdio", action="store_true", help="serve standard input and output, as without it")
 
 
 def _address(text: str) -> tuple[str, int]:

@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
-from typing import NamedTuple
+from functools import partial
+from math import inf
+from typing import NamedTuple, TypeVar
 
 from dialects.families import program_languages
 from dialects.problems import Problem
 from shell.program_text import ProgramGrammar, ProgramText
+from shell.threads import in_thread
 
+T = TypeVar("T")
 DELAY = 0.25
 """Seconds without a change after which a text is checked."""
 
@@ -29,7 +32,8 @@ Publish = Callable[[Document | str, list[Problem]], None]
 class Documents:
     """The open documents. `publish` gets the problems of a document; for the URI of a closed one, none.
 
-    One thread checks texts, one after the other: the loop answers meanwhile. A text that changed is not published.
+    One thread at a time checks a text: the loop answers meanwhile, and the process may end. The problems of a text that
+    changed are not published.
     """
 
     def __init__(self, publish: Publish, product: str, delay: float = DELAY) -> None:
@@ -37,7 +41,8 @@ class Documents:
         self._open: dict[str, Document] = {}
         self._grammars: dict[str, ProgramGrammar] = {}
         self._checks: dict[str, asyncio.Task[None]] = {}
-        self.thread = ThreadPoolExecutor(1, "check")
+        self._turn = asyncio.Lock()
+        self._work: set[asyncio.Task[object]] = set()
 
     def find(self, uri: str) -> Document | None:
         """Return an open document. A file that no client opened is not read."""
@@ -60,11 +65,22 @@ class Documents:
         if self._open.pop(uri, None) is not None:
             self._publish(uri, [])
 
-    def end(self) -> None:
-        """End the checks."""
-        for uri in list(self._checks):
-            self._cancel(uri)
-        self.thread.shutdown(wait=False, cancel_futures=True)
+    async def beside(self, work: Callable[[], T]) -> T:
+        """Do slow work in a thread, after what was begun before. A caller that goes leaves it to its end."""
+        task: asyncio.Task[T] = asyncio.get_running_loop().create_task(self._in_turn(work))
+        self._work.add(task)
+        task.add_done_callback(self._ended)
+        return await asyncio.shield(task)
+
+    def _ended(self, task: asyncio.Task[T]) -> None:
+        """Forget work that ended; a failure is the caller's, if there still is one."""
+        self._work.discard(task)
+        if not task.cancelled():
+            task.exception()
+
+    async def _in_turn(self, work: Callable[[], T]) -> T:
+        async with self._turn:
+            return await in_thread(work, inf, "check of a text")
 
     def _take(self, uri: str, text: str, version: int | None, delay: float) -> None:
         document = Document(uri, version, ProgramText(text, self._grammars[uri], self.product))
@@ -78,15 +94,16 @@ class Documents:
 
     async def _check(self, document: Document, delay: float) -> None:
         await asyncio.sleep(delay)
-        problems = await asyncio.get_running_loop().run_in_executor(self.thread, _problems, document.text)
+        problems = await self.beside(partial(self._problems, document))
         if self._open.get(document.uri) is document:
             self._publish(document, problems)
 
-
-def _problems(text: ProgramText) -> list[Problem]:
-    """Return the problems of a text; its names are known first, as hover and completion need them soon."""
-    _ = text.names
-    return list(text.problems)
+    def _problems(self, document: Document) -> list[Problem]:
+        """Return the problems of a text; its names are known first, as hover and completion need them soon."""
+        if self._open.get(document.uri) is not document:  # it changed while another text was checked
+            return []
+        _ = document.text.names
+        return list(document.text.problems)
 
 
 def _language(language_id: str) -> str:

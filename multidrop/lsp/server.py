@@ -6,7 +6,6 @@ without a name or a word, is replied with nothing. A `Diagnostic` becomes an err
 
 from __future__ import annotations
 
-import asyncio
 from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Protocol
@@ -221,9 +220,8 @@ class Server:
         if document is None:
             return None
         first, last = _lines(params, len(document.text.lines))
-        loop = asyncio.get_running_loop()
         try:
-            edits = await loop.run_in_executor(self.documents.thread, document.text.formatted, first, last)
+            edits = await self.documents.beside(partial(document.text.formatted, first, last))
         except Diagnostic as problem:
             self._show(str(problem))
             return None

@@ -94,8 +94,6 @@ def serve(product: str, tcp: tuple[str, int] | None) -> int:
             asyncio.run(_stdio(server) if tcp is None else serve_port(server, *tcp))
         except SystemExit as end:
             return int(end.code or 0)
-        finally:
-            server.documents.end()
     return 1
 
 

@@ -22,17 +22,10 @@ from shell.program_text import Edit, ProgramGrammar, ProgramText
 from simulator.cell.spec import DriveSpec, WorldSpec
 from simulator.lexium.device import MCodeDevice
 from simulator.world import World
+from tests.support.program_texts import TEXTS
 from tests.support.sample_files import MCODE, PMX, product_of
 
 FILES = ("a.mxt", "a.prg")
-WORDS = st.sampled_from(
-    ["LB G1", "VA Q1=5", "mr q1", "BR G1,Q1<3", "brg1", "vaq1", "PG 1", "PG", "E", "TI=1,G1", 'PR "Q1 \'', "' Q1", "H5",
-     "PRG 0", "SUB 3", "GOSUB 3", "IF V1<3", "ELSE", "ENDIF", "XV1YV2", "V1=V2+1", "; V1", "END", "WHILE V1=", "😀",
-     "DN Q", "\t", " ", "\x85", "\u2028", "\x1a", "\ud800"]
-)  # fmt: skip
-TEXTS = st.lists(st.tuples(WORDS, st.sampled_from(["\n", "\r\n", "\r", " ", ""])), max_size=12).map(
-    lambda parts: "".join(word + end for word, end in parts)
-) | st.text(max_size=60)
 PLACES = st.integers(0, 30)
 
 

@@ -100,7 +100,6 @@ async def editing(
         assert errors == []
     finally:
         over.set()
-        server.documents.end()
         for writer in writers:
             writer.close()
         await asyncio.gather(*tasks, return_exceptions=True)
