@@ -77,7 +77,8 @@ class DescriptorPipe(Pipe):
     @property
     def pending(self) -> int:
         """Number of bytes that the system has not taken yet."""
-        return sum(map(len, self._pending))
+        with self._guard:
+            return sum(map(len, self._pending))
 
     def discard(self, whole: bool = False) -> int:
         """Drop what waits here and what the system can give back; `whole`: only writes that have not begun."""

@@ -77,7 +77,8 @@ class ThreadedPipe(Pipe):
     @property
     def pending(self) -> int:
         """Number of bytes that the writing thread has not taken yet."""
-        return sum(map(len, tuple(self._queue)))
+        with self._turn:
+            return sum(map(len, self._queue))
 
     def discard(self, whole: bool = False) -> int:
         """Drop what is queued and what this machine holds, and tell the other end to do the same if it can.

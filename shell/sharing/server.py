@@ -132,7 +132,7 @@ class SharedPort:
             elif isinstance(action, Stop):
                 self._stop(action)
             elif isinstance(action, Purge):
-                self._purged += self._drop()
+                self._purge()
             else:
                 self._begin(self._apply(action))
 
@@ -150,13 +150,15 @@ class SharedPort:
         self._transport.write(action.data)
 
     def _stop(self, action: Stop) -> None:
-        dropped, self._purged = self._drop() + self._purged, 0
-        self._transport.write(action.mended if dropped else action.data)
-
-    def _drop(self) -> int:
         dropped = self._transport.discard(whole=self._exchange.framed)
+        self._transport.write(action.mended if dropped or self._purged else action.data)
+        self._purged = 0
         self._do(self._exchange.dropped(dropped))
-        return dropped
+
+    def _purge(self) -> None:
+        dropped = self._transport.discard(whole=self._exchange.framed)
+        self._purged += dropped
+        self._do(self._exchange.dropped(dropped))
 
     async def _apply(self, action: Set) -> None:
         """Change a setting, in a thread, for the call may block. A port without settings takes any."""
