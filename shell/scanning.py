@@ -97,6 +97,7 @@ class Scanning:
         self._report = report
         self._done = 0
         self._searched_before: dict[Stage, None] = {}
+        self._said: set[str] = set()
 
     async def run(self, bauds: Sequence[int], everything: bool) -> None:
         """Search. `bauds`: only these; `everything`: do not end with the first stage that finds a drive.
@@ -200,6 +201,9 @@ class Scanning:
         """Have a stop reach a bus, and close it in the end."""
         bus = opened.bus
         self._workspace.adopt(opened, PLACE)
+        if opened.limits and opened.limits not in self._said:
+            self._said.add(opened.limits)
+            self._warn(self.port, [opened.limits])
         try:
             yield bus
         finally:

@@ -12,9 +12,6 @@ from typing import TypeVar
 
 from transports.base import Unreachable
 
-if sys.platform != "win32":
-    from transports.serial_posix import lock_owner
-
 T = TypeVar("T")
 
 
@@ -59,10 +56,9 @@ def _nothing(port: str) -> str:
 
 
 def _owner(port: str) -> str:
-    if sys.platform == "win32":
-        return "another program"
-    else:
-        return lock_owner(port) or "another program"
+    from transports.holders import holder
+
+    return holder(port) or "another program"
 
 
 def _group(port: str) -> str:

@@ -40,8 +40,11 @@ _HINTS = (
     ("connection refused", "no ssh server listens there; check the port's number and the server"),
     ("timed out", "check the address, its power and the network"),
     ("no route to host", "check the address, its power and the network"),
+    ("flock(", "another program has the port; close it there"),
+    ("no such file", "plug it in there, or look at /dev/serial/by-id there"),
+    ("inappropriate ioctl", "it is not a serial port"),
 )
-"""What to do, by a part of the last line of ssh."""
+"""What to do, by a part of the last line of ssh or of socat."""
 
 
 def arguments(far: FarPort, baud: int, way: str = "") -> list[str]:
@@ -87,10 +90,12 @@ def reason(far: FarPort, status: int | None, words: str, way: str = "") -> str:
         lacking = f"{way} is not" if way else "neither multidrop nor socat is"
         also = f" ({words})" if words else ""
         return f"{lacking} installed on {far.host}{also}; install {way or RELAY} there"
+    found = next((hint for part, hint in _HINTS if part in words.lower()), "")
+    hint = f"; {found.format(login=far.login)}" if found else ""
     if status in (255, None):
-        found = next((hint for part, hint in _HINTS if part in words.lower()), "")
-        hint = f"; {found.format(login=far.login)}" if found else ""
         return f"not reached: {words or 'ssh ended without a word'}{hint}"
     if status < 0:
         return f"ssh was ended by signal {-status}"
-    return words or f"the far side ended with status {status}; try `ssh {far.login} multidrop relay {far.path}`"
+    if words:
+        return words + hint
+    return f"the far side ended with status {status}; try `ssh {far.login} multidrop relay {far.path}`"
