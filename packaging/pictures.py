@@ -139,6 +139,15 @@ async def program(hand: Hand) -> None:
     await hand.look(1.0)
 
 
+async def twin(hand: Hand) -> None:
+    """A drive is pushed while it moves beside its twin."""
+    await hand.line("EE=1")
+    await hand.line("/twin on a", 6.0)
+    await hand.line("VM=20000")
+    await hand.line("MR 60000", 1.6)
+    await hand.line("/sim push a -20000", 0.9)
+
+
 SCENES: dict[str, Picture] = {
     "demo-80x24": Picture(SMALL, work),
     "demo-120x40": Picture(LARGE, work),
@@ -150,6 +159,7 @@ SCENES: dict[str, Picture] = {
     "controls-80x24": Picture(SMALL, page("controls")),
     "macros-80x24": Picture(SMALL, macros),
     "program-120x40": Picture(LARGE, program),
+    "twin-120x40": Picture(LARGE, twin),
 }
 
 
