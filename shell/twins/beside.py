@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from math import copysign
 from typing import Generic, Protocol, TypeVar
 
 from dialects.conditions import Conditions
@@ -17,6 +18,10 @@ from shell.twins.comparing import Comparison, Verdict
 from shell.twins.taken import reading_took, taken
 from shell.twins.twin import Twin
 
+DRIFT = 0.005
+"""The part of the time by which a program may run faster or slower than in the twin."""
+LONGEST = 30.0
+"""Seconds without a steady move whose drift is made good at once, at most."""
 SWITCHES = {"lim+": "limit+", "lim-": "limit-"}
 """Limits by the function of their lamps."""
 
@@ -109,6 +114,25 @@ class Beside(Compared[Twin]):
         self.drive, self.begun = drive, begun
         self._read_at = begun
         """When the inputs were last read."""
+        self._in_step_at = begun
+
+    def sample(self, sample: Sample, rest: int) -> Iterator[TwinEvent]:
+        """Compare a sample with the twin, and keep the twin in step."""
+        yield from super().sample(sample, rest)
+        if (comparison := self.axes.get(sample.axis)) is not None:
+            self._keep_step(comparison)
+
+    def _keep_step(self, comparison: Comparison) -> None:
+        """Shift the twin's time a little where a drive is ahead or behind at an equal velocity: its program's lines
+        take another time than the simulator's. No shift changes where the two rest.
+        """
+        if not comparison.steady:
+            return
+        before, pair = list(comparison.pairs)[-2:]
+        most = DRIFT * min(pair.at - self._in_step_at, LONGEST)
+        late = pair.difference / copysign(pair.fastest, pair.predicted - before.predicted)
+        self.twin.shift(max(-most, min(most, late)))
+        self._in_step_at = pair.at
 
     # What reaches the twin
 

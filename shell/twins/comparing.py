@@ -82,6 +82,14 @@ class Comparison:
         self._doubted = None
         return Verdict.DIVERGED if self.state is State.APART else Verdict.AGREED
 
+    @property
+    def steady(self) -> bool:
+        """Whether both move, agree, and are equally fast in the last two readings."""
+        last = list(self.pairs)[-2:]
+        if len(last) < 2 or self._doubted is not None or self.state is State.APART:
+            return False
+        return all(each.velocity and each.equally_fast for each in last) and last[0].predicted != last[1].predicted
+
     def rests(self, rest: int) -> bool:
         """Whether both stand where they should, so that the uncertainty of the last move is over."""
         last = list(self.pairs)[-2:]

@@ -13,7 +13,7 @@ from dialects.snapshots import Snapshot
 from drives.bus import Bus
 from drives.conclusions import Concluded
 from drives.drive import Drive
-from drives.events import BusEvent, Conditioned, Lost, Sample, Sent, Traffic, Valued
+from drives.events import BusEvent, Changed, Conditioned, Lost, Sample, Sent, Traffic, Valued
 from drives.keeping import GLOBAL
 from drives.readings import Value
 from drives.subscriptions import Subscription
@@ -41,10 +41,17 @@ class BusTwins:
         self._departing = False
         """The bytes of a request are written next."""
         self._ends: list[Callable[[], None]] = [bus.watch(self._take), bus.witnesses.add(self._concluded)]
+        self._polled: list[str] = []
+        """The addresses that are read."""
         self._samples: Subscription[str] | None = None
         self._inputs: Subscription[Value] | None = None
 
     # Drives
+
+    @property
+    def drives(self) -> list[Drive]:
+        """The drives that have a twin, or are about to."""
+        return list(dict.fromkeys((*self.besides, *self._waiting)))
 
     def expect(self, drive: Drive) -> None:
         """Keep what a drive takes after its snapshot, until its twin is there."""
@@ -78,7 +85,7 @@ class BusTwins:
     def _poll(self) -> None:
         """Read position, velocity and inputs of the drives with a twin."""
         telemetry, before = self.bus.telemetry, (self._samples, self._inputs)
-        addresses = [each.address for each in self.besides]
+        addresses = self._polled = [each.address for each in self.besides]
         words = [
             Value(drive.address, beside.twin.levels.word)
             for drive, beside in self.besides.items()
@@ -104,6 +111,8 @@ class BusTwins:
         elif isinstance(event, Conditioned):
             if (beside := self._at(event.address)) is not None:
                 beside.conditions(event.conditions)
+        elif isinstance(event, Changed) and self._polled != [each.address for each in self.besides]:  # DN, PY
+            self._poll()
         elif isinstance(event, Lost):
             self._lost()
 

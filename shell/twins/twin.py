@@ -30,6 +30,10 @@ class Twin:
         self._overheard: list[Transmission] = []
         shadow.rest()
 
+    def shift(self, seconds: float) -> None:
+        """Let it be ahead by so much more from now on; its own time never goes back."""
+        self._begun -= seconds
+
     def live(self, at: float) -> float:
         """Live up to a time of the host's clock; return the drive's own time."""
         self._now = max(self._now, at - self._begun)

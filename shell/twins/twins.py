@@ -52,13 +52,15 @@ class Twins:
         Raises DriveError, Diagnostic or TransportLost for the first that fails, once all have been tried.
         """
         failures: list[Exception] = []
-        for address in list(bus.drives) if addresses is None else addresses:
-            try:
-                await self._start(bus, bus.drives[address])
-            except (DriveError, Diagnostic) as failure:
-                failures.append(failure)
-        if not self.running(bus):
-            self._end(bus)
+        try:
+            for address in list(bus.drives) if addresses is None else addresses:
+                try:
+                    await self._start(bus, bus.drives[address])
+                except (DriveError, Diagnostic) as failure:
+                    failures.append(failure)
+        finally:
+            if not self.running(bus):
+                self._end(bus)
         if failures:
             raise failures[0]
 
@@ -124,7 +126,7 @@ class Twins:
             self._workspace.notify(f"{bus.name}: no twin: {failure}", bus=bus.name, warning=True)
 
     def _lost(self, bus: Bus) -> None:
-        addresses = [each.address for each in self._buses[bus].besides]
+        addresses = [each.address for each in self._buses[bus].drives]
         self.stop(bus)
         self._paused[bus] = addresses
         self._workspace.notify(

@@ -39,6 +39,17 @@ async def test_bytes_that_take_their_time_are_no_reason_for_a_warning(tmp_path: 
         assert [each.difference for each in of(cell, Predicted)][-2:] == [0, 0], "the twin took the place of the drive"
 
 
+async def test_a_program_whose_lines_take_longer_is_kept_in_step(tmp_path: Path) -> None:
+    lines = "PG 1\nLB G1\nMR 51200\nH\nMR -51200\nH\nBR G1\nE\nPG"
+    drive = party("a", VM=200000) + f'\ninstruction_us = 900\nprogram_text = """\n{lines}\n"""'
+    async with CellSession(tmp_path, bus("press", drive)) as cell:
+        await run(cell, "/twin on", "EX G1", "/sleep 25")
+        assert of(cell, Diverged) == []
+        cell.device("press:a").execute("VM=150000", cell._floor().now())
+        await asyncio.sleep(3)
+        assert of(cell, Diverged)[0].causes[0] == "settings changed"
+
+
 async def test_a_stall_is_named_first(tmp_path: Path) -> None:
     async with CellSession(tmp_path, bus("press", encoder(world="stall_at = 20000"))) as cell:
         await run(cell, "/twin on", "MR 16000", "/sleep 3")

@@ -174,3 +174,28 @@ async def test_a_wrong_use_is_one_line(tmp_path: Path) -> None:
         assert cell.printed()[0] == "no twin runs; /twin on begins one"
         assert re.fullmatch(r"a: a twin since \d\d:\d\d:\d\d, apart by 0 steps", cell.printed()[1])
         assert cell.printed()[2] == "limit at rest: 200 steps"
+
+
+async def test_a_drive_keeps_its_twin_under_another_name(tmp_path: Path) -> None:
+    async with CellSession(tmp_path, bus("press", party("a"), party("b"))) as cell:
+        await run(cell, "/twin on", '@a DN="k"', "@k MR 5000", "/sleep 2")
+        last = {each.address: (each.position, each.difference) for each in of(cell, Predicted)[-4:]}
+        assert last == {"k": (5000, 0), "b": (0, 0)}
+
+
+async def test_a_stop_while_a_drive_is_read_leaves_nothing_behind(tmp_path: Path) -> None:
+    async with CellSession(tmp_path, bus("press", party("a"))) as cell:
+        task = cell.session.start("/twin on")
+        await asyncio.sleep(0.5)
+        cell.session.stop()
+        assert not await task
+        await asyncio.sleep(2)
+        cell.events.clear()
+        await asyncio.sleep(2)
+        assert cell.written("press") == b"" and not cell.session.buses["press"].witnesses
+
+
+async def test_a_closed_bus_has_no_twins(tmp_path: Path) -> None:
+    async with CellSession(tmp_path, bus("press", party("a"))) as cell:
+        await run(cell, "/twin on", "/close press")
+        assert len(of(cell, TwinEnded)) == 1 and list(cell.session.twins.rows()) == []
