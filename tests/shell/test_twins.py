@@ -43,7 +43,7 @@ async def test_a_program_whose_lines_take_longer_is_kept_in_step(tmp_path: Path)
     lines = "PG 1\nLB G1\nMR 51200\nH\nMR -51200\nH\nBR G1\nE\nPG"
     drive = party("a", VM=200000) + f'\ninstruction_us = 900\nprogram_text = """\n{lines}\n"""'
     async with CellSession(tmp_path, bus("press", drive)) as cell:
-        await run(cell, "/twin on", "EX G1", "/sleep 25")
+        await run(cell, "/twin on", "EX G1", "/sleep 15")
         assert of(cell, Diverged) == []
         cell.device("press:a").execute("VM=150000", cell._floor().now())
         await asyncio.sleep(3)
