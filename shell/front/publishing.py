@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import asyncio
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from ipaddress import ip_address
 from typing import TYPE_CHECKING
 
 from dialects import Diagnostic
-from shell.events import SessionEvent, StateChanged
+from shell.events import FAILURES, SessionEvent, StateChanged
 from shell.front import batch
 from shell.output import report, write
 from shell.publishing import broker, messages
@@ -19,11 +19,17 @@ from shell.publishing.limits import parse_rate
 from shell.publishing.publisher import Publisher
 from shell.publishing.target import Target, parse_target
 from shell.publishing.topics import Topics
+from shell.secrets import without_secrets
 
 if TYPE_CHECKING:
+    from drives.bus import Bus
     from shell.connect.mqtt_settings import MqttSettings
+    from shell.session import Session
     from shell.workspace import Workspace
     from transports import TransportLost
+
+AGAIN = 30.0
+"""The time between two attempts to open a line that was not there, s."""
 
 
 def run(urls: Sequence[str], *, to: str, rate: str, reconnect: bool = True) -> int:
@@ -34,16 +40,46 @@ def run(urls: Sequence[str], *, to: str, rate: str, reconnect: bool = True) -> i
     except Diagnostic as problem:
         write(sys.stderr, report(problem))
         return 2
-    return batch.run(
-        urls,
-        lambda workspace: _until_ended(workspace, target, period),
-        interrupted=0,
-        reconnect=reconnect,
-        replies=False,
-    )
+
+    async def body(session: Session) -> None:
+        absent = await open_lines(session, urls, reconnect)
+        await _until_ended(session, target, period, absent)
+
+    return batch.run([], body, interrupted=0, reconnect=reconnect, replies=False)
 
 
-async def _until_ended(workspace: Workspace, target: Target, period: float) -> None:
+async def open_lines(session: Session, urls: Sequence[str], later: bool) -> list[str]:
+    """Open lines side by side; return the URLs of those that are not there, which are said.
+
+    Raises the failure of one: a wrong URL, the only line, or any where none is opened `later`.
+    """
+    failures: dict[int, BaseException] = {}
+    await session.open_all(urls, failures.__setitem__)
+    fatal = [each for each in failures.values() if isinstance(each, Diagnostic)]
+    if failures and (fatal or not later or len(failures) == len(urls)):
+        raise [*fatal, *failures.values()][0]
+    absent = [urls[number] for number in sorted(failures)]
+    for number in sorted(failures):
+        text = f"{without_secrets(urls[number])}: {failures[number]}; tried again every {AGAIN:g} s"
+        session.notify(text, warning=True)
+    return absent
+
+
+async def open_later(session: Session, url: str, add: Callable[[Bus], None]) -> None:
+    """Try a line until it is there, and add its buses."""
+    while True:
+        await asyncio.sleep(AGAIN)
+        try:
+            opened = await session.open(url)
+        except FAILURES:
+            continue
+        session.notify(f"{without_secrets(url)} is open", warning=True)
+        for bus in opened:
+            add(bus)
+        return
+
+
+async def _until_ended(workspace: Session, target: Target, period: float, absent: Sequence[str]) -> None:
     topics, settings = Topics(target.prefix), workspace.settings.mqtt
     if warning := _readable(target, settings):
         workspace.notify(warning, warning=True)
@@ -57,9 +93,12 @@ async def _until_ended(workspace: Workspace, target: Target, period: float) -> N
     await publisher.begin()
     write(sys.stderr, f"publishing {_counted(workspace)} to {target.text}; Ctrl+C ends it")
     feed.begin()
+    waits = [asyncio.create_task(open_later(workspace, url, feed.add)) for url in absent]
     try:
         await _all_lost(workspace)
     finally:
+        for each in waits:
+            each.cancel()
         feed.end()
         await publisher.end(Message(topics.status, messages.BYE, retain=True))
         write(sys.stderr, _summary(publisher))

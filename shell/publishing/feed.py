@@ -49,8 +49,12 @@ class Feed:
         """Publish from now on."""
         self._leave = self._workspace.subscribe(self._take)
         for bus in self._workspace.buses.values():
-            self._lines[bus.name] = _Line(self, bus)
+            self.add(bus)
         self._task = asyncio.get_running_loop().create_task(self._looking())
+
+    def add(self, bus: Bus) -> None:
+        """Publish a line, too."""
+        self._lines[bus.name] = _Line(self, bus)
 
     def end(self) -> None:
         """Publish nothing more, and poll no drive. May be called again."""

@@ -1,0 +1,223 @@
+"""`multidrop publish`: 200 lines of 3 drives each through one broker, and a burst of messages beside paho itself.
+
+The simulated drives, the broker (mosquitto), the publisher and a subscriber, which counts, are processes of this
+machine. The drives stand still, or all of them move to and fro. A cost is processor time, of the publisher only where
+nothing else is named. Where mosquitto is not installed, there are no rows.
+
+Run: python bench/bench_publish.py [--full]
+"""
+
+from __future__ import annotations
+
+import asyncio
+import os
+import shutil
+import socket
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager, suppress
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).parent.parent))
+
+import paho.mqtt.client as mqtt
+from report import Row, compared, main
+from sim_process import ROOT, all_served, busy
+
+from shell.connect.mqtt_settings import MqttSettings
+from shell.publishing.backlog import Backlog, Message
+from shell.publishing.broker import WINDOW, Connection
+from shell.publishing.publisher import Publisher
+from shell.publishing.target import parse_target
+
+MOSQUITTO = shutil.which("mosquitto", path=f"{os.environ.get('PATH', '')}:/usr/sbin") or ""
+NAMES = "abc"
+BUS = '[[bus]]\nname = "line{number}"\nserve = ["tcp://127.0.0.1:0"]\nbaud = 9600\n'
+DRIVE = '[[bus.drive]]\npersonality = "LMDCM"\nname = "{name}"\nparty = true\nset = {{ EM = 1 }}\n{program}'
+MOVING = "PG 1\nLB SU\n MR 512000\n H\n MR -512000\n H\n BR SU\nE\nPG\n"
+LINES, MANY = (200,), (25, 50, 100, 200)
+BURST = 20_000
+TEXT = '{{"time": "2026-11-22T14:03:07.123456+00:00", "value": {}}}'
+OPEN = 240.0
+"""The longest time to open all lines, s."""
+
+
+def rows(full: bool) -> Iterator[Row]:
+    """A burst, and lines at rest and moving."""
+    if not MOSQUITTO:
+        return
+    yield burst(7 if full else 3)
+    for count in MANY if full else LINES:
+        for moving in (False, True):
+            yield from fleet(count, moving, 60.0 if full else 20.0)
+
+
+@contextmanager
+def broker() -> Iterator[tuple[int, int]]:
+    """A broker on loopback: its process and its port."""
+    with socket.socket() as trial:
+        trial.bind(("127.0.0.1", 0))
+        port = int(trial.getsockname()[1])
+    with tempfile.TemporaryDirectory() as folder:
+        conf, silent = Path(folder, "conf"), subprocess.DEVNULL
+        options = "allow_anonymous true\npersistence false\nmax_queued_messages 0\nlog_dest none\n"
+        conf.write_text(f"listener {port} 127.0.0.1\n{options}", encoding="utf-8")
+        process = subprocess.Popen([MOSQUITTO, "-c", str(conf)], stdin=silent, stdout=silent, stderr=silent)
+        try:
+            while process.poll() is None:
+                with suppress(OSError):
+                    socket.create_connection(("127.0.0.1", port)).close()
+                    break
+                time.sleep(0.02)
+            yield process.pid, port
+        finally:
+            process.kill()
+            process.wait()
+
+
+# A burst
+
+
+def burst(rounds: int) -> Row:
+    """Messages a second of one publisher that has many at once, and of a bare client with as many in flight."""
+    with broker() as (_, port):
+        pairs = [(asyncio.run(ours(port)), bare(port)) for _ in range(rounds)]
+    note = f"{BURST:,} messages at QoS 1, {WINDOW} in flight"
+    mine, others = ([*each] for each in zip(*pairs, strict=True))
+    return compared("publish: a burst", "msg/s", mine, others, "bare paho", better="more", note=note)
+
+
+async def ours(port: int) -> float:
+    """Messages a second through a publisher, until the last one is acknowledged."""
+    target = parse_target(f"mqtt://127.0.0.1:{port}/bench")
+    connections: list[Connection] = []
+
+    def make() -> Connection:
+        connections.append(Connection(target, MqttSettings(), Message("bench/status", "lost", True)))
+        return connections[-1]
+
+    online = Message("bench/status", "online", True)
+    publisher = Publisher(make, online, print, lambda _: None, Backlog(2 * BURST))
+    await publisher.begin()
+    begin = time.perf_counter()
+    for number in range(BURST):
+        publisher.put(Message("bench/a/position", TEXT.format(number), bus="a"))
+    while publisher.waiting or connections[0].in_flight():
+        await asyncio.sleep(0.002)
+    took = time.perf_counter() - begin
+    await publisher.end(online)
+    return BURST / took
+
+
+def bare(port: int) -> float:
+    """Messages a second of a client alone: as many in flight, each acknowledgement makes room for one."""
+    client = mqtt.Client(mqtt.CallbackAPIVersion.VERSION2)
+    client.max_inflight_messages_set(WINDOW)
+    room = threading.Semaphore(WINDOW)
+    client.on_publish = lambda *_: room.release()
+    client.connect("127.0.0.1", port)
+    client.loop_start()
+    begin = time.perf_counter()
+    for number in range(BURST):
+        room.acquire()
+        client.publish("bench/a/position", TEXT.format(number), 1)
+    for _ in range(WINDOW):  # all are acknowledged
+        room.acquire()
+    took = time.perf_counter() - begin
+    client.disconnect()
+    client.loop_stop()
+    return BURST / took
+
+
+# Lines
+
+
+class Counter:
+    """A subscriber that counts, and notes the drives whose error it has seen, which is read last."""
+
+    def __init__(self, port: int) -> None:
+        self.count = 0
+        self.drives: set[str] = set()
+        self.client = mqtt.Client(mqtt.CallbackAPIVersion.VERSION2)
+        self.client.on_connect = lambda client, *_: client.subscribe("fleet/#", 1)
+        self.client.on_message = lambda _client, _data, message: self._take(message.topic)
+        self.client.connect("127.0.0.1", port)
+        self.client.loop_start()
+
+    def _take(self, topic: str) -> None:
+        self.count += 1
+        if topic.endswith("/error"):
+            self.drives.add(topic)
+
+    def close(self) -> None:
+        """Disconnect."""
+        self.client.disconnect()
+        self.client.loop_stop()
+
+
+def fleet(count: int, moving: bool, seconds: float) -> Iterator[Row]:
+    """What so many lines cost, and what the broker gets of them."""
+    program = 'program = "moving.mxt"\n' if moving else ""
+    drives = "".join(DRIVE.format(name=name, program=program) for name in NAMES)
+    cell = "".join(BUS.format(number=number) + drives for number in range(count))
+    with ExitStack() as stack:
+        cell_pid, places = stack.enter_context(all_served(cell, {"moving.mxt": MOVING}))
+        broker_pid, port = stack.enter_context(broker())
+        counter = Counter(port)
+        stack.callback(counter.close)
+        folder = Path(stack.enter_context(tempfile.TemporaryDirectory()))
+        urls = [f"{place}?party=1&drives={','.join(NAMES)}" for place in places]
+        publisher = stack.enter_context(published(urls, port, folder))
+        begin = time.monotonic()
+        while len(counter.drives) < count * len(NAMES):
+            assert publisher.poll() is None and time.monotonic() < begin + OPEN, _why(publisher, counter)
+            time.sleep(0.1)
+        opened = time.monotonic() - begin
+        pids = publisher.pid, broker_pid, cell_pid
+        before = *map(busy, pids), counter.count, time.monotonic()
+        time.sleep(seconds)
+        after = *map(busy, pids), counter.count, time.monotonic()
+        used, broker_used, cell_used, messages, took = (b - a for a, b in zip(before, after, strict=True))
+        pages = int(Path(f"/proc/{publisher.pid}/statm").read_text(encoding="utf-8").split()[1])
+        publisher.terminate()
+        said = publisher.communicate(timeout=60)[1].strip().splitlines()[-1]
+    what, memory = f"publish, {count} lines, {'moving' if moving else 'at rest'}", pages * os.sysconf("SC_PAGE_SIZE")
+    yield Row(f"{what}: to the broker", "msg/s", messages / took, note=f"{said}; all seen after {opened:.0f} s")
+    note = f"polls included; {used / took:.0%} of a core in all"
+    yield Row(f"{what}: a line of {len(NAMES)} drives", "% core", 100 * used / took / count, note=note)
+    note = f"{memory / 1e6:.0f} MB; cores: mosquitto {broker_used / took:.1%}, simulated drives {cell_used / took:.0%}"
+    yield Row(f"{what}: memory a line", "kB", memory / count / 1e3, note=note)
+
+
+def _why(publisher: subprocess.Popen[str], counter: Counter) -> str:
+    """Why not every drive was seen."""
+    publisher.kill()
+    return f"{len(counter.drives)} drives seen; {publisher.communicate()[1].strip()}"
+
+
+@contextmanager
+def published(urls: list[str], port: int, folder: Path) -> Iterator[subprocess.Popen[str]]:
+    """`multidrop publish` in a process of its own."""
+    command = [sys.executable, "-m", "multidrop", "publish", *urls, "--to", f"mqtt://127.0.0.1:{port}/fleet"]
+    places = {"MULTIDROP_CONFIG_DIR": str(folder), "MULTIDROP_STATE_DIR": str(folder), "PYTHONPATH": str(ROOT)}
+    process = subprocess.Popen(
+        command,
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.PIPE,
+        text=True,
+        env=os.environ | places,
+    )
+    try:
+        yield process
+    finally:
+        process.kill()
+        process.wait()
+
+
+if __name__ == "__main__":
+    main(rows)
