@@ -38,7 +38,7 @@ MOSQUITTO = shutil.which("mosquitto", path=f"{os.environ.get('PATH', '')}:/usr/s
 NAMES = "abc"
 BUS = '[[bus]]\nname = "line{number}"\nserve = ["tcp://127.0.0.1:0"]\nbaud = 9600\n'
 DRIVE = '[[bus.drive]]\npersonality = "LMDCM"\nname = "{name}"\nparty = true\nset = {{ EM = 1 }}\n{program}'
-MOVING = "PG 1\nLB SU\n MR 512000\n H\n MR -512000\n H\n BR SU\nE\nPG\n"
+MOVING = "PG 1\nLB SU\n MR 102400000\n H\n MR -102400000\n H\n BR SU\nE\nPG\n"
 LINES, MANY = (200,), (25, 50, 100, 200)
 BURST = 20_000
 TEXT = '{{"time": "2026-11-22T14:03:07.123456+00:00", "value": {}}}'
@@ -166,11 +166,13 @@ def fleet(count: int, moving: bool, seconds: float) -> Iterator[Row]:
     cell = "".join(BUS.format(number=number) + drives for number in range(count))
     with ExitStack() as stack:
         cell_pid, places = stack.enter_context(all_served(cell, {"moving.mxt": MOVING}))
+        with suppress(OSError):  # drives are not slower because this machine is busy; only root may say so
+            os.setpriority(os.PRIO_PROCESS, cell_pid, -10)
         broker_pid, port = stack.enter_context(broker())
         counter = Counter(port)
         stack.callback(counter.close)
         folder = Path(stack.enter_context(tempfile.TemporaryDirectory()))
-        urls = [f"{place}?party=1&drives={','.join(NAMES)}" for place in places]
+        urls = [f"{place}?party=1&timeout=5&drives={','.join(NAMES)}" for place in places]
         publisher = stack.enter_context(published(urls, port, folder))
         begin = time.monotonic()
         while len(counter.drives) < count * len(NAMES):
@@ -187,7 +189,8 @@ def fleet(count: int, moving: bool, seconds: float) -> Iterator[Row]:
         said = publisher.communicate(timeout=60)[1].strip().splitlines()[-1]
     what, memory = f"publish, {count} lines, {'moving' if moving else 'at rest'}", pages * os.sysconf("SC_PAGE_SIZE")
     yield Row(f"{what}: to the broker", "msg/s", messages / took, note=f"{said}; all seen after {opened:.0f} s")
-    note = f"polls included; {used / took:.0%} of a core in all"
+    yield Row(f"{what}: a message", "us", 1e6 * used / messages, note="processor time, the poll included")
+    note = f"{used / took:.0%} of a core in all"
     yield Row(f"{what}: a line of {len(NAMES)} drives", "% core", 100 * used / took / count, note=note)
     note = f"{memory / 1e6:.0f} MB; cores: mosquitto {broker_used / took:.1%}, simulated drives {cell_used / took:.0%}"
     yield Row(f"{what}: memory a line", "kB", memory / count / 1e3, note=note)
