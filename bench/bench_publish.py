@@ -97,7 +97,7 @@ async def ours(port: int) -> float:
     connections: list[Connection] = []
 
     def make() -> Connection:
-        connections.append(Connection(target, MqttSettings(), Message("bench/status", "lost", True)))
+        connections.append(Connection(target, MqttSettings(), Message("bench/status", "lost", True), "bench"))
         return connections[-1]
 
     online = Message("bench/status", "online", True)

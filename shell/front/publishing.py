@@ -60,8 +60,9 @@ async def open_lines(session: Session, urls: Sequence[str], later: bool) -> list
         raise [*fatal, *failures.values()][0]
     absent = [urls[number] for number in sorted(failures)]
     for number in sorted(failures):
-        text = f"{without_secrets(urls[number])}: {failures[number]}; tried again every {AGAIN:g} s"
-        session.notify(text, warning=True)
+        url, reason = without_secrets(urls[number]), str(failures[number])
+        where = "" if url.partition("?")[0] in reason else f"{url}: "
+        session.notify(f"{where}{reason}; tried again every {AGAIN:g} s", warning=True)
     return absent
 
 
@@ -80,11 +81,11 @@ async def open_later(session: Session, url: str, add: Callable[[Bus], None]) -> 
 
 
 async def _until_ended(workspace: Session, target: Target, period: float, absent: Sequence[str]) -> None:
-    topics, settings = Topics(target.prefix), workspace.settings.mqtt
+    topics, settings, name = Topics(target.prefix), workspace.settings.mqtt, broker.fresh_name()
     if warning := _readable(target, settings):
         workspace.notify(warning, warning=True)
     publisher = Publisher(
-        lambda: broker.Connection(target, settings, Message(topics.status, messages.LOST, retain=True)),
+        lambda: broker.Connection(target, settings, Message(topics.status, messages.LOST, retain=True), name),
         Message(topics.status, messages.ONLINE, retain=True),
         lambda text: workspace.notify(text, warning=True),
         lambda numbers: feed.dropped(numbers),

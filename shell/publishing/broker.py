@@ -48,12 +48,20 @@ def load() -> Any:
     return client
 
 
+def fresh_name() -> str:
+    """A name for a client, of at most 23 characters."""
+    return f"multidrop-{os.urandom(6).hex()}"
+
+
 class Connection:
     """One connection to a broker. `connect` makes it; it ends once, by `close` or by a loss."""
 
-    def __init__(self, target: Target, settings: MqttSettings, will: Message) -> None:
-        """Connect nothing yet."""
-        self._target, self._settings, self._will = target, settings, will
+    def __init__(self, target: Target, settings: MqttSettings, will: Message, name: str) -> None:
+        """Connect nothing yet.
+
+        `name`: the client's name. A broker ends an earlier connection of that name first, so its will comes in time.
+        """
+        self._target, self._settings, self._will, self._name = target, settings, will, name
         self._where = f"{target.host}:{target.port}"
         self._loop = asyncio.get_running_loop()
         self._accepted: asyncio.Future[None] = self._loop.create_future()
@@ -83,7 +91,7 @@ class Connection:
         paho = load()
         client = paho.Client(
             paho.CallbackAPIVersion.VERSION2,
-            client_id=f"multidrop-{os.urandom(6).hex()}",
+            client_id=self._name,
             reconnect_on_failure=False,
         )
         _log_in(client, self._target, self._settings)

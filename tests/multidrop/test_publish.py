@@ -119,7 +119,7 @@ async def test_a_broker_that_was_away_gets_what_waited_and_its_retained_states_a
     made: list[Connection] = []
 
     def make() -> Connection:
-        made.append(Connection(target, MqttSettings(), WILL))
+        made.append(Connection(target, MqttSettings(), WILL, "multidrop-t"))
         return made[-1]
 
     publisher = Publisher(make, Message("t/status", "online", True), said.append, lambda _: None)
@@ -141,6 +141,12 @@ async def test_a_broker_that_was_away_gets_what_waited_and_its_retained_states_a
     assert numbers == sorted(numbers) and set(range(500, 1000)) <= set(numbers)
     assert said[0].startswith("the broker is lost") and said[-1].startswith("the broker is back after")
     assert any("the broker is still lost: no broker at 127.0.0.1:" in each for each in said)
+    broken = made[-1]
+    again = Connection(target, MqttSettings(), WILL, "multidrop-t")  # as after a loss that the broker has not seen
+    await again.connect()
+    await asyncio.wait_for(broken.lost.wait(), 10)
+    await again.close()
+    await asyncio.to_thread(seen.until, lambda: seen.texts("t/status")[-2:] == ["lost", "online"])
     await publisher.end(Message("t/status", "bye", True))
     await asyncio.to_thread(seen.until, lambda: seen.texts("t/status")[-1] == "bye")
     await asyncio.to_thread(seen.close)
@@ -150,7 +156,7 @@ async def test_a_server_that_never_answers_is_given_up_and_nothing_stays(monkeyp
     monkeypatch.setattr(broker_module, "TIMEOUT", 0.2)
     server = socket.create_server(("127.0.0.1", 0))
     port = server.getsockname()[1]
-    connection = Connection(parse_target(f"mqtt://127.0.0.1:{port}/t"), MqttSettings(), WILL)
+    connection = Connection(parse_target(f"mqtt://127.0.0.1:{port}/t"), MqttSettings(), WILL, "t")
     with pytest.raises(Unreachable, match=f"the broker at 127.0.0.1:{port} does not answer"):
         await connection.connect()
     assert connection.lost.is_set() and not connection.publish(WILL)
