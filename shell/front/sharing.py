@@ -14,11 +14,11 @@ from shell.connect.listening import listening
 from shell.connect.opening import open_port
 from shell.connect.urls import parse
 from shell.events import FAILURES
-from shell.front.interrupts import on_signals
+from shell.front.interrupts import on_signals, on_stop_key
 from shell.output import exit_code, finish, nonblocking, report, write
 from shell.sharing.exchange import Say
 from shell.sharing.server import SharedPort
-from shell.sharing.stop_bytes import stop_bytes
+from shell.sharing.stop_bytes import own_stop, stop_bytes
 from transports import Limited, TransportLost
 from transports.exposure import exposed
 from transports.sockets import explain
@@ -65,9 +65,15 @@ async def _share(url: str, address: str, as_json: bool, over: asyncio.Event) -> 
             narrator.note(f"{opened.transport.name}: {opened.transport.limits}")
         if exposed(host):
             narrator.note(EXPOSED.format(endpoint))
-        await _ended(shared, over)
+        pieces = own_stop(opened.family, connection.hints.drives)
+        with on_stop_key(_nothing, lambda: shared.stop(pieces), over.set):
+            await _ended(shared, over)
     finally:
         await shared.close()
+
+
+def _nothing() -> None:
+    """Do nothing in the thread that reads the keys: this event loop is held up by nothing."""
 
 
 async def _listen(shared: SharedPort, host: str, port: int) -> str:
@@ -102,7 +108,7 @@ class Narrator:
             self._print(bus=name, endpoint=endpoint)
             self._print(ready=True)
         else:
-            write(sys.stdout, f"{name:<12} {endpoint}", "ready: Ctrl+C ends it")
+            write(sys.stdout, f"{name:<12} {endpoint}", "ready: Ctrl+X stops the drives, Ctrl+C ends it")
 
     def note(self, text: str) -> None:
         """Show a message on standard error."""

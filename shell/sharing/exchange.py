@@ -216,6 +216,11 @@ class Exchange:
         for each in filter(None, (before, rest)):
             self._write(client, each, now)
 
+    def stop(self, stop: bytes) -> list[Action]:
+        """Write a stop of this side."""
+        self._cut = self._mid_line and not self.framed
+        return [Stop(stop, self._stops.mended(stop)), Say("this terminal", "stop", stop.hex(" "))]
+
     def _write(self, client: int, data: bytes, now: float) -> None:
         known = self.clients[client]
         if known.refused:

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-from collections.abc import Callable, Coroutine
+from collections.abc import Callable, Coroutine, Sequence
 from functools import partial
 from typing import Any, cast
 
+from dialects import StopPiece
 from shell.connect.opening import OpenedPort
 from shell.connect.reconnect import FIRST, GLANCE, LONGEST
 from shell.connect.reopening import Absent
@@ -80,6 +81,17 @@ class SharedPort:
         if self._timer is not None:
             self._timer.cancel()
         await self._transport.close()
+
+    def stop(self, pieces: Sequence[StopPiece]) -> None:
+        """Write a stop of this side at once, and its repetition in pieces."""
+        first, *others = pieces
+        self._do(self._exchange.stop(first.data))
+        self._begin(self._repeat(others))
+
+    async def _repeat(self, pieces: Sequence[StopPiece]) -> None:
+        for piece in pieces:
+            await asyncio.sleep(piece.quiet)
+            self._do(self._exchange.stop(piece.data))
 
     # Clients
 

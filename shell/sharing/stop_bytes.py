@@ -7,9 +7,10 @@ another one. Where messages carry their length, a byte says nothing by itself: o
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass
 
-from dialects import Diagnostic
+from dialects import Diagnostic, StopPiece
 from dialects.families import DEFAULT, FAMILIES, TABLE
 
 KEYS = rb"[\x03\x1b]"
@@ -63,3 +64,9 @@ def stop_bytes(family: str) -> StopBytes:
         return StopBytes(re.compile(b"(?:" + found[0] + b")+", re.DOTALL), True)
     pattern = re.compile(b"|".join([*found, KEYS]))
     return StopBytes(pattern, False, FAMILIES[family or DEFAULT].codec.invalidate())
+
+
+def own_stop(family: str, drives: Sequence[str]) -> tuple[StopPiece, ...]:
+    """The stop of this side, piece by piece: in the language of the family, or the default one, in every form."""
+    codec = FAMILIES[family or DEFAULT].codec
+    return (StopPiece(codec.stop(drives, False), 0.0), *codec.stop_again(drives, False))

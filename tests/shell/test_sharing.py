@@ -175,6 +175,15 @@ def test_the_writers_own_stop_drops_what_came_with_it_and_what_follows_is_writte
     assert "ada unsent 9 bytes that came with a stop were dropped" in port.said
 
 
+def test_a_stop_of_this_side_is_one_of_any_client() -> None:
+    port = Port(slow=True)
+    port.send(ADA, b"MR 5")
+    port.do(port.exchange.stop(b"\x1b"))
+    port.send(ADA, b"1200\rPR P\r")
+    assert port.written == b"\x1b" + b"~" * 65 + b"\r" + b"\x1b" and port.waiting == b"PR P\r"
+    assert "this terminal stop 1b" in port.said
+
+
 def test_bytes_of_no_language_of_text_pass_as_they_are_and_a_stop_among_anothers_does_too() -> None:
     port = Port()
     port.send(ADA, bytes(range(256)))

@@ -21,7 +21,7 @@ from shell.connect.urls import parse
 from shell.sharing import server
 from shell.sharing.exchange import Say
 from shell.sharing.server import SharedPort
-from shell.sharing.stop_bytes import stop_bytes
+from shell.sharing.stop_bytes import own_stop, stop_bytes
 from tests.support.until import until
 from transports import TransportLost, Unreachable
 from transports.rfc2217 import open_rfc2217
@@ -221,3 +221,14 @@ async def test_our_stop_from_another_thread_passes_while_the_loop_is_held_up(sha
     client.yielded()
     await shared.line.got(b"\x1b")
     await client.close()
+
+
+async def test_ctrl_x_at_the_shared_port_stops_the_drives_and_sharing_goes_on(shared: Shared) -> None:
+    _, ada = await shared.client()
+    ada.write(b"PR P\r")
+    await shared.line.got(b"PR P\r")
+    shared.port.stop(own_stop("", []))
+    stop = b"\x1b\x05!\x05!\x1b\n\x1b\x05"
+    await shared.line.got(stop * 2)
+    ada.write(b"PR V\r")
+    await shared.line.got(b"PR V\r")

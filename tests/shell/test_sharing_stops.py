@@ -8,7 +8,7 @@ from dialects import Codec, Diagnostic
 from dialects.mcode.host.codec import MCode
 from dialects.pmx.host.codec import Pmx
 from dialects.tmcl.host.codec import Tmcl
-from shell.sharing.stop_bytes import stop_bytes
+from shell.sharing.stop_bytes import own_stop, stop_bytes
 
 CODECS: list[tuple[str, Codec]] = [
     *(("mcode", MCode(party=party, escape=escape)) for party in (False, True) for escape in (0, 1, 2, 3)),
@@ -51,3 +51,10 @@ def test_a_frame_that_is_not_mst_is_no_stop(frame: bytes) -> None:
 def test_an_ethernet_drive_is_not_shared() -> None:
     with pytest.raises(Diagnostic, match="a line of modbus cannot be shared"):
         stop_bytes("modbus")
+
+
+def test_the_stop_of_this_side_is_in_every_form_and_repeated() -> None:
+    first, again = own_stop("", ["a"])
+    assert first.data == again.data == b"\x1b\x05a\x05a\x1b\n\x1b\x05"
+    pieces = [piece.data for piece in own_stop("pmx", ["00", "01"])]
+    assert pieces[:2] == [b"@00ABORT\r", b"@01ABORT\r"] and b"@01SR0=0\r" in pieces
