@@ -7,15 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 from types import MappingProxyType
 from typing import NamedTuple
 
-from multidrop import (
-    arguments,
-    lsp_arguments,
-    macro_arguments,
-    publish_arguments,
-    relay_arguments,
-    share_arguments,
-    sweep_arguments,
-)
+from multidrop.arguments import editors, fleets, lines, macros, parts, programs, settings
 
 
 class Command(NamedTuple):
@@ -25,7 +17,7 @@ class Command(NamedTuple):
     examples: Sequence[str]
     run: str = ""
     """`FILE.FUNCTION` in `multidrop.commands`; it takes the parsed arguments and returns the exit code."""
-    add: Callable[[argparse.ArgumentParser], None] = arguments.none
+    add: Callable[[argparse.ArgumentParser], None] = parts.none
     """Adds the arguments."""
     urls: bool = False
     """The help explains URLs."""
@@ -38,7 +30,7 @@ PROGRAM = {
         "report the errors in program files, by line and column",
         ["program check shuttle.mxt pick.prg"],
         "program_check.run",
-        arguments.program_check,
+        programs.check,
     ),
     "test": Command(
         "run program files on a simulated drive in virtual time: prints, errors, a summary",
@@ -48,7 +40,7 @@ PROGRAM = {
             "program test shuttle.mxt --cell press.toml#line:b --until 60 --json",
         ],
         "program_test.run",
-        arguments.program_test,
+        programs.test,
     ),
     "sweep": Command(
         "run a program file in many simulated worlds, and show those in which a condition does not hold",
@@ -58,27 +50,27 @@ PROGRAM = {
             'program sweep shuttle.mxt --vary VM=20000..80000:5000 --expect "virtual_s < 2" --cluster tcp://pc:8786',
         ],
         "program_sweep.run",
-        sweep_arguments.sweep,
+        programs.sweep,
     ),
     "list": Command(
         "print the program in a drive",
         ["program list sim:#pmx"],
         "program_drive.list_",
-        arguments.program_drive,
+        programs.drive,
         urls=True,
     ),
     "upload": Command(
         "save the program in a drive to a new file",
         ["program upload press kept.mxt --drive b"],
         "program_drive.upload",
-        arguments.program_upload,
+        programs.upload,
         urls=True,
     ),
     "download": Command(
         "back up what a drive holds, send it a program file, and read that back",
         ["program download press shuttle.mxt --drive b", "program download press shuttle.mxt --save --run G1"],
         "program_drive.download",
-        arguments.program_download,
+        programs.download,
         urls=True,
     ),
 }
@@ -87,7 +79,7 @@ PARAMS = {
         "save all settings of a drive to a new file",
         ["params backup press kept.toml --drive b", "params backup press kept --drive all"],
         "params.backup",
-        arguments.params_backup,
+        settings.params_backup,
         urls=True,
     ),
     "diff": Command(
@@ -98,20 +90,20 @@ PARAMS = {
             "params diff press --defaults",
         ],
         "params.diff",
-        arguments.params_diff,
+        settings.params_diff,
         urls=True,
     ),
     "restore": Command(
         "send the settings of a file that differ, in an order that the drive accepts; asks first",
         ["params restore press kept.toml --drive b --dry-run", "params restore press kept.toml --drive b --save"],
         "params.restore",
-        arguments.params_restore,
+        settings.params_restore,
         urls=True,
     ),
 }
 MACRO = {
     "list": Command("list the macros: name, key, number of lines, values, note", ["macro list"], "macro.list_"),
-    "show": Command("print a macro's file", ["macro show shuttle"], "macro.show", arguments.macro_show),
+    "show": Command("print a macro's file", ["macro show shuttle"], "macro.show", macros.show),
     "play": Command(
         "play a macro: once, several rounds, or until it is interrupted",
         [
@@ -120,50 +112,48 @@ MACRO = {
             "macro play shuttle --on sim:cell.toml --fast --times forever",
         ],
         "macro.play",
-        arguments.macro_play,
+        macros.play,
         urls=True,
     ),
     "edit": Command(
         "open a macro's file in the editor of VISUAL or EDITOR; it changes only once the whole text is right",
         ["macro edit shuttle"],
         "macro_files.edit",
-        arguments.macro_show,
+        macros.show,
     ),
     "describe": Command(
         "change a macro's note",
         ['macro describe shuttle "ten turns and back"'],
         "macro_files.describe",
-        macro_arguments.describe,
+        macros.describe,
     ),
     "rename": Command(
-        "give a macro another name", ["macro rename shuttle ten-turns"], "macro_files.rename", macro_arguments.rename
+        "give a macro another name", ["macro rename shuttle ten-turns"], "macro_files.rename", macros.rename
     ),
     "copy": Command(
         "copy a macro; --project: into the folder macros of the current folder",
         ["macro copy shuttle shuttle --project"],
         "macro_files.copy",
-        macro_arguments.copy,
+        macros.copy,
     ),
-    "delete": Command(
-        "delete a macro; asks first", ["macro delete shuttle"], "macro_files.delete", macro_arguments.delete
-    ),
+    "delete": Command("delete a macro; asks first", ["macro delete shuttle"], "macro_files.delete", macros.delete),
     "key": Command(
         "put a macro on a function key, or free the key",
         ["macro key F3 shuttle", "macro key F3 shuttle --page 2", "macro key F3 off"],
         "macro_files.key",
-        macro_arguments.key,
+        macros.key,
     ),
     "import": Command(
         "make macros of a vendor's function-key strings, one a line: F2 STRING ; comment",
         ["macro import keys.txt"],
         "macro_files.import_",
-        macro_arguments.import_,
+        macros.import_,
     ),
     "export": Command(
         "write macros to a new file of a vendor's function-key strings",
         ["macro export keys.txt", "macro export keys.txt f2 shuttle"],
         "macro_files.export",
-        macro_arguments.export,
+        macros.export,
     ),
 }
 SNAPSHOT = {
@@ -174,7 +164,7 @@ SNAPSHOT = {
             "snapshot apply machine.toml /dev/ttyUSB0 --from b --dry-run",
         ],
         "snapshot.apply",
-        arguments.snapshot_apply,
+        settings.snapshot_apply,
         urls=True,
     ),
 }
@@ -183,25 +173,25 @@ LOG = {
         "print a session log: typed lines, bytes both ways, replies, notices, failures",
         ["log show", "log show day.jsonl --drive b", "log show --json"],
         "log.show",
-        arguments.log_show,
+        lines.log_show,
     ),
     "follow": Command(
         "print the end of a session log, and what is added to it, until interrupted",
         ["log follow"],
         "log.follow",
-        arguments.log_show,
+        lines.log_show,
     ),
     "grep": Command(
         "print the entries of a session log that match; exit code 0: some do, 1: none does",
         ['log grep "PR P"', "log grep -i refused day.jsonl --drive b"],
         "log.grep",
-        arguments.log_grep,
+        lines.log_grep,
     ),
     "replay": Command(
         "send the lines of a session log to other drives and print where the answers differ; asks first",
         ["log replay day.jsonl --against machine.toml --fast", "log replay day.jsonl --to sim:"],
         "log.replay",
-        arguments.log_replay,
+        lines.log_replay,
         urls=True,
     ),
 }
@@ -218,21 +208,21 @@ COMMANDS: Mapping[str, Command] = {
         "show the screen, with a tab for each bus",
         ["tui sim:", "tui press eth"],
         "screen.tui",
-        arguments.urls,
+        lines.urls,
         urls=True,
     ),
     "shell": Command(
         "show the prompt; read lines from standard input if that is not a terminal",
         ["shell sim:", "shell /dev/ttyUSB0?drives=a,b", "shell sim: < lines.txt", "shell --raw /dev/ttyUSB0"],
         "lines.shell",
-        arguments.shell,
+        lines.shell,
         urls=True,
     ),
     "send": Command(
         "run lines, print the replies, exit",
         ['send sim:#press "@a MR 51200" "/wait stopped" "@a PR P"', 'send press "PR AL"'],
         "lines.send",
-        arguments.send,
+        lines.send,
         urls=True,
     ),
     "run": Command(
@@ -243,14 +233,14 @@ COMMANDS: Mapping[str, Command] = {
             "run shuttle.txt --on sim:#press --set STEPS=51200 --junit report.xml",
         ],
         "lines.run",
-        arguments.run,
+        lines.run,
         urls=True,
     ),
     "sim": Command(
         "serve a simulated cell to other programs; the demo cell without CELL",
         ["sim", "sim cell.toml --json", "sim --speed 10"],
         "sim.run",
-        arguments.sim,
+        lines.sim,
     ),
     "program": Command(
         "check and test program files; transfer programs",
@@ -278,7 +268,7 @@ COMMANDS: Mapping[str, Command] = {
             "plot press --to rerun+http://pc:9876/proxy",
         ],
         "plot.run",
-        arguments.plot,
+        lines.plot,
         urls=True,
     ),
     "publish": Command(
@@ -288,21 +278,21 @@ COMMANDS: Mapping[str, Command] = {
             "publish press eth --to mqtts://shop-7@broker/plant/hall-2 --rate 5",
         ],
         "publish.run",
-        publish_arguments.publish,
+        fleets.publish,
         urls=True,
     ),
     "share": Command(
         "lend a port to several clients over the network (RFC 2217), of which one writes; a stop passes from any",
         ["share /dev/ttyUSB0 --rfc2217 2217", "share 'sim:#press' --rfc2217 0 --json"],
         "share.run",
-        share_arguments.share,
+        fleets.share,
         urls=True,
     ),
     "snapshot": Command(
         "read every drive into a new cell file, which the simulator opens as the same machine",
         ["snapshot press -o machine.toml", "snapshot sim: -o machine.toml", *SNAPSHOT["apply"].examples],
         "snapshot.take",
-        arguments.snapshot,
+        settings.snapshot,
         urls=True,
         parts=SNAPSHOT,
     ),
@@ -310,26 +300,26 @@ COMMANDS: Mapping[str, Command] = {
         "list the serial ports of this machine, with their stable names",
         ["ports", "ports --json"],
         "ports.run",
-        arguments.ports,
+        lines.ports,
     ),
     "relay": Command(
         "lend a serial port of this machine to ssh://HOST/PORT elsewhere, which starts this by itself",
         ["relay /dev/ttyUSB0", "relay /dev/ttyUSB0 --baud 115200"],
         "relay.run",
-        relay_arguments.relay,
+        fleets.relay,
     ),
     "scan": Command(
         "find the drives on a port: baud rates, names, modes; ask before what another drive may take for an error",
         ["scan /dev/ttyUSB0", "scan /dev/ttyUSB0 --baud 9600 --dialect mcode --json", "scan COM3 --all --save press"],
         "scan.run",
-        arguments.scan,
+        lines.scan,
         urls=True,
     ),
     "rescue": Command(
         "free a drive that does not reply, step by step; ask before what may do harm, and before FD, which erases",
         ["rescue /dev/ttyUSB0", "rescue /dev/ttyUSB0 --plain", "rescue COM3 --baud 9600 --dialect mcode"],
         "rescue.run",
-        arguments.rescue,
+        lines.rescue,
         urls=True,
     ),
     "log": Command(
@@ -346,18 +336,18 @@ COMMANDS: Mapping[str, Command] = {
         "serve an editor: check, help, completion and renaming in program files (Language Server Protocol)",
         ["lsp", "lsp --personality MDI", "lsp --tcp 9257"],
         "lsp.run",
-        lsp_arguments.add,
+        editors.add,
     ),
     "report": Command(
         "show what a bug report needs, and write it to a file",
         ["report", "report -o report.txt"],
         "report.run",
-        arguments.report,
+        lines.report,
     ),
     "completion": Command(
         "print the completion of this command line for a shell",
         ["completion bash > ~/.local/share/bash-completion/completions/multidrop", "completion fish | source"],
         "completion.run",
-        arguments.completion,
+        lines.completion,
     ),
 }

@@ -17,10 +17,10 @@ from pytest_lsp import client_capabilities
 from pytest_lsp.client import make_test_lsp_client
 
 from dialects import Diagnostic
+from multidrop.arguments.editors import add
 from multidrop.commands import lsp
 from multidrop.lsp.server import Server
 from multidrop.lsp.serving import serve_port
-from multidrop.lsp_arguments import add
 from tests.support.lsp_session import Editor
 from tests.support.processes import environment
 

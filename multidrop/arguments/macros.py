@@ -1,21 +1,41 @@
-"""The arguments of the commands that change macros' files."""
+"""The arguments of `multidrop macro`."""
 
 from __future__ import annotations
 
 import argparse
 
-from multidrop import arguments
+from multidrop.arguments import parts
+
+
+def show(parser: argparse.ArgumentParser) -> None:
+    """Add a macro's name."""
+    parser.add_argument("name", metavar="NAME")
+
+
+def play(parser: argparse.ArgumentParser) -> None:
+    """Add a macro's name, what to open, values, and the manner of playing."""
+    show(parser)
+    parts.on(parser, required=False)
+    parts.role(parser)
+    parts.values(parser)
+    parser.add_argument(
+        "--times", metavar="N|forever", type=_rounds, default=1, help="play N rounds, or until it is interrupted"
+    )
+    parser.add_argument("--fast", action="store_true", help="leave out the recorded pauses")
+    parts.json_of_lines(parser)
+    parts.junit(parser)
+    parts.yes(parser)
 
 
 def describe(parser: argparse.ArgumentParser) -> None:
     """Add a macro's name and its note."""
-    arguments.macro_show(parser)
+    show(parser)
     parser.add_argument("text", metavar="TEXT", nargs="+", help="the note")
 
 
 def rename(parser: argparse.ArgumentParser) -> None:
     """Add a macro's name and another one."""
-    arguments.macro_show(parser)
+    show(parser)
     parser.add_argument("new", metavar="NEW", help="the other name")
 
 
@@ -27,8 +47,8 @@ def copy(parser: argparse.ArgumentParser) -> None:
 
 def delete(parser: argparse.ArgumentParser) -> None:
     """Add a macro's name, and the answer to the question."""
-    arguments.macro_show(parser)
-    arguments.yes(parser)
+    show(parser)
+    parts.yes(parser)
 
 
 def key(parser: argparse.ArgumentParser) -> None:
@@ -57,3 +77,11 @@ def _function_key(text: str) -> str:
     if not (key[:1] == "F" and key[1:].isdecimal() and key.isascii() and 2 <= int(key[1:3]) <= 12 and len(key) < 4):
         raise argparse.ArgumentTypeError(f"no key {text}; valid: F2 to F12")
     return key
+
+
+def _rounds(text: str) -> int | None:
+    if text == "forever":
+        return None
+    if not (text.isascii() and text.isdecimal() and 1 <= int(text[:12]) <= 10**9):
+        raise argparse.ArgumentTypeError(f"{text} is not a number from 1 to 1000000000, or forever")
+    return int(text)

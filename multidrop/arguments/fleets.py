@@ -1,0 +1,44 @@
+"""The arguments of `multidrop relay`, `share` and `publish`."""
+
+from __future__ import annotations
+
+import argparse
+
+
+def relay(parser: argparse.ArgumentParser) -> None:
+    """Add the port and its baud rate."""
+    parser.add_argument("port", metavar="PORT", help="a serial port of this machine")
+    parser.add_argument("--baud", metavar="N", type=_any_baud, default=9600, help="bits/s (default: 9600)")
+
+
+def _any_baud(text: str) -> int:
+    if not (text.isascii() and text.isdecimal() and len(text) < 9 and int(text)):
+        raise argparse.ArgumentTypeError(f"no baud rate {text}; one such as 9600")
+    return int(text)
+
+
+def share(parser: argparse.ArgumentParser) -> None:
+    """Add a URL, where clients connect, and the form of the output."""
+    parser.add_argument("url", metavar="URL", help="the port to lend")
+    parser.add_argument(
+        "--rfc2217",
+        metavar="[HOST:]PORT",
+        required=True,
+        help="serve it here (host: 127.0.0.1 unless given; port 0: a free one)",
+    )
+    parser.add_argument(
+        "--json", action="store_true", help="print the endpoint and the events as JSON objects, a line each"
+    )
+
+
+def publish(parser: argparse.ArgumentParser) -> None:
+    """Add URLs, the broker, and how often it gets samples."""
+    parser.add_argument("urls", metavar="URL", nargs="+", help="what to open")
+    parser.add_argument(
+        "--to",
+        metavar="mqtt://[USER@]BROKER[:PORT]/PREFIX",
+        required=True,
+        help="the broker, and the topic above all others; mqtts:// is encrypted",
+    )
+    parser.add_argument("--rate", metavar="N", default="2", help="samples a second of each drive, at most (default: 2)")
+    parser.add_argument("--no-reconnect", action="store_true", help="give up a lost line, and do not try again")
