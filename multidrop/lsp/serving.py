@@ -14,6 +14,7 @@ import signal
 import sys
 import threading
 from collections.abc import Awaitable, Callable, Iterator
+from json import JSONDecodeError
 from types import FrameType
 from typing import BinaryIO, Protocol
 
@@ -71,14 +72,19 @@ class _Output:
         """Leave the stream open: the interpreter closes it."""
 
 
-class _Bugs(logging.Handler):
-    """Writes what the library reports of an error in a handler; a refused request is none."""
+class _Reports(logging.Handler):
+    """Writes what the library reports: a wrong message of the client in one line, a bug of ours with its traceback."""
 
     def emit(self, record: logging.LogRecord) -> None:
         failure = record.exc_info[1] if record.exc_info else None
-        if not isinstance(failure, JsonRpcException):
-            with contextlib.suppress(OSError):
-                print(self.format(record), file=sys.stderr, flush=True)
+        if isinstance(failure, JsonRpcException):  # a refused request
+            return
+        first = record.getMessage().partition("\n")[0]
+        if isinstance(failure, (JSONDecodeError, UnicodeDecodeError)):
+            first = f"{first}: {failure}"
+            failure = None
+        with contextlib.suppress(OSError):
+            print(f"multidrop: {first}" if failure is None else self.format(record), file=sys.stderr, flush=True)
 
 
 def serve(product: str, tcp: tuple[str, int] | None) -> int:
@@ -87,7 +93,7 @@ def serve(product: str, tcp: tuple[str, int] | None) -> int:
     Return 0 after `shutdown` and `exit`, and after a signal; 1 where the client left otherwise.
     """
     library = logging.getLogger("pygls")
-    library.propagate, library.handlers = False, [_Bugs(logging.ERROR)]
+    library.propagate, library.handlers = False, [_Reports(logging.ERROR)]
     server = Server(product)
     with _signals():
         try:

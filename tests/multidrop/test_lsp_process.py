@@ -61,26 +61,39 @@ async def test_a_session_of_a_client_of_another_project(tmp_path: Path) -> None:
     await client.stop()
 
 
+def reply(process: subprocess.Popen[bytes]) -> dict[str, object]:
+    """Read one message; nothing else may be on standard output."""
+    assert process.stdout is not None
+    size = re.fullmatch(rb"Content-Length: (\d+)\r\n", process.stdout.readline())
+    while process.stdout.readline() != b"\r\n":
+        pass
+    assert size is not None
+    return dict(json.loads(process.stdout.read(int(size[1]))))
+
+
 @pytest.mark.process
-def test_a_signal_ends_it_and_its_output_is_the_protocol(tmp_path: Path) -> None:
+def test_a_signal_ends_it_while_a_text_is_checked(tmp_path: Path) -> None:
+    text = "PG 1\n" + "LB G1\nMR 5\nH\nBR G1,P<5\n" * 20_000 + "E\nPG\n"
+    item = {"uri": "file:///a.mxt", "languageId": "mcode", "version": 1, "text": text}
+    place = {"textDocument": {"uri": "file:///b.mxt"}, "position": {"line": 0, "character": 0}}
     with begun(tmp_path) as process:
-        assert process.stdin is not None and process.stdout is not None
-        process.stdin.write(INITIALIZE)
+        assert process.stdin is not None and process.stdout is not None and process.stderr is not None
+        process.stdin.write(INITIALIZE + message("textDocument/didOpen", params={"textDocument": item}))
+        process.stdin.write(message("textDocument/hover", id=2, params=place))
         process.stdin.flush()
-        size = re.fullmatch(rb"Content-Length: (\d+)\r\n", process.stdout.readline())
-        while process.stdout.readline() != b"\r\n":
-            pass
-        assert size is not None and json.loads(process.stdout.read(int(size[1])))["id"] == 1
+        assert [reply(process)["id"], reply(process)["id"]] == [1, 2]
         process.send_signal(signal.SIGTERM)
         assert process.stdout.read() == b"" and process.stderr.read() == b""
     assert process.returncode == 0
 
 
 @pytest.mark.process
-def test_an_exit_without_a_shutdown_is_a_failure(tmp_path: Path) -> None:
+def test_an_exit_without_a_shutdown_is_a_failure_and_a_wrong_message_one_line(tmp_path: Path) -> None:
+    wrong = b"no header\r\nContent-Length: 5\r\n\r\n{bad}"
     with begun(tmp_path) as process:
-        output, errors = process.communicate(b"no header\r\n" + INITIALIZE + message("exit"), timeout=WAIT)
-    assert process.returncode == 1 and output.count(b"Content-Length") == 1 and errors == b""
+        output, errors = process.communicate(wrong + INITIALIZE + message("exit"), timeout=WAIT)
+    assert process.returncode == 1 and output.count(b'"id"') == 1
+    assert re.fullmatch(rb"multidrop: Unable to handle message: [^\n]*\n", errors)
 
 
 async def test_a_port_serves_one_client(capsys: pytest.CaptureFixture[str]) -> None:

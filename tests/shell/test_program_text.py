@@ -110,6 +110,12 @@ def test_a_name_is_renamed_in_all_its_uses(at: tuple[int, int], new: str, after:
     assert edited(text, text.renamed_at(*at, new)).split("\n") == after.split("|")
 
 
+@pytest.mark.parametrize("line", ["LB G1", "lb=g1", "LBG1", "VA G1", "va=G1=5", "vag1=G1", " VA G1=G1+1"])
+def test_a_name_is_declared_once_in_a_line(line: str) -> None:
+    (name,) = text_of(f"PG 1\n{line}\nE\nPG\n").names
+    assert [place.start for place in name.declared] == [line.upper().index("G1")]
+
+
 @pytest.mark.parametrize(
     ("at", "new", "why"),
     [

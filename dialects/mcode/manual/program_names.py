@@ -30,7 +30,7 @@ def names(text: str) -> list[UserName]:
             word, start = token.text.upper(), line.column - 1 + token.start
             place = Span(line.number - 1, start, start + len(token.text))
             places.setdefault(word, []).append(place)
-            if number == 1 and word == line.declares:
+            if number <= 2 and word == line.declares:  # LB G1, LB=G1
                 declared.setdefault(word, []).append(place)
     sources = lines_of(text)
 
