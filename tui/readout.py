@@ -217,6 +217,8 @@ class Readout:
             for each in self.axes:
                 each.twin = None
             return
+        if self.last is None and self.twin is None:
+            self.axis = event.axis  # a prediction that comes before its sample
         axis = self if event.axis == self.axis else self.others.setdefault(event.axis, Readout(axis=event.axis))
         axis.twin = axis.twin or Beside()
         axis.twin.take(event)

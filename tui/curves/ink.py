@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 MARKS = "*+ox#%"
@@ -14,7 +15,7 @@ TWINS = len(PATTERNS)
 TWIN_MARKS = ".,:;'~"
 """The ASCII mark of each twin."""
 SPARSE = 5
-"""Dots of a line of which a twin shows one, in whatever direction the line goes."""
+"""Dots of a line of which a twin shows one or two, in whatever direction the line goes."""
 
 
 @dataclass(frozen=True)
@@ -26,18 +27,20 @@ class Ink:
     tall: int
     glyphs: tuple[str, ...]
     """The sign of each dot pattern; none: the mark of the series."""
+    shown: tuple[int, ...] = (0,)
+    """The dots of a twin that are shown, of `SPARSE`."""
 
     def glyph(self, dots: int, series: int) -> str:
         """The sign of a dot pattern."""
         return self.glyphs[dots] if self.glyphs else _mark(series)
 
-    def dots(self, series: int, x: int, top: int, bottom: int) -> range:
+    def dots(self, series: int, x: int, top: int, bottom: int) -> Sequence[int]:
         """The dots that a series shows in column `x` of dots, of those from `top` to `bottom`.
 
         Flat parts are dashed; the marks of a series tell it apart where it has any.
         """
         if series >= TWINS and self.glyphs:
-            return range(top + (2 * x - top) % SPARSE, bottom + 1, SPARSE)
+            return [y for y in range(top, bottom + 1) if (x + 2 * y) % SPARSE in self.shown]
         period, length = PATTERNS[series % len(PATTERNS)]
         shown = not self.glyphs or x % period < length or bottom - top >= self.tall
         return range(top, bottom + 1) if shown else range(0)
@@ -68,7 +71,7 @@ def _braille(dots: int) -> str:
 
 
 BRAILLE = Ink("full", 2, 4, tuple(_braille(dots) for dots in range(256)))
-BLOCK = Ink("boxes", 1, 2, (" ", "▀", "▄", "█"))
+BLOCK = Ink("boxes", 1, 2, (" ", "▀", "▄", "█"), (0, 2))
 ASCII = Ink("ascii", 1, 1, ())
 INKS = {ink.name: ink for ink in (BRAILLE, BLOCK, ASCII)}
 """By the value of `tui.widgets.signs.Signs`."""
