@@ -197,7 +197,7 @@ class _Loop:
         """Wait, and do what can be done; False at the end."""
         readable, writable = self._wait()
         if time.monotonic() - self._last > self._silence and self._source not in readable:
-            raise TransportLost(f"nothing has come from the other end for {self._silence:g} s")
+            raise TransportLost(f"the relay has ended: it got no sign of life for {self._silence:g} s")
         if self._source in readable and not self._take():
             return False
         try:
@@ -213,7 +213,7 @@ class _Loop:
         relay = self._relay
         reads = [self._source] + ([self._port] if len(relay.out) < _FULL else [])
         writes = ([self._sink] if relay.out else []) + ([self._port] if relay.queue else [])
-        patience = _LOOK if relay.held else self._silence
+        patience = _LOOK if relay.held else max(_LOOK, self._last + self._silence - time.monotonic())
         readable, writable, _ = select.select(reads, writes, [], patience)
         return readable, writable
 

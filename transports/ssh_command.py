@@ -40,6 +40,7 @@ _HINTS = (
     ("connection refused", "no ssh server listens there; check the port's number and the server"),
     ("timed out", "check the address, its power and the network"),
     ("no route to host", "check the address, its power and the network"),
+    ("invalid choice: 'relay'", "multidrop there is older; install this version there, or add relay=socat to the URL"),
     ("flock(", "another program has the port; close it there"),
     ("no such file", "plug it in there, or look at /dev/serial/by-id there"),
     ("inappropriate ioctl", "it is not a serial port"),

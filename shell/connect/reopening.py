@@ -30,6 +30,8 @@ LOGIN = 4.0
 """The shortest attempt to log in, s: after a connection that others shared, a new one takes longer."""
 SLOWEST_LOGIN = 20.0
 """The longest attempt to log in, s."""
+FIRST_PAUSE, LONGEST_PAUSE = 0.5, 5.0
+"""The shortest and the longest pause after a login that failed, s."""
 TERMINALS = "/dev/pts/"
 
 
@@ -87,17 +89,25 @@ class HostAgain:
 
 
 class LoginAgain:
-    """A port behind a login, opened at the baud rate that it had. `took` is how long the first login took, s."""
+    """A port behind a login, opened at the baud rate that it had. `took` is how long the first login took, s.
+
+    Logins that fail are tried ever less often: a server may shut out a machine that tries too often.
+    """
 
     def __init__(self, open_: Callable[[float, int | None], Awaitable[Transport]], took: float) -> None:
         self._open = open_
         self._within = min(max(LOGIN, PATIENCE * took), SLOWEST_LOGIN)
+        self._pause = 0.0
 
     async def __call__(self, old: Transport) -> Transport:
         """Log in, and open it."""
         await old.close()
+        await asyncio.sleep(self._pause)
+        self._pause = min(2 * self._pause + FIRST_PAUSE, LONGEST_PAUSE)
         control = old.control if isinstance(old, Controllable) else None
-        return await self._open(self._within, control.baud if control else None)
+        opened = await self._open(self._within, control.baud if control else None)
+        self._pause = 0.0
+        return opened
 
 
 async def _at_the_same_baud(opened: Transport, old: Transport) -> Transport:

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 from dataclasses import dataclass, field
+from itertools import pairwise
 from pathlib import Path
 
 import pytest
@@ -17,7 +19,7 @@ from shell.connect.urls import Connection, parse
 from shell.events import Notified
 from shell.scanning import NothingFound, Scanning
 from shell.session import Session
-from transports import Received
+from transports import Received, Unreachable
 from transports.base import Lost
 
 pytestmark = pytest.mark.virtual
@@ -65,6 +67,22 @@ async def test_a_lost_port_is_opened_at_the_rate_that_it_had(control: Control | 
     await LoginAgain(open_, 0.3)(FakeSsh(control))
     await LoginAgain(open_, 2.0)(FakeSsh(control))
     assert asked == [(LOGIN, baud), (8.0, baud)]
+
+
+async def test_logins_that_fail_are_tried_ever_less_often_until_one_works() -> None:
+    clock, at = asyncio.get_running_loop(), list[float]()
+
+    async def open_(within: float, rate: int | None) -> FakeSsh:
+        at.append(clock.time())
+        if len(at) in (7, 8):
+            return FakeSsh()
+        raise Unreachable("ssh://pc/dev/ttyS0: not reached: Permission denied (publickey)")
+
+    again = LoginAgain(open_, 0.3)
+    for _ in range(8):
+        with contextlib.suppress(Unreachable):
+            await again(FakeSsh())
+    assert [round(b - a, 3) for a, b in pairwise(at)] == [0.5, 1.5, 3.5, 5.0, 5.0, 5.0, 0.0]
 
 
 class Shop:

@@ -9,7 +9,7 @@ from collections.abc import Iterator
 
 from transports import TransportLost
 from transports.relay import serve
-from transports.relay_frames import GREETING
+from transports.relay_frames import GREETING, SILENCE
 from transports.serial_posix import SerialEndpoint
 
 
@@ -30,14 +30,14 @@ class SocketConnection:
 
 
 @contextlib.contextmanager
-def lent(port: str, baud: int = 9600) -> Iterator[SocketConnection]:
+def lent(port: str, baud: int = 9600, silence: float = SILENCE) -> Iterator[SocketConnection]:
     """Lend a port in a thread, until the connection is closed."""
     endpoint = SerialEndpoint(port, baud)
     ours, theirs = socket.socketpair()
 
     def lend() -> None:
         with theirs, contextlib.suppress(TransportLost):
-            serve(endpoint, theirs.fileno(), theirs.fileno())
+            serve(endpoint, theirs.fileno(), theirs.fileno(), silence)
 
     far = threading.Thread(target=lend)
     far.start()

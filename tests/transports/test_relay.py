@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+import os
+import select
 from dataclasses import dataclass, field
 
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from tests.support.lent_port import lent
 from transports.relay import Relay
 from transports.relay_frames import CREDIT, GREETING, MOST, Frames, Garbled, Kind, Setting, frame
 from transports.relay_pipe import RelayEndpoint
+from transports.serial_posix import lock_owner
 
 FRAMES = st.lists(st.tuples(st.sampled_from(Kind), st.binary(max_size=40)), max_size=20)
 HELD = 16
@@ -313,3 +317,15 @@ def test_output_that_is_not_of_a_relay_is_a_loss() -> None:
     both.way.back += b"bash: warning\n"
     with pytest.raises(OSError, match="not of a relay"):
         both.near.read()
+
+
+def test_a_relay_that_gets_no_sign_of_life_ends_and_frees_its_port() -> None:
+    master, slave = os.openpty()
+    try:
+        with lent(os.ttyname(slave), silence=0.1) as connection:
+            found, _, _ = select.select([connection.fileno()], [], [], 10.0)
+            assert found and connection.read(10) == b""
+            assert lock_owner(os.ttyname(slave)) == ""
+    finally:
+        os.close(master)
+        os.close(slave)
