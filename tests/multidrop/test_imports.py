@@ -44,7 +44,6 @@ TABLE = {
     ("send", "tcp://127.0.0.1:1", "PR P"): HEAVY | OTHERS | SIMULATORS | VERBS | {"serial"},
     ("send", "/dev/does-not-exist", "PR P"): HEAVY | OTHERS | SIMULATORS | VERBS | {"serial.tools.list_ports"},
     ("send", "sim:a.toml", "PR P"): HEAVY | OTHERS | {"serial", "simulator.pmx", "simulator.tmcl"},
-    ("send", "ssh://-h/dev/x", "PR P"): HEAVY | OTHERS | SIMULATORS | VERBS | {"serial", "transports.ssh"},
     ("relay", "/dev/does-not-exist"): HEAVY | LOOP | HOSTS | SIMULATORS | VERBS | {"json", "platformdirs"},
     ("publish", "sim:", "--to", "http://broker"): HEAVY | SIMULATORS | VERBS | {"serial", "paho"},
     ("share", "/dev/does-not-exist", "--rfc2217", "0"): HEAVY | OTHERS | SIMULATORS | {"shell.session"},
