@@ -59,7 +59,7 @@ def jobs(commands: int, on_ports: int) -> list[Job]:
     ]
     found = list(_chunks(lines, commands, "checksum"))
     real = partial(Setup, baud=115200, latest=0.6, level=3e-4)
-    for place in ("pty", "tcp"):
+    for place in ("pty", "tcp", "rfc2217"):
         found += [Job(real(em=em), on_ports, place) for em in range(4)]
     found += [Job(real(em=1, checksum=0), on_ports, "udp", "no checksum")]
     bare = [Setup(em=em, checksum=0, level=level) for em in range(4) for level in LEVELS]

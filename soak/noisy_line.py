@@ -18,8 +18,12 @@ from typing import Any
 
 from dialects import DriveError
 from drives.events import Notice
+from shell.connect.opening import open_port
 from shell.connect.settings import Settings
+from shell.connect.urls import parse
 from shell.session import Session
+from shell.sharing.server import SharedPort
+from shell.sharing.stop_bytes import stop_bytes
 from simulator import cells
 from simulator.cell.spec import Faults
 from simulator.floor import Floor
@@ -225,17 +229,31 @@ async def in_memory(setup: Setup, folder: Path) -> AsyncIterator[NoisyLine]:
 
 @contextlib.asynccontextmanager
 async def served(setup: Setup, folder: Path, scheme: str) -> AsyncIterator[NoisyLine]:
-    """A line on a real pseudo-terminal, TCP or UDP port of this process, in real time."""
-    serve = '"pty:line.tty"' if scheme == "pty" else f'"{scheme}://127.0.0.1:0"'
+    """A line on a real port of this process, in real time: a pseudo-terminal (also shared), TCP, UDP or Modbus/TCP."""
+    serve = '"pty:line.tty"' if scheme in ("pty", "rfc2217") else f'"{scheme}://127.0.0.1:0"'
     cell = cells.load(str(setup.write(folder, serve)))
     floor = RunningFloor(Floor(cell))
     async with AsyncExitStack() as stack:
         stack.callback(floor.close)
         [endpoint] = await serve_bus(floor, cell.buses[0], stack)
-        place = f"serial:{folder / 'line.tty'}" if scheme == "pty" else endpoint.endpoint
-        query = f"{LANGUAGES[setup.language].url}&drives={','.join(setup.names)}&timeout=0.4&baud={setup.baud}"
-        if scheme != "pty":
-            query = query.rpartition("&")[0]
-        if scheme == "modbus":
-            query = "timeout=0.4"
-        yield NoisyLine(setup, floor, lambda session: session.open(f"{place}?{query}"), folder)
+        place = f"serial:{folder / 'line.tty'}" if serve.startswith('"pty') else endpoint.endpoint
+        if scheme == "rfc2217":
+            place = await _shared(f"{place}?baud={setup.baud}", stack)
+        url = f"{place}?{'&'.join(_query(setup, scheme))}"
+        yield NoisyLine(setup, floor, lambda session: session.open(url), folder)
+
+
+def _query(setup: Setup, scheme: str) -> Iterator[str]:
+    yield "timeout=0.4"
+    if scheme != "modbus":
+        yield LANGUAGES[setup.language].url
+        yield f"drives={','.join(setup.names)}"
+    if scheme in ("pty", "rfc2217"):
+        yield f"baud={setup.baud}"
+
+
+async def _shared(url: str, stack: AsyncExitStack) -> str:
+    """Share a port as `multidrop share` does; return where."""
+    shared = SharedPort(await open_port(parse(url)), stop_bytes("mcode"), lambda said: None)
+    stack.push_async_callback(shared.close)
+    return await shared.open("127.0.0.1", 0)

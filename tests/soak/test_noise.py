@@ -27,7 +27,7 @@ def test_nor_where_the_line_hangs_up_and_is_opened_again():
 
 
 @pytest.mark.process
-@pytest.mark.parametrize("place", ["pty", "tcp"])
+@pytest.mark.parametrize("place", ["pty", "tcp", "rfc2217"])
 def test_nor_on_a_real_port(place):
     ledger = judge(Job(Setup(level=5e-4, baud=115200, latest=0.5), 24, place))
     assert ledger.misdeeds == [] and ledger.words["done"] > 4
