@@ -183,6 +183,8 @@ class _Line:
         if addresses == list(self._drives):
             return
         self.close()
+        for gone in self._drives.keys() - set(addresses):  # its retained state must not stay
+            self._drives[gone].lost(self._bus.now())
         self._drives = {
             each: self._drives.get(each) or self._feed.drive_feed(self._bus.name, each) for each in addresses
         }

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import asyncio
 import json
+import shutil
 import signal
 import socket
+import subprocess
 import sys
 from collections.abc import Iterator
 from pathlib import Path
@@ -98,7 +100,15 @@ def test_the_encrypted_form_needs_the_right_authority_and_login_and_sigterm_says
     assert wrong(f'[mqtt]\nca = "{conf}"\n')[0] == 2
     assert wrong(f'{ca}password = "{PASSWORD}"\n', to.replace(f"{USER}@", ""))[0] == 2
 
-    conf.write_text(f'{ca}password_file = "word"\n')
+    own = 'password_file = "word"\ncert = "cert.pem"\nkey = '
+    locked = ["-aes256", "-passout", "pass:x", "-out", str(conf.parent / "locked.pem")]
+    subprocess.run(["openssl", "pkey", "-in", mosquitto.folder / "key.pem", *locked], check=True)
+    shutil.copy(mosquitto.folder / "cert.pem", conf.parent)
+    shutil.copy(mosquitto.folder / "key.pem", conf.parent)
+    code, text = wrong(f'{ca}{own}"locked.pem"\n')  # and nobody is asked for its passphrase
+    assert code == 2 and text.startswith("mqtt.cert: not a certificate that can be used")
+
+    conf.write_text(f'{ca}{own}"key.pem"\n')
     seen = Subscriber(mosquitto.plain)
     running = Running("publish", "sim:#eth", "--to", to, folder=tmp_path)
     seen.until(lambda: bool(seen.texts("p/eth/!/position")))

@@ -122,6 +122,16 @@ async def test_a_line_that_is_lost_and_back_says_so_and_its_drives_are_not_known
         assert broker.texts("p/status") == ["online"]
 
 
+async def test_a_drive_that_has_another_address_now_is_lost_at_the_old_one(tmp_path: Path) -> None:
+    async with CellSession(tmp_path, bus("press", party("a"), party("b"))) as shop, published(shop) as broker:
+        await asyncio.sleep(2)
+        await shop.session.run('@b DN = "c"')
+        await asyncio.sleep(3)
+        assert broker.values("p/press/b/state")[-1] == "lost"
+        assert broker.values("p/press/c/state")[-1] == "at rest"
+        assert broker.values("p/press/a/state") == ["at rest"] * len(broker.values("p/press/a/state"))
+
+
 async def test_a_drive_without_power_is_silent_and_comes_back(tmp_path: Path) -> None:
     async with CellSession(tmp_path, bus("press", party("a"), party("b"))) as shop, published(shop) as broker:
         await asyncio.sleep(3)
