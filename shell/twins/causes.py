@@ -82,6 +82,8 @@ def _likely(pairs: Sequence[Pair], limits: Sequence[str]) -> Iterator[str]:
         yield from _obstacles(pairs, limits)
     elif _slipped(pairs):
         yield from (SLIP, LOAD, UNSEEN)
+    elif _outrun(pairs):
+        yield from (UNSEEN, SETTINGS)
     elif _lost_speed(pairs):
         yield from (LOAD, SETTINGS, STALL)
     else:
@@ -99,14 +101,24 @@ def _alone(pairs: Sequence[Pair]) -> Iterator[str]:
 
 def _held_up(pairs: Sequence[Pair]) -> bool:
     """Whether the drive stands at the end, and most of the difference has come since: its twin moved on."""
-    first = last = pairs[-1]
-    for each in reversed(pairs):
-        if each.position != last.position:
+    return _left_behind([(each.position, each.predicted) for each in pairs])
+
+
+def _outrun(pairs: Sequence[Pair]) -> bool:
+    """Whether the twin stands at the end, and most of the difference has come since: the drive moved on."""
+    return _left_behind([(each.predicted, each.position) for each in pairs])
+
+
+def _left_behind(places: Sequence[tuple[int, int]]) -> bool:
+    """Whether the first of two stands at the end, and the other one moved away from it meanwhile."""
+    stands, there = places[-1]
+    first = places[-1]
+    for each in reversed(places):
+        if each[0] != stands:
             break
         first = each
-    return abs(last.difference) > abs(first.difference) and 2 * abs(last.predicted - first.predicted) >= abs(
-        last.difference
-    )
+    apart = abs(there - stands)
+    return apart > abs(first[1] - stands) and 2 * abs(there - first[1]) >= apart
 
 
 def _slipped(pairs: Sequence[Pair]) -> bool:

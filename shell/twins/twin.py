@@ -5,7 +5,7 @@ It has no clock: it lives up to the time of what it is given. The host's clock c
 
 from __future__ import annotations
 
-from dialects import Diagnostic
+from dialects import Inexpressible
 from dialects.family import Motion
 from dialects.snapshots import Levels, Snapshot
 from simulator import cells
@@ -82,7 +82,7 @@ class Twin:
 
 
 def make(snapshot: Snapshot, begun: float, modbus: bool, alone: bool) -> tuple[Twin, list[str]]:
-    """Make the twin of a drive that was read, and say what it lacks. Raises Diagnostic where none can be made.
+    """Make the twin of a drive that was read, and say what it lacks. Raises Inexpressible, or Diagnostic.
 
     `begun`: the time of the host's clock from which it lives. `alone`: no other drive is on the line.
     """
@@ -90,7 +90,7 @@ def make(snapshot: Snapshot, begun: float, modbus: bool, alone: bool) -> tuple[T
     spec = cells.read(write([BusText(NAME, [described])]), NAME).buses[0].drives[0]
     unit = family_of(spec.personality).build(spec, Place(alone=alone))
     if unit.shadow is None:
-        raise Diagnostic(f"the simulator has no twin of an {spec.personality}")
+        raise Inexpressible(f"the simulator has no twin of an {spec.personality}")
     lacks = [*described.remarks]
     if described.unread:
         lacks.append(f"not read: {', '.join(name for name, _ in described.unread)}")

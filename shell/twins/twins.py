@@ -29,6 +29,8 @@ class Twins:
         self._buses: dict[Bus, BusTwins] = {}
         self._paused: dict[Bus, list[str]] = {}
         """The addresses of the twins that a loss has ended, by bus."""
+        self._said: set[str] = set()
+        """What twins lack, each said once."""
         self._tasks: dict[Bus, asyncio.Task[None]] = {}
 
     @property
@@ -90,8 +92,9 @@ class Twins:
         try:
             snapshot = await snapshots.read(self._workspace, drive)
             if snapshot.active:
-                hint = "/twin on once it stands and no program runs"
-                raise Diagnostic("it moves or a program runs, and a twin begins at rest", name, hint)
+                raise DriveError(
+                    f"{name}: it moves or a program runs, and a twin begins at rest; /twin on once it stands"
+                )
             begun = bus.now()
             twin, lacks = make(snapshot, begun, drive.family.name == "modbus", len(bus.drives) == 1)
             twins.begin(Beside(drive, twin, begun))
@@ -99,7 +102,9 @@ class Twins:
             twins.forgo(drive)
         self._workspace.notify(f"{name}: a twin runs beside it", bus=bus.name, outcome=True)
         for each in lacks:
-            self._workspace.notify(f"{name}: its twin: {each}", bus=bus.name)
+            if (text := f"{name}: its twin: {each}") not in self._said:
+                self._said.add(text)
+                self._workspace.notify(text, bus=bus.name)
 
     # Losses
 

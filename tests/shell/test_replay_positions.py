@@ -81,6 +81,24 @@ async def test_a_stall_in_a_log_is_found_with_its_time(tmp_path: Path, capsys: p
     assert told[-1] == "1 of 1 axes were not where the log has them"
 
 
+@pytest.mark.parametrize(
+    ("then", "now", "cause"),
+    [
+        (encoder(), encoder(world="stall_at = 20000"), "a command not seen here"),
+        (encoder(), encoder().replace("A = 40000", "A = 9000"), "settings changed"),
+        (encoder(world="locked = [[3.0, 3.4]]", SF=60000), encoder(), "stall"),
+    ],
+    ids=["the cell stalls", "the cell is slower", "the drive was held"],
+)
+async def test_a_difference_in_a_log_has_its_cause(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], then: str, now: str, cause: str
+) -> None:
+    log = await recorded(tmp_path, bus("press", then), "/sleep 2", "MR 16000", "/sleep 4")
+    await replayed(tmp_path, log, bus("press", now), as_json=True)
+    found = json.loads(capsys.readouterr().out.splitlines()[0])["diverged"]["causes"]
+    assert found[0] == cause
+
+
 async def test_typed_positions_are_compared_without_polls(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     lines = ("MR 16000", "/wait stopped", "/sleep 0.3", "PR P", "/sleep 0.3")
     log = await recorded(tmp_path, bus("press", encoder(world="stall_at = 20000")), *lines, polled=False)

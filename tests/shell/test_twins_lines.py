@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from dialects import Diagnostic, NoAnswer, Refused
+from dialects import Diagnostic, DriveError, NoAnswer, Refused
 from drives.events import Sent
 from shell.events import Diverged, OnBus, Predicted, TwinEnded
 from tests.support.cell_session import ETHERNET, CellSession, bus, party, pmx
@@ -132,7 +132,7 @@ async def test_a_line_that_comes_back_is_read_again(tmp_path: Path) -> None:
 async def test_a_drive_that_moves_gets_no_twin(tmp_path: Path) -> None:
     async with CellSession(tmp_path, bus("press", party("a"))) as cell:
         await run(cell, "SL 500")
-        with pytest.raises(Diagnostic, match="a twin begins at rest"):
+        with pytest.raises(DriveError, match="a twin begins at rest"):
             await cell.session.run("/twin on")
         assert list(cell.session.twins.rows()) == []
         cell.events.clear()
