@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from dialects.visible import visible
 from shell.sharing.client import Client, Request
 from shell.sharing.stop_bytes import StopBytes
 from transports.com_port import FLOW, FLOW_IN, GROUPS, NEEDED, PURGE_RECEIVED, Control, Setting, group_of
@@ -207,7 +208,7 @@ class Exchange:
         if stop:
             self._cut = others and self._mid_line and not self.framed
             self._actions.append(Stop(stop, self._stops.mended(stop)))
-            self._say(client, "stop", stop.hex(" "))
+            self._say(client, "stop", _text(stop))
             if others:
                 before, rest = before.strip(_ENDS), rest.strip(_ENDS)
             elif lost := len(data) - len(stop) - len(rest):
@@ -219,7 +220,7 @@ class Exchange:
     def stop(self, stop: bytes) -> list[Action]:
         """Write a stop of this side."""
         self._cut = self._mid_line and not self.framed
-        return [Stop(stop, self._stops.mended(stop)), Say("this terminal", "stop", stop.hex(" "))]
+        return [Stop(stop, self._stops.mended(stop)), Say("this terminal", "stop", _text(stop))]
 
     def _write(self, client: int, data: bytes, now: float) -> None:
         known = self.clients[client]
@@ -315,3 +316,7 @@ def _shown(what: str, value: int) -> str:
     if what == "baud":
         return f"{value}"
     return "off" if value == GROUPS[what][-1] else "on"
+
+
+def _text(stop: bytes) -> str:
+    return visible(stop.decode("latin-1"))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pytest
 
+from dialects.visible import visible
 from shell.sharing.exchange import SILENT, Action, Close, Exchange, Purge, Say, Send, Set, Stop, Write
 from shell.sharing.stop_bytes import stop_bytes
 from transports import telnet
@@ -121,7 +122,7 @@ def test_a_stop_passes_from_any_client_which_stays_connected_and_does_not_write(
     expected = b"\x03" if key[0] == telnet.IAC else key
     assert port.written == b"MR 51200\r" + expected
     assert port.closed == [] and port.exchange.writer == ADA
-    assert port.said[-1] == f"bob stop {expected.hex(' ')}"
+    assert port.said[-1] == f"bob stop {visible(expected.decode())}"
 
 
 def test_a_stop_passes_from_a_client_that_was_refused_and_in_the_read_that_is_refused() -> None:
@@ -181,7 +182,7 @@ def test_a_stop_of_this_side_is_one_of_any_client() -> None:
     port.do(port.exchange.stop(b"\x1b"))
     port.send(ADA, b"1200\rPR P\r")
     assert port.written == b"\x1b" + b"~" * 65 + b"\r" + b"\x1b" and port.waiting == b"PR P\r"
-    assert "this terminal stop 1b" in port.said
+    assert r"this terminal stop \x1b" in port.said
 
 
 def test_bytes_of_no_language_of_text_pass_as_they_are_and_a_stop_among_anothers_does_too() -> None:
