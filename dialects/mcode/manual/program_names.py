@@ -6,33 +6,51 @@ once a name exists or is gone (`H5` is `H 5` unless H5 is a variable), so all li
 
 from __future__ import annotations
 
-from collections.abc import Container, Iterator, Mapping, Sequence
+from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
 from functools import lru_cache
+from typing import NamedTuple
 
 from dialects.errors import Diagnostic
-from dialects.mcode.manual.grammar import NAME_FORM, Token, divided, is_name, statement_tokens, tokens
+from dialects.mcode.manual.grammar import NAME_FORM, Token, divided, is_name, tokens
 from dialects.mcode.manual.mnemonic import EVERY
-from dialects.mcode.manual.program_file import LONGEST, bare, remark_at, scan
+from dialects.mcode.manual.program_file import LONGEST, ProgramLine, bare, remark_at
 from dialects.mcode.manual.program_products import AT_POWER_UP
 from dialects.mcode.manual.table import lookup
 from dialects.program_editing import Span, UserName, lines_of, replaced
 
 
+class _Line(NamedTuple):
+    """A line of a file: its text without remark, the column of that from 0, the name that it declares, its tokens."""
+
+    text: str
+    column: int
+    declares: str
+    tokens: list[Token]
+
+
+@lru_cache(maxsize=16384)
+def _read(source: str) -> _Line:
+    """Read a line; it is kept, as an editor asks for all lines again after every key."""
+    text = bare(source)
+    column = len(source) - len(source.lstrip(" \t"))
+    return _Line(text, column, ProgramLine(0, text, "").declares, tokens(text))
+
+
 def names(text: str) -> list[UserName]:
     """Return the labels and variables of a file."""
-    lines = scan(text)[0]
-    words = frozenset(line.declares for line in lines if line.declares)
+    sources = lines_of(text.rstrip("\x1a"))
+    lines = [_read(source) for source in sources]
+    words = _declared(lines)
+    labels = {line.declares for line in lines if line.text[:2].upper() == "LB"}
     places: dict[str, list[Span]] = {}
     declared: dict[str, list[Span]] = {}
-    labels = {line.declares for line in lines if line.text[:2].upper() == "LB"}
-    for line in lines:
-        for number, token in _uses(line.text, words):
-            word, start = token.text.upper(), line.column - 1 + token.start
-            place = Span(line.number - 1, start, start + len(token.text))
+    for at, line in enumerate(lines):
+        for number, token in _uses(line, words):
+            word, start = token.text.upper(), line.column + token.start
+            place = Span(at, start, start + len(token.text))
             places.setdefault(word, []).append(place)
             if number <= 2 and word == line.declares:  # LB G1, LB=G1
                 declared.setdefault(word, []).append(place)
-    sources = lines_of(text)
 
     def named(word: str) -> UserName:
         kind, there = "label" if word in labels else "variable", declared.get(word, [])
@@ -41,20 +59,18 @@ def names(text: str) -> list[UserName]:
     return [named(word) for word in places]
 
 
+def _declared(lines: Iterable[_Line]) -> frozenset[str]:
+    return frozenset(line.declares for line in lines if line.declares)
+
+
 def remark(line: str) -> str:
     """Return the text of the remark of a line; empty if it has none."""
     return line[remark_at(line) + 1 :].strip()
 
 
-@lru_cache(maxsize=8192)
-def _read(line: str) -> list[Token]:
-    """Return the tokens of a line: an editor asks for all lines again after every key."""
-    return tokens(line)
-
-
-def _uses(line: str, words: Container[str]) -> Iterator[tuple[int, Token]]:
+def _uses(line: _Line, words: Container[str]) -> Iterator[tuple[int, Token]]:
     """Yield the tokens of a line that are one of the words, each with its number; the letter after DN is none."""
-    found = divided(_read(line), words)
+    found = divided(line.tokens, words)
     names_device = bool(found) and found[0].text.upper() == "DN"
     for number, token in enumerate(found):
         if token.kind == "word" and token.text.upper() in words and not (names_device and number):
@@ -79,11 +95,11 @@ def renamed(text: str, name: UserName, new: str, product: str) -> str:
         return new
     if lookup(word) is not None:
         raise Diagnostic(_taken(word, product), "", "choose another name")
-    lines = lines_of(text)
-    for number, line in enumerate(lines, 1):
-        if any(_uses(bare(line), (word,))):
+    sources = lines_of(text)
+    for number, source in enumerate(sources, 1):
+        if any(_uses(_read(source), (word,))):
             raise Diagnostic(f"{word} is in use already, in line {number}", "", "choose another name")
-    _compare(lines, replaced(lines, name.places, new), name.word, word)
+    _compare(sources, replaced(sources, name.places, new), name.word, word)
     return new
 
 
@@ -97,19 +113,20 @@ def _taken(word: str, product: str) -> str:
 
 def _compare(before: Sequence[str], after: Sequence[str], old: str, new: str) -> None:
     """Raise Diagnostic for a line that a rename makes too long, or that the drive would divide differently."""
-    words = frozenset(line.declares for line in scan("\n".join(before))[0] if line.declares)
+    lines = [_read(source) for source in before]
+    words = _declared(lines)
     others = words - {old} | {new}
-    for number, (line, other) in enumerate(zip(map(bare, before), map(bare, after), strict=True), 1):
-        if len(other) > LONGEST >= len(line):
-            what = f"line {number} would have {len(other)} characters; a drive takes {LONGEST}"
+    for number, (line, other) in enumerate(zip(lines, map(_read, after), strict=True), 1):
+        if len(other.text) > LONGEST >= len(line.text):
+            what = f"line {number} would have {len(other.text)} characters; a drive takes {LONGEST}"
             raise Diagnostic(what, "", "choose a shorter name, or split the line")
         if _tokens(line, words, {old: new}) != _tokens(other, others, {}):
             raise Diagnostic(f"line {number} would mean something else with {new}", "", "choose another name")
 
 
-def _tokens(line: str, words: frozenset[str], new: Mapping[str, str]) -> list[str]:
+def _tokens(line: _Line, words: frozenset[str], new: Mapping[str, str]) -> list[str]:
     """Return the tokens of a line, its names in capitals and renamed."""
-    found = [token.text for token in statement_tokens(line, words)]
+    found = [token.text for token in divided(line.tokens, words)]
     for number, token in _uses(line, words):
         upper = token.text.upper()
         found[number] = new.get(upper, upper)
