@@ -29,7 +29,7 @@ from tui.panels.glance import glances_of
 from tui.panels.plot import plot_rows
 from tui.panels.view import View
 from tui.screen_model import ScreenModel
-from tui.widgets.lines import Lines
+from tui.widgets.lines import Lines, Roles
 from tui.widgets.theme import DARK, DEFAULTS
 
 AIM = 0.05
@@ -109,7 +109,8 @@ class Screen(App[None]):
         return DEFAULTS
 
     def compose(self) -> ComposeResult:
-        """Make the part."""
+        """Make the part, and what has the styles of its roles, as on the main screen."""
+        yield Roles()
         yield self.lines
 
 
