@@ -34,6 +34,8 @@ WINDOW = 100
 """Messages that may wait for their acknowledgement."""
 TIMEOUT = 15.0
 """The longest time to connect, and to be accepted, s."""
+LONGEST = 65535
+"""Bytes of a user or a password."""
 LEAVE = 1.0
 """The longest time to disconnect, s."""
 
@@ -126,7 +128,8 @@ class Connection:
     def _ended(self) -> None:
         self.lost.set()
         if not self._accepted.done():
-            hint = "mqtts:// is the encrypted form of mqtt://"
+            wants = "it may want cert and key under [mqtt]"
+            hint = wants if self._target.encrypted else "mqtts:// is the encrypted form of mqtt://"
             self._accepted.set_exception(Unreachable(f"{self._where} hung up before the login; {hint}"))
 
     def _acknowledged(self) -> None:
@@ -192,6 +195,8 @@ def _log_in(client: Client, target: Target, settings: MqttSettings) -> None:
     user, secret = target.user or settings.username, settings.secret()
     if secret and not user:
         raise Diagnostic("mqtt.password needs mqtt.username", hint="or --to mqtt://USER@BROKER/PREFIX")
+    if max(len(user.encode()), len(secret.encode())) > LONGEST:
+        raise Diagnostic(f"the login is too long; MQTT has room for {LONGEST} bytes")
     if user:
         client.username_pw_set(user, secret or None)
     if target.encrypted:

@@ -154,7 +154,6 @@ class _Line:
     def take(self, event: object) -> None:
         """Publish what an event says about a drive, or about the line."""
         if isinstance(event, Lost):
-            self._say(messages.LOST)
             for drive in self._drives.values():
                 drive.lost(event.at)
         elif isinstance(event, Changed):

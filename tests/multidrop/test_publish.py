@@ -178,6 +178,7 @@ async def test_a_server_that_never_answers_is_given_up_and_nothing_stays(monkeyp
     [
         (["--to", "mqtt://127.0.0.1:{free}/p"], 3, "no broker at 127.0.0.1:"),
         (["--to", "mqtt://127.0.0.1:1/p", "--rate", "max"], 2, "--rate: invalid rate 'max'"),
+        (["--to", f"mqtt://{'m' * 70000}@127.0.0.1/p"], 2, "the login is too long"),
         (["--to", "mqtt://me:hunter2@127.0.0.1/p"], 2, "--to: a password in a URL"),
         ([], 2, "--to"),
     ],
