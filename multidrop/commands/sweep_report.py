@@ -12,7 +12,7 @@ from dialects import Diagnostic
 from multidrop.commands.failure import fail
 from shell.front.junit import Case as JUnitCase
 from shell.front.junit_file import JUnitFile
-from shell.output import write
+from shell.output import INTERRUPTED, write
 from shell.status_line import StatusLine
 from shell.sweeps.failures import Failures, command, grouped, rows
 from shell.sweeps.interruption import Interruption
@@ -24,8 +24,8 @@ from shell.sweeps.variation import SEED
 FAILED = 1
 PERIOD = 0.1
 """The shortest time between two reports of progress, s."""
-SEARCH = 10.0
-"""The time in which simpler worlds are looked for, s."""
+SEARCH, LATE_SEARCH = 10.0, 1.0
+"""The time in which simpler worlds are looked for, s; and after an early end."""
 
 
 class Report:
@@ -90,9 +90,10 @@ class Report:
         for number in sorted(self._early):
             self._take(self._early.pop(number))
         seconds = time.perf_counter() - self._began
-        failures = self._failures(interruption, search=not code)
+        interruption.came = False  # the next signal ends the search
+        failures = self._failures(interruption, LATE_SEARCH if code else SEARCH)
         self.erase()
-        if code and not interruption.came and not self._reported:
+        if code not in (0, INTERRUPTED) and not self._reported:
             return self._finish_junit(failures, seconds, code)
         if self._json:
             summary = {"cases": len(self._reported), "failed": len(self._failed), "seconds": round(seconds, 3)}
@@ -109,12 +110,12 @@ class Report:
     def _counted(self) -> str:
         return f"{len(self._reported)} case{'' if len(self._reported) == 1 else 's'}"
 
-    def _failures(self, interruption: Interruption, *, search: bool) -> Failures:
-        """Put failures into groups; `search` for simpler worlds, as long as there is time and no signal."""
-        ready, until = bench(self._plan.job), time.perf_counter() + SEARCH
+    def _failures(self, interruption: Interruption, seconds: float) -> Failures:
+        """Put failures into groups; look for simpler worlds in this time, until there is a signal."""
+        ready, until = bench(self._plan.job), time.perf_counter() + seconds
 
         def run(case: Case) -> Result | None:
-            if not search or time.perf_counter() > until:
+            if time.perf_counter() > until:
                 return None
             self._status.show(f"{len(self._failed)} of {self._counted} failed; looking for the simplest worlds")
             try:

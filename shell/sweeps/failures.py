@@ -83,7 +83,7 @@ def command(plan: Plan, world: World, failed: int) -> str:
         words += ["--vary", f"{name}={spelled(value)}"]
     words += ["--expect", plan.job.expects[failed]] if failed >= 0 and asked.expect else []
     words += ["--run", asked.run] if asked.run else []
-    words += ["--until", spelled(asked.until)] if asked.until is not None else []
+    words += ["--until", f"{asked.until:.15g}"] if asked.until is not None else []
     words += ["--language", asked.language] if asked.language else []
     return subprocess.list2cmdline(words) if sys.platform == "win32" else shlex.join(words)
 
