@@ -36,9 +36,9 @@ def results(job: Job, cases: Iterator[Case], address: str, interruption: Interru
         with interruption.open():
             _check_workers(client, address)
             first = next(cases)
-            begin = time.perf_counter()
+            begin = time.process_time()
             found = trial.chunk(job, [first])
-        size = max(1, round(CHUNK / max(time.perf_counter() - begin, 1e-6)))
+        size = max(1, round(CHUNK / max(time.process_time() - begin, 1e-6)))
         yield found
         if todo := list(chunks(cases, size)):
             yield from _Work(client, job, address, interruption).results(todo)
@@ -89,7 +89,7 @@ class _Work:
     def __init__(self, client: Client, job: Job, address: str, interruption: Interruption) -> None:
         self._client, self._job, self._address, self._interruption = client, job, address, interruption
         self._again: list[list[Case]] = []
-        """Chunks whose result was lost with a worker."""
+        """Chunks whose result was lost with a worker, and the rests of chunks that took long."""
         self._alone = False
         self._suspects: list[Case] = []
         """Cases of chunks whose workers died. The cluster counts against all that waited there, too."""
@@ -129,6 +129,8 @@ class _Work:
 
         try:
             found: list[Result] = future.result()
+            if len(found) < len(cases):
+                self._again.append(cases[len(found) :])
             return found
         except FutureCancelledError:
             if self._client.status != "running":

@@ -36,6 +36,8 @@ class Pools:
         self._context = _context()
         self._suspects: list[Case] = []
         """The cases that the end of a pool cut off: one of them was the cause."""
+        self._rests: list[list[Case]] = []
+        """The rests of chunks that took long."""
 
     def results(self, todo: Iterator[list[Case]]) -> Iterator[list[Result]]:
         """Run chunks; yield the results of each as it ends."""
@@ -57,7 +59,9 @@ class Pools:
                     if isinstance(future.exception(), BrokenProcessPool):
                         self._suspects += cases
                     else:
-                        yield future.result()
+                        found = future.result()
+                        self._rests += [cases[len(found) :]] if len(found) < len(cases) else []
+                        yield found
                 if self._interruption.came:
                     raise KeyboardInterrupt
                 self._submit(pool, todo, running)
@@ -66,7 +70,7 @@ class Pools:
         self, pool: ProcessPoolExecutor, todo: Iterator[list[Case]], running: dict[Future[list[Result]], list[Case]]
     ) -> None:
         while len(running) < self._jobs * AHEAD and not self._suspects:
-            cases = next(todo, None)
+            cases = self._rests.pop() if self._rests else next(todo, None)
             if cases is None:
                 return
             try:

@@ -6,6 +6,7 @@ A `Job` is what all cases have in common; each process reads it once. A case is 
 from __future__ import annotations
 
 import json
+import time
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
@@ -24,6 +25,8 @@ from simulator.program_run import Load, ProgramRun
 
 UNTIL = 60.0
 """Virtual seconds after which a case has failed, unless the sweep sets a time."""
+LONGEST = 0.5
+"""Seconds after which a chunk gives back what it has, so that it can be reported."""
 HELD = -1
 """The number of the failed condition of a case in which all hold."""
 CUT, REFUSED, DIED = -2, -3, -4
@@ -108,9 +111,14 @@ def bench(job: Job) -> Bench:
 
 
 def chunk(job: Job, cases: Sequence[Case]) -> list[Result]:
-    """Run some cases in turn."""
-    ready = bench(job)
-    return [_named(ready, each) for each in cases]
+    """Run some cases in turn: one at least, and no further one after `LONGEST`."""
+    ready, until = bench(job), time.monotonic() + LONGEST
+    found: list[Result] = []
+    for case in cases:
+        found.append(_named(ready, case))
+        if time.monotonic() > until:
+            break
+    return found
 
 
 def _named(ready: Bench, case: Case) -> Result:

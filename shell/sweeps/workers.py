@@ -16,9 +16,9 @@ from shell.sweeps.interruption import Interruption
 from shell.sweeps.trial import Case, Job, Result
 
 CHUNK = 0.075
-"""The work of one chunk, s."""
+"""The work of one chunk, s of processor time."""
 WORTH = 0.1
-"""The work that is worth further processes, s."""
+"""The work that is worth further processes, s of processor time."""
 FIRST = 3
 """The cases that run in this process first; the last of them is the measure."""
 Run = Callable[[Job, Sequence[Case]], list[Result]]
@@ -26,7 +26,9 @@ Run = Callable[[Job, Sequence[Case]], list[Result]]
 
 def cores() -> int:
     """The number of cores that this process may use."""
-    return len(os.sched_getaffinity(0)) if sys.platform == "linux" else os.cpu_count() or 1
+    if sys.platform == "linux":
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
 
 
 def results(
@@ -35,10 +37,10 @@ def results(
     """Run `count` cases in `jobs` processes; yield the results of each chunk as it ends."""
     seconds = 0.0
     for case in islice(cases, FIRST):
-        begin = time.perf_counter()
+        begin = time.process_time()
         with interruption.open():
             found = run(job, [case])
-        seconds = time.perf_counter() - begin
+        seconds = time.process_time() - begin
         yield found
     work = seconds * (count - FIRST)
     if jobs > 1 and work > WORTH:

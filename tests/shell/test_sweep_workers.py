@@ -22,8 +22,14 @@ SLOW = 0.002
 
 
 def slow(job: Job, cases: Sequence[Case]) -> list[Result]:
-    time.sleep(SLOW * len(cases))
+    until = time.process_time() + SLOW * len(cases)
+    while time.process_time() < until:
+        pass
     return [Result(number) for number, _ in cases]
+
+
+def lazy(job: Job, cases: Sequence[Case]) -> list[Result]:
+    return slow(job, cases[:2])
 
 
 def deadly(job: Job, cases: Sequence[Case]) -> list[Result]:
@@ -44,6 +50,11 @@ def test_every_case_runs_once() -> None:
     assert multiprocessing.active_children() == []
 
 
+def test_the_rest_of_a_chunk_that_took_long_runs_later() -> None:
+    results = found(lazy, 150, 2)
+    assert sorted(results) == [Result(number) for number in range(1, 151)]
+
+
 def test_little_work_needs_no_processes(monkeypatch: pytest.MonkeyPatch) -> None:
     clock = [0.0]
 
@@ -51,7 +62,7 @@ def test_little_work_needs_no_processes(monkeypatch: pytest.MonkeyPatch) -> None
         clock[0] += SLOW
         return [Result(number) for number, _ in cases]
 
-    monkeypatch.setattr(workers.time, "perf_counter", lambda: clock[0])
+    monkeypatch.setattr(workers.time, "process_time", lambda: clock[0])
     monkeypatch.setattr(pools, "ProcessPoolExecutor", None)
     assert len(found(timed, 40, 2)) == 40 and len(found(timed, 150, 1)) == 150
     with pytest.raises(TypeError):
