@@ -16,7 +16,7 @@ from shell.connect.urls import parse
 from shell.events import FAILURES
 from shell.front.interrupts import on_signals, on_stop_key
 from shell.output import exit_code, finish, nonblocking, report, write
-from shell.sharing.exchange import Say
+from shell.sharing.actions import Say
 from shell.sharing.server import SharedPort
 from shell.sharing.stop_bytes import own_stop, stop_bytes
 from transports import Limited, TransportLost

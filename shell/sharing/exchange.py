@@ -7,9 +7,10 @@ sent what the drives send.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import re
 
 from dialects.visible import visible
+from shell.sharing.actions import Action, Close, Purge, Say, Send, Set, Stop, Write
 from shell.sharing.client import Client, Request
 from shell.sharing.stop_bytes import StopBytes
 from transports.com_port import FLOW, FLOW_IN, GROUPS, NEEDED, PURGE_RECEIVED, Control, Setting, group_of
@@ -17,65 +18,10 @@ from transports.com_port import FLOW, FLOW_IN, GROUPS, NEEDED, PURGE_RECEIVED, C
 SILENT = 10.0
 """Seconds of silence after which another client may write."""
 _ENDS = b"\r\n"
+_LINES = re.compile(b"[\r\n]")
+LONGEST = 80
+"""Bytes of an unfinished line that are looked at."""
 _ASKS = (Control.ASK_FLOW, Control.ASK_BREAK, Control.ASK_DTR, Control.ASK_RTS, Control.ASK_FLOW_IN)
-
-
-@dataclass(frozen=True)
-class Send:
-    """Send bytes to a client."""
-
-    client: int
-    data: bytes
-
-
-@dataclass(frozen=True)
-class Close:
-    """Close a client's connection, after the bytes that say why."""
-
-    client: int
-    farewell: bytes
-
-
-@dataclass(frozen=True)
-class Write:
-    """Write bytes to the port, for a client."""
-
-    client: int
-    data: bytes
-
-
-@dataclass(frozen=True)
-class Stop:
-    """Drop what the port has not sent, and write a stop: `mended` where something was dropped."""
-
-    data: bytes
-    mended: bytes
-
-
-@dataclass(frozen=True)
-class Purge:
-    """Drop what the port has not sent."""
-
-
-@dataclass(frozen=True)
-class Set:
-    """Change a setting of the port for a client; `applied` follows."""
-
-    client: int
-    setting: int
-    value: int
-
-
-@dataclass(frozen=True)
-class Say:
-    """Something for a person: the client, what happened, and more about it."""
-
-    client: str
-    event: str
-    detail: str = ""
-
-
-Action = Send | Close | Write | Stop | Purge | Set | Say
 
 
 class Exchange:
@@ -99,8 +45,10 @@ class Exchange:
         """The time at which the writer wrote last."""
         self._setter: int | None = None
         """The client that has set the baud rate while nobody wrote."""
-        self._mid_line = False
-        """The writer's last byte did not end a line."""
+        self._begun = b""
+        """What was written of a line without its end."""
+        self._before: int | None = None
+        """The last writer."""
         self._cut = False
         """The last stop came from another client within a line of the writer."""
         self._skipping = False
@@ -206,7 +154,8 @@ class Exchange:
         if stop and not others and self._stops.binary(data):
             before, stop, rest = data, b"", b""
         if stop:
-            self._cut = others and self._mid_line and not self.framed
+            self._cut = others and bool(self._begun)
+            self._begun = b""
             self._actions.append(Stop(stop, self._stops.mended(stop)))
             self._say(client, "stop", _text(stop))
             if others:
@@ -219,7 +168,7 @@ class Exchange:
 
     def stop(self, stop: bytes) -> list[Action]:
         """Write a stop of this side."""
-        self._cut = self._mid_line and not self.framed
+        self._cut, self._begun = bool(self._begun), b""
         return [Stop(stop, self._stops.mended(stop)), Say("this terminal", "stop", _text(stop))]
 
     def _write(self, client: int, data: bytes, now: float) -> None:
@@ -227,16 +176,27 @@ class Exchange:
         if known.refused:
             return
         if self.writer is None:
-            self.writer, self._skipping, self._mid_line = client, False, False
-            self._say(client, "writes")
-        if client != self.writer:
+            self._begin(client)
+        elif client != self.writer:
             name = self.clients[self.writer].name
             self._close(client, "refused", f"{name} writes, until it leaves or is silent for {SILENT:g} s")
             return
         self._last = now
         if data := self._rest_of_line(data):
-            self._mid_line = data[-1] not in _ENDS
+            self._begun = b"" if self.framed else _LINES.split(self._begun + data)[-1][-LONGEST:]
             self._actions.append(Write(client, data))
+
+    def _begin(self, client: int) -> None:
+        """Make a client the writer. What another one has begun, and this one's first end of a line would execute, ends
+        harmlessly.
+        """
+        if client != self._before:
+            if self._stops.moves(self._begun):
+                self._say(client, "unfinished", f"'{_text(self._begun)}' of the writer before is made harmless")
+                self._actions.append(Write(client, self._stops.invalidate))
+            self._begun = b""
+        self.writer, self._before, self._skipping = client, client, False
+        self._say(client, "writes")
 
     def _rest_of_line(self, data: bytes) -> bytes:
         """Drop what is left of a line whose beginning a stop has dropped."""

@@ -12,7 +12,8 @@ from dialects import StopPiece
 from shell.connect.opening import OpenedPort
 from shell.connect.reconnect import FIRST, GLANCE, LONGEST
 from shell.connect.reopening import Absent
-from shell.sharing.exchange import Action, Close, Exchange, Purge, Say, Send, Set, Stop, Write
+from shell.sharing.actions import Action, Close, Purge, Say, Send, Set, Stop, Write
+from shell.sharing.exchange import Exchange
 from shell.sharing.stop_bytes import StopBytes
 from transports import Controllable, PortControl, Queueing, Transport, TransportLost
 from transports.com_port import Control, Setting

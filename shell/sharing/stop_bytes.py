@@ -7,7 +7,7 @@ another one. Where messages carry their length, a byte says nothing by itself: o
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from dialects import Diagnostic, StopPiece
@@ -26,6 +26,8 @@ class StopBytes:
     pattern: re.Pattern[bytes]
     framed: bool
     invalidate: bytes = b""
+    moves: Callable[[bytes], bool] = lambda line: False
+    """Whether the beginning of a line, once something ends it, may start a motion or a program."""
 
     def found(self, data: bytes) -> tuple[bytes, bytes, bytes]:
         """Divide what came in one read: what is before the first stop, the stops, and what follows the last one.
@@ -63,7 +65,15 @@ def stop_bytes(family: str) -> StopBytes:
     if framed:
         return StopBytes(re.compile(b"(?:" + found[0] + b")+", re.DOTALL), True)
     pattern = re.compile(b"|".join([*found, KEYS]))
-    return StopBytes(pattern, False, FAMILIES[family or DEFAULT].codec.invalidate())
+    codec, language = FAMILIES[family or DEFAULT].codec, FAMILIES[family or DEFAULT].language
+
+    def moves(line: bytes) -> bool:
+        text = line.decode("latin-1")
+        words = re.findall("[A-Z]+", text.upper())  # the first letter may be a drive's name
+        known = any(language.knows(each) for word in words for each in (word, word[1:]) if each)
+        return known and codec.starts_motion(text)
+
+    return StopBytes(pattern, False, codec.invalidate(), moves)
 
 
 def own_stop(family: str, drives: Sequence[str]) -> tuple[StopPiece, ...]:

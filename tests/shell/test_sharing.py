@@ -5,7 +5,8 @@ from __future__ import annotations
 import pytest
 
 from dialects.visible import visible
-from shell.sharing.exchange import SILENT, Action, Close, Exchange, Purge, Say, Send, Set, Stop, Write
+from shell.sharing.actions import Action, Close, Purge, Say, Send, Set, Stop, Write
+from shell.sharing.exchange import SILENT, Exchange
 from shell.sharing.stop_bytes import stop_bytes
 from transports import telnet
 from transports.com_port import OPTION, REPLY, Control, Setting, message
@@ -201,6 +202,44 @@ def test_in_frames_only_a_whole_stop_is_one() -> None:
     assert port.written == ROR + bytes([3, 0x1B, 5]) + MST * 2
     port.send(BOB, b"\x1b")
     assert port.closed == [BOB]
+
+
+@pytest.mark.parametrize(
+    ("family", "line", "harmless"),
+    [
+        ("", b"MR 5", b"~" * 65 + b"\r"),
+        ("mcode", b"PR P\raSL 2", b"~" * 65 + b"\r"),
+        ("pmx", b"@00X10", b"~~~\r"),
+        ("", b"PR P", b""),
+        ("", b"hello", b""),
+        ("", b"MR 5\r", b""),
+        ("", b"\r", b""),
+    ],
+)
+def test_a_motion_that_a_writer_left_unfinished_is_not_executed_by_the_next_one(
+    family: str, line: bytes, harmless: bytes
+) -> None:
+    port = Port(family)
+    port.send(ADA, line)
+    port.do(port.exchange.leave(ADA))
+    port.send(BOB, b"\n")
+    assert port.written == line + harmless + b"\n"
+
+
+def test_a_writer_that_was_silent_ends_its_own_line() -> None:
+    port = Port()
+    port.send(ADA, b"MR 5", 0.0)
+    port.send(ADA, b"0\r", 20.0)
+    assert port.written == b"MR 50\r"
+
+
+def test_a_stop_leaves_no_unfinished_line() -> None:
+    port = Port()
+    port.send(ADA, b"MR 5")
+    port.send(ADA, b"\x1b")
+    port.do(port.exchange.leave(ADA))
+    port.send(BOB, b"\n")
+    assert port.written == b"MR 5\x1b\n"
 
 
 # RFC 2217

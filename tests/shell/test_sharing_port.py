@@ -19,7 +19,7 @@ import serial
 from shell.connect.opening import open_port
 from shell.connect.urls import parse
 from shell.sharing import server
-from shell.sharing.exchange import Say
+from shell.sharing.actions import Say
 from shell.sharing.server import SharedPort
 from shell.sharing.stop_bytes import own_stop, stop_bytes
 from tests.support.until import until
