@@ -4,10 +4,18 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from transports.base import Unreachable
+
 RELAY = "multidrop"
 SOCAT = "socat"
 WAYS = (RELAY, SOCAT)
 """The programs on the far side; both are tried in this order unless one is asked for."""
+
+
+class NotInstalled(Unreachable):
+    """None of the programs that were tried is installed on the far side."""
+
+
 _IN_URL = str.maketrans({"%": "%25", "?": "%3F", "#": "%23"})
 
 

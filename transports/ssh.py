@@ -6,7 +6,7 @@ import asyncio
 import sys
 
 from transports.base import Transport, Unreachable
-from transports.far_port import FarPort
+from transports.far_port import SOCAT, FarPort, NotInstalled
 from transports.pipe import in_thread
 
 OPENING = 20.0
@@ -18,17 +18,30 @@ async def open_ssh(far: FarPort, baud: int = 9600, within: float | None = None, 
     if sys.platform == "win32":
         raise Unreachable(f"{far.name}: ssh:// needs multidrop on Linux or macOS here")
     else:
+        try:
+            return await _opened(far, baud, within or OPENING, way)
+        except NotInstalled as neither:
+            if way:
+                raise
+            try:  # a server that allows a few commands only may refuse the first one as a whole
+                return await _opened(far, baud, within or OPENING, SOCAT)
+            except NotInstalled:
+                raise neither from None
+
+
+if sys.platform != "win32":
+
+    async def _opened(far: FarPort, baud: int, within: float, way: str) -> Transport:
         from transports.ssh_session import SshSession, greeted
 
-        patience = within or OPENING
         session = await in_thread(lambda: SshSession(far, baud, way), lambda late: late.close(True))
         try:
-            async with asyncio.timeout(patience):
+            async with asyncio.timeout(within):
                 return await greeted(session, far, baud, way)
         except TimeoutError:
             why = session.last_words() or "no reply"
             await asyncio.to_thread(session.close, True)
-            raise Unreachable(f"{far.name}: not reached within {patience:g} s: {why}; try `ssh {far.login}`") from None
+            raise Unreachable(f"{far.name}: not reached within {within:g} s: {why}; try `ssh {far.login}`") from None
         except BaseException:
             await asyncio.shield(asyncio.to_thread(session.close, True))
             raise

@@ -18,10 +18,10 @@ import time
 
 from transports.base import Transport, Unreachable
 from transports.descriptor import DescriptorPipe
-from transports.far_port import FarPort
+from transports.far_port import FarPort, NotInstalled
 from transports.relay_frames import GREETING, Frames, Garbled, Kind, frame
 from transports.relay_pipe import RelayPipe
-from transports.ssh_command import SOCAT_WORD, arguments, reason, unknown_greeting
+from transports.ssh_command import MISSING, SOCAT_WORD, arguments, reason, unknown_greeting
 
 if sys.platform != "win32":
     from transports.output_queue import output_queue
@@ -177,7 +177,7 @@ async def greeted(session: SshSession, far: FarPort, baud: int, way: str) -> Tra
         early, took = await _measured(session, early)
         return RelayPipe(session, baud, early, took)
     if (status := await asyncio.to_thread(session.status, _SETTLE)) is not None:
-        raise Unreachable(f"{far.name}: {reason(far, status, session.last_words(), way)}")
+        raise _failure(far, status, session.last_words(), way)
     session.mark()
     return SocatPipe(SocatEndpoint(session), LIMITS.format(host=far.host))
 
@@ -209,4 +209,9 @@ async def _greeting(session: SshSession, far: FarPort, way: str) -> tuple[str, b
                 raise Unreachable(f"{far.name}: {wrong}")
             said = text or said
     status = await asyncio.to_thread(session.status, _ENDING)
-    raise Unreachable(f"{far.name}: {reason(far, status, session.last_words() or said, way)}")
+    raise _failure(far, status, session.last_words() or said, way)
+
+
+def _failure(far: FarPort, status: int | None, words: str, way: str) -> Unreachable:
+    kind = NotInstalled if status == MISSING else Unreachable
+    return kind(f"{far.name}: {reason(far, status, words, way)}")

@@ -72,6 +72,7 @@ async def test_a_drive_behind_a_real_sshd_moves_and_comes_back_after_each_kill_w
         assert not lock_owner(port)
 
 
+REFUSES_THE_FIRST = 'case "$last" in *"multidrop relay"*) exit 127;; *) echo multidrop-socat; exec cat;; esac'
 FAILURES = [
     (
         "echo 'ssh: connect to host pc port 22: Connection refused' >&2; exit 255",
@@ -93,6 +94,8 @@ FAILURES = [
 @pytest.mark.process
 async def test_what_goes_wrong_before_the_greeting_is_one_line_that_quotes_it(tmp_path: Path, monkeypatch) -> None:
     before = len(os.listdir("/dev/fd"))
+    monkeypatch.setenv("PATH", fake_ssh(tmp_path / "bin", REFUSES_THE_FIRST))
+    await (await open_ssh(FarPort("pc", "/dev/tty9"))).close()
     for body, words in FAILURES:
         monkeypatch.setenv("PATH", fake_ssh(tmp_path / "bin", body))
         with pytest.raises(Unreachable) as caught:

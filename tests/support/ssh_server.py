@@ -20,7 +20,9 @@ from tests.support.paths import ROOT
 FOLDERS = f"{os.defpath}:/usr/sbin:/sbin"
 SSHD = shutil.which("sshd", path=FOLDERS)
 SSH = shutil.which("ssh")
-needs_sshd = pytest.mark.skipif(not (SSHD and SSH), reason="needs OpenSSH: sshd and ssh")
+needs_sshd = pytest.mark.skipif(
+    not (SSHD and SSH and sys.platform == "linux"), reason="needs OpenSSH (sshd and ssh) on Linux"
+)
 CONFIG = """
 ListenAddress 127.0.0.1
 Port {port}
