@@ -265,9 +265,31 @@ def test_the_outline_of_a_script_has_its_blocks() -> None:
         ((7, 5), "4", "PRG 0| V1=0 ; count| IF V1<3|  GOSUB 4| ENDIF| XV1YV2|END|SUB 4 ; lamp|ENDSUB|SUB 31|ENDSUB|"),
     ],
 )
-def test_a_number_of_a_script_is_changed_everywhere(at: tuple[int, int], new: str, after: str) -> None:
+def test_a_number_of_a_script_is_changed_in_all_its_uses(at: tuple[int, int], new: str, after: str) -> None:
     text = text_of(SCRIPT, "a.prg")
     assert edited(text, text.renamed_at(*at, new)).split("\n") == after.split("|")
+
+
+@pytest.mark.parametrize(
+    ("line", "after"),
+    [
+        ("XV1YV2", "XV9YV2"),
+        (" X V1Y2", " X V9Y2"),
+        ("X V2 YV1 ; V1", "X V2 YV9 ; V1"),
+        ("Y V1", "Y V9"),
+        ("V12=V1+V1", "V12=V9+V9"),
+        ("V1=~V1", "V9=~V9"),
+        ("V2=V1>>V11", "V2=V9>>V11"),
+        ("DELAY = V1", "DELAY = V9"),
+        ("IF V1>=-1", "IF V9>=-1"),
+        ("WHILE AI1<V1", "WHILE AI1<V9"),
+        ("HSPDX=V1", "HSPDX=V9"),
+    ],
+)
+def test_a_variable_is_renamed_wherever_a_statement_has_one(line: str, after: str) -> None:
+    end = {"I": "\nENDIF", "W": "\nENDWHILE"}.get(line[0], "")
+    text = text_of(f"V1=5\n{line}{end}\nEND\n", "a.prg")
+    assert edited(text, text.renamed_at(0, 1, "V9")) == f"V9=5\n{after}{end}\nEND\n"
 
 
 @pytest.mark.parametrize(

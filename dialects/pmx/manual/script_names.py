@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
+from dataclasses import replace
 
 from dialects.errors import Diagnostic
-from dialects.pmx.manual.line_parts import MOVE, words
+from dialects.pmx.manual.line_parts import words
 from dialects.pmx.manual.script_help import VARIABLE_NAMES
+from dialects.pmx.manual.script_parser import MOVE, TARGET, Statement, Value, parse
 from dialects.pmx.manual.script_words import HANDLER, KEPT_VARIABLES, SUBROUTINES, VARIABLES
-from dialects.program_editing import Span, UserName, lines_of
+from dialects.program_editing import Span, UserName, lines_of, replaced
 
-_VARIABLE = re.compile(r"V\d+", re.ASCII)
 _NUMBERED = re.compile(r"\s*(PRG|SUB|GOSUB)\s*(\d{1,4})\s*", re.ASCII)
 _SETS = re.compile(r"\s*(V\d+)\s*=", re.ASCII)
 _NUMBER = re.compile(r"(?:SUB)?\s*(\d{1,4})\s*", re.ASCII)
@@ -47,13 +48,12 @@ def _found(code: str) -> Iterator[tuple[str, str, int, int]]:
         head, kind = _KINDS[numbered[1]]
         yield f"{head} {int(numbered[2])}", kind, *numbered.span(2)
         return
-    for word in words(code):
-        if word.text in VARIABLE_NAMES:
-            yield word.text, "variable", word.start, word.stop
-        elif MOVE.fullmatch(word.text):
-            for found in _VARIABLE.finditer(word.text):
-                if found[0] in VARIABLE_NAMES:
-                    yield found[0], "variable", word.start + found.start(), word.start + found.end()
+    indent = len(code) - len(code.lstrip())
+    if MOVE.fullmatch(code.strip()):
+        found = [(each[2], indent + each.start(2)) for each in TARGET.finditer(code.strip())]
+    else:
+        found = [(word.text, word.start) for word in words(code)]
+    yield from ((text, "variable", start, start + len(text)) for text, start in found if text in VARIABLE_NAMES)
 
 
 def _declares(code: str, kind: str, start: int) -> bool:
@@ -80,7 +80,26 @@ def renamed(text: str, name: UserName, new: str, product: str) -> str:  # noqa: 
     taken = next((each for each in names(text) if each.word == word and each.word != name.word), None)
     if taken is not None:
         raise Diagnostic(f"{word} is in use already, in line {taken.places[0].line + 1}", "", "choose another number")
+    _compare(text, name, word)
     return word.removeprefix("SUB ")
+
+
+def _compare(text: str, name: UserName, word: str) -> None:
+    """Raise Diagnostic unless a rename gives the statements of the text with the other word, and nothing else."""
+    after = replaced(lines_of(text), name.places, word.removeprefix("SUB "))
+    wanted = [_renamed(each, name.word, word) for each in parse(text)[0]]
+    for one, other in zip(wanted, parse("\n".join(after))[0], strict=True):
+        if one != other:
+            raise Diagnostic(f"line {other.line} would mean something else with {word}", "", "choose another number")
+
+
+def _renamed(statement: Statement, old: str, new: str) -> Statement:
+    """Return a statement with another variable, or another number of a subroutine."""
+    if old.startswith("SUB "):
+        numbered = statement.word in ("SUB", "GOSUB") and statement.values == (Value(old[4:]),)
+        return replace(statement, values=(Value(new[4:]),)) if numbered else statement
+    values = tuple(Value(new) if each.text == old else each for each in statement.values)
+    return replace(statement, values=values, word=new if statement.word == old else statement.word)
 
 
 def _variable(name: UserName, new: str) -> str:

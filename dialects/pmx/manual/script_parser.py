@@ -20,8 +20,8 @@ _BREAK = re.compile(r"\r\n|\n|\r")
 _BLOCK = re.compile(r"(IF|ELSEIF|WHILE)(?![A-Za-z0-9])(.*)")
 _NUMBERED = re.compile(r"(PRG|GOSUB|SUB)\s*(-?\d+)?\s*")
 _PLAIN = re.compile(r"(ELSEIF|ELSE|ENDIF|ENDWHILE|ENDSUB|END)\s*")
-_MOVE = re.compile(r"([XYZU])\s*(-?\d+|V\d+)(?:\s*([XYZU])\s*(-?\d+|V\d+))*\s*")
-_TARGET = re.compile(r"([XYZU])\s*(-?\d+|V\d+)")
+MOVE = re.compile(r"([XYZU])\s*(-?\d+|V\d+)(?:\s*([XYZU])\s*(-?\d+|V\d+))*\s*")
+TARGET = re.compile(r"([XYZU])\s*(-?\d+|V\d+)")
 _SET = re.compile(r"\s*([A-Za-z]\w*)\s*=(.*)")
 _CONDITION = re.compile(rf"\s*({_VALUE})\s*(>=|<=|!=|=|>|<)\s*({_VALUE})\s*")
 _HEAD = re.compile(r"\s*[A-Za-z]+")
@@ -126,7 +126,7 @@ def _statement(bare: str, line: int) -> Statement:
         return Statement("block", found[1], (_number(found, column),), "", line, column)
     if (found := _PLAIN.fullmatch(text)) and found[1] != "ELSEIF":
         return Statement("block", found[1], (), "", line, column)
-    if found := _MOVE.fullmatch(text):
+    if found := MOVE.fullmatch(text):
         return _move(text, line, column)
     if found := _SET.fullmatch(text):
         return _set(found, line, column)
@@ -182,7 +182,7 @@ def _long(text: str) -> bool:
 
 def _move(text: str, line: int, column: int) -> Statement:
     axes, values = "", []
-    for found in _TARGET.finditer(text):
+    for found in TARGET.finditer(text):
         axis, at = found[1], column + found.start()
         if axis not in AXES:
             raise _Wrong(at, f"no axis {axis}", "the axes are X and Y")
