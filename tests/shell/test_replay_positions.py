@@ -86,14 +86,14 @@ async def test_a_stall_in_a_log_is_found_with_its_time(tmp_path: Path, capsys: p
     [
         (encoder(), encoder(world="stall_at = 20000"), "a command not seen here"),
         (encoder(), encoder().replace("A = 40000", "A = 9000"), "settings changed"),
-        (encoder(world="locked = [[3.0, 3.4]]", SF=60000), encoder(), "stall"),
+        (encoder(world="locked = [[2.0, 2.4]]", SF=60000), encoder(), "stall"),
     ],
     ids=["the cell stalls", "the cell is slower", "the drive was held"],
 )
 async def test_a_difference_in_a_log_has_its_cause(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], then: str, now: str, cause: str
 ) -> None:
-    log = await recorded(tmp_path, bus("press", then), "/sleep 2", "MR 16000", "/sleep 4")
+    log = await recorded(tmp_path, bus("press", then), "/sleep 1", "MR 16000", "/sleep 3")
     await replayed(tmp_path, log, bus("press", now), as_json=True)
     found = json.loads(capsys.readouterr().out.splitlines()[0])["diverged"]["causes"]
     assert found[0] == cause
@@ -112,10 +112,10 @@ async def test_typed_positions_are_compared_without_polls(tmp_path: Path, capsys
     [
         (
             bus("line", pmx("00")),
-            ("HSPD=20000", "LSPD=1000", "ACC=300", "EO=3", "X30000", "/sleep 3", "Y-5000", "/sleep 2"),
+            ("HSPD=20000", "LSPD=1000", "ACC=300", "EO=3", "X10000", "/sleep 1.5", "Y-2000", "/sleep 1.5"),
         ),
         (bus("eth", ETHERNET, baud=0), ("MR 51200", "/sleep 2")),
-        (bus("mods", 'personality = "TMCM"\nname = "1"'), ("MVP REL, 0, 100000", "/sleep 8")),
+        (bus("mods", 'personality = "TMCM"\nname = "1"'), ("MVP REL, 0, 20000", "/sleep 3")),
     ],
     ids=["pmx", "modbus", "tmcl"],
 )

@@ -21,29 +21,29 @@ async def test_a_drive_that_does_what_its_twin_does_agrees_to_the_step(tmp_path:
     async with CellSession(tmp_path, bus("press", party("a", VM=200000), party("b"), baud=0)) as cell:
         await run(cell, "@a P=1234", "/twin on")
         for line in MOVES:
-            await run(cell, line, "/sleep 1.3")
-        await run(cell, "/sleep 2")
+            await run(cell, line, "/sleep 0.9")
+        await run(cell, "/sleep 1")
         assert len(of(cell, Predicted)) > 100
         assert {each.difference for each in of(cell, Predicted)} <= {-1, 0, 1}
 
 
 async def test_bytes_that_take_their_time_are_no_reason_for_a_warning(tmp_path: Path) -> None:
-    async with CellSession(tmp_path, bus("press", party("a", VM=200000), party("b"))) as cell:
+    async with CellSession(tmp_path, bus("press", party("a", VM=200000))) as cell:
         await run(cell, "/twin on")
-        for line in MOVES:
-            await run(cell, line, "/sleep 1.3")
-        await run(cell, "/sleep 2")
+        for line in ("@a MR 100000", "@a SL 50000", "@a MA 0"):
+            await run(cell, line, "/sleep 1.1")
+        await run(cell, "/sleep 1")
         assert of(cell, Diverged) == []
         assert [each.difference for each in of(cell, Predicted)][-2:] == [0, 0], "after an absolute move"
-        await run(cell, "@a SL 200000", "/sleep 1", "@a SL 0", "/sleep 1")
+        await run(cell, "@a SL 200000", "/sleep 0.6", "@a SL 0", "/sleep 0.8")
         assert [each.difference for each in of(cell, Predicted)][-2:] == [0, 0], "the twin took the place of the drive"
 
 
 async def test_a_program_whose_lines_take_longer_is_kept_in_step(tmp_path: Path) -> None:
     lines = "PG 1\nLB G1\nMR 51200\nH\nMR -51200\nH\nBR G1\nE\nPG"
     drive = party("a", VM=200000) + f'\ninstruction_us = 900\nprogram_text = """\n{lines}\n"""'
-    async with CellSession(tmp_path, bus("press", drive)) as cell:
-        await run(cell, "/twin on", "EX G1", "/sleep 15")
+    async with CellSession(tmp_path, bus("press", drive, baud=0)) as cell:
+        await run(cell, "/twin on", "EX G1", "/sleep 13")
         assert of(cell, Diverged) == []
         cell.device("press:a").execute("VM=150000", cell._floor().now())
         await asyncio.sleep(3)
