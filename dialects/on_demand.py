@@ -15,16 +15,17 @@ T = TypeVar("T")
 def importing() -> Iterator[None]:
     """Pause the collector of garbage: what an import makes stays, so it would look in vain.
 
-    Afterwards all objects count as old: the next collection visits none of them.
+    Afterwards all objects count as old, so the next collection visits none of them; frozen ones stay frozen.
     """
-    collects = gc.isenabled()
+    collects, frozen = gc.isenabled(), gc.get_freeze_count()
     gc.disable()
     try:
         yield
     finally:
         if collects:
             gc.freeze()
-            gc.unfreeze()
+            if not frozen:
+                gc.unfreeze()
             gc.enable()
 
 

@@ -74,9 +74,9 @@ class Frames:
         return True
 
     def first(self) -> None:
-        """Paint all, as the first frame."""
+        """Paint all, as the first frame: now, or once the terminal takes it."""
         self._beat = PANELS - 1
-        self.tick()
+        self._hurry()
 
     def _frame(self) -> None:
         """Paint a frame, and another one until all is painted that has come."""
