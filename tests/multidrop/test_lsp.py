@@ -63,16 +63,6 @@ async def test_problems_follow_the_text_and_go_with_the_document(client: Languag
     assert await editor.format() is None
 
 
-async def test_a_text_that_changes_on_is_checked_once_at_its_end() -> None:
-    async with editing(delay=0.05) as client:
-        editor = Editor(client)
-        await editor.open("PG 1\nE\nPG\n")
-        for at in range(20):
-            editor.change(f"PG 1\nMX {at}\nE\nPG\n")
-        editor.change("PG 1\nMR 5\nH\nE\nPG\n")
-        assert await editor.problems() == []
-
-
 @pytest.mark.parametrize(
     ("uri", "language_id", "text", "wrong"),
     [

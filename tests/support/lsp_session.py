@@ -73,11 +73,9 @@ class Editor:
 
 
 @contextlib.asynccontextmanager
-async def editing(
-    client_name: str = "visual-studio-code", options: object = None, delay: float = 0.0
-) -> AsyncIterator[LanguageClient]:
+async def editing(options: object = None) -> AsyncIterator[LanguageClient]:
     """Yield a client whose session has begun; end the session, and both sides."""
-    server, client = Server("LMDCM", delay), make_test_lsp_client()
+    server, client = Server("LMDCM", delay=0.0), make_test_lsp_client()
     ours, theirs = socket.socketpair()
     tasks, writers = [], []
     over = threading.Event()
@@ -93,7 +91,7 @@ async def editing(
     errors: list[Exception] = []
     try:
         await client.initialize_session(
-            types.InitializeParams(client_capabilities(client_name), initialization_options=options)
+            types.InitializeParams(client_capabilities("visual-studio-code"), initialization_options=options)
         )
         yield client
         await client.shutdown_async(None)
