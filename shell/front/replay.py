@@ -99,7 +99,7 @@ class Replay:
         """Take the steps; return what differs, in words. Raises DriveError at a difference in an error."""
         leave = self._session.subscribe(self._note)
         measured = self._positions() if positions and self.steps else None
-        differences = 0
+        differences = done = 0
         began = self._session.now()
         try:
             async with _beside(measured, began):
@@ -107,9 +107,10 @@ class Replay:
                     if not fast:
                         await waits.sleep(max(0.0, began + _after(self.steps[0].at, step.at) - self._session.now()))
                     differences += await self._step(step)
+                    done += 1
         finally:
             leave()
-            self._report.summary(self._session, len(self.steps), differences, self._uncompared, measured)
+            self._report.summary(self._session, done, differences, self._uncompared, measured)
         return self._report.words(len(self.steps), differences, measured)
 
     def _positions(self) -> Positions:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from copy import copy
 from datetime import datetime
 from typing import NamedTuple
@@ -10,6 +10,7 @@ from typing import NamedTuple
 from dialects import DriveError, Priority, Request
 from dialects.codec import Reply
 from dialects.family import Motion
+from dialects.numbers import whole
 from drives.drive import Drive
 from drives.procedure import ProcedureRunner
 from shell.log.steps import Exchange, Step
@@ -80,9 +81,6 @@ def printed(step: Step, drive: Drive) -> Iterator[Measured]:
     """Yield the position that a line has printed."""
     questions = {drive.family.question(word): axis for word, axis in WORDS.items()}
     axis = questions.get(" ".join(step.text.upper().split()))
-    if axis is not None and len(step.printed) == 1 and _whole(step.printed):
-        yield Measured(step.where, step.at, axis, int(step.printed[0]), None)
-
-
-def _whole(printed: Sequence[str]) -> bool:
-    return printed[0].strip().lstrip("+-").isdecimal()
+    position = whole(step.printed[0].strip(), -(2**31), 2**31 - 1) if len(step.printed) == 1 else None
+    if axis is not None and position is not None:
+        yield Measured(step.where, step.at, axis, position, None)

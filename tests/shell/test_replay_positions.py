@@ -6,14 +6,22 @@ import asyncio
 import json
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
+from types import SimpleNamespace
+from typing import cast
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
-from dialects import DriveError
+from dialects import DriveError, Priority
+from dialects.families import FAMILIES
+from drives.drive import Drive
+from drives.procedure import ProcedureRunner
 from shell.front.replay import replay
 from shell.front.replay_report import ReplayReport
-from shell.log.steps import read
+from shell.log.steps import Exchange, read
 from shell.log.writer import SessionLog
+from shell.twins.measured import Decoding
 from tests.support.cell_session import ETHERNET, CellSession, bus, party, pmx
 from tests.support.twin_cell import encoder, run
 
@@ -127,3 +135,28 @@ async def test_polls_of_every_family_are_decoded(
     assert capsys.readouterr().out == ""
     compared = [each for each in told if "positions compared" in each]
     assert compared and all(int(each.split()[1]) > 10 for each in compared)
+
+
+REPLIES = {
+    "mcode": b'PR P,"~",V\r\n5~7\r\n>',
+    "pmx": b"5\r",
+    "modbus": bytes.fromhex("000000000007010304000500000000"),
+    "tmcl": bytes.fromhex("020164060000000572"),
+}
+"""A whole reply to the first request of a poll, or its like."""
+
+
+@given(
+    st.sampled_from(sorted(REPLIES)),
+    st.lists(st.tuples(st.booleans(), st.binary(max_size=24), st.integers(0, 30)), max_size=6),
+)
+def test_no_bytes_in_a_log_break_the_decoding(name: str, polls: list[tuple[bool, bytes, int]]) -> None:
+    family = FAMILIES[name]
+    state = family.new_state(family.codec, {"pmx": "00", "tmcl": "1"}.get(name, ""))
+    first = ProcedureRunner(family.motion(state, Priority.POLL)).request
+    assert first is not None
+    decoding = Decoding(cast(Drive, SimpleNamespace(family=family, state=state)))
+    for known, noise, cut in polls:
+        sent = first.codec.encode(first) if known else noise
+        poll = Exchange("log:1", AT, "bus", "", sent, REPLIES[name][:cut] + noise)
+        assert all(isinstance(each.position, int) for each in decoding.take(poll))
