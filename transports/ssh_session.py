@@ -10,6 +10,7 @@ import asyncio
 import contextlib
 import os
 import re
+import signal
 import socket
 import subprocess
 import sys
@@ -113,9 +114,9 @@ class SshSession:
         with contextlib.suppress(OSError):
             self._socket.shutdown(socket.SHUT_WR)
         self._drain(time.monotonic() + (0.0 if lost else _ENDING))
-        for end in (self._process.terminate, self._process.kill):
+        for number in (signal.SIGTERM, signal.SIGKILL):
             if self._process.poll() is None:
-                end()
+                os.killpg(self._process.pid, number)  # with the programs that it uses as its way
                 with contextlib.suppress(subprocess.TimeoutExpired):
                     self._process.wait(1.0)
         self._release()

@@ -73,6 +73,16 @@ async def test_a_drive_behind_a_real_sshd_moves_and_comes_back_after_each_kill_w
 
 
 REFUSES_THE_FIRST = 'case "$last" in *"multidrop relay"*) exit 127;; *) echo multidrop-socat; exec cat;; esac'
+
+
+def running(file: Path) -> bool:
+    """Whether the process that a file names runs; one that has ended may wait for its parent."""
+    try:
+        return Path(f"/proc/{int(file.read_text())}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
+    except (OSError, ValueError):
+        return False
+
+
 FAILURES = [
     (
         "echo 'ssh: connect to host pc port 22: Connection refused' >&2; exit 255",
@@ -87,7 +97,7 @@ FAILURES = [
     ("echo 'This account is not available.'; exit 1", ["This account is not available."]),
     ("echo 'multidrop: no port /dev/tty9; plug it in' >&2; exit 3", ["/dev/tty9: no port /dev/tty9; plug it in"]),
     ("yes | head -c 100000", ["y"]),
-    ("exec sleep 60", ["not reached within 0.3 s", "ssh -p 22 me@pc"]),
+    ('sleep 60 & echo $! >"$0.way"; wait', ["not reached within 0.3 s", "ssh -p 22 me@pc"]),
 ]
 
 
@@ -103,6 +113,7 @@ async def test_what_goes_wrong_before_the_greeting_is_one_line_that_quotes_it(tm
         text = str(caught.value)
         assert text.startswith("ssh://me@pc:22/dev/tty9: ") and "\n" not in text
         assert [word for word in words if word not in text] == [], text
+    await until(lambda: not running(tmp_path / "bin" / "ssh.way"))
     monkeypatch.setenv("PATH", str(tmp_path))
     with pytest.raises(Unreachable, match="the program ssh cannot be started"):
         await open_ssh(FarPort("pc", "/dev/tty9"))
