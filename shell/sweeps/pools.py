@@ -17,6 +17,7 @@ from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from multiprocessing import connection
 from multiprocessing.context import BaseContext
+from typing import ParamSpec, TypeVar
 
 from shell.signals import SIGNALS
 from shell.sweeps import trial
@@ -26,6 +27,8 @@ from shell.sweeps.trial import DIED, Case, Job, Result
 AHEAD = 3
 """Chunks for each process that are submitted and not done."""
 Run = Callable[[Job, Sequence[Case]], list[Result]]
+P = ParamSpec("P")
+T = TypeVar("T")
 
 
 class Pools:
@@ -38,6 +41,8 @@ class Pools:
         """The cases that the end of a pool cut off: one of them was the cause."""
         self._rests: list[list[Case]] = []
         """The rests of chunks that took long."""
+        self._possible = True
+        """Whether processes can begin at all; otherwise this one runs the cases."""
 
     def results(self, todo: Iterator[list[Case]]) -> Iterator[list[Result]]:
         """Run chunks; yield the results of each as it ends."""
@@ -45,8 +50,11 @@ class Pools:
         while self._suspects:
             suspects, self._suspects = self._suspects, []
             for case in suspects:
-                yield self._alone(case)
-            yield from self._in_a_pool(todo)
+                yield self._alone(case) if self._possible else self._here(case)
+            if self._possible:
+                yield from self._in_a_pool(todo)
+        for case in (case for cases in (*self._rests, *todo) for case in cases):
+            yield self._here(case)
 
     def _in_a_pool(self, todo: Iterator[list[Case]]) -> Iterator[list[Result]]:
         """Run chunks to the end, or until a process dies."""
@@ -76,7 +84,7 @@ class Pools:
             try:
                 with _signals_blocked():
                     running[pool.submit(self._run, self._job, cases)] = cases
-            except BrokenProcessPool:
+            except (BrokenProcessPool, OSError):  # OSError: too many processes, or no memory for one more
                 self._suspects += cases
 
     def _done(self, running: Iterable[Future[list[Result]]]) -> set[Future[list[Result]]]:
@@ -87,15 +95,28 @@ class Pools:
             return {each for each in running if each.done()}
 
     def _alone(self, case: Case) -> list[Result]:
-        """Run a case in a process of its own."""
+        """Run a case in a process of its own, if one begins."""
         with self._pool(1) as pool:
-            with _signals_blocked():
-                future = pool.submit(self._run, self._job, [case])
-            with self._interruption.open():
-                wait([future])
-            if isinstance(future.exception(), BrokenProcessPool):
+            try:
+                self._outcome(pool, trial.version)
+            except (BrokenProcessPool, OSError):
+                self._possible = False
+                return self._here(case)
+            try:
+                return self._outcome(pool, self._run, self._job, [case])
+            except BrokenProcessPool:
                 return [Result(case[0], DIED, "the process that ran it died: killed, or out of memory")]
-            return future.result()
+
+    def _outcome(self, pool: ProcessPoolExecutor, call: Callable[P, T], *args: P.args, **kwargs: P.kwargs) -> T:
+        with _signals_blocked():
+            future = pool.submit(call, *args, **kwargs)
+        with self._interruption.open():
+            wait([future])
+        return future.result()
+
+    def _here(self, case: Case) -> list[Result]:
+        with self._interruption.open():
+            return self._run(self._job, [case])
 
     @contextmanager
     def _pool(self, size: int) -> Iterator[ProcessPoolExecutor]:

@@ -75,6 +75,14 @@ def test_a_case_that_ends_its_process_is_named_and_the_others_run() -> None:
     assert [(each.number, each.failed) for each in results if not each.ok] == [(77, DIED)]
 
 
+def test_where_no_process_can_begin_this_one_runs_the_cases(monkeypatch: pytest.MonkeyPatch) -> None:
+    def refused(*_: object) -> None:
+        raise OSError(11, "Resource temporarily unavailable")
+
+    monkeypatch.setattr(pools.ProcessPoolExecutor, "submit", refused)
+    assert sorted(found(slow, 60, 2)) == [Result(number) for number in range(1, 61)]
+
+
 def test_a_signal_ends_the_processes_and_keeps_what_is_done() -> None:
     kept: list[Result] = []
     with Interruption() as interruption, pytest.raises(KeyboardInterrupt):
