@@ -6,7 +6,7 @@ The cases of a grid are in the order of `--vary`: the values of the last key cha
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from math import prod
@@ -83,14 +83,17 @@ def make(asked: Asked) -> Plan:
     """Read the files and check everything, before anything runs. Raises Diagnostic."""
     language = asked.language or program_language_of(asked.file)
     program = text_of(asked.file)
-    candidates = [] if asked.cell is None else cells.matching(asked.cell)
-    names = {name for each in candidates for name in (each.spec.name, f"{each.bus}:{each.spec.name}")}
-    parsed = [(*_parsed(key, names, asked.cell), _values(key, text, asked)) for key, text in asked.vary]
-    chosen = _chosen(asked.cell, candidates, {drive for drive, _, _ in parsed} - {""}, language)
+    default = PROGRAMS[language].drive
+    bare = Placed("", "", default, {"personality": default.personality, "name": default.name})
+    everyone = [bare] if asked.cell is None else cells.matching(asked.cell.partition("#")[0])
+    names = {name: each for each in everyone for name in _names(each)}
+    parsed = [(*_parsed(key, names), _values(key, text, asked)) for key, text in asked.vary]
+    chosen = bare if asked.cell is None else _chosen(asked.cell, {drive for drive, _, _ in parsed} - {""})
     keys = tuple(key for _, key, _ in parsed)
     _check_keys(keys)
     for named, key, _ in parsed:
-        _check_drive(named, key, chosen)
+        if named and named not in _names(chosen):
+            raise _without_effect(key, names[named], chosen)
     drive = {name: each for name, each in chosen.table.items() if name not in OWN_KEYS}
     expects = tuple(asked.expect) or EXPECTED
     where = f"drive {chosen.spec.name}"
@@ -100,7 +103,7 @@ def make(asked: Asked) -> Plan:
     return made
 
 
-def _parsed(text: str, names: set[str], cell: str | None) -> tuple[str, Key]:
+def _parsed(text: str, names: Collection[str]) -> tuple[str, Key]:
     try:
         return variation.parse(text, names)
     except Diagnostic as problem:
@@ -115,16 +118,17 @@ def _values(key: str, text: str, asked: Asked) -> Values:
         raise Diagnostic(problem.message, f"--vary {key}", problem.hint) from None
 
 
-def _chosen(cell: str | None, candidates: Sequence[Placed], named: set[str], language: str) -> Placed:
+def _names(drive: Placed) -> tuple[str, ...]:
+    """The ways to write a drive in a key."""
+    name = drive.spec.name
+    return (name, f"{drive.bus}:{name}") if drive.bus else (name,)
+
+
+def _chosen(cell: str, named: set[str]) -> Placed:
     """The drive that runs the program: the only one, or else the only one that a key names. Raises Diagnostic."""
-    if cell is None:
-        spec = PROGRAMS[language].drive
-        return Placed("", "", spec, {"personality": spec.personality, "name": spec.name})
-    if len(candidates) > 1:
-        chosen = [each for each in candidates if {each.spec.name, f"{each.bus}:{each.spec.name}"} & named]
-        if len(chosen) == 1:
-            return chosen[0]
-    return cells.placed(cell)
+    candidates = cells.matching(cell)
+    chosen = [each for each in candidates if named.intersection(_names(each))]
+    return chosen[0] if len(candidates) > 1 and len(chosen) == 1 else cells.placed(cell)
 
 
 def _place(cell: str | None, chosen: Placed) -> str:
@@ -143,12 +147,10 @@ def _check_keys(keys: Sequence[Key]) -> None:
         seen[place] = each.text
 
 
-def _check_drive(drive: str, key: Key, chosen: Placed) -> None:
-    """Refuse a key of a drive that does not run the program: it would change nothing. Raises Diagnostic."""
-    name = chosen.spec.name
-    if drive and drive not in (name, f"{chosen.bus}:{name}"):
-        what = f"drive {name} runs the program, so drive {drive} changes nothing"
-        raise Diagnostic(what, f"--vary {key.text}", f"--cell {chosen.cell}#BUS:{drive} lets drive {drive} run it")
+def _without_effect(key: Key, drive: Placed, chosen: Placed) -> Diagnostic:
+    """The error about a key of a drive that does not run the program."""
+    what = f"drive {chosen.spec.name} runs the program, so drive {drive.spec.name} changes nothing"
+    return Diagnostic(what, f"--vary {key.text}", f"--cell {drive.place} lets drive {drive.spec.name} run it")
 
 
 def _check(plan: Plan) -> None:
