@@ -21,21 +21,19 @@ from textual import events
 from textual._compositor import ChopsUpdate, LayoutUpdate
 from textual.binding import Binding, BindingType
 from textual.driver import Driver
-from textual.filter import LineFilter
 from textual.geometry import Size
 from textual.message import Message
 from textual.screen import Screen
 
 from drives.events import Unsolicited
-from shell.asking import Field
 from shell.connect.look import DEFAULT, Look
 from shell.events import Failed, OnBus, Printed, SessionEvent, StateChanged
 from tui.actions import Actions
 from tui.assist import Assist
-from tui.curves.ink import INKS
 from tui.editor.texts import Texts
 from tui.frames import AGEING, Frames
 from tui.function_keys import FunctionKeys
+from tui.hooks import Hooks
 from tui.keymap import keymap, named_key
 from tui.opening import Opener
 from tui.outbox import Outbox
@@ -61,8 +59,7 @@ from tui.unsent import Unsent
 from tui.widgets.banner import Banner
 from tui.widgets.entry import Entry
 from tui.widgets.footer import Footer
-from tui.widgets.signs import SignFilter, Signs, signs_for
-from tui.widgets.theme import DEFAULTS, THEMES, theme_for, wrong_theme
+from tui.widgets.theme import wrong_theme
 
 INTERRUPTED = 130
 """The exit code after a signal."""
@@ -142,37 +139,13 @@ class MultidropApp(Actions):
         self._unsubscribe = session.subscribe(self._receive)
         self._stops = session.stops
         self._own_task: asyncio.Task[Any] | None = None
-        session.fill = self._fill_in
-        session.before_quit, session.ask, session.screen = self._before_quit, self._go_on, self._show_page
-        session.edit = self._edit
-        session.renamed = self.selection.rename
+        Hooks(self, self.keyboard, self.presenter, lambda: self._check_size(self.size))
         self._is_composed = False
         """The main screen has its parts: they can be painted."""
         self.frames = Frames(self._paint, self.call_later, lambda: self.presenter.behind)
-        self._signs = SignFilter(signs_for(look.signs, os.environ))
-        self.model.look.ink = INKS[self._signs.font.value]
-        for theme in THEMES:
-            self.register_theme(theme)
-        self.theme = theme_for(None if self.no_color else self.console.color_system)
-        self._troubles = self._wear(look)
-
-    def _wear(self, look: Look) -> list[str]:
-        """Take over keys and colours of the configuration; return what does not count."""
+        self.dress(look)
         self.set_keymap(self.keymap.changed)
-        if look.theme in self.available_themes and not self.no_color:
-            self.theme = look.theme
-        return [f"{look.where}: {trouble}" for trouble in [*self.keymap.troubles, *wrong_theme(look.theme)]]
-
-    def get_theme_variable_defaults(self) -> dict[str, str]:
-        """Colours for themes that are not ours."""
-        return DEFAULTS
-
-    def refresh_css(self, animate: bool = True) -> None:
-        """Read the style sheet again, for other colours; at the start Textual reads it by itself."""
-        if self.main.is_attached:
-            super().refresh_css(animate)
-        else:
-            self.stylesheet.set_variables(self.get_css_variables())
+        self._troubles = [f"{look.where}: {trouble}" for trouble in [*self.keymap.troubles, *wrong_theme(look.theme)]]
 
     def check_action(self, action: str, parameters: tuple[object, ...]) -> bool | None:
         """Whether an action is possible: Escape ends the tour unless it closes something."""
@@ -180,18 +153,6 @@ class MultidropApp(Actions):
         if action == "end_tour":
             return self.tour.on and self.focused is entry and not entry.listing.open
         return True
-
-    def get_line_filters(self) -> Sequence[LineFilter]:
-        """The filters of Textual, and the one that replaces signs; it comes last."""
-        filters = super().get_line_filters()
-        return filters if self._signs.font is Signs.FULL else [*filters, self._signs]
-
-    def show_signs(self, signs: Signs) -> None:
-        """Show only these signs from now on."""
-        self._signs.font = signs
-        self.model.look.ink = INKS[signs.value]
-        self.refresh_css()
-        self.refresh(layout=True)  # a style sheet that says the same paints nothing
 
     def get_default_screen(self) -> Screen[Any]:
         """The main screen, below all others."""
@@ -418,38 +379,6 @@ class MultidropApp(Actions):
         """Show the meaning of the typed text, once no more keys wait."""
         if self.keyboard.idle:
             self.typist.edited()
-
-    async def _go_on(self, question: str) -> bool:
-        """Put a question of the session. Keys typed ahead answer nothing."""
-        self.keyboard.turn_deaf()
-        self.presenter.take_records(self.main)
-        before = self.main.page(self.main.current).since_typed()
-        return await self.questions.go_on(question, before, lambda: self._check_size(self.size))
-
-    async def _fill_in(self, title: str, fields: Sequence[Field]) -> dict[str, str] | None:
-        """Put a form of the session. Keys typed ahead are not for it."""
-        self.keyboard.turn_deaf()
-        return await self.questions.fill(title, fields, lambda: self._check_size(self.size))
-
-    async def _show_page(self, name: str) -> None:
-        """Show what `/page` and `/tour` name. Raises Diagnostic, and what an opening raises."""
-        if name == "tour":
-            await self.tour.begin()
-            return
-        before = self.screen
-        await self.action_page(name)
-        if self.screen is not before:
-            self.keyboard.turn_deaf()  # what was typed after the line was not meant for the page
-
-    async def _edit(self, path: str) -> None:
-        """Show a file in the editor. Raises Diagnostic."""
-        self.texts.open(path)
-        await self.action_page("program")
-
-    async def _before_quit(self) -> bool:
-        """Take `/quit` as Ctrl+Q, which ends the app by itself."""
-        self.call_later(self.action_quit)
-        return False
 
     async def action_quit(self) -> None:
         """Quit; ask if that would leave something unfinished."""

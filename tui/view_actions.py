@@ -5,7 +5,6 @@ from __future__ import annotations
 from functools import partial
 from typing import TYPE_CHECKING
 
-from textual.app import App
 from textual.widgets import Input, TextArea
 
 from tui.palette import PADDING, PALETTE
@@ -14,37 +13,29 @@ from tui.screens.framed import Framed
 from tui.screens.help import entries
 from tui.screens.help import found as help_on
 from tui.session_view import selected_place
+from tui.themed import Themed
 
 if TYPE_CHECKING:
     from tui.function_keys import FunctionKeys
     from tui.keymap import Keymap
     from tui.polling import Polling
-    from tui.screen_model import ScreenModel
-    from tui.screens.main_screen import MainScreen
     from tui.screens.questions import Questions
     from tui.session_view import SessionView
     from tui.tour import Tour
-    from tui.widgets.signs import Signs
 
 CTRL_C = "Ctrl+Q quits, Ctrl+X stops all drives"
 
 
-class ViewActions(App[int]):
+class ViewActions(Themed):
     """The actions on the view."""
 
     session: SessionView
-    model: ScreenModel
-    main: MainScreen
     polling: Polling
     macros: FunctionKeys
     questions: Questions
     keymap: Keymap
     tour: Tour
     mouse_on: bool
-
-    def show_signs(self, signs: Signs) -> None:
-        """Show only these signs from now on."""
-        raise NotImplementedError
 
     def action_panel(self, name: str) -> None:
         """Show a panel, or hide it."""
