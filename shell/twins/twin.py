@@ -18,12 +18,12 @@ NAME = "twin"
 
 
 class Twin:
-    """The simulated drive. `modbus`: the real one is reached over Modbus/TCP."""
+    """The simulated drive. `registers`: the real one is reached through its registers, by a connection of its own."""
 
-    def __init__(self, unit: Unit, shadow: Shadow, levels: Levels | None, begun: float, modbus: bool) -> None:
+    def __init__(self, unit: Unit, shadow: Shadow, levels: Levels | None, begun: float, registers: bool) -> None:
         self.levels = levels
         self._unit, self._shadow, self._begun = unit, shadow, begun
-        self._connection = unit.connect() if modbus and unit.connect is not None else None
+        self._connection = unit.connect() if registers and unit.connect is not None else None
         self._world = next(iter(unit.worlds.values()))
         self._now = 0.0
         self._inputs: dict[int, int] = {}
@@ -81,7 +81,7 @@ class Twin:
         self.live(at)
 
 
-def make(snapshot: Snapshot, begun: float, modbus: bool, alone: bool) -> tuple[Twin, list[str]]:
+def make(snapshot: Snapshot, begun: float, registers: bool, alone: bool) -> tuple[Twin, list[str]]:
     """Make the twin of a drive that was read, and say what it lacks. Raises Inexpressible, or Diagnostic.
 
     `begun`: the time of the host's clock from which it lives. `alone`: no other drive is on the line.
@@ -94,4 +94,4 @@ def make(snapshot: Snapshot, begun: float, modbus: bool, alone: bool) -> tuple[T
     lacks = [*described.remarks]
     if described.unread:
         lacks.append(f"not read: {', '.join(name for name, _ in described.unread)}")
-    return Twin(unit, unit.shadow, snapshot.levels, begun, modbus), lacks
+    return Twin(unit, unit.shadow, snapshot.levels, begun, registers), lacks

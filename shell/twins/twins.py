@@ -96,7 +96,7 @@ class Twins:
                     f"{name}: it moves or a program runs, and a twin begins at rest; /twin on once it stands"
                 )
             begun = bus.now()
-            twin, lacks = make(snapshot, begun, drive.family.name == "modbus", len(bus.drives) == 1)
+            twin, lacks = make(snapshot, begun, drive.family.registers is not None, len(bus.drives) == 1)
             twins.begin(Beside(drive, twin, begun))
         finally:
             twins.forgo(drive)
