@@ -146,6 +146,9 @@ class RunningTwins(Protocol):
     def stop(self, bus: Bus) -> None:
         """End the twins of a bus."""
 
+    def off(self) -> bool:
+        """End all twins, also those that are about to begin; return whether there were any."""
+
     def rows(self) -> Iterator[str]:
         """A line for each twin that runs."""
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 from typing import TYPE_CHECKING
 
-from dialects import Diagnostic, DriveError
+from dialects import Diagnostic, DriveError, Stopped
 from shell.events import FAILURES, Agreed, Diverged, OnBus, TwinEvent
 from shell.twins.comparing import LIMIT
 
@@ -51,20 +51,35 @@ class Twins:
     async def start(self, bus: Bus, addresses: Sequence[str] | None = None) -> None:
         """Read drives of a bus (None: all), and run a twin beside each; one that runs is set anew.
 
-        Raises DriveError, Diagnostic or TransportLost for the first that fails, once all have been tried.
+        Raises DriveError, Diagnostic or TransportLost for the first that fails, once all have been tried; the others
+        are warnings. A stop, or the end of the twins, ends the reading.
         """
+        drives = [bus.drives[each] for each in (list(bus.drives) if addresses is None else addresses)]
+        twins = self._of(bus)
         failures: list[Exception] = []
         try:
-            for address in list(bus.drives) if addresses is None else addresses:
+            for drive in drives:
                 try:
-                    await self._start(bus, bus.drives[address])
+                    await self._start(twins, drive)
                 except (DriveError, Diagnostic) as failure:
                     failures.append(failure)
+                    if isinstance(failure, Stopped):
+                        break
         finally:
-            if not self.running(bus):
+            if self._buses.get(bus) is twins and not twins.drives:
                 self._end(bus)
+        for other in failures[1:]:
+            self._workspace.notify(f"{bus.name}: no twin: {other}", bus=bus.name, warning=True)
         if failures:
             raise failures[0]
+
+    def off(self) -> bool:
+        """End all twins: those that run, are read, or wait for their line. Return whether there were any."""
+        buses = {*self._buses, *self._paused, *self._tasks}
+        for bus in buses:
+            self.stop(bus)
+        self.wanted = False
+        return bool(buses)
 
     def stop(self, bus: Bus) -> None:
         """End the twins of a bus."""
@@ -77,20 +92,25 @@ class Twins:
         if (twins := self._buses.pop(bus, None)) is not None:
             twins.close()
 
-    async def _start(self, bus: Bus, drive: Drive) -> None:
-        from shell import snapshots
-        from shell.twins.beside import Beside
+    def _of(self, bus: Bus) -> BusTwins:
         from shell.twins.on_bus import BusTwins
-        from shell.twins.twin import make
 
-        name = self._workspace.display_name(drive)
         if bus not in self._buses:
             self._buses[bus] = BusTwins(bus, lambda event: self._publish(bus, event), lambda: self._lost(bus))
             self._buses[bus].rest = self._rest
-        twins = self._buses[bus]
+        return self._buses[bus]
+
+    async def _start(self, twins: BusTwins, drive: Drive) -> None:
+        from shell import snapshots
+        from shell.twins.beside import Beside
+        from shell.twins.twin import make
+
+        name, bus = self._workspace.display_name(drive), twins.bus
         twins.expect(drive)
         try:
             snapshot = await snapshots.read(self._workspace, drive)
+            if self._buses.get(bus) is not twins:
+                raise Stopped(f"{name}: the twins were ended while it was read")
             if snapshot.active:
                 raise DriveError(
                     f"{name}: it moves or a program runs, and a twin begins at rest; /twin on once it stands"

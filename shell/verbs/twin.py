@@ -66,11 +66,8 @@ async def _begin(call: Call, twins: RunningTwins, targets: list[str]) -> None:
 
 
 def _end(call: Call, twins: RunningTwins) -> None:
-    running = [bus for bus in call.workspace.buses.values() if twins.running(bus)]
-    if not running:
+    if not twins.off():
         raise Diagnostic("no twin runs", call.verb.name)
-    for bus in running:
-        twins.stop(bus)
     call.workspace.notify("all twins have ended")
 
 
