@@ -12,42 +12,13 @@ from __future__ import annotations
 import threading
 from collections import deque
 from collections.abc import Callable
-from typing import Protocol
 
 from transports.base import PortControl
+from transports.endpoint import Endpoint
 from transports.pipe import Pipe
 
 _READS = 64
 """Greatest number of reads of a broken pipe, for what arrived before the break."""
-
-
-class Endpoint(Protocol):
-    """A descriptor that never blocks: `read` and `write` raise BlockingIOError instead."""
-
-    @property
-    def name(self) -> str:
-        """The name for a person."""
-
-    def fileno(self) -> int:
-        """The descriptor."""
-
-    def read(self) -> bytes | None:
-        """Bytes that arrived; empty: nothing of interest; None: the end."""
-
-    def write(self, data: bytes | memoryview) -> int:
-        """Write, and return how many bytes the system took."""
-
-    def unsent(self) -> int:
-        """Number of bytes that the system holds and has not sent, as far as it reports them."""
-
-    def drop(self) -> int:
-        """Take back what the system holds, if possible; return how many bytes that was."""
-
-    def explain(self, error: OSError | None) -> str:
-        """Reason of a break, and the remedy; None: the other end closed the pipe."""
-
-    def close(self) -> None:
-        """Close the descriptor; may block."""
 
 
 class DescriptorPipe(Pipe):

@@ -1,12 +1,12 @@
 """The far side of `ssh://`: a port here, lent to one multidrop elsewhere through standard input and output.
 
-Theory of operation. One loop waits for three descriptors, and none of them is ever waited for in a write: a relay that
-blocked on its port would never see the end of its input, and stay behind as the holder of the port. All input that has
-arrived is taken in before the port gets a byte. So a drop is obeyed ahead of the bytes that came before it.
+Theory of operation. One loop waits for three descriptors, and no write blocks. A relay that blocked on its port would
+never see the end of its input, and would keep the port. The relay reads all input that has arrived before it writes to
+the port. So it obeys a drop ahead of the bytes that came before it.
 
-A byte counts as sent when it has left the driver, as far as the driver reports that. It is reported at once, because
-this side's credit and its knowledge of half-sent lines depend on it. The relay ends with its input, and after a silence
-of `SILENCE` seconds. It then gives the driver a second to send what it holds, because the last of it may be a stop.
+A byte counts as sent when it has left the driver, where the driver reports that. The relay reports it at once, because
+the near side's credit and its knowledge of half-sent lines depend on it. The relay ends with its input, and after a
+silence of `SILENCE` seconds. It then gives the driver a second to send its bytes, because the last may be a stop.
 """
 
 from __future__ import annotations
@@ -19,6 +19,7 @@ from collections.abc import Callable
 from typing import Protocol
 
 from transports.base import PortControl, TransportLost
+from transports.endpoint import Endpoint
 from transports.relay_frames import GREETING, SILENCE, Frames, Garbled, Kind, Setting, data_frames, frame
 
 assert sys.platform != "win32"
@@ -32,37 +33,16 @@ _LOOK = 0.002
 """Seconds between two looks at what the driver holds."""
 
 
-class Port(Protocol):
-    """An open port, which never blocks: `read` and `write` raise BlockingIOError instead."""
+class Port(Endpoint, Protocol):
+    """An open port."""
 
     @property
     def control(self) -> PortControl:
         """Its settings."""
 
-    def fileno(self) -> int:
-        """The descriptor."""
-
-    def read(self) -> bytes | None:
-        """Bytes that arrived; None: the port was hung up."""
-
-    def write(self, data: bytes | memoryview) -> int:
-        """Write, and return how many bytes the driver took."""
-
-    def unsent(self) -> int:
-        """Bytes that the driver holds."""
-
-    def drop(self) -> int:
-        """Empty the driver's output queue; return how many bytes that was."""
-
-    def explain(self, error: OSError | None) -> str:
-        """Reason of a loss."""
-
-    def close(self) -> None:
-        """Close the port."""
-
 
 class Relay:
-    """What the relay does with bytes; the loop that waits is `serve`."""
+    """The relay as bytes in and out; `serve` is the loop that waits."""
 
     def __init__(self, port: Port) -> None:
         self.port = port
@@ -91,7 +71,7 @@ class Relay:
         self.push()
 
     def push(self) -> None:
-        """Pass on to the port what it takes, and report what it has sent. Raises OSError where it is lost."""
+        """Write to the port, and report what it has sent. Raises OSError where it is lost."""
         while self.queue:
             try:
                 taken = self.port.write(bytes(self.queue))
@@ -162,7 +142,7 @@ def _changed(control: PortControl, setting: int, value: bytes) -> str:
 
 
 def serve(port: Port, source: int = 0, sink: int = 1, silence: float = SILENCE) -> None:
-    """Lend an open port to whoever is at the other end of these descriptors; return when that end is gone.
+    """Lend an open port to the other end of these descriptors; return when that end is gone.
 
     Raises TransportLost where the port is lost, or where the input is not that of multidrop. Closes the port.
     """

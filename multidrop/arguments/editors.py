@@ -5,22 +5,14 @@ from __future__ import annotations
 import argparse
 
 from dialects.numbers import whole
+from multidrop.arguments import parts
 
 HOST = "127.0.0.1"
 
 
 def add(parser: argparse.ArgumentParser) -> None:
     """Add the drive that programs are for, and the port."""
-    from multidrop.commands.languages import DEFAULT_PERSONALITY, Checked
-
-    parser.add_argument(
-        "--personality",
-        metavar="P",
-        type=str.upper,
-        choices=Checked(),
-        default=DEFAULT_PERSONALITY,
-        help=f"the drive that programs are for, unless the editor names one (default: {DEFAULT_PERSONALITY})",
-    )
+    parts.personality(parser, "the drive that programs are for, unless the editor names one")
     where = parser.add_mutually_exclusive_group()
     where.add_argument("--tcp", metavar="[HOST:]PORT", type=_address, help="serve one client there")
     where.add_argument("--stdio", action="store_true", help="serve standard input and output, as without it")

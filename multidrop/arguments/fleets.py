@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import argparse
 
+from multidrop.arguments import parts
+
 
 def relay(parser: argparse.ArgumentParser) -> None:
     """Add the port and its baud rate."""
@@ -41,4 +43,4 @@ def publish(parser: argparse.ArgumentParser) -> None:
         help="the broker, and the topic above all others; mqtts:// is encrypted",
     )
     parser.add_argument("--rate", metavar="N", default="2", help="samples a second of each drive, at most (default: 2)")
-    parser.add_argument("--no-reconnect", action="store_true", help="give up a lost line, and do not try again")
+    parts.no_reconnect(parser)

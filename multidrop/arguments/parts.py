@@ -17,6 +17,27 @@ def files(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--language", choices=names(), help=f"default: {endings()}")
 
 
+def personality(parser: argparse.ArgumentParser, about: str) -> None:
+    """Add the drive that programs are checked for."""
+    from multidrop.commands.languages import DEFAULT_PERSONALITY, Checked
+
+    parser.add_argument(
+        "--personality",
+        metavar="P",
+        type=str.upper,
+        choices=Checked(),
+        default=DEFAULT_PERSONALITY,
+        help=f"{about} (default: {DEFAULT_PERSONALITY})",
+    )
+
+
+def run_label(parser: argparse.ArgumentParser) -> None:
+    """Add where a program begins."""
+    parser.add_argument(
+        "--run", metavar="LABEL", default="", help="the label or program to execute (default: its own start)"
+    )
+
+
 def url(parser: argparse.ArgumentParser) -> None:
     """Add what to open."""
     parser.add_argument("url", metavar="URL", help="what to open")

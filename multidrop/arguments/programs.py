@@ -9,17 +9,8 @@ from multidrop.arguments import parts
 
 def check(parser: argparse.ArgumentParser) -> None:
     """Add files, their language, and the drive that they are for."""
-    from multidrop.commands.languages import DEFAULT_PERSONALITY, Checked
-
     parts.files(parser)
-    parser.add_argument(
-        "--personality",
-        metavar="P",
-        type=str.upper,
-        choices=Checked(),
-        default=DEFAULT_PERSONALITY,
-        help=f"the drive that the program is for (default: {DEFAULT_PERSONALITY})",
-    )
+    parts.personality(parser, "the drive that the program is for")
     parser.add_argument(
         "--format", action="store_true", help="rewrite files without errors in canonical spelling; remarks stay"
     )
@@ -44,9 +35,7 @@ def test(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--until", metavar="SECONDS", type=parts.duration, help="virtual seconds at most, for a program without an end"
     )
-    parser.add_argument(
-        "--run", metavar="LABEL", default="", help="the label or program to execute (default: its own start)"
-    )
+    parts.run_label(parser)
     parser.add_argument(
         "--trace", action="store_true", help="print each line that is executed, with its time and what it changed"
     )
@@ -124,9 +113,7 @@ def sweep(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--random", metavar="N", type=_count, help="draw N cases, in place of all")
     parser.add_argument("--seed", metavar="N", type=int, default=1, help="the seed of these draws (default: 1)")
-    parser.add_argument(
-        "--run", metavar="LABEL", default="", help="the label or program to execute (default: its own start)"
-    )
+    parts.run_label(parser)
     parser.add_argument(
         "--until",
         metavar="SECONDS",

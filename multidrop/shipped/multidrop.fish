@@ -239,7 +239,7 @@ complete -c multidrop -n '_shtab_multidrop_using; and test $_shtab_multidrop_npo
 complete -c multidrop -n '_shtab_multidrop_using publish' -s h -l help -d 'show this help message and exit'
 complete -c multidrop -n '_shtab_multidrop_using publish' -l to -x -d 'the broker, and the topic above all others; mqtts:// is encrypted'
 complete -c multidrop -n '_shtab_multidrop_using publish' -l rate -x -d 'samples a second of each drive, at most (default: 2)'
-complete -c multidrop -n '_shtab_multidrop_using publish' -l no-reconnect -d 'give up a lost line, and do not try again'
+complete -c multidrop -n '_shtab_multidrop_using publish' -l no-reconnect -d 'give up a lost connection, and do not try again'
 complete -c multidrop -n '_shtab_multidrop_using publish; and test $_shtab_multidrop_npos -ge 0' -ka "(_multidrop_url)" -d 'what to open'
 complete -c multidrop -n '_shtab_multidrop_using; and test $_shtab_multidrop_npos -eq 0' -a share -d 'Lend a port to several clients over the network (RFC 2217), of which one writes; a stop passes from any.'
 complete -c multidrop -n '_shtab_multidrop_using share' -s h -l help -d 'show this help message and exit'

@@ -49,6 +49,7 @@ class Port:
     arrived: list[bytes | None] = field(default_factory=list)
     settings: list[tuple[str, int]] = field(default_factory=list)
     baud = 9600
+    name = "port"
 
     @property
     def control(self) -> Port:
