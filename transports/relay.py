@@ -6,7 +6,8 @@ the port. So it obeys a drop ahead of the bytes that came before it.
 
 A byte counts as sent when it has left the driver, where the driver reports that. The relay reports it at once, because
 the near side's credit and its knowledge of half-sent lines depend on it. The relay ends with its input, and after a
-silence of `SILENCE` seconds. It then gives the driver a second to send its bytes, because the last may be a stop.
+silence of `SILENCE` seconds; of what arrives after that it passes on only a stop. It then gives the driver a second to
+send its bytes, because the last may be a stop.
 """
 
 from __future__ import annotations
@@ -69,6 +70,22 @@ class Relay:
             else:
                 raise Garbled(f"a frame {kind.name}, which only the far side sends")
         self.push()
+
+    def late(self, data: bytes) -> None:
+        """Take in what arrived after too long a silence, and pass on nothing but a stop. May raise as `receive`.
+
+        The other end has given up by now: a motion that began now would surprise whoever was told of the loss.
+        """
+        stop: bytes | None = None
+        for kind, payload in self._frames.take(data):
+            if kind is Kind.DROP:
+                stop = b""
+            elif kind is Kind.DATA and stop == b"":
+                stop = payload
+        if stop:
+            self._drop()
+            self.queue += stop
+            self.push()
 
     def push(self) -> None:
         """Write to the port, and report what it has sent. Raises OSError where it is lost."""
@@ -154,13 +171,18 @@ def serve(port: Port, source: int = 0, sink: int = 1, silence: float = SILENCE) 
         port.close()
 
 
+def _now() -> float:
+    """The time, s; on Linux it goes on while the machine is suspended."""
+    return time.clock_gettime(time.CLOCK_BOOTTIME) if sys.platform == "linux" else time.monotonic()
+
+
 class _Loop:
     """The loop that waits for the input, the port and the reader."""
 
     def __init__(self, relay: Relay, source: int, sink: int, silence: float) -> None:
         self._relay, self._source, self._sink, self._silence = relay, source, sink, silence
         self._port = relay.port.fileno()
-        self._last = time.monotonic()
+        self._last = _now()
         """When something arrived from the other end."""
 
     def run(self) -> None:
@@ -176,10 +198,11 @@ class _Loop:
     def _turn(self) -> bool:
         """Wait, and do what can be done; False at the end."""
         readable, writable = self._wait()
-        if time.monotonic() - self._last > self._silence and self._source not in readable:
-            raise TransportLost(f"the relay has ended: it got no sign of life for {self._silence:g} s")
-        if self._source in readable and not self._take():
+        late = _now() - self._last > self._silence
+        if self._source in readable and not self._take(late):
             return False
+        if late:
+            raise TransportLost(f"the relay has ended: it got no sign of life for {self._silence:g} s")
         try:
             hung_up = self._port in readable and not self._relay.read()
             self._relay.push()
@@ -193,13 +216,13 @@ class _Loop:
         relay = self._relay
         reads = [self._source] + ([self._port] if len(relay.out) < _FULL else [])
         writes = ([self._sink] if relay.out else []) + ([self._port] if relay.queue else [])
-        patience = _LOOK if relay.held else max(_LOOK, self._last + self._silence - time.monotonic())
+        patience = _LOOK if relay.held else max(_LOOK, self._last + self._silence - _now())
         readable, writable, _ = select.select(reads, writes, [], patience)
         return readable, writable
 
-    def _take(self) -> bool:
+    def _take(self, late: bool) -> bool:
         """Take in what arrived from the other end; False where that is gone."""
-        self._last = time.monotonic()
+        self._last = _now()
         try:
             data = os.read(self._source, _READ)
         except (BlockingIOError, InterruptedError):
@@ -207,7 +230,7 @@ class _Loop:
         except OSError:
             return False
         try:
-            self._relay.receive(data)
+            (self._relay.late if late else self._relay.receive)(data)
         except OSError as error:
             raise TransportLost(self._relay.lost(error)) from error
         return bool(data)

@@ -24,8 +24,10 @@ BEAT = 1.5
 """The pause between two signs of life of this side, s; the far side replies to each."""
 MISSED = 3
 """Without a reply to this many signs of life in turn the connection is lost."""
-SILENCE = 10.0
-"""Without a byte from this side for that long, s, the far side ends: a cut network must not keep the port locked."""
+SILENCE = 6.0
+"""Without a byte from this side for that long, s, the far side ends: a cut network must not keep the port locked.
+
+By then this side has given up. What it sent before must not be executed later."""
 _HEAD = 3
 
 

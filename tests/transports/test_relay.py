@@ -11,6 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tests.support.lent_port import lent
+from transports import relay
 from transports.relay import Relay
 from transports.relay_frames import CREDIT, GREETING, MOST, Frames, Garbled, Kind, Setting, frame
 from transports.relay_pipe import RelayEndpoint
@@ -243,6 +244,16 @@ def test_whatever_is_on_its_way_a_stop_follows_only_what_was_sent_before_it(data
     assert both.near.unsent() == 0 and both.near.room == CREDIT
 
 
+def test_of_what_arrives_after_too_long_a_silence_only_a_stop_is_passed_on() -> None:
+    both = Both()
+    both.far.late(frame(Kind.DATA, b"MR 51200\r") + frame(Kind.BEAT))
+    both.send_all()
+    assert bytes(both.port.sent) == b""
+    both.far.late(frame(Kind.DROP) + frame(Kind.DATA, b"\x1b") + frame(Kind.DATA, b"MR 5\r"))
+    both.send_all()
+    assert bytes(both.port.sent) == b"\x1b"
+
+
 def test_a_way_that_is_full_gets_the_rest_of_a_frame_first() -> None:
     both = Both()
     both.way.full = True
@@ -318,6 +329,21 @@ def test_output_that_is_not_of_a_relay_is_a_loss() -> None:
     both.way.back += b"bash: warning\n"
     with pytest.raises(OSError, match="not of a relay"):
         both.near.read()
+
+
+def test_a_relay_that_was_held_up_for_too_long_passes_no_command_on(monkeypatch: pytest.MonkeyPatch) -> None:
+    master, slave = os.openpty()
+    now = [0.0]
+    monkeypatch.setattr(relay, "_now", lambda: now[0])
+    try:
+        with lent(os.ttyname(slave)) as connection:
+            now[0] = 60.0
+            connection.write(frame(Kind.DATA, b"MR 51200\r"))
+            assert select.select([connection.fileno()], [], [], 10.0)[0] and connection.read(10) == b""
+            assert not select.select([master], [], [], 0)[0]
+    finally:
+        os.close(master)
+        os.close(slave)
 
 
 def test_a_relay_that_gets_no_sign_of_life_ends_and_frees_its_port() -> None:
