@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import gc
 import importlib
+import sys
 from collections.abc import Iterator, Mapping
 from typing import Any, TypeVar
 
@@ -32,8 +33,10 @@ def importing() -> Iterator[None]:
 def imported(place: str) -> Any:
     """Import what a `MODULE:ATTRIBUTE` names."""
     module, _, attribute = place.partition(":")
-    with importing():
-        return getattr(importlib.import_module(module), attribute)
+    if module not in sys.modules:  # else `importing`, which counts all frozen objects, would take longer than the rest
+        with importing():
+            importlib.import_module(module)
+    return getattr(importlib.import_module(module), attribute)
 
 
 def imported_if(place: str) -> Any:

@@ -5,7 +5,8 @@ from collections.abc import Iterator
 
 import pytest
 
-from dialects.on_demand import importing
+from dialects import on_demand
+from dialects.on_demand import imported, importing
 
 
 @pytest.fixture(autouse=True)
@@ -45,3 +46,8 @@ def test_what_is_frozen_stays_frozen() -> None:
     with importing():
         made = [object()]
     assert (generation(kept), generation(made)) == (None, None)
+
+
+def test_what_is_imported_already_leaves_the_collector_alone(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delattr(on_demand, "importing")
+    assert imported("dialects.on_demand:imported") is imported
