@@ -15,7 +15,7 @@ from tests.support.cell_session import ETHERNET, CellSession, bus, party, pmx
 from tests.support.twin_cell import of, run
 
 pytestmark = pytest.mark.virtual
-POLLS = re.compile(r'PR (?:P,.*V|IN.*|EF," ",BY,DN)')
+POLLS = re.compile(r"PR (?:P,DN,V|IN,DN)")
 
 MARK = re.compile(r'"~\d+"')
 
