@@ -154,9 +154,7 @@ class Exchange:
         if stop and not others and self._stops.binary(data):
             before, stop, rest = data, b"", b""
         if stop:
-            self._cut = others and bool(self._begun)
-            self._begun = b""
-            self._actions.append(Stop(stop, self._stops.mended(stop)))
+            self._actions.append(self._stop(stop, others))
             self._say(client, "stop", _text(stop))
             if others:
                 before, rest = before.strip(_ENDS), rest.strip(_ENDS)
@@ -168,8 +166,15 @@ class Exchange:
 
     def stop(self, stop: bytes) -> list[Action]:
         """Write a stop of this side."""
-        self._cut, self._begun = bool(self._begun), b""
-        return [Stop(stop, self._stops.mended(stop)), Say("this terminal", "stop", _text(stop))]
+        return [self._stop(stop, True), Say("this terminal", "stop", _text(stop))]
+
+    def _stop(self, stop: bytes, others: bool) -> Stop:
+        """Make the action of a stop. One that comes within a line of another client ends that line harmlessly, for a
+        PMX would take both for one command.
+        """
+        begun, self._begun = self._begun, b""
+        self._cut, mended = others and bool(begun), self._stops.mended(stop)
+        return Stop(mended if self._cut and not self._stops.binary(begun) else stop, mended)
 
     def _write(self, client: int, data: bytes, now: float) -> None:
         known = self.clients[client]

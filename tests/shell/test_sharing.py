@@ -169,6 +169,22 @@ def test_the_stop_of_a_pmx_follows_the_end_of_the_line_that_it_cuts() -> None:
     assert port.written == b"~~~\r@00ABORT\r"
 
 
+@pytest.mark.parametrize(
+    ("family", "line", "stop", "written"),
+    [
+        ("", b"PR P\rMR 5", b"a\x1b\n", b"a\x1b" + b"~" * 65 + b"\ra\x1b\n"),
+        ("pmx", b"@00X10", b"@00ABORT\r", b"~~~\r@00ABORT\r"),
+    ],
+)
+def test_a_stop_within_a_line_that_another_one_is_typing_is_no_part_of_it(
+    family: str, line: bytes, stop: bytes, written: bytes
+) -> None:
+    port = Port(family)
+    port.send(ADA, line)
+    port.send(BOB, stop.rstrip(b"\n"))
+    assert port.written.startswith(line + written.rstrip(b"\n"))
+
+
 def test_the_writers_own_stop_drops_what_came_with_it_and_what_follows_is_written() -> None:
     port = Port()
     port.send(ADA, b"PR P\r")
