@@ -44,7 +44,7 @@ class Bus:
         self.link = Link(name, transport, self.line, keeper)
         self._conversations = Conversations(self.link, keeper)
         self.witnesses = self._conversations.witnesses
-        """Those who hear of every conversation once it is over."""
+        """The functions called at the end of every conversation."""
         self.roster = Roster(self._conversations, assumed)
         self.telemetry = Telemetry(self.roster)
         self._stopping = Stopping(self.roster)

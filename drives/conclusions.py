@@ -1,4 +1,4 @@
-"""The ends of conversations, and those who witness them."""
+"""The ends of conversations, and their witnesses: functions called with each."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ Witness = Callable[[Concluded], None]
 
 
 class Witnesses:
-    """Those who hear of every conversation of a link once it is over, before its caller does; false without any."""
+    """The functions called at the end of every conversation of a link, before its caller goes on; false without any."""
 
     def __init__(self, name: str) -> None:
         self._all: tuple[Witness, ...] = ()
@@ -61,7 +61,7 @@ class Witnesses:
         return leave
 
     def report(self, concluded: Concluded) -> None:
-        """Report a conversation that is over."""
+        """Call each with a conversation that is over."""
         for witness in self._all:
             with self._apart:
                 witness(concluded)

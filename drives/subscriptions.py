@@ -16,7 +16,7 @@ class Subscription(Generic[Thing]):
         self._ended = ended
 
     def close(self) -> None:
-        """End it. Again: do nothing."""
+        """End it; a second call has no effect."""
         self._ended(self)
 
 

@@ -137,7 +137,7 @@ class Agreed(NamedTuple):
 
 
 class TwinEnded(NamedTuple):
-    """The twin of a drive has ended: nothing is predicted any more."""
+    """The twin of a drive has ended, and with it the predictions."""
 
     at: float
     address: str

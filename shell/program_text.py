@@ -35,7 +35,7 @@ class ProgramGrammar:
         return self._files.language.parts(line)
 
     def check(self, text: str, product: str) -> Sequence[Problem]:
-        """Return what `multidrop program check` reports; nothing for an empty text, which somebody begins."""
+        """Return the problems of `multidrop program check`; none for an empty text, which a person has just begun."""
         from shell.checking import examine_text, personality_of  # a screen without an editor needs no simulator
 
         if not text.strip():
@@ -101,7 +101,7 @@ class ProgramText:
 
     @cached_property
     def problems(self) -> Sequence[Problem]:
-        """What the check reports. For a thread: a long text takes a second."""
+        """The problems of the check. For a thread: a long text takes a second."""
         return self.grammar.check(self.text, self._product)
 
     @cached_property

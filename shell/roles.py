@@ -141,7 +141,7 @@ class RunningTwins(Protocol):
         """Whether a drive of a bus has a twin."""
 
     async def start(self, bus: Bus, addresses: Sequence[str] | None = None) -> None:
-        """Read drives of a bus (None: all), and run a twin beside each; one that runs is set anew."""
+        """Read drives of a bus (None: all), and begin a twin beside each, in place of one that runs."""
 
     def stop(self, bus: Bus) -> None:
         """End the twins of a bus."""

@@ -52,7 +52,7 @@ class Shadow:
     """The operations of a simulated drive that runs beside a real one: they need no wire."""
 
     rest: Callable[[], None]
-    """End what power-up has begun, and take lines as a drive that a host has talked to; at time 0."""
+    """End the work of power-up, and take lines as a drive that a host has talked to; at time 0."""
     motion: Callable[[float], tuple[Motion, ...]]
     """Position and velocity of each axis at a time, as the drive reports them."""
     align: Callable[[str, int, float], None]

@@ -73,9 +73,9 @@ Load = Callable[[DriveSpec], ProgramRun]
 class Programs(NamedTuple):
     """The runs of a family's program files on a simulated drive, in virtual time.
 
-    `drive` is the default drive. `read` reads a text, of a file of this name. `refusals` finds the lines that a drive
-    refuses: of a text, its file's name, the personality, and the problems found already; None: the text alone shows
-    all of them.
+    `drive` is the default drive. `read` takes a text and its file's name. `refusals` finds the lines that a drive
+    refuses. It takes a text, its file's name, the personality, and the problems found already. None: the check of the
+    text finds them all.
     """
 
     drive: DriveSpec

@@ -24,7 +24,7 @@ class Said:
 
 
 class Language(Protocol):
-    """What the judge and the operators need of a language."""
+    """The part of a language that the judge and the operators use."""
 
     url: str
     """The key of a URL."""

@@ -113,7 +113,7 @@ class Limited(Protocol):
 
     @property
     def limits(self) -> str:
-        """What it cannot do, for a person who opens it."""
+        """The promises it cannot keep, for a person who opens it."""
 
 
 @runtime_checkable

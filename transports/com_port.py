@@ -30,7 +30,7 @@ class Setting(IntEnum):
 
 
 class Control(IntEnum):
-    """The values of CONTROL that are used here; ASK_ ones change nothing."""
+    """The values of CONTROL that are used here; those named ASK_ only ask."""
 
     ASK_FLOW = 0
     NO_FLOW = 1
@@ -54,7 +54,7 @@ NAMES = {
     Setting.PARITY: "no parity",
     Setting.STOP_SIZE: "1 stop bit",
 }
-"""What a client needs, for a person."""
+"""The settings that a client needs, for a person."""
 NEEDED = {Setting.DATA_SIZE: 8, Setting.PARITY: 1, Setting.STOP_SIZE: 1}
 """The values of 8N1."""
 FLOW, FLOW_IN, BREAK, DTR, RTS = "flow control", "inbound flow control", "break", "DTR", "RTS"
@@ -69,7 +69,7 @@ GROUPS = {
 
 
 def group_of(value: int) -> str:
-    """What a value of CONTROL sets; empty if it is unknown."""
+    """The setting that a value of CONTROL changes; empty if it is unknown."""
     return next((name for name, values in GROUPS.items() if value in values), "")
 
 

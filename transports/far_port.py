@@ -1,4 +1,4 @@
-"""A serial port of another machine: its place, and the programs there that lend it. Imports nothing that takes time."""
+"""A serial port of another machine: its place, and the programs there that lend it. Its imports are quick."""
 
 from __future__ import annotations
 

@@ -4,8 +4,8 @@ A frame is a kind, the length of the payload (2 bytes, the high one first), and 
 one line of text, `GREETING`, once its port is open; frames follow it in both directions.
 
 Bytes on their way through ssh cannot be taken back: pipes and windows on the way hold megabytes. So this side sends no
-more than `CREDIT` bytes that the far port has not sent, and `DROP` has the far side drop what it holds. The far side
-reads all that has arrived before it writes to its port. Thus a drop reaches the far side ahead of its queue.
+more than `CREDIT` bytes ahead of the far port, and at `DROP` the far side drops its queue. The far side reads all that
+has arrived before it writes to its port. Thus a drop reaches the far side ahead of its queue.
 """
 
 from __future__ import annotations

@@ -30,13 +30,13 @@ class Connection(Protocol):
         """The descriptor."""
 
     def read(self, most: int) -> bytes:
-        """Read what arrived; empty at the end. Raises BlockingIOError where nothing did."""
+        """Read bytes that arrived; empty at the end. Raises BlockingIOError where there are none."""
 
     def write(self, data: bytes | bytearray | memoryview) -> int:
         """Write, and return how many bytes were taken. Raises BlockingIOError where none are."""
 
     def last_words(self) -> str:
-        """What is known of the reason of its end; empty if nothing is."""
+        """The reason of its end; empty if unknown."""
 
     def close(self, lost: bool) -> None:
         """End it; may block."""
@@ -46,7 +46,7 @@ class RelayEndpoint:
     """The frames and the credit. `read` is called by the loop, all that writes under the lock of the pipe."""
 
     def __init__(self, connection: Connection, early: bytes) -> None:
-        """`early`: bytes that arrived behind the greeting."""
+        """`early`: bytes that arrived after the greeting."""
         self.name = connection.name
         self.answered = 0
         """Number of signs of life that the far side has replied to."""
@@ -132,7 +132,7 @@ class RelayEndpoint:
         self.flush()
 
     def flush(self) -> None:
-        """Write what has to leave, as far as the system takes it."""
+        """Write waiting frames until the system takes no more."""
         try:
             while self._rest:
                 del self._rest[: self._connection.write(self._rest)]
@@ -160,7 +160,7 @@ class RelayEndpoint:
         )
 
     def end(self) -> None:
-        """Have nobody wait for an outcome any more."""
+        """End every wait for an outcome."""
         with self.news:
             self._ended = True
             self.news.notify_all()
@@ -182,7 +182,7 @@ class RelayPipe(DescriptorPipe):
     """A transport over a relay. Room comes with a report of the far side, not with the descriptor."""
 
     def __init__(self, connection: Connection, baud: int, early: bytes = b"", round_trip: float = 0.0) -> None:
-        """`early`: bytes that arrived behind the greeting."""
+        """`early`: bytes that arrived after the greeting."""
         self.round_trip = round_trip
         """The time to the far side and back, s."""
         self._relay = RelayEndpoint(connection, early)
@@ -228,7 +228,7 @@ class RelayPipe(DescriptorPipe):
         self._loop.call_soon(self._read_early)
 
     def _read_early(self) -> None:
-        """Read what came with the greeting, of which the descriptor knows nothing."""
+        """Read the bytes that came with the greeting: no event of the descriptor announces them."""
         if self._usable:
             self._read()
 

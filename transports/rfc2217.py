@@ -93,10 +93,10 @@ class Rfc2217Pipe:
         self._agreed = asyncio.Event()
         """The server supports RFC 2217, or the pipe is lost."""
         self._asked: dict[str, tuple[int, asyncio.Future[int]]] = {}
-        """What is to be confirmed, with the value asked for."""
+        """The settings to be confirmed, each with the value asked for."""
         self.control = Rfc2217Control(self, self._loop)
         self.limits = ""
-        """What the server did not confirm, for a person; empty: nothing."""
+        """The wishes that the server did not confirm, for a person."""
 
     @property
     def name(self) -> str:
@@ -229,7 +229,7 @@ class Rfc2217Pipe:
         return self._inner.pending if isinstance(self._inner, Queueing) else 0
 
     def discard(self, whole: bool = False) -> int:
-        """Drop what has not left, and unless `whole` tell the server to drop the same. No message is cut in two."""
+        """Drop unsent bytes, and unless `whole` ask the server to purge its own. No message is cut in two."""
         dropped = self._inner.discard(whole=True)
         if not whole:
             self._inner.write(_PURGE)

@@ -1,4 +1,4 @@
-"""The command line of `ssh` and of the machine behind it, and the reasons why it did not work.
+"""The command lines of `ssh` and of the far machine, and the reasons of a failure.
 
 The far shell gets one command: it executes `multidrop relay` where that is installed, and `socat` where it is not. Both
 take the place of the shell, so that none stays between. The port's path is quoted for that shell: it executes nothing.
@@ -19,7 +19,7 @@ SOCAT_WORD = "multidrop-socat"
 MISSING = 127
 """The far shell's status where neither program is installed."""
 _OPTIONS = (
-    "BatchMode=yes",  # it asks nothing: nobody could answer
+    "BatchMode=yes",  # it asks nothing: no person could answer
     f"ConnectTimeout={CONNECT}",
     "ServerAliveInterval=2",
     "ServerAliveCountMax=2",
@@ -61,7 +61,7 @@ def arguments(far: FarPort, baud: int, way: str = "") -> list[str]:
 
 
 def far_command(path: str, baud: int, way: str = "") -> str:
-    """The command for the far shell, whose PATH lacks the folder of pipx where nobody logs in at a terminal."""
+    """The command for the far shell. Without a terminal its PATH may lack the folder of pipx."""
     relay = f"exec multidrop relay --baud {baud} -- {shlex.quote(path)}"
     address = f"OPEN:{_SPECIAL.sub(_escaped, path)},b{baud},{_LINE}"
     claim = _CLAIM.format(path=shlex.quote(path))
@@ -79,7 +79,7 @@ def _escaped(found: re.Match[str]) -> str:
 
 
 def unknown_greeting(line: str) -> str:
-    """Why a first line is from another version of multidrop; empty if it is from none."""
+    """The reason to refuse a first line of another version of multidrop; empty for any other line."""
     if not line.startswith(f"{WORD} "):
         return ""
     return f"multidrop there speaks '{line[:40]}', this one '{GREETING}'; install one version on both machines"

@@ -1,4 +1,4 @@
-"""A running `ssh` and what is behind it: `multidrop relay` or `socat` on another machine.
+"""A running `ssh` and its far side: `multidrop relay` or `socat` on another machine.
 
 `ssh` has one socket as its standard input and output. It runs in a session of its own, so a Ctrl+C at the terminal
 does not end it ahead of the stop. Its messages go to a file, of which the last line is the reason of an end.
@@ -41,7 +41,7 @@ _ENDING = 2.5
 """Seconds that ssh gets for its end once its input has ended."""
 _READ = 4096
 _PREFIX = re.compile(r"multidrop: |\S+ \S+ socat\[\d+\] [A-Z] ")
-"""What a line of the far side begins with."""
+"""The beginning of each line of the far side."""
 
 
 class SshSession:
@@ -100,7 +100,7 @@ class SshSession:
         return _PREFIX.sub("", lines[-1])[:400].rstrip(".") if lines else ""
 
     def mark(self) -> None:
-        """Count what was printed until now as no reason of an end."""
+        """Count lines printed until now not as the reason of an end."""
         self._heard = os.fstat(self._words.fileno()).st_size
 
     def status(self, within: float) -> int | None:
@@ -122,7 +122,7 @@ class SshSession:
         self._release()
 
     def _drain(self, deadline: float) -> None:
-        """Read until the end, so that nothing holds ssh up."""
+        """Read until the end, so that ssh never waits for a reader."""
         with contextlib.suppress(OSError):
             while (left := deadline - time.monotonic()) > 0:
                 self._socket.settimeout(left)
@@ -137,7 +137,7 @@ class SshSession:
 
 
 class SocatEndpoint:
-    """The bytes of a far socat, which knows no frames and gives nothing back."""
+    """The bytes of a far socat, which knows no frames and cannot drop sent bytes."""
 
     def __init__(self, session: SshSession) -> None:
         self.name = session.name
@@ -164,7 +164,7 @@ class SocatEndpoint:
 
 
 class SocatPipe(DescriptorPipe):
-    """A transport that keeps less than others; `limits` says what it does not."""
+    """A transport that keeps fewer promises than others; `limits` names the others."""
 
     def __init__(self, endpoint: SocatEndpoint, limits: str) -> None:
         super().__init__(endpoint)
@@ -197,7 +197,7 @@ async def _measured(session: SshSession, early: bytes) -> tuple[bytes, float]:
 
 
 async def _greeting(session: SshSession, far: FarPort, way: str) -> tuple[str, bytes]:
-    """The first line that is a greeting, and the bytes behind it; a far shell may print others before."""
+    """The first line that is a greeting, and the bytes after it; a far shell may print others before."""
     held, count, said = b"", 0, ""
     while count < _PREAMBLE and (data := await session.read_some()):
         count += len(data)

@@ -117,7 +117,7 @@ class Beside:
     """None: they agree."""
 
     def behind(self, last: Point | None) -> bool:
-        """Whether samples came for which there is no prediction."""
+        """Whether the samples have gone on without predictions."""
         return self.predicted is not None and last is not None and last.at - self.predicted.at > BEHIND
 
     def take(self, event: Predicted | Diverged | Agreed) -> None:

@@ -1,4 +1,4 @@
-"""The colours and signs of the app: themes of ours, and a filter that replaces signs which a terminal lacks."""
+"""The colours and signs of the app: our themes, and a filter that replaces signs that a terminal lacks."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ class Themed(App[int]):
         self._signs.font = signs
         self.model.look.ink = INKS[signs.value]
         self.refresh_css()
-        self.refresh(layout=True)  # a style sheet that says the same paints nothing
+        self.refresh(layout=True)  # an equal style sheet paints nothing
 
     def get_line_filters(self) -> Sequence[LineFilter]:
         """The filters of Textual, and the one that replaces signs; it comes last."""

@@ -14,9 +14,7 @@ def relay(parser: argparse.ArgumentParser) -> None:
 
 
 def _any_baud(text: str) -> int:
-    if not (text.isascii() and text.isdecimal() and len(text) < 9 and int(text)):
-        raise argparse.ArgumentTypeError(f"no baud rate {text}; one such as 9600")
-    return int(text)
+    return parts.number(text, 1, 99_999_999)
 
 
 def share(parser: argparse.ArgumentParser) -> None:

@@ -6,6 +6,8 @@ import argparse
 
 from multidrop.arguments import parts
 
+_KEYS = [f"F{number}" for number in range(2, 13)]
+
 
 def show(parser: argparse.ArgumentParser) -> None:
     """Add a macro's name."""
@@ -74,14 +76,10 @@ def export(parser: argparse.ArgumentParser) -> None:
 
 def _function_key(text: str) -> str:
     key = text.upper()
-    if not (key[:1] == "F" and key[1:].isdecimal() and key.isascii() and 2 <= int(key[1:3]) <= 12 and len(key) < 4):
+    if key not in _KEYS:
         raise argparse.ArgumentTypeError(f"no key {text}; valid: F2 to F12")
     return key
 
 
 def _rounds(text: str) -> int | None:
-    if text == "forever":
-        return None
-    if not (text.isascii() and text.isdecimal() and 1 <= int(text[:12]) <= 10**9):
-        raise argparse.ArgumentTypeError(f"{text} is not a number from 1 to 1000000000, or forever")
-    return int(text)
+    return None if text == "forever" else parts.number(text, 1, 10**9, "forever")

@@ -105,9 +105,17 @@ def _role_url(text: str) -> tuple[str, str]:
 
 def baud(text: str) -> int:
     """Read a baud rate."""
-    if not (text.isdecimal() and 300 <= int(text) <= 1_000_000):
-        raise argparse.ArgumentTypeError(f"{text} is not a number from 300 to 1000000")
-    return int(text)
+    return number(text, 300, 1_000_000)
+
+
+def number(text: str, low: int, high: int, other: str = "") -> int:
+    """Read a whole number; `other`: the words that are valid in place of one."""
+    from dialects.numbers import whole
+
+    found = whole(text, low, high)
+    if found is None:
+        raise argparse.ArgumentTypeError(f"{text} is not a number from {low} to {high}{other and f', or {other}'}")
+    return found
 
 
 def duration(text: str) -> float:

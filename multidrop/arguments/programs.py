@@ -137,6 +137,4 @@ def _key_and_values(text: str) -> tuple[str, str]:
 
 
 def _count(text: str) -> int:
-    if not (text.isascii() and text.isdecimal() and 1 <= int(text[:9]) <= 100_000):
-        raise argparse.ArgumentTypeError(f"{text} is not a number from 1 to 100000")
-    return int(text)
+    return parts.number(text, 1, 100_000)

@@ -17,7 +17,7 @@ _LIMITS: Mapping[str, tuple[int, ...]] = {
 
 
 class Positions:
-    """Converts columns of lines between characters and code units; UTF-16 where nothing else was agreed on."""
+    """Converts columns of lines between characters and code units; UTF-16 unless both agreed on another encoding."""
 
     def __init__(self, encoding: str | None) -> None:
         self._limits = _LIMITS[encoding or types.PositionEncodingKind.Utf16]

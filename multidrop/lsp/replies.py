@@ -1,4 +1,4 @@
-"""What the server replies, as types of the protocol."""
+"""The replies of the server, as types of the protocol."""
 
 from __future__ import annotations
 
@@ -81,7 +81,7 @@ def item(offer: Offer, number: int, place: types.Range, about: types.MarkupConte
 
 
 def symbols(document: Document, positions: Positions, blocks: Iterable[Block]) -> list[types.DocumentSymbol]:
-    """Return an outline; IF and WHILE are no part of it."""
+    """Return an outline, without IF and WHILE."""
     lines = document.text.lines
     found = []
     for block in blocks:

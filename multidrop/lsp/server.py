@@ -1,7 +1,7 @@
 """The language server: each request of the protocol as a question to a `ProgramText`.
 
-The handlers know the protocol and no language. A request for a document that the client did not open, and a place
-without a name or a word, is replied with nothing. A `Diagnostic` becomes an error of the request, in one line.
+The handlers know the protocol and no language. The reply is empty for a document that the client did not open, and for
+a place without a name or a word. A `Diagnostic` becomes an error of the request, in one line.
 """
 
 from __future__ import annotations

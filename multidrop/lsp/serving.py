@@ -1,7 +1,7 @@
 """Serving one client: on standard input and output, or on a TCP port.
 
-Standard output belongs to the protocol: whatever else is printed goes to standard error. A signal ends the process at
-once, also while a client does not read: nothing is to be kept.
+Standard output belongs to the protocol: all other prints go to standard error. A signal ends the process at once, also
+while a client does not read: the server has no state to save.
 """
 
 from __future__ import annotations

@@ -4,7 +4,7 @@
 username = "shop-7"
 password_file = "broker.password"   # or password = "..."
 ca = "plant-ca.pem"                 # the authority of the broker's certificate, for mqtts://
-cert = "shop-7.pem"                 # a certificate of our own, where the broker wants one
+cert = "shop-7.pem"                 # our certificate, where the broker requires one
 key = "shop-7.key"
 
 A relative path begins at the folder of the configuration file.

@@ -38,7 +38,7 @@ class Opened:
     warnings: tuple[str, ...] = ()
     """Notices for a person before the search for drives."""
     limits: str = ""
-    """What its transport cannot do."""
+    """The promises that its transport cannot keep."""
     reopen: Reopen | None = None
     """Opens its port again after a loss; None: it cannot be found again."""
 

@@ -89,7 +89,7 @@ class HostAgain:
 
 
 class LoginAgain:
-    """A port behind a login, opened at the baud rate that it had. `took` is how long the first login took, s.
+    """A port that is reached by a login, opened at its last baud rate. `took` is how long the first login took, s.
 
     Logins that fail are tried ever less often: a server may shut out a machine that tries too often.
     """

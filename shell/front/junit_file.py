@@ -13,7 +13,7 @@ from shell.front.junit import Case, junit
 
 
 class JUnitFile:
-    """A report of `name` at a path; `text` empty: nothing is ever written."""
+    """A report of `name` at a path; `text` empty: no report is written."""
 
     def __init__(self, text: str, name: str, begun: datetime) -> None:
         self._path = Path(text) if text else None
@@ -21,7 +21,7 @@ class JUnitFile:
 
     @property
     def wanted(self) -> bool:
-        """Whether it is written."""
+        """Whether a report is written."""
         return self._path is not None
 
     def begin(self) -> None:

@@ -1,8 +1,8 @@
 """A session log, taken again on other drives: the same lines, and where the answers differ.
 
-A number that a drive prints while it may move (after a line that can start it, until a wait or a stop) may be another
-number. It ends at the first difference in an error, and stops at its end what it moved. Against a cell, it compares the
-positions in the log, too, with those of the simulated drives at the same times.
+A number that a drive prints while it may move may be another number. A drive may move from a line that can start it
+until a wait or a stop. The replay ends at the first difference in an error, and stops the drives that it moved. Against
+a cell, it also compares the positions in the log with those of the simulated drives at the same times.
 """
 
 from __future__ import annotations

@@ -54,7 +54,7 @@ class ReplayReport:
 
     @staticmethod
     def words(lines: int, differences: int, positions: Positions | None) -> str:
-        """What differs, in words; empty: nothing does."""
+        """The differences in words; empty: none."""
         said = [f"{differences} of {lines} lines gave another answer than in the log"] if differences else []
         if positions is not None and positions.diverged:
             axes = f"{len(positions.diverged)} of {len(positions.compared)} axes"

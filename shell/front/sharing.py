@@ -73,7 +73,7 @@ async def _share(url: str, address: str, as_json: bool, over: asyncio.Event) -> 
 
 
 def _nothing() -> None:
-    """Do nothing in the thread that reads the keys: this event loop is held up by nothing."""
+    """Do nothing in the thread that reads the keys: the event loop, which never blocks here, writes the stop."""
 
 
 async def _listen(shared: SharedPort, host: str, port: int) -> str:
@@ -95,12 +95,12 @@ async def _ended(shared: SharedPort, over: asyncio.Event) -> None:
 
 
 class Narrator:
-    """What happens, for a person on standard error, or as JSON lines on standard output."""
+    """Reports events to a person on standard error, or as JSON lines on standard output."""
 
     def __init__(self, as_json: bool) -> None:
         self._as_json = as_json
         self._refused: dict[str, float] = {}
-        """The hosts whose clients were sent away, and when that was said."""
+        """The hosts whose clients were refused, and the time of that line."""
 
     def ready(self, name: str, endpoint: str) -> None:
         """Print where clients connect, as `multidrop sim` does."""
@@ -115,7 +115,7 @@ class Narrator:
         write(sys.stderr, f"multidrop: {text}")
 
     def say(self, event: Say) -> None:
-        """Show what happened."""
+        """Report an event of a client."""
         if self._as_json:
             self._print(at=round(time.time(), 3), client=event.client, event=event.event, detail=event.detail)
         elif not self._repeated(event, time.monotonic()):
@@ -126,7 +126,7 @@ class Narrator:
         write(sys.stdout, json.dumps(fields))
 
     def _repeated(self, event: Say, now: float) -> bool:
-        """Whether clients of a host are sent away again and again, as one that connects again by itself is."""
+        """Whether a client of a host was refused a moment ago: one that connects again by itself is said once."""
         host = event.client.rpartition(":")[0]
         again = bool(host) and event.event in _REPEATED and now < self._refused.get(host, -AGAIN) + AGAIN
         if host and event.event in _SENT_AWAY and not again:

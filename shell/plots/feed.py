@@ -164,7 +164,7 @@ def _sparing(telemetry: Telemetry, addresses: Sequence[str]) -> Iterator[Callabl
 
 
 def _twin(plot: Plot, wanted: set[Series], bus: str, event: TwinEvent) -> None:
-    """Plot what the twin of a wanted drive predicts, or only the difference, and whether they agree."""
+    """Plot the predictions of a wanted drive's twin, or only the difference, and whether they agree."""
     whole = Series(bus, event.address) in wanted
     if not whole and Series(bus, event.address, DIFFERENCE) not in wanted:
         return

@@ -94,7 +94,7 @@ class Plot:
             self._point(Curve(bus, read.address, "", read.word), read.at, read.value)
 
     def predicted(self, bus: str, twin: Predicted, *, alone: bool = False) -> None:
-        """Take what the twin of a drive predicts; `alone`: the difference only. Never blocks."""
+        """Take a prediction of a drive's twin; `alone`: the difference only. Never blocks."""
         if not self._done:
             self.samples += alone
             drive = (bus, twin.address, twin.axis)

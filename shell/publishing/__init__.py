@@ -1,1 +1,1 @@
-"""What drives do and say, published to an existing MQTT broker. Nothing is commanded through it."""
+"""Samples, states, errors and transcripts of drives, for an existing MQTT broker, which commands no drive."""

@@ -32,7 +32,7 @@ class Backlog:
         return len(self._waiting)
 
     def put(self, message: Message) -> None:
-        """Add a message; drop the oldest one where there is no room."""
+        """Add a message; a full queue drops its oldest one."""
         if message.retain:
             self._retained[message.topic] = message
         self._waiting.append(message)
@@ -64,7 +64,7 @@ class Backlog:
         return self._dropped.total()
 
     def take_dropped(self) -> Counter[str]:
-        """The numbers of messages that were dropped, by bus; count anew."""
+        """Return the numbers of messages that were dropped, by bus, and count from 0."""
         found, self._dropped = self._dropped, Counter()
         return found
 

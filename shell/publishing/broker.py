@@ -1,8 +1,8 @@
 """A connection to an MQTT broker, by paho, which is imported with the first one.
 
 Theory of operation. Each connection is a client of its own: paho's own reconnection gives no reason for a failure. paho
-has a thread; what it notes is handed to the event loop. Every message is sent at QoS 1. Those that the broker has not
-acknowledged are known, so that the next connection sends them again. A client here subscribes to nothing.
+has a thread; its events are handed to the event loop. Every message is sent at QoS 1. Those that the broker has not
+acknowledged are known, so that the next connection sends them again. A client never subscribes.
 """
 
 from __future__ import annotations
@@ -103,7 +103,7 @@ class Connection:
         client.on_disconnect = lambda *_: self._call(self._ended)
         client.on_publish = lambda *_: self._acknowledged()
         client.connect(self._target.host, self._target.port, KEEPALIVE)
-        if self.lost.is_set():  # nobody waits for it any more
+        if self.lost.is_set():  # its caller has gone
             client.disconnect()
             return
         client.loop_start()
@@ -142,7 +142,7 @@ class Connection:
         self.on_room()
 
     def publish(self, message: Message) -> bool:
-        """Send a message; False where that is not possible now. Never blocks."""
+        """Send a message; False while the connection is full or lost. Never blocks."""
         self._full = True  # before the count, which an acknowledgement may change meanwhile
         if self._client is None or self.lost.is_set() or len(self._unacknowledged()) >= WINDOW:
             return False
@@ -174,7 +174,7 @@ class Connection:
 
 
 def _reason(where: str, error: OSError | UnicodeError) -> str:
-    """Why there is no connection, in a line for a person."""
+    """The reason of a failed connection, in a line for a person."""
     if isinstance(error, TimeoutError):
         return f"the broker at {where} does not answer"
     if isinstance(error, ssl.SSLCertVerificationError):
@@ -223,7 +223,7 @@ def _context(settings: MqttSettings) -> ssl.SSLContext:
         context = ssl.create_default_context(cafile=settings.ca or None)
         context.sslsocket_class = _Socket
         place = "mqtt.cert"
-        if settings.cert:  # an encrypted key is refused: nobody is there to be asked
+        if settings.cert:  # an encrypted key is refused: no person is there to type its passphrase
             context.load_cert_chain(settings.cert, settings.key or None, password=lambda: "")
     except (OSError, ValueError) as error:
         raise Diagnostic(f"{place}: not a certificate that can be used ({why(error)})") from None

@@ -39,7 +39,7 @@ class DriveFeed:
             self._conditions(event)
 
     def lost(self, at: float) -> None:
-        """Publish that nothing is known of the drive while its line is away."""
+        """Publish the state LOST, and no values, while the line is away."""
         self._program = None
         self._moving.clear()
         self._say_state(at, messages.LOST)

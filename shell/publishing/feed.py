@@ -33,7 +33,7 @@ HEARTBEAT = 30.0
 
 
 class Feed:
-    """What a workspace does, as messages of a publisher, from `begin` to `end`."""
+    """Makes messages for a publisher of the events of a workspace, from `begin` to `end`."""
 
     def __init__(self, workspace: Workspace, publisher: Publisher, topics: Topics, period: float) -> None:
         """`period`: between two samples of a drive, s."""
@@ -57,7 +57,7 @@ class Feed:
         self._lines[bus.name] = _Line(self, bus)
 
     def end(self) -> None:
-        """Publish nothing more, and poll no drive. May be called again."""
+        """End publishing and polling. May be called again."""
         self._leave()
         for line in self._lines.values():
             line.close()

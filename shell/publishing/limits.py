@@ -1,6 +1,6 @@
 """The limits of what is published: samples a second of a drive, unchanged values, lines a second of a transcript.
 
-Every time is given; nothing here reads a clock.
+Every time is given; no function here reads a clock.
 """
 
 from __future__ import annotations

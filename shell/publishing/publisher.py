@@ -36,7 +36,7 @@ class Connection(Protocol):
         """Connect. Raises TransportLost or Diagnostic."""
 
     def publish(self, message: Message) -> bool:
-        """Send a message; False where there is no room now."""
+        """Send a message; False while the connection is full."""
 
     def in_flight(self) -> list[Message]:
         """The messages that are not acknowledged, oldest first."""
@@ -123,7 +123,7 @@ class Publisher:
 
     @property
     def connected(self) -> bool:
-        """Whether the broker is there."""
+        """Whether a broker is connected."""
         return self._connection is not None
 
     @property

@@ -16,7 +16,7 @@ FORM = "valid: mqtt://[USER@]BROKER[:PORT]/PREFIX or mqtts://..."
 
 @dataclass(frozen=True)
 class Target:
-    """A broker and the topic under which everything is published."""
+    """A broker, and the topic above all that is published."""
 
     host: str
     port: int
@@ -51,7 +51,8 @@ def _address(scheme: str, address: str) -> tuple[str, int]:
         host, port = parts.hostname, parts.port
     except ValueError:
         raise Diagnostic(f"no address {address!r} of a broker", "--to", FORM) from None
-    if not host or port == 0 or parts.netloc != address or visible(host) != host or " " in host:
+    whole = parts.netloc == address and port != 0
+    if not (whole and host) or visible(host) != host or " " in host:
         raise Diagnostic(f"no address {address!r} of a broker", "--to", FORM)
     return host, port or PORTS[scheme]
 

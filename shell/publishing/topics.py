@@ -61,7 +61,7 @@ class Topics:
         return f"{self.prefix}/{escape(bus)}/status"
 
     def transcript(self, bus: str) -> str:
-        """The topic of what is typed and printed on a line."""
+        """The topic of the lines that are typed and printed on a bus."""
         return f"{self.prefix}/{escape(bus)}/transcript"
 
     def drive(self, bus: str, address: str, what: str) -> str:

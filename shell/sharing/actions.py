@@ -1,4 +1,4 @@
-"""What an `Exchange` has its caller do."""
+"""The actions that an `Exchange` returns to its caller."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ class Send:
 
 @dataclass(frozen=True)
 class Close:
-    """Close a client's connection, after the bytes that say why."""
+    """Close a client's connection, after the bytes that give the reason."""
 
     client: int
     farewell: bytes
@@ -53,7 +53,7 @@ class Set:
 
 @dataclass(frozen=True)
 class Say:
-    """Something for a person: the client, what happened, and more about it."""
+    """Report an event to a person: the client, the event, and more about it."""
 
     client: str
     event: str

@@ -1,6 +1,7 @@
 """One client of a shared port as bytes: raw, or telnet with the com port option (RFC 2217).
 
-The first byte that a client sends decides: IAC begins telnet, any other one means that it negotiates nothing. Such a
+The first byte that a client sends decides: IAC begins telnet; any other one means that it
+negotiates nothing. Such a
 client is sent no byte that is not a drive's: a program would take a reason for a reply.
 """
 
@@ -28,7 +29,7 @@ class Request:
 
 
 class Client:
-    """What one client sends, divided into bytes for the line and requests; and the form of what it is sent."""
+    """Divides the bytes of one client into data and requests, and encodes the bytes for it."""
 
     def __init__(self, name: str, text: bool) -> None:
         """`text`: the line's language is text."""
@@ -49,7 +50,7 @@ class Client:
     # From the client
 
     def receive(self, data: bytes) -> list[bytes | Request]:
-        """Divide what came."""
+        """Divide received bytes into data and requests."""
         if not self._begun and data:
             self._begun = True
             self._telnet = telnet.Decoder() if data[0] == telnet.IAC else None
@@ -140,7 +141,7 @@ class Client:
 
     @property
     def overflowed(self) -> bool:
-        """Whether it has suspended the flow for too long."""
+        """Whether more than `HELD` bytes wait for a client that has suspended the flow."""
         return len(self._held) > HELD
 
     def _resumed(self) -> bytes:

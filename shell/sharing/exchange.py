@@ -44,15 +44,15 @@ class Exchange:
         self._last = 0.0
         """The time at which the writer wrote last."""
         self._setter: int | None = None
-        """The client that has set the baud rate while nobody wrote."""
+        """The client that has set the baud rate while there was no writer."""
         self._begun = b""
-        """What was written of a line without its end."""
+        """The beginning of a line whose end was not written."""
         self._before: int | None = None
         """The last writer."""
         self._cut = False
         """The last stop came from another client within a line of the writer."""
         self._skipping = False
-        """What is left of that line is dropped."""
+        """The rest of that line is dropped."""
         self._away = ""
         """The reason why the port is lost; empty: it is open."""
         self._actions: list[Action] = []
@@ -79,7 +79,7 @@ class Exchange:
         return self._done()
 
     def close(self, client: int, event: str, reason: str) -> list[Action]:
-        """Close a client's connection, and say why."""
+        """Close a client's connection, with the reason."""
         self._close(client, event, reason)
         return self._done()
 
@@ -121,7 +121,7 @@ class Exchange:
     # From the drives
 
     def printed(self, data: bytes) -> list[Action]:
-        """Send every client what the drives have sent."""
+        """Send bytes of the drives to every client."""
         for number, client in self.clients.items():
             if not client.refused and (sent := client.data(data)):
                 self._actions.append(Send(number, sent))
@@ -132,7 +132,7 @@ class Exchange:
     # From a client
 
     def receive(self, client: int, data: bytes, now: float) -> list[Action]:
-        """Take what a client has sent."""
+        """Take bytes that a client has sent."""
         self._release(now)
         known = self.clients[client]
         for each in known.receive(data):
@@ -204,7 +204,7 @@ class Exchange:
         self._say(client, "writes")
 
     def _rest_of_line(self, data: bytes) -> bytes:
-        """Drop what is left of a line whose beginning a stop has dropped."""
+        """Drop the rest of a line whose beginning a stop has dropped."""
         if not self._skipping:
             return data
         end = next((at for at, byte in enumerate(data) if byte in _ENDS), None)

@@ -114,7 +114,7 @@ class SharedPort:
         self._do(self._exchange.leave(number))
 
     def received(self, number: int, data: bytes) -> None:
-        """Take what a client has sent."""
+        """Take bytes that a client has sent."""
         self._do(self._exchange.receive(number, data, self._loop.time()))
         self._set_timer()
 
@@ -254,7 +254,7 @@ class Connection(asyncio.Protocol):
         self._number = self._port.connected(self, host_port(peer[0], peer[1]))
 
     def data_received(self, data: bytes) -> None:
-        """Take what the client has written."""
+        """Take bytes that the client has written."""
         self._port.received(self._number, data)
 
     def connection_lost(self, exc: Exception | None) -> None:

@@ -1,7 +1,7 @@
-"""The stops in what a client sends, for the languages that may be on a line.
+"""The stops in the bytes of a client, for the languages that may be on a line.
 
-A line whose URL names no language may have any of those that are text: their stops differ, and none is a command of
-another one. Where messages carry their length, a byte says nothing by itself: only whole messages are looked at.
+A line whose URL names no language may have any language that is text. Their stops differ, and none is a command of
+another one. Where messages carry their length, a single byte has no meaning: only a whole message can be a stop.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ _TEXT = bytes(range(0x20, 0x7F)) + b"\t" + _ENDS
 
 @dataclass(frozen=True)
 class StopBytes:
-    """How the stops of a line look, and what makes a half-sent line harmless."""
+    """The bytes of the stops of a line, and those that make a half-sent line harmless."""
 
     pattern: re.Pattern[bytes]
     framed: bool
@@ -42,11 +42,11 @@ class StopBytes:
         return data[: matches[0].start()], b"".join(each[0] for each in matches), data[matches[-1].end() :]
 
     def binary(self, data: bytes) -> bool:
-        """Whether bytes of no language of text came in the same read: then no byte of the writer's is a stop."""
+        """Whether a read holds a byte that no language of text has: then no byte of the writer's is a stop."""
         return not self.framed and bool(self.pattern.sub(b"", data).translate(None, _TEXT))
 
     def mended(self, stop: bytes) -> bytes:
-        """The stop to write where a line was cut in two: no byte of it may end that line before it is harmless."""
+        """The stop after a line was cut in two: no byte of it may end that line before it is harmless."""
         if not self.invalidate:
             return stop
         keys = any(byte < 0x20 and byte not in _ENDS for byte in stop)

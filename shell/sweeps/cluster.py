@@ -95,7 +95,7 @@ class _Work:
         """Cases of chunks whose workers died. The cluster counts against all that waited there, too."""
 
     def results(self, todo: list[list[Case]]) -> Iterator[list[Result]]:
-        """Run chunks; then each case whose workers died, with nothing beside it."""
+        """Run chunks; then alone each case whose workers died."""
         while todo:
             yield from self._run(todo)
             todo, self._again = self._again, []
@@ -109,7 +109,7 @@ class _Work:
         futures = self._client.map(trial.chunk, [self._job] * len(todo), todo, pure=False)
         of = dict(zip(futures, todo, strict=True))
         done = as_completed(futures, loop=self._client.loop)
-        del futures  # the cluster drops results that nobody holds
+        del futures  # the cluster drops results without a holder
         try:
             while of:
                 with self._interruption.open():

@@ -1,4 +1,4 @@
-"""The CONDITION of `--expect`: one comparison, as `/assert` has it, over the results of a run in place of words.
+"""The CONDITION of `--expect`: one comparison like that of `/assert`, over the results of a run instead of words.
 
 Lists stand in brackets, compare with `==` and `!=`, and take no part in calculations: `errors == [86]`. A number in a
 list equals a print that is this number. `ended` is a text, and beside a number 1 or 0: ended by itself, or not.
@@ -31,7 +31,7 @@ class Condition:
     tree: Comparison
 
     def holds(self, outcome: Outcome) -> bool:
-        """Whether it is true of a result. Raises Diagnostic for a calculation without a result."""
+        """Whether the condition holds for a result. Raises Diagnostic for a calculation without a value."""
         known: Known = {each: _known(each.name, outcome) for each in unknowns(self.tree) if isinstance(each, Name)}
         left, right = (_side(each, outcome, known) for each in (self.tree.left, self.tree.right))
         if not (isinstance(left, tuple) or isinstance(right, tuple)):

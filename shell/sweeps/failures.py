@@ -65,7 +65,7 @@ def _simplest(plan: Plan, case: Case, result: Result, run: Run, groups: list[Gro
     world: World = tuple(
         None if key.part == SEED else value for key, value in zip(plan.job.keys, case[1], strict=True)
     )  # no condition of a program test depends on the seed
-    if result.failed != DIED:  # it would take this process along
+    if result.failed != DIED:  # it would end this process, too
         world = shrunk((case[0], world), result.failed, plan.values, own, run)
     found = next((each for each in groups if (each.failed, each.world) == (result.failed, world)), None)
     if found is None:

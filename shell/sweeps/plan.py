@@ -148,7 +148,7 @@ def _check_keys(keys: Sequence[Key]) -> None:
 
 
 def _without_effect(key: Key, drive: Placed, chosen: Placed) -> Diagnostic:
-    """The error about a key of a drive that does not run the program."""
+    """The error for a key of a drive that does not run the program."""
     what = f"drive {chosen.spec.name} runs the program, so drive {drive.spec.name} changes nothing"
     return Diagnostic(what, f"--vary {key.text}", f"--cell {drive.place} lets drive {drive.spec.name} run it")
 

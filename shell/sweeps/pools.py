@@ -135,7 +135,7 @@ class Pools:
 
 
 def _context() -> BaseContext:
-    """How processes begin: as forks of this one, unless it has threads, whose locks would be copied, too."""
+    """The way processes begin: as forks of this one, unless it has threads, whose locks a fork would copy."""
     if sys.platform != "linux" or threading.active_count() > 1:
         if "forkserver" not in multiprocessing.get_all_start_methods():
             return multiprocessing.get_context("spawn")

@@ -1,7 +1,7 @@
 """The simplest world in which a case still fails as it did: fewer changes, then values nearer to the cell's own.
 
-A key of the case either has the cell's own value, or one of its own values, or a nearer one of the sweep's. So every
-world that is tried is one that the sweep could have had.
+Each key has the cell's own value, the value of the failed case, or a value of the sweep between the two. So every world
+that is tried is one that the sweep could have had.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ MOST = 60
 World = tuple[Value | None, ...]
 """A value for each key; None is the cell's own."""
 Run = Callable[[Case], Result | None]
-"""Runs a case; None: it shall not, and the search ends where it is."""
+"""Runs a case; None: no further run, and the search ends."""
 
 
 def shrunk(case: Case, failed: int, values: Sequence[Values], own: Sequence[Value | None], run: Run) -> World:

@@ -35,7 +35,7 @@ CUT, REFUSED, DIED = -2, -3, -4
 
 @dataclass(frozen=True)
 class Job:
-    """What all cases have in common. `drive` is the table of the drive, as JSON; `where` names it in messages."""
+    """The common part of all cases. `drive` is the table of the drive, as JSON; `where` names it in messages."""
 
     file: str
     program: str
@@ -61,7 +61,7 @@ class Result(NamedTuple):
 
     @property
     def ok(self) -> bool:
-        """Whether all conditions hold."""
+        """Whether all conditions hold in the case."""
         return self.failed == HELD
 
 

@@ -72,7 +72,7 @@ class Values:
 
     @property
     def count(self) -> int:
-        """How many there are."""
+        """The number of values."""
         return sum(each.count for each in self.pieces)
 
     def at(self, index: int) -> Value:
@@ -103,9 +103,15 @@ def parse(text: str, *, drawn: bool = False) -> Values:
 def spelled(value: Value) -> str:
     """Write a value, so that `parse` reads it again."""
     if isinstance(value, str):
-        bare = value and value == value.strip() and not set(value) & set(',"[\\') and ".." not in value
-        return value if bare and not _NUMERIC.fullmatch(value) else json.dumps(value, ensure_ascii=False)
+        return value if _is_bare(value) else json.dumps(value, ensure_ascii=False)
     return format(Decimal(repr(value)), "f") if isinstance(value, float) else json.dumps(value)
+
+
+def _is_bare(text: str) -> bool:
+    """Whether a text is read as itself without quotation marks."""
+    if not text or text != text.strip() or _NUMERIC.fullmatch(text):
+        return False
+    return ".." not in text and not set(text) & set(',"[\\')
 
 
 def _items(text: str) -> Iterator[str]:
@@ -151,7 +157,7 @@ def _steps(item: str, low: Decimal, high: Decimal, step: Decimal | None, drawn: 
 
 
 def _plain(number: Decimal) -> int | float:
-    """The number as TOML has it; a whole one is an int."""
+    """The number as a value of TOML; a whole one is an int."""
     return int(number) if number == number.to_integral_value() else float(number)
 
 

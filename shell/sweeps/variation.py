@@ -22,7 +22,7 @@ Drive = Mapping[str, Any]
 
 @dataclass(frozen=True)
 class Key:
-    """A key as it is written, and its place in a drive's table: `world` or `set`, the axis, the name; or the seed."""
+    """A key as it is written, and its place: `world` or `set`, the axis, the name in a drive's table; or the seed."""
 
     text: str
     part: str

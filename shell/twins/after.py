@@ -70,7 +70,7 @@ class _Place:
         """The positions that were compared, by axis."""
 
     def take(self, found: Measured, at: float) -> Iterator[Diverged]:
-        """Compare a position; the simulated drive begins where the real one first stood."""
+        """Compare a position; the simulated drive begins at the first position of the real one."""
         expected = self.compared.twin.motion(at).get(found.axis)
         if expected is None:
             return

@@ -62,7 +62,7 @@ class Compared(Generic[T]):
         return self.axes.setdefault(axis, Comparison())
 
     def disturbed(self, at: float) -> None:
-        """Note that something acts on the drive now: the end of a move that is under way depends on the moment."""
+        """Note a command or an input at this time: the end of a move that is under way depends on the moment."""
         for axis, velocity in self.velocities(at).items():
             self.comparison(axis).disturbed(velocity)
 
@@ -123,8 +123,9 @@ class Beside(Compared[Twin]):
             self._keep_step(comparison)
 
     def _keep_step(self, comparison: Comparison) -> None:
-        """Shift the twin's time a little where a drive is ahead or behind at an equal velocity: its program's lines
-        take another time than the simulator's. No shift changes where the two rest.
+        """Shift the twin's time a little where a drive is early or late at an equal velocity.
+
+        The lines of its program take another time than the simulator's. No shift changes where the two rest.
         """
         if not comparison.steady:
             return

@@ -1,8 +1,8 @@
 """Cause candidates of a difference between a drive and its twin, the likeliest first.
 
-Theory of operation. Only what was measured and predicted since the two last agreed counts. A drive that stands while
-its twin moves is held up: by a limit, a stall or its load. Equal velocities with positions apart are a slip. Other
-velocities are other settings, or a load. A drive that moves beside a twin that never did has got a command elsewhere.
+Theory of operation. Only what was measured and predicted since the two last agreed counts. A drive at rest while its
+twin moves is held up: by a limit, a stall or its load. Equal velocities with positions apart are a slip. Other
+velocities are other settings, or a load. A drive that moves beside a twin that never did got a command from elsewhere.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ class Pair(NamedTuple):
 
     @property
     def at_rest(self) -> bool:
-        """Whether both report that they stand."""
+        """Whether both report velocity 0."""
         return not (self.velocity or self.expected)
 
     @property
@@ -59,7 +59,7 @@ class Pair(NamedTuple):
 
 
 class Known(NamedTuple):
-    """What else is known of the drive."""
+    """Other facts about the drive."""
 
     doubtful: str = ""
     """The last line of which it is not known whether it was executed."""
@@ -95,22 +95,22 @@ def _moved(pairs: Sequence[Pair], positions: Sequence[int], velocities: Sequence
 
 
 def _alone(pairs: Sequence[Pair]) -> Iterator[str]:
-    """The causes where the twin has stood all the time: a drive that reports no velocity was pushed."""
+    """The causes where the twin was at rest all the time: a drive that reports velocity 0 was pushed."""
     yield from (UNSEEN, SETTINGS) if any(each.velocity for each in pairs) else (SLIP, UNSEEN)
 
 
 def _held_up(pairs: Sequence[Pair]) -> bool:
-    """Whether the drive stands at the end, and most of the difference has come since: its twin moved on."""
+    """Whether the drive is at rest at the end, and most of the difference came since: its twin moved on."""
     return _left_behind([(each.position, each.predicted) for each in pairs])
 
 
 def _outrun(pairs: Sequence[Pair]) -> bool:
-    """Whether the twin stands at the end, and most of the difference has come since: the drive moved on."""
+    """Whether the twin is at rest at the end, and most of the difference came since: the drive moved on."""
     return _left_behind([(each.predicted, each.position) for each in pairs])
 
 
 def _left_behind(places: Sequence[tuple[int, int]]) -> bool:
-    """Whether the first of two stands at the end, and the other one moved away from it meanwhile."""
+    """Whether the first of two is at rest at the end, and the other one moved away from it meanwhile."""
     stands, there = places[-1]
     first = places[-1]
     for each in reversed(places):
@@ -132,7 +132,7 @@ def _slipped(pairs: Sequence[Pair]) -> bool:
 
 
 def _obstacles(pairs: Sequence[Pair], limits: Sequence[str]) -> Iterator[str]:
-    """The causes of a drive that stands: where it never began to move, its load comes before a stall."""
+    """The causes of a drive at rest: where it never began to move, its load comes before a stall."""
     if limits:
         yield f"{LIMIT} ({', '.join(limits)})"
     never = len({each.position for each in pairs}) == 1

@@ -1,10 +1,10 @@
 """One axis beside its twin: when the two diverge, and when they agree again.
 
-Theory of operation. The limit at rest is in steps. A move adds `SKEW` seconds of the faster velocity: requests and
-replies take a time on their way that nobody measures. A reading in several requests adds the time that it takes. A
-command or an input that acts in the middle of a move adds as much once more, until both stand (`slack`): the place of
-the end depends on the moment then. A difference beyond the limit counts once it has lasted for `LASTING`, and is over
-in the same way.
+Theory of operation. The limit at rest is in steps. A move adds `SKEW` seconds of the faster velocity, because the time
+of requests and replies on their way is not measured. A reading in several requests adds the time that it takes. A
+command or an input in the middle of a move adds as much once more, until both are at rest (`slack`): the place of the
+end depends on the moment then. A difference beyond the limit counts once it has lasted for `LASTING`, and is over in
+the same way.
 """
 
 from __future__ import annotations
@@ -91,16 +91,16 @@ class Comparison:
         return all(each.velocity and each.equally_fast for each in last) and last[0].predicted != last[1].predicted
 
     def rests(self, rest: int) -> bool:
-        """Whether both stand where they should, so that the uncertainty of the last move is over."""
+        """Whether both are at rest and agree, so that the uncertainty of the last move is over."""
         last = list(self.pairs)[-2:]
         settled = len(last) == 2 and all(each.at_rest for each in last) and last[0].difference == last[1].difference
         return settled and self.state is State.AGREE and abs(last[1].difference) <= self.limit(last[1], rest)
 
     def disturbed(self, velocity: float, late: float = 0.0) -> None:
-        """Note that something acts in the middle of a move of this velocity, and was seen up to `late` s after that."""
+        """Note a command or an input during a move of this velocity, seen up to `late` s after it acted."""
         self.slack += abs(velocity) * (SKEW + late)
         self.lag = max(self.lag, late)
 
     def calm(self) -> None:
-        """Note that the drive and its twin stand: the next move is as certain as the first."""
+        """Note that the drive and its twin are at rest: the next move is as certain as the first."""
         self.slack = self.lag = 0.0

@@ -20,7 +20,7 @@ WORDS = {"P": "", "PX": "x", "PY": "y"}
 
 
 class Measured(NamedTuple):
-    """Where an axis of a drive was."""
+    """The measured position of an axis of a drive."""
 
     where: str
     at: datetime

@@ -1,8 +1,8 @@
 """The twins of one bus: its events reach them, and what they predict is published beside the samples.
 
-Theory of operation. A twin has no timer. It lives up to the time of each sample, and of what its drive took. Samples of
-a drive never come in the middle of a conversation with it, so a conversation reaches the twin as a whole, once it is
-over. Bytes that belong to no request are a stop, or a person's own: they reach every twin at once.
+Theory of operation. A twin has no timer. It lives up to the time of each sample, and of what its drive took. No
+sample of a drive comes in the middle of a conversation with it. So a conversation reaches the twin as a whole, once it
+is over. Bytes without a request are a stop, or a person's own: they reach every twin at once.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ class BusTwins:
         """The limit at rest, steps."""
         self.besides: dict[Drive, Beside] = {}
         self._waiting: dict[Drive, list[Concluded]] = {}
-        """What was concluded with a drive that is being read."""
+        """The conversations of a drive that is being read."""
         self._publish, self._lost = publish, lost
         self._departing = False
         """The bytes of a request are written next."""
@@ -75,7 +75,7 @@ class BusTwins:
             self._publish(TwinEnded(self.bus.now(), beside.drive.address))
 
     def close(self) -> None:
-        """End all twins, and read nothing more for them."""
+        """End all twins and their readings."""
         for drive in list(self.besides):
             self.remove(drive)
         self._poll()

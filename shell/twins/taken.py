@@ -1,8 +1,8 @@
-"""What a drive has taken of a conversation: only that reaches its twin.
+"""The requests of a conversation that the drive has taken: only these reach its twin.
 
-A request counts once the whole conversation is over, at the time at which its last byte had left. In one that succeeded
-every request counts that the drive did not refuse by itself (a damaged frame is repeated). In one that failed, the last
-command counts only if the drive acknowledged it: it was refused, or it is not known whether it was executed.
+A request counts once the whole conversation is over, at the time at which its last byte had left. In a conversation
+that succeeded, every request counts but those that the drive refused as damaged, which were repeated. In one that
+failed, the last command counts only if the drive acknowledged it. Otherwise its execution is doubtful.
 """
 
 from __future__ import annotations
@@ -21,7 +21,8 @@ NOT_TAKEN = (End.REFUSED, End.NAK, End.STOPPED)
 def reading_took(concluded: Concluded) -> float | None:
     """The time between the first and the last request of a reading of motion, s; None for another conversation."""
     result = concluded.outcome.result[0] if concluded.outcome.result else None
-    if not (isinstance(result, tuple) and result and isinstance(result[0], Motion) and concluded.transactions):
+    first = result[0] if isinstance(result, tuple) and result else None
+    if not isinstance(first, Motion) or not concluded.transactions:
         return None
     return concluded.transactions[-1].transmitted_at - concluded.transactions[0].transmitted_at
 

@@ -54,7 +54,7 @@ class Twin:
         self._unit.port.overhear(data, self.live(at))
 
     def printed(self) -> list[bytes]:
-        """What it has sent that other drives of its line overhear, since this was last asked."""
+        """The bytes for other drives of its line that it has sent since the last call."""
         printed, self._overheard = self._overheard, []
         return [each.data for each in printed]
 
@@ -82,7 +82,7 @@ class Twin:
 
 
 def make(snapshot: Snapshot, begun: float, registers: bool, alone: bool) -> tuple[Twin, list[str]]:
-    """Make the twin of a drive that was read, and say what it lacks. Raises Inexpressible, or Diagnostic.
+    """Make the twin of a drive that was read; return it and its gaps. Raises Inexpressible, or Diagnostic.
 
     `begun`: the time of the host's clock from which it lives. `alone`: no other drive is on the line.
     """

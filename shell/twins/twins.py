@@ -1,4 +1,4 @@
-"""The twins of a session: begun, ended, read anew after a loss; and what is said of them."""
+"""The twins of a session: they begin, end, and begin again after a loss; and the messages about them."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 
 class Twins:
-    """The twins of all buses. Nothing of them is loaded, and nothing is read, before the first one begins."""
+    """The twins of all buses. Their code is imported, and a drive read, only once the first one begins."""
 
     def __init__(self, workspace: Workspace) -> None:
         self.wanted = False
@@ -30,7 +30,7 @@ class Twins:
         self._paused: dict[Bus, list[str]] = {}
         """The addresses of the twins that a loss has ended, by bus."""
         self._said: set[str] = set()
-        """What twins lack, each said once."""
+        """The gaps of twins that were reported, each once."""
         self._tasks: dict[Bus, asyncio.Task[None]] = {}
 
     @property
@@ -49,7 +49,7 @@ class Twins:
         return bus in self._buses and bool(self._buses[bus].besides)
 
     async def start(self, bus: Bus, addresses: Sequence[str] | None = None) -> None:
-        """Read drives of a bus (None: all), and run a twin beside each; one that runs is set anew.
+        """Read drives of a bus (None: all), and begin a twin beside each, in place of one that runs.
 
         Raises DriveError, Diagnostic or TransportLost for the first that fails, once all have been tried; the others
         are warnings. A stop, or the end of the twins, ends the reading.
@@ -134,7 +134,7 @@ class Twins:
             self._begin(bus, None)
 
     def changed(self, bus: Bus) -> None:
-        """Note that a bus has changed: a lost one that is back is read anew."""
+        """Note that a bus has changed: the drives of a lost one that is back are read again."""
         if bus.lost is None and bus in self._paused:
             found = [each for each in self._paused.pop(bus) if each in bus.drives]
             self._begin(bus, found)
@@ -158,7 +158,7 @@ class Twins:
             f"{bus.name}: its twins end with the line; they are set anew once it is back", bus=bus.name
         )
 
-    # What is said
+    # Messages
 
     def rows(self) -> Iterator[str]:
         """A line for each twin that runs."""

@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 from dialects import Diagnostic, Stopped
+from dialects.numbers import whole
 from macros import Macro
 from shell import casting
 from shell.events import By
@@ -61,9 +62,10 @@ def rounds(text: str, wrong: Wrong) -> int | None:
     """Read a number of rounds; None: without an end. Raises the Diagnostic that `wrong` returns."""
     if text == FOREVER:
         return None
-    if not (text.isascii() and text.isdecimal() and 1 <= int(text[:12]) <= MOST_ROUNDS):
+    number = whole(text, 1, MOST_ROUNDS)
+    if number is None:
         raise wrong(f"no number of rounds {text}".rstrip() + f"; valid: 1 to {MOST_ROUNDS}, or {FOREVER}")
-    return int(text)
+    return number
 
 
 @verb(

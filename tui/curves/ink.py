@@ -37,7 +37,7 @@ class Ink:
     def dots(self, series: int, x: int, top: int, bottom: int) -> Sequence[int]:
         """The dots that a series shows in column `x` of dots, of those from `top` to `bottom`.
 
-        Flat parts are dashed; the marks of a series tell it apart where it has any.
+        Flat parts are dashed, unless the series has marks of its own.
         """
         if series >= TWINS and self.glyphs:
             return [y for y in range(top, bottom + 1) if (x + 2 * y) % SPARSE in self.shown]

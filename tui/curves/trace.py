@@ -22,7 +22,7 @@ _SLACK = 1024
 
 
 PREDICTED = {"position": "predicted position", "velocity": "predicted velocity"}
-"""What a twin predicts, by what is measured."""
+"""The predicted quantity for each measured one."""
 
 
 class Quantity(NamedTuple):
@@ -103,7 +103,7 @@ class Traces:
             self.add(Quantity(bus, event.address, event.axis, "velocity"), event.at, event.velocity)
 
     def predict(self, bus: str, event: Predicted) -> None:
-        """Take what the twin of a drive predicts."""
+        """Take a prediction of a drive's twin."""
         drive = (bus, event.address, event.axis)
         self.add(Quantity(*drive, PREDICTED["position"]), event.at, event.position)
         self.add(Quantity(*drive, PREDICTED["velocity"]), event.at, event.velocity)

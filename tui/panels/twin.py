@@ -34,7 +34,7 @@ def twin_rows(axis: Readout, unit: str, number: int, width: int, *, dim: bool) -
 
 
 def differs(axis: Readout, *, causes: bool = True) -> str:
-    """`≠ +8,112 stall, load`: the difference from the twin while it is above the limit, else nothing."""
+    """`≠ +8,112 stall, load`: the difference from the twin while it is above the limit; empty otherwise."""
     twin = axis.twin
     if twin is None or twin.diverged is None:
         return ""

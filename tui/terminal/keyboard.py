@@ -176,8 +176,8 @@ class Keyboard:
     def _binding(self, key: str) -> tuple[Binding, DOMNode, bool] | None:
         """The binding of a key, and whether its action is possible now.
 
-        `Screen.active_bindings` has it, too, after asking for each key whether its action is possible: that takes
-        longer than all else between Enter and the wire.
+        `Screen.active_bindings` would ask for each key whether its action is possible. That takes longer than all else
+        between Enter and the wire.
         """
         found: tuple[Binding, DOMNode, bool] | None = None
         for node, bindings in self._app.screen._modal_binding_chain:

@@ -1,4 +1,4 @@
-"""The composition of a screen without the work for what is covered.
+"""The composition of a screen without the work for covered widgets.
 
 Textual's compositor cuts every row of every widget into pieces, then takes the front one of each place. A transcript
 lies in five containers of its own size. So most of the pieces are made in vain.
@@ -18,7 +18,7 @@ Row = dict[int, Strip | None]
 
 
 class FrontCompositor(Compositor):
-    """A compositor that renders a widget only where nothing covers it."""
+    """A compositor that renders only the visible places of a widget."""
 
     def _render_chops(self, crop: Region, is_rendered_line: Callable[[int], bool]) -> Sequence[Mapping[int, Strip]]:
         """Render the rows of a region, from front to back."""
@@ -37,12 +37,12 @@ class FrontCompositor(Compositor):
 
 
 def _free(rows: Sequence[Row], y: int, shown: Region) -> list[int]:
-    """The places of a row that a widget shows, and that nothing covers."""
+    """The places of a row in which a widget is visible."""
     return [x for x, strip in rows[y].items() if strip is None and shown.x <= x < shown.right]
 
 
 def _fill(row: Row, strip: Strip, shown: Region, cuts: Sequence[int], free: Sequence[int]) -> None:
-    """Put the pieces of a widget's row where nothing covers them; a strip may be too short for some."""
+    """Put the pieces of a widget's row into its visible places; a strip may be too short for some."""
     ends = [cut for cut in cuts if shown.x < cut <= shown.right]
     pieces = strip.divide([end - shown.x for end in ends])
     for place, piece in zip([shown.x, *ends], pieces, strict=False):

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 from dialects.codec import Procedure
 from dialects.errors import Refused
 from dialects.held import Held
@@ -10,6 +12,15 @@ from dialects.mcode.host.parameters import GLOBAL, listed
 from dialects.mcode.host.state import MCodeState
 from dialects.mcode.host.wording import who
 from dialects.mcode.manual import help, name_places
+
+_LABELS_AT: Mapping[str, tuple[bool, ...]] = {
+    name_places.STATEMENT: (False,),
+    name_places.NEW: (),
+    name_places.LABEL: (True,),
+    name_places.PRINTED: (False, True),
+    name_places.VALUE: (False,),
+}
+"""The kinds of names at each place, in order: True for labels, False for variables."""
 
 
 def read(state: MCodeState) -> Procedure[Held]:
@@ -24,14 +35,14 @@ def offered(held: Held, line: str) -> list[tuple[str, str]]:
     """The names that may end a line: labels where a line takes one, variables elsewhere, both after PR."""
     word = help.typing(line)
     head = line[: len(line) - len(word)]
-    place = name_places.expected(head)
-    if head.count('"') % 2 or place == name_places.NEW or not (word or head.endswith((" ", ",", "=")) and head.strip()):
+    in_text = head.count('"') % 2 == 1
+    begun = bool(word or (head.strip() and head.endswith((" ", ",", "="))))
+    if in_text or not begun:
         return []
-    kinds = (True,) if place == name_places.LABEL else (False, True) if place == name_places.PRINTED else (False,)
     names = names_of(held)
     return [
         (name, _meaning(called))
-        for labels in kinds
+        for labels in _LABELS_AT[name_places.expected(head)]
         for name, called in names.items()
         if (called.kind == LABEL) is labels and name.startswith(word.upper())
     ]

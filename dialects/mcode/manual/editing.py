@@ -63,7 +63,7 @@ def _may_follow(kind: str, place: str) -> bool:
 
 
 def _fits(row: Mnemonic, place: str) -> bool:
-    """Whether a word of the drive may stand at a place."""
+    """Whether a word of the drive may be typed at a place."""
     if place == STATEMENT:
         return row.kind != "math" and (row.kind == "instruction" or row.access in ("RW", "WO"))
     if place == PRINTED:

@@ -1,7 +1,7 @@
 """The labels and variables of an MCode program file: where each is, and the check of another name for one.
 
-A rename keeps the program: every line has the tokens that it had, but for that name. A line may be divided differently
-once a name exists or is gone (`H5` is `H 5` unless H5 is a variable), so all lines are compared.
+A rename keeps the program: every line has the tokens that it had, but for that name. A drive may divide a line
+differently once a name exists or is gone: `H5` is `H 5` unless H5 is a variable. So the check compares all lines.
 """
 
 from __future__ import annotations
@@ -85,7 +85,7 @@ def fixed(name: UserName) -> str:
 
 
 def renamed(text: str, name: UserName, new: str, product: str) -> str:
-    """Return the new name as given. Raises Diagnostic where it is no name, is in use, or changes the program."""
+    """Return the new name as given. Raises Diagnostic for one that is not a name, is in use, or changes the program."""
     if reason := fixed(name):
         raise Diagnostic(reason)
     word = new.upper()
@@ -104,7 +104,7 @@ def renamed(text: str, name: UserName, new: str, product: str) -> str:
 
 
 def _taken(word: str, product: str) -> str:
-    """Say whose word this is."""
+    """Name the owner of a word in use: the drive, or the program."""
     row = lookup(word, product)
     if row is not None:
         return f"{word} is a word of the drive: {row.title}"

@@ -85,7 +85,7 @@ def renamed(text: str, name: UserName, new: str, product: str) -> str:  # noqa: 
 
 
 def _compare(text: str, name: UserName, word: str) -> None:
-    """Raise Diagnostic unless a rename gives the statements of the text with the other word, and nothing else."""
+    """Raise Diagnostic unless a rename changes that word alone in the statements of the text."""
     after = replaced(lines_of(text), name.places, word.removeprefix("SUB "))
     wanted = [_renamed(each, name.word, word) for each in parse(text)[0]]
     for one, other in zip(wanted, parse("\n".join(after))[0], strict=True):
