@@ -7,20 +7,15 @@ sent what the drives send.
 
 from __future__ import annotations
 
-import re
-
 from dialects.visible import visible
 from shell.sharing.actions import Action, Close, Purge, Say, Send, Set, Stop, Write
 from shell.sharing.client import Client, Request
+from shell.sharing.half_line import ENDS, HalfLine
 from shell.sharing.stop_bytes import StopBytes
 from transports.com_port import FLOW, FLOW_IN, GROUPS, NEEDED, PURGE_RECEIVED, Control, Setting, group_of
 
 SILENT = 10.0
 """Seconds of silence after which another client may write."""
-_ENDS = b"\r\n"
-_LINES = re.compile(b"[\r\n]")
-LONGEST = 80
-"""Bytes of an unfinished line that are looked at."""
 _ASKS = (Control.ASK_FLOW, Control.ASK_BREAK, Control.ASK_DTR, Control.ASK_RTS, Control.ASK_FLOW_IN)
 
 
@@ -45,14 +40,9 @@ class Exchange:
         """The time at which the writer wrote last."""
         self._setter: int | None = None
         """The client that has set the baud rate while there was no writer."""
-        self._begun = b""
-        """The beginning of a line whose end was not written."""
+        self._line = HalfLine(stops.framed)
         self._before: int | None = None
         """The last writer."""
-        self._cut = False
-        """The last stop came from another client within a line of the writer."""
-        self._skipping = False
-        """The rest of that line is dropped."""
         self._away = ""
         """The reason why the port is lost; empty: it is open."""
         self._actions: list[Action] = []
@@ -157,7 +147,7 @@ class Exchange:
             self._actions.append(self._stop(stop, others))
             self._say(client, "stop", _text(stop))
             if others:
-                before, rest = before.strip(_ENDS), rest.strip(_ENDS)
+                before, rest = before.strip(ENDS), rest.strip(ENDS)
             elif lost := len(data) - len(stop) - len(rest):
                 self._say(client, "unsent", f"{lost} bytes that came with a stop were dropped")
                 before = b""
@@ -169,12 +159,12 @@ class Exchange:
         return [self._stop(stop, True), Say("this terminal", "stop", _text(stop))]
 
     def _stop(self, stop: bytes, others: bool) -> Stop:
-        """Make the action of a stop. One that comes within a line of another client ends that line harmlessly, for a
-        PMX would take both for one command.
+        """Make the action of a stop. Within a line of another client it first makes that line harmless.
+
+        A PMX would take both for one command.
         """
-        begun, self._begun = self._begun, b""
-        self._cut, mended = others and bool(begun), self._stops.mended(stop)
-        return Stop(mended if self._cut and not self._stops.binary(begun) else stop, mended)
+        cut, mended = self._line.stopped(others), self._stops.mended(stop)
+        return Stop(mended if cut and not self._stops.binary(cut) else stop, mended)
 
     def _write(self, client: int, data: bytes, now: float) -> None:
         known = self.clients[client]
@@ -187,8 +177,8 @@ class Exchange:
             self._close(client, "refused", f"{name} writes, until it leaves or is silent for {SILENT:g} s")
             return
         self._last = now
-        if data := self._rest_of_line(data):
-            self._begun = b"" if self.framed else _LINES.split(self._begun + data)[-1][-LONGEST:]
+        if data := self._line.rest(data):
+            self._line.written(data)
             self._actions.append(Write(client, data))
 
     def _begin(self, client: int) -> None:
@@ -196,25 +186,18 @@ class Exchange:
         harmlessly.
         """
         if client != self._before:
-            if self._stops.moves(self._begun):
-                self._say(client, "unfinished", f"'{_text(self._begun)}' of the writer before is made harmless")
+            if self._stops.moves(self._line.text):
+                self._say(client, "unfinished", f"'{_text(self._line.text)}' of the writer before is made harmless")
                 self._actions.append(Write(client, self._stops.invalidate))
-            self._begun = b""
-        self.writer, self._before, self._skipping = client, client, False
+            self._line.ended()
+        self._line.begin_writer()
+        self.writer, self._before = client, client
         self._say(client, "writes")
-
-    def _rest_of_line(self, data: bytes) -> bytes:
-        """Drop the rest of a line whose beginning a stop has dropped."""
-        if not self._skipping:
-            return data
-        end = next((at for at, byte in enumerate(data) if byte in _ENDS), None)
-        self._skipping = end is None
-        return b"" if end is None else data[end + 1 :]
 
     def dropped(self, count: int) -> list[Action]:
         """Note the number of bytes of the writer that a stop or a purge has dropped."""
         if count:
-            self._skipping, self._cut = self._cut, False
+            self._line.dropped()
             who = self.clients[self.writer].name if self.writer is not None else ""
             self._actions.append(Say(who, "unsent", f"{count} bytes that had not left were dropped"))
         return self._done()
