@@ -26,7 +26,7 @@ class HalfLine:
         self.text = b"" if self._framed else _LINES.split(self.text + data)[-1][-LONGEST:]
 
     def stopped(self, others: bool) -> bytes:
-        """Note a stop; return the beginning of the line that it cut off. A stop of the writer itself (not `others`) cuts none."""
+        """Note a stop; return the beginning of the line that it cut off, which only the stop of `others` does."""
         begun, self.text = self.text, b""
         self._cut = others and bool(begun)
         return begun if self._cut else b""
