@@ -10,6 +10,7 @@ do.
 from __future__ import annotations
 
 import asyncio
+import contextlib
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
@@ -63,6 +64,8 @@ class Watching:
         self._watches = Subscriptions[str](SHORTEST, self._begin)
         self._watched: dict[str, _Watched] = {}
         self._task: asyncio.Task[None] | None = None
+        self._changed = asyncio.Event()
+        """Something may be due sooner than it was."""
         self._paused = False
 
     def watch(self, addresses: Sequence[str], period: float = PERIOD) -> Subscription[str]:
@@ -81,6 +84,7 @@ class Watching:
         """Go on after a pause, or after one of the link: everything is read again."""
         self._paused = False
         self._watched.clear()
+        self._changed.set()
 
     def close(self) -> None:
         """End all watches."""
@@ -89,6 +93,7 @@ class Watching:
             self._task.cancel()
 
     def _begin(self) -> None:
+        self._changed.set()
         if self._watches.periods and (self._task is None or self._task.done()):
             self._task = asyncio.get_running_loop().create_task(self._run())
 
@@ -102,7 +107,7 @@ class Watching:
             address = min(listed, key=lambda each: self._at(each).due)
             watched, now = self._at(address), self._link.now()
             if watched.due > now:
-                await asyncio.sleep(min(watched.due - now, SHORTEST))
+                await self._until(watched.due - now)
                 continue
             watched.period = periods[address]
             watched.due = now + watched.period
@@ -112,6 +117,13 @@ class Watching:
             if trouble:
                 watched.due = now + AFTER_DEFECT
                 self._link.notify(f"{watched.drive.shown}: {trouble[0]}", address, warning=True)
+
+    async def _until(self, seconds: float) -> None:
+        """Wait so long, or until something may be due sooner."""
+        self._changed.clear()
+        with contextlib.suppress(TimeoutError):
+            async with asyncio.timeout(seconds):
+                await self._changed.wait()
 
     def _at(self, address: str) -> _Watched:
         """The facts of a drive; those of another drive at the same address are dropped."""
