@@ -49,6 +49,8 @@ class Compared(Generic[T]):
         self.axes: dict[str, Comparison] = {}
         self.differences: dict[str, int] = {}
         """The last difference of each axis."""
+        self._causes: dict[str, tuple[str, ...]] = {}
+        """The candidates for the present difference of each axis."""
         self._took = 0.0
         """Seconds from the first to the last request of the last sample."""
         self._limits: dict[str, tuple[str, ...]] = {}
@@ -56,6 +58,11 @@ class Compared(Generic[T]):
     def velocities(self, at: float) -> dict[str, int]:
         """The predicted velocity of each axis."""
         return {axis: motion.velocity for axis, motion in self.twin.motion(at).items()}
+
+    @property
+    def causes(self) -> tuple[str, ...]:
+        """The candidates for the differences that are above the limit now, of all axes."""
+        return tuple(dict.fromkeys(each for named in self._causes.values() for each in named))
 
     def comparison(self, axis: str) -> Comparison:
         """The comparison of an axis."""
@@ -93,11 +100,12 @@ class Compared(Generic[T]):
         pairs = list(comparison.pairs)
         if verdict is Verdict.AGREED:
             self.doubtful = ""
+            self._causes.pop(axis, None)
             return Agreed(pairs[-1].at, address, axis)
         known = Known(self.doubtful, self._limits.get(axis, ()))
         first = next((each for each in pairs if abs(each.difference) > comparison.limit(each, rest)), pairs[-1])
-        last = pairs[-1]
-        return Diverged(first.at, address, last.difference, comparison.limit(last, rest), causes(pairs, known), axis)
+        last, self._causes[axis] = pairs[-1], causes(pairs, known)
+        return Diverged(first.at, address, last.difference, comparison.limit(last, rest), self._causes[axis], axis)
 
     def _settle(self, axis: Comparison, pair: Pair, sample: Sample) -> None:
         """Have the twin take the place of the drive after a move whose end could not be known to the step."""

@@ -81,8 +81,8 @@ class Twin:
         self.live(at)
 
 
-def make(snapshot: Snapshot, begun: float, registers: bool, alone: bool) -> tuple[Twin, list[str]]:
-    """Make the twin of a drive that was read; return it and its gaps. Raises Inexpressible, or Diagnostic.
+def make(snapshot: Snapshot, begun: float, registers: bool, alone: bool) -> tuple[Twin, tuple[str, ...]]:
+    """Make the twin of a drive that was read, with its gaps. Raises Inexpressible, or Diagnostic.
 
     `begun`: the time of the host's clock from which it lives. `alone`: no other drive is on the line.
     """
@@ -91,7 +91,7 @@ def make(snapshot: Snapshot, begun: float, registers: bool, alone: bool) -> tupl
     unit = family_of(spec.personality).build(spec, Place(alone=alone))
     if unit.shadow is None:
         raise Inexpressible(f"the simulator has no twin of an {spec.personality}")
-    lacks = [*described.remarks]
+    gaps = [*described.remarks]
     if described.unread:
-        lacks.append(f"not read: {', '.join(name for name, _ in described.unread)}")
-    return Twin(unit, unit.shadow, snapshot.levels, begun, registers), lacks
+        gaps.append(f"not read, so as in a new drive: {', '.join(name for name, _ in described.unread)}")
+    return Twin(unit, unit.shadow, snapshot.levels, begun, registers), tuple(gaps)

@@ -29,8 +29,8 @@ class Twins:
         self._buses: dict[Bus, BusTwins] = {}
         self._paused: dict[Bus, list[str]] = {}
         """The addresses of the twins that a loss has ended, by bus."""
-        self._said: set[str] = set()
-        """The gaps of twins that were reported, each once."""
+        self._said: set[tuple[str, str]] = set()
+        """The gaps of twins that were reported, with the name of the drive."""
         self._tasks: dict[Bus, asyncio.Task[None]] = {}
 
     @property
@@ -57,10 +57,12 @@ class Twins:
         drives = [bus.drives[each] for each in (list(bus.drives) if addresses is None else addresses)]
         twins = self._of(bus)
         failures: list[Exception] = []
+        gaps: dict[str, list[str]] = {}
         try:
             for drive in drives:
                 try:
-                    await self._start(twins, drive)
+                    for gap in await self._start(twins, drive):
+                        gaps.setdefault(gap, []).append(self._workspace.display_name(drive))
                 except (DriveError, Diagnostic) as failure:
                     failures.append(failure)
                     if isinstance(failure, Stopped):
@@ -68,6 +70,7 @@ class Twins:
         finally:
             if self._buses.get(bus) is twins and not twins.drives:
                 self._end(bus)
+            self._report_gaps(bus, gaps)
         for other in failures[1:]:
             self._workspace.notify(f"{bus.name}: no twin: {other}", bus=bus.name, warning=True)
         if failures:
@@ -100,7 +103,15 @@ class Twins:
             self._buses[bus].rest = self._rest
         return self._buses[bus]
 
-    async def _start(self, twins: BusTwins, drive: Drive) -> None:
+    def _report_gaps(self, bus: Bus, gaps: dict[str, list[str]]) -> None:
+        """Report the gaps of twins, each once; drives with an equal gap share a line."""
+        for gap, names in gaps.items():
+            if fresh := [each for each in names if (each, gap) not in self._said]:
+                self._said |= {(each, gap) for each in fresh}
+                self._workspace.notify(f"twin of {', '.join(fresh)}: {gap}", bus=bus.name)
+
+    async def _start(self, twins: BusTwins, drive: Drive) -> tuple[str, ...]:
+        """Read a drive, and run a twin beside it; return the gaps of the twin."""
         from shell import snapshots
         from shell.twins.beside import Beside
         from shell.twins.twin import make
@@ -116,15 +127,12 @@ class Twins:
                     f"{name}: it moves or a program runs, and a twin begins at rest; /twin on once it stands"
                 )
             begun = bus.now()
-            twin, lacks = make(snapshot, begun, drive.family.registers is not None, len(bus.drives) == 1)
+            twin, gaps = make(snapshot, begun, drive.family.registers is not None, len(bus.drives) == 1)
             twins.begin(Beside(drive, twin, begun))
         finally:
             twins.forgo(drive)
         self._workspace.notify(f"{name}: a twin runs beside it", bus=bus.name, outcome=True)
-        for each in lacks:
-            if (text := f"{name}: its twin: {each}") not in self._said:
-                self._said.add(text)
-                self._workspace.notify(text, bus=bus.name)
+        return gaps
 
     # Losses
 
@@ -167,7 +175,8 @@ class Twins:
                 apart = [f"{axis} {steps}".strip() for axis, steps in beside.differences.items()]
                 began = f"{self._workspace.wall(beside.begun):%H:%M:%S}"
                 said = f"apart by {', '.join(apart)} steps" if apart else "not compared yet"
-                yield f"{self._workspace.display_name(drive)}: a twin since {began}, {said}"
+                why = f": {', '.join(beside.causes)}" if beside.causes else ""
+                yield f"{self._workspace.display_name(drive)}: a twin since {began}, {said}{why}"
 
     def _publish(self, bus: Bus, event: TwinEvent) -> None:
         self._workspace.publish(OnBus(bus.name, event))

@@ -43,7 +43,7 @@ async def twin(call: Call) -> None:
 def _list(call: Call, twins: RunningTwins) -> None:
     rows = list(twins.rows())
     for row in rows:
-        call.workspace.output(row)
+        call.workspace.output(row, columns=True)
     call.workspace.output(f"limit at rest: {twins.limit} steps" if rows else "no twin runs; /twin on begins one")
 
 

@@ -176,6 +176,27 @@ async def test_a_wrong_use_is_one_line(tmp_path: Path) -> None:
         assert cell.printed()[2] == "limit at rest: 200 steps"
 
 
+async def test_the_list_of_twins_names_the_causes_of_a_difference_until_it_is_over(tmp_path: Path) -> None:
+    async with CellSession(tmp_path, bus("press", party("a"), party("b"))) as cell:
+        await run(cell, "/twin on")
+        cell.device("press:a").execute("SL 20000", cell._floor().now())
+        await asyncio.sleep(1)
+        await run(cell, "/twin")
+        apart, agrees, _ = cell.printed()
+        assert re.fullmatch(r"a: .*, apart by \d+ steps: a command not seen here, settings changed", apart)
+        assert agrees.endswith(", apart by 0 steps")
+        await run(cell, "@a SL 0", "/wait stopped", "/twin on a", "/sleep 1", "/twin")
+        assert cell.printed()[3].endswith(", apart by 0 steps")
+
+
+async def test_an_equal_gap_of_twins_is_reported_once_for_all_drives(tmp_path: Path) -> None:
+    async with CellSession(tmp_path, bus("press", party("a"), party("b"))) as cell:
+        await run(cell, "/twin on", "/twin on b")
+        assert [each for each in cell.told() if each.startswith("twin of")] == [
+            "twin of a, b: not read, so as in a new drive: OE, IS5, A, D, MS, VI and VM for encoder counts"
+        ]
+
+
 async def test_a_drive_keeps_its_twin_under_another_name(tmp_path: Path) -> None:
     async with CellSession(tmp_path, bus("press", party("a"), party("b"))) as cell:
         await run(cell, "/twin on", '@a DN="k"', "@k MR 5000", "/sleep 2")
