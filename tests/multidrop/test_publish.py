@@ -25,6 +25,7 @@ from shell.publishing.target import parse_target
 from shell.publishing.topics import Topics
 from tests.support.mosquitto import PASSWORD, USER, Mosquitto, Subscriber, free_port, retained
 from tests.support.processes import Running
+from tests.support.until import until
 from transports import Unreachable
 
 WILL = Message("t/status", "lost", True)
@@ -142,7 +143,7 @@ async def test_a_broker_that_was_away_gets_what_waited_and_its_retained_states_a
     await asyncio.wait_for(made[0].lost.wait(), 10)
     for number in range(500, 1000):
         publisher.put(Message("t/n", str(number)))
-    await asyncio.sleep(0.2)
+    await until(lambda: any("still lost" in each for each in said))
     await asyncio.to_thread(mosquitto.start)
     seen = await asyncio.to_thread(Subscriber, mosquitto.plain)
     await asyncio.to_thread(seen.until, lambda: seen.texts("t/n")[-1:] == ["999"])

@@ -1,0 +1,59 @@
+"""The rules of a shared port with three clients: what is written, sent and said."""
+
+from __future__ import annotations
+
+from shell.sharing.actions import Action, Close, Purge, Say, Send, Set, Stop, Write
+from shell.sharing.exchange import Exchange
+from shell.sharing.stop_bytes import stop_bytes
+
+ADA, BOB, EVE = 1, 2, 3
+
+
+class Port:
+    """An exchange whose port takes all bytes at once, unless it is `slow`: then they wait until they are dropped."""
+
+    def __init__(self, family: str = "", slow: bool = False) -> None:
+        self.exchange = Exchange(stop_bytes(family), 9600)
+        self.slow = slow
+        self.written = b""
+        self.waiting = b""
+        self.sent: dict[int, bytes] = {ADA: b"", BOB: b"", EVE: b""}
+        self.said: list[str] = []
+        self.set: list[Set] = []
+        self.closed: list[int] = []
+        for client, name in ((ADA, "ada"), (BOB, "bob"), (EVE, "eve")):
+            self.do(self.exchange.connect(client, name))
+        self.said.clear()
+
+    def send(self, client: int, data: bytes, now: float = 0.0) -> None:
+        self.do(self.exchange.receive(client, data, now))
+
+    def do(self, actions: list[Action]) -> None:
+        for each in actions:
+            match each:
+                case Write(_, data):
+                    self._take(data)
+                case Stop(data, mended):
+                    self.written += mended if self._drop() else data
+                case Purge():
+                    self._drop()
+                case Send(client, data):
+                    self.sent[client] += data
+                case Close(client, farewell):
+                    self.sent[client] += farewell
+                    self.closed.append(client)
+                case Set():
+                    self.set.append(each)
+                case Say(client, event, detail):
+                    self.said.append(" ".join(filter(None, (client, event, detail))))
+
+    def _take(self, data: bytes) -> None:
+        if self.slow:
+            self.waiting += data
+        else:
+            self.written += data
+
+    def _drop(self) -> int:
+        dropped, self.waiting = len(self.waiting), b""
+        self.do(self.exchange.dropped(dropped))
+        return dropped
