@@ -23,6 +23,8 @@ EQUAL = 0.02
 
 SKEW = 0.03
 """Seconds between the time of a request and its execution, at most."""
+SPARSE = 0.5
+"""Seconds between two readings beyond which their velocities do not explain what was between."""
 JITTER = 20
 """Steps of a difference that are no jump."""
 
@@ -80,6 +82,8 @@ def _likely(pairs: Sequence[Pair], limits: Sequence[str]) -> Iterator[str]:
         yield from _alone(pairs)
     elif _held_up(pairs):
         yield from _obstacles(pairs, limits)
+    elif _fell_short(pairs):
+        yield from (STALL, LOAD, SLIP, LIMIT, SETTINGS)
     elif _slipped(pairs):
         yield from (SLIP, LOAD, UNSEEN)
     elif _outrun(pairs):
@@ -119,6 +123,16 @@ def _left_behind(places: Sequence[tuple[int, int]]) -> bool:
         first = each
     apart = abs(there - stands)
     return apart > abs(first[1] - stands) and 2 * abs(there - first[1]) >= apart
+
+
+def _fell_short(pairs: Sequence[Pair]) -> bool:
+    """Whether the drive came less far than its twin between two readings of which nothing is known in between."""
+    for before, after in pairwise(pairs):
+        due, came = after.predicted - before.predicted, after.position - before.position
+        most = 2 * abs(due - came) >= abs(pairs[-1].difference)
+        if most and after.at - before.at > SPARSE and abs(due) > JITTER and 0 <= came * due < due * due:
+            return True
+    return False
 
 
 def _slipped(pairs: Sequence[Pair]) -> bool:

@@ -72,6 +72,12 @@ def test_the_likeliest_cause_is_the_first(measured: Motion, predicted: Motion, f
     assert causes(pairs(measured, predicted), Known())[0] == first
 
 
+def test_where_two_readings_are_far_apart_a_drive_that_came_less_far_may_have_stalled() -> None:
+    """Typed positions in a log: no velocity, and nothing in between."""
+    found = [Pair(0.0, 2000, 0, 2000, 0), Pair(2.0, 31250, 40000, 50486, 40000)]
+    assert causes(found, Known())[0] == "stall"
+
+
 def test_a_limit_that_is_lit_and_a_doubtful_line_come_first() -> None:
     found = pairs(stopped(MOVE, 1.0), MOVE)
     assert causes(found, Known(limits=("limit+",)))[0] == "a limit (limit+)"
