@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from math import copysign
+from math import copysign, inf
 from typing import Generic, Protocol, TypeVar
 
 from dialects.conditions import Conditions
@@ -11,7 +11,7 @@ from dialects.family import Motion
 from drives.conclusions import Concluded
 from drives.conversations import ASKING
 from drives.drive import Drive
-from drives.events import Sample
+from drives.events import Sample, Transaction
 from shell.events import Agreed, Diverged, Predicted, TwinEvent
 from shell.twins.causes import Known, Pair, causes
 from shell.twins.comparing import Comparison, Verdict
@@ -22,6 +22,8 @@ DRIFT = 0.005
 """The part of the time by which a program may run faster or slower than in the twin."""
 LONGEST = 30.0
 """Seconds without a steady move whose drift is made good at once, at most."""
+FADING = 0.95
+"""The part of a delay that is still expected after a further reply."""
 SWITCHES = {"lim+": "limit+", "lim-": "limit-"}
 """Limits by the function of their lamps."""
 
@@ -52,7 +54,7 @@ class Compared(Generic[T]):
         self._causes: dict[str, tuple[str, ...]] = {}
         """The candidates for the present difference of each axis."""
         self._took = 0.0
-        """Seconds from the first to the last request of the last sample."""
+        """Seconds that the last sample may be uncertain: from its first to its last request, and its delay."""
         self._limits: dict[str, tuple[str, ...]] = {}
 
     def velocities(self, at: float) -> dict[str, int]:
@@ -68,10 +70,13 @@ class Compared(Generic[T]):
         """The comparison of an axis."""
         return self.axes.setdefault(axis, Comparison())
 
-    def disturbed(self, at: float) -> None:
-        """Note a command or an input at this time: the end of a move that is under way depends on the moment."""
+    def disturbed(self, at: float, late: float = 0.0) -> None:
+        """Note a command or an input at this time, or up to `late` s later.
+
+        The end of a move that is under way depends on the moment.
+        """
         for axis, velocity in self.velocities(at).items():
-            self.comparison(axis).disturbed(velocity)
+            self.comparison(axis).disturbed(velocity, late)
 
     def conditions(self, found: tuple[Conditions, ...]) -> None:
         """Take the lamps of the drive, which others read."""
@@ -123,6 +128,10 @@ class Beside(Compared[Twin]):
         self._read_at = begun
         """When the inputs were last read."""
         self._in_step_at = begun
+        self._quickest = inf
+        """The shortest time from a reading's request to its reply, s."""
+        self._delay = 0.0
+        """Seconds by which the last replies came later than that: a request or a stop may take as much on its way."""
 
     def sample(self, sample: Sample, rest: int) -> Iterator[TwinEvent]:
         """Compare a sample with the twin, and keep the twin in step."""
@@ -148,12 +157,23 @@ class Beside(Compared[Twin]):
     def concluded(self, concluded: Concluded) -> None:
         """Take a conversation with the drive, or with all drives."""
         if (took := reading_took(concluded)) is not None:
-            self._took = took
+            last = concluded.transactions[-1]
+            self._quickest = min(self._quickest, last.ended_at - last.transmitted_at)
+            self._note_delay(last)
+            self._took = took + self._delay
         for each in taken(concluded):
             data = each.request.codec.encode(each.request)
-            self._acts(data, each.transmitted_at, each.request.kind not in ASKING)
+            disturbs = each.request.kind not in ASKING
+            if disturbs and each.reply.acknowledged:
+                self._note_delay(each)
+            self._acts(data, each.transmitted_at, disturbs)
         if concluded.unproven:
             self.doubtful = concluded.unproven
+
+    def _note_delay(self, transaction: Transaction) -> None:
+        """Note how late a reply came. A delay that was seen fades with further replies."""
+        delay = transaction.ended_at - transaction.transmitted_at - self._quickest
+        self._delay = max(0.0, delay, FADING * self._delay)
 
     def stopped(self, data: bytes, at: float) -> None:
         """Take the bytes of a stop, or those that a person typed in raw mode."""
@@ -169,5 +189,5 @@ class Beside(Compared[Twin]):
 
     def _acts(self, data: bytes, at: float, disturbs: bool = True) -> None:
         if disturbs:
-            self.disturbed(at)
+            self.disturbed(at, self._delay)
         self.twin.hear(data, at)
