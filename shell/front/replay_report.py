@@ -46,7 +46,8 @@ class ReplayReport:
         if positions is not None:
             largest, compared = positions.largest, positions.compared
             for name, number in compared.items():
-                text = f"{name}: {number} positions compared, largest difference {largest[name]} steps"
+                noun = "position" if number == 1 else "positions"
+                text = f"{name}: {number} {noun} compared, largest difference {largest[name]} steps"
                 channel.notify(text, outcome=True)
             fact |= {"compared": sum(compared.values()), "diverged": len(positions.diverged), "largest": largest}
         if self._json:

@@ -68,14 +68,21 @@ class _Place:
         self.compared = Compared(_Simulated(read))
         self.counts: dict[str, int] = {}
         """The positions that were compared, by axis."""
+        self._moved = False
+        """Whether a line that can start motion was replayed."""
+
+    def disturbed(self, at: float, line: str) -> None:
+        """Note a line or a stop (empty) that acts on the drive now."""
+        self._moved = self._moved or (bool(line) and self.drive.starts(line))
+        self.compared.disturbed(at)
 
     def take(self, found: Measured, at: float) -> Iterator[Diverged]:
-        """Compare a position; the simulated drive begins at the first position of the real one."""
+        """Compare a position; the simulated drive begins at one that was measured before the first motion."""
         expected = self.compared.twin.motion(at).get(found.axis)
         if expected is None:
             return
         velocity = expected.velocity if found.velocity is None else found.velocity
-        if found.axis not in self.counts and not (velocity or expected.velocity):
+        if found.axis not in self.counts and not (self._moved or velocity or expected.velocity):
             self.compared.twin.align(found.axis, found.position, at)
         self.counts[found.axis] = self.counts.get(found.axis, 0) + 1
         self.compared.comparison(found.axis).lag = LATE
@@ -134,14 +141,14 @@ class Positions:
         if isinstance(each, Step) and (not each.text or each.drive in EVERYONE):  # a stop, or a line for all
             for (bus, _), place in self._places.items():
                 if each.bus in ("", bus):
-                    place.compared.disturbed(at)
+                    place.disturbed(at, each.text)
         elif (found := self._places.get((each.bus, each.drive))) is not None:
             self._take_of(found, each, at)
 
     def _take_of(self, place: _Place, each: Exchange | Step, at: float) -> None:
         measured = list(place.decoding.take(each) if isinstance(each, Exchange) else printed(each, place.drive))
         if isinstance(each, Step) and not measured:
-            place.compared.disturbed(at)
+            place.disturbed(at, each.text)
         for found in measured:
             self._report(place, place.take(found, at))
 

@@ -115,6 +115,16 @@ async def test_typed_positions_are_compared_without_polls(tmp_path: Path, capsys
     assert told[-1].endswith("1 of 1 axes were not where the log has them")
 
 
+async def test_a_first_position_after_a_motion_is_compared(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    log = await recorded(tmp_path, bus("press", encoder()), "MR 16000", "/wait stopped", "PR P", polled=False)
+    told = await replayed(tmp_path, log, bus("press", encoder(world="stall_at = 20000")), as_json=True)
+    found = [json.loads(each) for each in capsys.readouterr().out.splitlines()]
+    (diverged,), summary = [each for each in found if "diverged" in each], found[-1]
+    assert diverged["diverged"]["drive"] == "press:a"
+    assert summary["summary"]["compared"] == 1 and summary["summary"]["largest"]["press:a"] > 10000
+    assert any(each.startswith("press:a: 1 position compared") for each in told)
+
+
 @pytest.mark.parametrize(
     ("real", "lines"),
     [
