@@ -247,7 +247,10 @@ class _Loop:
 
     def _linger(self) -> None:
         """Give the driver and the reader a moment for what they hold."""
-        deadline, reader = time.monotonic() + _LINGER, True
-        while time.monotonic() < deadline and (self._relay.port.unsent() or (reader and self._relay.out)):
-            reader = reader and self._write()
+        deadline, reads = time.monotonic() + _LINGER, True
+        while time.monotonic() < deadline:
+            waits = reads and bool(self._relay.out)
+            if not (waits or self._relay.port.unsent()):
+                break
+            reads = reads and self._write()
             time.sleep(_LOOK)

@@ -56,7 +56,8 @@ async def open_lines(session: Session, urls: Sequence[str], later: bool) -> list
     failures: dict[int, BaseException] = {}
     await session.open_all(urls, failures.__setitem__)
     fatal = [each for each in failures.values() if isinstance(each, Diagnostic)]
-    if failures and (fatal or not later or len(failures) == len(urls)):
+    none_open = len(failures) == len(urls)
+    if failures and (fatal or none_open or not later):
         raise [*fatal, *failures.values()][0]
     absent = [urls[number] for number in sorted(failures)]
     for number in sorted(failures):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING
 
 from dialects import Diagnostic
@@ -96,28 +97,7 @@ def attach(workspace: Workspace, plot: Plot, series: Sequence[Series], period: f
     wanted, buses = set(series), {each.bus for each in series}
     for bus, address, _ in series:
         plot.label(bus, address, workspace.buses[bus].drives[address].label)
-
-    def take(event: SessionEvent) -> None:
-        if not isinstance(event, OnBus):
-            return _log(plot, buses, event)
-        bus, inner = event
-        if isinstance(inner, TwinEvent):
-            return _twin(plot, wanted, bus, inner)
-        if isinstance(inner, Sample) and Series(bus, inner.address) in wanted:
-            plot.sample(bus, inner)
-        elif isinstance(inner, Valued) and Series(bus, inner.address, inner.word) in wanted:
-            plot.value(bus, inner)
-        elif isinstance(inner, Conditioned) and Series(bus, inner.address) in wanted:
-            for each in inner.conditions:
-                for name, state in states_of(each):
-                    plot.state(bus, inner.address, each.axis, name, inner.at, state)
-        elif isinstance(inner, Lost) and bus in buses:
-            plot.gap(bus, inner.at)
-        elif isinstance(inner, Unsolicited) and bus in buses:
-            for text in inner.lines:
-                plot.text(bus, "", inner.at, text, "reply")
-
-    ends: list[Callable[[], None]] = [workspace.subscribe(take)]
+    ends: list[Callable[[], None]] = [workspace.subscribe(partial(_take, plot, wanted, buses))]
     for bus in sorted(buses):
         ends += _polls(
             workspace.buses[bus].telemetry, [each for each in dict.fromkeys(series) if each.bus == bus], period
@@ -133,6 +113,28 @@ def attach(workspace: Workspace, plot: Plot, series: Sequence[Series], period: f
 
     plot.on_failure(failed)
     return detach
+
+
+def _take(plot: Plot, wanted: set[Series], buses: set[str], event: SessionEvent) -> None:
+    """Plot an event of a wanted series, or of one of the buses."""
+    if not isinstance(event, OnBus):
+        return _log(plot, buses, event)
+    bus, inner = event
+    if isinstance(inner, TwinEvent):
+        return _twin(plot, wanted, bus, inner)
+    if isinstance(inner, Sample) and Series(bus, inner.address) in wanted:
+        plot.sample(bus, inner)
+    elif isinstance(inner, Valued) and Series(bus, inner.address, inner.word) in wanted:
+        plot.value(bus, inner)
+    elif isinstance(inner, Conditioned) and Series(bus, inner.address) in wanted:
+        for each in inner.conditions:
+            for name, state in states_of(each):
+                plot.state(bus, inner.address, each.axis, name, inner.at, state)
+    elif isinstance(inner, Lost) and bus in buses:
+        plot.gap(bus, inner.at)
+    elif isinstance(inner, Unsolicited) and bus in buses:
+        for text in inner.lines:
+            plot.text(bus, "", inner.at, text, "reply")
 
 
 def _polls(telemetry: Telemetry, series: Sequence[Series], period: float) -> Iterator[Callable[[], None]]:

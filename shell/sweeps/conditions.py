@@ -73,7 +73,8 @@ def _check_lists(text: str, tree: Comparison, example: Outcome) -> None:
     """Refuse a list in a calculation, beside a number, or in an order. Raises Diagnostic."""
     sides = [_is_list(each, example) for each in (tree.left, tree.right)]
     inner = [each for part in _inside(tree, example) for each in unknowns(part) if _is_list(each, example)]
-    if inner or any(sides) != all(sides) or (any(sides) and tree.sign not in EQUAL):
+    mixed, ordered = any(sides) != all(sides), any(sides) and tree.sign not in EQUAL
+    if inner or mixed or ordered:
         hint = 'as in errors == [], errors == [86], prints == ["done"]'
         raise Diagnostic("compares a list, which has == and != with a list only", f"--expect {text}", hint)
     for each in unknowns(tree):

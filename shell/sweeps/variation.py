@@ -65,7 +65,8 @@ def parse(text: str, names: Container[str]) -> tuple[str, Key]:
         drive, rest = "", text
     axis, dot, name = rest.partition(".")
     axis, name = (axis.lower(), name) if dot else ("", rest)
-    if not name or (dot and (axis not in AXES or not _in_world(name))):
+    of_an_axis = axis in AXES and _in_world(name)
+    if not name or (dot and not of_an_axis):
         raise Diagnostic("is not a key", f"--vary {text}", "valid: seed, DRIVE.KEY, or KEY with one drive")
     if axis or _in_world(name):
         return drive, Key(text, WORLD, name.lower(), axis)

@@ -113,7 +113,8 @@ def _with_words(view: View, taken: Sequence[tuple[Group, Chart, dict[Line, Exten
         words = []
         for line in group.lines:
             extent = extents.get(line)
-            if line in moving or (line.twin and (extent is None or line.of_drive in agreeing)):
+            silent = extent is None or line.of_drive in agreeing
+            if line in moving or (line.twin and silent):
                 continue
             if extent in (None, (0, 0)) and group.word == "velocity" and line.quantity[:3] in positions:
                 continue
