@@ -157,7 +157,8 @@ def headline(tally: Tally, width: int = 0) -> str:
 def _ways(tally: Tally) -> list[str]:
     """The wordings of the banner, from the longest to the shortest."""
     if tally.stand:
-        head = f"■ STOPPED   {words(tally)}"
+        sure = "■ STOPPED" if tally.found else "· NO STOP SENT"
+        head = f"{sure}   {words(tally)}"
         return [f"{head}       {RESUME}", head]
     clock = f"{tally.at:%H:%M:%S}"
     if tally.sure:

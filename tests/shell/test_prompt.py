@@ -96,7 +96,7 @@ async def test_the_toolbar_says_what_is_known_since_a_stop(typist):
     assert typist.prompt._toolbar().startswith("^X STOP ALL  /open")
     typist.session.stop()
     assert typist.prompt._toolbar().startswith(
-        "^X STOP ALL  ■ STOPPED   no drive is open       /resume lets macros run"
+        "^X STOP ALL  · NO STOP SENT   no drive is open       /resume lets macros run"
     )
 
 

@@ -85,7 +85,7 @@ async def test_it_stops_on_the_first_screen_and_shows_it_there() -> None:
         await pilot.press("tab", "t", "ctrl+x")
         assert session.stops == 1
         await settle(pilot)
-        assert "■ STOPPED   no drive is open" in app.screen.query_one(".banner").plain  # type: ignore[attr-defined]
+        assert "· NO STOP SENT   no drive is open" in app.screen.query_one(".banner").plain  # type: ignore[attr-defined]
 
 
 @pytest.mark.tui
