@@ -1,7 +1,7 @@
 """`multidrop publish`: 200 lines of 3 drives each through one broker, and a burst of messages beside paho itself.
 
 The simulated drives, the broker (mosquitto), the publisher and a subscriber, which counts, are processes of this
-machine. The drives stand still, or all of them move to and fro. A cost is processor time, of the publisher only where
+machine. The drives are at rest, or all of them move to and fro. A cost is processor time, of the publisher only where
 nothing else is named. Where mosquitto is not installed, there are no rows.
 
 Run: python bench/bench_publish.py [--full]
@@ -160,7 +160,7 @@ class Counter:
 
 
 def fleet(count: int, moving: bool, seconds: float) -> Iterator[Row]:
-    """What so many lines cost, and what the broker gets of them."""
+    """Measure the cost of so many lines, and the messages that the broker gets."""
     program = 'program = "moving.mxt"\n' if moving else ""
     drives = "".join(DRIVE.format(name=name, program=program) for name in NAMES)
     cell = "".join(BUS.format(number=number) + drives for number in range(count))

@@ -15,7 +15,7 @@ T = TypeVar("T")
 
 @dataclass(frozen=True)
 class Outcome(Generic[T]):
-    """The end of a conversation: what it returned, or the error that it raised."""
+    """The end of a conversation: its result, or the error that it raised."""
 
     result: tuple[T, ...] = ()
     error: BaseException | None = None

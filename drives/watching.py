@@ -69,7 +69,7 @@ class Watching:
         self._paused = False
 
     def watch(self, addresses: Sequence[str], period: float = PERIOD) -> Subscription[str]:
-        """Read the conditions of these drives every `period` s; after the last such watch nothing more is read."""
+        """Read the conditions of these drives every `period` s; the end of the last such watch ends the readings."""
         now = self._link.now()
         for each in (self._watched[address] for address in addresses if address in self._watched):
             if not each.failures:  # one that was asked for at a slower rate

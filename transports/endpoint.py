@@ -16,7 +16,7 @@ class Endpoint(Protocol):
         """The descriptor."""
 
     def read(self) -> bytes | None:
-        """Bytes that arrived; empty: nothing of interest; None: the end."""
+        """Bytes that arrived; empty: only bytes for the endpoint itself; None: the end."""
 
     def write(self, data: bytes | memoryview) -> int:
         """Write, and return how many bytes the system took."""

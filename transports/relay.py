@@ -72,9 +72,9 @@ class Relay:
         self.push()
 
     def late(self, data: bytes) -> None:
-        """Take in what arrived after too long a silence, and pass on nothing but a stop. May raise as `receive`.
+        """Take in what arrived after too long a silence, and pass on only a stop. May raise as `receive`.
 
-        The other end has given up by now: a motion that began now would surprise whoever was told of the loss.
+        The other end has given up: a motion that began now would surprise the person who read of the loss.
         """
         stop: bytes | None = None
         for kind, payload in self._frames.take(data):

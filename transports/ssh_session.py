@@ -30,7 +30,7 @@ if sys.platform != "win32":
 assert sys.platform != "win32"
 
 LIMITS = (
-    "on {host} socat passes the bytes on instead of multidrop: a stop waits there behind what was sent before it, and "
+    "on {host} socat passes the bytes on instead of multidrop: a stop waits there for the bytes sent before it, and "
     "the baud rate does not change while the port is open"
 )
 _PREAMBLE = 65536

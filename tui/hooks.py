@@ -11,7 +11,7 @@ from tui.terminal.keyboard import Keyboard
 
 
 class Hooks:
-    """Gives a session what it needs of the screen. `closed` is called after each dialog."""
+    """Sets the functions of a session that need the screen. `closed` is called after each dialog."""
 
     def __init__(self, app: Actions, keyboard: Keyboard, presenter: Presenter, closed: Callable[[], None]) -> None:
         self._app, self._keyboard, self._presenter, self._closed = app, keyboard, presenter, closed

@@ -21,7 +21,7 @@ def params_backup(parser: argparse.ArgumentParser) -> None:
 
 
 def params_diff(parser: argparse.ArgumentParser) -> None:
-    """Add a drive and what it is compared with."""
+    """Add a drive, and the file or the drive to compare it with."""
     _settings_of(parser)
     parser.add_argument("file", metavar="FILE", nargs="?", default="", help="a file of `params backup`")
     parser.add_argument("--against", metavar="URL2", default="", help="compare with a drive there")

@@ -25,7 +25,7 @@ class JUnitFile:
         return self._path is not None
 
     def begin(self) -> None:
-        """Write a report that says that nothing has ended, lest an older one is taken for this run's.
+        """Write a report of a run without an end, lest an older one is taken for this run's.
 
         Raises Diagnostic where it cannot be written, and for another file in its place, which stays: then and later.
         """

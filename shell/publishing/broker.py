@@ -59,7 +59,7 @@ class Connection:
     """One connection to a broker. `connect` makes it; it ends once, by `close` or by a loss."""
 
     def __init__(self, target: Target, settings: MqttSettings, will: Message, name: str) -> None:
-        """Connect nothing yet.
+        """Make a connection that is not connected yet.
 
         `name`: the client's name. A broker ends an earlier connection of that name first, so its will comes in time.
         """

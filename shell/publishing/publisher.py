@@ -56,7 +56,7 @@ class Publisher:
         dropped: Callable[[Counter[str]], None],
         backlog: Backlog | None = None,
     ) -> None:
-        """Connect nothing yet. `online`: the message that opens each connection.
+        """Make a publisher that is not connected yet. `online`: the message that opens each connection.
 
         `notify` takes warnings for a person. `dropped` takes the numbers of messages that were dropped, by bus.
         """

@@ -1,4 +1,4 @@
-"""Who writes on a shared port: the rules, without clock and sockets. Bytes and times in, actions out.
+"""The rules for the writer of a shared port, without clock and sockets. Bytes and times in, actions out.
 
 The first client to write is the writer, until it leaves or is silent for ten seconds. Bytes of another one are refused,
 and its connection is closed. A stop passes from any client, before what waits: those bytes are dropped. Every client is

@@ -1,7 +1,7 @@
 """The CONDITION of `--expect`: one comparison like that of `/assert`, over the results of a run instead of words.
 
-Lists stand in brackets, compare with `==` and `!=`, and take no part in calculations: `errors == [86]`. A number in a
-list equals a print that is this number. `ended` is a text, and beside a number 1 or 0: ended by itself, or not.
+Lists are written in brackets, compare with `==` and `!=`, and take no part in calculations: `errors == [86]`. A number
+in a list equals a print that is this number. `ended` is a text, and beside a number 1 or 0: ended by itself, or not.
 """
 
 from __future__ import annotations

@@ -61,7 +61,7 @@ def parse(text: str, names: Container[str]) -> tuple[str, Key]:
     drive, dot, rest = text.partition(".")
     if drive not in names:
         if dot and drive.lower() not in AXES:
-            raise Diagnostic(f"there is no drive {drive}", f"--vary {text}")
+            raise Diagnostic(f"no drive {drive}", f"--vary {text}")
         drive, rest = "", text
     axis, dot, name = rest.partition(".")
     axis, name = (axis.lower(), name) if dot else ("", rest)

@@ -101,7 +101,7 @@ class Compared(Generic[T]):
             self._settle(axis, pair, sample)
 
     def news(self, verdict: Verdict, comparison: Comparison, address: str, axis: str, rest: int) -> Diverged | Agreed:
-        """Make the event of a verdict; an agreement shows that nothing was lost."""
+        """Make the event of a verdict; an agreement shows that no line was lost."""
         pairs = list(comparison.pairs)
         if verdict is Verdict.AGREED:
             self.doubtful = ""

@@ -126,7 +126,7 @@ def _left_behind(places: Sequence[tuple[int, int]]) -> bool:
 
 
 def _fell_short(pairs: Sequence[Pair]) -> bool:
-    """Whether the drive came less far than its twin between two readings of which nothing is known in between."""
+    """Whether the drive came less far than its twin between two readings with a long time between them."""
     for before, after in pairwise(pairs):
         due, came = after.predicted - before.predicted, after.position - before.position
         most = 2 * abs(due - came) >= abs(pairs[-1].difference)

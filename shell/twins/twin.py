@@ -1,6 +1,6 @@
 """A simulated drive in the time of a real one: the bytes that the real one took go in, positions come out.
 
-It has no clock: it lives up to the time of what it is given. The host's clock counts from the moment of its making.
+It has no clock: it lives up to the times that it is given. The host's clock counts from the moment of its making.
 """
 
 from __future__ import annotations

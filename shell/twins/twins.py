@@ -124,7 +124,7 @@ class Twins:
                 raise Stopped(f"{name}: the twins were ended while it was read")
             if snapshot.active:
                 raise DriveError(
-                    f"{name}: it moves or a program runs, and a twin begins at rest; /twin on once it stands"
+                    f"{name}: it moves or a program runs, and a twin begins at rest; /twin on once it is at rest"
                 )
             begun = bus.now()
             twin, gaps = make(snapshot, begun, drive.family.registers is not None, len(bus.drives) == 1)

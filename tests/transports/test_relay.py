@@ -104,7 +104,7 @@ class Port:
 
 
 class Way:
-    """What ssh does: takes all that it is given, and delivers it when the test says."""
+    """A connection like ssh: it takes all bytes, and delivers them at a call of the test."""
 
     name = "ssh://pc/dev/ttyS0"
 

@@ -1,4 +1,4 @@
-"""The twin of an axis in rows and in few words: what it predicts, the difference, and why they may differ."""
+"""The twin of an axis in rows and in few words: the prediction, the difference, and its possible causes."""
 
 from __future__ import annotations
 

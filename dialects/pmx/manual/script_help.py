@@ -11,7 +11,7 @@ KEYWORDS: Mapping[str, tuple[str, str]] = {
     "PRG": (f"PRG 0 to PRG {PROGRAMS - 1}", "begins a program; END ends it"),
     "END": ("END", "ends a program"),
     "SUB": (f"SUB 0 to SUB {SUBROUTINES - 1}", "begins a subroutine; SUB 31 runs after an error of a program"),
-    "ENDSUB": ("ENDSUB", "ends a subroutine: the program goes on behind its GOSUB"),
+    "ENDSUB": ("ENDSUB", "ends a subroutine: the program goes on after its GOSUB"),
     "GOSUB": ("GOSUB n", "calls the subroutine SUB n"),
     "IF": ("IF V1<10", "executes the lines up to ELSEIF, ELSE or ENDIF if two values compare so"),
     "ELSEIF": ("ELSEIF V1=5", "another condition of an IF, tried where those before it do not hold"),
