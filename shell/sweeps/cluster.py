@@ -32,7 +32,7 @@ def results(job: Job, cases: Iterator[Case], address: str, interruption: Interru
 
     Raises Unreachable, TransportLost, and Diagnostic for workers that have another multidrop or none.
     """
-    with _client(address, interruption) as client:
+    with _client(address, interruption) as client, _reached(address):
         with interruption.open():
             _check_workers(client, address)
             first = next(cases)
@@ -64,6 +64,17 @@ def _client(address: str, interruption: Interruption) -> Iterator[Client]:
     finally:
         with suppress(OSError, TimeoutError):
             client.close(timeout=PATIENCE)
+
+
+@contextmanager
+def _reached(address: str) -> Iterator[None]:
+    """Raise TransportLost where a connection to the scheduler ends in the middle of a question."""
+    from distributed.comm import CommClosedError
+
+    try:
+        yield
+    except CommClosedError:
+        raise TransportLost(f"{address}: the scheduler was lost") from None
 
 
 def _check_workers(client: Client, address: str) -> None:
