@@ -243,7 +243,7 @@ COMMANDS: Mapping[str, Command] = {
         lines.sim,
     ),
     "program": Command(
-        "check and test program files; transfer programs",
+        "check, test and sweep program files; transfer programs",
         [each.examples[-1] for each in PROGRAM.values()],
         urls=True,
         parts=PROGRAM,
@@ -323,7 +323,7 @@ COMMANDS: Mapping[str, Command] = {
         urls=True,
     ),
     "log": Command(
-        "show, follow and search session logs, which /log begins",
+        "show, follow, search and replay session logs, which /log begins",
         [each.examples[-1] for each in LOG.values()],
         parts=LOG,
     ),

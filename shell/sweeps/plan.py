@@ -165,7 +165,8 @@ def _check(plan: Plan) -> None:
                 _check_value(plan, index, key, value)
             except Diagnostic as problem:
                 where = f"--vary {key.text}={values.spelled(value)}"
-                raise Diagnostic(f"{problem.where}: {problem.message}", where, problem.hint) from None
+                hint = variation.hint(key) or problem.hint
+                raise Diagnostic(f"{problem.where}: {problem.message}", where, hint) from None
 
 
 def _check_value(plan: Plan, index: int, key: Key, value: Value) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Container, Mapping
 from dataclasses import dataclass
+from difflib import get_close_matches
 from typing import Any
 
 from dialects import Diagnostic
@@ -71,6 +72,12 @@ def parse(text: str, names: Container[str]) -> tuple[str, Key]:
     if axis or _in_world(name):
         return drive, Key(text, WORLD, name.lower(), axis)
     return drive, Key(text, SETTINGS, name.upper())
+
+
+def hint(key: Key) -> str:
+    """What a refused setting may have meant: a key of the world with a similar name; empty if none has."""
+    near = get_close_matches(key.name.lower(), (*KEYS, *ENCODER_KEYS), 1, 0.7) if key.part == SETTINGS else ()
+    return f"did you mean the world's {near[0]}?" if near else ""
 
 
 def _in_world(name: str) -> bool:

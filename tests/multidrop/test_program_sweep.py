@@ -176,6 +176,7 @@ def test_interrupted_it_keeps_what_is_done(sweep, tmp_path: Path, monkeypatch: p
     ("arguments", "what"),
     [
         (("--vary", "b.speed=1"), '--vary b.speed=1: drive b: set: "SPEED" is not an MCode mnemonic'),
+        (("--vary", "b.lod=1"), "LMDCM; did you mean the world's load?"),
         (("--vary", "c.load=1"), "no drive c; valid: a, b, 00, line:a, line:b, stage:00"),
         (("--vary", "b.load=5..1"), "--vary b.load: 5..1 is an empty range"),
         (("--vary", "b.load=0,11"), "--vary b.load=11: drive b: [bus.drive.world]: load must be from 0 to 10, not 11"),
