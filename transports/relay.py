@@ -173,7 +173,9 @@ def serve(port: Port, source: int = 0, sink: int = 1, silence: float = SILENCE) 
 
 def _now() -> float:
     """The time, s; on Linux it goes on while the machine is suspended."""
-    return time.clock_gettime(time.CLOCK_BOOTTIME) if sys.platform == "linux" else time.monotonic()
+    if sys.platform == "linux":
+        return time.clock_gettime(time.CLOCK_BOOTTIME)
+    return time.monotonic()
 
 
 class _Loop:
