@@ -182,7 +182,7 @@ def _reason(where: str, error: OSError | UnicodeError) -> str:
         return f"the certificate of {where} is not trusted: {error.verify_message}; {hint}"
     if isinstance(error, ssl.SSLError):
         return f"no encrypted connection with {where} ({error.reason}); mqtt:// is the form without encryption"
-    return f"no broker at {where} ({why(error)})"
+    return f"no broker at {where} ({why(error)}); check that it runs, its name and its port"
 
 
 def _leave(client: Client) -> None:
