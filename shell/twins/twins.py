@@ -163,7 +163,7 @@ class Twins:
         self.stop(bus)
         self._paused[bus] = addresses
         self._workspace.notify(
-            f"{bus.name}: its twins end with the line; they are set anew once it is back", bus=bus.name
+            f"{bus.name}: its twins end with the line; they begin again once it is back", bus=bus.name
         )
 
     # Messages

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
 from dialects.codec import Procedure
 from dialects.errors import Refused
 from dialects.held import Held
@@ -12,15 +10,6 @@ from dialects.mcode.host.parameters import GLOBAL, listed
 from dialects.mcode.host.state import MCodeState
 from dialects.mcode.host.wording import who
 from dialects.mcode.manual import help, name_places
-
-_LABELS_AT: Mapping[str, tuple[bool, ...]] = {
-    name_places.STATEMENT: (False,),
-    name_places.NEW: (),
-    name_places.LABEL: (True,),
-    name_places.PRINTED: (False, True),
-    name_places.VALUE: (False,),
-}
-"""The kinds of names at each place, in order: True for labels, False for variables."""
 
 
 def read(state: MCodeState) -> Procedure[Held]:
@@ -42,7 +31,7 @@ def offered(held: Held, line: str) -> list[tuple[str, str]]:
     names = names_of(held)
     return [
         (name, _meaning(called))
-        for labels in _LABELS_AT[name_places.expected(head)]
+        for labels in name_places.LABELS_AT[name_places.expected(head)]
         for name, called in names.items()
         if (called.kind == LABEL) is labels and name.startswith(word.upper())
     ]

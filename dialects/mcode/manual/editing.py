@@ -9,7 +9,7 @@ from dialects.mcode.manual import help, program_names
 from dialects.mcode.manual.grammar import statement_tokens
 from dialects.mcode.manual.line_parts import MOVES
 from dialects.mcode.manual.mnemonic import Mnemonic
-from dialects.mcode.manual.name_places import LABEL, NEW, PRINTED, STATEMENT, expected
+from dialects.mcode.manual.name_places import LABEL, LABELS_AT, NEW, PRINTED, STATEMENT, expected
 from dialects.mcode.manual.program_file import ProgramLine, remark_at, scan
 from dialects.program_editing import Block, Offer, Span, UserName, Word, lines_of
 
@@ -52,14 +52,10 @@ def offers(before: str, names: Iterable[UserName], product: str) -> list[Offer]:
     own = [
         Offer(each.word, each.about, each.kind)
         for each in names
-        if each.word.startswith(folded) and _may_follow(each.kind, place)
+        if each.word.startswith(folded) and (each.kind == "label") in LABELS_AT[place]
     ]
     rows = [] if place == LABEL else [row for row in help.offered(word, product) if _fits(row, place)]
     return [*own, *(Offer(row.name, row.meaning, "starts" if row.name in MOVES else "word") for row in rows)]
-
-
-def _may_follow(kind: str, place: str) -> bool:
-    return place == PRINTED or (kind == "label") == (place == LABEL)
 
 
 def _fits(row: Mnemonic, place: str) -> bool:

@@ -9,6 +9,14 @@ from dialects.mcode.manual.program_flow import PLACES
 
 STATEMENT, NEW, LABEL, PRINTED, VALUE = "statement", "new", "label", "printed", "value"
 """A head; a name that is not there yet; the label of a place; an item of PR; any other argument."""
+LABELS_AT: Mapping[str, tuple[bool, ...]] = {
+    STATEMENT: (False,),
+    NEW: (),
+    LABEL: (True,),
+    PRINTED: (False, True),
+    VALUE: (False,),
+}
+"""The kinds of names at each place, in order: True for labels, False for variables."""
 _TARGETS: Mapping[str, int] = {**PLACES, "EX": 0}
 """Words that take a label, and the number of commas before it."""
 
