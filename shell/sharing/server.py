@@ -281,9 +281,10 @@ class Connection(asyncio.Protocol):
         self._ending = asyncio.get_running_loop().call_later(LINGER, self.end)
 
     def end(self) -> None:
-        """Close the connection, after what is to be sent."""
+        """Close the connection after what is to be sent; a client that does not read gets a limited time for it."""
         if self._transport is not None:
             self._transport.close()
+            self._ending = asyncio.get_running_loop().call_later(LINGER, self.abort)
 
     def abort(self) -> None:
         """Close the connection at once."""

@@ -12,6 +12,7 @@ import tty
 from collections.abc import AsyncIterator
 from functools import partial
 from pathlib import Path
+from unittest.mock import Mock
 
 import pytest
 import serial
@@ -175,6 +176,17 @@ async def test_a_client_that_does_not_read_is_dropped_and_the_others_are_served(
             await hears.read(65536)
         ada.write(b"PR P\r")
         await shared.line.got(b"PR P\r")
+
+
+async def test_a_client_that_never_reads_its_last_bytes_is_cut_off(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(server, "LINGER", 0.01)
+    stuck = Mock(spec=asyncio.Transport)
+    stuck.get_extra_info.return_value, stuck.is_closing.return_value = None, False
+    connection = server.Connection(Mock())
+    connection.connection_made(stuck)
+    connection.say_goodbye(b"refused")
+    await until(lambda: stuck.abort.called)
+    assert stuck.close.called
 
 
 async def test_a_writer_that_is_too_far_ahead_of_the_line_is_dropped_and_a_stop_still_passes(
