@@ -63,7 +63,8 @@ def _run(arguments: Sequence[str]) -> int:
     try:
         code = run(parse(arguments))
         sys.stdout.flush()
-        return code or _unwritten()
+        unwritten = _unwritten()
+        return code or unwritten
     except SystemExit as end:  # --help, --version, and wrong usage
         return end.code if isinstance(end.code, int) else 0
 

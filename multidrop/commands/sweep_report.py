@@ -146,7 +146,8 @@ class Report:
         try:
             self._junit.write(cases, seconds)
         except Diagnostic as problem:
-            return code or fail(problem)
+            wrong = fail(problem)
+            return code or wrong
         return code
 
     def _junit_case(self, number: int, commands: dict[int, str]) -> JUnitCase:

@@ -11,6 +11,9 @@ from xml.etree import ElementTree
 
 import pytest
 
+from dialects import Diagnostic
+from shell.front.junit import Case
+from shell.front.junit_file import JUnitFile
 from shell.sweeps import trial
 from tests.support.front_door import Command, Done
 from tests.support.front_door import multidrop as multidrop
@@ -214,3 +217,22 @@ def test_files_that_cannot_be_read_are_one_line(sweep, tmp_path: Path) -> None:
         "--vary b.load: drive a runs the program, so drive b changes nothing; "
         "--cell cell.toml#line:b lets drive b run it\n"
     )
+
+
+FAILING = ("--cell", "cell.toml", "--vary", "b.stall_at=100000", "--expect", "errors == []")
+
+
+def test_a_lost_report_is_said_beside_failed_cases(sweep, monkeypatch: pytest.MonkeyPatch) -> None:
+    def full(file: JUnitFile, cases: list[Case], *_: object) -> None:
+        if cases[0].name.startswith("case 1"):
+            raise Diagnostic("No space left on device", "sweep.xml")
+
+    monkeypatch.setattr(JUnitFile, "write", full)
+    done = sweep(*FAILING, "--junit", "sweep.xml")
+    assert (done.returncode, done.stderr) == (1, "sweep.xml: No space left on device\n")
+
+
+def test_lost_output_is_said_beside_failed_cases(sweep, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("shell.output.dropped", ["the output cannot be written: No space left on device"])
+    done = sweep(*FAILING)
+    assert (done.returncode, done.stderr) == (1, "the output cannot be written: No space left on device\n")
