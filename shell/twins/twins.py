@@ -108,7 +108,7 @@ class Twins:
         for gap, names in gaps.items():
             if fresh := [each for each in names if (each, gap) not in self._said]:
                 self._said |= {(each, gap) for each in fresh}
-                self._workspace.notify(f"twin of {', '.join(fresh)}: {gap}", bus=bus.name)
+                self._workspace.notify(f"twin of {', '.join(fresh)}: {gap}", bus=bus.name, outcome=True)
 
     async def _start(self, twins: BusTwins, drive: Drive) -> tuple[str, ...]:
         """Read a drive, and run a twin beside it; return the gaps of the twin."""
