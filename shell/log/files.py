@@ -106,6 +106,8 @@ def _changed(path: Path) -> float:
 
 def parts(path: Path) -> list[Path]:
     """The parts of a log that exist, the oldest first."""
+    if path.is_dir():  # it cannot be read, and `.` and `/` have no name that a number could follow
+        return [path]
     number = 1
     while part(path, number).exists():
         number += 1
