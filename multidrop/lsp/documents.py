@@ -37,12 +37,16 @@ class Documents:
     """
 
     def __init__(self, publish: Publish, product: str, delay: float = DELAY) -> None:
-        self._publish, self.product, self._delay = publish, product, delay
+        self._publish, self._product, self._delay = publish, product, delay
         self._open: dict[str, Document] = {}
         self._grammars: dict[str, ProgramGrammar] = {}
         self._checks: dict[str, asyncio.Task[None]] = {}
         self._turn = asyncio.Lock()
         self._work: set[asyncio.Task[object]] = set()
+
+    def check_for(self, product: str) -> None:
+        """Check texts that come from now on for this personality."""
+        self._product = product
 
     def find(self, uri: str) -> Document | None:
         """Return an open document. A file that no client opened is not read."""
@@ -83,7 +87,7 @@ class Documents:
             return await in_thread(work, inf, "check of a text")
 
     def _take(self, uri: str, text: str, version: int | None, delay: float) -> None:
-        document = Document(uri, version, ProgramText(text, self._grammars[uri], self.product))
+        document = Document(uri, version, ProgramText(text, self._grammars[uri], self._product))
         self._open[uri] = document
         self._cancel(uri)
         self._checks[uri] = asyncio.get_running_loop().create_task(self._check(document, delay))

@@ -109,7 +109,7 @@ class Server:
             return
         known = [each for row in TABLE.values() if row.programs for each in row.personalities]
         if isinstance(product, str) and product.upper() in known:
-            self.documents.product = product.upper()
+            self.documents.check_for(product.upper())
         else:
             self._show(f"no personality {shortened(str(product))}; valid: {', '.join(known)}")
 

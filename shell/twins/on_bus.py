@@ -29,11 +29,10 @@ INPUTS = 0.05
 class BusTwins:
     """The twins of the drives of a bus."""
 
-    def __init__(self, bus: Bus, publish: Callable[[TwinEvent], None], lost: Callable[[], None]) -> None:
-        """`lost`: called when the line is lost."""
+    def __init__(self, bus: Bus, limit: int, publish: Callable[[TwinEvent], None], lost: Callable[[], None]) -> None:
+        """`limit`: that at rest, steps. `lost`: called when the line is lost."""
         self.bus = bus
-        self.rest = 0
-        """The limit at rest, steps."""
+        self._limit = limit
         self.besides: dict[Drive, Beside] = {}
         self._waiting: dict[Drive, list[Concluded]] = {}
         """The conversations of a drive that is being read."""
@@ -45,6 +44,10 @@ class BusTwins:
         """The addresses that are read."""
         self._samples: Subscription[str] | None = None
         self._inputs: Subscription[Value] | None = None
+
+    def set_limit(self, steps: int) -> None:
+        """Set the limit at rest."""
+        self._limit = steps
 
     # Drives
 
@@ -123,7 +126,7 @@ class BusTwins:
     def _sample(self, sample: Sample) -> None:
         if (beside := self._at(sample.address)) is None:
             return
-        for event in beside.sample(sample, self.rest):
+        for event in beside.sample(sample, self._limit):
             self._publish(event)
         self._pass_on(beside, sample.at)
 

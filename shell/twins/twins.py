@@ -42,7 +42,7 @@ class Twins:
     def limit(self, steps: int) -> None:
         self._rest = steps
         for each in self._buses.values():
-            each.rest = steps
+            each.set_limit(steps)
 
     def running(self, bus: Bus) -> bool:
         """Whether a drive of a bus has a twin."""
@@ -99,8 +99,9 @@ class Twins:
         from shell.twins.on_bus import BusTwins
 
         if bus not in self._buses:
-            self._buses[bus] = BusTwins(bus, lambda event: self._publish(bus, event), lambda: self._lost(bus))
-            self._buses[bus].rest = self._rest
+            self._buses[bus] = BusTwins(
+                bus, self._rest, lambda event: self._publish(bus, event), lambda: self._lost(bus)
+            )
         return self._buses[bus]
 
     def _report_gaps(self, bus: Bus, gaps: dict[str, list[str]]) -> None:
