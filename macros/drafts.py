@@ -29,7 +29,7 @@ class Draft(NamedTuple):
 
 
 def begin(store: MacroStore, folder: Path, name: str) -> Draft:
-    """Make a draft of a macro, or find the one that is left. Raises Diagnostic where there is no such macro."""
+    """Make a draft of a macro, or find the one that is left. Raises Diagnostic for an unknown macro."""
     current = store.contents(name)
     if current is None:
         store.load(name)  # raises, with the names that there are

@@ -61,13 +61,13 @@ def delete(store: MacroStore, name: str) -> list[str]:
 
 
 def check(store: MacroStore, name: str) -> None:
-    """Raise Diagnostic where there is no such macro, with those that there are."""
+    """Raise Diagnostic for an unknown macro; it names the known ones."""
     if store.contents(name) is None:
         store.load(name)
 
 
 def deletion(store: MacroStore, name: str) -> str:
-    """The effect of a deletion, for the question before it. Raises Diagnostic where there is no such macro."""
+    """The effect of a deletion, for the question before it. Raises Diagnostic for an unknown macro."""
     check(store, name)
     return f"deletes macro {name}, the file {store.path(name)}"
 

@@ -43,7 +43,7 @@ class Transport(Protocol):
         """
 
     def discard(self, whole: bool = False) -> int:
-        """Drop what has not left this machine yet; return the number of bytes, as far as it is known.
+        """Drop what has not left this machine yet; return the number of bytes that are known of.
 
         With `whole`, a write that has begun to leave continues to its end, and the system keeps what it holds.
         """

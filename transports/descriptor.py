@@ -113,7 +113,7 @@ class DescriptorPipe(Pipe):
         self._after_push(problem)
 
     def _push(self) -> OSError | None:
-        """Pass on what waits, as far as the system takes it; return the error of a broken pipe."""
+        """Pass on the waiting bytes that the system takes; return the error of a broken pipe."""
         while self._pending:
             chunk = self._pending[0]
             try:

@@ -22,7 +22,7 @@ class Endpoint(Protocol):
         """Write, and return how many bytes the system took."""
 
     def unsent(self) -> int:
-        """Number of bytes that the system holds and has not sent, as far as it reports them."""
+        """Number of bytes that the system reports as held and not sent."""
 
     def drop(self) -> int:
         """Take back what the system holds, if possible; return how many bytes that was."""

@@ -39,7 +39,7 @@ class Device(Protocol):
         """Tell the other end to drop what it has not sent. Called in the writing thread, before the next write."""
 
     def abort(self) -> int:
-        """Drop what this machine holds; return how many bytes, as far as it is known. Never blocks; any thread."""
+        """Drop what this machine holds; return how many bytes are known of. Never blocks; any thread."""
 
     def cancel(self) -> None:
         """End a `read` and a `write` that wait. Any thread; both may be called again before `close`."""
@@ -81,7 +81,7 @@ class ThreadedPipe(Pipe):
             return sum(map(len, self._queue))
 
     def discard(self, whole: bool = False) -> int:
-        """Drop what is queued and what this machine holds, and tell the other end to do the same if it can.
+        """Drop what is queued and what this machine holds, and ask the other end to do the same if it can.
 
         With `whole`, drop only what has not begun to leave.
         """

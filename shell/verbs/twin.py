@@ -10,7 +10,7 @@ from shell.verbs.registry import Call, as_typed, verb
 MOST = 1_000_000_000
 """The largest limit, steps."""
 WORDS = {
-    "on": "run a twin beside each drive, or set it anew",
+    "on": "run a twin beside each drive; read a drive again that has one",
     "off": "end all twins",
     "limit": "the steps by which a drive at rest may differ",
 }

@@ -92,7 +92,7 @@ class ProgramRun:
     def _news(self, last: bool = False) -> Iterator[Output | Failed | Followed]:
         """Yield what was executed, switched and what failed since the last look, in the order of time.
 
-        What comes after the begin of a statement that is under way waits for its end. `last`: there is no more.
+        What follows the start of an unfinished statement waits for its end. `last`: the run is over.
         """
         news, begun = [*self._later, *self._outputs], inf
         if self._watcher is not None:

@@ -35,5 +35,5 @@ def size_words(size: int) -> str:
 
 
 def _end_of(path: str, width: int) -> str:
-    """The end of a path, which tells files apart."""
+    """Shorten a path to its end, where file names differ."""
     return path if len(path) <= width else f"…{path[1 - width :]}"

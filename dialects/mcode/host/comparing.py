@@ -66,9 +66,9 @@ def _not_replaced(program: FileProgram, start: int, starts: set[int], product: s
 
 
 def _there(program: FileProgram, start: int | None, starts: set[int], held: Held, product: str) -> Sequence[Stored]:
-    """Return the lines in the drive from an address on: as many as the program has, and what it has left behind them.
+    """Return the lines in the drive from an address on: those of the program, and what an earlier one left after them.
 
-    A line after the program belongs to it if there is no gap, unless the program is a part of another one.
+    A line after the program belongs to it if no gap is between them, unless the program is a part of another one.
     """
     lines = held.lines
     first = next((n for n, line in enumerate(lines) if line.at == start), len(lines))
