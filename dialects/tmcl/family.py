@@ -31,6 +31,6 @@ TMCL = Family(
     readings_at="dialects.tmcl.host.readings:READINGS",
     no_programs="TMCL's direct mode runs no programs",
     conditions_at="dialects.tmcl.host.conditions:READER",
-    controls_at="dialects.tmcl.manual.controls:controls",
+    controls_at="dialects.tmcl.host.controls:controls",
     stop_bytes=STOP_BYTES,
 )

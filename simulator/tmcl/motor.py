@@ -1,7 +1,8 @@
 """One motor of a simulated TMCL module: its ramp generator, axis parameters and limit switches.
 
 Rulings where the manuals are silent: a limit switch stops the motor at once and lets it run away from it; MVP REL
-counts from the last target; a position beyond 32 bits wraps around, and a move takes the shorter way.
+counts from the last target, with parameter 127 at 1 or 2 from the actual position; a position beyond 32 bits wraps
+around, and a move takes the shorter way.
 """
 
 from __future__ import annotations
@@ -19,6 +20,8 @@ FULL = 256
 """Microsteps of a full step, which is one motor step of the world."""
 STORED = tuple(number for number, row in AXIS.items() if row.writable and number > Axis.TARGET_VELOCITY)
 """Parameters that EEPROM holds."""
+FROM_TARGET = 0
+"""The value of parameter 127 with which MVP REL counts from the last target."""
 
 
 class Mode(Enum):
@@ -91,8 +94,9 @@ class Motor:
         self._plan(t)
 
     def go_by(self, distance: int, t: float) -> None:
-        """Move to a position that is so far from the last target."""
-        self.go(self._target + distance, t)
+        """Move by a distance from the last target, or from here, as parameter 127 says."""
+        here = self.parameters[Axis.RELATIVE_FROM] != FROM_TARGET
+        self.go((self.position(t) if here else self._target) + distance, t)
 
     def rotate(self, velocity: int, t: float) -> None:
         """Turn at a velocity, and on; 0 slows down to rest."""

@@ -1,9 +1,9 @@
-"""How many motors a module has: found by reading, which moves nothing."""
+"""How many motors a module has, and from where they count relative moves: found by reading, which moves nothing."""
 
 from __future__ import annotations
 
 from dialects.codec import Priority, Procedure
-from dialects.errors import Refused
+from dialects.errors import NoAnswer, Refused
 from dialects.tmcl.host.codec import MOST_MOTORS
 from dialects.tmcl.host.exchange import read
 from dialects.tmcl.host.state import TmclState
@@ -12,7 +12,7 @@ from dialects.tmcl.manual.parameters import Axis
 
 
 def motors(state: TmclState, priority: Priority = Priority.OPERATOR) -> Procedure[int]:
-    """The number of motors; count them where that is not known: until the module refuses one. Raises NoAnswer."""
+    """The number of motors; where it is not known, read motors until the module refuses one. Raises NoAnswer."""
     if state.motors:
         return state.motors
     count = 1
@@ -23,4 +23,15 @@ def motors(state: TmclState, priority: Priority = Priority.OPERATOR) -> Procedur
     except Refused:
         pass
     state.motors_counted(count)
+    yield from _relative(state, priority)
     return count
+
+
+def _relative(state: TmclState, priority: Priority) -> Procedure[None]:
+    """Read parameter 127 of each motor; a module that refuses it for one lacks it."""
+    try:
+        for motor in range(state.motors):
+            call = Call(Command.GAP, Axis.RELATIVE_FROM, motor)
+            state.relative_read(motor, (yield from read(state, call, priority)))
+    except (Refused, NoAnswer):
+        pass

@@ -23,6 +23,10 @@ def perform(state: TmclState, text: str) -> Procedure[tuple[str, ...]]:
     except grammar.LineError as error:
         raise Inexpressible(f"'{text.strip()}': {error}; nothing was sent") from None
     request = state.codec.request(state.address, text.strip(), call)
+    if call.command == Command.FACTORY or (
+        call.command in (Command.SAP, Command.RSAP) and call.type == Axis.RELATIVE_FROM
+    ):
+        state.relative_forgotten()
     reply = yield from answered(state, request)
     _remark(state, call)
     return reply.lines if request.kind is Kind.PRINT else ()
@@ -85,6 +89,8 @@ def status(state: TmclState) -> Procedure[tuple[str, ...]]:
 
 def _remark(state: TmclState, call: Call) -> None:
     """Tell a person that the module is reached in another way from now on; follow it to its new address."""
+    if call.command == Command.SAP and call.type == Axis.RELATIVE_FROM:
+        state.relative_read(call.motor, call.value)
     if call.command == Command.FACTORY:
         state.remark(f"{who(state)}: factory settings; it may now have address 1 and 9600 baud: open the line again")
     if call.command == Command.SGP and call.type == Global.BAUD:

@@ -18,6 +18,8 @@ class TmclState(DriveState):
 
     motors: int = 0
     """Number of its motors; 0: not counted."""
+    relative: dict[int, int] = field(default_factory=dict)
+    """Axis parameter 127 of each motor: from where MVP REL counts; a motor without an entry: not known."""
 
     def reply_lost(self, command: int) -> None:
         """The reply to a command did not come."""
@@ -32,6 +34,14 @@ class TmclState(DriveState):
     def motors_counted(self, motors: int) -> None:
         """Record how many motors the module has."""
         self.motors = motors
+
+    def relative_read(self, motor: int, value: int) -> None:
+        """Record axis parameter 127 of a motor."""
+        self.relative[motor] = value
+
+    def relative_forgotten(self) -> None:
+        """Axis parameter 127 may have changed."""
+        self.relative.clear()
 
     def readdressed(self, address: int) -> None:
         """The module has another address from now on: requests and stops go there."""

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 from dialects.errors import Diagnostic
 from dialects.tmcl.manual.commands import WORDS, Command, Row
-from dialects.tmcl.manual.parameters import AXIS, GLOBAL, Parameter
+from dialects.tmcl.manual.parameters import AXIS, GLOBAL, RELATIVE_FROM, Parameter
 from dialects.tmcl.manual.status import REFUSALS
 
 ON_AXIS = frozenset({Command.SAP, Command.GAP, Command.STAP, Command.RSAP})
@@ -31,6 +31,9 @@ def describe(word: str, product: str = "") -> list[str]:
     lines = [f"{row.word}: {row.title}", f"  syntax     {row.syntax}"]
     if row.moves:
         lines.append("  note       it can start motion")
+    if row.command == Command.MVP:
+        values = ", ".join(f"{value} {meaning}" for value, meaning in RELATIVE_FROM.items())
+        lines.append(f"  REL        axis parameter 127: {values}; not known where a module lacks it")
     return lines + [f"  {line}" for line in _parameters(row)]
 
 

@@ -36,6 +36,7 @@ class Axis(IntEnum):
     LEFT_SWITCH = 11
     RIGHT_LIMIT_OFF = 12
     LEFT_LIMIT_OFF = 13
+    RELATIVE_FROM = 127
     MICROSTEPS = 140
     SEARCH_MODE = 193
     SEARCH_SPEED = 194
@@ -88,6 +89,7 @@ AXIS: Mapping[int, Parameter] = MappingProxyType(
         Axis.LEFT_SWITCH: Parameter("left limit switch: 1 is active"),
         Axis.RIGHT_LIMIT_OFF: Parameter("1 switches the right limit switch off", FLAG),
         Axis.LEFT_LIMIT_OFF: Parameter("1 switches the left limit switch off", FLAG),
+        Axis.RELATIVE_FROM: Parameter("MVP REL counts from: 0 the last target, 1 here, 2 the encoder", range(3)),
         Axis.MICROSTEPS: Parameter("microsteps of a full step: 2 to the power of it", range(9), "", 8),
         Axis.SEARCH_MODE: Parameter(
             "reference search: 1 left; 2 right, then left; 3 right, then home", range(1, 4), "", 1
@@ -100,6 +102,10 @@ AXIS: Mapping[int, Parameter] = MappingProxyType(
         Axis.DRIVER_FLAGS: Parameter("error flags of the driver"),
     }
 )
+RELATIVE_FROM: Mapping[int, str] = MappingProxyType(
+    {0: "counts from the last target", 1: "counts from here", 2: "counts from the encoder's position"}
+)
+"""The values of axis parameter 127; only some modules have it (in the maker's tables 1240, 1241 and 1276)."""
 GLOBAL: Mapping[int, Parameter] = MappingProxyType(
     {
         Global.BAUD: Parameter("baud code of the serial port; it acts on the next message", range(12)),

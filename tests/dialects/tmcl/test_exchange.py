@@ -7,11 +7,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from dialects.codec import Priority
+from dialects.controls import BY
 from dialects.errors import Inexpressible, NoAnswer, Refused, Stopped
 from dialects.family import Hints
 from dialects.tmcl.family import TMCL
 from dialects.tmcl.host.codec import Tmcl
 from dialects.tmcl.manual.commands import Call, Command
+from dialects.tmcl.manual.parameters import AXIS, Axis
 from drives.line import Line
 from tests.conftest import Bench
 from tests.support.cases import for_each
@@ -189,9 +191,10 @@ def test_after_a_stop_a_late_reply_is_not_taken_for_a_value():
     shop = Shop()
     (state,) = shop.open()
     shop.delays = [0.5]
+    asked = shop.count(Command.GAP) + 1
 
     def stop(_):
-        if shop.count(Command.GAP) == 2 and not shop.line.waiting:
+        if shop.count(Command.GAP) == asked and not shop.line.waiting:
             shop.line.stop(shop.now)
 
     with pytest.raises(Stopped):
@@ -359,3 +362,24 @@ def test_a_harmed_frame_turns_no_module_otherwise_than_typed_and_gives_no_wrong_
     assert shop.count(Command.ROR) <= 2
     for device in shop.devices.values():
         assert device.execute(Call(Command.GAP, 2), shop.now).value in (0, 700)
+
+
+@pytest.mark.parametrize(("option", "counted"), [(0, "counts from the last target"), (1, "counts from here")])
+def test_the_host_says_from_where_a_relative_move_counts(option, counted):
+    shop = Shop({"set": {"127": option}})
+    (state,) = shop.open()
+    assert TMCL.controls(state, "")[BY].about == counted
+    shop.type(state, f"SAP 127, 0, {1 - option}")
+    assert TMCL.controls(state, "")[BY].about != counted
+    shop.delays = [None]
+    with pytest.raises(NoAnswer):
+        shop.type(state, "SAP 127, 0, 0")
+    assert "not known" in TMCL.controls(state, "")[BY].about
+
+
+def test_a_module_without_parameter_127_counts_from_a_place_that_is_not_known(monkeypatch):
+    shop = Shop()
+    monkeypatch.setattr("simulator.tmcl.module.AXIS", {n: row for n, row in AXIS.items() if n != Axis.RELATIVE_FROM})
+    (state,) = shop.open()
+    assert state.motors == 1
+    assert "not known" in TMCL.controls(state, "")[BY].about

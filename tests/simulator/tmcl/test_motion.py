@@ -193,3 +193,14 @@ def test_a_maximum_velocity_starts_a_move_that_waits_for_one():
     module.ask("SAP 4, 0, 5000")
     module.rest()
     assert module.ask("GAP 1, 0") == 1000
+
+
+@pytest.mark.parametrize(("option", "target"), [(0, 101_000), (1, 13_800), (2, 13_800)])
+def test_after_a_stop_parameter_127_says_from_where_a_relative_move_counts(option, target):
+    module = Module(settings={"127": option, "5": 51_200})
+    module.ask("MVP ABS, 0, 100000")
+    module.wait(0.5)
+    module.ask("MST 0")
+    module.rest()
+    assert (module.ask("GAP 1, 0"), module.ask("GAP 0, 0")) == (12_800, 100_000)
+    assert module.ask("MVP REL, 0, 1000") == target
