@@ -21,7 +21,7 @@ from transports import TransportLost
 from tui.outbox import BURST
 from tui.polling import LIVELY, OTHERS, PLOT, REST, STATUS
 from tui.readout import State
-from tui.screens.dialogs import Confirm, TooSmall
+from tui.screens.dialogs import Choose, Confirm, Offer, TooSmall, offers_like
 from tui.screens.start import Start
 
 pytestmark = pytest.mark.tui
@@ -182,6 +182,47 @@ async def test_keys_and_numbers_switch_buses() -> None:
             await pilot.press(key)
             found.append(session.selected_bus)
         assert found == ["eth", "pmx", "press", "pmx", "eth"]
+
+
+@pytest.mark.parametrize(("key", "picked"), [("ctrl+o", "b"), ("ctrl+l", "b")])
+async def test_a_picker_narrows_and_a_letter_that_matches_nothing_takes_nothing(key: str, picked: str) -> None:
+    session = demo_session()
+    app = make_app(session)
+    async with app.run_test(size=(80, 24)) as pilot:
+        await pilot.press(key, "q", "enter")
+        await settle(pilot)
+        assert isinstance(app.screen, Choose)
+        assert app.main.beside.bus == ""
+        assert session.selected is not None and session.selected.address == "a"
+        await pilot.press("backspace", picked, "enter")
+        await settle(pilot)
+        assert app.screen is app.main
+        taken = session.selected.address if key == "ctrl+o" else app.main.beside.address
+        assert taken == picked
+
+
+def test_a_picker_takes_the_drive_of_that_address_and_no_part_of_a_word() -> None:
+    offers = [
+        Offer("1", "hall a LMDCM", "hall a axle"),
+        Offer("2", "press h LMDCM", "press h right"),
+        Offer("3", "press H LMDCM", "press H hoist"),
+    ]
+    for typed, keys in {"": "123", "h": "231", "H": "321", "l": "", "press:h": "23", "ax": "1", "h z": ""}.items():
+        assert "".join(match.key for match in offers_like(offers, typed)) == keys, typed
+
+
+async def test_a_letter_chooses_an_answer_and_one_that_begins_none_takes_nothing() -> None:
+    session = demo_session()
+    app = make_app(session)
+    async with app.run_test(size=(80, 24)) as pilot:
+        for letter, sent in {"z": [], "n": [], "s": ["press:a MR 1", "press:a MR 2"]}.items():
+            await app.questions.paste(["MR 1", "MR 2"], lambda lines: [app.outbox.type(line) for line in lines])
+            await pilot.press(letter, "enter")
+            await settle(pilot)
+            assert isinstance(app.screen, Confirm) is (letter == "z")
+            assert session.sent == sent, letter
+            if letter == "z":
+                await pilot.press("escape")
 
 
 async def test_the_selector_chooses_a_drive_of_any_bus() -> None:

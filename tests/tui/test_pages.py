@@ -100,7 +100,7 @@ async def test_a_key_shows_and_hides_a_panel_at_every_size(size: tuple[int, int]
         assert any("last 20 s" in part.plain for part in parts) is not shown
 
 
-async def test_a_click_on_the_footer_does_what_the_key_does() -> None:
+async def test_a_click_on_the_footer_does_what_the_key_does_but_moves_nothing() -> None:
     session = demo_session()
     app = make_app(session)
     async with app.run_test(size=(120, 24)) as pilot:
@@ -108,13 +108,27 @@ async def test_a_click_on_the_footer_does_what_the_key_does() -> None:
         footer = app.main.lines("footer").plain
         await pilot.click("#footer", offset=(footer.index("F3 shuttle") + 4, 0))
         await settle(pilot)
-        assert [line for line, _ in session.lines] == ["/play shuttle"]
+        assert session.lines == []  # the click was for the focus of the terminal
+        assert any("press F3" in str(each.message) for each in app._notifications)
         await pilot.click("#footer", offset=(footer.index("^A all drives"), 0))
         await settle(pilot)
         assert isinstance(app.screen, AllDrives)
         await pilot.click("#footer", offset=(app.screen.lines("footer").plain.index("Esc"), 0))
         await settle(pilot)
         assert app.screen is app.main
+
+
+async def test_what_is_typed_on_the_page_of_all_drives_chooses_an_address_and_enter_takes_nothing_else() -> None:
+    session = demo_session()
+    app = make_app(session)
+    async with app.run_test(size=(80, 24)) as pilot:
+        for typed, selected in {"t": "a", "b": "b"}.items():
+            await pilot.press("ctrl+a")
+            await settle(pilot)
+            await pilot.press(*typed, "enter", *(["escape", "escape"] if typed == "t" else []))
+            await settle(pilot)
+            assert session.selected is not None and session.selected.address == selected, typed
+            assert app.screen is app.main
 
 
 @pytest.mark.parametrize("width", [60, 75, 76, 80, 120])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Sequence
+from string import ascii_letters, digits
 from typing import ClassVar, NamedTuple
 
 from textual.app import ComposeResult
@@ -69,17 +70,22 @@ class Place(NamedTuple):
 
 
 def worst_first(view: View, filtered: str) -> list[Place]:
-    """The drives of all lines whose row contains the text."""
+    """The drives of all lines whose row contains each word of the text.
+
+    A single letter is looked for at the beginning of names only: nearly every row has one in its state or its product.
+    """
     buses = view.session.buses.values()
     places = [Place(bus.name, each) for bus in buses for each in glances_of(view.session, view.model, bus)]
     wanted = filtered.casefold().split()
-    found = [place for place in places if all(word in _words(place, view.now) for word in wanted)]
+    found = [place for place in places if all(_has(place, word, view.now) for word in wanted)]
     return sorted(found, key=lambda place: place.urgency)
 
 
-def _words(place: Place, now: float) -> str:
+def _has(place: Place, word: str, now: float) -> bool:
+    if len(word) == 1:
+        return any(name.startswith(word) for name in place.name.casefold().replace(":", " ").split())
     sign, _ = place.glance.sign(now)
-    return f"{place.name} {sign} {place.alarm()} {place.glance.product}".casefold()
+    return word in f"{place.name} {sign} {place.alarm()} {place.glance.product}".casefold()
 
 
 def drive_row(place: Place, now: float, width: int, chosen: bool) -> Row:
@@ -120,7 +126,7 @@ def summary(places: Sequence[Place]) -> str:
 
 
 class AllDrives(Page):
-    """All drives. Enter selects one and goes back; `/` filters."""
+    """All drives. Enter selects one and goes back; what is typed filters."""
 
     AUTO_FOCUS = ""
     BINDINGS: ClassVar[list[BindingType]] = [
@@ -128,7 +134,8 @@ class AllDrives(Page):
         Binding("down", "step(1)", show=False, priority=True),
         Binding("pageup", "step(-10)", show=False, priority=True),
         Binding("pagedown", "step(10)", show=False, priority=True),
-        Binding("slash", "filter", show=False),
+        Binding("slash", "filter('')", show=False),
+        *(Binding(each, f"filter('{each}')", show=False) for each in ascii_letters + digits),
         Binding("enter", "take", show=False),
     ]
     KEYS = (("↑↓", "choose"), ("Enter", "select"), ("/", "filter"))
@@ -136,9 +143,10 @@ class AllDrives(Page):
 
     def __init__(self, host: Host) -> None:
         super().__init__(host)
-        self._filter = Field(lambda _: self.action_take(), placeholder="filter", id="filter")
+        self._filter = Field(lambda _: self.action_take(), edited=self._edited, placeholder="filter", id="filter")
         self._chosen: tuple[str, str] | None = None
         self._places: list[Place] = []
+        self._view: View | None = None
 
     def content(self) -> ComposeResult:
         """Make the heading, the filter and the rows."""
@@ -155,6 +163,7 @@ class AllDrives(Page):
 
     def show(self, view: View) -> None:
         """Paint the rows around the chosen one."""
+        self._view = view
         self._places = worst_first(view, self._filter.value)
         at = self._at()
         if self._chosen is None:
@@ -178,10 +187,23 @@ class AllDrives(Page):
             place = self._places[min(max(self._at() + by, 0), len(self._places) - 1)]
             self._chosen = (place.bus, place.glance.address)
 
-    def action_filter(self) -> None:
-        """Show the filter and type into it."""
+    def action_filter(self, typed: str) -> None:
+        """Show the filter and type into it: a letter or `/` begins it."""
         self._filter.display = True
         self.set_focus(self._filter)
+        self._filter.value += typed
+        self._filter.cursor_position = len(self._filter.value)
+
+    def _edited(self, text: str) -> None:
+        """Narrow the list at once: Enter may follow in the same read. An address that is typed is the chosen drive."""
+        if self._view is None:
+            return
+        self._places = worst_first(self._view, text)
+        named = [
+            place for place in self._places if text in (place.glance.address, f"{place.bus}:{place.glance.address}")
+        ]
+        chosen = (named or self._places)[:1]
+        self._chosen = (chosen[0].bus, chosen[0].glance.address) if chosen else None
 
     def action_leave(self) -> None:
         """Leave the filter, then the page."""

@@ -9,6 +9,7 @@ message.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from string import ascii_letters
 from typing import ClassVar, Generic, NamedTuple, TypeVar
 
 from rich.text import Text
@@ -90,30 +91,6 @@ class Dialog(Over[T], Generic[T]):
         self.dismiss(None)
 
 
-class Choose(Dialog[str]):
-    """Choose one of a list; returns its key."""
-
-    def __init__(self, title: str, options: Sequence[tuple[str, str]], current: str = "") -> None:
-        super().__init__()
-        self.heading, self.options, self.current = title, list(options), current
-
-    def compose(self) -> ComposeResult:
-        """Make the list."""
-        with Vertical(classes="box"):
-            yield Static(self.heading, classes="title", markup=False)
-            yield Options([text for _, text in self.options], self._taken)
-            yield Static("↑↓ choose   Enter take   Esc close", classes="keys")
-
-    def on_mount(self) -> None:
-        """Highlight the current option."""
-        keys = [key for key, _ in self.options]
-        self.query_one(Options).highlighted = keys.index(self.current) if self.current in keys else 0
-        self.set_focus(self.query_one(Options))
-
-    def _taken(self, number: int) -> None:
-        self.dismiss(self.options[number][0])
-
-
 class Ask(Dialog[str]):
     """Ask for one line."""
 
@@ -137,7 +114,14 @@ class Ask(Dialog[str]):
 
 
 class Confirm(Dialog[str]):
-    """A question with a few answers, each with its key; Escape returns None."""
+    """A question with a few answers, each with its key; Escape returns None.
+
+    A letter highlights the next answer that begins with it. One that begins none leaves nothing to take.
+    """
+
+    BINDINGS: ClassVar[list[BindingType]] = [
+        Binding(letter, f"begin('{letter.lower()}')", show=False) for letter in ascii_letters
+    ]
 
     def __init__(self, title: str, lines: Sequence[str], answers: Sequence[tuple[str, str]]) -> None:
         super().__init__()
@@ -149,12 +133,19 @@ class Confirm(Dialog[str]):
             yield Static(self.heading, classes="title", markup=False)
             yield Static("\n".join(self.lines), classes="about", markup=False)
             yield Options([text for _, text in self.answers], self._taken)
-            yield Static("↑↓ choose   Enter take   Esc close", classes="keys")
+            yield Static("↑↓ or a letter choose   Enter take   Esc close", classes="keys")
 
     def on_mount(self) -> None:
         """Highlight the first answer."""
         self.query_one(Options).highlighted = 0
         self.set_focus(self.query_one(Options))
+
+    def action_begin(self, letter: str) -> None:
+        """Highlight the next answer whose key or text begins with a letter; none where no answer does."""
+        options = self.query_one(Options)
+        begun = [n for n, words in enumerate(self.answers) if any(word.lower().startswith(letter) for word in words)]
+        at = -1 if options.highlighted is None else options.highlighted
+        options.highlighted = next((n for n in begun if n > at), begun[0] if begun else None)
 
     def _taken(self, number: int) -> None:
         self.dismiss(self.answers[number][0])
@@ -258,7 +249,7 @@ class Search(Dialog[str]):
         self.found = self._find(text)
         options = self.query_one(Options)
         options.clear_options()
-        options.add_options([Option(match.text) for match in self.found] or [Option("nothing", disabled=True)])
+        options.add_options([Option(match.text) for match in self.found] or [Option("nothing matches", disabled=True)])
         options.highlighted = 0 if self.found else None
 
     def action_step(self, by: int) -> None:
@@ -272,6 +263,45 @@ class Search(Dialog[str]):
 
     def _taken(self, number: int) -> None:
         self.dismiss(self.found[number].key)
+
+
+class Offer(NamedTuple):
+    """One of a list: its key, its text, and the words by which it is found; the words of the text if none are given."""
+
+    key: str
+    text: str
+    words: str = ""
+
+
+class Choose(Search):
+    """Choose one of a list, which narrows as its words are typed; returns its key. `current` is highlighted first."""
+
+    def __init__(self, title: str, offers: Sequence[Offer], current: str = "") -> None:
+        hint = "type to narrow   ↑↓ choose   Enter take   Esc close"
+        super().__init__(title, lambda typed: offers_like(offers, typed), hint)
+        self._current = current
+
+    def _narrow(self, text: str) -> None:
+        super()._narrow(text)
+        keys = [match.key for match in self.found]
+        if not text.strip() and self._current in keys:
+            self.query_one(Options).highlighted = keys.index(self._current)
+
+
+def offers_like(offers: Sequence[Offer], typed: str) -> list[Match]:
+    """The offers that have a word for each typed one that begins with it; first those that have just these words.
+
+    A word never matches inside another one: the `l` of a product would take any drive.
+    """
+    wanted = typed.replace(":", " ").split()
+    found: list[tuple[bool, bool, int]] = []
+    for number, offer in enumerate(offers):
+        words = (offer.words or offer.text).replace(":", " ").split()
+        lower = [word.casefold() for word in words]
+        if all(any(word.startswith(each.casefold()) for word in lower) for each in wanted):
+            same = all(each in words for each in wanted)
+            found.append((not same, not all(each.casefold() in lower for each in wanted), number))
+    return [Match(offers[number].key, Text(visible(offers[number].text))) for *_, number in sorted(found)]
 
 
 LEAST = (60, 15)

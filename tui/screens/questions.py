@@ -11,7 +11,7 @@ from textual.app import App
 
 from shell.asking import Field
 from tui.panels.glance import Glance
-from tui.screens.dialogs import Ask, Choose, Confirm, Dialog, GoOn, Match, Search, TooSmall
+from tui.screens.dialogs import Ask, Choose, Confirm, Dialog, GoOn, Match, Offer, Search, TooSmall
 from tui.screens.form import Form
 from tui.session_view import BusView, SessionView
 from tui.text import visible
@@ -122,7 +122,7 @@ class Questions:
     async def half(self, glances: Callable[[BusView], list[Glance]], show: Callable[[str, str], None]) -> None:
         """Choose the drive or the line for the other half of the screen."""
         drives, _ = drive_choices(self._session, glances)
-        lines = [(f"{name}\n", f" {name:<8} all of the line") for name in self._session.buses]
+        lines = [Offer(f"{name}\n", f" {name:<8} all of the line") for name in self._session.buses]
 
         def chosen(key: str | None) -> None:
             if key is not None:
@@ -140,7 +140,7 @@ class Questions:
                 self._app.theme = name
 
         ours = [theme.name for theme in THEMES]
-        themes = [(name, name) for name in [*ours, *sorted(set(self._app.available_themes) - set(ours))]]
+        themes = [Offer(name, name) for name in [*ours, *sorted(set(self._app.available_themes) - set(ours))]]
         await self._app.push_screen(Choose("Theme", themes, self._app.theme), chosen)
 
     async def signs(self, show: Callable[[Signs], None]) -> None:
@@ -151,9 +151,9 @@ class Questions:
                 show(Signs(name))
 
         answers = [
-            (Signs.FULL.value, "full     ⣀⠔⠉ ▶ ■ ✗ ● ○   all signs"),
-            (Signs.BOXES.value, "boxes    no braille: Linux console, PuTTY"),
-            (Signs.ASCII.value, "ascii    nothing but ASCII"),
+            Offer(Signs.FULL.value, "full     ⣀⠔⠉ ▶ ■ ✗ ● ○   all signs"),
+            Offer(Signs.BOXES.value, "boxes    no braille: Linux console, PuTTY"),
+            Offer(Signs.ASCII.value, "ascii    nothing but ASCII"),
         ]
         await self._app.push_screen(Choose("Signs", answers), chosen)
 
@@ -192,17 +192,18 @@ class Questions:
         await self._app.push_screen(Search("Help", find, "type to search   ↑↓ PgUp PgDn read   Esc close"))
 
 
-def drive_choices(session: SessionView, glances: Callable[[BusView], list[Glance]]) -> tuple[Answers, str]:
+def drive_choices(session: SessionView, glances: Callable[[BusView], list[Glance]]) -> tuple[list[Offer], str]:
     """Every drive of every bus, and the key of the selected one. A key is the bus, a line feed, the address."""
     now = session.now()
-    options: Answers = []
+    options: list[Offer] = []
     current = ""
     for bus in session.buses.values():
         for glance in glances(bus):
             key = f"{bus.name}\n{glance.address}"
             current = key if glance.selected else current
             sign = glance.sign(now)[0]
-            options.append((key, f" {bus.name:<8} {glance.address:<3} {glance.label:<12} {sign} {glance.product}"))
+            text = f" {bus.name:<8} {glance.address:<3} {glance.label:<12} {sign} {glance.product}"
+            options.append(Offer(key, text, f"{bus.name} {glance.address} {glance.label}"))
     return options, current
 
 

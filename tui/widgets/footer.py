@@ -56,8 +56,12 @@ def key_at(row: Row, x: int) -> str:
     return ""
 
 
+MOVING = frozenset({"app.play", "play", "jog", "step", "enter"})
+"""Actions that may move a drive, or send what is pending: they need their key. A click may only focus the terminal."""
+
+
 class Footer(Lines):
-    """The footer. A click on a key does what the key does; the app handles the one on the stop."""
+    """The footer. A click on a key does what the key does, unless that moves; the app handles the one on the stop."""
 
     @staticmethod
     def is_stop(x: int) -> bool:
@@ -70,4 +74,7 @@ class Footer(Lines):
         if shown.startswith("/") and len(shown) > 1:
             await self.run_action(f"app.begin_line({shown!r})")
         elif found := self.screen.active_bindings.get(read_key(shown)):
+            if found.binding.action.partition("(")[0] in MOVING:
+                self.notify(f"Nothing was sent: a click moves nothing; press {shown}", timeout=4)
+                return
             await self.app.run_action(found.binding.action, found.node)
