@@ -17,8 +17,7 @@ from report import Row, alone, main
 
 from dialects.mcode.manual import program_file
 from simulator.cell.spec import DriveSpec, WorldSpec
-from simulator.lexium.program_events import Printed, Summary
-from simulator.lexium.program_run import ProgramRun
+from simulator.lexium.program_run import Printed, ProgramRun, Summary
 
 AIM = 1.0
 MINUTES = 10

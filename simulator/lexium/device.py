@@ -20,12 +20,11 @@ from simulator.lexium.language.input_functions import InputFunctions
 from simulator.lexium.language.instructions import Instructions
 from simulator.lexium.language.interpreter import Interpreter
 from simulator.lexium.language.motor_commands import MotorCommands
-from simulator.lexium.language.names import Names
 from simulator.lexium.language.pausing import Pausing
 from simulator.lexium.language.printed_setups import PrintedSetups
 from simulator.lexium.language.prints import Prints
 from simulator.lexium.language.program_commands import ProgramCommands
-from simulator.lexium.language.program_mode import ProgramMode
+from simulator.lexium.language.program_mode import Names, ProgramMode
 from simulator.lexium.language.setups import Setups
 from simulator.lexium.language.thread import Thread
 from simulator.lexium.language.variable_access import VariableAccess

@@ -8,12 +8,14 @@ happen any more, or when its time is over.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from dataclasses import replace
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import partial
 from math import inf
+from typing import Any, NamedTuple
 
 from dialects import Diagnostic
-from dialects.mcode.manual import program_file
+from dialects.mcode.manual import error_texts, program_file
 from dialects.mcode.manual.grammar import Name, Number, words
 from dialects.mcode.manual.program_file import ProgramLine
 from dialects.mcode.manual.remedies import remedy
@@ -21,14 +23,250 @@ from dialects.numbers import whole
 from dialects.problems import Problem, errors
 from simulator.cell.spec import DriveSpec
 from simulator.lexium.device import MCodeDevice
-from simulator.lexium.program_events import Failed, Printed, Summary
-from simulator.lexium.program_watch import Subject, Watcher
 from simulator.lexium.state.errors import Failure, Fault
+from simulator.lexium.state.expressions import Read
 from simulator.lexium.state.models import MODELS
 from simulator.lexium.state.printer import CRLF
-from simulator.program_run import LONGEST, MOST_LINES, NO_DEBUGGING, SLICE, Debugging, Load, Programs
-from simulator.program_watch import Followed, source_lines
+from simulator.program_run import (
+    LONGEST,
+    MOST_LINES,
+    NO_DEBUGGING,
+    SLICE,
+    BreakPoint,
+    Debugging,
+    Followed,
+    Line,
+    Load,
+    Programs,
+    Recorder,
+    Value,
+    Values,
+    remark,
+    source_lines,
+    split_break,
+)
 from simulator.world import World
+
+# What a person follows in the run of an MCode program: which line of the file comes next, what variables hold.
+
+
+LAST_LINE = 999_999
+
+
+@dataclass(frozen=True)
+class Subject:
+    """The parts of a drive that are looked at: its time, its variables, labels and lines by address."""
+
+    now: Callable[[], float]
+    reader: Callable[[str], Read | None]
+    values: Values
+    labels: Mapping[str, int]
+    index: Mapping[int, int]
+
+
+class Watcher:
+    """Looks at each line that the interpreter executes. Raises Diagnostic for a place or a name that is not there.
+
+    `lines` are the lines of the file by line of the interpreter, `stored` by address.
+    """
+
+    def __init__(
+        self,
+        subject: Subject,
+        debugging: Debugging,
+        lines: Mapping[int, ProgramLine],
+        stored: Mapping[int, ProgramLine],
+        source: Sequence[str],
+        file: str,
+    ) -> None:
+        self._subject, self._lines, self._source, self._file = subject, lines, source, file
+        readers = {name.upper(): self._reader(name.upper()) for name in debugging.watch}
+        everything = debugging.trace and not readers
+        self.recorder = Recorder(
+            debugging,
+            source,
+            {self._broken_line(each, stored): self._point(each) for each in debugging.breaks},
+            (lambda: subject.values) if everything else partial(_values, readers),
+        )
+
+    def before(self, line: int) -> bool:
+        """See Observer."""
+        found = self._lines.get(line)
+        if found is None or not self.recorder.reaches(found.number):
+            return False
+        self.recorder.breaks(self._subject.now(), found.number, self._text(found))
+        return True
+
+    def after(self, line: int) -> None:
+        """See Observer."""
+        if self.recorder.full or (found := self._lines.get(line)) is None:
+            return
+        self.recorder.after(self._subject.now(), found.number, self._text(found), self.recorder.changed())
+
+    def take(self) -> list[Followed]:
+        """Return the events since the last time."""
+        return self.recorder.take()
+
+    def _text(self, line: ProgramLine) -> str:
+        return self._source[line.number - 1].strip()
+
+    def _reader(self, name: str) -> Read:
+        read = self._subject.reader(name)
+        if read is None:
+            raise Diagnostic(f"no variable {name} to watch", self._file, "valid: a variable or flag, or a name with VA")
+        return read
+
+    def _point(self, text: str) -> BreakPoint:
+        found = split_break(text)
+        if found is None:
+            hint = "valid: LINE or LABEL, or with ,PASSES from 1 to 65535"
+            raise Diagnostic(f"no break point {text}", self._file, hint)
+        return BreakPoint(*found)
+
+    def _broken_line(self, text: str, stored: Mapping[int, ProgramLine]) -> int:
+        """The line of the file before which the run ends."""
+        place, index = self._point(text).place, self._subject.index
+        number = whole(place, 0, LAST_LINE)
+        if number is None:
+            address = self._subject.labels.get(place.upper())
+        else:
+            address = next((at for at, line in stored.items() if line.number == number), None)
+        found = self._lines.get(index.get(address, -1)) if address is not None else None
+        if found is None:
+            labels = ", ".join(sorted(self._subject.labels)) or "none"
+            hint = f"valid: a line of the program, or a label ({labels})"
+            raise Diagnostic(f"no line to break at {place}", self._file, hint)
+        return found.number
+
+
+def _values(readers: Mapping[str, Read]) -> Values:
+    """Read what is watched; a variable that is not declared yet is left out."""
+    found: dict[str, Value] = {}
+    for name, read in readers.items():
+        try:
+            found[name] = read()
+        except Fault:
+            continue
+    return found
+
+
+# What the run of an MCode program reports: as values, as JSON objects, and as lines for a person.
+
+
+ENDS = {"E": "ended at E", "error": "ended by an error", "until": "stopped", "break": "stopped at a break point"}
+
+
+class Printed(NamedTuple):
+    """A line that the drive has printed, and when it was complete; seconds from the start of the program."""
+
+    t: float
+    text: str
+
+    @property
+    def failed(self) -> bool:
+        """Return False: only a summary says that a test has failed."""
+        return False
+
+    def fact(self, real: float) -> dict[str, Any]:
+        """See Event."""
+        return {"t": round(self.t, 6), "print": self.text}
+
+    def lines(self, file: str, real: float) -> Iterator[Line]:
+        """See Event."""
+        yield Line(f"{self.t:10.4f}  {_visible(self.text)}")
+
+
+@dataclass(frozen=True)
+class Failed:
+    """An error of the drive: its time, its code, the line of the file; whether a subroutine of OE handled it.
+
+    `loading`: the drive refused the line when the file was loaded.
+    """
+
+    t: float
+    code: int
+    line: int
+    text: str
+    handled: bool = False
+    loading: bool = False
+    personality: str = field(default="LMDCM", compare=False)
+    failed = False
+
+    def fact(self, real: float) -> dict[str, Any]:
+        """See Event."""
+        more = {"handled": True} if self.handled else {}
+        return {"t": round(self.t, 6), "error": self.code, "line": self.line, **more}
+
+    def lines(self, file: str, real: float) -> Iterator[Line]:
+        """See Event."""
+        when = "refused" if self.loading else f"at {self.t:.4f} s"
+        handled = " (OE has handled it)" if self.handled else ""
+        yield Line(f"{file}:{self.line}: {self.text}: {when}: {self.meaning}{handled}", problem=True)
+
+    @property
+    def meaning(self) -> str:
+        """The error's code and its meaning."""
+        return f"error {self.code}, {error_texts.text(self.code, self.personality)}"
+
+
+@dataclass(frozen=True)
+class Summary:
+    """How a run ended: "E", "error", "break" or "until". `errors` are the codes that no subroutine handled.
+
+    `line` is where the program is or has ended (0: nowhere). `moving` is the velocity at the end, steps/s.
+    `given_up`: no time was set, and the program was still running. `stuck`: nothing would ever have happened any more.
+    """
+
+    ended: str
+    t: float
+    position: int
+    moves: int
+    instructions: int
+    errors: tuple[int, ...]
+    line: int
+    moving: int
+    given_up: bool
+    stuck: bool
+
+    @property
+    def failed(self) -> bool:
+        """See Event."""
+        return bool(self.errors or self.given_up)
+
+    def fact(self, real: float) -> dict[str, Any]:
+        """See Event."""
+        return {
+            "summary": {
+                "position": self.position,
+                "moves": self.moves,
+                "errors": list(self.errors),
+                "instructions": self.instructions,
+                "virtual_s": round(self.t, 6),
+                "real_s": round(real, 3),
+                "ended": self.ended,
+            }
+        }
+
+    def lines(self, file: str, real: float) -> Iterator[Line]:
+        """See Event."""
+        failed = f"errors {', '.join(str(each) for each in self.errors)}" if self.errors else "no errors"
+        counts = f"{_count(self.moves, 'motion')}, {_count(self.instructions, 'line')}"
+        how = f"{ENDS[self.ended]} after {self.t:.4f} s" if self.line else "not run"
+        yield Line(f"{how}: position {self.position}, {counts}, {failed} ({real:.2f} s real)")
+        turns = self.moving and self.ended == "E"
+        turning = f"the motor still turns, {self.moving} steps/s; H before E waits for it" if turns else ""
+        if text := remark(stuck=self.stuck, given_up=self.given_up, turning=turning):
+            yield Line(f"{file}:{self.line}: {text}", problem=True)
+
+
+def _count(number: int, what: str) -> str:
+    return f"{number} {what}{'' if number == 1 else 's'}"
+
+
+def _visible(text: str) -> str:
+    """Escape what would act on a terminal."""
+    return "".join(each if each.isprintable() or each == "\t" else f"\\x{ord(each):02x}" for each in text)
+
 
 FIRST_ADDRESS = 1
 LAST_ADDRESS = 99_999

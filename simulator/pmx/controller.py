@@ -11,8 +11,7 @@ from math import inf
 from simulator.cell.spec import WorldSpec
 from simulator.pmx import motions
 from simulator.pmx.axis import Axis
-from simulator.pmx.interpolation import Line
-from simulator.pmx.joystick import Stick
+from simulator.pmx.motions import Line, Stick
 from simulator.pmx.settings import AXES, Settings
 from simulator.pmx.states import JOYSTICK, TIMED_OUT, Doing
 from simulator.world import World

@@ -2,10 +2,158 @@
 
 from __future__ import annotations
 
+from math import copysign, hypot, inf
+
+from simulator.kinematics.profile import Profile, halt, slew
+from simulator.pmx import motions
 from simulator.pmx.axis import Axis
 from simulator.pmx.homing import Homing
-from simulator.pmx.settings import WINDOWS, Refusal
-from simulator.pmx.states import Doing, Pace, own_pace
+from simulator.pmx.pulses import planned
+from simulator.pmx.settings import AXES, WINDOWS, Refusal, Settings
+from simulator.pmx.states import Doing, Pace, own_pace, paced
+
+# Joystick control of one axis (manual 7.15): an analog input commands the speed, within soft limits.
+#
+# The manual's figures 7.7 and 7.8 are lines: the speed grows in proportion from the edge of the zero zone to the ends
+# of the joystick, and between the inner and the outer soft limit it shrinks in proportion to the distance left. The
+# joystick is sampled every `PERIOD`. The speed changes by at most JV3 or JV4 a sample (0: without a limit), which is a
+# ramp of constant acceleration between two samples.
+
+
+PERIOD = 0.01
+"""Seconds between two samples of the joystick (our choice: the manual does not give it)."""
+MIDDLE = 2500
+"""Millivolts at which the motor is at rest."""
+SLOWEST = 1.0
+"""Pulses/s; anything slower is rest."""
+
+
+class Stick:
+    """The joystick of one axis: the time of its next sample, and the motion that follows."""
+
+    def __init__(self, axis: Axis) -> None:
+        self._axis = axis
+        self.number = AXES.index(axis.name)
+        self.due: float | None = None
+
+    def switch(self, on: bool, t: float) -> None:
+        """Begin or end sampling."""
+        self.due = t if on else None
+
+    def wanted(self, millivolts: int, t: float) -> float:
+        """The speed that the joystick commands here, pulses/s, signed."""
+        settings, n = self._axis.settings, self.number
+        fastest, zone = settings[f"JV{1 + n}"], settings[f"JV{5 + n}"]
+        out = abs(millivolts - MIDDLE) - zone
+        if out <= 0:
+            return 0.0
+        direction = copysign(1.0, millivolts - MIDDLE)
+        return direction * fastest * min(out / (MIDDLE - zone), 1.0) * self._room(direction, t)
+
+    def steer(self, millivolts: int, t: float) -> None:
+        """Sample the joystick, and move at the commanded speed."""
+        axis = self._axis
+        self.due = t + PERIOD
+        if axis.homing or axis.trouble or (axis.pulses.moving(t) and axis.doing is not Doing.STICK):
+            return
+        now = axis.pulses.profile.velocity(t)
+        change = self.wanted(millivolts, t) - now
+        most = axis.settings[f"JV{3 + self.number}"] or abs(change)
+        speed = now + copysign(min(abs(change), most), change)
+        if now * speed < 0 or abs(speed) < SLOWEST:
+            speed = 0.0
+        if speed or now:
+            rate = max(abs(speed - now), SLOWEST) / PERIOD
+            path = slew(t, axis.pulses.place(t), now, speed, vi=0.0, a=rate, d=rate)
+            axis.start(Doing.STICK, path, t, Pace(0.0, abs(speed), rate, max(rate, abs(speed) / PERIOD)))
+
+    def fence(self, after: float) -> float:
+        """The time at which the outer soft limit ahead is met; infinite: never."""
+        path = self._axis.pulses.profile
+        if self.due is None or not path.moving(after):
+            return inf
+        direction = path.direction(after)
+        place = self.edge(direction) - self._axis.pulses.counter(after) + path.position(after)
+        found = path.crossing(place, after, direction)
+        return inf if found is None else found
+
+    def edge(self, direction: float) -> float:
+        """The outer soft limit in a direction, as a count of the counter."""
+        return self._axis.settings[f"JL{self.number * 4 + (4 if direction > 0 else 1)}"]
+
+    def _room(self, direction: float, t: float) -> float:
+        """The fraction of the speed that the soft limits allow."""
+        first = self.number * 4
+        outer = self.edge(direction)
+        inner = self._axis.settings[f"JL{first + (3 if direction > 0 else 2)}"]
+        place = self._axis.pulses.counter(t)
+        left = (outer - place) * direction
+        if left <= 0:
+            return 0.0
+        if (place - inner) * direction <= 0:
+            return 1.0
+        return left / max((outer - inner) * direction, left)
+
+
+# A straight line of both axes of a PMX (manual 7.8.2): one motion along the path, of which each axis makes its share.
+#
+# The global speeds are those along the path (the manual leaves that open), in pulses/s with StepNLoop too (7.17). What
+# ends the line for one axis ends it for the other.
+
+
+class Line:
+    """The line of two axes, during a motion. Raises Refusal for a line that cannot begin."""
+
+    def __init__(self, axes: tuple[Axis, Axis], settings: Settings) -> None:
+        self._axes = axes
+        self._settings = settings
+        self._members: tuple[Axis, ...] = ()
+
+    def begin(self, targets: tuple[int, int], t: float) -> None:
+        """Move both axes from rest to their targets."""
+        axes, settings = self._axes, self._settings
+        for axis in axes:
+            motions.check(axis, t)
+        speeds, times = (settings["LSPD"], settings["HSPD"]), (settings["ACC"], settings["DEC"])
+        pace = paced(settings, axes[0].name, speeds, times)
+        shares = [
+            motions.aim(axis, target, t) - axis.pulses.place(t) for axis, target in zip(axes, targets, strict=True)
+        ]
+        length = hypot(*shares)
+        whole = planned(t, 0.0, length, pace)
+        self._members = tuple(axis for axis, share in zip(axes, shares, strict=True) if share)
+        for axis, target, share in zip(axes, targets, shares, strict=True):
+            axis.loop.attempts, axis.goal = 0, target
+            part = _part(whole, axis.pulses.place(t), share, length)
+            axis.pulses.begin(Doing.LINE, part, t, _scaled(pace, abs(share) / length if length else 0.0))
+        for axis in axes:
+            axis.live(t)
+        self.watch(t)
+
+    def others(self, axis: Axis) -> tuple[Axis, ...]:
+        """The axes that stop with this one: all axes of a line, or only this one."""
+        return self._members if axis in self._members and axis.doing is Doing.LINE else (axis,)
+
+    def watch(self, t: float) -> None:
+        """Stop the other axis if one was ended before its time."""
+        left = [axis for axis in self._members if axis.doing is Doing.LINE]
+        if len(left) < len(self._members):
+            for axis in left:
+                axis.abort(t)
+            self._members = ()
+
+
+def _part(whole: Profile, here: float, share: float, length: float) -> Profile:
+    """The share of one axis: the whole path, scaled, from where the axis is."""
+    if not share:
+        return halt(whole.start, here)
+    part = whole.scaled(share / length)
+    segments = tuple(each._replace(position=each.position + here) for each in part.segments)
+    return Profile(part.start, part.end, here, here + share, segments)
+
+
+def _scaled(pace: Pace, factor: float) -> Pace:
+    return Pace(pace.low * factor, pace.high * factor, pace.up * factor, pace.down * factor, pace.shape)
 
 
 def check(axis: Axis, t: float) -> None:

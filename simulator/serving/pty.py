@@ -10,6 +10,7 @@ serial port's buffer; packet mode reports that.
 from __future__ import annotations
 
 import contextlib
+import ctypes
 import fcntl
 import os
 import select
@@ -20,11 +21,126 @@ import tty
 from pathlib import Path
 
 from dialects import Diagnostic
-from simulator.serving import link as links
 from simulator.serving.input_queue import InputQueue
 from simulator.serving.running import RunningFloor
-from simulator.serving.tty_watch import TtyWatch
 from simulator.wire.baud import resample
+
+# The number of clients that have a pseudo-terminal open, counted without polling.
+#
+# A simulator that holds both ends of a pseudo-terminal gets no signal when its client comes or goes. On Linux inotify
+# reports it; elsewhere the number is unknown, and a client is assumed.
+
+
+_OPEN, _CLOSE = 0x20, 0x08 | 0x10
+_EVENT = struct.Struct("iIII")
+
+
+class TtyWatch:
+    """Counts the clients of a device file from now on. `fd` is readable when the count changes; None: unknown."""
+
+    def __init__(self, path: str) -> None:
+        self.fd = _watch(path)
+        self._clients = 0
+
+    def clients(self) -> int | None:
+        """The number of clients now; None if it is unknown."""
+        if self.fd is None:
+            return None
+        while True:
+            try:
+                data = os.read(self.fd, 4096)
+            except BlockingIOError:
+                return self._clients
+            at = 0
+            while at < len(data):
+                _, mask, _, length = _EVENT.unpack_from(data, at)
+                self._clients += bool(mask & _OPEN) - bool(mask & _CLOSE)
+                at += _EVENT.size + length
+
+    def deserted(self) -> bool:
+        """Whether no client has it open. Quick to ask; the end of the last client may be seen a moment late."""
+        return self._clients == 0 and self.clients() == 0
+
+    def close(self) -> None:
+        """Stop watching."""
+        if self.fd is not None:
+            os.close(self.fd)
+            self.fd = None
+
+
+def _watch(path: str) -> int | None:
+    """Open an inotify descriptor for opens and closes of `path`; None if that is not possible."""
+    if sys.platform != "linux":
+        return None
+    try:
+        libc = ctypes.CDLL(None, use_errno=True)
+        fd: int = libc.inotify_init1(os.O_NONBLOCK | os.O_CLOEXEC)
+    except (OSError, AttributeError):
+        return None
+    if fd < 0:
+        return None
+    if libc.inotify_add_watch(fd, os.fsencode(path), _OPEN | _CLOSE) < 0:
+        os.close(fd)
+        return None
+    return fd
+
+
+# The symlink to a pseudo-terminal: held by one server, never in place of a regular file.
+
+
+assert sys.platform != "win32"
+
+
+class Link:
+    """A link at a path. Raises Diagnostic if another server holds it. `where` names its bus in errors."""
+
+    def __init__(self, path: Path, where: str) -> None:
+        self.path, self._where = path, where
+        self._lock_path = path.with_name(f".{path.name}.lock")
+        self._lock = self._locked()
+
+    def _locked(self) -> int:
+        """Hold the link by a lock: the target of a stale link may belong to another program by now."""
+        try:
+            lock = os.open(self._lock_path, os.O_CREAT | os.O_RDWR | os.O_CLOEXEC, 0o644)
+        except OSError as error:
+            raise self._cannot(error) from None
+        try:
+            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError:
+            os.close(lock)
+            hint = "end the other multidrop sim, or use another path"
+            raise Diagnostic(f"{self.path} is served already", self._where, hint) from None
+        return lock
+
+    def make(self, device: str) -> None:
+        """Create the symlink, replacing a stale one; never overwrite a regular file. Raises Diagnostic."""
+        link = self.path
+        if not link.is_symlink() and link.exists():
+            raise Diagnostic(f"{link} exists and is not a link", self._where, "remove it, or use another path")
+        new = link.with_name(f".{link.name}.{os.getpid()}")
+        try:
+            new.unlink(missing_ok=True)
+            new.symlink_to(device)
+            new.replace(link)
+        except OSError as error:
+            raise self._cannot(error) from None
+
+    def remove(self, device: str) -> None:
+        """Remove the symlink if it still leads to this device."""
+        if self.path.is_symlink() and os.readlink(self.path) == device:
+            self.path.unlink(missing_ok=True)
+
+    def release(self) -> None:
+        """Let other servers use the link."""
+        if self._lock >= 0:
+            self._lock_path.unlink(missing_ok=True)
+            os.close(self._lock)
+            self._lock = -1
+
+    def _cannot(self, error: OSError) -> Diagnostic:
+        return Diagnostic(f"cannot make the link {self.path} ({error.strerror})", self._where)
+
 
 assert sys.platform != "win32"
 
@@ -43,7 +159,7 @@ class PtyServer:
 
     def __init__(self, floor: RunningFloor, bus: str, link: Path | None) -> None:
         self._floor, self._bus = floor, bus
-        self._link = links.Link(link, f'bus "{bus}"') if link else None
+        self._link = Link(link, f'bus "{bus}"') if link else None
         self._queue = InputQueue(floor, bus, self)
         self._master = self._slave = -1
         self._watch: TtyWatch | None = None

@@ -20,16 +20,51 @@ Faults draw from one seeded source in the order of the bytes: an equal conversat
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from heapq import heappop, heappush
 from math import inf
 from random import Random
 from typing import NamedTuple, Protocol
 
 from simulator.cell.spec import Faults
-from simulator.wire import noise
 from simulator.wire.baud import BITS_A_BYTE, resample
 from simulator.wire.collisions import Merger, Paced, Unpaced
+
+# The faults of a wire: what they do to bytes, drawn from one seeded source in the order of the bytes.
+
+
+def harmed(data: bytes, faults: Faults, rng: Random) -> bytes:
+    """Return the bytes with some of them lost, doubled and with a bit flipped, and with others inserted."""
+    if not faults.harmful:
+        return data
+    out = bytearray()
+    for byte in data:
+        if faults.insert and rng.random() < faults.insert:
+            out.append(rng.randrange(256))
+        if rng.random() < faults.drop:
+            continue
+        out.append(byte ^ (1 << rng.randrange(8)) if rng.random() < faults.flip else byte)
+        if faults.double and rng.random() < faults.double:
+            out.append(out[-1])
+    return bytes(out)
+
+
+def lateness(faults: Faults, rng: Random) -> float:
+    """Draw the seconds by which a byte, and all that follow it, are late."""
+    return rng.uniform(*faults.late_by) if faults.late and rng.random() < faults.late else 0.0
+
+
+def pieces(data: bytes, faults: Faults, rng: Random) -> Iterator[tuple[float, bytes]]:
+    """Divide bytes before each that is late; yield the seconds before each piece, and the piece."""
+    begin, late = 0, 0.0
+    for n in range(len(data)) if faults.late else ():
+        if more := lateness(faults, rng):
+            if data[begin:n]:
+                yield late, data[begin:n]
+                late = 0.0
+            begin, late = n, late + more
+    yield late, data[begin:]
+
 
 MOST_UNSENT = 4096
 """Bytes that the drives have to send still when the host's next message waits.
@@ -130,7 +165,7 @@ class Wire:
             self._coming.append((at, data, source))
             return
         for byte in data:
-            at += self._byte_time + noise.lateness(self._faults, self._rng)
+            at += self._byte_time + lateness(self._faults, self._rng)
             self._coming.append((at, BYTES[byte], source))
 
     def queued(self, source: int = 0) -> int:
@@ -162,7 +197,7 @@ class Wire:
         while self._overheard and self._overheard[0][0] <= now:
             self._pass_on(*heappop(self._overheard)[1:], now)
         received += self._merger.take(now)
-        return b"" if self.hung_up else noise.harmed(received, self._faults, self._rng)
+        return b"" if self.hung_up else harmed(received, self._faults, self._rng)
 
     def _hang_up_or_plug(self, now: float) -> None:
         """Carry out a hang-up of the faults, or the plugging in after it."""
@@ -189,7 +224,7 @@ class Wire:
                 break
             _, data, source = self._coming.popleft()
             self._count(source, -len(data))
-            self._arrive(noise.harmed(data, self._faults, self._rng), at)
+            self._arrive(harmed(data, self._faults, self._rng), at)
         return received
 
     @property
@@ -276,7 +311,7 @@ class Wire:
         for at, data, overheard in sent:
             if high and not self._merger.busy(who, at):
                 at += self._rng.uniform(low, high)
-            for late, piece in noise.pieces(data, self._faults, self._rng):
+            for late, piece in pieces(data, self._faults, self._rng):
                 sent_as = resample(piece, port.baud, self.baud) if port.baud else piece
                 at = end = self._merger.send(who, at + late, sent_as)
             if overheard and len(self._ports) > 1:

@@ -14,8 +14,7 @@ from dialects.pmx.manual import program_file
 from multidrop.__main__ import main
 from simulator.cell.spec import DriveSpec
 from simulator.cells import read
-from simulator.pmx.program_events import Failed, Output, Summary
-from simulator.pmx.program_run import ProgramRun
+from simulator.pmx.program_run import Failed, Output, ProgramRun, Summary
 from tests.support import pmx_programs as shapes
 
 pytestmark = pytest.mark.slow

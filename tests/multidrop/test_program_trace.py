@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from multidrop.__main__ import main
-from simulator import program_watch
+from simulator import program_run
 
 LOOP = """VM=200000
 PG 1
@@ -122,7 +122,7 @@ def test_json_has_one_object_for_each_line(test: Test) -> None:
 
 
 def test_a_trace_is_bounded_and_says_so(test: Test, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(program_watch, "MOST_TRACED", 3)
+    monkeypatch.setattr(program_run, "MOST_TRACED", 3)
     code, out, err = test("loop.mxt", "--trace")
     assert code == 0 and sum("loop.mxt:" in line for line in out) == 3 and out[-1].startswith("ended at E")
     assert len(err) == 1 and "the trace ends after 3 lines" in err[0]

@@ -7,8 +7,7 @@ import pytest
 from dialects import Diagnostic
 from dialects.mcode.manual import program_file
 from simulator.cell.spec import DriveSpec, WorldSpec
-from simulator.lexium.program_events import Failed, Printed, Summary
-from simulator.lexium.program_run import LONGEST, ProgramRun
+from simulator.lexium.program_run import LONGEST, Failed, Printed, ProgramRun, Summary
 
 Event = Printed | Failed | Summary
 

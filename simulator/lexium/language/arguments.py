@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 from dialects.mcode.manual.errors import ErrorNumber as E
 from dialects.mcode.manual.grammar import Argument, Name, Number, Statement
-from simulator.lexium.language.linked_program import Action
+from simulator.lexium.language.program_mode import Action
 from simulator.lexium.language.variable_access import VariableAccess
 from simulator.lexium.state.errors import Fault
 from simulator.lexium.state.expressions import whole

@@ -12,9 +12,8 @@ from dialects.mcode.manual.grammar import Argument, Compare, Name, Number, State
 from dialects.mcode.manual.table import lookup
 from simulator.lexium.language.arguments import Compile, bare, is_place, only, pair
 from simulator.lexium.language.interpreter import Interpreter
-from simulator.lexium.language.linked_program import Action
-from simulator.lexium.language.names import Names
 from simulator.lexium.language.pausing import Pausing
+from simulator.lexium.language.program_mode import Action, Names
 from simulator.lexium.language.variable_access import VariableAccess
 from simulator.lexium.motion.motor import Motor
 from simulator.lexium.state.errors import Fault

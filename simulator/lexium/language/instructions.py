@@ -16,12 +16,11 @@ from dialects.mcode.manual.grammar import Name, Statement
 from dialects.mcode.manual.table import Mnemonic
 from simulator.lexium.language.arguments import Compile, bare, is_place, only
 from simulator.lexium.language.flow import Flow
-from simulator.lexium.language.linked_program import Action
 from simulator.lexium.language.motor_commands import MotorCommands
 from simulator.lexium.language.prints import REGISTERS, Prints
 from simulator.lexium.language.program_commands import ProgramCommands
+from simulator.lexium.language.program_mode import Action, Storage
 from simulator.lexium.language.setups import Setups
-from simulator.lexium.language.storage import Storage
 from simulator.lexium.language.variable_access import VariableAccess
 from simulator.lexium.state.errors import Fault
 from simulator.lexium.state.expressions import Read, whole, wrap

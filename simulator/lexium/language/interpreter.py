@@ -15,7 +15,7 @@ from typing import Protocol
 
 from dialects.mcode.manual.errors import ErrorNumber as E
 from dialects.mcode.manual.grammar import Argument, Statement
-from simulator.lexium.language.linked_program import Action, LinkedProgram
+from simulator.lexium.language.program_mode import Action, LinkedProgram
 from simulator.lexium.language.thread import NORMAL, SILENT, STEPPED, TRACED, Frame, Thread
 from simulator.lexium.state.error_flag import ErrorFlag
 from simulator.lexium.state.errors import Fault

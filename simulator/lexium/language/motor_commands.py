@@ -12,7 +12,7 @@ from math import inf
 from dialects.mcode.manual.errors import ErrorNumber as E
 from dialects.mcode.manual.grammar import Number, Statement
 from simulator.lexium.language.arguments import Compile, bare, numbers, only
-from simulator.lexium.language.linked_program import Action
+from simulator.lexium.language.program_mode import Action
 from simulator.lexium.language.variable_access import VariableAccess
 from simulator.lexium.motion.motor import Motor
 from simulator.lexium.state.errors import Fault

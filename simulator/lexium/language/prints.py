@@ -12,8 +12,8 @@ from functools import partial
 from dialects.mcode.manual.errors import ErrorNumber as E
 from dialects.mcode.manual.grammar import Argument, Name, Number, Statement, Text
 from dialects.mcode.manual.table import MNEMONICS
-from simulator.lexium.language.linked_program import Action
 from simulator.lexium.language.printed_setups import PrintedSetups, fields
+from simulator.lexium.language.program_mode import Action
 from simulator.lexium.language.variable_access import VariableAccess
 from simulator.lexium.motion.motor import Motor
 from simulator.lexium.motion.trips import BITS

@@ -11,9 +11,7 @@ from dialects.mcode.manual.errors import ErrorNumber as E
 from dialects.mcode.manual.grammar import Argument, Name, Number, Statement
 from simulator.lexium.language.arguments import Compile, is_place, pair
 from simulator.lexium.language.interpreter import Interpreter
-from simulator.lexium.language.linked_program import Action
-from simulator.lexium.language.program_mode import ProgramMode
-from simulator.lexium.language.storage import Storage
+from simulator.lexium.language.program_mode import Action, ProgramMode, Storage
 from simulator.lexium.language.variable_access import VariableAccess
 from simulator.lexium.motion.motion_status import MotionStatus
 from simulator.lexium.state.errors import Fault

@@ -14,7 +14,7 @@ from dialects.mcode.manual.grammar import Argument, Number, Statement
 from dialects.mcode.manual.table import lookup
 from simulator.lexium.language.arguments import Compile, is_place, missing, numbers
 from simulator.lexium.language.input_functions import InputFunctions
-from simulator.lexium.language.linked_program import Action
+from simulator.lexium.language.program_mode import Action
 from simulator.lexium.language.variable_access import VariableAccess
 from simulator.lexium.motion.inputs import ANALOG, Inputs
 from simulator.lexium.motion.motor import Motor

@@ -7,20 +7,113 @@ motion that ends between two steps ends on the nearest one. Manual 5.1.16, 5.1.1
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from math import floor, inf
-from typing import Protocol
+from typing import Protocol, TypedDict
 
 from dialects.mcode.manual.errors import ErrorNumber as E
 from simulator.kinematics.profile import Profile, halt, move, slew
-from simulator.lexium.motion.backlash import Backlash
+from simulator.kinematics.segments import LINEAR, Shape
 from simulator.lexium.motion.bridges import Bridges
 from simulator.lexium.motion.counters import Counters
-from simulator.lexium.motion.ramps import Ramps
 from simulator.lexium.motion.rotor import Rotor
 from simulator.lexium.motion.units import Units
 from simulator.lexium.state.errors import Fault
+from simulator.lexium.state.expressions import Value
 from simulator.lexium.state.memory import Memory
+
+# Ramps: how the velocity changes, from VI, A, D and the S-curves (manual 5.1.7, 5.1.9, 5.1.27, 5.1.30).
+
+
+STEEPEST = 1.1e9
+"""The highest acceleration that a drive makes, steps/s2; an S-curve's peak may not be above it."""
+STRAIGHT = Shape()
+
+
+class RampValues(TypedDict):
+    """Steps/s, steps/s2, and the shapes of both ramps."""
+
+    vi: float
+    a: float
+    d: float
+    up: Shape
+    down: Shape
+
+
+class Ramps:
+    """The ramps that are set."""
+
+    def __init__(self, values: Mapping[str, Value], units: Units) -> None:
+        self._values, self._units = values, units
+
+    def check(self) -> None:
+        """Check that a motion may begin with these S-curves. Raises Fault (98, 99) for too steep a middle."""
+        for shape, rate, code in (("AT", "A", E.NO_ACCELERATION_FITS), ("DT", "D", E.NO_DECELERATION_FITS)):
+            if self._shape(shape, rate) is None:
+                raise Fault(code)
+
+    def values(self) -> RampValues:
+        """The ramps in steps: straight where a curve would be too steep, as a stop is never refused."""
+        values, scale = self._values, self._units.scale
+        up, down = self._shape("AT", "A") or STRAIGHT, self._shape("DT", "D") or STRAIGHT
+        return {"vi": values["VI"] * scale, "a": values["A"] * scale, "d": values["D"] * scale, "up": up, "down": down}
+
+    def _shape(self, kind: str, rate: str) -> Shape | None:
+        """What AT and AJ, or DT and DJ, make of a ramp; None where its middle would be too steep."""
+        values = self._values
+        if int(values.get(kind, LINEAR)) == LINEAR:
+            return STRAIGHT
+        shape = Shape(int(values.get(kind, LINEAR)), int(values.get(f"{rate}J", 0)))
+        return shape if values[rate] * self._units.scale * shape.peak <= STEEPEST else None
+
+
+# Backlash: what a move is lengthened by to make up for play in the gear (manual 5.1.10 to 5.1.12).
+#
+# Mode 0 (BM=0) adds |BL| to each move that reverses the axis; the counters show it. The sum of all that was added is
+# part of the targets of absolute moves until P is set again, so these stay true on both flanks. The first move counts
+# as along the flank that is loaded already. Mode 1 passes a target by |BL| and returns, unless the move has the
+# direction of BL's sign. So it reaches every target from one side.
+
+
+class Backlash:
+    """The flank that is loaded, and the sum of what was added, in the unit of commands."""
+
+    def __init__(self, values: Mapping[str, Value]) -> None:
+        self.values = values
+        self.flank = 0
+        self.added = 0
+
+    def restart(self) -> None:
+        """Begin at power-up: no flank is loaded."""
+        self.flank = self.added = 0
+
+    def forget(self) -> None:
+        """Forget what was added: P has been set, and it is part of the position now."""
+        self.added = 0
+
+    def convert(self, ratio: float) -> None:
+        """Convert what was added to another unit of commands."""
+        self.added = round(self.added * ratio)
+
+    def plan(self, distance: int, absolute: bool) -> tuple[int, int]:
+        """The distance to go for a move, and the distance to go after that."""
+        values = self.values
+        if not values.get("BE"):
+            self.flank, self.added = (distance > 0) - (distance < 0) or self.flank, 0
+            return distance, 0
+        amount, sign = abs(int(values["BL"])), 1 if values["BL"] >= 0 else -1
+        if values["BM"]:
+            loads = not distance or (distance > 0) == (sign > 0)
+            return (distance, 0) if loads else (distance - sign * amount, sign * amount)
+        if absolute:
+            distance += self.added
+        flank = (distance > 0) - (distance < 0)
+        if flank and self.flank and flank != self.flank:
+            self.added += flank * amount
+            distance += flank * amount
+        self.flank = flank or self.flank
+        return distance, 0
+
 
 MOVES, SLEW = ("MA", "MR"), "SL"
 CORRECTION, HOMING, TORQUE = "correction", "homing", "torque"

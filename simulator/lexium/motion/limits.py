@@ -1,7 +1,7 @@
 """Limits: switches on inputs (IS types 2 and 3) and positions in software (LS). Manual 5.1.76, 5.1.78.
 
 A limit acts on motion in its own direction only. While it is active nothing moves further that way (83, 84). What LM
-makes of one that is reached is the matter of `limit_stop`.
+makes of one that is reached: `homing.LimitStop`.
 """
 
 from __future__ import annotations

@@ -10,18 +10,16 @@ from collections.abc import Callable
 from math import inf
 
 from dialects.mcode.manual.errors import ErrorNumber as E
+from simulator.kinematics.profile import move
 from simulator.lexium.motion.axis import HOMING, Axis
 from simulator.lexium.motion.bridges import Bridges
-from simulator.lexium.motion.clock_inputs import ClockInputs
-from simulator.lexium.motion.configuration_test import ConfigurationTest
 from simulator.lexium.motion.counters import Counters
 from simulator.lexium.motion.encoder import Encoder
 from simulator.lexium.motion.heat import Heat
 from simulator.lexium.motion.hmt import Hmt
-from simulator.lexium.motion.homing import Homing
-from simulator.lexium.motion.inputs import HOME, Inputs
+from simulator.lexium.motion.homing import Homing, LimitStop
+from simulator.lexium.motion.inputs import HOME, ClockInputs, Inputs
 from simulator.lexium.motion.jog import Jog
-from simulator.lexium.motion.limit_stop import LimitStop
 from simulator.lexium.motion.limits import DIRECTIONS, Limits
 from simulator.lexium.motion.motion_status import MotionStatus
 from simulator.lexium.motion.program_control import ProgramControl
@@ -30,9 +28,59 @@ from simulator.lexium.motion.scale import Scale
 from simulator.lexium.motion.torque import Torque
 from simulator.lexium.motion.trips import Trips
 from simulator.lexium.motion.units import Units
+from simulator.lexium.state.errors import Fault
 from simulator.lexium.state.memory import Memory
 from simulator.lexium.state.timeline import Event, Timeline, when
 from simulator.world import World
+
+# The configuration test (SC): half a turn, to see what the encoder makes of it. Manual 5.1.115.
+
+
+TEST = "test"
+"""The kind of motion that SC makes."""
+
+
+class ConfigurationTest:
+    """The configuration test of one drive."""
+
+    def __init__(
+        self,
+        memory: Memory,
+        timeline: Timeline,
+        units: Units,
+        bridges: Bridges,
+        axis: Axis,
+        status: MotionStatus,
+        program: ProgramControl,
+    ) -> None:
+        self._values, self._timeline, self._units, self._bridges = memory.values, timeline, units, bridges
+        self._axis, self._status, self._program = axis, status, program
+        self._begun_at = 0.0
+
+    def start(self, t: float) -> None:
+        """Begin. Raises Fault (89, 94, 96, 103)."""
+        values, scale, axis = self._values, self._units.scale, self._axis
+        if not self._bridges.enabled:
+            raise Fault(E.NOT_TESTED)
+        if self._status.moving(t):
+            raise Fault(E.CALIBRATION_WHILE_MOVING)
+        axis.allow(t, 1.0)
+        here, vi = axis.position(t), values["VI"] * scale
+        self._begun_at = axis.rotor.position(t)
+        top, rate = values["VM"] * scale, values["A"] * scale
+        target = here + self._units.steps_per_turn / 2
+        axis.begin(TEST, move(t, here, 0.0, target, vi=vi, vm=top, a=rate, d=rate), t)
+        self._timeline.replan()
+
+    def moving(self, t: float) -> bool:
+        """Whether its motion is under way."""
+        return self._axis.kind == TEST and self._axis.profile.moving(t)
+
+    def arrive(self, t: float) -> None:
+        """Compare what the encoder has seen, where its motion has ended."""
+        seen = self._axis.rotor.position(t) - self._begun_at
+        if self._axis.kind == TEST and abs(seen - self._units.steps_per_turn / 2) > 1:
+            self._program.raise_error(E.ENCODER_RESOLUTION_WRONG)
 
 
 class Motor:
