@@ -52,6 +52,8 @@ class Conditions:
     error_text: str = ""
     program: str = ""
     """The label of the program that runs, or `running`; empty: none runs."""
+    runs: bool | None = None
+    """Whether a program runs in the drive that can move it; None: this axis, or the family, does not report it."""
     line: str = ""
     """The place of the running program; empty where the drive does not report it."""
     target: int | None = None

@@ -58,6 +58,8 @@ class Motion:
     axis: str = ""
     trouble: str = ""
     """What is wrong with the axis, in words; empty: nothing, as far as this reading shows."""
+    program: bool | None = None
+    """Whether a program runs in the drive; None: not read together with the motion."""
 
 
 Printed = Procedure[tuple[str, ...]]
@@ -215,11 +217,14 @@ class Family(Generic[S]):
     perform: Callable[[S, str], Printed]
     """Carry out a typed line, and make sure of the outcome."""
     motion: Callable[[S, Priority], Procedure[tuple[Motion, ...]]]
-    """Position and velocity of every axis, in as few bytes as the language allows."""
+    """Position and velocity of every axis, in as few bytes as the language allows.
+
+    Where one print has room, it also says whether a program runs; a poll leaves that out.
+    """
     moving: Callable[[S], Procedure[bool]]
     """Whether the drive reports motion."""
     busy: Callable[[S], Procedure[bool]]
-    """Whether a program runs."""
+    """Whether a program runs, which can move the drive. A stop is confirmed by it; Refused or NoAnswer: not known."""
     language: Language
     """Help and completion for what a person types to it."""
     question: Callable[[str], str | None]

@@ -1,17 +1,19 @@
-"""Confirmation of a stop: read the velocities, and stop again what moves on.
+"""Confirmation of a stop: read velocities and programs, and stop again what moves or runs on.
 
-A stop is believed only when the velocity was read as 0: screen and log must not lie. So each drive is read once the
-wire is quiet and the stop was repeated. A drive that still moves and does not slow down is stopped again, unless a
-command has started it since.
+A stop is believed only when the velocity was read as 0 and no program runs that can set another one: screen and log
+must not lie. So each drive is read once the wire is quiet and the stop was repeated. A drive that still moves and does
+not slow down is stopped again, and so is one whose program runs, unless a command has started it since.
 """
 
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
+from typing import NamedTuple
 
-from dialects import DriveError, Priority, Stopped
+from dialects import DriveError, Motion, Priority, Stopped
 from drives.drive import Drive
+from drives.events import Sample, Transaction
 from drives.halt import Halt
 from transports import TransportLost
 
@@ -20,70 +22,108 @@ BETWEEN = 0.1
 """Time between two readings of a drive that may be slowing down, s."""
 RAMP = 30.0
 """How long a drive is read that slows down, or was stopped in vain, s."""
-ENDLESS = 1 << 40
-"""Speed of a drive that another stop kept from being read: faster than any."""
+
+
+class Activity(NamedTuple):
+    """What a drive did when it was read; nothing, where that is not known."""
+
+    speed: int = 0
+    """Unsigned, of its fastest axis."""
+    runs: bool = False
+    """A program runs."""
+
+    def lessens(self, before: Activity | None) -> bool:
+        """Whether it slows down, as far as two readings show, and no program runs that can move it again."""
+        return not self.runs and (before is None or self.speed < before.speed)
+
+
+NOTHING = Activity()
+ENDLESS = Activity(1 << 40)
+"""Of a drive that another stop kept from being read: faster than any."""
 
 
 async def confirm_stop(halt: Halt, repeat: Callable[[Halt], None], superseded: Callable[[Halt], bool]) -> None:
-    """Read the drives of a stop and publish what was found; `repeat` it for what moves and does not slow down."""
+    """Read the drives of a stop and publish what was found; `repeat` it for what goes on and does not slow down."""
     link = halt.link
     unconfirmed = list(halt.affected)
     if not unconfirmed:
         link.notify("stop sent; no drive is known here, so no velocity could be read", warning=True)
-    before: dict[Drive, int] = {}
-    moving: list[Drive] = []
+    before: dict[Drive, Activity] = {}
+    active: dict[Drive, Activity] = {}
     tries, until = 0, link.now() + RAMP
     while unconfirmed and link.now() < until:
-        speeds = {drive: await _speed(drive, halt) for drive in unconfirmed if not halt.started_since(drive)}
+        found = {drive: await _read(drive, halt) for drive in unconfirmed if not halt.started_since(drive)}
         if superseded(halt) and not link.lost:
             return
-        moving = [drive for drive, speed in speeds.items() if speed and not halt.started_since(drive)]
-        slow_down = all(speeds[drive] < before.get(drive, speeds[drive] + 1) for drive in moving)
-        before = speeds
-        if moving and not slow_down and tries < TRIES:
+        active = {drive: each for drive, each in found.items() if each != NOTHING and not halt.started_since(drive)}
+        slow_down = all(each.lessens(before.get(drive)) for drive, each in active.items())
+        before = found
+        if active and not slow_down and tries < TRIES:
             tries += 1
-            _once_more(halt, {drive: speeds[drive] for drive in moving}, tries, repeat)
+            _once_more(halt, active, tries, repeat)
         # The line of an operator that may start a drive may also be refused, and then nothing has started it.
         undecided = [drive for drive in unconfirmed if halt.started_since(drive) and drive.starting]
-        unconfirmed = moving + undecided
+        unconfirmed = [*active, *undecided]
         if unconfirmed:
             await asyncio.sleep(BETWEEN)
-    if moving and tries < TRIES:
-        names = ", ".join(drive.shown for drive in moving)
+    if active and tries < TRIES:
+        names = ", ".join(drive.shown for drive in active)
         link.notify(f"{names}: slows down for more than {RAMP:g} s", warning=True)
 
 
-def _once_more(halt: Halt, speeds: dict[Drive, int], tries: int, repeat: Callable[[Halt], None]) -> None:
-    """Stop again what moves on, or give up and say so."""
+def _once_more(halt: Halt, active: Mapping[Drive, Activity], tries: int, repeat: Callable[[Halt], None]) -> None:
+    """Stop again what goes on, or give up and say so."""
     link = halt.link
     if tries == TRIES:
         halt.vain = True
-        names = ", ".join(drive.shown for drive in speeds)
-        link.notify(f"STILL MOVING after {TRIES} stops: {names}; cut the power", warning=True)
+        for goes_on, moves in (("MOVING", True), ("RUNNING", False)):
+            if names := ", ".join(drive.shown for drive, each in active.items() if bool(each.speed) is moves):
+                link.notify(f"STILL {goes_on} after {TRIES} stops: {names}; cut the power", warning=True)
         return
-    for drive, speed in speeds.items():
-        link.notify(f"{drive.shown}: still moves at {speed} a second; stop sent again", warning=True)
+    for drive, each in active.items():
+        does = f"still moves at {each.speed} a second" if each.speed else "its program still runs"
+        link.notify(f"{drive.shown}: {does}; stop sent again", warning=True)
     repeat(halt)
 
 
-async def _speed(drive: Drive, halt: Halt) -> int:
-    """Read the unsigned speed of a drive; 0 also where it cannot be read, which is published."""
+async def _read(drive: Drive, halt: Halt) -> Activity:
+    """Read and publish what a drive does; NOTHING also where that cannot be read, which is a doubt of the stop."""
     if drive.programming and not drive.engaged:
         return _not_known(drive, halt, "its velocity cannot be read in program mode")
+    ended: list[Transaction] = []
     try:
-        axes = await drive.motion(Priority.OPERATOR)
+        axes = await drive.motion(Priority.OPERATOR, ended.append)
+        runs, why = await _program(drive, axes)
     except Stopped:
         return ENDLESS
     except (TimeoutError, DriveError, TransportLost) as error:
         return _not_known(drive, halt, f"its velocity could not be read: {error}")
+    at = ended[-1].transmitted_at
+    for each in axes:
+        drive.link.publish(Sample(at, drive.address, each.position, each.velocity, each.axis, each.trouble, runs))
+    if why:
+        return _not_known(drive, halt, why)
     halt.doubts.pop(drive, None)
-    speed = max(abs(axis.velocity) for axis in axes)
-    if not speed:
-        drive.link.notify(f"{drive.shown}: stopped, velocity 0 at {', '.join(str(a.position) for a in axes)}")
-    return speed
+    found = Activity(max(abs(axis.velocity) for axis in axes), bool(runs))
+    if found == NOTHING:
+        drive.link.notify(f"{drive.shown}: stopped, velocity 0 at {', '.join(str(each.position) for each in axes)}")
+    return found
 
 
-def _not_known(drive: Drive, halt: Halt, why: str) -> int:
+async def _program(drive: Drive, axes: Sequence[Motion]) -> tuple[bool | None, str]:
+    """Whether a program runs, None where that is not asked: a drive that moves is stopped again; or why not known."""
+    runs = axes[0].program
+    if runs is not None or any(axis.velocity for axis in axes):
+        return runs, ""
+    try:
+        return await drive.busy(), ""
+    except Stopped:
+        raise
+    except (TimeoutError, DriveError, TransportLost) as error:
+        return None, f"velocity 0 was read, and whether a program runs was not: {error}"
+
+
+def _not_known(drive: Drive, halt: Halt, why: str) -> Activity:
     halt.doubts[drive] = why
     drive.link.notify(f"{drive.shown}: stop sent, but {why}", warning=True)
-    return 0
+    return NOTHING

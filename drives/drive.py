@@ -57,6 +57,16 @@ class Seen:
     """Velocity of the fastest axis, signed, per second."""
 
 
+@dataclass(frozen=True)
+class Running:
+    """The last reading of a drive's programs."""
+
+    at: float
+    """When it was requested, s of the link's clock."""
+    runs: bool
+    """Whether one runs, which can move the drive again."""
+
+
 class Drive:
     """A drive to talk to. Its methods raise Refused, NoAnswer, Stopped, Inexpressible or TransportLost."""
 
@@ -66,6 +76,7 @@ class Drive:
         self.transferring = False
         """A program is being transferred: the drive stays busy for a while."""
         self.seen: Seen | None = None
+        self.running: Running | None = None
         self.started_at = float("-inf")
         """When something that can start motion or a program was last sent to it, even if the drive refused it."""
         self.commanded_at = float("-inf")
@@ -234,7 +245,10 @@ class Drive:
 
         def over(outcome: Outcome[tuple[Motion, ...]]) -> None:
             if outcome.error is None:
-                self.seen = Seen(transactions[0].sent_at, max((axis.velocity for axis in outcome.value()), key=abs))
+                axes, at = outcome.value(), transactions[0].sent_at
+                self.seen = Seen(at, max((axis.velocity for axis in axes), key=abs))
+                if axes[0].program is not None:
+                    self.running = Running(at, axes[0].program)
             on_over(outcome)
 
         return self.start(self.family.motion(self.state, priority), over, watch)
@@ -245,7 +259,10 @@ class Drive:
 
     async def busy(self) -> bool:
         """Read whether a program runs in it."""
-        return await self.run(self.family.busy(self.state))
+        at = self.link.now()
+        runs = await self.run(self.family.busy(self.state))
+        self.running = Running(at, runs)
+        return runs
 
     async def run(self, procedure: Procedure[T], on_ended: OnEnded | None = None) -> T:
         """Run a conversation with this drive."""

@@ -76,6 +76,8 @@ class Sample(NamedTuple):
     axis: str = ""
     trouble: str = ""
     """The fault that this reading reports, in words; empty if it reports none."""
+    program: bool | None = None
+    """Whether a program runs in the drive; None: not read with it."""
 
 
 class Conditioned(NamedTuple):

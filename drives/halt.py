@@ -17,9 +17,10 @@ class Fate(Enum):
     """What is known of a drive since a stop."""
 
     SENT = "sent, not read yet"
-    STANDING = "velocity read as 0 since"
+    STANDING = "velocity read as 0 since, and no program runs"
     MOVING = "velocity read as not 0 since"
-    NOT_KNOWN = "sent, and the velocity cannot be read"
+    RUNNING = "a program runs, read since"
+    NOT_KNOWN = "sent, and the velocity, or whether a program runs, cannot be read"
     NOT_REACHED = "not sent: the line is lost, or writing failed"
     STARTED = "started again since, by a command"
 
@@ -46,7 +47,7 @@ class Halt:
     doubts: dict[Drive, str] = field(default_factory=dict)
     """Why a drive could not be read."""
     vain: bool = False
-    """A drive moves on after the last attempt to stop it."""
+    """A drive moves on, or its program runs on, after the last attempt to stop it."""
 
     @property
     def affected(self) -> tuple[Drive, ...]:
@@ -67,11 +68,12 @@ class Halt:
         if self.started_since(drive):
             return Fate.STARTED
         since = max(self.at, drive.started_at)  # a refused line may have run an error routine in the drive
-        seen = drive.seen if drive.seen is not None and drive.seen.at > since else None
-        if seen is not None and not seen.velocity:
+        moves = bool(drive.seen.velocity) if drive.seen is not None and drive.seen.at > since else None
+        runs = drive.running.runs if drive.running is not None and drive.running.at > since else None
+        if moves is False and runs is False:
             return Fate.STANDING
         if not self.data or drive in self.missed:
             return Fate.NOT_REACHED
-        if seen is not None:
-            return Fate.MOVING
+        if moves or runs:
+            return Fate.MOVING if moves else Fate.RUNNING
         return Fate.NOT_KNOWN if self.link.lost or drive in self.doubts else Fate.SENT

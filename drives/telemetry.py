@@ -159,7 +159,7 @@ class Telemetry:
         loop = asyncio.get_running_loop()
         self._next()
         for axis in axes:
-            sample = Sample(at, address, axis.position, axis.velocity, axis.axis, axis.trouble)
+            sample = Sample(at, address, axis.position, axis.velocity, axis.axis, axis.trouble, axis.program)
             loop.call_soon(self._publish, sample)
 
     def _publish(self, sample: Sample) -> None:

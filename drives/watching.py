@@ -19,7 +19,7 @@ from dialects import DriveError, NoAnswer, Refused
 from dialects.conditions import Part, Reader
 from dialects.parameters import Value
 from drives.apart import apart
-from drives.drive import Drive
+from drives.drive import Drive, Running
 from drives.events import Conditioned
 from drives.roster import Roster
 from drives.subscriptions import Subscription, Subscriptions
@@ -139,7 +139,7 @@ class Watching:
         reader: Reader[Any] | None = drive.family.conditions
         if reader is None:
             return
-        ready = False
+        ready, begun = False, self._link.now()
         for name in [part.name for part in reader.parts(drive.state, watched.facts)]:
             part = next((each for each in reader.parts(drive.state, watched.facts) if each.name == name), None)
             if part is None or not self._due(watched, part):
@@ -149,6 +149,8 @@ class Watching:
             ready = True
         if ready and watched.facts:
             conditions = reader.fold(drive.state, watched.facts)
+            if (runs := next((each.runs for each in conditions if each.runs is not None), None)) is not None:
+                drive.running = Running(begun, runs)
             self._link.publish(Conditioned(self._link.now(), drive.address, conditions))
 
     def _due(self, watched: _Watched, part: Part[Any]) -> bool:

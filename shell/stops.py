@@ -1,7 +1,7 @@
 """The state of drives after a stop, counted and in words: for banner, toolbar, standard error and /resume.
 
-The words claim only what was read. A drive is at rest if its velocity was read as 0 since the stop; drives that the
-stop did not reach are named.
+The words claim only what was read. A drive is at rest if its velocity was read as 0 since the stop and no program runs
+in it; drives that the stop did not reach are named.
 """
 
 from __future__ import annotations
@@ -29,6 +29,7 @@ PARTS = (
     (Fate.STARTED, "started again", "started again"),
     (Fate.SENT, "not read yet", "not read yet"),
     (Fate.MOVING, "MOVES", "MOVE"),
+    (Fate.RUNNING, "RUNS A PROGRAM", "RUN PROGRAMS"),
     (Fate.NOT_KNOWN, "NOT KNOWN", "NOT KNOWN"),
     (Fate.NOT_REACHED, "NOT REACHED", "NOT REACHED"),
 )
@@ -55,7 +56,7 @@ class Tally:
     at: datetime
     found: tuple[Found, ...]
     vain: bool = False
-    """A drive still moves after several stops."""
+    """A drive still moves, or its program runs, after several stops."""
 
     def of(self, fate: Fate) -> list[Found]:
         """The drives with one fate."""
@@ -63,7 +64,7 @@ class Tally:
 
     @property
     def stand(self) -> bool:
-        """Whether every drive was read at velocity 0 since the stop."""
+        """Whether every drive was read at velocity 0 since the stop, and without a program that runs."""
         return all(each.fate is Fate.STANDING for each in self.found)
 
     @property

@@ -78,7 +78,7 @@ async def test_what_a_program_prints_is_shown_up_to_its_stop_and_behind_it(em):
     await asyncio.sleep(1.0)
     line.stop()
     printed = int(device.execute("PR R1", floor.now()).lines[0])
-    await asyncio.sleep(0.2)
+    await line.stopped()  # until then a program is stopped again
     device.execute("EX G1", floor.now())
     await asyncio.sleep(0.5)
     whole = [text for text in heard if text.startswith("tick ")]

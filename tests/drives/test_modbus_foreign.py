@@ -17,6 +17,7 @@ from dialects.modbus.host import framing
 from dialects.modbus.manual.registers import REGISTERS
 from drives.bus import Bus
 from drives.events import Notice, Traffic, Unsolicited
+from drives.halt import Fate
 from transports.sockets import open_tcp
 
 PATIENCE = 10.0
@@ -25,7 +26,7 @@ logging.getLogger("pymodbus").addHandler(logging.NullHandler())
 
 
 @asynccontextmanager
-async def opened(timeout: float = 1.0):
+async def opened(timeout: float = 1.0, **registers: int):
     """A bus that is open on pymodbus' server, what it heard as PDUs, and the register values as they were set."""
     heard: list[tuple[int, int | None]] = []
 
@@ -35,7 +36,7 @@ async def opened(timeout: float = 1.0):
         return pdu
 
     values = [0] * LAST
-    for name, value in {"P": -51200, "V": 0, "VM": 768000, "HC": 5}.items():
+    for name, value in ({"P": -51200, "V": 0, "VM": 768000, "HC": 5} | registers).items():
         row = REGISTERS[name]
         values[row.address : row.address + row.count] = framing.words_of(value, row.count)
     block = [SimData(0, values=values, datatype=DataType.REGISTERS)]
@@ -67,6 +68,19 @@ async def test_it_is_opened_and_read_and_written():
         assert (motion.position, motion.velocity) == (-51200, 0)
         assert await drive.still() and not await drive.busy()
         assert (16, 0x8B) in heard
+
+
+@pytest.mark.parametrize(("busy", "fate"), [(0, Fate.STANDING), (1, Fate.RUNNING)])
+async def test_a_stop_is_confirmed_by_the_register_of_the_program(busy, fate):
+    async with opened(BY=busy) as (bus, heard):
+        (drive,) = await bus.identify(Hints())
+        heard.clear()
+        halt = bus.stop()
+        await bus.stopped()
+        assert halt.fate(drive) is fate and halt.vain is bool(busy)
+        assert (3, 0x0004) in heard and heard.count((16, 0x78)) == (
+            3 if busy else 1
+        )  # it takes the first of two requests
 
 
 async def test_exceptions_of_a_foreign_server_are_refusals():

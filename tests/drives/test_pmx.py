@@ -10,6 +10,7 @@ from dialects.pmx.host.codec import GAP, Pmx
 from drives.bus import Bus
 from drives.events import Unsolicited
 from drives.flight import Finished
+from drives.halt import Fate
 from drives.line import QUIET, Line, Write
 from drives.stop_forms import stop_forms
 from tests.support.virtual import in_virtual_time
@@ -80,12 +81,34 @@ async def test_a_stop_reaches_every_known_number_and_no_answers_run_into_it():
     commands = [data for _, data in wire.written]
     assert commands[:4] == [b"@00ABORT\r", b"@01ABORT\r", b"@02ABORT\r", b"@00ABORT\r"]
     for number in (b"00", b"01", b"02"):
-        own = [data[3:] for data in commands if data[1:3] == number and data[3:4] in b"AS"]
+        own = [data[3:] for data in commands if data[1:3] == number and data[3:5] in (b"AB", b"SR")]
         assert own[-3:] == [b"SR0=0\r", b"SR1=0\r", b"ABORT\r"]
     assert wire.collisions == []
     first = [at - begin for at, data in wire.written if data == b"@02ABORT\r"][0]
     assert first < 0.15
     assert [text for text in told if "stopped, velocity 0 at 0, 0" in text] and "OK" not in told
+    await bus.close()
+
+
+@pytest.mark.parametrize("program", ["SASTAT0", "SASTAT1"])
+@pytest.mark.parametrize(
+    ("answer", "fate", "said", "aborts"),
+    [
+        ("1", Fate.RUNNING, "STILL RUNNING after 3 stops: 00; cut the power", 9),
+        (None, Fate.NOT_KNOWN, "00: stop sent, but velocity 0 was read, and whether a program runs was not: ", 3),
+        ("2", Fate.STANDING, "00: stopped, velocity 0 at 0, 0", 3),
+    ],
+)
+@in_virtual_time
+async def test_a_stop_is_confirmed_by_both_programs_too(program, answer, fate, said, aborts):
+    bus, wire = await opened("00", **{program: answer})
+    wire.written.clear()
+    told = []
+    bus.watch(lambda event: told.append(getattr(event, "text", "")))
+    halt = bus.stop()
+    await bus.stopped()
+    assert halt.fate(bus.drives["00"]) is fate and any(text.startswith(said) for text in told)
+    assert [data for _, data in wire.written].count(b"@00ABORT\r") == aborts
     await bus.close()
 
 

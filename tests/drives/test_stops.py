@@ -468,3 +468,107 @@ def test_a_reply_keeps_what_it_was_read_from():
     assert Reply(("5",)).heard(b"5\r\n", True) == Reply(("5",), raw=b"5\r\n", doubtful=True)
     assert DriveState.__hash__ is not None
     assert Unsolicited(0.0, ("x",)).lines == ("x",)
+
+
+# Programs that run on
+
+DWELL = 'program_text = """\nPG 1\nLB G1\nH 60000\nBR G1\nE\nPG\n"""'
+
+
+def deaf(shop: Shop, name: str, times: int, then: str = "") -> list[float]:
+    """Make a drive ignore this many stops, or execute a line after each of them; return their times."""
+    device, heard = shop.devices[name], []
+    escape = device.escape
+
+    def hear(now: float) -> None:
+        heard.append(now)
+        if len(heard) > times or then:
+            escape(now)
+        if len(heard) <= times and then:
+            device.execute(then, now)
+
+    device.escape = hear
+    return heard
+
+
+@pytest.mark.parametrize("then", ["", "EX G1"])
+@in_virtual_time
+async def test_a_drive_whose_program_runs_on_or_again_is_stopped_once_more_although_it_reads_velocity_0(then):
+    shop = Shop(f"{party('a', EM=1, CK=1)}\n{DWELL}", party("b", EM=1, CK=1))
+    await shop.open("a", "b")
+    await shop.bus.drives["a"].send("EX G1")
+    await asyncio.sleep(0.5)
+    stops, since = deaf(shop, "a", 2, then), len(shop.sent)  # a stop is two escapes
+    halt = shop.bus.stop()
+    fates = []
+    shop.bus.watch(lambda event: fates.append(halt.fate(shop.bus.drives["a"])))
+    await shop.bus.stopped()
+    assert len(stops) == 4 and not shop.devices["a"].running
+    assert "a: its program still runs; stop sent again" in shop.said and "a: stopped, velocity 0 at 0" in shop.said
+    assert shop.said.index("stop sent again") < shop.said.index("a: stopped") and "b: its program" not in shop.said
+    assert Fate.RUNNING in fates and Fate.STANDING not in fates[: fates.index(Fate.RUNNING)]
+    assert halt.fate(shop.bus.drives["a"]) is Fate.STANDING and not halt.vain
+    asked = [data for data in shop.sent[since:] if data.startswith(b"aPR")]
+    assert len(asked) == 2 and all(data.startswith(b"aPR BY,P,DN,V") for data in asked)
+
+
+@in_virtual_time
+async def test_a_program_that_three_stops_do_not_end_is_named_among_twelve_drives():
+    names = "abcdefghijkl"
+    shop = Shop(*(f"{party(name, EM=1, CK=1)}\n{DWELL}" for name in names))
+    await shop.open(*names)
+    await shop.bus.at("*").send("EX G1")
+    await asyncio.sleep(0.5)
+    assert all(device.running for device in shop.devices.values())
+    stops = deaf(shop, "g", 100)
+    halt = shop.bus.stop()
+    await asyncio.sleep(10.0)
+    assert len(stops) == 6 and shop.said.count("g: its program still runs; stop sent again") == 2
+    assert "STILL RUNNING after 3 stops: g; cut the power" in shop.said and "STILL MOVING" not in shop.said
+    assert halt.vain and halt.fate(shop.bus.drives["g"]) is Fate.RUNNING
+    assert {halt.fate(shop.bus.drives[name]) for name in names if name != "g"} == {Fate.STANDING}
+    assert [name for name in names if shop.devices[name].running] == ["g"]
+    await shop.bus.close()
+
+
+@in_virtual_time
+async def test_a_program_that_a_person_starts_after_a_stop_is_left_to_them():
+    shop = Shop(f"{party('a', EM=1, CK=1)}\n{DWELL}")
+    await shop.open("a")
+    halt = shop.bus.stop()
+    await asyncio.sleep(0.001)
+    await shop.bus.drives["a"].send("EX G1")
+    await shop.bus.stopped()
+    assert shop.devices["a"].running and halt.fate(shop.bus.drives["a"]) is Fate.STARTED
+    assert "still runs" not in shop.said
+
+
+@in_virtual_time
+async def test_a_program_that_starts_by_itself_after_a_stop_takes_back_that_the_drive_is_at_rest():
+    shop = Shop(f"{party('a', EM=1, CK=1)}\n{DWELL}")
+    await shop.open("a")
+    drive = shop.bus.drives["a"]
+    halt = shop.bus.stop()
+    await shop.bus.stopped()
+    assert halt.fate(drive) is Fate.STANDING
+    shop.devices["a"].execute("EX G1", shop.floor.now())
+    watch = shop.bus.telemetry.watch(("a",))
+    await asyncio.sleep(3.0)
+    assert halt.fate(drive) is Fate.RUNNING
+    watch.close()
+    await shop.bus.close()
+
+
+@in_virtual_time
+async def test_a_poll_does_not_ask_for_the_program_and_a_stop_does():
+    shop = Shop(party("a", EM=1, CK=1))
+    await shop.open("a")
+    with_poll = shop.bus.telemetry.subscribe(("a",))
+    await asyncio.sleep(1.0)
+    with_poll.close()
+    assert {data[:11] for data in shop.sent if data.startswith(b"aPR P,")} == {b"aPR P,DN,V\xcd"}
+    before = len(shop.events)
+    shop.bus.stop()
+    await shop.bus.stopped()
+    samples = [event for event in shop.events[before:] if isinstance(event, Sample)]
+    assert [(event.velocity, event.program) for event in samples] == [(0, False)]

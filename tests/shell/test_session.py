@@ -31,7 +31,7 @@ class FakeDrive:
     family: object = FAMILIES[DEFAULT]
     state: object = field(default_factory=lambda: MCodeState(MCode()))
 
-    seen = None
+    seen = running = None
     commands = 0
     started_at = commanded_at = float("-inf")
     starting = 0

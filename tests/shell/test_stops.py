@@ -1,6 +1,7 @@
 """What a stop reaches, what it says of what it did not, on simulated lines of every family, in virtual time."""
 
 import asyncio
+from types import SimpleNamespace
 
 import pytest
 
@@ -211,7 +212,8 @@ async def test_a_drive_that_begins_to_move_by_itself_behind_a_stop_is_told(tmp_p
 async def test_a_drive_that_slows_down_is_waited_for_and_one_that_does_not_is_stopped_again(speeds, said, tmp_path):
     async with CellSession(tmp_path, bus("press", party("a"))) as shop:
 
-        async def motion(priority, ended=None):
+        async def motion(priority, ended):
+            ended(SimpleNamespace(transmitted_at=shop.session.now()))
             return (Motion(0, speeds.pop(0)),)
 
         shop.session.selected.motion = motion

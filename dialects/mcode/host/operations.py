@@ -134,7 +134,8 @@ def listing(state: MCodeState, start: str) -> Procedure[tuple[str, ...]]:
 def motion(state: MCodeState, priority: Priority) -> Procedure[tuple[Motion, ...]]:
     """Read position and velocity in one print, so that they belong together and use the wire half as long.
 
-    The drive's signature is between them, so another drive's reply does not match.
+    The drive's signature is between them, so another drive's reply does not match. Only a poll leaves out BY, which is
+    read before the velocity: after BY=0 no program sets a new one.
     """
     _not_in_program(state, "ask again")
     yield from attend(state, _motion(state.codec, state.address, sign(state), priority))
@@ -147,7 +148,7 @@ def motion(state: MCodeState, priority: Priority) -> Procedure[tuple[Motion, ...
         raise NoAnswer(f"{who(state)} does not reply ({reply.end.value})")
     found = re.fullmatch(request.expect or "", reply.text)
     assert found is not None
-    return (Motion(int(found[1]), int(found[2])),)
+    return (Motion(int(found[2]), int(found[3]), program=found[1] == "1" if found[1] else None),)
 
 
 def status(state: MCodeState) -> Procedure[tuple[str, ...]]:
@@ -170,8 +171,9 @@ def status(state: MCodeState) -> Procedure[tuple[str, ...]]:
 @lru_cache(maxsize=256)
 def _motion(codec: MCode, address: str, own: Sign, priority: Priority) -> Request:
     """Build the request once for each drive; telemetry sends it as fast as the wire allows."""
-    asked = codec.request(address, f"PR P,{own.item},V")
-    expect = f"({INTEGER}){re.escape(own.shown)}({INTEGER})"
+    busy = priority is not Priority.POLL
+    asked = codec.request(address, f"PR {'BY,' if busy else ''}P,{own.item},V")
+    expect = f"({'[01]' if busy else ''})({INTEGER}){re.escape(own.shown)}({INTEGER})"
     return replace(asked, expect=expect, signed=True, priority=priority)
 
 

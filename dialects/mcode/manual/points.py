@@ -45,6 +45,7 @@ def conditions(product: str, facts: Facts, target: int | None) -> Conditions:
         error=UNREAD if facts.get("EF") else 0,
         error_text=SET if facts.get("EF") else "",
         program="running" if facts.get("BY") else "",
+        runs=bool(facts["BY"]) if "BY" in facts else None,
         target=target if facts.get("MV") else None,
         limits=limits,
         run_current=_whole(facts, "RC"),

@@ -78,6 +78,7 @@ def _conditions(axis: str, facts: Facts) -> Conditions:
         error=code,
         error_text=text,
         program=running,
+        runs=_runs(facts) if first else None,
         line=line,
         more=tuple(_more(axis, facts)),
         unit="counts" if facts.get(f"SL{axis}") else "pulses",
@@ -103,6 +104,12 @@ def _shared(facts: Facts) -> Iterator[Lamp]:
         bits = facts.get(word)
         for n in range(count):
             yield Lamp(str(n + 1), "", bool(bits >> n & 1) if isinstance(bits, int) else None, output)
+
+
+def _runs(facts: Facts) -> bool | None:
+    """Whether a program runs; a paused one moves nothing."""
+    states = [facts.get(f"SASTAT{n}") for n in PROGRAMS]
+    return None if None in states else RUNNING in states
 
 
 def _program(facts: Facts) -> tuple[str, str]:
