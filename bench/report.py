@@ -106,11 +106,11 @@ def _aim(row: Row) -> str:
 
 
 def number(value: float | None) -> str:
-    """Three significant digits, thousands apart."""
+    """Three significant digits at least."""
     if value is None:
         return "-"
     if abs(value) >= 100:
-        return f"{value:,.0f}"
+        return f"{value:.0f}"
     return f"{value:.3g}"
 
 

@@ -11,7 +11,7 @@ from typing import NamedTuple, Protocol
 
 from dialects.conditions import UNREAD, Conditions
 from drives.events import Conditioned, Sample, Silent
-from tui.text import thousands
+from tui.text import digits
 
 LIMITS = {"lim+": "limit+", "lim-": "limit-"}
 """Lamps whose lighting is reported, by function."""
@@ -117,7 +117,7 @@ def _limits(before: Conditions, after: Conditions, last: Place | None) -> Iterat
     lit = {(lamp.name, lamp.function) for lamp in before.lamps if lamp.on}
     for lamp in after.lamps:
         if lamp.on and lamp.function in LIMITS and not lamp.output and (lamp.name, lamp.function) not in lit:
-            place = "" if last is None else f" at {thousands(last.position)}"
+            place = "" if last is None else f" at {digits(last.position)}"
             stands = "; it stands" if last is not None and last.velocity == 0 else ""
             yield Happening(_named(f"{LIMITS[lamp.function]} reached{place}{stands}", after.axis), warning=True)
 

@@ -1,4 +1,4 @@
-"""Values and bytes as text for a person: thousands separators, k and M, ages, visible control characters."""
+"""Values and bytes as text for a person: numbers, k and M, ages, visible control characters."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ LONGEST = 4096
 def visible(text: str) -> str:
     r"""Write out control and direction characters (`\x06`), and cut a line of any length."""
     shown = written_out(text[:LONGEST])
-    return shown if len(text) <= LONGEST else f"{shown} … ({len(text):,} characters)"
+    return shown if len(text) <= LONGEST else f"{shown} … ({len(text)} characters)"
 
 
-def thousands(value: int | None) -> str:
-    """Format a number as `384,112`; `–` if it is unknown."""
-    return "–" if value is None else f"{value:,}"
+def digits(value: int | None) -> str:
+    """Format a number, without separators, so that a copy of it may be typed; `–` if it is unknown."""
+    return "–" if value is None else str(value)
 
 
 def short(value: float, step: float, width: int = 8) -> str:

@@ -58,8 +58,8 @@ class Transcripts:
         now = self._session.now()
         await asyncio.to_thread(_write, path, records, self._session.wall(now) - timedelta(seconds=now))
         what = f", {page.sight.filter.words}" if page.sight.filter else ""
-        older = f"; {page.records.dropped:,} older ones were dropped before" if page.records.dropped else ""
-        return f"{len(records):,} lines{what}, in {path}{older}"
+        older = f"; {page.records.dropped} older ones were dropped before" if page.records.dropped else ""
+        return f"{len(records)} lines{what}, in {path}{older}"
 
     async def offer_unsent(self) -> None:
         """Offer the lines that were not sent. Raises Diagnostic if there are none."""

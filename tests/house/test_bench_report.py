@@ -44,7 +44,7 @@ def test_an_aim_is_of_the_figure_or_of_the_ratio(better, aim_of, aim, reached):
 
 def test_a_line_names_the_peer_and_an_aim_that_is_not_reached():
     row = report.compared("trips", "/s", [6000], [8000], "bare", better="more", aim_of="ratio", aim=0.9, note="a pty")
-    assert report.line(row).split() == ["trips", "6,000", "8,000", "bare", "0.75", "!>=0.9x", "/s", "a", "pty"]
+    assert report.line(row).split() == ["trips", "6000", "8000", "bare", "0.75", "!>=0.9x", "/s", "a", "pty"]
 
 
 def test_a_peer_that_is_not_installed_is_said():

@@ -95,7 +95,7 @@ def test_the_phase_of_a_move(velocities: tuple[int, ...], said: str) -> None:
 
 
 def test_the_time_to_go_is_that_of_the_profile() -> None:
-    moving = readout(*[(n / 10, n * 10_000, 100_000) for n in range(3)])  # at 20,000 with full speed
+    moving = readout(*[(n / 10, n * 10_000, 100_000) for n in range(3)])  # at 20000 with full speed
     ramp = (100_000 - 1000) / 1e6
     slowing = (100_000**2 - 1000**2) / 2e6
     assert seconds_to_go(moving, 0.2) == pytest.approx((40_000 - slowing) / 100_000 + ramp, abs=1e-6)
@@ -118,7 +118,7 @@ def test_a_time_to_go_is_never_negative(left: int, speed: int, slowest: int) -> 
 
 def test_the_panel_shows_what_the_drive_does() -> None:
     shown = text(drive_rows(view(readout(*CRUISE), 0.4), 50, 20))
-    for each in ("▶ moving", "cruises", "s to go", "30,000 steps", "→ 60,000", "50,000 steps/s", "software limits"):
+    for each in ("▶ moving", "cruises", "s to go", "30000 steps", "→ 60000", "50000 steps/s", "software limits"):
         assert each in shown
     for each in ("1 home ●", "2 lim+ ●", "out 1 ·", "error none", "run 25 %", "hold 5 %"):
         assert each in shown

@@ -30,7 +30,7 @@ def told(*events: object) -> list[tuple[str, str, str]]:
 
 
 def test_a_limit_is_said_with_the_position_when_it_lights_and_not_while_it_stays() -> None:
-    assert told((2_048_000, 0), REST, LIMIT, LIMIT) == [("!", "b", "limit+ reached at 2,048,000; it stands")]
+    assert told((2_048_000, 0), REST, LIMIT, LIMIT) == [("!", "b", "limit+ reached at 2048000; it stands")]
     assert told((0, 500), REST, LIMIT) == [("!", "b", "limit+ reached at 0")]
     assert told(LIMIT) == [], "what was read first is a state, not an event"
 

@@ -49,20 +49,20 @@ def wave(address: str, session: FakeSession) -> list[OnBus]:
 def test_a_resting_drive_is_one_line() -> None:
     session = demo_session()
     rows = plot_rows(view(session, *rest("a", 51_300, session)), 60, 20)
-    assert plain(*rows) == " a gantry at rest at 51,300 steps"
+    assert plain(*rows) == " a gantry at rest at 51300 steps"
 
 
 def test_an_encoder_between_two_counts_rests() -> None:
     session = demo_session()
     shown = view(session, *rest("a", 51_300, session), OnBus("press", Sample(session.time, "a", 51_301, 0)))
-    assert plain(*plot_rows(shown, 60, 20)) == " a gantry at rest at 51,300 to 51,301 steps"
+    assert plain(*plot_rows(shown, 60, 20)) == " a gantry at rest at 51300 to 51301 steps"
 
 
 def test_a_steady_velocity_is_one_line_while_the_position_changes() -> None:
     session = demo_session()
     events = [OnBus("press", Sample(session.time - 25 + n / 20, "a", 100 * n, 2000)) for n in range(500)]
     text = plain(*plot_rows(view(session, *events), 60, 20))
-    assert text.startswith(" a gantry steady at 2,000 steps/s\n position a gantry steps ")
+    assert text.startswith(" a gantry steady at 2000 steps/s\n position a gantry steps ")
 
 
 def test_without_samples_it_says_so() -> None:
@@ -94,7 +94,7 @@ def test_what_rests_is_said_and_does_not_widen_the_scale_of_what_moves() -> None
     session = demo_session()
     session.plotted = (Series("press", "a"), Series("press", "b"))
     text = plain(*plot_rows(view(session, *wave("a", session), *rest("b", 2_048_000, session)), 60, 20))
-    assert " b clamp at rest at 2,048,000 steps" in text
+    assert " b clamp at rest at 2048000 steps" in text
     assert "M ┤" not in text
 
 
@@ -102,7 +102,7 @@ def test_lines_bear_their_names_at_their_ends_with_their_last_values() -> None:
     session = demo_session()
     session.plotted = (Series("press", "a"), Series("press", "b"))
     rows = plot_rows(view(session, *a_move(session)[:480], *wave("b", session)), 100, 30)
-    assert "a gantry 600,000" in plain(*rows) and "b clamp" in plain(*rows)
+    assert "a gantry 600000" in plain(*rows) and "b clamp" in plain(*rows)
     assert {role for row in rows for text, role in row if "b clamp" in text} == {"series2"}
 
 
@@ -111,7 +111,7 @@ def test_values_are_plotted_by_their_words_on_any_line() -> None:
     session.plotted = (Series("press", "b", "I1"), Series("eth", "", "VM"))
     inputs = [OnBus("press", Valued(session.time - 5 + n / 10, "b", "I1", float(n > 25))) for n in range(50)]
     text = plain(*plot_rows(view(session, *inputs, OnBus("eth", Valued(session.time - 1, "", "VM", 768000))), 100, 20))
-    assert " I1 press:b clamp " in text and " eth VM steady at 768,000" in text
+    assert " I1 press:b clamp " in text and " eth VM steady at 768000" in text
 
 
 def test_each_drive_may_have_charts_of_its_own() -> None:
@@ -202,7 +202,7 @@ async def test_keys_of_the_page() -> None:
         assert look.paused_at is not None and "paused" in page.lines("heading").plain
         await press(pilot, "space", "left", "left", "plus", "up")
         assert look.cursor is not None and look.zoom == 2 and look.span == 10.0
-        assert "a gantry velocity 600,000" in page.lines("below").plain
+        assert "a gantry velocity 600000" in page.lines("below").plain
         await press(pilot, "0", "s", "v")
         assert look.cursor is None and look.apart and "velocity" not in page.lines("charts").plain
         await press(pilot, "p")

@@ -97,7 +97,7 @@ async def test_the_oldest_are_dropped_and_a_reader_moves_on_with_them() -> None:
         app.page.extend(numbered(range(KEPT, KEPT + 1000)))
         assert len(app.page.records) == KEPT
         await pilot.resize_terminal(80, 6)
-        assert (await shown(pilot, app.page))[-1].startswith(" 1,000 older lines were dropped")
+        assert (await shown(pilot, app.page))[-1].startswith(" 1000 older lines were dropped")
         assert (await shown(pilot, app.page))[0].endswith("line 1000")
 
 

@@ -51,10 +51,10 @@ def test_what_is_predicted_is_below_what_is_measured() -> None:
     session = demo_session()
     rows = drive_rows(view(session, *beside(session.time, 384_112, 600_000, -14)), 45, 20)
     assert plain(*rows[:4]).splitlines() == [
-        " ▶ moving                    600,000 steps/s",
-        "        384,112 steps",
-        "        384,098 twin         599,986 steps/s",
-        "            +14 difference",
+        " ▶ moving                     600000 steps/s",
+        "       384112 steps",
+        "       384098 twin            599986 steps/s",
+        "          +14 difference",
     ]
     assert "error" not in roles(rows[3])
 
@@ -63,7 +63,7 @@ def test_a_divergence_has_a_sign_its_limit_and_its_causes() -> None:
     session = demo_session()
     rows = drive_rows(view(session, *beside(session.time, 0, 0, 8112), apart(session)), 45, 20)
     assert plain(*rows[3:5]).splitlines() == [
-        " ≠       -8,112 difference         limit 200",
+        " ≠      -8112 difference           limit 200",
         "   stall, load",
     ]
     assert "error" in roles(rows[3]) and roles(rows[4]) == {"error"}
@@ -77,7 +77,7 @@ def test_a_twin_that_ended_is_not_shown() -> None:
     shown = view(session, *beside(session.time, 0, 0, 8112), apart(session), ended)
     text = plain(*drive_rows(shown, 45, 20), *narrow_rows(shown, 80))
     assert "twin" not in text and "≠" not in text and trouble_mark(shown.model.bus("press"), ["a"], False) == ""
-    assert "a gantry twin at rest at 8,112" in plain(*plot_rows(shown, 60, 20)), "it was there in the time shown"
+    assert "a gantry twin at rest at 8112" in plain(*plot_rows(shown, 60, 20)), "it was there in the time shown"
     session.time += 21
     assert "twin" not in plain(*plot_rows(view(session, *beside(session.time - 21, 0, 0, 8112)), 60, 20))
 
@@ -93,7 +93,7 @@ def test_each_axis_has_its_own_twin() -> None:
     session = demo_session()
     events = [*beside(session.time, 5, 0, 0, axis="x"), *beside(session.time, 7, 0, 9000, axis="y")]
     text = plain(*drive_rows(view(session, *events, apart(session, axis="y")), 45, 20))
-    assert "+0 difference" in text and "≠       -9,000 difference" in text
+    assert "+0 difference" in text and "≠      -9000 difference" in text
 
 
 def test_predictions_that_come_before_the_first_samples_make_no_further_axis() -> None:
@@ -111,8 +111,8 @@ def test_predictions_that_come_before_the_first_samples_make_no_further_axis() -
 def test_rows_of_drives_have_a_sign_and_as_many_causes_as_fit() -> None:
     session = demo_session()
     shown = view(session, *beside(session.time, 0, 600_000, 8112), apart(session))
-    assert "600,000/s ≠ -8,112 stall, l…" in plain(*narrow_rows(shown, 80))
-    assert plain(drives_rows(shown, 45, 3)[0]).endswith("≠ -8,112")
+    assert "600000/s ≠ -8112 stall, load" in plain(*narrow_rows(shown, 80))
+    assert plain(drives_rows(shown, 45, 3)[0]).endswith("≠ -8112")
     agrees = view(session, *beside(session.time, 0, 0, 14))
     assert plain(narrow_rows(agrees, 80)[-1]).endswith("twin -14   polls 0.5 Hz")
 
@@ -126,7 +126,7 @@ def test_a_drive_that_differs_comes_first_of_all_drives(width: int) -> None:
     assert [place.glance.address for place in places] == ["b"]
     assert next(place for place in worst_first(shown, "") if place.bus == "press").glance.address == "b"
     row = drive_row(places[0], shown.now, width, False)
-    assert "≠ -8,112" in plain(row) and width_of(row) <= width
+    assert "≠ -8112" in plain(row) and width_of(row) <= width
     assert kept(shown.glances, 1)[0].address == "a" and kept(shown.glances, 2)[1].address == "b"
 
 
@@ -134,11 +134,11 @@ def test_trouble_and_a_difference_are_both_said() -> None:
     session = demo_session()
     error = OnBus("press", Conditioned(session.time, "a", (replace(AT_LIMIT, lamps=()),)))
     shown = view(session, *beside(session.time, 0, 0, 8112), apart(session), error)
-    assert plain(narrow_rows(shown, 80)[0]).endswith(" ✗ error ≠ -8,112")
-    assert plain(drives_rows(shown, 45, 3)[0]).endswith(" ✗ error ≠ -8,112")
+    assert plain(narrow_rows(shown, 80)[0]).endswith(" ✗ error ≠ -8112")
+    assert plain(drives_rows(shown, 45, 3)[0]).endswith(" ✗ error ≠ -8112")
     assert plain(drives_rows(shown, 39, 3)[0]).endswith(" ✗ error ≠")
     places = worst_first(shown, "press")
-    assert plain(drive_row(places[0], shown.now, 120, False)).endswith(" ✗ error ≠ -8,112")
+    assert plain(drive_row(places[0], shown.now, 120, False)).endswith(" ✗ error ≠ -8112")
     assert summary(places).startswith("1 ≠ twin · ")
 
 
@@ -168,8 +168,8 @@ def test_a_plot_has_a_curve_of_the_twin_beside_that_of_the_drive() -> None:
     session = demo_session()
     rows = plot_rows(view(session, *a_run(session)), 100, 30)
     text = plain(*rows)
-    assert "a gantry 5,970,000" in text and "a twin 6,368,000" in text and "velocity a gantry" in text
-    assert text.index("a twin 6,368,000") < text.index("a gantry 5,970,000"), "the higher one is above"
+    assert "a gantry 5970000" in text and "a twin 6368000" in text and "velocity a gantry" in text
+    assert text.index("a twin 6368000") < text.index("a gantry 5970000"), "the higher one is above"
     assert {role for row in rows for part, role in row if "a twin" in part} == {"series1"}, "one colour a drive"
     assert plain(plot_title(view(session, *a_run(session)))) == " plot last 20 s  20 Hz"
 
@@ -203,12 +203,12 @@ def test_the_dots_of_a_twin_are_as_many_in_every_direction(slope: tuple[int, int
 def test_what_rests_where_its_twin_does_is_said_once() -> None:
     session = demo_session()
     agree = [event for n in range(100) for event in beside(session.time - 5 + n / 20, 51_300, 0, 0)]
-    assert plain(*plot_rows(view(session, *agree), 60, 20)) == " a gantry at rest at 51,300 steps, its twin too"
+    assert plain(*plot_rows(view(session, *agree), 60, 20)) == " a gantry at rest at 51300 steps, its twin too"
     off = [event for n in range(100) for event in beside(session.time - 5 + n / 20, 51_300, 0, 0)[:1]]
     off += [OnBus("press", Predicted(session.time - 5 + n / 20, "a", 60_000, 0, -8_700)) for n in range(100)]
     assert plain(*plot_rows(view(session, *off), 60, 20)).splitlines() == [
-        " a gantry at rest at 51,300 steps",
-        " a gantry twin at rest at 60,000 steps",
+        " a gantry at rest at 51300 steps",
+        " a gantry twin at rest at 60000 steps",
     ]
 
 
@@ -217,7 +217,7 @@ def test_the_difference_is_plotted_as_a_value() -> None:
     session.plotted = (Series("press", "a", DIFFERENCE),)
     shown = view(session, *a_run(session))
     text = plain(*plot_rows(shown, 100, 20))
-    assert "difference a gantry steps" in text and "velocity" not in text and "a gantry -398,000" in text
+    assert "difference a gantry steps" in text and "velocity" not in text and "a gantry -398000" in text
     polling = Polling()
     polling.update(session, shown.model, {"plot", "samples"})
     assert session.buses["press"].telemetry.polled["a"] == 0.02, "it needs samples"

@@ -151,6 +151,6 @@ class Editor(TextArea):
         event.stop()
         event.prevent_default()
         if len(event.text) > LARGEST_PASTE:
-            self.notify(f"{len(event.text):,} characters are more than a paste takes; nothing was inserted")
+            self.notify(f"{len(event.text)} characters are more than a paste takes; nothing was inserted")
             return
         self.replace(edited(event.text), *self.selection, maintain_selection_offset=False)

@@ -12,11 +12,11 @@ from tui.panels.travel import LEARNT, LIMITS, SEEN, bar, phase, to_go_words, tra
 from tui.panels.twin import twin_rows
 from tui.panels.view import View
 from tui.readout import Readout, State
-from tui.text import fit, thousands
+from tui.text import digits, fit
 from tui.widgets.lines import Row, Span, spread, width_of
 
-NUMBER = 14
-"""Width of the longest position, -2,147,483,648."""
+NUMBER = 12
+"""Width of the longest position, -2147483648, and a space."""
 WORDS = {LIMITS: "software limits", LEARNT: "between limit switches", SEEN: "seen so far"}
 
 
@@ -67,7 +67,7 @@ def axis_rows(glance: Glance, axis: Readout, now: float, width: int) -> list[Row
     rows: list[Row] = [spread(_state(glance, axis, now, width - width_of(speed) - 1), speed, width)]
     rows += [((f"{name} {text}", role_of),) for text, role_of in _troubles(axis, now)]
     target = axis.conditions.target if axis.conditions is not None and live else None
-    arrow = f"   → {thousands(target)}" if target is not None else ""
+    arrow = f"   → {digits(target)}" if target is not None else ""
     togo = to_go_words(axis, now) if live else ""
     right: list[Span] = [(f"{togo} to go ", "text")] if togo else []
     rows.append(spread([(f" {position:>{NUMBER}} ", role), (unit, "dim"), (arrow, role)], right, width))
@@ -113,8 +113,8 @@ def _travel_rows(axis: Readout, role: str, width: int) -> list[Row]:
     row: Row = ((f" {bar(axis, width - 2)}", drawn),)
     if travel is None:
         return [row, ((" travel not known", "dim"),)]
-    ends: list[Span] = [(f" {travel.low:,}", "dim")]
-    return [row, spread([*ends, (f"  {WORDS[travel.known_by]}", "dim")], [(f"{travel.high:,} ", "dim")], width)]
+    ends: list[Span] = [(f" {travel.low}", "dim")]
+    return [row, spread([*ends, (f"  {WORDS[travel.known_by]}", "dim")], [(f"{travel.high} ", "dim")], width)]
 
 
 def _condition_rows(glance: Glance, axis: Readout, now: float, width: int, *, named: bool) -> list[Row]:

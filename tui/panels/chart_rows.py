@@ -12,7 +12,7 @@ from tui.curves.scale import Scale, row_of, ticks
 from tui.curves.window import Window
 from tui.panels.series import Group, Line, groups, role_of
 from tui.panels.view import View
-from tui.text import age, fit, short, thousands
+from tui.text import age, digits, fit, short
 from tui.widgets.lines import SERIES, Row, Span
 
 AXIS = 10
@@ -48,7 +48,7 @@ def gutter(width: int) -> int:
 
 def shown_number(value: float) -> str:
     """Format a value; a whole number has no decimals."""
-    return thousands(int(value)) if value == int(value) else f"{value:,.3f}"
+    return digits(int(value)) if value == int(value) else f"{value:.3f}"
 
 
 def chart_rows(view: View, shown: Shown, window: Window, width: int, height: int) -> list[Row]:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from tui.readout import Readout, State
 from tui.screen_model import ScreenModel
 from tui.session_view import BusView, SessionView
-from tui.text import fit, thousands
+from tui.text import digits, fit
 from tui.widgets.lines import Span
 
 STATE = 17
@@ -43,8 +43,8 @@ class Glance:
         """Position, velocity, and their role: dim unless they are known to be current."""
         last = (axis or self.readout).last
         dim = self.lost or self.readout.silent_since is not None or self.readout.old(now) or self.storing
-        position = thousands(None if last is None else last.position)
-        velocity = thousands(None if last is None else last.velocity)
+        position = digits(None if last is None else last.position)
+        velocity = digits(None if last is None else last.velocity)
         return position, velocity, "dim" if dim else "strong"
 
 

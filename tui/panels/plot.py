@@ -141,7 +141,7 @@ def _slack(line: Line, velocities: Mapping[tuple[str, str, str], Extent]) -> flo
 
 
 def _words(view: View, line: Line, extent: Extent | None, velocity: Extent | None) -> Row:
-    """`a gantry at rest at 51,300 steps`; what is not known is said."""
+    """`a gantry at rest at 51300 steps`; what is not known is said."""
     measured = line.of_drive.quantity.word
     word = "" if measured in PLOTTED else f"{measured} "
     name = f" {line.shown} {word}"

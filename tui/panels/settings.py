@@ -115,6 +115,6 @@ class SettingsTable:
 
 
 def _aligned(text: str) -> str:
-    """A value at the right of its column, a whole number with thousands separators; fields and texts are cut."""
-    shown = f"{int(text):,}" if text.lstrip("-").isdigit() else text
+    """A value at the right of its column, a whole number without zeros before it; fields and texts are cut."""
+    shown = str(int(text)) if text.lstrip("-").isdigit() else text
     return f"{fit(shown, VALUE).strip():>{VALUE}}"

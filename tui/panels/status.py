@@ -15,7 +15,7 @@ from tui.panels.travel import bar, to_go_words
 from tui.panels.twin import SIGN, alarm_words, difference_words, differs
 from tui.panels.view import View
 from tui.readout import Readout, State
-from tui.text import age, fit, thousands
+from tui.text import age, digits, fit
 from tui.widgets.lines import Row, Span, spread, width_of
 
 NAME = 9
@@ -63,7 +63,7 @@ def _axis_row(glance: Glance, axis: Readout, now: float, width: int, *, first: b
         _name(glance, axis, first=first),
         (short_words(glance, axis, now), _state_role(glance, now)),
         (f"{bar(axis, BAR)} ", "dim" if role == "dim" else "text"),
-        (f"{thousands(None if axis.last is None else axis.last.position):>{NUMBER}}", role),
+        (f"{digits(None if axis.last is None else axis.last.position):>{NUMBER}}", role),
         (f"{f'{velocity}/s' if moves else '':>{VELOCITY}} ", role),
     ]
     room = width - width_of(row)
@@ -104,7 +104,7 @@ def _besides(axis: Readout, now: float, room: int, *, live: bool) -> Span:
         return text, "error" if live or trouble else "dim"
     target = axis.conditions.target if axis.conditions is not None else None
     if live and target is not None and axis.last is not None and axis.last.velocity:
-        return f"→ {thousands(target)}  {to_go_words(axis, now)}".rstrip(), "text"
+        return f"→ {digits(target)}  {to_go_words(axis, now)}".rstrip(), "text"
     return program_words(axis), "dim" if aged(axis, now) else "motion"
 
 

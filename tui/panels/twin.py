@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 from tui.readout import Readout
-from tui.text import at_words, thousands
+from tui.text import at_words, digits
 from tui.widgets.lines import Row, Span, spread
 
 SIGN = "≠"
@@ -21,29 +21,29 @@ def twin_rows(axis: Readout, unit: str, number: int, width: int, *, dim: bool) -
         return
     predicted, diverged = twin.predicted, twin.diverged
     role = "dim" if dim or twin.behind(axis.last) else "text"
-    velocity: list[Span] = [(thousands(predicted.velocity), role), (f" {unit}/s ", "dim")]
-    yield spread([(f" {predicted.position:>{number},} ", role), ("twin", "dim")], velocity, width)
+    velocity: list[Span] = [(digits(predicted.velocity), role), (f" {unit}/s ", "dim")]
+    yield spread([(f" {predicted.position:>{number}} ", role), ("twin", "dim")], velocity, width)
     if diverged is None:
-        yield ((f" {predicted.difference:>+{number},} ", role), ("difference", "dim"))
+        yield ((f" {predicted.difference:>+{number}} ", role), ("difference", "dim"))
         return
     alarm = "dim" if role == "dim" else "error"
-    limit: list[Span] = [(f"limit {thousands(diverged.limit)} ", "dim")]
-    yield spread([(f" {SIGN} {predicted.difference:>+{number - 2},} ", alarm), ("difference", alarm)], limit, width)
+    limit: list[Span] = [(f"limit {digits(diverged.limit)} ", "dim")]
+    yield spread([(f" {SIGN} {predicted.difference:>+{number - 2}} ", alarm), ("difference", alarm)], limit, width)
     for text in at_words(", ".join(diverged.causes), width - 4)[:CAUSES]:
         yield ((f"   {text}", alarm),)
 
 
 def differs(axis: Readout, *, causes: bool = True) -> str:
-    """`≠ +8,112 stall, load`: the difference from the twin while it is above the limit; empty otherwise."""
+    """`≠ +8112 stall, load`: the difference from the twin while it is above the limit; empty otherwise."""
     twin = axis.twin
     if twin is None or twin.diverged is None:
         return ""
     now = (twin.predicted or twin.diverged).difference
-    return f"{SIGN} {now:+,} {', '.join(twin.diverged.causes) if causes else ''}".rstrip()
+    return f"{SIGN} {now:+} {', '.join(twin.diverged.causes) if causes else ''}".rstrip()
 
 
 def alarm_words(trouble: str, axes: Sequence[Readout], room: int) -> str:
-    """`≠ +8,112 stall, load`, or `✗ error ≠ +8,112`, or `✗ error ≠` where there is no room; empty without an alarm."""
+    """`≠ +8112 stall, load`, or `✗ error ≠ +8112`, or `✗ error ≠` where there is no room; empty without an alarm."""
     if not trouble:
         return "; ".join(filter(None, map(differs, axes)))
     found = "; ".join(filter(None, (differs(each, causes=False) for each in axes)))
@@ -56,4 +56,4 @@ def difference_words(axis: Readout) -> str:
     twin = axis.twin
     if twin is None or twin.predicted is None or twin.diverged is not None:
         return ""
-    return f"twin {twin.predicted.difference:+,}"
+    return f"twin {twin.predicted.difference:+}"

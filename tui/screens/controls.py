@@ -141,7 +141,7 @@ class ControlsPage(Page):
         head: list[Span] = [
             ("─ ", "rule"),
             (f"jog {axis.axis}".rstrip() + "  ", "dim"),
-            (f"{self.step:,} {unit}", "strong"),
+            (f"{self.step} {unit}", "strong"),
         ]
         jog = controls[BY]
         minus, plus = (self._shown(jog, axis, sign * self.step) for sign in (-1, 1))
@@ -250,7 +250,7 @@ class ControlsPage(Page):
         number = int(text)
         if not LOW <= number <= HIGH or (not name and number <= 0):
             low = LOW if name else 1
-            self._say(f"nothing was sent: {what} {number:,} is out of range; valid: {low:,} to {HIGH:,}", "!")
+            self._say(f"nothing was sent: {what} {number} is out of range; valid: {low} to {HIGH}", "!")
             return
         self._close("")
         if name:
@@ -273,7 +273,7 @@ class ControlsPage(Page):
         assert axis.last is not None
         to = number if name == TO else axis.last.position + number
         if not LOW <= to <= HIGH:
-            self._say(f"not sent: the end of the move, {to:,}, is out of range", "!")
+            self._say(f"not sent: the end of the move, {to}, is out of range", "!")
             return
         self._send(control.filled(by=number, to=to))
 

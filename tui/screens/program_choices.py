@@ -71,7 +71,7 @@ def files_in(folder: str) -> list[Found]:
                 folders.append(Found(f"{folder}{each.name}/", "folder"))
             elif os.path.splitext(each.name)[1].lower() in endings and each.is_file():
                 state = each.stat()
-                about = f"{state.st_size:,} B   {datetime.fromtimestamp(state.st_mtime):%Y-%m-%d %H:%M}"
+                about = f"{state.st_size} B   {datetime.fromtimestamp(state.st_mtime):%Y-%m-%d %H:%M}"
                 files.append((state.st_mtime, Found(f"{folder}{each.name}", about)))
     except OSError:
         return []

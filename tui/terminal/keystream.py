@@ -104,7 +104,7 @@ class KeyStream:
                 self._old_paste = False
                 self._warn("the rest of the paste in which the stop came was dropped, too")
             elif piece.kind is Kind.TOO_LONG:
-                self._warn(f"a paste of more than {MOST:,} characters was dropped")
+                self._warn(f"a paste of more than {MOST} characters was dropped")
             else:
                 found.append(piece)
         return found

@@ -27,7 +27,7 @@ MOST_COPIED = 50_000
 """Characters that terminals take into their clipboard."""
 FIND = " find ▸ "
 COUNTS = 17
-"""Width of `50,000 of 50,000`."""
+"""Width of `50000 of 50000`."""
 LEAST = 22
 """Width of the searched text and its label at least."""
 PICK_KEYS = ("Shift+↑↓ or Space more   Enter copy   Esc close ", "Enter copy   Esc close ", "Enter ")
@@ -218,7 +218,7 @@ class Reader(Horizontal):
 
     def _found(self, search: Search) -> Row:
         place, count = search.place
-        counts = f"{place:,} of {count:,}" if count else "nothing" if search.text else ""
+        counts = f"{place} of {count}" if count else "nothing" if search.text else ""
         keys = next(each for each in KEYS if not each or len(each) + COUNTS + LEAST <= self.size.width)
         room = len(keys) + COUNTS
         if self._words.styles.width is None or self._words.styles.width.value != room:
@@ -230,5 +230,5 @@ def counted(picked: Picked) -> str:
     """`3 lines, 42 characters`."""
     records = picked.records
     characters = sum(len(record.text) for record in records) + max(0, len(records) - 1)
-    lines = "1 line" if len(records) == 1 else f"{len(records):,} lines"
-    return f"{lines}, {characters:,} characters"
+    lines = "1 line" if len(records) == 1 else f"{len(records)} lines"
+    return f"{lines}, {characters} characters"

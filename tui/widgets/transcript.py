@@ -188,15 +188,15 @@ class Transcript(Lines, can_focus=False):
         sight = self.sight
         left: list[Span] = []
         if sight.filter:
-            counted = f"{len(sight.numbers):,} of {len(self.records):,} lines"
+            counted = f"{len(sight.numbers)} of {len(self.records)} lines"
             left = [(f" {sight.filter.words} ", "focus"), (f" {counted}   /filter off shows all", "dim")]
         elif sight.at_oldest and self.records.dropped:
-            left = [(f" {self.records.dropped:,} older lines were dropped", "dim")]
+            left = [(f" {self.records.dropped} older lines were dropped", "dim")]
         right: list[Span] = []
         if sight.paused:
-            right = [(f" PAUSED   {sight.below:,} new below   Ctrl+S: go on ", "focus")]
+            right = [(f" PAUSED   {sight.below} new below   Ctrl+S: go on ", "focus")]
         elif not sight.following and sight.below:
-            right = [(f" ▼ {sight.below:,} more below   Ctrl+End: follow ", "focus")]
+            right = [(f" ▼ {sight.below} more below   Ctrl+End: follow ", "focus")]
         if not left and not right:
             return []
         if width_of(left) + width_of(right) + 1 > width:

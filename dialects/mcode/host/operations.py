@@ -7,7 +7,7 @@ from dataclasses import replace
 from functools import lru_cache
 
 from dialects.codec import End, Kind, Priority, Procedure, Reply, Request
-from dialects.errors import NoAnswer, Refused
+from dialects.errors import Inexpressible, NoAnswer, Refused
 from dialects.family import Motion
 from dialects.mcode.host import classify
 from dialects.mcode.host.attend import attend
@@ -21,6 +21,7 @@ from dialects.mcode.host.program_mode import enter_program, program_line, put_ba
 from dialects.mcode.host.signatures import Sign, question, sign, signed, value
 from dialects.mcode.host.state import MCodeState
 from dialects.mcode.host.wording import who
+from dialects.mcode.manual import grammar
 from dialects.mcode.manual.mnemonic import EXPANDED
 from dialects.mcode.manual.status import EXPANDED_INPUTS, INPUTS, STATUS, in_words
 
@@ -28,7 +29,14 @@ GLOBAL = ("*", "^")
 
 
 def perform(state: MCodeState, text: str) -> Procedure[tuple[str, ...]]:
-    """Send a typed line and prove its outcome; return the printed lines. Raises Refused, NoAnswer or Stopped."""
+    """Send a typed line and prove its outcome; return the printed lines.
+
+    Raises Refused, NoAnswer, Stopped or Inexpressible.
+    """
+    try:
+        grammar.check_groups(text)
+    except grammar.LineError as error:
+        raise Inexpressible(f"'{text}': {error.why}; nothing was sent") from None
     request = state.codec.request(state.address, text)
     if state.address in GLOBAL:
         yield from _broadcast(state, request)

@@ -20,7 +20,7 @@ from math import inf
 from typing import NamedTuple
 
 from dialects.mcode.manual.errors import ErrorNumber
-from dialects.mcode.manual.table import lookup
+from dialects.mcode.manual.table import MDRIVE, MNEMONICS, lookup
 
 FUNCTIONS = frozenset({"AB", "CS", "C_", "LO", "L_", "SI", "SQ", "S_", "TG", "T_"})
 """Words that precede their operand (manual 5.2.15 to 5.2.25)."""
@@ -50,6 +50,11 @@ _TOKEN = re.compile(
 NAME_FORM = "a name is a letter, alone or with a letter, a digit or two digits"
 _NAME = re.compile(r"[A-Z](?:[A-Z0-9]|[0-9]{2})?\Z")
 _SWAPPED = {"=<": "<=", "=>": ">="}
+_GROUP = re.compile(r"\d{3}(?:\.\d*)?", re.ASCII)
+_REMARKED = re.compile(r"(?:['`]\d{3})+\s*(?:['`].*)?", re.ASCII)
+_GROUPED = re.compile(r"\d+(?:(?:\s*,\s*|\s+|['`])[0-9]{3}(?![0-9]))+(?:\.[0-9]*)?")
+_BINARY_FIELDS = frozenset({"<0/1>", "0", "1"})
+"""What the syntax of a word calls a field that takes only 0 or 1."""
 
 
 class Token(NamedTuple):
@@ -189,6 +194,42 @@ def parse(line: str, names: Container[str] = ()) -> Statement | None:
     if len(found) > MOST_TOKENS:
         raise LineError(ErrorNumber.ILLEGAL_DATA, found[MOST_TOKENS].start, "the line is too long")
     return _Parser(found, len(line), names).statement()
+
+
+def check_groups(line: str, names: Container[str] = ()) -> None:
+    """Raise LineError for a number in groups of three digits (`MA 200,000`), of which a drive reads the first.
+
+    Three digits after a number and a comma or a space are such a group where the word has no further field, or a field
+    that takes only 0 or 1. `PR` has as many fields as a line holds. An apostrophe begins a remark: `MA 200'000`.
+    """
+    found = divided(tokens(line), names)
+    word = found[0].text.upper() if found and found[0].kind == "word" else ""
+    number, field, place = None, 0, 0
+    for token in found if word != "PR" else ():
+        if token.kind == "remark" and number is not None and number.stop == token.start:
+            grouped = _REMARKED.fullmatch(token.text) is not None
+        else:
+            group = token.kind == "number" and _GROUP.fullmatch(token.text)
+            grouped = bool(group) and number is not None and _fields(word, place + 1) <= _BINARY_FIELDS
+        if number is not None and grouped:
+            whole = _GROUPED.match(line, number.start)
+            shown = whole[0].rstrip() if whole else line[number.start : token.stop]
+            why = f"{shown} would be read as {number.text}; write {re.sub(r'[^0-9.]', '', shown)}"
+            raise LineError(ErrorNumber.ILLEGAL_DATA, number.start, why)
+        if token.kind == "number":
+            number, place = token, field
+        elif token.kind == "comma":
+            field += 1
+        elif not token.text.isspace():  # a space that is not ASCII is no token of the language
+            number = None
+
+
+def _fields(word: str, at: int) -> set[str]:
+    """What the forms of a word take in their field `at`, from 0, in any firmware; empty where no form has it."""
+    rows = [table[word] for table in (MNEMONICS, MDRIVE) if word in table]
+    forms = [re.sub(r"[][]", "", form) for row in rows for form in row.syntax.split(", ")]
+    takes = [form[len(word) + 1 :].split(",") for form in forms if re.match(rf"{word}[ =]", form)]
+    return {fields[at] for fields in takes if len(fields) > at}
 
 
 def divided(found: list[Token], names: Container[str]) -> list[Token]:

@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING
 from dialects.files import text_of
 from dialects.layout import respelled
 from dialects.mcode.manual.canonical import canonical
-from dialects.mcode.manual.grammar import LineError, parse
+from dialects.mcode.manual.grammar import LineError, check_groups, parse
 from dialects.mcode.manual.table import lookup
 from dialects.problems import Problem, refuse
 
@@ -83,7 +83,8 @@ def scan(text: str) -> tuple[list[ProgramLine], list[Problem]]:
     ]
     if not lines:
         return [], [Problem(1, 1, "nothing to send: no line but remarks and blanks")]
-    problems = [problem for line in lines for problem in _unsendable(line)]
+    names = frozenset(line.declares for line in lines if line.declares)
+    problems = [problem for line in lines for problem in _unsendable(line, names)]
     sections, unpaired = _sections(lines)
     problems += unpaired
     if "program" not in sections:
@@ -128,8 +129,8 @@ def unsendable(text: str) -> int | None:
     return next((at for at, each in enumerate(text) if each != "\t" and not " " <= each <= "~"), None)
 
 
-def _unsendable(line: ProgramLine) -> Iterator[Problem]:
-    """Report a character that cannot be sent, or a line longer than a drive accepts."""
+def _unsendable(line: ProgramLine, names: frozenset[str]) -> Iterator[Problem]:
+    """Report a character that cannot be sent, a line longer than a drive accepts, and a number in groups of digits."""
     at = unsendable(line.text)
     if at is not None:
         character = line.text[at]
@@ -139,6 +140,10 @@ def _unsendable(line: ProgramLine) -> Iterator[Problem]:
     if len(line.text) > LONGEST:
         what = f"{len(line.text)} characters without the remark; a drive takes {LONGEST}"
         yield Problem(line.number, line.column + LONGEST, what, "split the line")
+    try:
+        check_groups(line.text, names)
+    except LineError as wrong:
+        yield Problem(line.number, line.column + wrong.column, wrong.why)
 
 
 def _sections(lines: list[ProgramLine]) -> tuple[list[str], list[Problem]]:

@@ -29,6 +29,7 @@ def perform(state: ModbusState, text: str) -> Procedure[tuple[str, ...]]:
     """Carry out a line of MCode; return the printed lines. Raises Refused, NoAnswer, Stopped or Inexpressible."""
     text = grammar.strip(text)
     try:
+        grammar.check_groups(text, USER)
         statement = grammar.parse(text, USER)
     except grammar.LineError as error:
         raise Inexpressible(f"'{text}': {error.why}; nothing was sent") from None

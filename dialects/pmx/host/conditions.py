@@ -128,7 +128,7 @@ def _more(axis: str, facts: Facts) -> Iterator[tuple[str, str]]:
     if isinstance(loop, int):
         yield "StepNLoop", words.loop(loop)
     if isinstance(delta := facts.get(f"DX{axis}"), int):
-        yield "delta", f"{delta:,}"
+        yield "delta", str(delta)
     if isinstance(drivers := facts.get("EO"), int):
         yield "motor", "on" if drivers & DRIVERS[axis] else f"off (EO{DRIVERS[axis]}=0)"
     failed = [str(n) for n in PROGRAMS if facts.get(f"SASTAT{n}") == 4]

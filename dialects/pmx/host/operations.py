@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from dialects.codec import Priority, Procedure, Request
-from dialects.errors import Refused
+from dialects.errors import Inexpressible, Refused
 from dialects.family import Motion
 from dialects.pmx.host.exchange import answered, beyond_doubt, number, who
 from dialects.pmx.host.state import PmxState
 from dialects.pmx.manual import status as words
-from dialects.pmx.manual.table import AXES
+from dialects.pmx.manual.table import AXES, grouped
 
 OK = "OK"
 LATER = ("DN", "DB")
@@ -19,6 +19,8 @@ POINTS = (("DI", "inputs on"), ("DO", "outputs on"), ("EO", "motor drivers on"))
 
 def perform(known: PmxState, text: str) -> Procedure[tuple[str, ...]]:
     """Send a command as typed; return the printed lines. Raises Refused, NoAnswer, Stopped or Inexpressible."""
+    if wrong := grouped(text):
+        raise Inexpressible(f"'{text}': {wrong}; nothing was sent")
     reply = yield from answered(known, known.codec.request(known.address, text))
     name, sets, _ = text.strip().partition("=")
     if sets and name in LATER:

@@ -13,6 +13,7 @@ import re
 from dataclasses import dataclass, field
 
 from dialects.pmx.manual.script_words import AXES, BLOCKS, COMPARISONS, INT32, PROGRAMS, SUBROUTINES, WORDS
+from dialects.pmx.manual.table import grouped
 from dialects.problems import Problem
 
 _VALUE = r"-?\d+|[A-Za-z]\w*"
@@ -119,6 +120,8 @@ def _statement(bare: str, line: int) -> Statement:
             raise _Wrong(column + at, f"A-SCRIPT has no character {character!r}", "remarks begin with ;")
     if found := _FOREIGN.search(text):
         raise _Wrong(column + found.start(), f"{found[0]} begins no remark in A-SCRIPT", "remarks begin with ;")
+    if wrong := grouped(text):
+        raise _Wrong(column, wrong)
     if found := _BLOCK.fullmatch(text):
         values, op = _condition(found[2], column + found.start(2), found[1])
         return Statement("block", found[1], values, op, line, column)

@@ -164,6 +164,17 @@ ELSEWHERE: Mapping[str, str] = {
 _HEAD = re.compile(r"[A-Za-z]+")
 _PLACE = re.compile(r"(X-?\d+(Y-?\d+)?|Y-?\d+|I-?\d+:-?\d+|T[XY]-?\d+)", re.ASCII)
 
+_GROUPED = re.compile(r"[0-9]+(?:(?:\s*,\s*|\s+|')[0-9]{3}(?![0-9]))+")
+
+
+def grouped(text: str) -> str:
+    """Return why a line is refused for a number in groups of three digits (`X200,000`); empty where it has none.
+
+    No command separates numbers by a comma or a space.
+    """
+    found = _GROUPED.search(text)
+    return f"{found[0]} is not one number; write {re.sub(r'[^0-9]', '', found[0])}" if found else ""
+
 
 def lookup(word: str) -> Command | None:
     """Find the row of a command, with or without its continuation (`HSPDX`, `X1000`, `DO3=1`), in any case."""

@@ -1,0 +1,110 @@
+"""A number in groups of three digits is refused in every family, and nothing is sent; lines with fields are not."""
+
+from __future__ import annotations
+
+import asyncio
+
+import pytest
+
+from dialects import Diagnostic, Inexpressible
+from dialects.mcode.manual import program_checker, program_file
+from dialects.mcode.manual.grammar import LineError, check_groups
+from dialects.modbus.host.codec import Modbus
+from dialects.modbus.host.operations import perform
+from dialects.modbus.host.state import ModbusState
+from dialects.pmx.manual import program_file as pmx_file
+from dialects.pmx.manual.table import grouped
+from dialects.tmcl.manual import grammar as tmcl
+from macros import Macro, Step
+from shell.events import By
+from tests.support.cases import for_each
+from tests.support.cell_session import CellSession, bus, party, pmx
+from tests.support.virtual import in_virtual_time
+
+GROUPED = {
+    "MA 200,000": "200000", "MR -200,000": "200000", "MA200,000": "200000", "ma 1,234,567": "1234567",
+    "MA 200,000,1": "200000", "MA 200 000": "200000", "MA 200, 000": "200000", "MA 1,5,100": "5100",
+    "MA 200\u2009000": "200000", "MA 200\u202f000": "200000", "MA 200\u00a0000": "200000", "MA 200'000": "200000",
+    "SL -1,000 'slow": "1000", "VM=1 000 000": "1000000", "P=1,000.5": "1000.5", "R1=R2+200,000": "200000",
+    "LS=1,200,000": "200000", "VA Q1=200,000": "200000", "Q1=200,000": "200000", "H 1,000": "1000",
+    "BR A1,P>200,000": "200000", "200,000": "200000", "PG 1,000": "1000",
+}  # fmt: skip
+FIELDS = (
+    "MA 51200,1", "MA 51200,1,1", "MA 5,0,1", "IS=1,16,1", "IS=5,1,100", "OS=1,16,1", "S1=16,1,0", "S1 16,1",
+    "LS=1,200", "LS=1,-200,0", "PR 1,000", 'PR "1,000"', "PR P,100", "TP 5000,100", "TR=100,200,300", "PW=1,200,300",
+    "MR 5,0,1", "MA 5 '200", "MA 5 ' 200,000",
+    "PF=10,100", "EX 100,1", "CP 1,100", "BR 100,P=200", "BP 100,200", "TI=1,100", "MU=1,1",
+)  # fmt: skip
+TMCL = ("MVP ABS, 0, 200", "ROR 0,100", "ROL 1,100", "SAP 140, 100, 100", "137 0, 0, 123", "138 1,200,300", "GAP 1,100")
+
+
+def why(line: str) -> str:
+    try:
+        check_groups(line)
+    except LineError as wrong:
+        return wrong.why
+    return ""
+
+
+@for_each(("line", "number"), GROUPED.items())
+def test_groups_of_three_digits_are_refused_with_the_number_to_write(line: str, number: str) -> None:
+    assert why(line).endswith(f"; write {number}"), line
+
+
+@for_each("line", FIELDS)
+def test_a_field_of_a_word_may_have_three_digits(line: str) -> None:
+    assert why(line) == "", line
+
+
+@for_each("line", TMCL)
+def test_every_line_of_tmcl_has_its_fields(line: str) -> None:
+    assert tmcl.parse(line)
+
+
+def test_no_command_of_the_controller_separates_numbers() -> None:
+    for line in ("X200,000", "X200 000", "I1000:200,000", "V1=-200,000", "HSPD=1\u202f000"):
+        assert "write" in grouped(line), line
+    for line in ("X1000Y2000", "I1000:-1000", "V1=200000", "SA1=100", "TX1000", "DN=2ED00"):
+        assert grouped(line) == "", line
+
+
+def test_nothing_leaves_over_modbus() -> None:
+    with pytest.raises(Inexpressible, match="200,000 would be read as 200; write 200000; nothing was sent"):
+        next(perform(ModbusState(Modbus()), "MA 200,000"))
+
+
+def test_a_line_of_a_program_is_an_error_with_its_place() -> None:
+    text = "VA Q1=1,000\nPG 1\nLB A\n  MA 200,000\nMA 5,0,1\nE\nPG\n"
+    found = [(each.line, each.column, each.what) for each in program_file.scan(text)[1]]
+    assert [each[:2] for each in found] == [(1, 7), (4, 6)] and "write 200000" in found[1][2]
+    assert [each.line for each in program_checker.check(text) if not each.warning][:2] == [1, 4]
+    with pytest.raises(Diagnostic, match="x:1:1: X200,000 is not one number|x:1:1: 200,000 is not one number"):
+        pmx_file.read("X200,000\nEND\n", "x")
+
+
+@in_virtual_time
+async def test_nothing_is_sent_however_the_line_comes(tmp_path) -> None:
+    async with CellSession(tmp_path, bus("press", party("a"), party("b")), bus("stages", pmx("00"))) as shop:
+        await asyncio.sleep(1.0)
+        shop.events.clear()
+        for line in ("MA 200,000", "@a MA 200 000", "@b MR -200,000,1", "@* SL 200,000", "@stages:00 X200,000"):
+            for by in (By.OPERATOR, By.SCRIPT):
+                with pytest.raises(Inexpressible, match="nothing was sent"):
+                    await shop.session.run(line, by)
+        with pytest.raises(Inexpressible, match="write 200000"):
+            await shop.session.play(Macro("go", (Step(0.0, "@a MA 200,000"),)), {})
+        await asyncio.sleep(1.0)
+        assert b"200" not in shop.written("press") + shop.written("stages") and not shop.moving()
+        await shop.session.run("@a MA 200,1")
+        assert b"MA 200,1" in shop.written("press")
+
+
+@in_virtual_time
+async def test_a_line_for_the_program_is_refused_too(tmp_path) -> None:
+    async with CellSession(tmp_path, bus("press", party("a"))) as shop:
+        await shop.session.run("PG 1")
+        with pytest.raises(Inexpressible):
+            await shop.session.run("MA 200,000")
+        await shop.session.run("E")
+        await shop.session.run("PG")
+        assert b"200" not in shop.written("press")
