@@ -82,7 +82,7 @@ def worst_first(view: View, filtered: str) -> list[Place]:
 
 
 def _has(place: Place, word: str, now: float) -> bool:
-    if len(word) == 1:
+    if len(word) == 1 and word.isalnum():
         return any(name.startswith(word) for name in place.name.casefold().replace(":", " ").split())
     sign, _ = place.glance.sign(now)
     return word in f"{place.name} {sign} {place.alarm()} {place.glance.product}".casefold()
