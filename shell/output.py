@@ -10,6 +10,7 @@ from __future__ import annotations
 import contextlib
 import errno
 import os
+import sys
 from collections.abc import Callable
 from typing import TextIO
 
@@ -60,8 +61,11 @@ dropped: list[str] = []
 def write(stream: TextIO, *lines: str, spare: bool = False) -> None:
     r"""Write and flush lines, their control characters as text (`\x1b`).
 
-    A lost reader gets nothing more; a slow one gets no spare lines.
+    A lost reader gets nothing more; a slow one gets no spare lines. What a program has printed comes before what is
+    written to standard error.
     """
+    if stream is sys.stderr:
+        flush_printed()
     lines = tuple(visible(line, tabs=True) for line in lines)
     if isinstance(stream, outlets.LineStream):
         stream.lines(lines, spare)
@@ -73,6 +77,14 @@ def write(stream: TextIO, *lines: str, spare: bool = False) -> None:
         stream.flush()
     except (OSError, ValueError) as problem:  # ValueError: the stream was closed
         lose(stream, problem)
+
+
+def flush_printed() -> None:
+    """Write what a program has printed: where standard output is no terminal, Python keeps it back."""
+    try:
+        sys.stdout.flush()
+    except (OSError, ValueError) as problem:
+        lose(sys.stdout, problem)
 
 
 def lose(stream: TextIO, problem: OSError | ValueError) -> None:

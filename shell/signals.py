@@ -1,7 +1,61 @@
-"""The signals that end a process."""
+"""The signals that end a process early: automation stops what it moved. Signals of a fault are not among them."""
 
 from __future__ import annotations
 
+import contextlib
+import os
 import signal
+import sys
+import threading
+from collections.abc import Iterator
 
-SIGNALS = tuple(getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name))
+
+def _existing(*names: str) -> tuple[signal.Signals, ...]:
+    """The signals of this platform among those named."""
+    return tuple(signal.Signals[name] for name in names if hasattr(signal, name))
+
+
+FROM_TERMINAL = _existing("SIGINT", "SIGHUP", "SIGQUIT")
+"""A terminal sends these to all processes of a job."""
+SIGNALS = (*FROM_TERMINAL, *_existing("SIGTERM", "SIGALRM", "SIGUSR1", "SIGUSR2", "SIGXCPU"))
+"""All but SIGPIPE: see `early_ends`."""
+
+
+@contextlib.contextmanager
+def early_ends() -> Iterator[None]:
+    """Within this block SIGNALS may be given handlers; on Linux, SIGPIPE counts as SIGTERM."""
+    before = {each: signal.getsignal(each) for each in SIGNALS}
+    with _pipe_taken():
+        try:
+            yield
+        finally:
+            for each, handler in before.items():
+                signal.signal(each, handler)
+
+
+@contextlib.contextmanager
+def _pipe_taken() -> Iterator[None]:
+    """Send SIGTERM for each SIGPIPE to the process. Enter it before other threads start: they block the signal, too.
+
+    Python ignores SIGPIPE, because a broken socket sends it. Linux sends that one to the thread whose write failed.
+    There it stays blocked, and a thread that waits gets those to the process. Other systems send both to the process.
+    """
+    if sys.platform != "linux":
+        yield
+        return
+    pipe, over = {signal.SIGPIPE}, threading.Event()
+
+    def wait() -> None:
+        while signal.sigwait(pipe) and not over.is_set():
+            os.kill(os.getpid(), signal.SIGTERM)
+
+    mask = signal.pthread_sigmask(signal.SIG_BLOCK, pipe)
+    taker = threading.Thread(target=wait, daemon=True, name="signals")
+    taker.start()
+    try:
+        yield
+    finally:
+        over.set()
+        signal.pthread_kill(taker.ident or 0, signal.SIGPIPE)
+        taker.join()
+        signal.pthread_sigmask(signal.SIG_SETMASK, mask)

@@ -13,6 +13,7 @@ from textual.driver import Driver
 
 from dialects import Diagnostic
 from dialects.on_demand import importing
+from shell.signals import SIGNALS, early_ends
 from tui.app import MultidropApp
 from tui.assist import ShellAssist
 
@@ -34,7 +35,8 @@ def run(urls: Sequence[str], reconnect: bool = True, raw: bool = False, twin: bo
     if not (sys.stdin.isatty() and sys.stdout.isatty()):
         raise Diagnostic("the screen needs a terminal", "tui", "multidrop shell reads lines from standard input")
     sys.setswitchinterval(SWITCH)
-    return asyncio.run(_run(urls, load(), reconnect, raw, twin))
+    with early_ends():
+        return asyncio.run(_run(urls, load(), reconnect, raw, twin))
 
 
 async def _run(urls: Sequence[str], settings: Settings, reconnect: bool, raw: bool, twin: bool) -> int:
@@ -97,10 +99,10 @@ def driver() -> type[Driver] | None:
 
 
 def _watch_signals(app: MultidropApp) -> None:
-    """On a hang-up, a kill or an interrupt, stop what automation moves, then end the app."""
+    """On a hang-up, or another signal that ends a process, stop what automation moves, then end the app."""
     if sys.platform != "win32":
         loop = asyncio.get_running_loop()
-        for number in (signal.SIGTERM, signal.SIGINT):
+        for number in SIGNALS:
             loop.add_signal_handler(number, app.interrupted)
         loop.add_signal_handler(signal.SIGHUP, _hung_up, app)
 

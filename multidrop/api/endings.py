@@ -1,7 +1,7 @@
 """The end of the process while sessions are open: what they set in motion is stopped.
 
-An uncaught exception ends the main thread, and with it what is still open. SIGTERM and SIGHUP would end a process at
-once; where the program leaves them at that, they become a SystemExit, so that its `with` and `finally` blocks run.
+An uncaught exception ends the main thread, and with it what is still open. Signals such as SIGTERM would end a process
+at once; where the program leaves them at that, they become a SystemExit, so that its `with` and `finally` blocks run.
 """
 
 from __future__ import annotations
@@ -10,11 +10,13 @@ import atexit
 import contextlib
 import importlib
 import signal
+import sys
 import threading
 from collections.abc import Callable
 from typing import Protocol
 
-SIGNALS = tuple(getattr(signal, name) for name in ("SIGTERM", "SIGHUP") if hasattr(signal, name))
+from shell.signals import SIGNALS
+
 SIGNALLED = 128
 """The exit code after a signal is this and its number."""
 
@@ -41,12 +43,19 @@ def opened(session: Endable) -> None:
 
 def closed(session: Endable) -> None:
     """Forget a session; the last one gives the signals back."""
+    flush_printed()
     _open.discard(session)
     if not _open and threading.current_thread() is threading.main_thread():
         for each, before in _handled.items():
             if signal.getsignal(each) is _exit:
                 signal.signal(each, before)
         _handled.clear()
+
+
+def flush_printed() -> None:
+    """Write what the program has printed: it comes before a report of its end, or a traceback."""
+    with contextlib.suppress(OSError, ValueError, AttributeError):  # no reader, closed, or no standard output at all
+        sys.stdout.flush()
 
 
 def _exit(number: int, _: object) -> None:

@@ -35,6 +35,7 @@ Notice = Callable[[str, bool], object]
 
 def log(text: str, warning: bool) -> None:
     """Pass a line to `logging`, whose default shows warnings on standard error."""
+    endings.flush_printed()
     logging.getLogger("multidrop").log(logging.WARNING if warning else logging.INFO, text)
 
 

@@ -28,7 +28,7 @@ from shell.front.interrupts import on_stop_key
 from shell.front.report import Report
 from shell.output import INTERRUPTED, exit_code, write
 from shell.scripts.results import Result
-from shell.signals import SIGNALS
+from shell.signals import SIGNALS, early_ends
 
 
 def run(chosen: argparse.Namespace, report: Report) -> int:
@@ -77,7 +77,7 @@ class _Execution:
     def run(self) -> int:
         """Open, execute, close; return the exit code. What goes wrong is said."""
         with contextlib.ExitStack() as around:
-            around.callback(self._signals())
+            around.enter_context(self._signals())
             try:
                 with self._session() as session:
                     try:
@@ -96,17 +96,20 @@ class _Execution:
 
     # Signals and the stop key
 
-    def _signals(self) -> Callable[[], None]:
-        """Take the signals that end a program; the function returned gives them back."""
-        taken = {each: signal.signal(each, self._signalled) for each in SIGNALS}
-        if sys.platform != "win32":
-            taken[signal.SIGCONT] = signal.signal(signal.SIGCONT, self._continued)
-
-        def restore() -> None:
-            for number, before in taken.items():
-                signal.signal(number, before)
-
-        return restore
+    @contextlib.contextmanager
+    def _signals(self) -> Iterator[None]:
+        """Take the signals that end a program."""
+        with early_ends():
+            for each in SIGNALS:
+                signal.signal(each, self._signalled)
+            if sys.platform == "win32":
+                yield
+                return
+            before = signal.signal(signal.SIGCONT, self._continued)
+            try:
+                yield
+            finally:
+                signal.signal(signal.SIGCONT, before)
 
     def _signalled(self, number: int, frame: object) -> None:
         """Raise in the program; the end of it is not cut off."""

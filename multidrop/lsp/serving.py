@@ -23,9 +23,9 @@ from pygls.io_ import run_async
 
 from dialects import Diagnostic
 from multidrop.lsp.server import Server
+from shell.signals import SIGNALS
 from transports.exposure import exposed
 
-SIGNALS = tuple(getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name))
 PIECE = 65536
 
 

@@ -9,7 +9,7 @@ import sys
 from collections.abc import Callable, Iterator
 
 from shell.front.keyboard import Keyboard, foreground_terminal
-from shell.signals import SIGNALS
+from shell.signals import SIGNALS, early_ends
 
 
 @contextlib.contextmanager
@@ -26,15 +26,16 @@ def on_signals(callback: Callable[[], None]) -> Iterator[None]:
         came.add(number)
         callback()
 
-    for each in SIGNALS:
-        with contextlib.suppress(NotImplementedError):  # a loop without signals: KeyboardInterrupt ends it
-            loop.add_signal_handler(each, call, each)
-            handled.append(each)
-    try:
-        yield
-    finally:
-        for number in handled:
-            loop.remove_signal_handler(number)
+    with early_ends():
+        for each in SIGNALS:
+            with contextlib.suppress(NotImplementedError):  # a loop without signals: KeyboardInterrupt ends it
+                loop.add_signal_handler(each, call, each)
+                handled.append(each)
+        try:
+            yield
+        finally:
+            for number in handled:
+                loop.remove_signal_handler(number)
         if sys.platform != "win32" and signal.SIGHUP in came:
             signal.signal(signal.SIGHUP, signal.SIG_IGN)
 

@@ -19,7 +19,7 @@ from multiprocessing import connection
 from multiprocessing.context import BaseContext
 from typing import ParamSpec, TypeVar
 
-from shell.signals import SIGNALS
+from shell.signals import FROM_TERMINAL, SIGNALS
 from shell.sweeps import trial
 from shell.sweeps.interruption import Interruption
 from shell.sweeps.trial import DIED, Case, Job, Result
@@ -165,7 +165,7 @@ def _begin() -> None:
     """
     gc.freeze()
     for each in SIGNALS:
-        signal.signal(each, signal.SIG_DFL if each == signal.SIGTERM else signal.SIG_IGN)
+        signal.signal(each, signal.SIG_IGN if each in FROM_TERMINAL else signal.SIG_DFL)
     if sys.platform != "win32":
         signal.pthread_sigmask(signal.SIG_UNBLOCK, SIGNALS)
     threading.Thread(target=_end_with_parent, daemon=True).start()

@@ -20,6 +20,7 @@ import pytest
 
 from multidrop.__main__ import main
 from tests.support.paths import ROOT
+from tests.support.processes import environment
 
 pytestmark = pytest.mark.process
 
@@ -65,9 +66,8 @@ PAGES = {
 def test_the_commands_of_a_page_print_what_it_says(page: str, tmp_path: Path) -> None:
     for content, file in FILE.findall(PAGES[page]):
         (tmp_path / file).write_text(content, encoding="utf-8")
-    env = os.environ | {
+    env = environment(tmp_path) | {
         "PATH": f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}",
-        "PYTHONPATH": str(ROOT),
         "MULTIDROP_CONFIG_DIR": str(tmp_path),
         "MULTIDROP_STATE_DIR": str(tmp_path),
     }

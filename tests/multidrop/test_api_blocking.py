@@ -193,17 +193,19 @@ def test_the_end_of_the_process_stops_what_is_open(url: str) -> None:
     assert moving(cell) == set() and not session.thread.alive
 
 
-def test_signals_that_would_end_the_process_become_an_exit(url: str) -> None:
-    before = signal.signal(signal.SIGTERM, signal.SIG_DFL)
+@pytest.mark.parametrize("name", ["TERM", "HUP", "QUIT", "ALRM", "USR1", "USR2", "XCPU"])
+def test_signals_that_would_end_the_process_become_an_exit(url: str, name: str) -> None:
+    number = signal.Signals[f"SIG{name}"]
+    before = signal.signal(number, signal.SIG_DFL)
     try:
         with pytest.raises(SystemExit) as ended, connect(url) as session:
             cell = floor(session)
             session.drive("a").send(RUN)
-            os.kill(os.getpid(), signal.SIGTERM)
-        assert ended.value.code == 143 and moving(cell) == set()
-        assert signal.getsignal(signal.SIGTERM) is signal.SIG_DFL
+            os.kill(os.getpid(), number)
+        assert ended.value.code == 128 + number and moving(cell) == set()
+        assert signal.getsignal(number) is signal.SIG_DFL
     finally:
-        signal.signal(signal.SIGTERM, before)
+        signal.signal(number, before)
 
 
 def test_a_blocking_call_in_its_own_thread_is_refused(session: Session) -> None:

@@ -113,16 +113,24 @@ def test_reports_of_what_was_sent_and_where(run: Any, tmp_path: Path) -> None:
 
 
 @POSIX
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
-def test_a_signal_interrupts_the_program_and_stops_what_it_moved(run: Any, number: int) -> None:
+@pytest.mark.parametrize("name", ["INT", "TERM", "HUP", "QUIT", "ALRM", "USR1", "USR2", "XCPU", "PIPE"])
+def test_a_signal_interrupts_the_program_and_stops_what_it_moved(run: Any, name: str) -> None:
+    number = signal.Signals[f"SIG{name}"]
     before = signal.getsignal(number)
     done = run(
-        f"import os\na.send('SL 1000')\ntry:\n    os.kill(os.getpid(), {number:d})\nfinally:\n    print('finally')"
+        "import os, time\na.send('SL 1000')\n"
+        f"try:\n    os.kill(os.getpid(), {number:d})\n    time.sleep(60)\nfinally:\n    print('finally')"
     )
     assert done.returncode == 130 and done.stdout == "finally\n"
     assert done.stderr.splitlines()[0] == "stopped a: all 2 read velocity 0"
     assert done.stderr.splitlines()[-1] == "interrupted"
     assert signal.getsignal(number) is before
+
+
+@POSIX
+def test_a_broken_pipe_of_the_programs_own_ends_nothing(run: Any) -> None:
+    text = "import os\ngone, pipe = os.pipe()\nos.close(gone)\ntry:\n    os.write(pipe, b'x')\nexcept OSError:\n"
+    assert run(text + "    print(a.position)").stdout == "0\n"
 
 
 @POSIX
@@ -137,6 +145,41 @@ def test_a_program_that_swallows_a_signal_is_interrupted_all_the_same_and_leaves
 def test_the_session_is_only_there_under_run() -> None:
     with pytest.raises(ImportError, match=r"under `multidrop run SCRIPT.py`; use multidrop.connect"):
         from multidrop.script import session  # noqa: F401
+
+
+def in_one_file(shop: Any, *command: str) -> str:
+    """What a Python process writes to standard output and standard error, which are the same file."""
+    with (shop.folder / "out").open("w") as file:
+        environ, python = environment(shop.folder), [sys.executable, *command]
+        subprocess.run(python, cwd=shop.folder, env=environ, stdout=file, stderr=file, timeout=120, check=False)
+    return (shop.folder / "out").read_text()
+
+
+@pytest.mark.process
+@pytest.mark.parametrize(
+    ("end", "said"),
+    [
+        ("1 / 0", "Traceback"),
+        ("session.send('VM=5')", "job.py:3: b refused"),
+        ("raise SystemExit('not today')", "not today"),
+        ("session.stop()", "stop: b reads velocity 0"),
+        ("import os; os.kill(os.getpid(), 15)", "interrupted"),
+    ],
+)
+def test_what_a_program_printed_comes_before_what_is_said_of_its_end(shop: Any, end: str, said: str) -> None:
+    text = f"from multidrop.script import session\nprint('turned', end='. ')\n{end}\n"
+    (shop.folder / "job.py").write_text(text)
+    assert in_one_file(shop, "-m", "multidrop", "run", "job.py", "--on", "press").startswith(f"turned. {said}")
+
+
+@pytest.mark.process
+def test_what_a_plain_program_printed_comes_before_a_warning_and_its_traceback(shop: Any) -> None:
+    text = "session.drive('b').send('SL 1000')\n    print('turns', end='. ')\n    1 / 0\n"
+    (shop.folder / "plain.py").write_text(
+        f"import multidrop\nwith multidrop.connect({shop.urls['press']!r}) as session:\n    {text}"
+    )
+    written = in_one_file(shop, "plain.py")
+    assert written.startswith("turns. stopped b: b reads velocity 0\nTraceback")
 
 
 @pytest.mark.process

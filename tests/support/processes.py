@@ -18,8 +18,8 @@ WAIT = 30.0
 
 
 def environment(folder: Path) -> dict[str, str]:
-    """What a process is given so that it keeps to `folder`, and finds the rooms from there."""
-    inherited = {name: value for name, value in os.environ.items() if name != "PYTHONUNBUFFERED"}
+    """What a process is given so that it keeps to `folder`, and finds the rooms from there. No PYTHON* is passed on."""
+    inherited = {name: value for name, value in os.environ.items() if not name.startswith("PYTHON")}
     return inherited | {
         "PYTHONPATH": str(ROOT),
         "MULTIDROP_CONFIG_DIR": str(folder / "conf"),

@@ -48,8 +48,8 @@ E
 PG
 """
 OTHERS = [pytest.param(number, marks=pytest.mark.nightly) for number in (signal.SIGINT, signal.SIGHUP)]
-SIGNALS = [signal.SIGTERM, *OTHERS]
-"""The signals that end a program; one of them in every run where a test starts a process for each."""
+SIGNALS = [signal.SIGTERM, signal.SIGQUIT, *OTHERS]
+"""Signals that end a program, some of them in every run where a test starts a process for each."""
 FLOOD = 250_000
 """Bytes, more than a terminal and a queue in front of it hold."""
 LOG = "seen.log"
