@@ -262,6 +262,8 @@ class Family(Generic[S]):
     """None: the family has no line that a person must agree to."""
     stop_bytes: re.Pattern[bytes] | None = None
     """Matches each piece of a stop, however its drives are set; None: several programs cannot share a line of them."""
+    message_moves: Callable[[bytes], bool] = lambda messages: False
+    """Whether messages that carry their length can start a motion or a program."""
     prepare: Callable[[], object] | None = None
     """Slow work before the first message, safe in any thread; None: there is none."""
 

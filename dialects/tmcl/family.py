@@ -6,7 +6,7 @@ It has no URL scheme: its frames contain bytes that other drives obey, so nothin
 from __future__ import annotations
 
 from dialects.family import Family, Guards, Sentences
-from dialects.tmcl.host import operations
+from dialects.tmcl.host import framing, operations
 from dialects.tmcl.host.codec import STOP_BYTES, Tmcl
 from dialects.tmcl.host.identify import identify
 from dialects.tmcl.host.state import TmclState
@@ -33,4 +33,5 @@ TMCL = Family(
     conditions_at="dialects.tmcl.host.conditions:READER",
     controls_at="dialects.tmcl.host.controls:controls",
     stop_bytes=STOP_BYTES,
+    message_moves=framing.moves,
 )

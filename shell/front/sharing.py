@@ -18,7 +18,7 @@ from shell.front.interrupts import on_signals, on_stop_key
 from shell.output import exit_code, finish, nonblocking, report, write
 from shell.sharing.actions import Say
 from shell.sharing.server import SharedPort
-from shell.sharing.stop_bytes import own_stop, stop_bytes
+from shell.sharing.stop_bytes import stop_bytes
 from transports import Limited, TransportLost
 from transports.exposure import exposed
 from transports.sockets import explain
@@ -57,7 +57,7 @@ async def _share(url: str, address: str, as_json: bool, over: asyncio.Event) -> 
         stop_bytes(connection.hints.family)
     narrator = Narrator(as_json)
     opened = await open_port(connection)
-    shared = SharedPort(opened, stop_bytes(opened.family), narrator.say)
+    shared = SharedPort(opened, stop_bytes(opened.family, connection.hints.drives), narrator.say)
     try:
         endpoint = await _listen(shared, host, port)
         narrator.ready(opened.name, endpoint)
@@ -65,8 +65,7 @@ async def _share(url: str, address: str, as_json: bool, over: asyncio.Event) -> 
             narrator.note(f"{opened.transport.name}: {opened.transport.limits}")
         if exposed(host):
             narrator.note(EXPOSED.format(endpoint))
-        pieces = own_stop(opened.family, connection.hints.drives)
-        with on_stop_key(_nothing, lambda: shared.stop(pieces), over.set):
+        with on_stop_key(_nothing, shared.stop, over.set):
             await _ended(shared, over)
     finally:
         await shared.close()

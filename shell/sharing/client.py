@@ -7,6 +7,7 @@ client is sent no byte that is not a drive's: a program would take a reason for 
 
 from __future__ import annotations
 
+from collections import deque
 from dataclasses import dataclass
 
 from transports import telnet
@@ -17,7 +18,13 @@ HELD = 1 << 16
 INTERRUPTS = (b"\xff\xf4\xff\xfd\x06", b"\xff\xf4")
 """Ctrl+C of a telnet program that has negotiated nothing: IAC IP, mostly with a request to mark the time."""
 _TAKEN = (telnet.BINARY, telnet.SGA)
-_LENGTHS = {Setting.BAUD: 4}
+_LENGTHS: dict[int, int] = {
+    **dict.fromkeys((Setting.DATA_SIZE, Setting.PARITY, Setting.STOP_SIZE, Setting.CONTROL, Setting.PURGE), 1),
+    **dict.fromkeys((Setting.LINE_MASK, Setting.MODEM_MASK), 1),
+    **dict.fromkeys((Setting.SIGNATURE, Setting.SUSPEND, Setting.RESUME), 0),
+    Setting.BAUD: 4,
+}
+"""The bytes of the value of each request that is answered."""
 
 
 @dataclass(frozen=True)
@@ -26,6 +33,10 @@ class Request:
 
     setting: int
     value: int
+
+
+Input = bytes | Request
+"""What a client sends: bytes for the line, or a request."""
 
 
 class Client:
@@ -40,6 +51,10 @@ class Client:
         """Only stops are taken from it."""
         self.replies = bytearray()
         """Replies to its negotiation that are to be sent to it."""
+        self.waiting: deque[Input] = deque()
+        """What has been received from it and is not worked off."""
+        self.setting = False
+        """A setting of its is being changed: what follows waits for that."""
         self._text = text
         self._telnet: telnet.Decoder | None = None
         self._begun = False
@@ -49,14 +64,14 @@ class Client:
 
     # From the client
 
-    def receive(self, data: bytes) -> list[bytes | Request]:
-        """Divide received bytes into data and requests."""
+    def receive(self, data: bytes) -> list[Input]:
+        """Divide received bytes into data and requests; no request is answered here."""
         if not self._begun and data:
             self._begun = True
             self._telnet = telnet.Decoder() if data[0] == telnet.IAC else None
         if self._telnet is None:
             return [self._interrupted(data)]
-        found: list[bytes | Request] = []
+        found: list[Input] = []
         for event in self._telnet.receive(data):
             if isinstance(event, telnet.Data):
                 found.append(self._plain(event.data))
@@ -100,23 +115,33 @@ class Client:
             self.replies += telnet.option(verb, option)
 
     def _request(self, body: bytes) -> Request | None:
-        """The request in a subnegotiation; None: it is answered here, or has no meaning."""
+        """The request in a subnegotiation; None where it has no meaning."""
         found = parsed(body)
-        if found is None or not self.com_port:
+        if found is None or not self.com_port or found[0] not in _LENGTHS:
             return None
-        setting, value = found
-        if setting in (Setting.SUSPEND, Setting.RESUME):
-            self._suspended = setting == Setting.SUSPEND
+        setting, value = found[0], int.from_bytes(found[1])
+        valid = len(found[1]) == _LENGTHS[setting] and (setting != Setting.PURGE or 0 < value <= PURGE_BOTH)
+        return Request(setting, value) if valid else None
+
+    def answers(self, request: Request) -> bool:
+        """Answer a request that concerns this client alone; return whether it does."""
+        if request.setting in (Setting.SUSPEND, Setting.RESUME):
+            self._suspended = request.setting == Setting.SUSPEND
             self.replies += b"" if self._suspended else self._resumed()
-        elif setting == Setting.SIGNATURE and not value:
-            self.replies += message(setting + REPLY, b"multidrop share")
-        elif setting in (Setting.LINE_MASK, Setting.MODEM_MASK) and len(value) == 1:
-            self.replies += message(setting + REPLY, value)
-        elif setting == Setting.PURGE and len(value) == 1 and 0 < value[0] <= PURGE_BOTH:
-            return Request(setting, value[0])
-        elif Setting.BAUD <= setting <= Setting.CONTROL and len(value) == _LENGTHS.get(Setting(setting), 1):
-            return Request(setting, int.from_bytes(value))
-        return None
+        elif request.setting == Setting.SIGNATURE:
+            self.replies += message(request.setting + REPLY, b"multidrop share")
+        elif request.setting in (Setting.LINE_MASK, Setting.MODEM_MASK):
+            self.reply(request.setting, request.value)
+        else:
+            return False
+        return True
+
+    def overtaken(self) -> bytes:
+        """Take the bytes that wait for its turn, which a stop has overtaken; requests stay."""
+        waiting = tuple(self.waiting)
+        self.waiting.clear()
+        self.waiting.extend(each for each in waiting if isinstance(each, Request))
+        return b"".join(each for each in waiting if isinstance(each, bytes))
 
     # To the client
 

@@ -3,19 +3,29 @@
 The first client to write is the writer, until it leaves or is silent for ten seconds. Bytes of another one are refused,
 and its connection is closed. A stop passes from any client, before what waits: those bytes are dropped. Every client is
 sent what the drives send.
+
+A stop that the drives may not have received, because the port is lost, is owed: it is the first thing written once the
+port is back.
 """
 
 from __future__ import annotations
 
 from dialects.visible import visible
 from shell.sharing.actions import Action, Close, Purge, Say, Send, Set, Stop, Write
-from shell.sharing.client import Client, Request
+from shell.sharing.client import Client, Input, Request
 from shell.sharing.half_line import ENDS, HalfLine
-from shell.sharing.stop_bytes import StopBytes
+from shell.sharing.stop_bytes import OwedStop, StopBytes
 from transports.com_port import FLOW, FLOW_IN, GROUPS, NEEDED, PURGE_RECEIVED, Control, Setting, group_of
 
 SILENT = 10.0
 """Seconds of silence after which another client may write."""
+TURN = 8
+"""The requests and writes of one client that are worked off before the others are read."""
+WAITING = 1024
+"""The requests and writes that may wait for one client."""
+NOT_REACHED = "NOT REACHED"
+OWED = "the stop is written first once the port is back; until then drives may run on"
+NEVER = "the stop is never written, drives may run on: stop them at the machine"
 _ASKS = (Control.ASK_FLOW, Control.ASK_BREAK, Control.ASK_DTR, Control.ASK_RTS, Control.ASK_FLOW_IN)
 
 
@@ -45,11 +55,14 @@ class Exchange:
         """The last writer."""
         self._away = ""
         """The reason why the port is lost; empty: it is open."""
+        self.owed = OwedStop(stops.own)
         self._actions: list[Action] = []
 
     @property
     def deadline(self) -> float | None:
-        """The time at which the writer has been silent for long enough."""
+        """The time of the next `advance`: 0.0 while clients wait for a turn, else when the writer has been silent."""
+        if any(each.waiting and not each.setting for each in self.clients.values()):
+            return 0.0
         return None if self.writer is None else self._last + SILENT
 
     # Clients
@@ -63,6 +76,10 @@ class Exchange:
     def leave(self, client: int) -> list[Action]:
         """Forget a client whose connection has ended."""
         if client in self.clients:
+            if self.writer in (None, client):
+                for each in self.clients[client].waiting:
+                    if isinstance(each, bytes):
+                        self._write(client, each, self._last)
             self._say(client, "left")
             self._free(client)
             del self.clients[client]
@@ -88,7 +105,9 @@ class Exchange:
             self._setter = None
 
     def advance(self, now: float) -> list[Action]:
-        """Let another client write once the writer has been silent for long enough."""
+        """Give each client a turn, and let another one write once the writer has been silent for long enough."""
+        for client in tuple(self.clients):
+            self._work(client, now)
         self._release(now)
         return self._done()
 
@@ -97,21 +116,32 @@ class Exchange:
             self._say(self.writer, "silent", "another client may write")
             self.writer = None
 
-    def lose(self, reason: str) -> list[Action]:
-        """Close all connections: the port is lost. Until `back`, a client is closed as soon as it sends anything."""
+    # A lost port
+
+    def lose(self, reason: str, now: float, returns: bool = True) -> list[Action]:
+        """Close all connections: the port is lost. Until `back`, a client is closed as soon as it sends anything.
+
+        `returns`: the port has a stable name.
+        """
         self._away = reason
+        self.owed.lost(now)
+        outcome = OWED if returns else NEVER
+        for name in self.owed.names:
+            self._actions.append(Say(name, NOT_REACHED, f"the stop may not have left before the loss; {outcome}"))
         for client in tuple(self.clients):
-            self._close(client, "lost", reason)
+            self._close(client, "lost", f"{reason}; {NOT_REACHED}: {outcome}" if self.owed.names else reason)
         return self._done()
 
     def back(self) -> None:
-        """Take clients again."""
+        """Take clients again; the stop that is owed comes before anything else."""
         self._away = ""
 
     # From the drives
 
-    def printed(self, data: bytes) -> list[Action]:
+    def printed(self, data: bytes, now: float) -> list[Action]:
         """Send bytes of the drives to every client."""
+        if not self._away:
+            self.owed.received(now)
         for number, client in self.clients.items():
             if not client.refused and (sent := client.data(data)):
                 self._actions.append(Send(number, sent))
@@ -126,45 +156,75 @@ class Exchange:
         self._release(now)
         known = self.clients[client]
         for each in known.receive(data):
-            if self._away:
-                continue
+            known.waiting.extend([each] if isinstance(each, Request) else self._without_stops(client, each, now))
+        if self._away:
+            stopped = known.name in self.owed.names
+            self._close(client, "lost", f"{self._away}; {NOT_REACHED}: {OWED}" if stopped else self._away)
+        elif len(known.waiting) > WAITING:
+            self._close(client, "dropped", f"it did not wait for the replies to {WAITING} requests")
+        self._work(client, now)
+        return self._done()
+
+    def _without_stops(self, client: int, data: bytes, now: float) -> list[Input]:
+        """Take the stops out of bytes, and write them at once; return what is left for the client's turn."""
+        before, stop, rest = self._stops.found(data)
+        others = self.writer is not None and client != self.writer
+        if not stop or (not others and not self._away and self._stops.binary(data)):
+            return [data]
+        self.owed.note(self.clients[client].name, stop, now)
+        if self._away:
+            self._say(client, NOT_REACHED, f"the port is lost; {OWED}")
+            return []
+        self._stop(stop, others)
+        self._say(client, "stop", _text(stop))
+        if others:
+            before, rest = before.strip(ENDS), rest.strip(ENDS)
+        elif lost := len(data) - len(stop) - len(rest):
+            self._say(client, "unsent", f"{lost} bytes that came with a stop were dropped")
+            before = b""
+        return [each for each in (before, rest) if each]
+
+    def stop(self, stop: bytes, now: float, owed: bool = False) -> list[Action]:
+        """Write a stop of this side, or one that was `owed`: the loss may have cut a line, which it makes harmless."""
+        who = ", ".join(self.owed.names) if owed else "this terminal"
+        if owed:
+            self.owed.written(now)
+        else:
+            self.owed.note(who, b"", now)
+        if self._away:
+            self._actions.append(Say(who, NOT_REACHED, f"the port is lost; {OWED}"))
+        else:
+            self._stop(self._stops.mended(stop) if owed else stop, True)
+            self._actions.append(Say(who, "stop", _text(stop) + ", owed since the loss of the port" * owed))
+        return self._done()
+
+    def _stop(self, stop: bytes, others: bool) -> None:
+        """Stop, and drop the bytes that wait for their client's turn.
+
+        Within a line of another client it first makes that line harmless: a PMX would take both for one command.
+        """
+        waited = {number: each.overtaken() for number, each in self.clients.items()}
+        overtaken = waited[self.writer] if others and self.writer is not None else b""
+        self._line.written(overtaken)
+        cut, mended = self._line.stopped(others), self._stops.mended(stop)
+        self._actions.append(Stop(mended if cut and not self._stops.binary(cut) else stop, mended))
+        if overtaken:
+            self._line.dropped()
+        for number, data in waited.items():
+            if data:
+                self._say(number, "unsent", f"{len(data)} bytes that came before a stop were dropped")
+
+    def _work(self, client: int, now: float) -> None:
+        """Work off a few requests and writes of a client: the others are read after that."""
+        known, left = self.clients[client], TURN
+        while known.waiting and left and not known.setting:
+            each, left = known.waiting.popleft(), left - 1
             if isinstance(each, Request):
                 self._request(client, each)
             else:
-                self._bytes(client, each, now)
-        if self._away:
-            self._close(client, "lost", self._away)
+                self._write(client, each, now)
         if not known.refused and (replies := known.taken()):
             self._actions.append(Send(client, replies))
-        return self._done()
-
-    def _bytes(self, client: int, data: bytes, now: float) -> None:
-        before, stop, rest = self._stops.found(data)
-        others = self.writer is not None and client != self.writer
-        if stop and not others and self._stops.binary(data):
-            before, stop, rest = data, b"", b""
-        if stop:
-            self._actions.append(self._stop(stop, others))
-            self._say(client, "stop", _text(stop))
-            if others:
-                before, rest = before.strip(ENDS), rest.strip(ENDS)
-            elif lost := len(data) - len(stop) - len(rest):
-                self._say(client, "unsent", f"{lost} bytes that came with a stop were dropped")
-                before = b""
-        for each in filter(None, (before, rest)):
-            self._write(client, each, now)
-
-    def stop(self, stop: bytes) -> list[Action]:
-        """Write a stop of this side."""
-        return [self._stop(stop, True), Say("this terminal", "stop", _text(stop))]
-
-    def _stop(self, stop: bytes, others: bool) -> Stop:
-        """Make the action of a stop. Within a line of another client it first makes that line harmless.
-
-        A PMX would take both for one command.
-        """
-        cut, mended = self._line.stopped(others), self._stops.mended(stop)
-        return Stop(mended if cut and not self._stops.binary(cut) else stop, mended)
 
     def _write(self, client: int, data: bytes, now: float) -> None:
         known = self.clients[client]
@@ -178,7 +238,8 @@ class Exchange:
             return
         self._last = now
         if data := self._line.rest(data):
-            self._line.written(data)
+            if any(map(self._stops.moves, self._line.written(data))):
+                self.owed.started()
             self._actions.append(Write(client, data))
 
     def _begin(self, client: int) -> None:
@@ -206,7 +267,7 @@ class Exchange:
 
     def _request(self, client: int, request: Request) -> None:
         known = self.clients[client]
-        if known.refused:
+        if known.refused or known.answers(request):
             return
         if request.setting == Setting.PURGE:
             if client == self.writer and request.value != PURGE_RECEIVED:
@@ -226,16 +287,14 @@ class Exchange:
         holds = self.values[what]
         if not changes or request.value == holds:
             self.clients[client].reply(request.setting, holds)
-        elif self._may_set(client):
+        elif client in (self.writer, self._setter) or (self.writer is None and self._setter is None):
+            self.clients[client].setting = True
             self._actions.append(Set(client, request.setting, request.value))
         else:
             self._say(client, "setting refused", f"another client has set {what} to {_shown(what, holds)}")
             self.clients[client].reply(request.setting, holds)
         if what == "baud" and self.writer is None and self._setter is None:
             self._setter = client
-
-    def _may_set(self, client: int) -> bool:
-        return client in (self.writer, self._setter) or (self.writer is None and self._setter is None)
 
     def applied(self, client: int, setting: int, value: int, trouble: str = "") -> list[Action]:
         """Note a setting that was changed, or could not be (`trouble`), and reply with what holds."""
@@ -246,6 +305,7 @@ class Exchange:
             detail = trouble or f"{what} is {_shown(what, value)}"
             self._say(client, "setting refused" if trouble else "setting", detail)
             known.reply(setting, self.values[what])
+            known.setting = False
             if not known.refused:
                 self._actions.append(Send(client, known.taken()))
         return self._done()

@@ -21,9 +21,13 @@ class HalfLine:
         self._skipping = False
         """The rest of that line is dropped."""
 
-    def written(self, data: bytes) -> None:
-        """Take bytes that were written."""
-        self.text = b"" if self._framed else _LINES.split(self.text + data)[-1][-LONGEST:]
+    def written(self, data: bytes) -> list[bytes]:
+        """Take bytes that were written; return the lines that they end, or the messages."""
+        if self._framed:
+            return [data]
+        *ended, begun = _LINES.split(self.text + data)
+        self.text = begun[-LONGEST:]
+        return ended
 
     def stopped(self, others: bool) -> bytes:
         """Note a stop; return the beginning of the line that it cut off, which only the stop of `others` does."""
@@ -33,7 +37,7 @@ class HalfLine:
 
     def dropped(self) -> None:
         """Note that the beginning of the line was dropped: its rest is dropped, too, if another client cut it."""
-        self._skipping, self._cut = self._cut, False
+        self._skipping, self._cut = self._skipping or self._cut, False
 
     def ended(self) -> None:
         """Forget what was written of it."""

@@ -13,7 +13,7 @@ from shell.connect.opening import OpenedPort
 from shell.connect.reconnect import FIRST, GLANCE, LONGEST
 from shell.connect.reopening import Absent
 from shell.sharing.actions import Action, Close, Purge, Say, Send, Set, Stop, Write
-from shell.sharing.exchange import Exchange
+from shell.sharing.exchange import NEVER, NOT_REACHED, Exchange
 from shell.sharing.stop_bytes import StopBytes
 from transports import Controllable, PortControl, Queueing, Transport, TransportLost
 from transports.com_port import Control, Setting
@@ -24,6 +24,8 @@ UNREAD = 1 << 18
 AHEAD = 1 << 18
 """Bytes that the writer may be ahead of the line. Within them its own stop is read at once."""
 CLIENTS = 32
+READ = 1 << 12
+"""Bytes of one client that are read before the others are."""
 LINGER = 2.0
 """Seconds for which stops are still taken from a client that is being disconnected."""
 FLUSH = 0.5
@@ -43,6 +45,7 @@ class SharedPort:
         self._narrate = narrate
         self._loop = asyncio.get_running_loop()
         control = _control_of(self._transport)
+        self._own = stops.own
         self._exchange = Exchange(stops, control.baud if control else port.baud)
         self._connections: dict[int, Connection] = {}
         self._left = asyncio.Event()
@@ -66,6 +69,8 @@ class SharedPort:
 
     async def close(self) -> None:
         """End the service, and close the port."""
+        for name in self._exchange.owed.names if self._loss is not None else ():
+            self._narrate(Say(name, NOT_REACHED, f"sharing ends before the port is back; {NEVER}"))
         if self._server is not None:
             self._server.close()
         for number in tuple(self._exchange.clients):
@@ -83,16 +88,23 @@ class SharedPort:
             self._timer.cancel()
         await self._transport.close()
 
-    def stop(self, pieces: Sequence[StopPiece]) -> None:
-        """Write a stop of this side at once, and its repetition in pieces."""
-        first, *others = pieces
-        self._do(self._exchange.stop(first.data))
-        self._begin(self._repeat(others))
+    def stop(self) -> None:
+        """Write a stop of this side at once, and its repetition in pieces; while the port is lost it is owed."""
+        self._write_pieces(self._own, owed=False)
 
-    async def _repeat(self, pieces: Sequence[StopPiece]) -> None:
+    def _write_pieces(self, pieces: Sequence[StopPiece], owed: bool) -> None:
+        first, *others = pieces
+        self._do(self._exchange.stop(first.data, self._loop.time(), owed))
+        self._begin(self._repeat(others, owed))
+
+    async def _repeat(self, pieces: Sequence[StopPiece], owed: bool) -> None:
+        """Write pieces of a stop; those of an owed one end where a client starts something."""
+        starts = self._exchange.owed.starts
         for piece in pieces:
             await asyncio.sleep(piece.quiet)
-            self._do(self._exchange.stop(piece.data))
+            if self._loss is not None or (owed and self._exchange.owed.starts != starts):
+                return
+            self._do(self._exchange.stop(piece.data, self._loop.time(), owed))
 
     # Clients
 
@@ -119,8 +131,12 @@ class SharedPort:
         self._set_timer()
 
     def _set_timer(self) -> None:
-        if self._timer is None and (deadline := self._exchange.deadline) is not None:
-            self._timer = self._loop.call_at(deadline, self._advance)
+        """Call `_advance` at its time; one that is due follows the next look at the sockets."""
+        if (deadline := self._exchange.deadline) is None or (self._timer and self._timer.when() <= deadline):
+            return
+        if self._timer is not None:
+            self._timer.cancel()
+        self._timer = self._loop.call_at(deadline, self._advance)
 
     def _advance(self) -> None:
         self._timer = None
@@ -130,7 +146,7 @@ class SharedPort:
     # The port
 
     def _received(self, data: bytes) -> None:
-        self._do(self._exchange.printed(data))
+        self._do(self._exchange.printed(data, self._loop.time()))
 
     def _do(self, actions: list[Action]) -> None:
         for action in actions:
@@ -183,13 +199,14 @@ class SharedPort:
                 except OSError as error:
                     trouble = error.strerror or str(error)
             self._do(self._exchange.applied(action.client, action.setting, action.value, trouble))
+            self._set_timer()
 
     # A lost port
 
     def _broke(self, loss: TransportLost) -> None:
         self._loss = loss
-        self._do(self._exchange.lose(str(loss)))
         self._narrate(Say("", "lost", str(loss)))
+        self._do(self._exchange.lose(str(loss), self._loop.time(), self._port.reopen is not None))
         if self._port.reopen is not None:
             self._begin(self._return())
         elif not self.lost_for_good.done():
@@ -211,6 +228,8 @@ class SharedPort:
                 self._loss, self._purged = None, 0
         self._transport.start(self._received, self._broke)
         self._exchange.back()
+        if owed := self._exchange.owed.pieces:
+            self._write_pieces(owed, owed=True)
         self._narrate(Say("", "back", self._transport.name))
 
     def _begin(self, work: Coroutine[Any, Any, None]) -> None:
@@ -236,10 +255,11 @@ def _control_of(transport: Transport) -> PortControl | None:
     return transport.control if isinstance(transport, Controllable) else None
 
 
-class Connection(asyncio.Protocol):
+class Connection(asyncio.BufferedProtocol):
     """One client's connection."""
 
     def __init__(self, port: SharedPort) -> None:
+        self._buffer = memoryview(bytearray(READ))
         self._port = port
         self._number = 0
         self._transport: asyncio.Transport | None = None
@@ -253,9 +273,13 @@ class Connection(asyncio.Protocol):
         peer = transport.get_extra_info("peername") or ("unknown", 0)
         self._number = self._port.connected(self, host_port(peer[0], peer[1]))
 
-    def data_received(self, data: bytes) -> None:
+    def get_buffer(self, sizehint: int) -> memoryview:
+        """Give the room for one read."""
+        return self._buffer
+
+    def buffer_updated(self, nbytes: int) -> None:
         """Take bytes that the client has written."""
-        self._port.received(self._number, data)
+        self._port.received(self._number, bytes(self._buffer[:nbytes]))
 
     def connection_lost(self, exc: Exception | None) -> None:
         """End: the client has left."""

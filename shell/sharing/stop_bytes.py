@@ -15,6 +15,15 @@ from dialects.families import DEFAULT, FAMILIES, TABLE
 
 KEYS = rb"[\x03\x1b]"
 """Ctrl+C and ESC, which stop on every line of text."""
+CERTAIN = 1.0
+"""Bytes that the drives send so many seconds after a stop, or later, show that the stop has left."""
+NOTICED = 10.0
+"""Seconds within which a loss is noticed, also that of a host: what was written before has left."""
+GAP = 0.1
+"""Seconds between pieces of a stop that is owed: replies do not collide."""
+_FORMS = 16
+"""The forms of a stop that are kept."""
+_ADDRESS_OR_CHECKSUM = re.compile(r"^@\d\d|[\x80-\xff]+$")
 _ENDS = b"\r\n"
 _TEXT = bytes(range(0x20, 0x7F)) + b"\t" + _ENDS
 
@@ -27,7 +36,9 @@ class StopBytes:
     framed: bool
     invalidate: bytes = b""
     moves: Callable[[bytes], bool] = lambda line: False
-    """Whether the beginning of a line, once something ends it, may start a motion or a program."""
+    """Whether a line, or the beginning of one once something ends it, may start a motion or a program."""
+    own: tuple[StopPiece, ...] = ()
+    """The stop of this side, piece by piece: in the language of the family, or the default one, in every form."""
 
     def found(self, data: bytes) -> tuple[bytes, bytes, bytes]:
         """Divide what came in one read: what is before the first stop, the stops, and what follows the last one.
@@ -53,8 +64,57 @@ class StopBytes:
         return (stop.translate(None, _ENDS) if keys else b"") + self.invalidate + stop
 
 
-def stop_bytes(family: str) -> StopBytes:
-    """The stops of a family's lines; empty: of any language that is text. Raises Diagnostic."""
+class OwedStop:
+    """The stops that the drives may not have received. Once its port is lost, they are owed."""
+
+    def __init__(self, own: Sequence[StopPiece]) -> None:
+        """`own`: the stop of this side."""
+        self._own = own
+        self._senders: dict[bytes, str] = {}
+        """The senders, by the form of their stop; b"" is this side's own."""
+        self._at = 0.0
+        self.starts = 0
+        """The number of writes of clients that can have started a motion or a program."""
+
+    @property
+    def names(self) -> list[str]:
+        """The senders."""
+        return list(dict.fromkeys(self._senders.values()))
+
+    @property
+    def pieces(self) -> list[StopPiece]:
+        """All of it, in every form of this side and as the senders sent it."""
+        first, *others = self._own
+        forms = [StopPiece(each, GAP) for each in self._senders if each]
+        return [first, *forms, *others] if self._senders else []
+
+    def note(self, who: str, stop: bytes, now: float) -> None:
+        """Take a stop, in its sender's form as long as these are few."""
+        self._senders[stop if len(self._senders) < _FORMS else b""] = who
+        self.written(now)
+
+    def written(self, now: float) -> None:
+        """Take notice that a piece of them is written: they may have left from now on."""
+        self._at = now
+
+    def received(self, now: float) -> None:
+        """Take notice of bytes of the drives: a stop well before them has left."""
+        if now >= self._at + CERTAIN:
+            self._senders.clear()
+
+    def started(self) -> None:
+        """Take notice of a command that can start something: no stop before it is repeated against it."""
+        self.starts += 1
+        self._senders.clear()
+
+    def lost(self, now: float) -> None:
+        """Keep the stops shortly before a loss: earlier ones have left."""
+        if now >= self._at + NOTICED:
+            self._senders.clear()
+
+
+def stop_bytes(family: str, drives: Sequence[str] = ()) -> StopBytes:
+    """The stops of a family's lines; empty: of any language that is text. `drives`: those known. Raises Diagnostic."""
     names = [family] if family else [name for name, row in TABLE.items() if not row.scheme]
     shared = [each for name in names if (each := FAMILIES[name]).stop_bytes is not None]
     if not shared:
@@ -62,21 +122,18 @@ def stop_bytes(family: str) -> StopBytes:
         raise Diagnostic(f"a line of {family} cannot be shared", hint=valid)
     framed = bool(family) and shared[0].codec.framed
     found = [each.stop_bytes.pattern for each in shared if each.stop_bytes and each.codec.framed == framed]
-    if framed:
-        return StopBytes(re.compile(b"(?:" + found[0] + b")+", re.DOTALL), True)
-    pattern = re.compile(b"|".join([*found, KEYS]))
     codec, language = FAMILIES[family or DEFAULT].codec, FAMILIES[family or DEFAULT].language
+    own = (StopPiece(codec.stop(drives, False), 0.0), *codec.stop_again(drives, False))
+    if framed:
+        return StopBytes(re.compile(b"(?:" + found[0] + b")+", re.DOTALL), True, b"", shared[0].message_moves, own)
+    pattern = re.compile(b"|".join([*found, KEYS]))
 
     def moves(line: bytes) -> bool:
-        text = line.decode("latin-1")
-        words = re.findall("[A-Z]+", text.upper())  # the first letter may be a drive's name
-        known = any(language.knows(each) for word in words for each in (word, word[1:]) if each)
+        text = _ADDRESS_OR_CHECKSUM.sub("", line.decode("latin-1"))
+        first = re.match("[A-Z]+", text.upper())
+        if first is None or not language.knows(first[0]):
+            text = text[1:]  # the first letter is a drive's name
+        known = any(map(language.knows, re.findall("[A-Z]+", text.upper())))
         return known and codec.starts_motion(text)
 
-    return StopBytes(pattern, False, codec.invalidate(), moves)
-
-
-def own_stop(family: str, drives: Sequence[str]) -> tuple[StopPiece, ...]:
-    """The stop of this side, piece by piece: in the language of the family, or the default one, in every form."""
-    codec = FAMILIES[family or DEFAULT].codec
-    return (StopPiece(codec.stop(drives, False), 0.0), *codec.stop_again(drives, False))
+    return StopBytes(pattern, False, codec.invalidate(), moves, own)

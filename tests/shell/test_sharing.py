@@ -30,7 +30,7 @@ def test_every_client_hears_what_the_drives_send_but_one_that_was_refused() -> N
     port.send(ADA, b"PR P\r")
     port.send(EVE, b"x")
     port.sent[EVE] = b""
-    port.do(port.exchange.printed(b"51200\r\n\xff"))
+    port.do(port.exchange.printed(b"51200\r\n\xff", 0.0))
     assert port.sent == {ADA: b"51200\r\n\xff", BOB: b"51200\r\n\xff", EVE: b""}
 
 
@@ -144,7 +144,7 @@ def test_the_writers_own_stop_drops_what_came_with_it_and_what_follows_is_writte
 def test_a_stop_of_this_side_is_one_of_any_client() -> None:
     port = Port(slow=True)
     port.send(ADA, b"MR 5")
-    port.do(port.exchange.stop(b"\x1b"))
+    port.do(port.exchange.stop(b"\x1b", 0.0))
     port.send(ADA, b"1200\rPR P\r")
     assert port.written == b"\x1b" + b"~" * 65 + b"\r" + b"\x1b" and port.waiting == b"PR P\r"
     assert r"this terminal stop \x1b" in port.said

@@ -21,10 +21,13 @@ from shell.connect.opening import open_port
 from shell.connect.urls import parse
 from shell.sharing import server
 from shell.sharing.actions import Say
+from shell.sharing.client import Client, Input, Request
+from shell.sharing.exchange import NOT_REACHED, TURN
 from shell.sharing.server import SharedPort
-from shell.sharing.stop_bytes import own_stop, stop_bytes
+from shell.sharing.stop_bytes import stop_bytes
 from tests.support.until import until
-from transports import TransportLost, Unreachable
+from transports import TransportLost, Unreachable, telnet
+from transports.com_port import OPTION, Setting, message
 from transports.rfc2217 import open_rfc2217
 
 pytestmark = [
@@ -53,8 +56,8 @@ class Line:
         os.close(self.far)
         os.close(self._near)
 
-    async def got(self, data: bytes) -> None:
-        """Wait for bytes at the far end."""
+    async def got(self, data: bytes) -> bytes:
+        """Wait for bytes at the far end; return all that came."""
 
         def read() -> bool:
             with contextlib.suppress(BlockingIOError):
@@ -62,7 +65,9 @@ class Line:
             return data in self.arrived
 
         await until(read, 10)
+        came = bytes(self.arrived)
         self.arrived.clear()
+        return came
 
     @property
     def baud(self) -> int:
@@ -239,8 +244,59 @@ async def test_ctrl_x_at_the_shared_port_stops_the_drives_and_sharing_goes_on(sh
     _, ada = await shared.client()
     ada.write(b"PR P\r")
     await shared.line.got(b"PR P\r")
-    shared.port.stop(own_stop("", []))
+    shared.port.stop()
     stop = b"\x1b\x05!\x05!\x1b\n\x1b\x05"
     await shared.line.got(stop * 2)
     ada.write(b"PR V\r")
     await shared.line.got(b"PR V\r")
+
+
+async def test_a_stop_while_the_port_is_lost_is_its_first_bytes_after_the_return(shared: Shared) -> None:
+    _, ada = await shared.client()
+    await until(lambda: "connected" in shared.events())
+    shared.line.close()
+    await until(lambda: "lost" in shared.events())
+    shared.port.stop()
+    assert shared.events()[-1] == NOT_REACHED
+    ada.write(b"\x1b")
+    await until(lambda: shared.events().count(NOT_REACHED) == 2)
+    shared.line.open()
+    await until(lambda: "back" in shared.events())
+    _, eve = await shared.client()
+    eve.write(b"PR P\r")
+    own, _ = stop_bytes("").own
+    mended = stop_bytes("").mended
+    await until(lambda: shared.events().count("stop") == 3)
+    assert (await shared.line.got(b"PR P\r")).startswith(mended(own.data))
+    assert "owed since the loss of the port" in next(each.detail for each in shared.said if each.event == "stop")
+
+
+async def test_four_clients_that_flood_it_with_requests_do_not_come_before_anothers_stop(
+    shared: Shared, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    worked, answers = list[Request](), Client.answers
+
+    def count(client: Client, request: Request) -> bool:
+        worked.append(request)
+        return answers(client, request)
+
+    at_stop, receive = list[int](), Client.receive
+
+    def note(client: Client, data: bytes) -> list[Input]:
+        if data == b"\x1b":
+            at_stop.append(len(worked))
+        return receive(client, data)
+
+    monkeypatch.setattr(Client, "answers", count)
+    monkeypatch.setattr(Client, "receive", note)
+    flooding = [await shared.client() for _ in range(4)]
+    _, bob = await shared.client()
+    await until(lambda: shared.events().count("connected") == 5)
+    for _, each in flooding:
+        each.write(telnet.option(telnet.WILL, OPTION) + message(Setting.LINE_MASK, 7) * 900)
+    await until(lambda: worked)
+    bob.write(b"\x1b")
+    before = len(worked)
+    await shared.line.got(b"\x1b")
+    assert at_stop[0] - before <= 4 * 2 * TURN * 3 < 4 * 900 - before  # three looks at the sockets, at most
+    await until(lambda: len(worked) == 4 * 900)

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from shell.sharing.actions import Set
+from shell.sharing.actions import Action, Close, Send, Set, Stop, Write
+from shell.sharing.exchange import TURN, WAITING
 from tests.support.shared_exchange import ADA, BOB, EVE, Port
 from transports import telnet
 from transports.com_port import OPTION, REPLY, Control, Setting, message
@@ -41,7 +42,7 @@ def test_iac_is_doubled_for_telnet_and_a_nul_after_a_terminals_cr_is_left_out() 
     port = Port()
     port.send(ADA, telnet.option(telnet.WILL, telnet.SGA) + b"PR P\r\0")
     port.sent[ADA] = b""
-    port.do(port.exchange.printed(b"\xff"))
+    port.do(port.exchange.printed(b"\xff", 0.0))
     assert port.written == b"PR P\r" and port.sent[ADA] == b"\xff\xff" and port.sent[BOB] == b"\xff"
 
 
@@ -140,7 +141,7 @@ def test_a_refused_telnet_terminal_is_sent_a_line() -> None:
 
 def test_while_the_port_is_lost_a_client_is_closed_once_it_is_known_how_to_tell_it() -> None:
     port = agreed(Port(), BOB)
-    port.do(port.exchange.lose("gone"))
+    port.do(port.exchange.lose("gone", 0.0))
     assert port.closed == [ADA, BOB, EVE]
     port.do(port.exchange.connect(4, "new"))
     port.sent[4] = b""
@@ -156,11 +157,84 @@ def test_a_client_that_suspends_the_flow_is_sent_it_later_and_dropped_in_the_end
     port = agreed(Port(), ADA)
     suspend, resume = message(Setting.SUSPEND, b""), message(Setting.RESUME, b"")
     port.send(ADA, suspend)
-    port.do(port.exchange.printed(b"held"))
+    port.do(port.exchange.printed(b"held", 0.0))
     assert port.sent[ADA] == b""
     port.send(ADA, resume)
     assert port.sent[ADA] == b"held"
     port.send(ADA, suspend)
     for _ in range(70):
-        port.do(port.exchange.printed(b"x" * 1000))
+        port.do(port.exchange.printed(b"x" * 1000, 0.0))
     assert port.closed == [ADA]
+
+
+def flood(requests: int) -> bytes:
+    return message(Setting.DATA_SIZE, 7) * requests
+
+
+def replies(actions: list[Action]) -> int:
+    """The number of requests that were worked off."""
+    return sum(each.data.count(message(Setting.DATA_SIZE + REPLY, 8)) for each in actions if isinstance(each, Send))
+
+
+@pytest.mark.parametrize("where", [0, 1, 300, 600])
+def test_a_stop_is_written_before_any_request_of_its_read(where: int) -> None:
+    port = agreed(Port(), ADA)
+    actions = port.exchange.receive(ADA, flood(where) + b"\x1b" + flood(600 - where), 0.0)
+    [stop] = [at for at, each in enumerate(actions) if isinstance(each, Stop)]
+    assert replies(actions[:stop]) == 0 and replies(actions) <= TURN
+
+
+def test_a_few_requests_of_each_client_are_worked_off_before_the_others_are_read() -> None:
+    port = agreed(Port(), ADA, BOB, EVE)
+    for client in (ADA, BOB, EVE):
+        assert replies(port.exchange.receive(client, flood(500), 0.0)) <= TURN
+    assert port.exchange.deadline == 0.0
+    worked = [replies(port.exchange.advance(0.0)) for _ in range(100)]
+    assert max(worked) <= 3 * TURN and sum(worked) == 3 * (500 - TURN) and port.exchange.deadline != 0.0
+
+
+def test_escape_within_a_request_is_no_stop() -> None:
+    port = agreed(Port(), ADA)
+    actions = port.exchange.receive(ADA, message(Setting.BAUD, 0x1B1B1B1B) + message(Setting.LINE_MASK, 0x1B), 0.0)
+    assert not [each for each in actions if isinstance(each, Stop)]
+
+
+def test_bytes_keep_their_place_among_requests_and_those_that_wait_are_dropped_by_a_stop() -> None:
+    port = agreed(Port(), ADA, BOB)
+    port.send(ADA, b"PR P\r" + flood(20) + b"PR V\rMR 5")
+    assert port.written == b"PR P\r"
+    port.send(BOB, b"\x1b")
+    assert port.written == b"PR P\r" + b"\x1b" + b"~" * 65 + b"\r\x1b"
+    assert "ada unsent 9 bytes that came before a stop were dropped" in port.said
+    port.send(ADA, b"1200\rPR A\r")  # the rest of a line that was dropped
+    while port.exchange.deadline == 0.0:
+        port.do(port.exchange.advance(0.0))
+    assert port.written.endswith(b"\x1bPR A\r") and port.sent[ADA].count(message(Setting.DATA_SIZE + REPLY, 8)) == 20
+
+
+def test_bytes_after_a_change_of_the_baud_rate_wait_for_it_and_a_stop_does_not() -> None:
+    port = agreed(Port(), ADA)
+    port.send(ADA, message(Setting.BAUD, 19200) + b"PR P\r")
+    assert port.written == b"" and port.exchange.deadline != 0.0
+    port.do(port.exchange.applied(ADA, Setting.BAUD, 19200))
+    port.do(port.exchange.advance(0.0))
+    assert port.written == b"PR P\r"
+    port.send(ADA, message(Setting.BAUD, 38400) + b"\x1b")
+    assert port.written == b"PR P\r\x1b"
+
+
+def test_bytes_that_wait_are_written_although_their_client_has_left() -> None:
+    port = agreed(Port(), ADA)
+    port.send(ADA, flood(20) + b"PR P\r")
+    port.do(port.exchange.leave(ADA))
+    assert port.written == b"PR P\r"
+
+
+def test_a_client_that_never_waits_for_replies_is_dropped_and_its_stop_still_passes() -> None:
+    port = agreed(Port(), ADA)
+    actions: list[Action] = []
+    while not any(isinstance(each, Close) for each in actions):
+        actions = port.exchange.receive(ADA, flood(400), 0.0)
+    assert len(port.exchange.clients[ADA].waiting) <= WAITING + 400
+    later = port.exchange.receive(ADA, flood(400) + b"\x1bMR 1\r", 0.0)
+    assert isinstance(later[0], Stop) and not [each for each in later if isinstance(each, Write)]

@@ -40,5 +40,11 @@ def call_of(frame: bytes) -> tuple[int, Call]:
     return address, Call(command, kind, motor, value)
 
 
+def moves(frames: bytes) -> bool:
+    """Whether requests can start a motion or a program; a part of one may belong to any."""
+    pieces = [frames[at : at + LENGTH] for at in range(0, len(frames), LENGTH)]
+    return any(len(each) < LENGTH or call_of(each)[1].moves for each in pieces)
+
+
 def _sealed(body: bytes) -> bytes:
     return body + bytes([sum(body) % 256])
