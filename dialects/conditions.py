@@ -60,6 +60,10 @@ class Conditions:
     """The end of the move that is under way, where it is known."""
     limits: tuple[int, int] | None = None
     """The travel between software limits."""
+    disabled: str = ""
+    """The reason for which the output stage is off, `DE=0`; empty: it is on, or that is not known."""
+    released: str = ""
+    """The reason for which no current holds the motor at rest, although it can move: `HC=0`."""
     run_current: int | None = None
     hold_current: int | None = None
     more: tuple[tuple[str, str], ...] = ()
@@ -68,6 +72,11 @@ class Conditions:
     pace: Pace | None = None
     modes: str = ""
     """How the drive is set to reply, as short as a person knows it: `EM1 CK1`."""
+
+    @property
+    def no_current(self) -> str:
+        """The reason for which nothing holds the load at rest; empty: there is current, or that is not known."""
+        return self.disabled or self.released
 
 
 S = TypeVar("S", bound=DriveState)

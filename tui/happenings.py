@@ -97,7 +97,7 @@ def _conditioned(known: Known, after: Conditions, failed_at: float) -> Iterator[
 
 
 def _state(before: Conditions, after: Conditions) -> Iterator[Happening]:
-    """The beginning and the end of a program, and an error that is gone."""
+    """The beginning and the end of a program, current off and on again, and an error that is gone."""
     if before.program and not after.program:
         which = "" if before.program == "running" else f" {before.program}"
         yield Happening(_named(f"the program{which} has ended", after.axis))
@@ -105,6 +105,10 @@ def _state(before: Conditions, after: Conditions) -> Iterator[Happening]:
         yield Happening(
             _named("a program runs" if after.program == "running" else f"program {after.program}", after.axis)
         )
+    if after.no_current and not before.no_current:
+        yield Happening(_named(f"no current in the motor ({after.no_current}): nothing holds the load", after.axis))
+    if before.no_current and not after.no_current:
+        yield Happening(_named("current in the motor again", after.axis))
     if before.error and not after.error:
         yield Happening(_named("the error is cleared", after.axis))
 

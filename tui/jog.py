@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from tui.readout import Readout, State
+from tui.readout import READ, Readout, State
 
 REPETITION = 0.2
 """Seconds between two presses below which the second is the repetition of a held key."""
@@ -49,7 +49,7 @@ class Jog:
 
     def obstacle(self, readout: Readout, axis: Readout, state: State, now: float) -> str:
         """The reason for which no move may start now; empty: it may."""
-        if state not in (State.MOVING, State.STOPPED) or axis.last is None:
+        if state not in READ or axis.last is None:
             return f"it is {'not read yet' if state is State.UNKNOWN else state.word}"
         if state is State.MOVING or axis.last.velocity != 0:
             return "it moves"
@@ -57,5 +57,7 @@ class Jog:
             return "a line is on its way"
         if axis.last.at <= max(self._busy + SETTLE, readout.touched) or readout.old(now):
             return "it has not been read at rest since the last line"
+        if axis.conditions is not None and axis.conditions.disabled:
+            return f"no current in the motor ({axis.conditions.disabled})"
         conditions = readout.conditions
         return "a program runs" if conditions is not None and conditions.program else ""

@@ -33,12 +33,16 @@ class State(Enum):
     UNKNOWN = ("·", "open", "dim")
     IDLE = ("■", "idle", "text")
     STOPPED = ("■", "stopped", "text")
+    NO_CURRENT = ("□", "no current", "strong")
+    """At rest, and nothing holds the load: it is disabled, or its current is off at rest."""
     MOVING = ("▶", "moving", "motion")
     STORING = ("◆", "storing", "strong")
     SILENT = ("?", "silent", "error")
     LOST = ("✗", "lost", "error")
     TROUBLE = ("✗", "error", "error")
     """Of a line: a drive of it has an error or a limit."""
+    OFF = ("□", "off", "strong")
+    """Of a line: all its drives are at rest, and one has no current."""
     DIFFERS = ("≠", "twin", "error")
     """Of a line: a drive of it differs from its twin."""
 
@@ -56,6 +60,10 @@ class State(Enum):
     def role(self) -> str:
         """The role that selects the style."""
         return self.value[2]
+
+
+READ = (State.MOVING, State.STOPPED, State.NO_CURRENT)
+"""The states that were read of a drive, which can be outdated."""
 
 
 class Point(NamedTuple):
@@ -260,6 +268,18 @@ class Readout:
         return any(each.twin is not None and each.twin.diverged is not None for each in self.axes)
 
     @property
+    def no_current(self) -> str:
+        """The reason for which this axis has no current at rest, as last read."""
+        return self.conditions.no_current if self.conditions is not None else ""
+
+    @property
+    def own_state(self) -> State:
+        """The state of this axis alone, as last read."""
+        if self.last is not None and self.last.velocity != 0:
+            return State.MOVING
+        return State.NO_CURRENT if self.no_current else State.STOPPED
+
+    @property
     def _moves(self) -> bool:
         return any(each.last is not None and each.last.velocity != 0 for each in self.axes)
 
@@ -280,7 +300,9 @@ class Readout:
             return State.SILENT
         if self.last is None:
             return State.UNKNOWN
-        return State.MOVING if self._moves else State.STOPPED
+        if self._moves:
+            return State.MOVING
+        return State.NO_CURRENT if any(each.no_current for each in self.axes) else State.STOPPED
 
     def words(self, now: float, *, storing: bool = False) -> str:
         """The state in words, with its duration, or with its age if it may be outdated."""
@@ -289,7 +311,7 @@ class Readout:
             return f"silent {age(now - self.silent_since)}"
         if state is State.UNKNOWN:
             return "not read yet"
-        if state in (State.MOVING, State.STOPPED) and self.last is not None and self.old(now):
+        if state in READ and self.last is not None and self.old(now):
             ago = age(now - self.last.at)
             return f"{'moved' if state is State.MOVING else 'stood'} {ago}{'' if 'min' in ago else ' ago'}"
         return state.word

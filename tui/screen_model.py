@@ -35,7 +35,7 @@ from shell.lines import EVERYONE
 from tui import happenings
 from tui.curves.look import Look
 from tui.curves.trace import Traces
-from tui.readout import Readout, State
+from tui.readout import READ, Readout, State
 from tui.traffic import TrafficStore
 
 KEPT = 50_000
@@ -238,7 +238,9 @@ def bus_state(facts: BusFacts | None, addresses: list[str], lost: bool) -> State
         return State.TROUBLE
     if any(facts.readout(address).differs for address in addresses):
         return State.DIFFERS
-    return State.IDLE if all(state is State.STOPPED for state in states) else State.UNKNOWN
+    if any(state not in READ for state in states):
+        return State.UNKNOWN
+    return State.OFF if State.NO_CURRENT in states else State.IDLE
 
 
 def bus_old(facts: BusFacts | None, addresses: list[str], now: float) -> bool:

@@ -26,6 +26,8 @@ class DriveFeed:
         """By axis."""
         self._program: str | None = None
         """None: not known."""
+        self._no_current = False
+        """An axis has no current at rest, as last read."""
         self._state: Fields = {}
         self._error: Fields = {}
 
@@ -47,17 +49,24 @@ class DriveFeed:
     def _sample(self, sample: Sample) -> None:
         at, axis = sample.at, sample.axis
         self._moving[axis] = sample.velocity != 0
-        self._say_state(at, messages.MOVING if any(self._moving.values()) else messages.AT_REST)
+        self._say_state(at, self._motion())
         if not self._limits.setdefault(axis, SampleLimit(self._period)).passes(at):
             return
         for what, value in (("position", sample.position), ("velocity", sample.velocity)):
             for point in self._curves.setdefault((what, axis), Curve()).take(Point(at, value)):
                 self._put(what, point.at, False, {"value": point.value, "axis": axis})
 
+    def _motion(self) -> str:
+        if any(self._moving.values()):
+            return messages.MOVING
+        return messages.NO_CURRENT if self._no_current else messages.AT_REST
+
     def _conditions(self, event: Conditioned) -> None:
         self._program = messages.program(event.conditions)
+        self._no_current = any(each.no_current for each in event.conditions)
         if self._state:
-            self._say_state(event.at, str(self._state["value"]))
+            known = str(self._state["value"])
+            self._say_state(event.at, self._motion() if self._moving and known != messages.SILENT else known)
         error = messages.error(event.conditions)
         if error != self._error:
             self._error = error

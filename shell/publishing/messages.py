@@ -13,8 +13,8 @@ from shell.output import shortened
 
 ONLINE, LOST, BYE = "online", "lost", "bye"
 """Plain words: the states of this program, and of a line."""
-MOVING, AT_REST, SILENT = "moving", "at rest", "silent"
-"""The states of a drive; or LOST, with its line."""
+MOVING, AT_REST, NO_CURRENT, SILENT = "moving", "at rest", "no current", "silent"
+"""The states of a drive; or LOST, with its line. NO_CURRENT: an axis is at rest, and nothing holds its load."""
 Fields = Mapping[str, int | str]
 """`value`, and more facts."""
 

@@ -112,5 +112,7 @@ def test_the_dashboard_has_the_words_of_the_states() -> None:
         for mapping in panel.get("fieldConfig", {}).get("defaults", {}).get("mappings", [])
         for word in mapping["options"]
     }
-    assert words == {getattr(messages, name) for name in ("ONLINE", "LOST", "BYE", "MOVING", "AT_REST", "SILENT")}
+    assert words == {
+        getattr(messages, name) for name in ("ONLINE", "LOST", "BYE", "MOVING", "AT_REST", "NO_CURRENT", "SILENT")
+    }
     assert len({panel["id"] for panel in BOARD["panels"]}) == len(BOARD["panels"])

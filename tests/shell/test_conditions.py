@@ -15,7 +15,7 @@ from shell.events import OnBus
 from tests.support.cell_session import ETHERNET, CellSession, bus, party, pmx
 
 pytestmark = pytest.mark.virtual
-STATE = b'PR EF,BY,MV,VC,MP,":",P,":",IN,":",I5,'
+STATE = b'PR EF,BY,MV,VC,MP,DE,":",P,":",IN,":",I5,'
 
 
 def read(cell: CellSession) -> list[tuple[Conditions, ...]]:
@@ -54,7 +54,7 @@ async def test_a_serial_drive_is_one_print_a_second_and_its_settings_once(tmp_pa
         await asyncio.sleep(10)
         sent = cell.written("line")
         assert 8 <= sent.count(b"a" + STATE) <= 11
-        assert [sent.count(word) for word in (b"PR EE,AS,DE", b"PR IS", b"PR OS", b"PR LS")] == [1, 1, 1, 1]
+        assert [sent.count(word) for word in (b"PR EE,AS,", b"PR IS", b"PR OS", b"PR LS")] == [1, 1, 1, 1]
         assert not any(word in sent for word in (b"ER", b"PR O1", b"PR ST"))
         assert cell.told() == []
 
@@ -138,7 +138,7 @@ async def test_a_refused_part_is_never_asked_again(tmp_path, monkeypatch):
         cell.session.buses["line"].drives[""].state.identified("LMDCM", "LMDCM 6.002")  # so it asks what this one lacks
         await asyncio.sleep(8)
         assert cell.written("line").count(b",AF,") == 1
-        assert cell.written("line").count(b"PR EE,AS,DE") == 1
+        assert cell.written("line").count(b"PR EE,AS,") == 1
 
 
 async def test_an_mdrive_plus_has_points_that_are_inputs_or_outputs(tmp_path):
@@ -148,6 +148,24 @@ async def test_an_mdrive_plus_has_points_that_are_inputs_or_outputs(tmp_path):
         assert lamps(found, output=True) == {"2 moving": False}
 
 
+@pytest.mark.parametrize(
+    ("drive", "line", "why"),
+    [
+        (party("a"), "@a DE=0", "DE=0"),
+        (party("a"), "@a HC=0", "HC=0"),
+        (ETHERNET, "DE=0", "DE=0"),
+        (pmx("00"), "@00 EO=2", "EO1=0"),
+        ('personality = "TMCM"', "@1 SAP 7, 0, 0", "parameter 7 is 0"),
+        ('personality = "TMCM"', "@1 SAP 204, 0, 500", "freewheels: parameter 204"),
+    ],
+)
+async def test_an_axis_without_current_says_why(tmp_path, drive, line, why):
+    address = line[1:].split()[0] if line.startswith("@") else ""
+    async with Watched(tmp_path, drive, address) as cell:
+        assert (await last(cell))[0].no_current == ""
+        assert (await last(cell, line))[0].no_current == why
+
+
 async def test_both_axes_of_a_controller_with_its_loop(tmp_path):
     async with Watched(tmp_path, pmx("00"), "00") as cell:
         x, y = await last(cell, "@00 SLX=1", "@00 DO2=1", "@00 X50000")
@@ -155,9 +173,8 @@ async def test_both_axes_of_a_controller_with_its_loop(tmp_path):
             "status": "at constant speed",
             "StepNLoop": "moving",
             "delta": dict(x.more)["delta"],
-            "motor": "on",
         }
-        assert (dict(y.more), x.unit, y.unit) == ({"status": "at rest", "motor": "on"}, "counts", "pulses")
+        assert (dict(y.more), x.unit, y.unit) == ({"status": "at rest"}, "counts", "pulses")
         assert lamps(x, output=True)["2"] is True
         assert "SPC" not in cell.written("line").decode() and "SLSY" not in cell.written("line").decode()
 

@@ -64,6 +64,14 @@ async def test_position_velocity_state_and_error_of_every_drive_are_published(tm
     assert broker.retained()["p/status"] == "bye"
 
 
+async def test_a_drive_at_rest_without_current_has_its_own_state(tmp_path: Path) -> None:
+    async with CellSession(tmp_path, bus("press", party("a"))) as shop, published(shop) as broker:
+        for line, state in (("@a DE=0", "no current"), ("@a DE=1", "at rest")):
+            await shop.session.run(line)
+            await asyncio.sleep(6)
+            assert broker.values("p/press/a/state")[-1] == state
+
+
 async def test_a_move_is_seen_at_the_rate_and_rest_every_few_seconds(tmp_path: Path) -> None:
     async with CellSession(tmp_path, bus("press", party("a"))) as shop, published(shop, 0.25) as broker:
         await asyncio.sleep(9)

@@ -10,9 +10,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from textual.pilot import Pilot
 
+from dialects.conditions import Conditions
 from dialects.controls import BY, NAMES, TO
 from dialects.families import FAMILIES
-from drives.events import Sample, Silent
+from drives.events import Conditioned, Sample, Silent
 from shell.events import OnBus
 from tests.support.fake_session import FakeSession, demo_session, make_app, settle
 from tui.jog import Jog
@@ -146,7 +147,7 @@ async def test_nothing_is_sent_while_it_moves_is_silent_or_a_line_runs() -> None
         session.emit(OnBus("press", Silent(session.time, "a")))
         await settle(pilot)
         session.time += 0.5
-        await pilot.press("right", "h")
+        await pilot.press("right", "h", "enter")
         await settle(pilot)
         assert session.sent == []
         assert "not sent: " in page.lines("said").plain
@@ -156,10 +157,12 @@ WALK: tuple[tuple[tuple[str, ...], list[str]], ...] = (
     (("m", *"-250", "enter"), ["press:a MA -250"]),
     (("b", *"70", "enter"), ["press:a MR 70"]),
     (("s", *"12", "enter", "right"), ["press:a MR 12"]),
-    (("h",), ["press:a HM 1"]),
-    (("H",), ["press:a HM 3"]),
+    (("h", "enter"), ["press:a HM 1"]),
+    (("H", "enter"), ["press:a HM 3"]),
     (("space",), ["press:a SL 0"]),
-    (("d", "e"), ["press:a DE=0", "press:a DE=1"]),
+    (("d", "enter", "enter", "e", "enter"), ["press:a DE=0", "press:a DE=1"]),
+    (("h", "escape"), []),
+    (("d", "space"), ["press:a SL 0"]),
     (("m", *"12x", "enter"), []),
     (("escape", "m", *"99999999999", "enter"), []),
     (("escape", "s", "0", "enter"), []),
@@ -181,6 +184,52 @@ async def test_a_control_sends_its_line_and_a_wrong_number_sends_nothing() -> No
             await settle(pilot)
             assert session.sent == sent, keys
             assert sent or keys[-1] == "escape" or "nothing was sent" in page.lines("said").plain
+
+
+@at_screen
+async def test_a_letter_alone_neither_moves_nor_lets_go_and_a_stop_or_another_drive_drops_it() -> None:
+    session = demo_session()
+    async with make_app(session).run_test(size=(80, 24)) as pilot:
+        page = await opened(pilot, session)
+        for letter in "hHde":
+            for after in ((), ("up", "enter"), ("ctrl+x", "enter"), ("escape", "enter")):
+                await pilot.press(letter, *after)
+                await settle(pilot)
+                assert session.sent == [], (letter, after)
+                if not after:
+                    assert "Enter sends" in page.lines("said").plain
+        await pilot.press("d")
+        session.select("b")
+        await pilot.press("enter")
+        await settle(pilot)
+        assert session.sent == []
+
+
+@at_screen
+async def test_a_disabled_axis_has_its_own_state_and_takes_no_move() -> None:
+    session = demo_session()
+    app = make_app(session)
+    async with app.run_test(size=(80, 24)) as pilot:
+        for address in "abc":
+            session.emit(OnBus("press", Sample(session.time - 0.05, address, 1000, 0)))
+        await settle(pilot)
+        assert "1 press ■ idle" in app.main.lines("top").plain
+        session.emit(OnBus("press", Conditioned(session.time, "a", (Conditions(disabled="DE=0"),))))
+        await settle(pilot)
+        assert "1 press □ off" in app.main.lines("top").plain
+        status = app.main.lines("status").plain
+        assert "a gantry □ no current" in status and "b clamp  ■ stopped" in status
+        await pilot.press("ctrl+n", "right")
+        await settle(pilot)
+        page = app.screen
+        assert isinstance(page, ControlsPage)
+        assert "not sent: no current in the motor (DE=0)" in page.lines("said").plain
+        assert "□ no current" in page.lines("drive").plain and "no current (DE=0)" in page.lines("drive").plain
+        await pilot.press("escape", "ctrl+a")
+        await settle(pilot)
+        shown = app.screen.lines("drives").plain  # type: ignore[attr-defined]
+        assert "press:a gantry    □ no current" in shown
+        assert session.sent == []
 
 
 @at_screen

@@ -11,7 +11,7 @@ from tui.panels.lamps import aged, error_span, facts_groups, flowing, lamp_group
 from tui.panels.travel import LEARNT, LIMITS, SEEN, bar, phase, to_go_words, travel_of
 from tui.panels.twin import twin_rows
 from tui.panels.view import View
-from tui.readout import Readout, State
+from tui.readout import READ, Readout
 from tui.text import digits, fit
 from tui.widgets.lines import Row, Span, spread, width_of
 
@@ -92,8 +92,8 @@ def _state(glance: Glance, axis: Readout, now: float, width: int) -> list[Span]:
     """The sign and words of an axis, and the phase of its move; as wide as there is room, so that nothing jumps."""
     words, role = glance.sign(now)
     name: list[Span] = [(f" {axis.axis}", "accent")] if axis.axis else []
-    if axis.axis and glance.state() in (State.MOVING, State.STOPPED) and axis.last is not None:
-        state = State.MOVING if axis.last.velocity else State.STOPPED
+    if axis.axis and glance.state() in READ and axis.last is not None:
+        state = axis.own_state
         words, role = (f"{state.sign} {state.word}", state.role) if role != "dim" else (words, role)
     live = role not in ("dim", "error")
     text = f"{words.rstrip()} {_phase(axis, now) if live else ''}".rstrip()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from tui.readout import Readout, State
+from tui.readout import READ, Readout, State
 from tui.screen_model import ScreenModel
 from tui.session_view import BusView, SessionView
 from tui.text import digits, fit
@@ -36,7 +36,9 @@ class Glance:
         """Sign and words of the state in a fixed width."""
         state = self.state()
         words = state.word if self.lost else self.readout.words(now, storing=self.storing)
-        aged = state in (State.MOVING, State.STOPPED) and self.readout.old(now)
+        aged = state in READ and self.readout.old(now)
+        if state is State.NO_CURRENT and self.readout.touched > self.readout.conditioned_at:
+            aged = True  # a line was sent since, which may have switched it on
         return fit(f"{state.sign} {words}", width), "dim" if aged else state.role
 
     def values(self, now: float, axis: Readout | None = None) -> tuple[str, str, str]:

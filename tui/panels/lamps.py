@@ -108,6 +108,8 @@ def facts_groups(readout: Readout, now: float) -> Iterator[list[Span]]:
         yield [error_span(conditions, old)]
     if words := program_words(readout):
         yield [(words, "dim" if old else "motion")]
+    if conditions.no_current:
+        yield [("no current ", "dim" if old else "strong"), (f"({conditions.no_current})", role)]
     for name, value in (("run", conditions.run_current), ("hold", conditions.hold_current)):
         if value is not None:
             yield [(f"{name} ", "dim"), (f"{value} %", role)]

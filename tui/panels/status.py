@@ -14,7 +14,7 @@ from tui.panels.spark import spark
 from tui.panels.travel import bar, to_go_words
 from tui.panels.twin import SIGN, alarm_words, difference_words, differs
 from tui.panels.view import View
-from tui.readout import Readout, State
+from tui.readout import READ, Readout, State
 from tui.text import age, digits, fit
 from tui.widgets.lines import Row, Span, spread, width_of
 
@@ -85,8 +85,8 @@ def _state_role(glance: Glance, now: float) -> str:
 def short_words(glance: Glance, axis: Readout, now: float) -> str:
     """Sign and state in few cells, with its age where it may be outdated: `■ stood 3 s`."""
     state = glance.state()
-    if state in (State.MOVING, State.STOPPED) and axis.last is not None:
-        state = State.MOVING if axis.last.velocity else State.STOPPED
+    if state in READ and axis.last is not None:
+        state = axis.own_state
         if glance.readout.old(now):
             word = "moved" if state is State.MOVING else "stood"
             return fit(f"{state.sign} {word} {age(now - axis.last.at)}", STATE)

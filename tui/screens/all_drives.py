@@ -23,7 +23,10 @@ from tui.screens.page import Host, Page
 from tui.text import fit
 from tui.widgets.lines import Row, Span, spread, width_of
 
-URGENCY = (State.LOST, State.SILENT, State.MOVING, State.STORING, State.UNKNOWN, State.STOPPED, State.IDLE)
+URGENCY = (
+    *(State.LOST, State.SILENT, State.MOVING, State.STORING, State.UNKNOWN),
+    *(State.NO_CURRENT, State.STOPPED, State.IDLE),
+)
 """The states, the worst first."""
 NAME = 17
 POSITION = 13
@@ -59,6 +62,9 @@ class Place(NamedTuple):
         """The fact that matters most besides its state: trouble and its twin, its program, else its product."""
         if alarm := self.alarm(room):
             return alarm, "error"
+        released = [each.axis for each in self.glance.readout.others.values() if each.no_current]
+        if released:
+            return f"{', '.join(released)}: {State.NO_CURRENT.word}", "strong"
         program = program_words(self.glance.readout)
         return (program, "motion") if program else (self.glance.product, "dim")
 

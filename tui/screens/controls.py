@@ -17,7 +17,7 @@ from tui.jog import Jog
 from tui.panels.axis import drive_rows, unit_of
 from tui.panels.glance import Glance, name_of
 from tui.panels.view import View
-from tui.readout import Readout, State
+from tui.readout import READ, Readout, State
 from tui.screens.dialogs import Field
 from tui.screens.page import Host, Page
 from tui.session_view import Place, selected_place
@@ -29,7 +29,9 @@ STEPS = tuple(10**n for n in range(8))
 FIRST_STEP = 100
 NUMBERED = {"m": (TO, "position"), "b": (BY, "distance"), "s": ("", "step")}
 """Keys that ask for a number: the control that takes it, and what it is. An empty name sets the step."""
-KEYED = {"h": HOME_MINUS, "H": HOME_PLUS, "space": STOP, "e": ENABLE, "d": DISABLE}
+SPACE = "space"
+KEYED = {"h": HOME_MINUS, "H": HOME_PLUS, SPACE: STOP, "e": ENABLE, "d": DISABLE}
+"""Keys of controls. Enter sends them, apart from the stop."""
 WORDS = {
     TO: "move to",
     BY: "move by",
@@ -40,13 +42,13 @@ WORDS = {
     DISABLE: "disable",
 }
 WHOLE = re.compile(r"[+-]?[0-9]{1,10}")
-KEY = 7
+KEY = 8
 WORD = 10
 LINE = 22
 
 
 class Asked(NamedTuple):
-    """A number that is being typed: its key, and the stops and the drive when it was begun."""
+    """A number that is typed, or a control that waits for Enter: its key, the stops and the drive when it was begun."""
 
     key: str
     stops: int
@@ -64,7 +66,8 @@ class ControlsPage(Page):
         Binding("down", "step(-1)", show=False),
         Binding("tab", "axis", show=False, priority=True),
         *(Binding(key, f"ask('{key}')", show=False) for key in NUMBERED),
-        *(Binding(key, f"do('{name}')", show=False) for key, name in KEYED.items()),
+        *(Binding(key, f"do('{key}')", show=False) for key in KEYED),
+        Binding("enter", "go", show=False),
     ]
     KEYS = (("←→", "jog"), ("↑↓", "step"), ("Space", "stop"))
     WANTS = frozenset({"motion", "conditions"})
@@ -75,6 +78,8 @@ class ControlsPage(Page):
         self._jog = Jog()
         self._axis = 0
         self._asked: Asked | None = None
+        self._begun: Asked | None = None
+        """The control that Enter would send."""
         self._said: Span = ("", "dim")
         self._place = selected_place(host.session)
         self._view: View | None = None
@@ -106,7 +111,7 @@ class ControlsPage(Page):
         self._follow(view)
         if view.model.trouble:
             self._say(f"✗ {view.model.trouble}", "!")
-            view.model.trouble = ""
+            view.model.trouble, self._begun = "", None
         self._jog.look(view.now, idle=self.host.outbox.idle)
         glance, width = view.chosen, self.size.width
         bus = view.session.selected_bus
@@ -129,6 +134,10 @@ class ControlsPage(Page):
         asked = self._asked
         if asked is not None and (asked.stops != view.session.stops or asked.place != place):
             self._close("stopped; the number was not used" if asked.place == place else "another drive is selected")
+        begun = self._begun
+        if begun is not None and (begun.stops != view.session.stops or begun.place != place):
+            self._begun = None
+            self._say("stopped; nothing was sent" if begun.place == place else "another drive is selected", "!")
 
     def _rows(self, view: View, glance: Glance | None, width: int) -> list[Row]:
         controls = self._controls()
@@ -190,6 +199,7 @@ class ControlsPage(Page):
 
     def action_step(self, by: int) -> None:
         """Choose another size of the step."""
+        self._begun = None
         larger = [each for each in STEPS if each > self.step]
         smaller = [each for each in STEPS if each < self.step]
         found = larger[:1] if by > 0 else smaller[-1:]
@@ -197,6 +207,7 @@ class ControlsPage(Page):
 
     def action_axis(self) -> None:
         """Choose the next axis."""
+        self._begun = None
         chosen = self._chosen()
         if chosen is not None:
             self._axis = (self._axis + 1) % len(chosen[0].readout.axes)
@@ -204,23 +215,42 @@ class ControlsPage(Page):
 
     def action_jog(self, sign: int) -> None:
         """Move by one step, if the drive is known to rest; else drop the press."""
+        self._begun = None
         self._move(BY, sign * self.step)
 
-    def action_do(self, name: str) -> None:
-        """Send the lines of a control."""
+    def action_do(self, key: str) -> None:
+        """Stop at once; every other control waits for Enter, as a letter alone neither moves nor lets go."""
+        name = KEYED[key]
         control = self._controls().get(name)
+        self._begun = None
         if control is None or control.absent:
             self._say(f"no {WORDS[name]}: {control.absent}" if control is not None else "no drive is selected", "!")
-        elif name in (HOME_MINUS, HOME_PLUS):
-            self._move(name, 0)
         elif name == STOP:
             self.host.outbox.at_once(control.filled())
             self._tell(control.filled())
         else:
+            self._begun = Asked(key, self.host.session.stops, selected_place(self.host.session))
+            about = f" - {control.about}" if control.about else ""
+            self._say(f"Enter sends {', '.join(control.filled())}{about}   Esc: nothing", "!")
+
+    def action_go(self) -> None:
+        """Send the control that was begun, unless a stop or another drive came in between."""
+        begun, self._begun = self._begun, None
+        session = self.host.session
+        if begun is None:
+            return
+        if begun.stops != session.stops or begun.place != selected_place(session):
+            self._say("nothing was sent: a stop or another drive came in between", "!")
+            return
+        name = KEYED[begun.key]
+        if name in (HOME_MINUS, HOME_PLUS):
+            self._move(name, 0)
+        elif (control := self._controls().get(name)) is not None:
             self._send(control.filled())
 
     def action_ask(self, key: str) -> None:
         """Ask for a number."""
+        self._begun = None
         if not self._controls():
             self._say("no drive is selected", "!")
             return
@@ -234,7 +264,7 @@ class ControlsPage(Page):
         """Take a blank, which no number has, as the key of the stop."""
         if " " in text:
             self._field.value = text.replace(" ", "")
-            self.action_do(STOP)
+            self.action_do(SPACE)
 
     def _typed(self, text: str) -> None:
         """Take a number on Enter."""
@@ -287,7 +317,11 @@ class ControlsPage(Page):
         self._say(f"sent: {', '.join(lines)}", ".")
 
     def action_leave(self) -> None:
-        """Leave the number, then the page."""
+        """Leave the number or the control that waits for Enter, then the page."""
+        if self._begun is not None:
+            self._begun = None
+            self._say("nothing was sent", "!")
+            return
         if self._asked is not None:
             self._close("")
             return
@@ -308,14 +342,12 @@ class ControlsPage(Page):
 def axis_state(glance: Glance, axis: Readout) -> State:
     """The state of one axis; that of the drive where it is not known to move or rest."""
     state = glance.state()
-    if state in (State.MOVING, State.STOPPED) and axis.last is not None:
-        return State.MOVING if axis.last.velocity else State.STOPPED
-    return state
+    return axis.own_state if state in READ and axis.last is not None else state
 
 
 def _control_row(key: str, name: str, control: Control, number: str, width: int) -> Row:
     """Key, word, lines and meaning of a control; an absent one has its reason."""
-    shown = "Space" if key == "space" else key
+    shown = "Space" if key == SPACE else key if number else f"{key} Enter"
     if control.absent:
         text = fit(f"not here: {control.absent}", max(0, width - KEY - WORD - 3))
         return ((f" {fit('', KEY)}", "dim"), (f"{fit(WORDS[name], WORD)} ", "dim"), (text, "dim"))

@@ -36,6 +36,7 @@ SIGNS: Sequence[Entry] = (
     ("✗", "refused, no reply, lost"),
     ("· !", "progress; warning"),
     ("▶ ■", "velocity last read: not 0; 0"),
+    ("□", "at rest without current: nothing holds the load"),
     ("? ·", "does not reply; not read lately"),
     ("≠", "the position differs from that of the drive's twin by more than the limit"),
     ("◆", "program mode: lines are stored, not executed"),

@@ -26,9 +26,9 @@ from dialects.mcode.manual import points
 from dialects.mcode.manual.parameters import Form, Setting
 from dialects.mcode.manual.table import words
 
-STATE = ("EF", "BY", "MV", "VC", "MP", "P", "IN", "I5", "AF")
-"""What changes by itself; the flags first, which need no separator."""
-SETTINGS = ("EE", "AS", "DE", "RC", "HC", "VI", "VM", "A", "D")
+STATE = ("EF", "BY", "MV", "VC", "MP", "DE", "P", "IN", "I5", "AF")
+"""What changes by itself, or by a program; the flags first, which need no separator."""
+SETTINGS = ("EE", "AS", "RC", "HC", "VI", "VM", "A", "D")
 POINTS = ("S1", "S2", "S3", "S4")
 """The set-ups of an MDrivePlus."""
 SETTLED = "IS1"

@@ -24,10 +24,11 @@ FUNCTIONS: Mapping[int, str] = {
 FIRST_OUTPUT = 16
 FOLLOWS: Mapping[int, str] = {17: "MV", 18: "EF", 20: "VC", 23: "MP"}
 """The flags that types of output show."""
+LOCKED = 8
 HMT: tuple[tuple[int, str], ...] = (
     (256, "failed to initialize"),
     (32, "fault"),
-    (8, "locked rotor"),
+    (LOCKED, "locked rotor"),
     (2, "lags"),
     (1, "leads"),
     (4, "at its bounds"),
@@ -48,6 +49,8 @@ def conditions(product: str, facts: Facts, target: int | None) -> Conditions:
         runs=bool(facts["BY"]) if "BY" in facts else None,
         target=target if facts.get("MV") else None,
         limits=limits,
+        disabled=_disabled(facts),
+        released="HC=0" if facts.get("HC") == 0 and not facts.get("AS") else "",
         run_current=_whole(facts, "RC"),
         hold_current=_whole(facts, "HC"),
         more=tuple(_more(facts)),
@@ -65,6 +68,14 @@ def _pace(facts: Facts) -> Pace | None:
     if any(name not in facts for name in names):
         return None
     return Pace(*(number(facts[name]) for name in names))
+
+
+def _disabled(facts: Facts) -> str:
+    """The reason for which the output bridges are off. (MCode reference 5.1.20, 5.1.30.)"""
+    if facts.get("DE") == 0:
+        return "DE=0"
+    locked = facts.get("AS") and int(number(facts.get("AF", 0))) & LOCKED
+    return "locked rotor; CF clears it" if locked else ""
 
 
 def _limits(facts: Facts) -> tuple[int, int] | None:
@@ -111,8 +122,6 @@ def _outputs(facts: Facts) -> Iterator[Lamp]:
 
 
 def _more(facts: Facts) -> Iterator[tuple[str, str]]:
-    if facts.get("DE") == 0:
-        yield "drive", "disabled (DE=0)"
     if "AF" in facts and facts.get("AS"):
         bits = int(number(facts["AF"]))
         words = [word for bit, word in HMT if bits & bit]

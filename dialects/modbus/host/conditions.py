@@ -18,8 +18,8 @@ from dialects.modbus.host.operations import OUTPUTS
 from dialects.modbus.host.state import ModbusState
 from dialects.modbus.manual.registers import REGISTERS
 
-FLAGS = ("EF", "BY", "MV")
-SETTINGS = ("EE", "AS", "DE", "RC", "HC", "VI", "VM", "A", "D")
+FLAGS = ("EF", "BY", "MV", "DE")
+SETTINGS = ("EE", "AS", "RC", "HC", "VI", "VM", "A", "D")
 INPUTS = 4
 
 

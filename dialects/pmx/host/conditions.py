@@ -72,6 +72,7 @@ def _conditions(axis: str, facts: Facts) -> Conditions:
     loop = facts.get(f"SLS{axis}")
     code, text = _error(status, loop if isinstance(loop, int) else None)
     running, line = _program(facts) if first else ("", "")
+    on = facts.get("EO")
     return Conditions(
         axis=axis.lower(),
         lamps=(*_switches(axis, facts), *(_shared(facts) if first else ())),
@@ -80,6 +81,7 @@ def _conditions(axis: str, facts: Facts) -> Conditions:
         program=running,
         runs=_runs(facts) if first else None,
         line=line,
+        disabled=f"EO{DRIVERS[axis]}=0" if isinstance(on, int) and not on & DRIVERS[axis] else "",
         more=tuple(_more(axis, facts)),
         unit="counts" if facts.get(f"SL{axis}") else "pulses",
         pace=_pace(axis, facts),
@@ -129,8 +131,6 @@ def _more(axis: str, facts: Facts) -> Iterator[tuple[str, str]]:
         yield "StepNLoop", words.loop(loop)
     if isinstance(delta := facts.get(f"DX{axis}"), int):
         yield "delta", str(delta)
-    if isinstance(drivers := facts.get("EO"), int):
-        yield "motor", "on" if drivers & DRIVERS[axis] else f"off (EO{DRIVERS[axis]}=0)"
     failed = [str(n) for n in PROGRAMS if facts.get(f"SASTAT{n}") == 4]
     if failed and axis == AXES[0]:
         yield "program", f"{', '.join(failed)} stopped by an error"

@@ -19,7 +19,8 @@ from dialects.tmcl.manual.parameters import Axis
 
 STATE = (Axis.TARGET_POSITION, Axis.POSITION_REACHED)
 SWITCHES = ((Axis.HOME_SWITCH, "home"), (Axis.RIGHT_SWITCH, "lim+"), (Axis.LEFT_SWITCH, "lim-"))
-SETTINGS = (Axis.RUN_CURRENT, Axis.STANDBY_CURRENT, Axis.MAXIMUM_VELOCITY, Axis.MAXIMUM_ACCELERATION)
+RAMP = (Axis.MAXIMUM_VELOCITY, Axis.MAXIMUM_ACCELERATION)
+SETTINGS = (Axis.RUN_CURRENT, Axis.STANDBY_CURRENT, Axis.FREEWHEELING, *RAMP)
 ABSENT = "absent"
 """A parameter that the module refuses: it lacks it."""
 FULL_CURRENT = 255
@@ -72,6 +73,7 @@ def _conditions(state: TmclState, facts: Facts, motor: int) -> Conditions:
         target=None if reached else target,
         run_current=_percent(facts, Axis.RUN_CURRENT, motor),
         hold_current=_percent(facts, Axis.STANDBY_CURRENT, motor),
+        released=_released(facts, motor),
         unit="microsteps",
         pace=_pace(facts, motor),
     )
@@ -87,6 +89,13 @@ def _percent(facts: Facts, axis: Axis, motor: int) -> int | None:
     return None if value is None else round(value * 100 / FULL_CURRENT)
 
 
+def _released(facts: Facts, motor: int) -> str:
+    """The reason for which no current holds the motor at rest."""
+    if _whole(facts, Axis.STANDBY_CURRENT, motor) == 0:
+        return "parameter 7 is 0"
+    return "freewheels: parameter 204" if _whole(facts, Axis.FREEWHEELING, motor) else ""
+
+
 def _lamps(facts: Facts, motor: int) -> Iterator[Lamp]:
     for axis, function in SWITCHES:
         if isinstance(value := facts.get(_key(axis, motor)), int):
@@ -95,7 +104,7 @@ def _lamps(facts: Facts, motor: int) -> Iterator[Lamp]:
 
 def _pace(facts: Facts, motor: int) -> Pace | None:
     """One ramp up and down; older modules count it in units of their chip, so it may be another."""
-    speed, ramp = (_whole(facts, axis, motor) for axis in SETTINGS[2:])
+    speed, ramp = (_whole(facts, axis, motor) for axis in RAMP)
     return Pace(0, speed, ramp, ramp) if speed and ramp else None
 
 

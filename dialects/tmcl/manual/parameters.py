@@ -42,6 +42,7 @@ class Axis(IntEnum):
     SEARCH_SPEED = 194
     SWITCH_SPEED = 195
     SWITCH_DISTANCE = 196
+    FREEWHEELING = 204
     LOAD = 206
     ERROR_FLAGS = 207
     DRIVER_FLAGS = 208
@@ -97,6 +98,7 @@ AXIS: Mapping[int, Parameter] = MappingProxyType(
         Axis.SEARCH_SPEED: Parameter("reference search: velocity of the search", SPEEDS, SPEED, 51_200),
         Axis.SWITCH_SPEED: Parameter("reference search: velocity near the switch", SPEEDS, SPEED, 12_800),
         Axis.SWITCH_DISTANCE: Parameter("distance of the end switches, after mode 2", unit=STEPS),
+        Axis.FREEWHEELING: Parameter("delay at standstill until the current is off; 0: it stays", range(2**16)),
         Axis.LOAD: Parameter("load of the motor, as the driver measures it"),
         Axis.ERROR_FLAGS: Parameter("extended error flags; reading clears them"),
         Axis.DRIVER_FLAGS: Parameter("error flags of the driver"),

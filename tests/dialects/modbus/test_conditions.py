@@ -38,3 +38,13 @@ def test_flags_points_settings_and_set_ups_make_the_conditions() -> None:
     assert shown[-3:] == [("1", "", True), ("2", "error", False), ("3", "", False)]
     assert (found.error, found.program, found.run_current, found.hold_current) == (0, "", 60, 5)
     assert not device.error_flag
+
+
+def test_a_disabled_drive_is_read_with_its_flags() -> None:
+    port = _connect(drive("DE=0", personality="LMDCE"))
+    state = ModbusState(Modbus(), product="LMDCE", version="LMDCE 6.002")
+    reader = MODBUS.conditions
+    assert reader is not None
+    quick = next(part for part in reader.parts(state, {}) if part.name == "flags")
+    assert not quick.slow
+    assert reader.fold(state, carried(port, quick.read(state)))[0].disabled == "DE=0"
