@@ -222,11 +222,13 @@ class Family(Generic[S]):
     Where one print has room, it also says whether a program runs; a poll leaves that out.
     """
     moving: Callable[[S], Procedure[bool]]
-    """Whether the drive reports motion."""
+    """Whether the drive reports motion. At rest: none in two readings, `drives.drive.REST` apart."""
     busy: Callable[[S], Procedure[bool]]
     """Whether a program runs, which can move the drive. A stop is confirmed by it; Refused or NoAnswer: not known."""
     language: Language
     """Help and completion for what a person types to it."""
+    rests_in_place: bool
+    """At rest the position, too, is the same in both readings: in motion the velocity may read 0."""
     question: Callable[[str], str | None]
     """The line that prints the value of a word; None: the word has no value to read."""
     sentences: Sentences

@@ -1,6 +1,6 @@
 """Confirmation of a stop: read velocities and programs, and stop again what moves or runs on.
 
-A stop is believed only when the velocity was read as 0 and no program runs that can set another one: screen and log
+A stop is believed only when two readings show the drive at rest and no program runs that can move it: screen and log
 must not lie. So each drive is read once the wire is quiet and the stop was repeated. A drive that still moves and does
 not slow down is stopped again, and so is one whose program runs, unless a command has started it since.
 """
@@ -14,7 +14,7 @@ from typing import NamedTuple
 from dialects import DriveError, Motion, Priority, Stopped
 from drives.drive import Drive
 from drives.events import Sample, Transaction
-from drives.halt import Halt
+from drives.halt import Fate, Halt
 from transports import TransportLost
 
 TRIES = 3
@@ -63,7 +63,8 @@ async def confirm_stop(halt: Halt, repeat: Callable[[Halt], None], superseded: C
             _once_more(halt, active, tries, repeat)
         # The line of an operator that may start a drive may also be refused, and then nothing has started it.
         undecided = [drive for drive in unconfirmed if halt.started_since(drive) and drive.starting]
-        unconfirmed = [*active, *undecided]
+        once = [drive for drive, each in found.items() if each == NOTHING and halt.fate(drive) is Fate.SENT]
+        unconfirmed = [*active, *undecided, *once]
         if unconfirmed:
             await asyncio.sleep(BETWEEN)
     if active and tries < TRIES:
@@ -104,8 +105,8 @@ async def _read(drive: Drive, halt: Halt) -> Activity:
     if why:
         return _not_known(drive, halt, why)
     halt.doubts.pop(drive, None)
-    found = Activity(max(abs(axis.velocity) for axis in axes), bool(runs))
-    if found == NOTHING:
+    found = Activity(abs(drive.seen.velocity) if drive.seen is not None else 0, bool(runs))
+    if halt.fate(drive) is Fate.STANDING:
         drive.link.notify(f"{drive.shown}: stopped, velocity 0 at {', '.join(str(each.position) for each in axes)}")
     return found
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol, TypeVar
@@ -31,6 +32,10 @@ from drives.link import Link
 from transports import TransportLost
 
 T = TypeVar("T")
+REST = 0.05
+"""The least time between two readings that show a drive at rest, s."""
+RECENT = 1.0
+"""The longest time between two readings that are compared where nothing else is known of the time between, s."""
 
 
 class Neighbours(Protocol):
@@ -54,7 +59,38 @@ class Seen:
     at: float
     """When it was requested, s of the link's clock."""
     velocity: int
-    """Velocity of the fastest axis, signed, per second."""
+    """Velocity of the fastest axis, signed, per second; where it reads 0 on the way, as the positions show it."""
+    confirms: float = float("-inf")
+    """When the latest reading was requested that shows the same rest, and at least REST earlier; -inf: none does."""
+
+    def at_rest(self, since: float | None = None) -> bool:
+        """Whether two readings after `since`, REST apart, show it at rest; by default two recent ones."""
+        return self.confirms > (self.at - RECENT if since is None else since)
+
+
+class Judged:
+    """The readings of a drive's motion, each judged by those before it."""
+
+    def __init__(self) -> None:
+        self.still: list[float] = []
+        """When the last readings in a row were requested that show it at rest in one place."""
+        self._last = (float("-inf"), tuple[int, ...]())
+
+    def reading(self, at: float, axes: Sequence[Motion], in_place: bool) -> Seen:
+        """Judge a reading. `in_place`: at rest the position must stay, too."""
+        (before, places), here = self._last, tuple(axis.position for axis in axes)
+        self._last = at, here
+        velocity = max((axis.velocity for axis in axes), key=abs)
+        displaced = in_place and here != places
+        if not velocity and displaced and 0 < at - before < RECENT:
+            ways = [after - earlier for earlier, after in zip(places, here, strict=False)]
+            velocity = round(max(ways, key=abs) / (at - before)) or 1
+        if velocity or displaced:
+            self.still.clear()
+        earlier = [each for each in self.still if each <= at - REST]
+        if not velocity:
+            self.still = [*earlier[-1:], *self.still[len(earlier) :], at]
+        return Seen(at, velocity, *earlier[-1:])
 
 
 @dataclass(frozen=True)
@@ -87,6 +123,7 @@ class Drive:
         """Number of requests sent to it that may do more than ask."""
         self._conversations = conversations
         self._neighbours = neighbours
+        self._judged = Judged()
 
     @property
     def link(self) -> Link:
@@ -187,6 +224,7 @@ class Drive:
         if self.link.away is None:
             for each in self._meant:
                 each.started_at = each.commanded_at = self.link.now()
+                each._judged.still.clear()
 
     @property
     def _meant(self) -> list[Drive]:
@@ -246,16 +284,21 @@ class Drive:
         def over(outcome: Outcome[tuple[Motion, ...]]) -> None:
             if outcome.error is None:
                 axes, at = outcome.value(), transactions[0].sent_at
-                self.seen = Seen(at, max((axis.velocity for axis in axes), key=abs))
+                self.seen = self._judged.reading(at, axes, self.family.rests_in_place)
                 if axes[0].program is not None:
                     self.running = Running(at, axes[0].program)
             on_over(outcome)
 
         return self.start(self.family.motion(self.state, priority), over, watch)
 
-    async def still(self) -> bool:
-        """Read whether it stands still."""
-        return not await self.run(self.family.moving(self.state))
+    async def rest(self) -> tuple[int, ...] | None:
+        """Read whether it rests: None while it moves; else what a reading REST later must show again, too."""
+        if await self.run(self.family.moving(self.state)):
+            return None
+        if not self.family.rests_in_place:
+            return ()
+        axes = await self.motion()
+        return None if any(axis.velocity for axis in axes) else tuple(axis.position for axis in axes)
 
     async def busy(self) -> bool:
         """Read whether a program runs in it."""
@@ -307,3 +350,21 @@ async def _to_each(drives: Sequence[Drive], text: str) -> tuple[str, ...]:
     if failures:
         raise failures[0]
     return tuple(printed)
+
+
+async def confirmed_motion(drive: Drive) -> tuple[Motion, ...]:
+    """Read position and velocity of each axis; at velocity 0 once more, unless earlier readings confirm it."""
+    axes = await drive.motion()
+    if drive.seen is not None and not drive.seen.velocity and not drive.seen.at_rest():
+        await asyncio.sleep(REST)
+        axes = await drive.motion()
+    return axes
+
+
+async def still(drive: Drive) -> bool:
+    """Read twice, REST apart, whether a drive is at rest."""
+    place = await drive.rest()
+    if place is None:
+        return False
+    await asyncio.sleep(REST)
+    return place == await drive.rest()

@@ -16,8 +16,8 @@ from drives.link import Link
 class Fate(Enum):
     """What is known of a drive since a stop."""
 
-    SENT = "sent, not read yet"
-    STANDING = "velocity read as 0 since, and no program runs"
+    SENT = "sent, not read yet, or at velocity 0 once"
+    STANDING = "read at rest since, and no program runs"
     MOVING = "velocity read as not 0 since"
     RUNNING = "a program runs, read since"
     NOT_KNOWN = "sent, and the velocity, or whether a program runs, cannot be read"
@@ -68,12 +68,12 @@ class Halt:
         if self.started_since(drive):
             return Fate.STARTED
         since = max(self.at, drive.started_at)  # a refused line may have run an error routine in the drive
-        moves = bool(drive.seen.velocity) if drive.seen is not None and drive.seen.at > since else None
+        seen = drive.seen if drive.seen is not None and drive.seen.at > since else None
         runs = drive.running.runs if drive.running is not None and drive.running.at > since else None
-        if moves is False and runs is False:
+        if seen is not None and seen.at_rest(since) and runs is False:
             return Fate.STANDING
         if not self.data or drive in self.missed:
             return Fate.NOT_REACHED
-        if moves or runs:
-            return Fate.MOVING if moves else Fate.RUNNING
+        if (seen is not None and seen.velocity) or runs:
+            return Fate.MOVING if seen is not None and seen.velocity else Fate.RUNNING
         return Fate.NOT_KNOWN if self.link.lost or drive in self.doubts else Fate.SENT

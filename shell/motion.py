@@ -9,7 +9,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from dialects import DriveError
-from shell.stops import last_seen
+from drives.drive import confirmed_motion
+from shell.stops import UNCONFIRMED, last_seen
 from transports import TransportLost
 
 if TYPE_CHECKING:
@@ -31,12 +32,16 @@ class Standing:
     name: str
     axes: tuple[Motion, ...] = ()
     why: str = ""
+    unconfirmed: bool = False
+    """It reads velocity 0, and its position may change."""
 
     @property
     def text(self) -> str:
         """In words: `b stands at 51200`."""
         if not self.axes:
             return f"{self.name} not known ({self.why})"
+        if self.unconfirmed:
+            return f"{self.name} {UNCONFIRMED}; now {' and '.join(str(each.position) for each in self.axes)}"
         return f"{self.name} {' and '.join(map(_axis, self.axes))}"
 
     @property
@@ -78,10 +83,21 @@ async def _standing(workspace: Workspace, drives: Sequence[Drive]) -> list[Stand
                     found[drive] = Standing(name, why=_unasked(drive))
                     if not found[drive].why:
                         found[drive] = Standing(name, why="no answer")
-                        found[drive] = Standing(name, await drive.motion())
+                        axes = await confirmed_motion(drive)
+                        found[drive] = Standing(
+                            name, axes, unconfirmed=not any(axis.velocity for axis in axes) and not _rests(drive)
+                        )
                 except (DriveError, TransportLost) as failure:
                     found[drive] = Standing(name, why=str(failure).removeprefix(f"{name}: "))
     return [found[drive] for drive in drives]
+
+
+def _rests(drive: Drive) -> bool:
+    return drive.seen is not None and drive.seen.at_rest()
+
+
+def _unconfirmed(drive: Drive) -> bool:
+    return drive.seen is not None and not drive.seen.velocity and not drive.seen.at_rest()
 
 
 def _unasked(drive: Drive) -> str:
@@ -108,9 +124,9 @@ async def _read(bus: Bus) -> None:
     with contextlib.suppress(TimeoutError):
         async with asyncio.timeout(LIMIT):
             for drive in sorted(bus.all_drives, key=_last_contact, reverse=True):
-                if not _fresh(drive, bus.now()) and _answers(drive):
+                if (not _fresh(drive, bus.now()) or _unconfirmed(drive)) and _answers(drive):
                     with contextlib.suppress(DriveError, TransportLost):
-                        await drive.motion()
+                        await confirmed_motion(drive)
 
 
 def _answers(drive: Drive) -> bool:
@@ -130,6 +146,8 @@ def _fresh(drive: Drive, since: float) -> bool:
 
 def _described(drive: Drive, begun: float, now: float) -> str:
     if _fresh(drive, begun) and drive.seen is not None:
+        if _unconfirmed(drive):
+            return UNCONFIRMED
         return f"moves at {drive.seen.velocity} a second" if drive.seen.velocity else ""
     known = bool(drive.product) or drive.seen is not None or drive.commands
     return f"is not known: {last_seen(drive, now)}" if known else ""

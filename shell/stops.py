@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 
 E_STOP = " - use the E-stop"
 NOT_OPEN = "still being opened"
+UNCONFIRMED = "reads velocity 0, but not twice at one position"
 GAP = "   "
 RESUME = "/resume lets macros run"
 SHOWN = 8
@@ -185,7 +186,9 @@ def last_seen(drive: Drive, now: float) -> str:
     ago = f"{max(0.0, now - since):.0f} s ago"
     if seen is None or drive.started_at > seen.at:
         return f"started {ago} and not read since"
-    return f"last seen moving at {seen.velocity} a second {ago}" if seen.velocity else f"last seen standing {ago}"
+    if seen.velocity:
+        return f"last seen moving at {seen.velocity} a second {ago}"
+    return f"last seen {'standing' if seen.at_rest() else 'once at velocity 0'} {ago}"
 
 
 def not_open(url: str) -> str:

@@ -20,6 +20,7 @@ from dialects.families import program_languages
 from dialects.files import text_of
 from dialects.held import Difference, Held
 from dialects.problems import errors, refuse
+from drives.drive import still
 from shell import backups, sources
 from shell.events import Printed
 from shell.jobs import running, transferring
@@ -189,7 +190,7 @@ class _Download:
             return
         self._say("its program ran and was ended", warning=True)
         deadline = self._workspace.now() + LIMIT
-        while await drive.busy() or not await drive.still():
+        while await drive.busy() or not await still(drive):
             if self._workspace.now() >= deadline:
                 raise DriveError(
                     f"{self._name}: its program goes on for {LIMIT:g} s; stop it (nothing was overwritten)"

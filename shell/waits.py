@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from dialects import Diagnostic, DriveError
+from drives.drive import REST
 
 if TYPE_CHECKING:
     from drives.drive import Drive
@@ -17,8 +18,8 @@ if TYPE_CHECKING:
 
 LIMIT = 60.0
 """The default time limit, s."""
-APART = 0.05
-"""The time between the two readings of velocity 0, and between those of a value, s."""
+APART = REST
+"""The time between the two readings of a drive at rest, and between those of a value, s."""
 SHOWN = 3
 """The number of lines that a wait for a text shows when it runs out."""
 SIGNS: Mapping[str, Callable[[int, int], bool]] = {
@@ -89,7 +90,8 @@ async def wait(workspace: Workspace, limit: float, *, idle: bool, drives: Sequen
 
 
 async def _moving(workspace: Workspace, drives: Sequence[Drive], idle: bool) -> Drive | None:
-    """The first drive that is not at rest in both of two readings."""
+    """The first drive that is not at rest, in one place, in both of two readings."""
+    before: dict[Drive, tuple[int, ...]] = {}
     for reading in range(2):
         if reading:
             await sleep(APART)
@@ -98,7 +100,8 @@ async def _moving(workspace: Workspace, drives: Sequence[Drive], idle: bool) -> 
                 raise DriveError(
                     f"{workspace.display_name(drive)} is in program mode and would store the question; PG ends it"
                 )
-            if not await drive.still() or (idle and await drive.busy()):
+            place = await drive.rest()
+            if place is None or before.setdefault(drive, place) != place or (idle and await drive.busy()):
                 return drive
     return None
 

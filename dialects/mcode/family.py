@@ -30,6 +30,7 @@ MCODE = Family(
     busy=partial(operations.flag, name="BY"),
     status=operations.status,
     language=help,
+    rests_in_place=False,
     question="PR {}".format,
     sentences=Sentences(sentences.move, sentences.move_to, sentences.assign),
     programs_at="dialects.mcode.host.programs:PROGRAMS",

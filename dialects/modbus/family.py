@@ -34,6 +34,7 @@ MODBUS = Family(
     busy=partial(operations.flag, name="BY"),
     status=operations.status,
     language=help,
+    rests_in_place=False,
     question="PR {}".format,
     sentences=Sentences(sentences.move, sentences.move_to, sentences.assign),
     no_programs=f"programs are neither listed nor written over Modbus; {ALTERNATIVE} does both with the same drive",

@@ -21,6 +21,7 @@ PMX = Family(
     busy=operations.busy,
     status=operations.status,
     language=help,
+    rests_in_place=False,
     question=lambda word: word if reads(word) else None,
     sentences=Sentences(sentences.move, sentences.move_to, sentences.assign),
     programs_at="dialects.pmx.host.programs:PROGRAMS",

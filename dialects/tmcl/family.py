@@ -23,6 +23,7 @@ TMCL = Family(
     busy=operations.busy,
     status=operations.status,
     language=help,
+    rests_in_place=True,
     question=lambda word: None,
     sentences=Sentences(sentences.move, sentences.move_to, lambda word, value: None),
     guards=Guards(guards.NAMES, lambda state, text: guards.find(text, state.address), guards.word_of, guards.only_ends),

@@ -88,7 +88,7 @@ class Drive:
         self._session.call(lambda: self._drive.move_to(position))
 
     def wait(self, timeout: float = waits.LIMIT, *, idle: bool = False) -> None:
-        """Wait until it reads velocity 0 twice; with `idle` also until no program runs.
+        """Wait until two readings show it at rest; with `idle` also until no program runs.
 
         Raises DriveError after `timeout` seconds.
         """

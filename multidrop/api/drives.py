@@ -7,6 +7,7 @@ import re
 from typing import TYPE_CHECKING, Protocol
 
 from dialects import Diagnostic, Motion, Refused
+from drives.drive import still
 from multidrop.api import owner
 from multidrop.api.parameters import AsyncParameters
 from multidrop.api.pictures import table
@@ -120,7 +121,7 @@ class AsyncDrive:
             await self._owner.call(lambda: self._send(*lines))
 
     async def wait(self, timeout: float = waits.LIMIT, *, idle: bool = False) -> None:
-        """Wait until it reads velocity 0 twice; with `idle` also until no program runs.
+        """Wait until two readings show it at rest; with `idle` also until no program runs.
 
         Raises DriveError after `timeout` seconds.
         """
@@ -136,9 +137,9 @@ class AsyncDrive:
         return (await self.motion()).velocity
 
     async def moving(self) -> bool:
-        """Read whether it moves."""
+        """Read whether it moves; at rest, two readings say so."""
         self._check_executes()
-        return not await self._owner.call(self.drive.still)
+        return not await self._owner.call(lambda: still(self.drive))
 
     async def motion(self) -> Motion:
         """Read position and velocity of its axis at one time."""

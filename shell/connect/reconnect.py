@@ -13,9 +13,10 @@ from typing import TYPE_CHECKING
 
 from dialects import DriveError, Hints, Stopped
 from drives.apart import apart
+from drives.drive import confirmed_motion
 from drives.events import Changed
 from shell.connect.reopening import Absent, Reopen
-from shell.stops import E_STOP, last_seen
+from shell.stops import E_STOP, UNCONFIRMED, last_seen
 from transports import TransportLost
 
 if TYPE_CHECKING:
@@ -169,11 +170,13 @@ class _Return:
 
 async def _motion(drive: Drive) -> str:
     try:
-        axes = await drive.motion()
+        axes = await confirmed_motion(drive)
     except (DriveError, TransportLost) as failure:
         return f"whether {drive.shown} moves could not be read: {failure}"
     velocity = max((axis.velocity for axis in axes), key=abs)
     where = ", ".join(str(axis.position) for axis in axes)
+    if not velocity and drive.seen is not None and not drive.seen.at_rest():
+        return f"{drive.shown} {UNCONFIRMED}; now {where}"
     return f"{drive.shown} moves at {velocity} a second" if velocity else f"{drive.shown} is at rest at {where}"
 
 
@@ -182,4 +185,4 @@ def may_move(drive: Drive) -> bool:
     seen = drive.seen
     if seen is None or drive.started_at > seen.at:
         return drive.started_at > float("-inf")
-    return seen.velocity != 0
+    return not seen.at_rest()

@@ -16,6 +16,7 @@ from dialects.families import family_of
 from dialects.modbus.host import framing
 from dialects.modbus.manual.registers import REGISTERS
 from drives.bus import Bus
+from drives.drive import still
 from drives.events import Notice, Traffic, Unsolicited
 from drives.halt import Fate
 from transports.sockets import open_tcp
@@ -66,7 +67,7 @@ async def test_it_is_opened_and_read_and_written():
         assert await drive.send("PR VM,HC") == ("6000005",)
         (motion,) = await drive.motion()
         assert (motion.position, motion.velocity) == (-51200, 0)
-        assert await drive.still() and not await drive.busy()
+        assert await still(drive) and not await drive.busy()
         assert (16, 0x8B) in heard
 
 

@@ -8,6 +8,7 @@ import pytest
 from dialects import DriveState, End, Hints, Kind, NoAnswer, Priority, Refused, Reply, Request, Stopped, StopPiece
 from dialects.mcode.manual import program_file
 from drives.bus import Bus
+from drives.drive import confirmed_motion
 from drives.events import Ended, Notice, Sample, Sent, Silent, Traffic, Unsolicited
 from drives.halt import Fate
 from simulator.cells import read
@@ -170,7 +171,7 @@ async def test_a_refused_line_is_no_proof_that_a_drive_still_stands():
     with pytest.raises(Refused):
         await drive.send("MR 1,2,3,4,5")  # it may run a routine on errors (OE) that moves
     assert halt.fate(drive) is Fate.SENT
-    await drive.motion(Priority.OPERATOR)
+    await confirmed_motion(drive)
     assert halt.fate(drive) is Fate.STANDING
 
 
@@ -571,4 +572,4 @@ async def test_a_poll_does_not_ask_for_the_program_and_a_stop_does():
     shop.bus.stop()
     await shop.bus.stopped()
     samples = [event for event in shop.events[before:] if isinstance(event, Sample)]
-    assert [(event.velocity, event.program) for event in samples] == [(0, False)]
+    assert {(event.velocity, event.program) for event in samples} == {(0, False)}

@@ -7,6 +7,7 @@ import signal
 import pexpect
 import pytest
 
+from drives.drive import confirmed_motion
 from tests.support.cell_session import CellSession, bus, party, pmx
 from tests.support.processes import Running
 from tests.support.served_cell import until
@@ -38,7 +39,7 @@ async def test_what_moves_is_found_by_a_quick_look_and_what_does_not_answer_is_n
 @in_virtual_time
 async def test_a_fresh_reading_is_not_asked_for_again(tmp_path):
     async with CellSession(tmp_path, bus("press", party("a"))) as shop:
-        await shop.session.selected.motion()
+        await confirmed_motion(shop.session.selected)
         shop.events.clear()
         assert await shop.session.in_motion() == []
         assert shop.written("press") == b""

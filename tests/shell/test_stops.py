@@ -1,11 +1,12 @@
 """What a stop reaches, what it says of what it did not, on simulated lines of every family, in virtual time."""
 
 import asyncio
-from types import SimpleNamespace
+from dataclasses import replace
 
 import pytest
 
 from dialects import Motion, Stopped
+from drives.drive import Drive, confirmed_motion
 from drives.halt import Fate
 from shell import stops
 from shell.events import OnBus
@@ -132,7 +133,7 @@ async def test_a_lost_bus_is_named_with_how_its_drives_were_last_seen(tmp_path):
         await shop.session.run("@line:c SL 5000")
         await asyncio.sleep(1.0)
         for drive in shop.session.buses["line"].drives.values():
-            await drive.motion()
+            await confirmed_motion(drive)
         shop.world("/sim unplug line")
         await asyncio.sleep(4.0)
         shop.session.stop("Ctrl+X")
@@ -209,14 +210,18 @@ async def test_a_drive_that_begins_to_move_by_itself_behind_a_stop_is_told(tmp_p
     ],
 )
 @in_virtual_time
-async def test_a_drive_that_slows_down_is_waited_for_and_one_that_does_not_is_stopped_again(speeds, said, tmp_path):
+async def test_a_drive_that_slows_down_is_waited_for_and_one_that_does_not_is_stopped_again(
+    speeds, said, tmp_path, monkeypatch
+):
     async with CellSession(tmp_path, bus("press", party("a"))) as shop:
+        left = iter(speeds)
 
-        async def motion(priority, ended):
-            ended(SimpleNamespace(transmitted_at=shop.session.now()))
-            return (Motion(0, speeds.pop(0)),)
+        def motion(state, priority):
+            yield state.codec.request(state.address, "PR V")
+            return (Motion(0, next(left, 0)),)
 
-        shop.session.selected.motion = motion
+        family = replace(shop.session.selected.family, motion=motion)
+        monkeypatch.setattr(Drive, "family", property(lambda drive: family))
         shop.session.stop()
         await asyncio.sleep(10.0)
         assert [text.removeprefix("press: ") for text in shop.told()[1:]] == said
