@@ -189,9 +189,9 @@ class Bus:
         """Write a stop of all drives or some, and nothing else: no watcher hears of it before `halted`."""
         return self._stopping.halt(only)
 
-    def halted(self, halt: Halt) -> None:
+    def halted(self, halt: Halt, confirm: bool = True) -> None:
         """Publish a stop that was written, fail what waited, and confirm that it works."""
-        self._stopping.halted(halt)
+        self._stopping.halted(halt, confirm)
 
     def stop(self, only: Iterable[Drive] | None = None) -> Halt:
         """Stop every drive at once, or some: both phases, for a caller with one bus."""

@@ -64,12 +64,12 @@ class Stopping:
         self._write(halt)
         return halt
 
-    def halted(self, halt: Halt) -> None:
+    def halted(self, halt: Halt, confirm: bool = True) -> None:
         """Publish a stop that was written, fail what waited, and confirm that it works."""
         if self._link.lost:
             return
         self._publish(halt)
-        if not self._link.away:
+        if not self._link.away and confirm:
             self._begin_to_confirm(halt)
         elif self._link.reserved:
             self.unasked()

@@ -44,12 +44,13 @@ class Rescue:
         Raises NothingFound, Diagnostic where a person does not agree, and the failures of a port.
         """
         stages = self._scanning.stages(bauds)
-        for step in (self._search, self._clear, self._widen, self._power_cycles):
-            await step(stages)
-            if self._scanning.found and not everything:
-                return
-        if not self._scanning.found:
-            await self._erase(stages, erase)
+        async with self._scanning.stopping_all():
+            for step in (self._search, self._clear, self._widen, self._power_cycles):
+                await step(stages)
+                if self._scanning.found and not everything:
+                    return
+            if not self._scanning.found:
+                await self._erase(stages, erase)
         if not self._scanning.found:
             raise self._scanning.nothing(stages)
 
@@ -66,7 +67,8 @@ class Rescue:
             for line in lines:
                 yield from family_of(codec).perform(drive.state, line)
 
-        await self._scanning.converse(drive.connection, procedure)
+        async with self._scanning.stopping_all():
+            await self._scanning.converse(drive.connection, procedure)
         self._say(f"{', '.join(lines)} is set; S saves it")
 
     # Steps

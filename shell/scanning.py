@@ -7,16 +7,18 @@ person is asked before it is tried.
 
 from __future__ import annotations
 
+import asyncio
 from collections.abc import AsyncIterator, Callable, Iterable, Iterator, Sequence
-from contextlib import AsyncExitStack, asynccontextmanager
+from contextlib import AsyncExitStack, asynccontextmanager, suppress
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from dialects import Diagnostic, DriveState, Procedure
-from dialects.families import FAMILIES
+from dialects.families import DEFAULT, FAMILIES
 from dialects.scanning import WINDOW, Reach, Scan
 from shell import jobs
-from shell.connect.opening import BAUDED
+from shell.connect.opening import BAUDED, port_name
+from shell.connect.port_state import memory_of
 from shell.connect.urls import Connection
 from shell.found import FoundDrive, port_of
 from transports import Remote, Transport, TransportLost
@@ -35,6 +37,9 @@ SPREAD, JITTER = 2.0, 0.02
 PLACE = 0
 BYTES = 20
 """The mean size of the questions to one address, bytes; for the estimate."""
+REPEATED = 0.2
+"""The time in which a stop is repeated once the line is quiet, s."""
+UNLISTED = "A drive that has not replied gets it without its name, which ES=2 and ES=3 need, and nothing confirms it"
 SO_FAR = "nothing more was sent"
 """What a refused question says in the middle of a search."""
 HAZARD = (
@@ -96,7 +101,12 @@ class Scanning:
         self._connection = connection
         self._report = report
         self._done = 0
-        self._searched_before: dict[Stage, None] = {}
+        self._agreed_to: dict[Stage, None] = {}
+        """The stages that need no question, and those that a person has agreed to."""
+        self._tried: dict[Stage, None] = {}
+        """The stages at which the port was opened."""
+        self._stopped: dict[Stage, None] = {}
+        """The stages at which a stop was sent."""
         self._said: set[str] = set()
 
     async def run(self, bauds: Sequence[int], everything: bool) -> None:
@@ -105,14 +115,15 @@ class Scanning:
         Raises NothingFound, Diagnostic where a person does not agree, and the failures of a port.
         """
         first, *others = self.stages(bauds)
-        await self.search([first], False)
-        if others and (everything or not self.found):
-            so_far = f"{len(self.found)} found" if self.found else "no drive replies"
-            seconds = round(sum(map(self._seconds, others)))
-            on = f"the search goes on with {listed(others)} (about {seconds} s)"
-            what = f"{so_far} with {listed([first])}; {on}; {HAZARD}"
-            if await self._agreed(what):
-                await self.search(others, everything)
+        async with self.stopping_all():
+            await self.search([first], False)
+            if others and (everything or not self.found):
+                so_far = f"{len(self.found)} found" if self.found else "no drive replies"
+                seconds = round(sum(map(self._seconds, others)))
+                on = f"the search goes on with {listed(others)} (about {seconds} s)"
+                what = f"{so_far} with {listed([first])}; {on}; {HAZARD}"
+                if await self._agreed(what):
+                    await self.search(others, everything)
         if not self.found:
             raise self.nothing([first, *others], "; multidrop rescue PORT frees a drive that is stuck")
 
@@ -147,36 +158,74 @@ class Scanning:
         return list(dict.fromkeys(bauds or (self._connection.baud or record.baud, *record.scan.bauds)))
 
     async def search(self, stages: Sequence[Stage], everything: bool, hasty: bool = False) -> None:
-        """Search these stages, to the first one that finds a drive unless `everything`. `hasty`: see `Reach`."""
+        """Search these stages, to the first one that finds a drive unless `everything`. `hasty`: see `Reach`.
+
+        A person has agreed to all of them, or need not.
+        """
         before, self._done = len(self.found), 0
+        self._agreed_to |= dict.fromkeys(stages)
         with jobs.running(self._workspace, f"{self._connection.short}: scan") as job:
             for stage in stages:
-                async with self._stopping_all(self.connection(stage)):
-                    await self._stage(stage, job, stages, hasty)
-                self._searched_before[stage] = None
+                await self._stage(stage, job, stages, hasty)
                 if len(self.found) > before and not everything:
                     return
 
+    # A stop meanwhile
+
     @asynccontextmanager
-    async def _stopping_all(self, connection: Connection) -> AsyncIterator[None]:
-        """Have a stop meanwhile reach what was searched before, too."""
+    async def stopping_all(self) -> AsyncIterator[None]:
+        """Have a stop meanwhile reach drives wherever they may be, once it was written as the port is open now."""
         stops = self._workspace.stops
         try:
             yield
         except BaseException:
             if self._workspace.stops != stops:
-                here = (connection.hints.family, connection.baud)
-                await self._stop_at([each for each in self._searched_before if (each.family, each.baud) != here])
+                stopping = asyncio.ensure_future(self._stop_everywhere())
+                while not stopping.done():
+                    with suppress(asyncio.CancelledError):  # another stop key, or the end: the stop goes on
+                        await asyncio.shield(stopping)
+                stopping.result()
             raise
 
-    async def _stop_at(self, stages: Sequence[Stage]) -> None:
-        """Repeat a stop as earlier stages spoke: their drives do not hear it as the last one speaks."""
-        for stage in stages:
-            for each in await self._opener(self.connection(stage), self._named):
-                async with self._adopted(each):
-                    each.bus.stop()
-                    await each.bus.stopped()
-            self._warn(self.port, [f"the stop was sent with {stage.words} too"])
+    async def _stop_everywhere(self) -> None:
+        """Send a stop where drives replied, are remembered or were sent something; then as far as was agreed.
+
+        At a wrong rate it is an error, and an OE subroutine may move its drive: so the first ones follow again. What
+        replied is read in the end, because that takes as long as a drive slows down.
+        """
+        replied = [_stage_of(each.connection) for each in self.found]
+        likely = list(dict.fromkeys([*replied, *self._remembered(), *self._tried]))
+        others = [each for each in self._agreed_to if each not in likely]
+        for stage in [*(each for each in likely if each not in self._stopped), *others]:
+            await self._stop_at(stage, confirm=False)
+        for stage in likely if others else dict.fromkeys(replied):
+            await self._stop_at(stage, confirm=True)
+        if self._stopped:
+            left_out = [each for each in self.stages(()) if each not in {**self._stopped, **self._agreed_to}]
+            why = f"; not with {listed(left_out)}: no search there was agreed to" if left_out else ""
+            self._warn(self.port, [f"the stop was sent with {listed(self._stopped)}{why}. {UNLISTED}"])
+
+    async def _stop_at(self, stage: Stage, confirm: bool) -> None:
+        """Send a stop with a language at a baud rate, to the drives that replied there by name; `confirm` reads them."""
+        try:
+            opened = await self._opener(self.connection(stage), self._named)
+        except TransportLost as loss:
+            self._warn(self.port, [f"NO STOP SENT with {stage.words}: {loss}"])
+            return
+        for each in opened:
+            async with self._adopted(each, stage):
+                for found in self.found:
+                    if _stage_of(found.connection) == stage:
+                        each.bus.roster.found(found.state)
+                each.bus.halted(each.bus.halt(), confirm=confirm and bool(each.bus.drives))
+                await each.bus.stopped()
+                await asyncio.sleep(REPEATED)
+
+    def _remembered(self) -> list[Stage]:
+        """The stage at which the last session's drives replied on this port."""
+        memory, _ = memory_of(self._workspace.settings.state, port_name(self._connection))
+        named = self._connection.hints.family in ("", DEFAULT)
+        return [Stage(DEFAULT, memory.baud)] if named and memory.drives and memory.baud else []
 
     def connection(self, stage: Stage) -> Connection:
         """The connection for a stage."""
@@ -184,7 +233,7 @@ class Scanning:
 
     async def converse(self, connection: Connection, procedure: Callable[[], Procedure[None]]) -> None:
         """Open the port, and run a conversation with all that is there."""
-        async with self._stopping_all(connection), self.opened(connection) as bus:
+        async with self.opened(connection) as bus:
             await bus.search(procedure())
 
     @asynccontextmanager
@@ -193,13 +242,14 @@ class Scanning:
         opened, *others = await self._opener(connection, self._named)
         for each in others:
             await each.bus.close()
-        async with self._adopted(opened) as bus:
+        async with self._adopted(opened, _stage_of(connection)) as bus:
             yield bus
 
     @asynccontextmanager
-    async def _adopted(self, opened: Opened) -> AsyncIterator[Bus]:
+    async def _adopted(self, opened: Opened, stage: Stage) -> AsyncIterator[Bus]:
         """Have a stop reach a bus, and close it in the end."""
         bus = opened.bus
+        self._tried[stage] = None
         self._workspace.adopt(opened, PLACE)
         if opened.limits and opened.limits not in self._said:
             self._said.add(opened.limits)
@@ -207,9 +257,8 @@ class Scanning:
         try:
             yield bus
         finally:
-            if bus.last_stop is not None:
-                text = "the stop was sent in every form; no drive is listed yet, so nothing confirms it"
-                self._warn(self.port, [text])
+            if bus.last_stop is not None and bus.last_stop.data:
+                self._stopped[stage] = None
             await self._workspace.forget(bus)
 
     def nothing(self, stages: Sequence[Stage], advice: str = "") -> NothingFound:
@@ -243,7 +292,7 @@ class Scanning:
             reach = self._reach(_distance(buses[0].bus.link.transport, connection.scheme, took), hasty)
             async with AsyncExitStack() as open_:
                 for each in buses:
-                    await open_.enter_async_context(self._adopted(each))
+                    await open_.enter_async_context(self._adopted(each, stage))
                 steps = [Steps(job, begun, total) for _ in buses]
                 outcomes = [
                     await self._searched(each, stage, connection, reach, count)
@@ -287,6 +336,10 @@ class Scanning:
 
     def _named(self, name: str) -> str:
         return name
+
+
+def _stage_of(connection: Connection) -> Stage:
+    return Stage(connection.hints.family or DEFAULT, connection.baud)
 
 
 def _families() -> list[str]:

@@ -64,7 +64,7 @@ async def open_buses(connection: Connection, naming: Naming, state: Path | None 
     hints, name = connection.hints, naming(connection.short)
     if state is None or not family.repairs:
         return [Opened(_bus(name, transport, connection, hints.family), hints, limits=limits, reopen=reopen)]
-    kept = PortState(state, port_name(connection))
+    kept = PortState(state, port_name(connection), _baud(connection))
     bus = _bus(name, transport, connection, hints.family, kept)
     kept.notify = partial(bus.notify, warning=True)
     warnings = (*kept.remarks, *([CUT.format(kept.cut)] if kept.cut else []))
@@ -142,11 +142,14 @@ def _family(connection: Connection) -> Family[Any]:
     return FAMILIES[name]
 
 
+def _baud(connection: Connection) -> int:
+    """The baud rate of a connection; 0 for a port that has none."""
+    return connection.baud or (_family(connection).baud if connection.scheme in BAUDED else 0)
+
+
 def _bus(name: str, transport: Transport, connection: Connection, family: str, keeper: Keeper | None = None) -> Bus:
-    serial = connection.scheme in BAUDED
-    baud = connection.baud or (_family(connection).baud if serial else 0)
     timeout = connection.timeout or DEFAULT_TIMEOUT
-    echo = connection.local_echo
+    echo, baud = connection.local_echo, _baud(connection)
     return Bus(name, transport, baud=baud, local_echo=echo, timeout=timeout, family=family, keeper=keeper)
 
 

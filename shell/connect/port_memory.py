@@ -25,12 +25,14 @@ class PortMemory:
 
     def __init__(self, path: Path) -> None:
         self.drives: tuple[Remembered, ...] = ()
+        self.baud = 0
+        """The baud rate at which they replied last; 0: not known, or the port has none."""
         self.remark = ""
         self._path = path
         self._load()
 
-    def update(self, found: Mapping[str, Remembered | None]) -> None:
-        """Take over what is known of the drives at these addresses; None forgets one.
+    def update(self, found: Mapping[str, Remembered | None], baud: int = 0) -> None:
+        """Take over what is known of the drives at these addresses, which reply at `baud`; None forgets one.
 
         A port has drives in party mode or one that is not, never both.
         """
@@ -38,24 +40,26 @@ class PortMemory:
         kept = [each for each in self.drives if each.address not in found]
         if new:
             kept = [each for each in kept if each.party == new[0].party]
-        drives = tuple(kept + new)[-MOST:]
-        if set(drives) != set(self.drives):
-            self.drives = drives
+        drives, baud = tuple(kept + new)[-MOST:], baud if new else self.baud
+        if set(drives) != set(self.drives) or baud != self.baud:
+            self.drives, self.baud = drives, baud
             self._save()
 
     def _load(self) -> None:
         if not self._path.is_file():  # a pipe in its place would be waited for
             return
         try:
-            rows = json.loads(self._path.read_text(encoding="utf-8"))["drives"]
-            self.drives = tuple(_row(each) for each in rows)[-MOST:]
+            kept = json.loads(self._path.read_text(encoding="utf-8"))
+            self.drives = tuple(_row(each) for each in kept["drives"])[-MOST:]
+            self.baud = int(kept.get("baud", 0))
         except OSError:
             return
         except (ValueError, TypeError, KeyError, RecursionError):
             self.remark = f"{self._path} is damaged and is ignored; multidrop writes a new one"
 
     def _save(self) -> None:
-        text = json.dumps({"drives": [asdict(each) for each in self.drives]}, indent=1) + "\n"
+        kept = {"baud": self.baud, "drives": [asdict(each) for each in self.drives]}
+        text = json.dumps(kept, indent=1) + "\n"
         new = self._path.with_name(f"{self._path.name}.{os.getpid()}.new")
         try:
             with open(os.open(new, os.O_WRONLY | os.O_CREAT | os.O_TRUNC, 0o600), "w", encoding="utf-8") as file:

@@ -42,12 +42,12 @@ class PortState:
     `cut` is the line that it was sending, `owed` the settings that it did not restore; `remarks` are for a person.
     """
 
-    def __init__(self, folder: Path, port: str) -> None:
+    def __init__(self, folder: Path, port: str, baud: int = 0) -> None:
         self.cut = ""
         self.owed: tuple[Owed, ...] = ()
         self.remarks: list[str] = []
         self.notify: Callable[[str], None] = self.remarks.append
-        self._port = port
+        self._port, self._baud = port, baud
         self._base = folder / "ports" / _file_name(port)
         self._line = -1
         self._shared = False
@@ -87,7 +87,7 @@ class PortState:
     def remember(self, drives: Mapping[str, Remembered | None]) -> None:
         """Remember drives by address; None forgets one. Another session that has the port open remembers its own."""
         if self._line >= 0:
-            self.memory.update(drives)
+            self.memory.update(drives, self._baud)
 
     def begun(self, line: str) -> None:
         """Record a line that may move something, as it begins to leave."""

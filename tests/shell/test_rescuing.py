@@ -147,3 +147,28 @@ async def test_a_stop_ends_a_rescue(tmp_path):
     with pytest.raises(Stopped):
         await running
     assert port.session.buses == {} and not any(text.endswith("factory defaults") for text in port.told())
+
+
+@in_virtual_time
+async def test_a_stop_while_it_listens_reaches_every_rate_that_was_agreed_to(tmp_path):
+    port = Port(tmp_path, bus("b", drive("a", em=0, py=0)))
+    device = port.devices[0]
+    device.power(False, 0.0)
+    listens = asyncio.Event()
+
+    async def ask(question):
+        if "listen" in question:
+            listens.set()
+        return True
+
+    port.session.ask = ask
+    _, work, _ = rescue(port, "/dev/ttyUSB9?dialect=mcode")
+    running = asyncio.create_task(port.session.tasks.run(work.run([], everything=False, erase=False)))
+    await listens.wait()
+    await asyncio.sleep(1.0)
+    before = len(port.opened)
+    port.session.stop("Ctrl+X")
+    with pytest.raises(Stopped):
+        await running
+    assert {baud for _, baud in port.opened[before:]} == set(BAUDS) - {9600}  # it listens with that one
+    assert any("the stop was sent with MCode at" in text for text in port.told())

@@ -5,12 +5,15 @@ import asyncio
 import pytest
 
 from dialects import Diagnostic, Stopped
+from dialects.state import Remembered
+from shell.connect.port_state import PortState
 from shell.connect.urls import parse
 from shell.found import url_of
 from shell.scanning import NothingFound, Scanning
 from tests.support.cell_session import CellSession, bus, party, pmx
 from tests.support.tuned_ports import Port
 from tests.support.virtual import in_virtual_time
+from transports import TransportLost
 
 pytestmark = pytest.mark.slow
 
@@ -140,7 +143,10 @@ async def test_a_stop_ends_the_search_and_keeps_what_was_found(tmp_path):
     with pytest.raises(Stopped):
         await running
     assert [each["address"] for each in found] == ["a"] and port.session.buses == {}
-    assert any("the stop was sent in every form" in text for text in port.told())
+    assert port.opened == [("mcode", 9600)] * 2  # once more with the drive that replied, which is read then
+    [text] = [text for text in port.told() if "the stop was sent with" in text]
+    assert "sent with MCode at 9600 baud; not with MCode at 4800, 19200, 38400, 115200 baud and PMX at 9600" in text
+    assert "no search there was agreed to" in text
 
 
 @in_virtual_time
@@ -180,13 +186,15 @@ async def test_the_verb_refuses_a_line_on_which_a_search_would_do_harm(tmp_path,
             await open_.session.run("/scan")
 
 
-@in_virtual_time
-async def test_a_stop_at_another_baud_rate_reaches_what_was_found_before(tmp_path):
-    port = Port(tmp_path, bus("b", party("a")))
-    _, search = scanning(port)
+ALL = [("mcode", baud) for baud in (9600, 4800, 19200, 38400, 115200)]
+ALL += [("pmx", baud) for baud in (9600, 19200, 38400, 57600, 115200)]
+
+
+async def stopped_at(port, search, opened):
+    """Search all, stop at this opening, and return the openings after the stop."""
     port.session.agreed = True
     running = asyncio.create_task(port.session.tasks.run(search.run([], True)))
-    while len(port.opened) < 3:
+    while len(port.opened) < opened:
         await asyncio.sleep(0.1)
     device = port.devices[0]
     device.execute("SL 5000", port.floor.now())
@@ -194,6 +202,92 @@ async def test_a_stop_at_another_baud_rate_reaches_what_was_found_before(tmp_pat
     port.session.stop("Ctrl+X")
     with pytest.raises(Stopped):
         await running
+    return port.opened[opened:]
+
+
+@in_virtual_time
+async def test_a_stop_is_sent_first_where_drives_may_be_then_as_far_as_was_agreed_then_again_where_they_may_be(
+    tmp_path,
+):
+    port = Port(tmp_path, bus("b", f"{party('a')}\n{MOVES}"))
+    _, search = scanning(port)
+    after = await stopped_at(port, search, 3)  # with MCode at 19200 baud
+    assert after == [ALL[0], ALL[1], *ALL[3:], *ALL[:3]]
     await asyncio.sleep(1)
+    device = port.devices[0]
     assert not device.moving(port.floor.now()) and port.session.buses == {}
-    assert any("the stop was sent with MCode at 9600 baud too" in text for text in port.told())
+    [text] = [text for text in port.told() if "the stop was sent with" in text]
+    assert "not with" not in text and all(str(baud) in text for _, baud in ALL)
+
+
+@in_virtual_time
+async def test_a_stop_before_any_agreement_reaches_the_remembered_rate_and_no_other(tmp_path):
+    port = Port(tmp_path, bus("b", party("a"), baud=19200))
+    state = PortState(port.session.settings.state, "/dev/ttyUSB9", 19200)
+    state.remember({"a": Remembered("a", "a", "LMDCM", "6.002", "", "", True, 0, 1)})
+    state.close()
+    _, search = scanning(port)
+    running = asyncio.create_task(port.session.tasks.run(search.run([], False)))
+    await asyncio.sleep(0.7)
+    device = port.devices[0]
+    device.execute("SL 5000", port.floor.now())
+    port.session.stop("Ctrl+X")
+    with pytest.raises(Stopped):
+        await running
+    assert port.opened == [("mcode", 9600), ("mcode", 19200)]
+    await asyncio.sleep(1)
+    assert not device.moving(port.floor.now())
+
+
+@in_virtual_time
+async def test_a_stop_at_the_question_reaches_what_was_searched(tmp_path):
+    port = Port(tmp_path, bus("b", party("a")))
+    asked = asyncio.Event()
+
+    async def ask(question):
+        asked.set()
+        await asyncio.sleep(1000)
+
+    port.session.ask = ask
+    _, search = scanning(port)
+    running = asyncio.create_task(port.session.tasks.run(search.run([], True)))
+    await asked.wait()
+    device = port.devices[0]
+    device.execute("SL 5000", port.floor.now())
+    port.session.stop("Ctrl+X")
+    with pytest.raises(Stopped):
+        await running
+    assert set(port.opened) == {("mcode", 9600)}
+    await asyncio.sleep(1)
+    assert not device.moving(port.floor.now())
+
+
+@in_virtual_time
+async def test_a_second_stop_key_does_not_end_the_first_stop(tmp_path):
+    port = Port(tmp_path, bus("b", party("a")))
+    _, search = scanning(port)
+    port.session.agreed = True
+    running = asyncio.create_task(port.session.tasks.run(search.run([], True)))
+    while len(port.opened) < 3:
+        await asyncio.sleep(0.1)
+    for _ in range(4):
+        port.session.stop("Ctrl+X")
+        await asyncio.sleep(0.1)
+    with pytest.raises(Stopped):
+        await running
+    assert port.opened[3:] == [ALL[0], ALL[1], *ALL[3:], *ALL[:3]]
+
+
+@in_virtual_time
+async def test_a_rate_at_which_the_port_cannot_be_opened_is_named_and_the_others_get_the_stop(tmp_path):
+    port = Port(tmp_path, bus("b", party("a")))
+    opener = port.opener
+
+    async def failing(connection, naming):
+        if port.session.stops and connection.baud == 38400:
+            raise TransportLost("busy")
+        return await opener(connection, naming)
+
+    search = Scanning(port.session, failing, parse("/dev/ttyUSB9?dialect=mcode"), lambda drive: None)
+    assert await stopped_at(port, search, 2) == [ALL[0], ALL[2], ALL[4], *ALL[:2]]
+    assert any("NO STOP SENT with MCode at 38400 baud: busy" in text for text in port.told())
