@@ -206,7 +206,7 @@ class Scanning:
             self._warn(self.port, [f"the stop was sent with {listed(self._stopped)}{why}. {UNLISTED}"])
 
     async def _stop_at(self, stage: Stage, confirm: bool) -> None:
-        """Send a stop with a language at a baud rate, to the drives that replied there by name; `confirm` reads them."""
+        """Send a stop at a stage, to the drives that replied there by name; `confirm`: read them."""
         try:
             opened = await self._opener(self.connection(stage), self._named)
         except TransportLost as loss:
