@@ -5,10 +5,14 @@ from __future__ import annotations
 import errno
 import gc
 import os
+import signal
 import sys
 from collections.abc import Sequence
 
 import multidrop
+
+PROTOCOLS = ("relay.run", "lsp.run")
+"""Commands whose standard output is a connection: they notice its end themselves."""
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -18,27 +22,30 @@ def main(arguments: Sequence[str] | None = None) -> int:
     collector need not visit every object again: that takes longer than the rest of the end.
     """
     if arguments is not None:
-        return _guarded(arguments)
-    code = _guarded(sys.argv[1:])
+        return _guarded(arguments, own=False)
+    code = _guarded(sys.argv[1:], own=True)
     gc.freeze()
     return code
 
 
-def _guarded(arguments: Sequence[str]) -> int:
+def _guarded(arguments: Sequence[str], own: bool) -> int:
+    """Run a command. `own`: it is the one of this process, whose reader is watched."""
     try:
         _complete_streams()
         if hidden := multidrop.hidden():
             sys.stderr.write(f"multidrop: {hidden}\n")
             return 2
-        code = _run(arguments)
+        code = _run(arguments, own)
         sys.stdout.flush()
     except KeyboardInterrupt:
-        return 130
+        from shell.output import INTERRUPTED, final
+
+        return final(INTERRUPTED)
     except BrokenPipeError:  # the reader of the output is gone
-        from shell.output import silence
+        from shell.output import READER_GONE, silence
 
         silence(sys.stdout)
-        return 0
+        return READER_GONE
     except OSError as problem:
         if problem.errno != errno.ENOSPC:
             raise
@@ -57,14 +64,19 @@ def _complete_streams() -> None:
             setattr(sys, name, os.fdopen(number, mode, encoding="utf-8", closefd=False))
 
 
-def _run(arguments: Sequence[str]) -> int:
+def _run(arguments: Sequence[str], own: bool) -> int:
     from multidrop.cli import parse, run
 
     try:
-        code = run(parse(arguments))
-        sys.stdout.flush()
+        chosen = parse(arguments)
+        from shell import output
+
+        if own and chosen.run_by not in PROTOCOLS:
+            output.watch_reader(signal.SIGINT)
+        code = run(chosen)
+        output.flush_printed()
         unwritten = _unwritten()
-        return code or unwritten
+        return output.final(code) or unwritten
     except SystemExit as end:  # --help, --version, and wrong usage
         return end.code if isinstance(end.code, int) else 0
 

@@ -68,6 +68,7 @@ class Session:
         self._close(stop=True)
 
     def _close(self, stop: bool) -> None:
+        endings.closing(self)
         if self.thread.alive:
             try:
                 self.call(lambda: self.awaited.close(stop=stop))

@@ -2,6 +2,7 @@
 
 An uncaught exception ends the main thread, and with it what is still open. Signals such as SIGTERM would end a process
 at once; where the program leaves them at that, they become a SystemExit, so that its `with` and `finally` blocks run.
+So does the end of the reader of standard output, as in `python program.py | head`, with exit code 141.
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ import threading
 from collections.abc import Callable
 from typing import Protocol
 
+from shell import output
 from shell.signals import SIGNALS
 
 SIGNALLED = 128
@@ -39,6 +41,14 @@ def opened(session: Endable) -> None:
         for each in SIGNALS:
             if each not in _handled and signal.getsignal(each) is signal.SIG_DFL:
                 _handled[each] = signal.signal(each, _exit)
+        if signal.SIGTERM in _handled and output.watch is None:
+            output.watch_reader(signal.SIGTERM)
+
+
+def closing(session: Endable) -> None:
+    """Note that a session is being closed: a reader that leaves does not interrupt the end of the last one."""
+    if _open == {session} and signal.SIGTERM in _handled:
+        output.work_done()
 
 
 def closed(session: Endable) -> None:
@@ -49,6 +59,9 @@ def closed(session: Endable) -> None:
         for each, before in _handled.items():
             if signal.getsignal(each) is _exit:
                 signal.signal(each, before)
+        if signal.SIGTERM in _handled:
+            output.work_done()
+            output.watch = None
         _handled.clear()
 
 
@@ -59,6 +72,9 @@ def flush_printed() -> None:
 
 
 def _exit(number: int, _: object) -> None:
+    if output.reader_left():
+        output.silence(sys.stdout)  # or the interpreter fails as it flushes
+        raise SystemExit(output.READER_GONE)
     raise SystemExit(SIGNALLED + number)
 
 

@@ -17,7 +17,7 @@ from dialects import Diagnostic
 from dialects.families import program_language_of
 from dialects.files import text_of
 from multidrop.commands.failure import fail
-from shell.output import write
+from shell.output import reader_left, write
 from simulator import cells
 from simulator.cell.spec import DriveSpec
 from simulator.families import PROGRAMS
@@ -65,7 +65,8 @@ def _test(file: str, chosen: argparse.Namespace, given: DriveSpec | None, severa
     except Diagnostic as problem:
         return fail(problem)
     except KeyboardInterrupt:
-        write(sys.stderr, f"{file}: interrupted")
+        if not reader_left():
+            write(sys.stderr, f"{file}: interrupted")
         raise
     return FAILED if failed else 0
 

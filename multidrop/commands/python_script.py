@@ -26,7 +26,7 @@ from multidrop.commands.python_report import HOME, ReportedSession, place, repla
 from shell.events import FAILURES
 from shell.front.interrupts import on_stop_key
 from shell.front.report import Report
-from shell.output import INTERRUPTED, exit_code, write
+from shell.output import INTERRUPTED, exit_code, lost_reader, why_interrupted, work_done, write
 from shell.scripts.results import Result
 from shell.signals import SIGNALS, early_ends
 
@@ -86,6 +86,7 @@ class _Execution:
                             raise KeyboardInterrupt
                     finally:
                         self._ending = True
+                        work_done()
                 code = 0
             except BaseException as end:
                 self._ending = True
@@ -176,8 +177,8 @@ class _Execution:
         """Say why a program ended; return its exit code."""
         if isinstance(end, SystemExit):
             return _exit_code(end)
-        if isinstance(end, KeyboardInterrupt):
-            write(sys.stderr, "interrupted")
+        if isinstance(end, KeyboardInterrupt) or lost_reader(end):
+            write(sys.stderr, why_interrupted())
             return INTERRUPTED
         line = place(end, self._file)
         if isinstance(end, FAILURES):

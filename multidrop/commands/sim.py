@@ -13,7 +13,7 @@ from simulator.serving.command import serve
 
 
 def run(chosen: argparse.Namespace) -> int:
-    """Serve the cell until a signal, whether or not its output is read."""
+    """Serve the cell until a signal, or until the reader of its output leaves."""
     return asyncio.run(_serve(chosen))
 
 

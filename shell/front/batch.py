@@ -1,7 +1,7 @@
 """A run without a screen: open the URLs, await the work, close, return the exit code.
 
-The work is one automation: its early end stops what it started. A signal ends it with exit code 130. The stop key stops
-every drive and ends it with exit code 4.
+The work is one automation: its early end stops what it started. A signal ends it with exit code 130, and so does the
+end of the reader of standard output, with exit code 141. The stop key stops every drive and ends it with exit code 4.
 """
 
 from __future__ import annotations
@@ -19,7 +19,16 @@ from shell.events import FAILURES
 from shell.front.answer import asker
 from shell.front.interrupts import on_signals, on_stop_key
 from shell.log.writer import begin as begin_log
-from shell.output import INTERRUPTED, exit_code, finish, nonblocking, report, write
+from shell.output import (
+    INTERRUPTED,
+    exit_code,
+    finish,
+    nonblocking,
+    report,
+    why_interrupted,
+    work_done,
+    write,
+)
 from shell.printer import Printer
 from shell.session import Session
 
@@ -122,6 +131,8 @@ class _Host:
         except asyncio.CancelledError:
             if not self.interrupted:
                 raise
+        finally:
+            work_done()
         if self._session.latched or self.interrupted:
             await settled(self._session)
         if self.interrupted:
@@ -136,7 +147,7 @@ class _Host:
     def _interruption(self) -> list[str]:
         """The lines after a signal; none for a plot, which ends well."""
         lines = outcome(self._session, self._session.automations.interrupted) or [""]
-        return [f"interrupted; {lines[0]}".removesuffix("; "), *lines[1:]] if self._code else []
+        return [f"{why_interrupted()}; {lines[0]}".removesuffix("; "), *lines[1:]] if self._code else []
 
     async def _whole(self, urls: Sequence[str], body: Body) -> None:
         async with self._session.automations.run():

@@ -19,6 +19,7 @@ from multiprocessing import connection
 from multiprocessing.context import BaseContext
 from typing import ParamSpec, TypeVar
 
+from shell.output import WATCHER
 from shell.signals import FROM_TERMINAL, SIGNALS
 from shell.sweeps import trial
 from shell.sweeps.interruption import Interruption
@@ -136,7 +137,8 @@ class Pools:
 
 def _context() -> BaseContext:
     """The way processes begin: as forks of this one, unless it has threads, whose locks a fork would copy."""
-    if sys.platform != "linux" or threading.active_count() > 1:
+    others = [each for each in threading.enumerate() if each.name != WATCHER]
+    if sys.platform != "linux" or len(others) > 1:
         if "forkserver" not in multiprocessing.get_all_start_methods():
             return multiprocessing.get_context("spawn")
         context = multiprocessing.get_context("forkserver")

@@ -3,10 +3,12 @@
 import shlex
 import subprocess
 import sys
+from datetime import UTC, datetime
 from pathlib import Path
 
 import pytest
 
+from shell.log.entries import Entry, line_of
 from tests.support.processes import environment
 
 pytestmark = pytest.mark.process
@@ -31,17 +33,97 @@ def test_a_full_disk_is_one_line_and_exit_1(tmp_path, arguments, variables):
     assert (done.returncode, done.stderr) == (1, "the output cannot be written: No space left on device\n")
 
 
-def test_a_reader_that_went_away_ends_nothing(tmp_path):
-    lines = ["PR P", "PR V", "@b MR 5000", "/wait stopped", "/log moved.log", "@b PR P"]
-    command = [sys.executable, "-m", "multidrop", "send", "sim:#press", *lines]
-    sender = subprocess.Popen(
-        command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, cwd=tmp_path, env=environment(tmp_path)
+MOVES = "@b MR 5000000\n/wait stopped 100\n"
+PROGRAM = """from time import sleep
+from multidrop.script import session
+
+print("begun", flush=True)
+session.send("@b MR 5000000")
+while True:
+    sleep(0.1)
+"""
+FOREVER = "name = 'go'\n" + "".join(
+    f"[[step]]\nline = '{line}'\n" for line in ("/print round", "@b MR 5000000", "/wait stopped 100")
+)
+
+
+def left(folder, *arguments, typed="", lines=1):
+    """Run a command until it has printed so many lines, and leave. Return its exit code and standard error."""
+    process = subprocess.Popen(
+        [sys.executable, "-m", "multidrop", *arguments], stdin=subprocess.PIPE, stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE, text=True, cwd=folder, env=environment(folder),
+    )  # fmt: skip
+    process.stdin.write(typed)
+    process.stdin.flush()
+    for _ in range(lines):
+        assert process.stdout.readline()
+    process.stdout.close()
+    try:
+        code = process.wait(30)
+    finally:
+        process.kill()
+    with process.stdin, process.stderr:
+        return code, process.stderr.read()
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ["send", "sim:#press", "PR P", *MOVES.splitlines()],
+        ["shell", "sim:#press"],
+        ["run", "s.txt", "--on", "sim:#press"],
+        ["run", "s.py", "--on", "sim:#press"],
+        ["macro", "play", "go", "--on", "sim:#press", "--times", "forever"],
+    ],
+    ids=lambda arguments: arguments[0] + arguments[1].removeprefix("s"),
+)
+def test_a_reader_that_leaves_stops_what_automation_moves_although_nothing_is_printed(tmp_path, arguments):
+    (tmp_path / "s.txt").write_text(f"PR P\n{MOVES}")
+    (tmp_path / "s.py").write_text(PROGRAM)
+    (tmp_path / "conf/macros").mkdir(parents=True)
+    (tmp_path / "conf/macros/go.toml").write_text(FOREVER)
+    code, said = left(tmp_path, *arguments, typed=f"PR P\n{MOVES}" if arguments[0] == "shell" else "")
+    assert code == 141
+    assert "the reader of standard output is gone" in said and "stopped b" in said
+
+
+def test_a_reader_that_leaves_a_session_of_reads_alone_stops_nothing(tmp_path):
+    code, said = left(tmp_path, "send", "sim:#press", "@b PR P", "/sleep 100")
+    assert (code, said) == (141, "the reader of standard output is gone\n")
+
+
+def test_a_reader_that_has_its_last_line_is_a_good_end(tmp_path):
+    assert left(tmp_path, "send", "sim:#press", "@b MR 5000", "/wait stopped", "@b PR P") == (0, "")
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [["sim", "--json"], ["program", "test", "endless.mxt", "--until", "100000"], ["log", "follow", "day.jsonl"]],
+    ids=lambda arguments: arguments[0],
+)
+def test_a_reader_that_leaves_ends_what_prints(tmp_path, arguments):
+    (tmp_path / "endless.mxt").write_text('PG 1\nLB G1\nPR "begun"\nLB G2\nR1=1\nBR G2\nE\nPG\n')
+    (tmp_path / "day.jsonl").write_bytes(line_of(Entry(datetime(2026, 1, 1, tzinfo=UTC), "typed", "PR P")))
+    assert left(tmp_path, *arguments) == (141, "")
+
+
+def test_the_reader_of_a_persons_own_program_leaves(tmp_path):
+    (tmp_path / "own.py").write_text(
+        "import multidrop, sys, time\n"
+        "with multidrop.connect('sim:#press') as session:\n"
+        "    print('begun', flush=True)\n"
+        "    session.send('@b MR 5000000')\n"
+        "    time.sleep(100)\n"
     )
-    assert sender.stdout.readline() == b"0\n"
-    sender.stdout.close()
-    assert (sender.wait(60), sender.stderr.read()) == (0, b"")
-    sender.stderr.close()
-    assert '"bus": "press", "drive": "b", "text": "5000"}' in (tmp_path / "moved.log").read_text()
+    process = subprocess.Popen(
+        [sys.executable, "own.py"], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, cwd=tmp_path,
+        env=environment(tmp_path),
+    )  # fmt: skip
+    assert process.stdout.readline() == "begun\n"
+    process.stdout.close()
+    assert process.wait(30) == 141
+    with process.stderr:
+        assert "stopped b" in process.stderr.read()
 
 
 @pytest.mark.parametrize(

@@ -1,4 +1,9 @@
+import contextlib
 import io
+import os
+import pty
+import signal
+import socket
 import sys
 
 import pytest
@@ -6,7 +11,7 @@ import pytest
 from dialects import Diagnostic, DriveError, Inexpressible, NoAnswer, Refused, Stopped
 from drives.events import Unsolicited
 from shell.events import Failed, Notified, OnBus, Output, Printed
-from shell.output import exit_code, report, write
+from shell.output import ReaderWatch, exit_code, report, write
 from shell.printer import Printer
 from transports import TransportLost, Unreachable
 
@@ -91,3 +96,42 @@ def test_a_full_disk_is_told_at_the_end(monkeypatch):
 
     write(Full(), "line")
     assert output.dropped == ["the output cannot be written: No space left on device"]
+
+
+@contextlib.contextmanager
+def ends(kind, folder):
+    """The two ends of a way: what reads, if anything does, and the descriptor that is written."""
+    if kind == "socket":
+        near, far = socket.socketpair()
+        yield far.detach(), near.detach()
+    elif kind == "terminal":
+        yield pty.openpty()
+    elif kind == "pipe":
+        yield os.pipe()
+    else:
+        yield None, os.open(os.devnull if kind == "null" else folder / "kept.txt", os.O_WRONLY | os.O_CREAT)
+
+
+@pytest.mark.parametrize("kind", ["pipe", "socket", "terminal", "file", "null"])
+def test_a_reader_is_gone_once_its_end_is_closed_and_a_file_has_none(kind, tmp_path, monkeypatch):
+    with ends(kind, tmp_path) as (reader, writer), os.fdopen(writer, "w") as stream:
+        monkeypatch.setattr(sys, "stdout", stream)
+        watch = ReaderWatch(signal.SIGINT)
+        assert watch.watches(stream) == (reader is not None) and not watch.is_gone()
+        if reader is not None:
+            os.close(reader)
+        assert watch.is_gone() == (reader is not None)
+
+
+def test_a_reader_that_leaves_interrupts_work_once_and_nothing_after_it(monkeypatch):
+    came = []
+    before = signal.signal(signal.SIGUSR2, lambda *_: came.append("interrupted"))
+    try:
+        for over in (False, True):
+            watch = ReaderWatch(signal.SIGUSR2)
+            watch.over = over
+            watch.gone()
+            watch.gone()
+            assert watch.left and came == ["interrupted"]
+    finally:
+        signal.signal(signal.SIGUSR2, before)
