@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import os
 import signal
 import sys
 import threading
@@ -47,7 +46,7 @@ def _pipe_taken() -> Iterator[None]:
 
     def wait() -> None:
         while signal.sigwait(pipe) and not over.is_set():
-            os.kill(os.getpid(), signal.SIGTERM)
+            signal.pthread_kill(threading.main_thread().ident or 0, signal.SIGTERM)  # which may sleep
 
     mask = signal.pthread_sigmask(signal.SIG_BLOCK, pipe)
     taker = threading.Thread(target=wait, daemon=True, name="signals")
