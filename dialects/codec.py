@@ -64,6 +64,8 @@ class Request:
     """A regular expression that the printed line matches in full; other lines belong to another drive or program."""
     gather: bool = False
     """Lines before the expected one belong to the reply too (a mark after a list)."""
+    rows: str | None = None
+    """A regular expression of the lines that are gathered, the others are a program's; None: all are."""
     body: bytes = field(default=b"", repr=False)
     """The bytes to send where the request is binary; `text` then describes it to a person."""
     spoken: str = field(default="", repr=False)
@@ -72,6 +74,11 @@ class Request:
     """The expected line ends in the drive's name or a fresh mark: no other drive's line can match."""
     tag: int = field(default=0, compare=False)
     """Its number on the wire, unique to each request, set by the line when it writes; for `numbered` codecs."""
+
+    @property
+    def is_poll(self) -> bool:
+        """The host asks by itself, at the lowest priority."""
+        return self.priority is Priority.POLL
 
     def numbered(self, tag: int) -> Request:
         """Return a copy with a number; `replace` takes ten times as long, and the line numbers every request."""
@@ -100,6 +107,8 @@ class Reply:
     """More than one ACK or NAK came: one of them answers an earlier request."""
     doubtful: bool = False
     """The reply to an earlier request is outstanding, and this may be it; set by the line."""
+    collided: tuple[str, ...] = ()
+    """What was received meanwhile and is neither the reply nor a whole line: a print may be lost in it."""
 
     @property
     def text(self) -> str:
@@ -220,6 +229,9 @@ class Codec(Protocol):
 
     def starts_motion(self, text: str) -> bool:
         """Whether a typed line can start motion or a program; an unknown command can."""
+
+    def damaged(self, line: str) -> bool:
+        """Whether a checksum shows that an unsolicited line was damaged on the wire."""
 
     def restarted(self, line: str) -> bool:
         """Whether an unsolicited line is the drive's message after power-up or a reset."""

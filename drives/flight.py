@@ -8,6 +8,8 @@ from typing import NamedTuple
 from dialects import Kind, Reply, Request
 from drives.events import Transaction
 
+TAIL = 0.05
+"""Quiet time after which no more of an unterminated line is awaited, s."""
 NEVER_QUIET = 1.0
 """Longest wait for a quiet wire, s: a program may print without a pause, and a stop must be repeated."""
 CHATTER = 4.0
@@ -57,7 +59,7 @@ class Flight:
     def deadline(self, buffer: bytes, default: float, by_quiet: bool) -> float:
         """Time at which it times out, or at which quiet may end it. `default`: the line's timeout, s."""
         patience = self.request.codec.quiet_time(self.request, buffer)
-        timeout = self._timeout_at(patience, default)
+        timeout = self._timeout_at(patience, buffer, default)
         if not by_quiet or self._judged_length == len(buffer):
             return timeout
         return min(timeout, self._quiet_at(patience))
@@ -68,7 +70,7 @@ class Flight:
 
     def timeout_at(self, buffer: bytes, default: float) -> float:
         """Time at which the request times out. `default`: the line's timeout, s."""
-        return self._timeout_at(self.request.codec.quiet_time(self.request, buffer), default)
+        return self._timeout_at(self.request.codec.quiet_time(self.request, buffer), buffer, default)
 
     def _quiet_at(self, patience: float) -> float:
         quiet = self._last_activity + patience
@@ -77,10 +79,12 @@ class Flight:
         # A command prints nothing, so a program that prints without a pause does not delay it.
         return min(quiet, self.transmitted_at + max(2 * patience, NEVER_QUIET))
 
-    def _timeout_at(self, patience: float, default: float) -> float:
+    def _timeout_at(self, patience: float, buffer: bytes, default: float) -> float:
         timeout = max(default if self.request.timeout is None else self.request.timeout, patience)
-        longest = LONGEST_LIST if self.request.kind is Kind.LIST else CHATTER * timeout
-        return min(self._last_activity + timeout, self.transmitted_at + longest)
+        longest = self.transmitted_at + (LONGEST_LIST if self.request.kind is Kind.LIST else CHATTER * timeout)
+        if not buffer.endswith(b"\n"):  # not in the middle of a program's line
+            longest = max(longest, min(self.received_at + TAIL, longest + NEVER_QUIET))
+        return min(self._last_activity + timeout, longest)
 
     def finished(self, reply: Reply, now: float) -> Finished:
         """The end of this request with a reply."""

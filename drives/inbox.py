@@ -11,10 +11,8 @@ from dataclasses import dataclass
 
 from dialects import Codec, Kind, Request
 from drives.echo import LocalEcho
-from drives.flight import NEVER_QUIET
+from drives.flight import NEVER_QUIET, TAIL
 
-TAIL = 0.05
-"""Quiet time after which an unterminated line is published as it is, s."""
 LONGEST_TAIL = 4096
 """Longest unsolicited line without an end, in characters; a longer one is published in pieces."""
 

@@ -76,6 +76,8 @@ class Line:
         """The baud rate of the port; 0 where it is not known."""
         self.byte_time = 10.0 / baud if baud else 0.0
         """The time of a byte on the wire, s; 0: it takes none."""
+        self.printed_at = float("-inf")
+        """Time of the last bytes that no request asked for."""
         self._queue = RequestQueue()
         self._state: State = Free()
         self._doubt = Doubt()
@@ -106,6 +108,8 @@ class Line:
         """Take received bytes."""
         if isinstance(self._state, Flight):
             self._state.received_at = now
+        else:
+            self.printed_at = now
         self.inbox.receive(data, now)
 
     def wrote(self, data: bytes, now: float, whole: bool = False) -> None:
@@ -266,7 +270,9 @@ class Line:
     def _publish(self, now: float, lines: Iterable[str]) -> None:
         """Publish unsolicited lines. They are evidence against a doubtful reply."""
         if lines := tuple(filter(None, lines)):
-            self._events.append(Unsolicited(now, lines))
+            if shown := self._doubt.without_late_polls(lines):
+                self._events.append(Unsolicited(now, shown))
+                self.printed_at = now
             self._doubt.stray(lines)
 
     # Times
@@ -291,6 +297,8 @@ class Line:
         since = max(self.transmitted, trouble.since)
         quiet = self._repeats[0].quiet if self._repeats else QUIET
         quiet_at = min(max(self.inbox.received_at, since) + quiet, since + NEVER_QUIET)
+        if not self._repeats:
+            return max(quiet_at, self.inbox.tail_at() or quiet_at)  # not in the middle of a program's line
         # A stop key that is held down must not keep the stop from the drives that get it piece by piece.
         return min(quiet_at, max(self.transmitted, trouble.held_up_since + HELD_UP * quiet))
 

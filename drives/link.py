@@ -34,6 +34,10 @@ class WrittenStop:
     """The same stop, to be repeated piece by piece once it is quiet."""
 
 
+LONGEST_HEARD = 60
+"""Most characters shown of a reply that was destroyed."""
+
+
 class LostInFlight(TransportLost):
     """The pipe broke after a request was written and before its reply came."""
 
@@ -242,6 +246,8 @@ class Link:
         if transaction.reply.end is End.DAMAGED:  # by a sign-on, perhaps
             self.on_unsolicited(transaction.reply.raw.decode("latin-1").splitlines())
         self.publish(Ended(transaction.ended_at, transaction))
+        if transaction.reply.collided:
+            self.notify(_destroyed(transaction), transaction.request.address, warning=True)
         if (on_answer := self._waiting.pop(event.ticket, None)) is not None:
             with self._answering:
                 on_answer(transaction)
@@ -249,6 +255,11 @@ class Link:
     def _unsolicited(self, event: Unsolicited, now: float) -> None:
         self.on_unsolicited(event.lines)
         if lines := self._debris.removed(event.lines, self.line.inbox.codec.stop_sign, now):
+            codec = self.line.inbox.codec
+            if damaged := [each for each in lines if codec.damaged(each)]:
+                self.notify(f"a printed line was damaged on the line (received {_short(damaged)})", warning=True)
+                lines = tuple(each for each in lines if each not in damaged)
+        if lines:
             self.publish(Unsolicited(event.at, lines))
 
     # The end
@@ -289,6 +300,21 @@ class Link:
         if self._orderly:
             self.departure.arrived()
         self._keeper.close()
+
+
+def _destroyed(transaction: Transaction) -> str:
+    """Say what was damaged in the time of a request, and may have been a print."""
+    request, reply = transaction.request, transaction.reply
+    asked = "a poll" if request.is_poll else f"'{request.text}'"
+    whose = f" of {request.address}" if request.address else ""
+    text = f"beside {asked}{whose} something was damaged on the line: a printed line may be lost"
+    return f"{text} (received {_short(reply.collided)})"
+
+
+def _short(lines: Sequence[str]) -> str:
+    """Quote the begin of destroyed lines."""
+    text = " ".join(lines)
+    return repr(text if len(text) <= LONGEST_HEARD else text[:LONGEST_HEARD] + "...")
 
 
 def loss_of(link: Link) -> TransportLost | None:

@@ -15,7 +15,7 @@ from dialects import DriveError, End, NoAnswer, Priority, Refused
 from drives.conclusions import Outcome
 from drives.conversations import Conversation
 from drives.events import Transaction, Valued
-from drives.roster import Roster
+from drives.roster import PrintWait, Roster
 from drives.subscriptions import Subscription, Subscriptions
 from transports import TransportLost
 
@@ -54,6 +54,7 @@ class Readings:
     def __init__(self, roster: Roster) -> None:
         self._roster, self._link = roster, roster.link
         self._subscriptions = Subscriptions[Value](FASTEST, self._changed)
+        self._print_wait = PrintWait(roster)
         self._due: dict[Value, _Due] = {}
         self._under_way: Conversation[float] | None = None
         self._busy = self._paused = False
@@ -97,6 +98,8 @@ class Readings:
         value, due = min(wanted.items(), key=lambda item: item[1].at)
         if due.at > now:
             return self._set_timer(due.at)
+        if left := self._print_wait.left(now):
+            return self._set_timer(now + left)
         drive = self._roster.at(value.address)
         if drive.programming or drive.transferring or drive.family.readings is None:
             due.at = now + RETRY

@@ -12,6 +12,11 @@ from drives.drive import Drive
 from drives.keeping import GLOBAL
 from drives.link import Link
 
+PRINT_QUIET = 0.1
+"""Quiet time after a print before the next poll of a party line, s."""
+LONGEST_WAIT = 0.2
+"""Longest time for which prints hold up a poll, s."""
+
 
 class Roster:
     """Every drive that a stop of the link must reach."""
@@ -130,3 +135,26 @@ def _compare(before: DriveState, now: DriveState) -> None:
         now.note(f"{who}: another drive replies than before the loss ({'; '.join(differences)})")
     elif now.codec != before.codec or now.address != before.address:
         now.note(f"{who}: its settings are not those of before the loss; they were read again")
+
+
+class PrintWait:
+    """The wait of one poller's next poll after a print. What people and stops ask for never waits for it.
+
+    A program often prints several lines in a row, and on a party line the reply of another drive runs into the next.
+    """
+
+    def __init__(self, roster: Roster) -> None:
+        self._roster = roster
+        self._since: float | None = None
+
+    def left(self, now: float) -> float:
+        """Seconds for which the next poll still waits; 0: it may begin."""
+        quiet = self._roster.link.line.printed_at + PRINT_QUIET - now
+        if quiet <= 0 or len(self._roster.drives) < 2:
+            self._since = None
+            return 0.0
+        self._since = now if self._since is None else self._since
+        left = min(quiet, self._since + LONGEST_WAIT - now)
+        if left <= 0:
+            self._since = None
+        return max(left, 0.0)

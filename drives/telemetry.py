@@ -19,7 +19,7 @@ from drives.conclusions import Outcome
 from drives.conversations import Conversation
 from drives.events import Sample, Silent, Transaction
 from drives.readings import USUAL, Readings, Value
-from drives.roster import Roster
+from drives.roster import PrintWait, Roster
 from drives.subscriptions import Subscription, Subscriptions
 from drives.watching import PERIOD, Watching
 from transports import TransportLost
@@ -60,6 +60,7 @@ class Telemetry:
         self._under_way: Conversation[tuple[Motion, ...]] | None = None
         self._busy = self._paused = False
         self._timer: asyncio.TimerHandle | None = None
+        self._print_wait = PrintWait(roster)
         self._watching = Watching(roster)
         self._readings = Readings(roster)
 
@@ -118,6 +119,8 @@ class Telemetry:
         poll = self._polls[address]
         if poll.due > now:
             return self._set_timer(poll.due)
+        if left := self._print_wait.left(now):
+            return self._set_timer(now + left)
         drive = self._roster.at(address)
         if drive.programming or drive.transferring:
             poll.due = now + RETRY

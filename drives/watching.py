@@ -21,7 +21,7 @@ from dialects.parameters import Value
 from drives.apart import apart
 from drives.drive import Drive, Running
 from drives.events import Conditioned
-from drives.roster import Roster
+from drives.roster import PrintWait, Roster
 from drives.subscriptions import Subscription, Subscriptions
 from transports import TransportLost
 
@@ -63,6 +63,7 @@ class Watching:
         self._link = roster.link
         self._watches = Subscriptions[str](SHORTEST, self._begin)
         self._watched: dict[str, _Watched] = {}
+        self._print_wait = PrintWait(roster)
         self._task: asyncio.Task[None] | None = None
         self._changed = asyncio.Event()
         """Something may be due sooner than it was."""
@@ -167,6 +168,8 @@ class Watching:
 
     async def _part(self, watched: _Watched, part: Part[Any]) -> bool:
         """Read one part; whether the next may follow."""
+        while left := self._print_wait.left(self._link.now()):
+            await asyncio.sleep(left)
         drive = watched.drive
         commands = drive.commands
         try:

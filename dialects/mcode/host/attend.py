@@ -11,7 +11,7 @@ from dataclasses import replace
 
 from dialects.codec import End, Kind, Procedure, Request
 from dialects.errors import NoAnswer
-from dialects.mcode.host.exchange import print_mark, read_error
+from dialects.mcode.host.exchange import read_error, synchronise
 from dialects.mcode.host.identity import find, find_in_text
 from dialects.mcode.host.resync import activate_party, look_in
 from dialects.mcode.host.signatures import question, value
@@ -30,7 +30,7 @@ def attend(state: MCodeState, request: Request) -> Procedure[Request]:
     elif state.settings_unknown:
         yield from find_again(state, request)
     elif state.reply_pending:
-        if (yield from print_mark(state, request.priority)) is None:
+        if not (yield from synchronise(state, request.priority)):
             yield from find_again(state, request)
         state.synchronised()
     if request.kind is not Kind.PRINT:
@@ -117,7 +117,7 @@ def find_again(state: MCodeState, request: Request) -> Procedure[None]:
         raise NoAnswer(f"{who(state)} does not reply: '{request.text}' was not sent")
     state.left_program_mode()
     if state.reply_pending:
-        yield from print_mark(state, request.priority)
+        yield from synchronise(state, request.priority)
     state.synchronised()
     if state.product and state.codec != before:
         state.note(

@@ -14,9 +14,9 @@ from dialects.codec import Decoded, End, Kind, Reply, Request, StopPiece
 from dialects.errors import Inexpressible
 from dialects.mcode.host import classify, printed
 from dialects.mcode.host.checksum import sealed
-from dialects.mcode.host.framing import SIGN_ON, unasked
+from dialects.mcode.host.framing import SIGN_ON, UNPRINTED, pieces, printable, unasked
 from dialects.mcode.host.quiet_times import SHORT, SILENT, quiet_time
-from dialects.mcode.host.reply_lines import ENDLESS
+from dialects.mcode.host.reply_lines import ENDLESS, ReplyLines, divided
 from dialects.mcode.host.reply_parser import ReplyParser
 from dialects.mcode.host.short_reply import only_strays, short_reply
 from dialects.mcode.manual.device_name import UNNAMED
@@ -124,18 +124,25 @@ class MCode:
         if any(byte not in b"\r\n" for byte in buffer):
             shown = buffer.decode("latin-1")
             heard = shown if len(shown) <= 48 else shown[:48] + "..."
-            return Decoded(
-                Reply(end=End.DAMAGED, detail=f"heard {heard!r}"), len(buffer), self._strays(request, buffer)
-            )
+            strays, collided = self._meanwhile(request, buffer)
+            return Decoded(Reply(end=End.DAMAGED, detail=f"heard {heard!r}", collided=collided), len(buffer), strays)
         silent = self.em == 2 and request.kind is Kind.PRINT
         return Decoded(Reply(end=End.SILENT if silent else End.TIMEOUT), len(buffer))
 
-    def _strays(self, request: Request, buffer: bytes) -> tuple[str, ...]:
-        """Whole lines that came instead of a print: a program's, except what looks like a piece of the reply."""
+    def _meanwhile(self, request: Request, buffer: bytes) -> tuple[tuple[str, ...], tuple[str, ...]]:
+        """Divide what came instead of a print: whole lines of a program, and what is none."""
         if request.kind is not Kind.PRINT or not request.expect:
-            return ()
-        lines, _ = self.parse_unsolicited(buffer)
-        return tuple(line for line in lines if request.text not in line and re.fullmatch(request.expect, line) is None)
+            return (), ()
+        got = ReplyLines(request, self.em, self.checksum, self._body(request))
+        for piece in pieces(buffer, 0, self.checksum != 0):
+            text = piece.shown.lstrip(b">?") if self.em == 0 else piece.shown
+            if piece.what == "line" and text and buffer[piece.end - 2 : piece.end] == b"\r\n":
+                got.add_earlier(text)
+            elif text:
+                got.collided.append(printable(text))
+        gathered = [] if request.rows else got.lines
+        strays, own = divided(request, gathered + got.strays, whole=False)
+        return strays, (*got.collided, *own)
 
     def quiet_time(self, request: Request, buffer: bytes) -> float:
         """Seconds of quiet after which the line calls `on_quiet`."""
@@ -177,6 +184,10 @@ class MCode:
     def starts_motion(self, text: str) -> bool:
         """Whether the tables list the word as one that starts motion; a print starts none, an unknown line may."""
         return classify.starts_motion(text)
+
+    def damaged(self, line: str) -> bool:
+        """Whether the check byte is still there, because it does not fit."""
+        return self.checksum > 0 and UNPRINTED.search(line) is not None and not self.restarted(line)
 
     def restarted(self, line: str) -> bool:
         """Whether a line is the sign-on, which a drive in party mode does not send (3.4.4)."""

@@ -92,13 +92,13 @@ def _list(state: MCodeState, word: str, numbers: Sequence[int]) -> Procedure[Fac
     """Print set-ups, up to the last number."""
     yield from _attended(state, question(state, "EF", "[01]"))
     last = rf" *{word} *= *{numbers[-1]} *(?:, *-?\d+ *)+"
-    wanted = replace(state.codec.request(state.address, f"PR {word}"), kind=Kind.PRINT, expect=last, gather=True)
+    row = rf" *{word} *=.*"
+    wanted = replace(
+        state.codec.request(state.address, f"PR {word}"), kind=Kind.PRINT, expect=last, gather=True, rows=row
+    )
     reply = yield replace(wanted, priority=Priority.POLL)
     _check(state, reply)
     rows = rows_of_list(word, numbers, reply.lines)
-    for line in reply.lines:
-        if line and not re.match(rf" *{word} *=", line):
-            state.remark(f"{who(state)} printed meanwhile: {line}")
     if reply.doubtful or len(rows) < len(numbers):
         state.reply_lost()
         raise NoAnswer(f"{who(state)}: the list of {word} may be incomplete, or another drive's")

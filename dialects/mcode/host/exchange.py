@@ -24,7 +24,7 @@ from dialects.codec import End, Kind, Priority, Procedure, Reply, Request
 from dialects.errors import NoAnswer, Refused
 from dialects.mcode.host import classify
 from dialects.mcode.host.framing import ACK
-from dialects.mcode.host.printed import INTEGER
+from dialects.mcode.host.printed import INTEGER, NOTHING
 from dialects.mcode.host.signatures import fresh, question, value
 from dialects.mcode.host.state import MCodeState
 from dialects.mcode.host.wording import described, unknown, who
@@ -210,20 +210,25 @@ def _read_error(state: MCodeState) -> Procedure[tuple[int | None, bool]]:
     return None, late
 
 
+def synchronise(state: MCodeState, priority: Priority) -> Procedure[bool]:
+    """Print a mark after a lost reply. What comes before it is a program's, or late: it belongs to no request."""
+    return (yield from print_mark(state, priority, rows=NOTHING)) is not None
+
+
 def mark(state: MCodeState, request: Request) -> Procedure[None]:
     """Print a sync mark: everything received before it is late."""
-    if not (yield from print_mark(state, request.priority)):
+    if not (yield from synchronise(state, request.priority)):
         state.reply_lost()
         fate = "was sent once" if request.kind is Kind.PRINT and state.codec.em == 2 else "was not sent"
         raise NoAnswer(f"{who(state)} does not reply: '{request.text}' {fate}")
     state.synchronised()
 
 
-def print_mark(state: MCodeState, priority: Priority) -> Procedure[tuple[str, ...] | None]:
-    """Have the drive print a fresh mark; return the lines up to the mark, or None."""
+def print_mark(state: MCodeState, priority: Priority, rows: str | None = None) -> Procedure[tuple[str, ...] | None]:
+    """Have the drive print a fresh mark; return the lines up to the mark, or None. `rows`: as for a Request."""
     own = fresh(state, state.address, state.codec.party)
     asked = state.codec.request(state.address, f"PR {own.item}")
-    reply = yield replace(asked, expect=re.escape(own.shown), gather=True, signed=True, priority=priority)
+    reply = yield replace(asked, expect=re.escape(own.shown), gather=True, rows=rows, signed=True, priority=priority)
     return reply.lines if reply.end is End.DONE else None
 
 

@@ -12,6 +12,8 @@ ACK, NAK, CR, LF = b"\x06", b"\x15", b"\r", b"\n"
 ADDRESS_PROMPT = re.compile(rb"\d{1,9}  ")
 SIGN_ON = re.compile(r"Copyright\W*\d{4}.*(Schneider|Intelligent Motion)")
 """The message after power-up or a reset, which a drive in party mode does not send (3.4.4)."""
+UNPRINTED = re.compile(r"[^\t\r\x03\x07\x08\x1b -~]")
+"""A character that no program prints: two drives sent at once, and the wire made the AND of both."""
 _ENDS = {False: re.compile(rb"\n"), True: re.compile(rb"[\n\x06\x15]")}
 _WHAT = {LF: "line", ACK: "ack", NAK: "nak"}
 

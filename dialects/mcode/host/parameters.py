@@ -181,7 +181,7 @@ def _numbered(state: MCodeState, word: str, numbers: Sequence[int]) -> Procedure
     yield from attend(state, question(state, "EF", "[01]"))
     asked = state.codec.request(state.address, f"PR {word}")
     last = rf" *{word} *= *{numbers[-1]} *(?:, *-?\d+ *)+"
-    reply = yield replace(asked, kind=Kind.PRINT, expect=last, gather=True)
+    reply = yield replace(asked, kind=Kind.PRINT, expect=last, gather=True, rows=rf" *{word} *=.*")
     if reply.end is End.DONE and not reply.doubtful and len(rows_of_list(word, numbers, reply.lines)) == len(numbers):
         return reply.lines
     state.reply_lost()

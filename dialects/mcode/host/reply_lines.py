@@ -3,14 +3,30 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 
 from dialects.codec import Decoded, End, Kind, Reply, Request
 from dialects.mcode.host import classify
 from dialects.mcode.host.checksum import checksum, unsealed
-from dialects.mcode.host.framing import SIGN_ON, Piece, printable
+from dialects.mcode.host.framing import SIGN_ON, UNPRINTED, Piece, printable
 
+SIGNED = re.compile(r'["~]')
+"""The sign of a signature: the quotation marks of a drive's name, or the host's own mark."""
 ENDLESS = {Kind.LIST, Kind.SETTING, Kind.QUIET}
 """Kinds whose reply has no end of its own."""
+
+
+def divided(request: Request, strays: Sequence[str], whole: bool) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Divide lines that are not the reply into programs' prints and pieces of the reply that a print ran into.
+
+    `whole`: the reply was received, so there are no pieces. A signed line is the request's own.
+    """
+    if request.kind is not Kind.PRINT or not request.expect or (whole and not request.signed):
+        return tuple(strays), ()
+    expect = request.expect
+    prints = [line for line in strays if re.fullmatch(expect, line) is None]
+    own = [] if whole else [line for line in prints if request.text in line or (request.signed and SIGNED.search(line))]
+    return tuple(line for line in prints if line not in own), tuple(own)
 
 
 class ReplyLines:
@@ -20,15 +36,32 @@ class ReplyLines:
         self.request, self.echo, self.sealed, self.frame = request, echo, sealed, frame
         self.lines: list[str] = []
         self.strays: list[str] = []
+        self.collided: list[str] = []
+        self.glued: list[str] = []
+        """Text without an end before an ACK or NAK: a print that ends in a semicolon, or a piece of a destroyed one."""
         self.damaged = ""
         self.acks = self.naks = self.blanks = 0
         self.answered = self.repeated = self.mixed = self.restarted = False
 
     # Collecting
 
-    def add_earlier(self, lines: list[str]) -> None:
-        """Add lines from before the reply: part of it where the request gathers them, otherwise strays."""
-        (self.lines if self.request.gather else self.strays).extend(lines)
+    def add_earlier(self, data: bytes) -> None:
+        """Add a line from before the reply: part of it where the request gathers it, otherwise a stray."""
+        plain = unsealed(data) if self.sealed else data
+        if plain is None:
+            self.collided.append(printable(data))
+        else:
+            self._add_stray(printable(plain))
+
+    def _add_stray(self, line: str) -> None:
+        """Add a line that is not the expected one."""
+        request = self.request
+        if UNPRINTED.search(line):
+            self.collided.append(line)
+        elif request.gather and not self.answered and (request.rows is None or re.fullmatch(request.rows, line)):
+            self.lines.append(line)
+        else:
+            self.strays.append(line)
 
     def add_glued(self, piece: Piece) -> None:
         """Sort text before an ACK or NAK: EM=3's repetition of the request, or an incomplete line."""
@@ -36,7 +69,10 @@ class ReplyLines:
             self.repeated = True
             return
         self.mixed = True
-        (self.lines if self.request.kind is Kind.QUIET else self.strays).append(printable(piece.data))
+        if self.request.kind is Kind.QUIET:
+            self.lines.append(printable(piece.data))
+        else:
+            self.glued.append(printable(piece.data))
 
     def add_line(self, data: bytes) -> None:
         """Sort a line without its line end: blank, sign-on, EM=3's repetition, or printed text."""
@@ -72,13 +108,14 @@ class ReplyLines:
         own = self.request.kind is Kind.PRINT and r"\r" not in self.request.text
         if not (own and before.strip(b"\r") and rest):
             return data
-        (self.lines if self.request.gather else self.strays).append(printable(before))
+        self.add_earlier(before)
         return rest
 
     def _sealed_line(self, data: bytes) -> None:
         found = unsealed(data) if self.sealed else data
         if found is None:
             self.damaged = f"checksum of {printable(data)!r} is wrong"
+            self.collided.append(printable(data))
             return
         self._sort(printable(found))
 
@@ -103,10 +140,8 @@ class ReplyLines:
         elif kind in ENDLESS:
             self.lines.append(line)
             self.answered = self.answered or (expect is not None and matches)
-        elif kind is not Kind.PRINT or self.answered:
-            self.strays.append(line)
-        elif self.repetition_missing or not matches or not self.announced:
-            (self.lines if self.request.gather else self.strays).append(line)
+        elif kind is not Kind.PRINT or self.answered or self.repetition_missing or not matches or not self.announced:
+            self._add_stray(line)
         else:
             self.answer(line)
 
@@ -192,8 +227,36 @@ class ReplyLines:
         done = end is End.DONE and (prompt not in ("", "?") or (kind is Kind.QUIET and self.answered))
         flagged = self.answered and self.naks > 0
         acknowledged, surplus = done or self.acks > 0, self.acks + self.naks > 1
-        reply = Reply(tuple(self.lines), end, prompt, acknowledged, self.damaged, flagged=flagged, surplus=surplus)
-        return Decoded(reply, used, tuple(self.strays))
+        (self.collided if self.collided else self.strays).extend(self.glued)
+        if kind is Kind.QUIET:
+            self._divide_collected()
+        strays, pieces = divided(self.request, self.strays, end is End.DONE or not self.request.signed)
+        reply = Reply(
+            tuple(self.lines),
+            end,
+            prompt,
+            acknowledged,
+            self.damaged,
+            flagged=flagged,
+            surplus=surplus,
+            collided=(*self.collided, *pieces),
+        )
+        return Decoded(reply, used, strays)
+
+    def _divide_collected(self) -> None:
+        """Set apart the prints in a collection that gathers certain rows only; their check bytes may be unexpected."""
+        request = self.request
+        if request.rows is None:
+            self.collided.clear()
+            return
+        collected, self.lines = self.lines, []
+        for line in collected:
+            data = line.lstrip(">?\x06\x15").encode("latin-1")
+            plain = printable(unsealed(data) or data)
+            if re.fullmatch(request.expect or "", plain) or request.text in plain:
+                self.lines.append(line)
+            else:
+                self._add_stray(plain)
 
     def _doubted(self, end: End) -> End:
         """Return DAMAGED where the reply may not be what it seems to be."""
@@ -205,7 +268,8 @@ class ReplyLines:
             return end
         if self.damaged and self._damage_counts:
             return End.DAMAGED
-        if self._print_is_missing:
+        missing = self.request.kind is Kind.PRINT and not self.answered
+        if missing and not classify.may_be_blank(self.request.text, self.request.expect):
             self.damaged = "nothing was printed that was asked for"
             return End.DAMAGED
         return end
@@ -216,11 +280,6 @@ class ReplyLines:
         if self.request.kind is Kind.PRINT:
             return not (self.answered and self.request.expect)
         return self.request.kind in ENDLESS
-
-    @property
-    def _print_is_missing(self) -> bool:
-        may_be_blank = classify.may_be_blank(self.request.text, self.request.expect)
-        return self.request.kind is Kind.PRINT and not self.answered and not may_be_blank
 
     def check_byte(self, frame: bytes) -> bytes:
         """The check byte of a frame; empty where the drive uses none."""

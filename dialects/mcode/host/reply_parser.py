@@ -57,8 +57,9 @@ class ReplyParser:
             if found is None:
                 return None
             start, between = found
-            before = [printable(line) for line in between.replace(b">", b"").splitlines() if line]
-            self.got.add_earlier(before)
+            for line in between.splitlines():
+                if line := line.lstrip(b">"):
+                    self.got.add_earlier(line)
         self.began = True
         for piece in pieces(self.buffer, start, self.sealed != 0):
             if (done := self._take(piece)) is not None:
@@ -236,5 +237,7 @@ class ReplyParser:
         if self.got.damaged:
             return self.got.decoded(End.DAMAGED, used)
         if self.got.blanks or self.got.acks or self.got.repeated:
-            return self.got.decoded(End.SILENT, used)
+            heard = " ".join((*self.got.collided, *self.got.glued))
+            self.got.damaged = f"heard {heard[:48]!r}" if self.got.collided else ""
+            return self.got.decoded(End.DAMAGED if self.got.collided else End.SILENT, used)
         return None

@@ -18,6 +18,7 @@ from dialects.mcode.host.classify import Setting
 from dialects.mcode.host.codec import MCode
 from dialects.mcode.host.framing import NAK
 from dialects.mcode.host.leave_program import take_out
+from dialects.mcode.host.printed import NOTHING
 from dialects.mcode.host.quiet_times import SLOWEST
 from dialects.mcode.host.signatures import fresh
 from dialects.mcode.host.state import MCodeState, Place
@@ -129,7 +130,10 @@ def asked(
     expect = f"({pattern}){re.escape(mark.shown)}"
     text = f"PR {items},{mark.item}"
     timeout = BRIEF + len(text) / SLOWEST
-    reply = yield Request(address, text, Kind.QUIET, form, priority, timeout=timeout, expect=expect, signed=True)
+    rows = NOTHING if state.product else None  # at an opening, what is left of an earlier session comes, too
+    reply = yield Request(
+        address, text, Kind.QUIET, form, priority, timeout=timeout, expect=expect, rows=rows, signed=True
+    )
     for found in re.finditer(rf"{expect}(.?)\r?\n", reply.raw.decode("latin-1")):
         if not form.checksum or found[0].rstrip("\r\n").encode("latin-1") == sealed(
             (found[1] + mark.shown).encode("latin-1")

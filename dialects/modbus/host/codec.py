@@ -89,6 +89,10 @@ class Modbus:
         """Whether a line is a write, each of which may start motion; a print only reads."""
         return text.strip()[:2].upper() != "PR"
 
+    def damaged(self, line: str) -> bool:
+        """No: no line carries a checksum."""
+        return False
+
     def restarted(self, line: str) -> bool:
         """Return False: a drive that restarts closes the connection."""
         return False

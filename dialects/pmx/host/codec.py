@@ -142,6 +142,10 @@ class Pmx:
         """Whether the table lists the command as one that starts motion; a read starts none, an unknown command may."""
         return starts_motion(text)
 
+    def damaged(self, line: str) -> bool:
+        """No: no line carries a checksum."""
+        return False
+
     def restarted(self, line: str) -> bool:
         """Return False: a controller prints nothing after power-up."""
         return False

@@ -134,6 +134,10 @@ class Tmcl:
         except grammar.LineError:
             return True
 
+    def damaged(self, line: str) -> bool:
+        """No: no line carries a checksum."""
+        return False
+
     def restarted(self, line: str) -> bool:
         """Never: a module says nothing after power-up."""
         return False
