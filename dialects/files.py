@@ -1,18 +1,39 @@
-"""Text files that people write."""
+"""Text files that people write: read within limits, divided into lines by one rule, TOML parsed.
+
+No file makes a program wait or fills its memory, and no line is hidden from a person who reads it in an editor.
+"""
 
 from __future__ import annotations
 
+import os
 import re
+import stat
 from codecs import BOM_UTF8
-from typing import TYPE_CHECKING, Any, Protocol
+from collections.abc import Iterable, Iterator
+from typing import IO, TYPE_CHECKING, Any, Protocol
 
 from dialects.errors import Diagnostic
 
 if TYPE_CHECKING:
     from pathlib import Path
 
-LARGEST = 16 * 1024 * 1024
-"""Bytes; more than any such file has, since a device file has no end."""
+LARGEST = 1024 * 1024
+"""Bytes of a script, a configuration, a macro or a cell; more than a person writes into one."""
+LARGEST_PROGRAM = 16 * LARGEST
+"""Bytes of a program file, remarks included."""
+MOST_LINES = 20_000
+"""Lines of a program file; no drive holds as many."""
+DEEPEST = 50
+"""The deepest nesting of tables, arrays and dotted keys in TOML: a parser's time grows with it."""
+
+_OWN = re.compile(r"/dev/(stdin|fd/\d+)|/proc/self/fd/\d+")
+"""Names of our own standard input and of pipes that a shell opened for us."""
+_WRONG = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\u2028\u2029]")
+"""Characters that end a line for one program and not for another, or that no editor shows. A TAB is fine."""
+_NAMES = {
+    "\r": "carriage return without a line feed", "\x0b": "vertical tab", "\x0c": "form feed", "\x1a": "Ctrl+Z",
+    "\x85": "next line", "\u2028": "line separator", "\u2029": "paragraph separator",
+}  # fmt: skip
 
 
 class SourceLine(Protocol):
@@ -27,34 +48,121 @@ class SourceLine(Protocol):
         """The text to send to the drive."""
 
 
-def bytes_of(path: str | Path) -> bytes:
-    """Read a file. Raises Diagnostic."""
+def bytes_of(path: str | Path, largest: int = LARGEST) -> bytes:
+    """Read a regular file, or our own standard input by its name. Raises Diagnostic, also for one that is too large."""
     where = str(path) or '""'
     try:
+        mode = os.stat(path).st_mode
+        if not (stat.S_ISREG(mode) or stat.S_ISDIR(mode) or _OWN.fullmatch(where)):
+            raise Diagnostic("is not a regular file", where, "a pipe or a device may have no end; copy it into a file")
         with open(path, "rb") as file:
-            data = file.read(LARGEST + 1)
+            return bounded(file, where, largest)
     except (OSError, ValueError) as error:
         raise Diagnostic(f"cannot be read: {why(error)}", where) from error
-    if len(data) > LARGEST:
-        raise Diagnostic(f"is larger than {LARGEST // 1024**2} MB", where, "this is not a file that multidrop reads")
+
+
+def bounded(file: IO[bytes], where: str, largest: int = LARGEST) -> bytes:
+    """Read a stream to its end. Raises Diagnostic for one that is too large, and OSError."""
+    data = file.read(largest + 1)
+    if len(data) > largest:
+        raise Diagnostic(f"is larger than {largest // 1024**2} MB", where, "this is not a file that multidrop reads")
     return data
 
 
 def text_of(path: str | Path) -> str:
-    """Read a text file, UTF-8 or Latin-1. Raises Diagnostic, also for a binary file."""
-    return encoded_text_of(path)[0]
+    """Read a text file, UTF-8 or of Windows (Latin-1). Raises Diagnostic, also for a binary file."""
+    return _decoded(bytes_of(path), str(path))[0]
 
 
-def encoded_text_of(path: str | Path) -> tuple[str, str]:
-    """Read a text file; return its text, and the encoding that gives the same bytes again. Raises Diagnostic."""
-    data = bytes_of(path)
-    if b"\0" in data:
-        raise Diagnostic("is not a text file", str(path), "a program is plain text")
-    encoding = "utf-8-sig" if data.startswith(BOM_UTF8) else "utf-8"
+def utf8_of(path: str | Path) -> str:
+    """Read a text file, UTF-8. Raises Diagnostic."""
+    return utf8(bytes_of(path), str(path))
+
+
+def utf8(data: bytes, where: str) -> str:
+    """The text of a file. Raises Diagnostic with its line."""
     try:
-        return data.decode(encoding), encoding
-    except UnicodeDecodeError:
-        return data.decode("latin-1"), "latin-1"
+        return data.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        line = data.count(b"\n", 0, error.start) + 1
+        raise Diagnostic("not UTF-8 text", _at(where, line), "save it as UTF-8") from None
+
+
+def program_text_of(path: str | Path) -> str:
+    """Read a program file. Raises Diagnostic."""
+    return encoded_program_of(path)[0]
+
+
+def encoded_program_of(path: str | Path) -> tuple[str, str]:
+    """Read a program file; return its text, and the encoding that gives the same bytes again. Raises Diagnostic."""
+    return program_of(bytes_of(path, LARGEST_PROGRAM), str(path))
+
+
+def program_of(data: bytes, where: str) -> tuple[str, str]:
+    """Decode a program file; see `encoded_program_of`. Raises Diagnostic."""
+    text, encoding = _decoded(data, where)
+    if max(text.count("\n"), text.count("\r")) > MOST_LINES:
+        raise Diagnostic(f"has more than {MOST_LINES} lines", where, "no drive holds such a program")
+    return text, encoding
+
+
+def _decoded(data: bytes, where: str) -> tuple[str, str]:
+    if b"\0" in data:
+        raise Diagnostic("is not a text file", where, "a program is plain text")
+    return decoded(data)
+
+
+def decoded(data: bytes) -> tuple[str, str]:
+    """Decode a text, UTF-8 or of Windows; return it with the encoding that gives the same bytes again."""
+    for encoding in ("utf-8-sig" if data.startswith(BOM_UTF8) else "utf-8", "cp1252"):
+        try:
+            return data.decode(encoding), encoding
+        except UnicodeDecodeError:
+            pass
+    return data.decode("latin-1"), "latin-1"
+
+
+# Lines
+
+
+def split_lines(text: str) -> list[str]:
+    """Divide a text, without a byte order mark and the Ctrl+Z of an old editor, at LF or CR LF.
+
+    A CR alone ends lines where there is no LF at all: terminals paste LF as CR. After the last line end is a last line.
+    """
+    body = text.removeprefix("\ufeff").removesuffix("\x1a")
+    return re.split(r"\r?\n", body) if "\n" in body else body.split("\r")
+
+
+def wrong_characters(lines: Iterable[str]) -> Iterator[tuple[int, int, str]]:
+    """Name the first character of each line that no line may have: line and column from 1, and its name."""
+    for number, line in enumerate(lines, 1):
+        if found := _WRONG.search(line):
+            yield number, found.start() + 1, named(found[0])
+
+
+def named(character: str) -> str:
+    """Name a character that no line may have."""
+    return f"{_NAMES.get(character, 'control character')} (U+{ord(character):04X})"
+
+
+def lines_of(text: str, where: str = "") -> list[str]:
+    """Divide a text into lines. Raises Diagnostic with its line (`where:3`) for a character that no line may have."""
+    lines = split_lines(text)
+    for number, line in enumerate(lines, 1):
+        check_line(line, where, number)
+    return lines
+
+
+def check_line(line: str, where: str = "", number: int = 1) -> None:
+    """Raise Diagnostic for a character that no line may have."""
+    if found := _WRONG.search(line):
+        raise Diagnostic(f"{named(found[0])} in the line", _at(where, number), "delete it: lines end at LF or CR LF")
+
+
+def escaped_toml(text: str) -> str:
+    """Write out what `lines_of` refuses in TOML that a program made: only its texts in quotes hold any."""
+    return _WRONG.sub(lambda found: f"\\u{ord(found[0]):04x}", text)
 
 
 def why(problem: OSError | ValueError) -> str:
@@ -62,6 +170,12 @@ def why(problem: OSError | ValueError) -> str:
     return getattr(problem, "strerror", None) or str(problem)
 
 
+_TOML = re.compile(
+    r"""(?:["]{3}(?:\\.|[^\\])*?(?:["]{3}|\Z) | '{3}.*?(?:'{3}|\Z) | "(?:\\.|[^"\\\n])*"? | '[^'\n]*'? | \#[^\n]*)
+      | (?P<mark>[][{}.\n=,])""",
+    re.VERBOSE | re.DOTALL,
+)
+"""A text, a remark, or a mark that opens or ends a level. What is not closed extends to the end."""
 _PLACE = re.compile(r" \(at line (\d+), column \d+\)$")
 _LONG_NUMBER = re.compile(r"\d{1000}")
 
@@ -70,8 +184,10 @@ def toml_of(text: str, where: str) -> dict[str, Any]:
     """Parse TOML. Raises Diagnostic with the file (`where`), and the line where it is known."""
     import tomllib  # in 5 ms, which a command without TOML is spared
 
+    lines_of(text, where)
+    _check_nesting(text, where)
     try:
-        return tomllib.loads(text)
+        return tomllib.loads(text.removeprefix("\ufeff"))
     except tomllib.TOMLDecodeError as error:
         problem = str(error)
         if place := _PLACE.search(problem):
@@ -83,6 +199,26 @@ def toml_of(text: str, where: str) -> dict[str, Any]:
         if found := _LONG_NUMBER.search(text):
             where = _at(where, text.count("\n", 0, found.start()) + 1)
         raise Diagnostic("not TOML: a number without end", where, "correct the line") from None
+
+
+def _check_nesting(text: str, where: str) -> None:
+    """Raise Diagnostic for brackets and dotted keys deeper than `DEEPEST`, without parsing."""
+    brackets = dots = 0
+    for found in _TOML.finditer(text):
+        mark = found["mark"]
+        if mark is None:
+            continue
+        if mark == ".":
+            dots += 1
+        elif mark in "[{":
+            brackets += 1
+        elif mark in "]}":
+            brackets = max(brackets - 1, 0)
+        if mark not in ".[]":
+            dots = 0
+        if brackets + dots > DEEPEST:
+            line = _at(where, text.count("\n", 0, found.start()) + 1)
+            raise Diagnostic(f"not TOML: nested deeper than {DEEPEST} levels", line, "flatten it")
 
 
 def _at(where: str, line: int) -> str:

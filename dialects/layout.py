@@ -10,14 +10,13 @@ TAB = 8
 """Columns from one tab stop to the next."""
 
 
-_BREAK = re.compile(r"(\r\n|\n|\r)")
 _END_OF_FILE = "\x1a"
 
 
 def respelled(text: str, remark_at: Callable[[str], int], spell: Callable[[str], str]) -> str:
     """Return a text with its statements in canonical spelling. `remark_at` finds where the remark of a line begins."""
     body = text.rstrip(_END_OF_FILE)
-    parts = _BREAK.split(body)
+    parts = re.split("(\r?\n)" if "\n" in body else "(\r)", body)  # as `split_lines` divides it
     parts[::2] = [_line(part, remark_at(part), spell) for part in parts[::2]]
     return "".join(parts) + text[len(body) :]
 

@@ -5,11 +5,8 @@ Lines and columns count from 0 here, in characters.
 
 from __future__ import annotations
 
-import re
 from collections.abc import Container, Iterable, Sequence
 from typing import NamedTuple, Protocol
-
-_BREAK = re.compile(r"\r\n|\n|\r")
 
 
 class Span(NamedTuple):
@@ -98,11 +95,6 @@ class EditingLanguage(Protocol):
 
     def outline(self, text: str) -> Sequence[Block]:
         """Return programs, labels, subroutines, declared variables and blocks."""
-
-
-def lines_of(text: str) -> list[str]:
-    """Return the lines of a text, without their ends, as every check counts them."""
-    return _BREAK.split(text)
 
 
 def replaced(lines: Sequence[str], places: Iterable[Span], new: str) -> list[str]:

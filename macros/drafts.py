@@ -10,8 +10,9 @@ from pathlib import Path
 from typing import NamedTuple
 
 from dialects.errors import Diagnostic
+from dialects.files import utf8
 from macros.atomic import write_atomically
-from macros.store import MacroStore, decoded
+from macros.store import MacroStore
 from macros.toml_format import parse_macro
 
 MODE = 0o600
@@ -88,7 +89,7 @@ def drop(draft: Draft) -> None:
 
 
 def _put(store: MacroStore, draft: Draft, data: bytes) -> None:
-    text = decoded(data, str(draft.file))
+    text = utf8(data, str(draft.file))
     macro = parse_macro(text, str(draft.file))
     if macro.name != draft.name:
         hint = f"write name = {draft.name!r}; macro rename {draft.name} {macro.name} renames it"

@@ -5,6 +5,8 @@ from __future__ import annotations
 import re
 from collections.abc import Callable
 
+from dialects.files import split_lines
+
 At = Callable[[str, int], str]
 """The place of a key: at the top, or in the step of that number. An empty key is the step itself."""
 _STEP = re.compile(r"\s*\[\[\s*[\"']?step[\"']?\s*\]\]")
@@ -20,7 +22,7 @@ def in_text(text: str, where: str) -> At:
     """The place of each key in a text, as far as its layout shows it; else the file."""
     lines: dict[tuple[str, int], int] = {}
     step = 0
-    for number, line in enumerate(text.split("\n"), 1):
+    for number, line in enumerate(split_lines(text), 1):
         if _STEP.match(line):
             step += 1
             lines.setdefault(("", step), number)

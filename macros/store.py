@@ -13,6 +13,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from dialects.errors import Diagnostic
+from dialects.files import bounded, utf8
 from macros.atomic import create_atomically, write_atomically
 from macros.model import FIRST_PAGE, KEYS, Macro, check, check_name, describe_clash, page_order
 from macros.toml_edit import with_values
@@ -83,7 +84,7 @@ class MacroStore:
             raise Diagnostic(f"no macro {name!r}", where, hint) from None
         except OSError as error:
             raise _unreadable(path, error) from None
-        macro = parse_macro(decoded(data, str(path)), str(path))
+        macro = parse_macro(utf8(data, str(path)), str(path))
         if macro.name != name:
             raise Diagnostic(
                 f"name = {macro.name!r} in the file of {name!r}",
@@ -236,7 +237,8 @@ def _bytes(path: Path) -> bytes:
     """Read a file. Raises OSError, also for a pipe or a device: who reads one may wait forever."""
     if path.exists() and not (path.is_file() or path.is_dir()):
         raise OSError(errno.EINVAL, "no file, but a pipe or a device")
-    return path.read_bytes()
+    with path.open("rb") as file:
+        return bounded(file, str(path))
 
 
 def _create(path: Path, text: str) -> None:
@@ -276,15 +278,6 @@ def _same(first: Path, second: Path) -> bool:
     with contextlib.suppress(OSError):
         return first.resolve() == second.resolve()
     return False
-
-
-def decoded(data: bytes, where: str) -> str:
-    """The text of a file. Raises Diagnostic with its line."""
-    try:
-        return data.decode("utf-8-sig")  # an editor may have put a byte order mark in front
-    except UnicodeDecodeError as error:
-        line = data.count(b"\n", 0, error.start) + 1
-        raise Diagnostic("not UTF-8 text", f"{where}:{line}", "save it as UTF-8") from None
 
 
 def _unreadable(path: Path, error: OSError) -> Diagnostic:

@@ -11,6 +11,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 
 from dialects.errors import Diagnostic
+from dialects.files import lines_of
 from dialects.visible import visible
 from macros.braces import escape, fill
 from macros.model import KEYS, Macro, Step
@@ -129,9 +130,9 @@ def imported(text: str, where: str, known: Iterable[str] = ()) -> list[Macro]:
     Raises Diagnostic with file, line and column for what has no counterpart.
     """
     found: dict[str, Macro] = {}
-    for number, row in enumerate(text.split("\n"), 1):
+    for number, row in enumerate(lines_of(text, where), 1):
         if row.strip() and not row.lstrip().startswith((";", "#")):
-            macro = _macro(row.rstrip("\r"), f"{where}:{number}")
+            macro = _macro(row, f"{where}:{number}")
             if macro.name in found:
                 raise Diagnostic(f"F{macro.name[1:]} is defined twice", f"{where}:{number}", "nothing was imported")
             found[macro.name] = macro

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 from dialects import Diagnostic
 from dialects.families import program_language_of, program_languages
-from dialects.files import encoded_text_of, why
+from dialects.files import encoded_program_of, split_lines, why
 from dialects.problems import Problem, errors, in_order
 from simulator.cell.spec import DriveSpec
 from simulator.families import PROGRAMS, TABLE
@@ -42,13 +42,13 @@ class Checked:
     @property
     def respelled(self) -> int:
         """The number of lines that the canonical spelling changes; 0 for a file with errors."""
-        lines = zip(self.text.splitlines(), self.spelled.splitlines(), strict=True)
+        lines = zip(split_lines(self.text), split_lines(self.spelled), strict=True)
         return sum(old != new for old, new in lines) if self.right else 0
 
 
 def examine(file: str, personality: str, language: str = "") -> Checked:
     """Check one file for a product; its name gives the language. Raises Diagnostic if it cannot be read."""
-    text, encoding = encoded_text_of(file)
+    text, encoding = encoded_program_of(file)
     return examine_text(text, file, personality, language, encoding)
 
 
@@ -80,7 +80,7 @@ def ending_of(product: str) -> str:
 
 def _mostly_wrong(text: str, problems: Sequence[Problem]) -> bool:
     """Whether a text no longer than a program has errors in a third of its lines or more."""
-    lines = sum(bool(line.strip()) for line in text.splitlines())
+    lines = sum(bool(line.strip()) for line in split_lines(text))
     return len(text) <= LONGEST and 3 * len({each.line for each in errors(problems)}) >= lines > 0
 
 
@@ -115,7 +115,7 @@ def rewrite(checked: Checked) -> None:
         raise Diagnostic("is not a regular file", checked.file, "only a regular file is rewritten")
     if not os.access(checked.file, os.W_OK):  # a replacement would not heed that
         raise Diagnostic("cannot be written: it is read-only", checked.file, "the file is as it was")
-    if encoded_text_of(checked.file)[0] != checked.text:
+    if encoded_program_of(checked.file)[0] != checked.text:
         raise Diagnostic("has changed since it was checked", checked.file, "check it again; the file is as it was")
     try:
         write_atomically(Path(checked.file), checked.spelled.encode(checked.encoding))

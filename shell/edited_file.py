@@ -8,16 +8,14 @@ from __future__ import annotations
 
 import os
 import re
-from codecs import BOM_UTF8
 from pathlib import Path
 
 from dialects import Diagnostic
-from dialects.files import bytes_of, why
+from dialects.files import bytes_of, decoded, why
 from dialects.visible import ACTING
 
 LARGEST = 512 * 1024
 """Bytes; many times what a drive holds, and as much as an editor takes with ease."""
-_BREAK = re.compile(r"\r\n|\n|\r")
 _ACT = [code for low, high in ACTING if low != 0xD800 for code in range(low, high + 1) if chr(code) not in "\n\t"]
 _STAND_IN_OF = {code: chr(0xF700 + number) for number, code in enumerate(_ACT)}
 _REAL = {ord(shown): chr(code) for code, shown in _STAND_IN_OF.items()}
@@ -71,14 +69,10 @@ class EditedFile:
         self._data, self.text, self.mixed = data, text, False
 
     def _decoded(self, data: bytes) -> str:
-        self.encoding = "utf-8-sig" if data.startswith(BOM_UTF8) else "utf-8"
-        try:
-            text = data.decode(self.encoding)
-        except UnicodeDecodeError:
-            self.encoding, text = "latin-1", data.decode("latin-1")
+        text, self.encoding = decoded(data)
         if _REAL.keys() & set(map(ord, text)):
             raise Diagnostic("holds characters of the private area U+F700", str(self.path), "edit it elsewhere")
-        ends = _BREAK.findall(text)
+        ends = re.findall(_end(text), text)
         self.mixed = len(set(ends)) > 1
         self.newline = max(set(ends), key=ends.count) if ends else "\n"
         return edited(text)
@@ -95,7 +89,12 @@ class EditedFile:
 
 def edited(text: str) -> str:
     """Return a text for an editor: LF line ends, and stand-ins for characters that act."""
-    return _BREAK.sub("\n", text).translate(_STAND_IN_OF)
+    return re.sub(_end(text), "\n", text).translate(_STAND_IN_OF)
+
+
+def _end(text: str) -> str:
+    """Match the line ends of a text as `split_lines` divides it."""
+    return "\r?\n" if "\n" in text else "\r"
 
 
 def real_text(text: str) -> str:

@@ -12,8 +12,9 @@ from typing import NamedTuple
 
 from dialects import Diagnostic
 from dialects.families import program_language_of, program_languages
+from dialects.files import split_lines
 from dialects.problems import Problem, errors
-from dialects.program_editing import Block, EditingLanguage, Offer, Span, UserName, lines_of
+from dialects.program_editing import Block, EditingLanguage, Offer, Span, UserName
 from dialects.program_files import Entry, Part
 
 BYTE_ORDER_MARK = "\ufeff"
@@ -97,7 +98,7 @@ class ProgramText:
     @cached_property
     def lines(self) -> list[str]:
         """The lines without their ends."""
-        return lines_of(self.text)
+        return split_lines(self.text)
 
     @cached_property
     def problems(self) -> Sequence[Problem]:
@@ -217,7 +218,7 @@ class ProgramText:
         if wrong := errors(self.problems):
             count = f"{len(wrong)} errors, the first" if len(wrong) > 1 else "an error"
             raise Diagnostic(f"not formatted: {count} in line {wrong[0].line}: {wrong[0].what}", "", wrong[0].hint)
-        lines = zip(self.lines, lines_of(self.grammar.formatted(self.text)), strict=True)
+        lines = zip(self.lines, split_lines(self.grammar.formatted(self.text)), strict=True)
         return [_edit(n, old, new) for n, (old, new) in enumerate(lines) if old != new and first <= n <= last]
 
 

@@ -17,7 +17,7 @@ from weakref import WeakSet
 from dialects import Diagnostic, DriveError, Refused, SourceLine
 from dialects.errors import Differs
 from dialects.families import program_languages
-from dialects.files import text_of
+from dialects.files import program_text_of
 from dialects.held import Difference, Held
 from dialects.problems import errors, refuse
 from drives.drive import still
@@ -56,21 +56,23 @@ class Wanted:
 # Checking
 
 
-def checked(workspace: Workspace, drive: Drive, file: str, text: str | None = None) -> tuple[str, Sequence[SourceLine]]:
+async def checked(
+    workspace: Workspace, drive: Drive, file: str, text: str | None = None
+) -> tuple[str, Sequence[SourceLine]]:
     """Return a file's text and its lines; publish warnings. `text`: what a file of that name would hold.
 
     Raises Diagnostic for the first error, or for another language.
     """
-    own, text = drive.program_files, text_of(file) if text is None else text
-    problems = own.language.check(text, drive.product)
+    own, text = drive.program_files, await asyncio.to_thread(program_text_of, file) if text is None else text
+    problems = await asyncio.to_thread(own.language.check, text, drive.product)
     for other in program_languages().values() if errors(problems) else ():
-        if other is not own and not errors(other.language.check(text)):
+        if other is not own and not errors(await asyncio.to_thread(other.language.check, text)):
             raise Diagnostic(f"is {other.title}, and {workspace.display_name(drive)} runs {own.title}", file)
     refuse(problems, file)
     for each in problems:
         if each.warning:
             workspace.notify(f"{each.where(file)}: warning: {each.what}", warning=True)
-    return text, own.language.read(text, file)
+    return text, await asyncio.to_thread(own.language.read, text, file)
 
 
 # Download
@@ -88,7 +90,7 @@ async def download(
 
     Raises Diagnostic for the file and the backup, and the drive's failures.
     """
-    text, lines = checked(workspace, drive, file, text)
+    text, lines = await checked(workspace, drive, file, text)
     check_one(drive)
     if drive in _under_way:
         raise Refused(f"{workspace.display_name(drive)}: a download to it is under way (nothing was sent)")

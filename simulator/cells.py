@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from dialects import Diagnostic
-from dialects.files import toml_of
-from simulator.cell.reader import Reader, text_of
+from dialects.files import toml_of, utf8_of
+from simulator.cell.reader import Reader
 from simulator.cell.spec import Cell, DriveSpec
 from simulator.cell.table import Table
 from simulator.families import BY_PERSONALITY
@@ -65,7 +65,7 @@ def matching(cell: str) -> Sequence[Placed]:
 
 
 def _drives(path: str) -> list[Placed]:
-    text = text_of(path) if path else _demo_text()
+    text = utf8_of(path) if path else _demo_text()
     shop = read(text, path, Path(path).absolute().parent) if path else demo()
     tables = toml_of(text, path).get("bus", [])
     return [

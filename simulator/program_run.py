@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple, Protocol
@@ -102,7 +101,6 @@ MOST_TRACED = 10_000
 """Traced lines after which a trace ends."""
 AROUND = 3
 """Lines of the file that are shown before and after a break point."""
-_BREAK = re.compile(r"\r\n|\n|\r")
 Value = int | float
 Values = Mapping[str, Value]
 
@@ -256,11 +254,6 @@ class Recorder:
         """Return the events since the last time."""
         taken, self._events = self._events, []
         return taken
-
-
-def source_lines(text: str) -> list[str]:
-    """The lines of a program file, with their remarks."""
-    return _BREAK.split(text.rstrip("\x1a"))
 
 
 def split_break(text: str) -> tuple[str, int] | None:

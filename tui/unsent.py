@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable
 
+from dialects.files import split_lines
 from tui.outbox import not_sent
 from tui.screen_model import Record, ScreenModel
 from tui.screens.main_screen import MainScreen
@@ -70,7 +71,7 @@ class Unsent:
         if self._half is None or not any(cut):
             return False
         plain = [re.split(NOT_TEXT, text)[0] for text in [self._half + cut[0], *cut[1:]]]
-        lines = [line.strip() for text in plain for line in text.splitlines() if line.strip()]
+        lines = [line.strip() for text in plain for line in split_lines(text) if line.strip()]
         self._half = ""
         for line in lines[-KEPT:]:
             self._keep(line)

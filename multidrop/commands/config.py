@@ -9,6 +9,7 @@ from dataclasses import asdict
 from pathlib import Path
 
 from dialects import Diagnostic
+from dialects.files import toml_of, utf8_of
 from multidrop.commands.failure import fail
 from shell.connect import settings
 from shell.connect.settings import Settings
@@ -43,7 +44,7 @@ def shown(found: Settings, keys: dict[str, str], text: str) -> list[str]:
 
     from tui.widgets.theme import wrong_theme
 
-    given = tomlkit.parse(text) if text else tomlkit.document()
+    given = toml_of(text, "")
 
     def rows(table: str, values: Mapping[str, object], refused: Collection[str] = ()) -> list[str]:
         has = given.get(table, {})
@@ -103,4 +104,4 @@ def _keys(found: Settings) -> dict[str, str]:
 
 
 def _text(file: Path) -> str:
-    return file.read_text(encoding="utf-8") if file.exists() else ""
+    return utf8_of(file) if file.exists() else ""

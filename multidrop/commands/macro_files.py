@@ -9,7 +9,7 @@ import sys
 from collections.abc import Callable
 
 from dialects import Diagnostic
-from dialects.files import why
+from dialects.files import bounded, utf8, why
 from macros import MacroStore, drafts
 from multidrop.commands.failure import fail
 from shell import macro_changes
@@ -18,6 +18,7 @@ from shell.output import INTERRUPTED, write
 
 STANDARD = "-"
 """The file that is standard input, or standard output."""
+INPUT = "standard input"
 
 
 def edit(chosen: argparse.Namespace) -> int:
@@ -101,7 +102,7 @@ def import_(chosen: argparse.Namespace) -> int:
     def work(store: MacroStore) -> list[str]:
         if chosen.file != STANDARD:
             return macro_changes.import_(store, chosen.file, chosen.force)
-        return macro_changes.import_text(store, sys.stdin.read(), "standard input", chosen.force)
+        return macro_changes.import_text(store, utf8(bounded(sys.stdin.buffer, INPUT), INPUT), INPUT, chosen.force)
 
     return _told(work)
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from dialects import Diagnostic
 from dialects.families import program_language_of, program_languages
-from dialects.files import text_of
+from dialects.files import program_text_of
 from dialects.problems import errors
 from multidrop.commands.failure import fail
 from shell import listings, new_file, transfers
@@ -61,7 +61,7 @@ def _wrong(file: str) -> Diagnostic | None:
     """Return the error of a file that is correct in no language, found in the language of its name."""
     own = program_languages()[program_language_of(file)]
     try:
-        text = text_of(file)
+        text = program_text_of(file)
         if all(errors(source.language.check(text)) for source in program_languages().values() if source is not own):
             own.language.load(file)
     except Diagnostic as problem:

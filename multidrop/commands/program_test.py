@@ -15,7 +15,7 @@ from dataclasses import replace
 
 from dialects import Diagnostic
 from dialects.families import program_language_of
-from dialects.files import text_of
+from dialects.files import program_text_of
 from multidrop.commands.failure import fail
 from shell.output import reader_left, write
 from simulator import cells
@@ -52,7 +52,7 @@ def _test(file: str, chosen: argparse.Namespace, given: DriveSpec | None, severa
     debugging = Debugging(chosen.trace, chosen.breaks, chosen.watch)
     failed = False
     try:
-        loaded = programs.read(text_of(file), file)(given or programs.drive)
+        loaded = programs.read(program_text_of(file), file)(given or programs.drive)
         if several and not chosen.json:
             write(sys.stdout, f"{file}:")
         for event in loaded.run(chosen.run, chosen.until, debugging):

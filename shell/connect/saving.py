@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from dialects import Diagnostic
-from dialects.files import why
+from dialects.files import toml_of, utf8_of, why
 from macros.atomic import write_atomically
 from shell.connect import settings
 
@@ -44,13 +44,11 @@ def _write(text: str) -> Path:
 def _document() -> Any:
     """The file as it is, with its remarks and its layout. Raises Diagnostic."""
     import tomlkit
-    from tomlkit.exceptions import TOMLKitError
 
     path = settings.config_file()
-    try:
-        return tomlkit.parse(path.read_text(encoding="utf-8") if path.exists() else "")
-    except (OSError, UnicodeDecodeError, TOMLKitError) as problem:
-        raise Diagnostic(f"cannot be read: {problem}", str(path)) from None
+    text = utf8_of(path) if path.exists() else ""
+    toml_of(text, str(path))  # tomlkit takes its time over what is wrong, and names no line
+    return tomlkit.parse(text)
 
 
 def _checked(document: Any) -> str:

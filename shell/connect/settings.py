@@ -30,7 +30,7 @@ from pathlib import Path
 from typing import Any
 
 from dialects import Diagnostic
-from dialects.files import toml_of
+from dialects.files import toml_of, utf8_of
 from dialects.visible import visible
 from shell.connect import guards, log_settings, look, mqtt_settings
 from shell.connect.guards import Guarding
@@ -109,13 +109,11 @@ def load() -> Settings:
     """Read the configuration; a missing file counts as empty. Raises Diagnostic with file and key."""
     path = config_file()
     try:
-        text = path.read_text(encoding="utf-8")
-    except FileNotFoundError:
-        return Settings()
-    except (OSError, UnicodeDecodeError) as problem:
-        reason = problem.strerror if isinstance(problem, OSError) else "not UTF-8"
-        raise Diagnostic(f"cannot be read: {reason}", str(path)) from None
-    return parse(text, str(path))
+        return parse(utf8_of(path), str(path))
+    except Diagnostic as problem:
+        if isinstance(problem.__cause__, FileNotFoundError):
+            return Settings()
+        raise
 
 
 def parse(text: str, where: str) -> Settings:

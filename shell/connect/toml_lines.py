@@ -5,12 +5,14 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 
+from dialects.files import split_lines
+
 
 def line_of(text: str, key: Sequence[str]) -> int:
     """The number of the line with a key, given with its tables (`screen`, `theme`), or with its table; 0: not found."""
     table: tuple[str, ...] = ()
     best = 0
-    for number, line in enumerate(text.splitlines(), 1):
+    for number, line in enumerate(split_lines(text), 1):
         if header := re.match(r"\s*\[\[?([^\]]+)\]", line):
             table = _parts(header[1])
             found = table

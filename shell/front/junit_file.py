@@ -7,7 +7,7 @@ from datetime import datetime
 from pathlib import Path
 
 from dialects import Diagnostic
-from dialects.files import bytes_of, why
+from dialects.files import LARGEST_PROGRAM, bytes_of, why
 from macros.atomic import write_atomically
 from shell.front.junit import Case, junit
 
@@ -54,6 +54,6 @@ def _check_place(path: Path) -> None:
         return
     if not path.is_file():
         raise Diagnostic("is not a file", str(path), "name a new file for the report")
-    begin = bytes_of(path)[:400]
+    begin = bytes_of(path, LARGEST_PROGRAM)[:400]
     if begin and b"<testsuite" not in begin:
         raise Diagnostic("exists already and is not a JUnit report", str(path), "name a new file for the report")

@@ -10,6 +10,8 @@ import asyncio
 import re
 from collections.abc import Sequence
 
+from dialects import Diagnostic
+from dialects.files import lines_of
 from dialects.visible import visible
 from shell.events import FAILURES
 from shell.lines import VerbLine, parse
@@ -50,7 +52,12 @@ class LineQueue:
         if now - self._entered > BURST:
             self._held, self._queued = "", False
         self._entered = now
-        for line in text.splitlines():
+        try:
+            lines = lines_of(text)
+        except Diagnostic as problem:
+            self._session.notify(f"{problem}; nothing was sent", warning=True)
+            return
+        for line in lines:
             self._take(line, self._session.stops)
 
     def _take(self, line: str, since: int) -> None:

@@ -22,9 +22,12 @@ from prompt_toolkit.application.current import set_app
 from prompt_toolkit.buffer import Buffer
 from prompt_toolkit.filters import is_searching
 from prompt_toolkit.key_binding import KeyBindings, KeyPressEvent
+from prompt_toolkit.keys import Keys
 from prompt_toolkit.output import create_output
 from prompt_toolkit.search import stop_search
 
+from dialects import Diagnostic
+from dialects.files import lines_of
 from shell.automation import outcome, settled
 from shell.connect import settings
 from shell.events import FAILURES, Progressed, SessionEvent, StateChanged
@@ -318,6 +321,13 @@ class Prompt:
                 self._question.no()
             else:
                 event.current_buffer.reset()
+
+        @bindings.add(Keys.BracketedPaste)
+        def paste(event: KeyPressEvent) -> None:
+            try:
+                event.current_buffer.insert_text("\n".join(lines_of(event.data)))
+            except Diagnostic as problem:
+                self._session.notify(f"{problem}; nothing was pasted", warning=True)
 
         @bindings.add("c-s", filter=~is_searching, eager=True)
         @bindings.add("c-q", eager=True)

@@ -8,6 +8,8 @@ import threading
 from collections.abc import AsyncIterator, Iterable
 from typing import TYPE_CHECKING
 
+from dialects import Diagnostic
+from dialects.files import LARGEST, check_line, split_lines
 from shell.lines import uncommented
 
 if TYPE_CHECKING:
@@ -16,6 +18,7 @@ if TYPE_CHECKING:
 
 QUIET = 0.5
 """The quiet time that ends the input of a line in raw mode, s."""
+INPUT = "standard input"
 AHEAD = 4
 """The number of reads of standard input that may wait for their lines to run."""
 
@@ -42,7 +45,10 @@ async def run_stream(session: Session, descriptor: int) -> None:
 
 
 async def stream_lines(descriptor: int) -> AsyncIterator[str]:
-    """Yield the lines of a descriptor (file, pipe), read by a daemon thread with bounded read-ahead."""
+    """Yield the lines of a descriptor (file, pipe), read by a daemon thread with bounded read-ahead.
+
+    Raises Diagnostic for a character that no line may have, and for a line without an end.
+    """
     loop = asyncio.get_running_loop()
     queue: asyncio.Queue[bytes] = asyncio.Queue()
     room = threading.Semaphore(AHEAD)
@@ -60,11 +66,21 @@ async def stream_lines(descriptor: int) -> AsyncIterator[str]:
         hand_over(b"")
 
     threading.Thread(target=read, daemon=True, name="standard input").start()
-    rest = b""
+    rest, number = b"", 0
     while data := await queue.get():
         *whole, rest = (rest + data).split(b"\n")
+        if len(rest) > LARGEST:
+            raise Diagnostic(f"a line is larger than {LARGEST // 1024**2} MB", f"{INPUT}:{number + len(whole) + 1}")
         for line in whole:
-            yield line.decode("utf-8", "replace")
+            number += 1
+            text = line.removesuffix(b"\r").decode("utf-8", "replace")
+            text = text.removeprefix("\ufeff") if number == 1 else text
+            check_line(text, INPUT, number)
+            yield text
         room.release()
-    if rest:
-        yield rest.decode("utf-8", "replace")
+    last = rest.decode("utf-8", "replace").removesuffix("\x1a")
+    for text in [last] if number else split_lines(last):
+        number += 1
+        check_line(text, INPUT, number)
+        if text:
+            yield text

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from dialects import Diagnostic
-from dialects.files import text_of, toml_of
+from dialects.files import escaped_toml, text_of, toml_of
 from dialects.parameters import SECTIONS, VARIABLES, Reading, Readings, Scalar, Value
 
 if TYPE_CHECKING:
@@ -68,7 +68,7 @@ def formatted(drive: Mapping[str, str], found: Readings) -> str:
         document[section] = table
     if found.unread:
         document[UNREAD] = dict(found.unread)
-    return tomlkit.dumps(document)
+    return escaped_toml(tomlkit.dumps(document))
 
 
 def _remark(reading: Reading) -> str:

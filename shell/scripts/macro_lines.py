@@ -14,7 +14,7 @@ UNKNOWN = "0"
 """Stands for a value that is only known when the line is executed."""
 
 
-def lines_of(macro: Macro, macros: MacroStore | None) -> tuple[list[ScriptLine], list[ScriptLine]]:
+def steps_of(macro: Macro, macros: MacroStore | None) -> tuple[list[ScriptLine], list[ScriptLine]]:
     """The lines of a macro and of its end. Without a file of this macro their places are its steps alone."""
     at = _places(macro, macros)
     steps = [

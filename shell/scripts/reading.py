@@ -13,12 +13,12 @@ from functools import partial
 from typing import NamedTuple, TypeVar
 
 from dialects import Diagnostic
-from dialects.files import LARGEST, bytes_of, why
+from dialects.files import bounded, bytes_of, lines_of, utf8, why
 from macros import Macro, MacroStore, check_name, checked_values, fill, value_names
 from shell.lines import VerbLine, parse, uncommented
 from shell.scripts import words
 from shell.scripts.expression import evaluate, unknowns
-from shell.scripts.macro_lines import UNKNOWN, lines_of, stand_in
+from shell.scripts.macro_lines import UNKNOWN, stand_in, steps_of
 from shell.scripts.model import CallFile, CallMacro, If, MacroScript, Node, Repeat, Script, ScriptLine, Step
 from shell.verbs.table import find
 
@@ -74,22 +74,16 @@ def source(file: str) -> list[ScriptLine]:
         raise Diagnostic(
             "is Python, not a script of lines", file, "multidrop run executes it; a script of lines cannot call it"
         )
-    try:
-        text = (_standard_input() if file == INPUT else bytes_of(file)).decode("utf-8-sig")
-    except UnicodeDecodeError:
-        raise Diagnostic("is not UTF-8 text", file) from None
-    numbered = ((number, uncommented(line)) for number, line in enumerate(text.splitlines(), 1))
+    text = utf8(_standard_input() if file == INPUT else bytes_of(file), file)
+    numbered = ((number, uncommented(line)) for number, line in enumerate(lines_of(text, file), 1))
     return [ScriptLine(file, number, line) for number, line in numbered if line]
 
 
 def _standard_input() -> bytes:
     try:
-        data = sys.stdin.buffer.read(LARGEST + 1)
+        return bounded(sys.stdin.buffer, INPUT)
     except OSError as error:
         raise Diagnostic(f"cannot be read: {why(error)}", INPUT) from None
-    if len(data) > LARGEST:
-        raise Diagnostic(f"is larger than {LARGEST // 1024**2} MB", INPUT, "give the script as a file")
-    return data
 
 
 class _Reader:
@@ -115,7 +109,7 @@ class _Reader:
         if self._too_many():
             return MacroScript(macro, (), (), {})
         chain = (*chain, Link(f"macro {macro.name}", macro.name))
-        steps, on_stop = lines_of(macro, self.macros)
+        steps, on_stop = steps_of(macro, self.macros)
         body = _Checker(self, steps, values, chain)
         ending = _Checker(self, on_stop, values, chain)
         checked = MacroScript(macro, body.script(), ending.script(), _stood_in(values))

@@ -14,7 +14,7 @@ from random import Random
 
 from dialects import Diagnostic
 from dialects.families import program_language_of
-from dialects.files import text_of
+from dialects.files import program_text_of
 from shell.sweeps import values, variation
 from shell.sweeps.trial import Case, Job, bench
 from shell.sweeps.values import Value, Values
@@ -82,7 +82,7 @@ class Plan:
 def make(asked: Asked) -> Plan:
     """Read the files and check everything, before anything runs. Raises Diagnostic."""
     language = asked.language or program_language_of(asked.file)
-    program = text_of(asked.file)
+    program = program_text_of(asked.file)
     default = PROGRAMS[language].drive
     bare = Placed("", "", default, {"personality": default.personality, "name": default.name})
     everyone = [bare] if asked.cell is None else cells.matching(asked.cell.partition("#")[0])

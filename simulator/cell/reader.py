@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any, Protocol
 
 from dialects import Diagnostic
-from dialects.files import bytes_of, toml_of
+from dialects.files import LARGEST_PROGRAM, bounded, program_of, toml_of, utf8_of
 from simulator.cell.spec import BusSpec, Cell, DriveSpec, Endpoint, Faults
 from simulator.cell.table import Table, quoted
 
@@ -56,7 +56,7 @@ class Reader:
     def load(self, path: str | Path) -> Cell:
         """Read a cell file. Raises Diagnostic."""
         path = Path(path)
-        cell = self.read(text_of(path), str(path), path.absolute().parent)
+        cell = self.read(utf8_of(path), str(path), path.absolute().parent)
         if not cell.buses:
             raise Diagnostic("has no bus", str(path), "each begins with [[bus]]")
         return cell
@@ -125,14 +125,6 @@ class Reader:
             raise Diagnostic(what, where, "add party = true")
 
 
-def text_of(path: str | Path) -> str:
-    """Read the text of a cell file. Raises Diagnostic."""
-    try:
-        return bytes_of(path).decode("utf-8")
-    except UnicodeDecodeError:
-        raise Diagnostic("is not UTF-8 text", str(path)) from None
-
-
 def common_keys(table: Table, folder: Traversable) -> dict[str, Any]:
     """Read the keys of a drive that mean the same in every family, as arguments of DriveSpec. Raises Diagnostic."""
     name = table.text("program", "")
@@ -155,7 +147,8 @@ def _program(name: str, table: Table, folder: Traversable) -> str:
         file = folder.joinpath(name)
         if not file.is_file():
             raise table.wrong("program", f"{quoted(name)} does not exist", "paths are relative to the cell file")
-        return file.read_bytes().decode("utf-8", "replace")
+        with file.open("rb") as stream:
+            return program_of(bounded(stream, name, LARGEST_PROGRAM), name)[0]
     except (OSError, ValueError) as error:
         why = getattr(error, "strerror", None) or "not a path"
         raise table.wrong("program", f"{quoted(name)} cannot be read ({why})") from None

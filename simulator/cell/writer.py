@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import Any
 
+from dialects.files import escaped_toml
 from dialects.parameters import Reading, same
 from dialects.visible import visible
 from simulator.cell.identities import LONGEST
@@ -74,7 +75,7 @@ def write(buses: Sequence[BusText]) -> str:
     for each in buses:
         tables.append(_bus(each))
     document.add("bus", tables)
-    return tomlkit.dumps(document)
+    return escaped_toml(tomlkit.dumps(document))
 
 
 def _bus(bus: BusText) -> Any:

@@ -15,6 +15,7 @@ from math import inf
 from typing import Any, NamedTuple
 
 from dialects import Diagnostic
+from dialects.files import split_lines
 from dialects.mcode.manual import error_texts, program_file
 from dialects.mcode.manual.grammar import Name, Number, words
 from dialects.mcode.manual.program_file import ProgramLine
@@ -42,7 +43,6 @@ from simulator.program_run import (
     Value,
     Values,
     remark,
-    source_lines,
     split_break,
 )
 from simulator.world import World
@@ -442,7 +442,7 @@ class ProgramRun:
 
 def read(text: str, file: str) -> Load:
     """Read the text of a file. Raises Diagnostic."""
-    lines, source = program_file.read(text, file), source_lines(text)
+    lines, source = program_file.read(text, file), split_lines(text)
     return lambda spec: ProgramRun(spec, lines, file, source)
 
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from dialects import Diagnostic
+from dialects.files import split_lines
 from simulator.cell.spec import DriveSpec
 from simulator.lexium.state.memory import Memory
 
@@ -37,7 +38,7 @@ def load(spec: DriveSpec, execute: Execute) -> None:
     """Declare the variables, and store the program. Raises Diagnostic."""
     for name, value in spec.variables.items():
         _accepted(f"VA {name}={value}", f"drive {spec.name}: variables", execute)
-    for number, line in enumerate(spec.program.splitlines(), 1):
+    for number, line in enumerate(split_lines(spec.program), 1):
         _accepted(line, f"{spec.program_name or 'program'}:{number}", execute)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dialects.files import split_lines
 from dialects.parameters import VARIABLES, Value
 from dialects.pmx.manual import program_file
 from dialects.pmx.manual.script_compiler import ERASED
@@ -54,7 +55,7 @@ def program(spec: DriveSpec) -> StoredProgram:
     if not spec.program:
         return StoredProgram()
     return StoredProgram(
-        tuple(program_file.memory(spec.program, spec.program_name)), tuple(spec.program.strip().splitlines())
+        tuple(program_file.memory(spec.program, spec.program_name)), tuple(split_lines(spec.program.strip()))
     )
 
 

@@ -14,7 +14,7 @@ from math import inf
 from typing import Any
 
 from dialects import Diagnostic
-from dialects.files import SourceLine
+from dialects.files import SourceLine, split_lines
 from dialects.numbers import whole
 from dialects.pmx.manual import program_file, script_compiler
 from dialects.pmx.manual.script_words import PROGRAMS, VARIABLES
@@ -37,7 +37,6 @@ from simulator.program_run import (
     Value,
     Values,
     remark,
-    source_lines,
     split_break,
 )
 
@@ -375,7 +374,7 @@ class ProgramRun:
 
 def read(text: str, file: str) -> Load:
     """Read the text of a file. Raises Diagnostic."""
-    lines, source = program_file.read(text, file), source_lines(text)
+    lines, source = program_file.read(text, file), split_lines(text)
     return lambda spec: ProgramRun(spec, lines, file, source)
 
 

@@ -280,7 +280,6 @@ def test_a_key_is_added_behind_the_name_and_nothing_else_is_changed(store: Macro
         'step = [\n  # one\n  {line = "MR 1"},\n]\nname = "a"',
         'note = """\nname = "b"\n"""\nname = "a"\n[[step]]\nline = "MR 1"',
         'name = "a"\n"key" = "F3" # x\n[[step]]\nline = "MR 1"',
-        'name = "a" # a\u2028key = 1\n[[step]]\nline = "MR 1"\n',
     ],
 )
 def test_a_key_goes_into_any_form_of_file(store: MacroStore, text: str) -> None:

@@ -70,7 +70,7 @@ def test_a_stop_is_explained_in_the_note() -> None:
         ("F2 ^M", "an empty line cannot be sent"),
         ("F2 /stop^M", "/ at the beginning of a line would be multidrop's own"),
         ("F2 @b MR 1^M", "@ at the beginning"),
-        ("F2 a\x1bb^M", "a control character in a\\x1bb"),
+        ("F2 a\x1bb^M", "keys.txt:1: control character (U+001B)"),
         ("F2 H^M\nF2 H^M", "keys.txt:2: F2 is defined twice"),
         ("F2 H^M^f3", "F2 calls F3, which is not there"),
         ("F2 H^M^f2", "F2 calls itself in the end"),

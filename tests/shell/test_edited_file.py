@@ -98,8 +98,8 @@ def test_a_character_that_the_encoding_lacks_is_named_with_its_line(tmp_path: Pa
     path = tmp_path / "a.mxt"
     path.write_bytes(b"' caf\xe9\n")
     file = EditedFile(path)
-    with pytest.raises(Diagnostic, match=r"'€' cannot be written.*latin-1") as caught:
-        file.save("H\n' €\n")
+    with pytest.raises(Diagnostic, match=r"'→' cannot be written.*cp1252") as caught:
+        file.save("H\n' →\n")
     assert caught.value.where.endswith("a.mxt:2")
     assert path.read_bytes() == b"' caf\xe9\n"
 

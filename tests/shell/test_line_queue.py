@@ -61,6 +61,19 @@ async def test_lines_run_one_after_the_other():
 
 
 @in_virtual_time
+async def test_a_text_with_a_hidden_line_is_not_sent_and_a_paste_with_cr_has_lines():
+    async with Typist() as typist:
+        for text in ("PR P\u2028MR 1", "PR P\x0bMR 1\nMR 2", "# x\rMR 1\nMR 2", "PR P\x85MR 1"):
+            typist.queue.enter(text)
+        await asyncio.sleep(3.0)
+        assert typist.session.done == [] and len(typist.session.notices) == 4
+        assert typist.session.notices[0].startswith("line 1: line separator (U+2028)")
+        typist.queue.enter("MR 1\rMR 2")
+        await asyncio.sleep(3.0)
+        assert typist.session.done == ["MR 1", "MR 2"]
+
+
+@in_virtual_time
 async def test_a_failed_line_holds_back_the_rest_of_its_burst_only():
     async with Typist() as typist:
         typist.queue.enter("bad\nMR 1")

@@ -215,10 +215,10 @@ def test_an_export_replaces_no_file(folder: Path, capsys: pytest.CaptureFixture[
 def test_function_keys_come_from_standard_input_and_go_to_standard_output(
     folder: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("sys.stdin", io.StringIO("F5 MR 7^M\nF6 ^x\n"))
+    monkeypatch.setattr("sys.stdin", io.TextIOWrapper(io.BytesIO(b"F5 MR 7^M\nF6 ^x\n")))
     assert main(["macro", "import", "-"]) == 2
     assert capsys.readouterr().err.startswith("standard input:2:")
-    monkeypatch.setattr("sys.stdin", io.StringIO("F5 MR 7^M\n"))
+    monkeypatch.setattr("sys.stdin", io.TextIOWrapper(io.BytesIO(b"F5 MR 7^M\n")))
     assert main(["macro", "import", "-"]) == 0
     assert main(["macro", "export", "-", "f5"]) == 0
     assert capsys.readouterr().out == "F5 MR 7^M\n"

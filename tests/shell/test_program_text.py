@@ -12,12 +12,13 @@ from hypothesis import strategies as st
 
 from dialects import Diagnostic
 from dialects.families import program_languages
+from dialects.files import split_lines
 from dialects.mcode.manual.canonical import canonical
 from dialects.mcode.manual.grammar import LineError, Statement, parse
 from dialects.mcode.manual.program_file import scan
 from dialects.pmx.manual.program_file import compiled
 from dialects.pmx.manual.program_file import read as read_script
-from dialects.program_editing import Block, lines_of, replaced
+from dialects.program_editing import Block, replaced
 from shell.program_text import Edit, ProgramGrammar, ProgramText
 from simulator.cell.spec import DriveSpec, WorldSpec
 from simulator.lexium.device import MCodeDevice
@@ -202,7 +203,7 @@ def test_the_spelling_of_any_mcode_keeps_its_statements(text: str) -> None:
     language = program_languages()["mcode"].language
     spelled = language.formatted(text)
     assert _statements(spelled) == _statements(text) and language.formatted(spelled) == spelled
-    assert len(lines_of(spelled)) == len(lines_of(text))
+    assert len(split_lines(spelled)) == len(split_lines(text))
 
 
 def _memory(text: str, product: str) -> list[tuple[str, str]]:

@@ -5,6 +5,7 @@ import select
 import pytest
 
 from dialects import Diagnostic
+from dialects.files import LARGEST
 from shell.front.stream import stream_lines
 from shell.lines import uncommented
 from shell.scripts.reading import read_script
@@ -36,7 +37,7 @@ def test_a_script_is_its_lines_without_comments_and_blanks(script):
         ("PR P\nMR {STEPS}\n", "s.txt:2: .*STEPS"),
         ("/slep 1\n", "s.txt:1: no verb /slep; try /sleep"),
         ("@a\n", "s.txt:1: "),
-        (b"\xff\xfe\x00", "s.txt: is not UTF-8"),
+        (b"\xff\xfe\x00", "s.txt:1: not UTF-8"),
     ],
 )
 def test_what_is_wrong_is_found_before_anything_runs(script, text, named):
@@ -73,6 +74,33 @@ async def test_lines_come_from_pipes_and_files_and_a_last_one_needs_no_end(tmp_p
         found = [line async for line in stream_lines(descriptor)]
     os.close(descriptor)
     assert [line.strip() for line in found] == ["PR P", "", "@b é", "last"]
+
+
+async def lines_of_input(text: bytes) -> list[str]:
+    descriptor, writer = os.pipe()
+    os.write(writer, text)
+    os.close(writer)
+    try:
+        async with asyncio.timeout(5):
+            return [line async for line in stream_lines(descriptor)]
+    finally:
+        os.close(descriptor)
+
+
+async def test_a_cr_ends_lines_of_standard_input_only_where_no_lf_comes():
+    assert await lines_of_input(b"\xef\xbb\xbfPR P\rMR 1\r") == ["PR P", "MR 1"]
+    assert await lines_of_input(b"\xef\xbb\xbfPR P\r\nMR 1\n\x1a") == ["PR P", "MR 1"]
+    for text in (b"PR P\n# a\rMR 1\n", "PR P\n# a\u2028MR 1\n".encode(), b"PR P\n# a\x0bMR 1", b"PR P\na\rMR 1"):
+        with pytest.raises(Diagnostic, match="^standard input:2: "):
+            await lines_of_input(text)
+
+
+async def test_a_line_of_standard_input_has_an_end(tmp_path):
+    (tmp_path / "lines").write_bytes(b"PR P\n" + b"x" * (LARGEST + 100_000))
+    descriptor = os.open(tmp_path / "lines", os.O_RDONLY)
+    with pytest.raises(Diagnostic, match="^standard input:2: a line is larger than 1 MB"):
+        _ = [line async for line in stream_lines(descriptor)]
+    os.close(descriptor)
 
 
 async def test_standard_input_is_read_ahead_of_the_lines_within_bounds():

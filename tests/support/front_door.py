@@ -35,7 +35,7 @@ def command(folder: Path, *arguments: str, stdin: str = "") -> Done:
     with (
         contextlib.chdir(folder),
         mock.patch.dict(os.environ, environment(folder)),
-        mock.patch("sys.stdin", io.StringIO(stdin)),
+        mock.patch("sys.stdin", io.TextIOWrapper(io.BytesIO(stdin.encode()), "utf-8")),
         contextlib.redirect_stdout(out),
         contextlib.redirect_stderr(err),
     ):

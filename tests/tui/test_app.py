@@ -132,6 +132,19 @@ async def test_one_pasted_line_is_typed_and_several_are_asked_about_and_sent_in_
         assert [line for line, _ in session.lines] == ["PG 100", "MR 1", "PG"]
 
 
+async def test_a_paste_with_a_hidden_line_types_and_sends_nothing() -> None:
+    session = demo_session()
+    app = make_app(session)
+    async with app.run_test(size=(80, 24)) as pilot:
+        for text in ("PR P\u2028MR 1", "# x\rMR 1\nPR P\n", "PR P\x0cMR 1", "PR P\x85MR 1"):
+            app.post_message(events.Paste(text))
+            await pilot.pause()
+            assert (app.main.entry.value, session.lines) == ("", []) and not isinstance(app.screen, Confirm)
+        app.post_message(events.Paste("MR 1\rMR 2\r"))
+        await pilot.pause()
+        assert isinstance(app.screen, Confirm) and "2" in app.screen.heading
+
+
 async def test_pasted_lines_after_one_that_failed_are_not_sent() -> None:
     session = demo_session()
     session.refuses["BAD"] = "a: 20 unknown"

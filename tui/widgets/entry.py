@@ -21,6 +21,8 @@ from textual.reactive import Reactive
 from textual.widgets import Input
 from textual.widgets.input import Selection
 
+from dialects import Diagnostic
+from dialects.files import lines_of
 from tui.assist import CompletionView
 from tui.text import fit
 from tui.widgets.lines import Lines, Row
@@ -249,9 +251,13 @@ class Entry(Input):
 
     async def on_paste(self, event: events.Paste) -> None:
         """Insert one pasted line; hand on several."""
-        lines = [line.rstrip() for line in event.text.splitlines() if line.strip()]
         event.stop()
         event.prevent_default()
+        try:
+            lines = [line.rstrip() for line in lines_of(event.text) if line.strip()]
+        except Diagnostic as problem:
+            self.notify(f"{problem}; nothing was pasted")
+            return
         if len(lines) > 1:
             await self._pasted(lines)
         elif lines:

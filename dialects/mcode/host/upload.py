@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterator, Sequence
 
 from dialects.codec import Procedure
+from dialects.files import split_lines
 from dialects.held import Held
 from dialects.mcode.host.holding import read
 from dialects.mcode.host.listing import GLOBAL, declared, names_of, programs
 from dialects.mcode.host.state import MCodeState
 from dialects.mcode.host.wording import who
 from dialects.mcode.manual import program_file
-
-_BREAK = re.compile(r"\r\n|\n|\r")
 
 
 def upload(state: MCodeState, raw: bool) -> Procedure[tuple[str, ...]]:
@@ -79,5 +77,5 @@ def _lines(text: str) -> Iterator[tuple[str, program_file.ProgramLine | None]]:
     """Yield each line of a file, with what of it is sent."""
     sent: Sequence[program_file.ProgramLine] = program_file.scan(text)[0]
     by_number = {line.number: line for line in sent}
-    for number, line in enumerate(_BREAK.split(text.rstrip("\x1a").removesuffix("\n")), 1):
+    for number, line in enumerate(split_lines(text.removesuffix("\x1a").removesuffix("\n")), 1):
         yield line, by_number.get(number)

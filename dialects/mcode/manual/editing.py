@@ -5,13 +5,14 @@ from __future__ import annotations
 from collections.abc import Container, Iterable, Iterator, Sequence
 
 from dialects.errors import Diagnostic
+from dialects.files import split_lines
 from dialects.mcode.manual import help, program_names
 from dialects.mcode.manual.grammar import statement_tokens
 from dialects.mcode.manual.line_parts import MOVES
 from dialects.mcode.manual.mnemonic import Mnemonic
 from dialects.mcode.manual.name_places import LABEL, LABELS_AT, NEW, PRINTED, STATEMENT, expected
 from dialects.mcode.manual.program_file import ProgramLine, remark_at, scan
-from dialects.program_editing import Block, Offer, Span, UserName, Word, lines_of
+from dialects.program_editing import Block, Offer, Span, UserName, Word
 
 names = program_names.names
 remark = program_names.remark
@@ -69,7 +70,7 @@ def _fits(row: Mnemonic, place: str) -> bool:
 
 def outline(text: str) -> list[Block]:
     """Return programs with their labels and variables, and the variables declared outside of programs."""
-    sources = lines_of(text)
+    sources = split_lines(text)
     found: list[Block] = []
     opened: list[ProgramLine] = []
     for line in scan(text)[0]:

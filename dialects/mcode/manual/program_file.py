@@ -16,7 +16,7 @@ from dataclasses import dataclass, field
 from math import inf
 from typing import TYPE_CHECKING
 
-from dialects.files import text_of
+from dialects.files import program_text_of, split_lines, wrong_characters
 from dialects.layout import respelled
 from dialects.mcode.manual.canonical import canonical
 from dialects.mcode.manual.grammar import LineError, check_groups, parse
@@ -29,7 +29,6 @@ if TYPE_CHECKING:
 LONGEST = 64
 """Characters that a drive's receive buffer holds (5.1.102)."""
 
-_BREAK = re.compile(r"\r\n|\n|\r")
 _REMARKS = "'`\\"
 _PROGRAM = re.compile(r"PG\s*=?\s*(\w*)\Z", re.IGNORECASE | re.ASCII)
 _DECLARES = re.compile(r"(LB|VA)\s*=?\s*([A-Z]\w{0,2})", re.IGNORECASE | re.ASCII)
@@ -61,7 +60,7 @@ class ProgramLine:
 
 def load(path: str | Path) -> list[ProgramLine]:
     """Read the lines of a file, UTF-8 or Latin-1. Raises Diagnostic, also for a file that is not text."""
-    return read(text_of(path), str(path))
+    return read(program_text_of(path), str(path))
 
 
 def read(text: str, name: str) -> list[ProgramLine]:
@@ -76,15 +75,18 @@ def read(text: str, name: str) -> list[ProgramLine]:
 
 def scan(text: str) -> tuple[list[ProgramLine], list[Problem]]:
     """Read all lines that are not empty, and report what prevents sending them. Never fails."""
+    raw = split_lines(text)
     lines = [
         ProgramLine(n, sent, "", len(line) - len(line.lstrip(" \t")) + 1)
-        for n, line in enumerate(_BREAK.split(text.rstrip("\x1a")), 1)
+        for n, line in enumerate(raw, 1)
         if (sent := bare(line))
     ]
     if not lines:
         return [], [Problem(1, 1, "nothing to send: no line but remarks and blanks")]
     names = frozenset(line.declares for line in lines if line.declares)
-    problems = [problem for line in lines for problem in _unsendable(line, names)]
+    problems = [Problem(*place, "lines end at LF or CR LF") for place in wrong_characters(raw)]
+    wrong = {each.line for each in problems}
+    problems += [problem for line in lines if line.number not in wrong for problem in _unsendable(line, names)]
     sections, unpaired = _sections(lines)
     problems += unpaired
     if "program" not in sections:
@@ -133,10 +135,7 @@ def _unsendable(line: ProgramLine, names: frozenset[str]) -> Iterator[Problem]:
     """Report a character that cannot be sent, a line longer than a drive accepts, and a number in groups of digits."""
     at = unsendable(line.text)
     if at is not None:
-        character = line.text[at]
-        control = character < " " or "\x7f" <= character <= "\x9f"
-        what = f"control character 0x{ord(character):02X}" if control else f"{character!r} cannot be sent"
-        yield Problem(line.number, line.column + at, what, "MCode is plain ASCII")
+        yield Problem(line.number, line.column + at, f"{line.text[at]!r} cannot be sent", "MCode is plain ASCII")
     if len(line.text) > LONGEST:
         what = f"{len(line.text)} characters without the remark; a drive takes {LONGEST}"
         yield Problem(line.number, line.column + LONGEST, what, "split the line")

@@ -11,12 +11,13 @@ from functools import lru_cache
 from typing import NamedTuple
 
 from dialects.errors import Diagnostic
+from dialects.files import split_lines
 from dialects.mcode.manual.grammar import NAME_FORM, Token, divided, is_name, tokens
 from dialects.mcode.manual.mnemonic import EVERY
 from dialects.mcode.manual.program_file import LONGEST, ProgramLine, bare, remark_at
 from dialects.mcode.manual.program_products import AT_POWER_UP
 from dialects.mcode.manual.table import lookup
-from dialects.program_editing import Span, UserName, lines_of, replaced
+from dialects.program_editing import Span, UserName, replaced
 
 
 class _Line(NamedTuple):
@@ -38,7 +39,7 @@ def _read(source: str) -> _Line:
 
 def names(text: str) -> list[UserName]:
     """Return the labels and variables of a file."""
-    sources = lines_of(text.rstrip("\x1a"))
+    sources = split_lines(text)
     lines = [_read(source) for source in sources]
     words = _declared(lines)
     labels = {line.declares for line in lines if line.text[:2].upper() == "LB"}
@@ -95,7 +96,7 @@ def renamed(text: str, name: UserName, new: str, product: str) -> str:
         return new
     if lookup(word) is not None:
         raise Diagnostic(_taken(word, product), "", "choose another name")
-    sources = lines_of(text)
+    sources = split_lines(text)
     for number, source in enumerate(sources, 1):
         if any(_uses(_read(source), (word,))):
             raise Diagnostic(f"{word} is in use already, in line {number}", "", "choose another name")

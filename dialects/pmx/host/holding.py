@@ -5,13 +5,12 @@ A controller writes each line of a program to its flash at once. (PMX-2ED-SA man
 
 from __future__ import annotations
 
-import re
 from collections.abc import Sequence
 
 from dialects.codec import Procedure
 from dialects.errors import Diagnostic, Refused
 from dialects.family import Progress
-from dialects.files import SourceLine
+from dialects.files import SourceLine, split_lines
 from dialects.held import Difference, Held, Stored
 from dialects.pmx.host.download import BLANK, read_line
 from dialects.pmx.host.exchange import answered, number, who
@@ -23,7 +22,6 @@ from dialects.pmx.manual.script_words import VARIABLES
 
 RUNS = (1, 2)
 """The states of a program that runs or waits to go on."""
-_BREAK = re.compile(r"\r\n|\n|\r")
 
 
 def read(state: PmxState, lines: Sequence[SourceLine], progress: Progress) -> Procedure[Held]:
@@ -117,4 +115,4 @@ def annotated(text: str, held: Held) -> tuple[str, ...]:
 
 def refreshed(text: str, _: Held) -> tuple[str, ...]:
     """Return the lines of a file: it gives variables no values."""
-    return tuple(_BREAK.split(text.rstrip("\x1a").removesuffix("\n")))
+    return tuple(split_lines(text.removesuffix("\x1a").removesuffix("\n")))

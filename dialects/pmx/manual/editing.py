@@ -5,12 +5,13 @@ from __future__ import annotations
 import re
 from collections.abc import Container, Iterable, Sequence
 
+from dialects.files import split_lines
 from dialects.pmx.manual import line_parts, script_help, script_names
 from dialects.pmx.manual.line_parts import MOVE
 from dialects.pmx.manual.script_parser import Statement, parse
 from dialects.pmx.manual.script_words import AXES
 from dialects.pmx.manual.script_words import Word as Register
-from dialects.program_editing import Block, Offer, Span, UserName, Word, lines_of
+from dialects.program_editing import Block, Offer, Span, UserName, Word
 
 names = script_names.names
 fixed = script_names.fixed
@@ -84,7 +85,7 @@ class _Outline:
     """The blocks of a file. A block that has no end ends before the program or subroutine that follows it."""
 
     def __init__(self, text: str) -> None:
-        self.lines = lines_of(text)
+        self.lines = split_lines(text)
         self.blocks: list[Block] = []
         self.open: list[tuple[Statement, list[Block]]] = []
         for number, statement in enumerate(parse(text)[0]):

@@ -11,7 +11,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from dialects.files import SourceLine, text_of
+from dialects.files import SourceLine, program_text_of, split_lines, wrong_characters
 from dialects.layout import respelled
 from dialects.pmx.manual import line_parts, script_checker, script_decompiler
 from dialects.pmx.manual.canonical import canonical
@@ -21,7 +21,6 @@ from dialects.problems import Problem, refuse
 LONGEST = 40
 """Characters of a compiled line, far more than the ten seen from units."""
 RAW = re.compile(r"SA(\d{1,4})=(\S*)", re.ASCII)
-_BREAK = re.compile(r"\r\n|\n|\r")
 parts = line_parts.parts
 entries = line_parts.entries
 
@@ -36,7 +35,7 @@ class ProgramLine:
 
 def load(path: str | Path) -> list[ProgramLine]:
     """Read the lines of a correct file. Raises Diagnostic with the first error and its place."""
-    return read(text_of(path), str(path))
+    return read(program_text_of(path), str(path))
 
 
 def read(text: str, name: str) -> list[ProgramLine]:
@@ -57,6 +56,8 @@ def formatted(text: str) -> str:
 
 def check(text: str, product: str = "") -> list[Problem]:  # noqa: ARG001
     """Report every error of a program, by line; there is one product."""
+    if wrong := [Problem(*place, "lines end at LF or CR LF") for place in wrong_characters(split_lines(text))]:
+        return wrong
     lines = _lines(text)
     return _check_raw(lines) if is_raw(lines) else script_checker.check(text)
 
@@ -103,7 +104,7 @@ def _held(stored: Mapping[int, str]) -> list[str]:
 
 
 def _lines(text: str) -> list[ProgramLine]:
-    bare = [line.partition(";")[0].strip() for line in _BREAK.split(text.rstrip("\x1a"))]
+    bare = [line.partition(";")[0].strip() for line in split_lines(text)]
     return [ProgramLine(number, line) for number, line in enumerate(bare, 1) if line]
 
 

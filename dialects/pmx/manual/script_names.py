@@ -7,11 +7,12 @@ from collections.abc import Iterator
 from dataclasses import replace
 
 from dialects.errors import Diagnostic
+from dialects.files import split_lines
 from dialects.pmx.manual.line_parts import words
 from dialects.pmx.manual.script_help import VARIABLE_NAMES
 from dialects.pmx.manual.script_parser import MOVE, TARGET, Statement, Value, parse
 from dialects.pmx.manual.script_words import HANDLER, KEPT_VARIABLES, SUBROUTINES, VARIABLES
-from dialects.program_editing import Span, UserName, lines_of, replaced
+from dialects.program_editing import Span, UserName, replaced
 
 _NUMBERED = re.compile(r"\s*(PRG|SUB|GOSUB)\s*(\d{1,4})\s*", re.ASCII)
 _SETS = re.compile(r"\s*(V\d+)\s*=", re.ASCII)
@@ -21,7 +22,7 @@ _KINDS = {"PRG": ("PRG", "program"), "SUB": ("SUB", "subroutine"), "GOSUB": ("SU
 
 def names(text: str) -> list[UserName]:
     """Return the names of a file. A variable has no declaration: the first line that sets it counts as one."""
-    lines = lines_of(text)
+    lines = split_lines(text)
     kinds: dict[str, str] = {}
     places: dict[str, list[Span]] = {}
     declared: dict[str, Span] = {}
@@ -86,7 +87,7 @@ def renamed(text: str, name: UserName, new: str, product: str) -> str:  # noqa: 
 
 def _compare(text: str, name: UserName, word: str) -> None:
     """Raise Diagnostic unless a rename changes that word alone in the statements of the text."""
-    after = replaced(lines_of(text), name.places, word.removeprefix("SUB "))
+    after = replaced(split_lines(text), name.places, word.removeprefix("SUB "))
     wanted = [_renamed(each, name.word, word) for each in parse(text)[0]]
     for one, other in zip(wanted, parse("\n".join(after))[0], strict=True):
         if one != other:

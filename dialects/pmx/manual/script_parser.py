@@ -12,12 +12,12 @@ import difflib
 import re
 from dataclasses import dataclass, field
 
+from dialects.files import split_lines
 from dialects.pmx.manual.script_words import AXES, BLOCKS, COMPARISONS, INT32, PROGRAMS, SUBROUTINES, WORDS
 from dialects.pmx.manual.table import grouped
 from dialects.problems import Problem
 
 _VALUE = r"-?\d+|[A-Za-z]\w*"
-_BREAK = re.compile(r"\r\n|\n|\r")
 _BLOCK = re.compile(r"(IF|ELSEIF|WHILE)(?![A-Za-z0-9])(.*)")
 _NUMBERED = re.compile(r"(PRG|GOSUB|SUB)\s*(-?\d+)?\s*")
 _PLAIN = re.compile(r"(ELSEIF|ELSE|ENDIF|ENDWHILE|ENDSUB|END)\s*")
@@ -93,7 +93,7 @@ def parse(text: str) -> tuple[list[Statement], list[Problem]]:
     """Parse every line, and report the errors. Never fails."""
     statements: list[Statement] = []
     problems: list[Problem] = []
-    for number, line in enumerate(_BREAK.split(text.rstrip("\x1a")), 1):
+    for number, line in enumerate(split_lines(text), 1):
         bare = line.partition(";")[0].rstrip()
         if not bare.strip():
             continue

@@ -70,7 +70,7 @@ def test_several_programs_keep_what_stands_between_them_before_them() -> None:
         ("VA Q1\nPG 1\nE\n", "press.mxt:2:1: PG is never ended"),
         ("PG 1\nE\nPG\nPG\n", "press.mxt:4:1: PG without an address"),
         ("PG 1\nE\nPG 100\nE\nPG\n", "press.mxt:3:1: PG 100 inside the program of line 1"),
-        ("PG 1\n  PR\x07\nPG\n", "press.mxt:2:5: control character 0x07"),
+        ("PG 1\n  PR\x07\nPG\n", "press.mxt:2:5: control character (U+0007)"),
         ('PG 1\nPR "20 °C"\nPG\n', "press.mxt:2:8: '°' cannot be sent"),
         ("PG 1\nPR “P”\nPG\nPG\n", "press.mxt:2:4: '“' cannot be sent (1 more: multidrop program check)"),
     ],
@@ -88,8 +88,8 @@ def test_a_line_of_64_characters_is_sent_and_one_of_65_is_not_remarks_not_counte
     )
 
 
-def test_odd_characters_in_a_remark_do_no_harm() -> None:
-    assert [line.text for line in read("PG 1 ' 20 °C \x07\nE ` – “ok”\nPG\n\x1a", "x")] == ["PG 1", "E", "PG"]
+def test_letters_of_any_script_in_a_remark_do_no_harm() -> None:
+    assert [line.text for line in read("PG 1 ' 20 °C\t速\nE ` – “ok”\nPG\n\x1a", "x")] == ["PG 1", "E", "PG"]
 
 
 def test_a_file_is_read_in_utf8_with_or_without_a_mark_and_in_latin1(tmp_path: Path) -> None:
