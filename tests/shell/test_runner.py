@@ -76,23 +76,23 @@ async def test_lines_come_from_pipes_and_files_and_a_last_one_needs_no_end(tmp_p
     assert [line.strip() for line in found] == ["PR P", "", "@b é", "last"]
 
 
-async def lines_of_input(text: bytes) -> list[str]:
-    descriptor, writer = os.pipe()
-    os.write(writer, text)
-    os.close(writer)
-    try:
+async def test_a_cr_ends_lines_of_standard_input_only_where_no_lf_comes(tmp_path):
+    opened = []
+
+    async def lines_of_input(text):
+        file = tmp_path / f"input-{len(opened)}"
+        file.write_bytes(text)
+        opened.append(os.open(file, os.O_RDONLY))  # closed at the end: a thread may still read it
         async with asyncio.timeout(5):
-            return [line async for line in stream_lines(descriptor)]
-    finally:
-        os.close(descriptor)
+            return [line async for line in stream_lines(opened[-1])]
 
-
-async def test_a_cr_ends_lines_of_standard_input_only_where_no_lf_comes():
     assert await lines_of_input(b"\xef\xbb\xbfPR P\rMR 1\r") == ["PR P", "MR 1"]
     assert await lines_of_input(b"\xef\xbb\xbfPR P\r\nMR 1\n\x1a") == ["PR P", "MR 1"]
     for text in (b"PR P\n# a\rMR 1\n", "PR P\n# a\u2028MR 1\n".encode(), b"PR P\n# a\x0bMR 1", b"PR P\na\rMR 1"):
         with pytest.raises(Diagnostic, match="^standard input:2: "):
             await lines_of_input(text)
+    for descriptor in opened:
+        os.close(descriptor)
 
 
 async def test_a_line_of_standard_input_has_an_end(tmp_path):
