@@ -69,8 +69,9 @@ def _run(arguments: Sequence[str], own: bool) -> int:
 
     try:
         chosen = parse(arguments)
-        from shell import output
+        from shell import outlets, output
 
+        outlets.as_json = getattr(chosen, "json", False) is True
         if own and chosen.run_by not in PROTOCOLS:
             output.watch_reader(signal.SIGINT)
         code = run(chosen)

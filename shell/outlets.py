@@ -1,9 +1,9 @@
 """Standard output and standard error that never make the event loop wait for a reader.
 
 Theory of operation. A thread writes to each destination, from a bounded queue. A terminal that is not read loses lines;
-once it is read again, it shows how many. Warnings and failures are kept for it. A pipe or a file loses no reply:
-automation awaits `ready` before its next line. Only unsolicited lines are dropped there, and standard error reports how
-many.
+once it is read again, it shows how many. Warnings and failures are kept for it. A pipe loses no reply: automation
+awaits `ready` before its next line. Only unsolicited lines are dropped there; standard error, or an object of a JSON
+stream, reports how many and when. A file loses none of them either, up to MOST: a disk that hangs blocks no loop.
 """
 
 from __future__ import annotations
@@ -12,17 +12,21 @@ import contextlib
 import io
 import os
 import select
+import stat
 import sys
 import threading
+import time
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from datetime import datetime
 from functools import partial
 from typing import TextIO
 
 LIMIT = 64 * 1024
-"""The largest number of bytes that wait for a reader, except replies to a pipe."""
+"""The largest number of bytes that wait for a reader, except replies to a pipe, and all lines to a file."""
 MOST = 64 * 1024 * 1024
-"""The largest number of bytes that wait for a pipe; automation waits long before that."""
+"""The largest number of bytes that wait for a pipe or a file; automation waits long before that."""
 CHUNK = 16 * 1024
 """The number of bytes in one write."""
 PIPE_TIMEOUT = 60.0
@@ -31,15 +35,40 @@ SHORT_TIMEOUT = 1.0
 """That time for a terminal, and for every reader after a stop or a signal."""
 
 
+as_json = False
+"""Standard output is a stream of JSON objects, and a loss is an object in it."""
+
+
+@dataclass
+class Loss:
+    """Lines that were dropped, and between which times of day, s."""
+
+    since: float
+    until: float
+    count: int = 0
+
+    def fact(self) -> dict[str, object]:
+        """The loss as an object for programs."""
+        since, until = (datetime.fromtimestamp(at).astimezone() for at in (self.since, self.until))
+        return {"lost": self.count, "from": since.isoformat(timespec="milliseconds")} | {
+            "to": until.isoformat(timespec="milliseconds")
+        }
+
+    def __str__(self) -> str:
+        """The loss in words; its times are local."""
+        since, until = (datetime.fromtimestamp(at).strftime("%H:%M:%S.%f")[:-3] for at in (self.since, self.until))
+        return f"{self.count} {'line' if self.count == 1 else 'lines'} lost, {since} to {until}"
+
+
 class Lane:
     """A descriptor and the thread that writes to it. `put` never waits; bytes leave in the order of `put`.
 
-    When there is room again, the thread calls `notice` with the number of dropped items and writes the result in their
+    Where items were dropped, the thread calls `notice` once all before them are written, and writes the result in their
     place. It calls `failed` when the descriptor can no longer be written.
     """
 
     def __init__(
-        self, descriptor: int, notice: Callable[[int], bytes], failed: Callable[[OSError], None], limit: int = LIMIT
+        self, descriptor: int, notice: Callable[[Loss], bytes], failed: Callable[[OSError], None], limit: int = LIMIT
     ) -> None:
         self.notice = notice
         self.written = 0
@@ -47,20 +76,22 @@ class Lane:
         self.closed = False
         """True after a failure, or when the reader was given up: nothing more is written."""
         self._descriptor, self._failed, self._limit = descriptor, failed, limit
-        self._queue: deque[bytes] = deque()
-        self._held = self._dropped = 0
+        self._queue: deque[bytes | Loss] = deque()
+        self._held = 0
+        self._loss: Loss | None = None
+        """The loss in the queue, which grows until the thread comes to it."""
         self._changed = threading.Condition()
         self._thread: threading.Thread | None = None
 
     @property
     def idle(self) -> bool:
         """Whether everything is written."""
-        return self.closed or not (self._held or self._dropped)
+        return self.closed or not (self._held or self._loss)
 
     @property
     def behind(self) -> bool:
         """Whether the reader is slower than the writer."""
-        return not self.closed and (self._dropped > 0 or self._held > self._limit // 2)
+        return not self.closed and (self._loss is not None or self._held > self._limit // 2)
 
     def put(self, data: bytes, keep: bool = False, count: int = 1) -> bool:
         """Queue `count` lines; False if they were dropped for lack of room. `keep`: drop them only beyond MOST."""
@@ -68,16 +99,21 @@ class Lane:
             if self.closed:
                 return False
             if self._held > MOST or (not keep and self._is_full(len(data))):
-                self._dropped += count
+                self._lose(count, time.time())
                 return False
             self._add(data)
         return True
 
+    def _lose(self, count: int, now: float) -> None:
+        if self._loss is None:
+            self._loss = Loss(now, now)
+            self._queue.append(self._loss)
+        self._loss.count += count
+        self._loss.until = now
+
     def _is_full(self, size: int) -> bool:
         """Whether an item of this size has no room. After a loss there is no room until the reader catches up."""
-        if not self._held and not self._dropped:
-            return False
-        return self._dropped > 0 or self._held + size > self._limit
+        return self._loss is not None or (self._held > 0 and self._held + size > self._limit)
 
     def _add(self, data: bytes) -> None:
         self._queue.append(data)
@@ -97,7 +133,7 @@ class Lane:
     def _run(self) -> None:
         while (data := self._next()) is not None:
             try:
-                written = os.write(self._descriptor, data[:CHUNK])
+                written = 0 if not data else os.write(self._descriptor, data[:CHUNK])
             except BlockingIOError:  # another process that shares the descriptor made it non-blocking
                 select.select([], [self._descriptor], [])
                 written = 0
@@ -113,10 +149,23 @@ class Lane:
             self._changed.wait_for(lambda: self._queue or self.closed)
             if self.closed:
                 return None
-            data = self._queue.popleft()
-            while self._queue and len(data) + len(self._queue[0]) <= CHUNK:
-                data += self._queue.popleft()
+            data = b""
+            while self._queue and (not data or len(data) + self._size(self._queue[0]) <= CHUNK):
+                item = self._queue.popleft()
+                if isinstance(item, Loss):
+                    item = self._notice(item)
+                data += item
             return data
+
+    def _size(self, item: bytes | Loss) -> int:
+        """The size of an item; a loss waits until all before it is written."""
+        return CHUNK if isinstance(item, Loss) else len(item)
+
+    def _notice(self, loss: Loss) -> bytes:
+        self._loss = None
+        notice = self.notice(loss)
+        self._held += len(notice)
+        return notice
 
     def _took(self, rest: bytes, written: int) -> None:
         with self._changed:
@@ -124,17 +173,16 @@ class Lane:
             self._held -= written
             if rest:
                 self._queue.appendleft(rest)
-            if self._dropped and self._held <= self._limit // 2:
-                dropped, self._dropped = self._dropped, 0
-                if notice := self.notice(dropped):
-                    self._add(notice)
 
 
 class LineStream(io.TextIOBase):
     """A text stream in place of a standard stream that takes whole lines at once."""
 
     def lines(self, lines: Sequence[str], spare: bool) -> None:
-        """Send lines. Without room a terminal loses all but warnings; a pipe loses spare (unsolicited) lines."""
+        """Send lines. Without room a terminal loses all but warnings; a pipe loses spare (unsolicited) lines.
+
+        A file loses none.
+        """
         raise NotImplementedError
 
 
@@ -144,6 +192,7 @@ class Outlet(LineStream):
     def __init__(self, stream: TextIO, lane: Lane, errors: bool) -> None:
         self.stream, self.lane = stream, lane
         self.terminal, self._errors = stream.isatty(), errors
+        self._file = stat.S_ISREG(os.fstat(stream.fileno()).st_mode)
         self._begun = ""
 
     @property
@@ -179,7 +228,7 @@ class Outlet(LineStream):
     def lines(self, lines: Sequence[str], spare: bool) -> None:
         """Send lines."""
         text = "\n".join((*lines, ""))
-        self._put(text, keep=self._errors or not (spare or self.terminal), count=len(lines))
+        self._put(text, keep=self._errors or self._file or not (spare or self.terminal), count=len(lines))
 
     def _put(self, text: str, keep: bool, count: int = 1) -> None:
         self.lane.put(text.encode(self.encoding, "backslashreplace"), keep, count)
@@ -253,16 +302,22 @@ def _place(stream: TextIO) -> tuple[int, int, int]:
     return facts.st_dev, facts.st_ino, facts.st_rdev
 
 
-def _notice(stream: TextIO, errors: Lane | None) -> Callable[[int], bytes]:
+def _notice(stream: TextIO, errors: Lane | None) -> Callable[[Loss], bytes]:
     """The report of dropped lines: in their place, or on standard error if that is another destination."""
     on_terminal = stream.isatty()
-    why = "the terminal did not take them" if on_terminal else "the output is not read"
 
-    def notice(dropped: int) -> bytes:
-        text = f"{dropped} {'line is' if dropped == 1 else 'lines are'} missing here: {why}\n".encode()
-        if errors is None or on_terminal:
+    def notice(loss: Loss) -> bytes:
+        if on_terminal:
+            are = "line is" if loss.count == 1 else "lines are"
+            return f"{loss.count} {are} missing here: the terminal did not take them\n".encode()
+        text = f"{loss}: the output is not read\n".encode()
+        if errors is None:
             return text
         errors.put(text, keep=True)
-        return b""
+        if not as_json:
+            return b""
+        import json  # a loss is rare
+
+        return json.dumps(loss.fact()).encode() + b"\n"
 
     return notice

@@ -18,7 +18,7 @@ from typing import Any, TextIO, cast
 
 from prompt_toolkit.application import Application, in_terminal
 
-from shell.outlets import LineStream, Outlet
+from shell.outlets import LineStream, Loss, Outlet
 
 MOST = 1000
 """The largest number of lines that wait for a terminal that takes none."""
@@ -131,7 +131,7 @@ class LinesAbove:
                 self._lane.notice = notice
             self._write_rest()
 
-    def _lost(self, dropped: int) -> bytes:
+    def _lost(self, loss: Loss) -> bytes:
         """Draw the prompt again after a loss. Called from the lane's thread."""
         self._damaged = True
         with contextlib.suppress(RuntimeError):  # the loop has ended

@@ -5,12 +5,14 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import errno
+import json
 import os
 import pty
 import re
 import select
 import sys
 import threading
+from datetime import datetime
 
 import pytest
 
@@ -27,7 +29,7 @@ class Pipe:
     def __init__(self, limit=10_000):
         self.reader, self.writer = os.pipe()
         self.problems, self.failed = [], threading.Event()
-        self.lane = Lane(self.writer, lambda dropped: f"[{dropped}]".encode(), self._failed, limit)
+        self.lane = Lane(self.writer, lambda loss: f"[{loss.count}]".encode(), self._failed, limit)
 
     def _failed(self, problem):
         self.problems.append(problem.errno)
@@ -70,8 +72,8 @@ def test_what_does_not_fit_is_dropped_and_told_in_its_place(pipe):
     assert [pipe.lane.put(b"lost\n") for _ in range(5)] == [False] * 5
     assert not pipe.lane.put(b"three\nlines\nmore\n", count=3)
     assert pipe.lane.put(b"kept\n", keep=True)
-    got = pipe.read(b"[8]")
-    assert got.endswith(b"kept\n[8]") and got.count(b"\n") == 101
+    got = pipe.read(b"kept\n")
+    assert got.endswith(b"x\n[8]kept\n") and got.count(b"\n") == 101
     assert pipe.lane.put(b"more\n")
     assert pipe.read(b"more\n") == b"more\n"
 
@@ -175,6 +177,52 @@ async def test_automation_waits_while_a_pipe_is_behind_and_no_reply_is_dropped(m
         assert got == (b"x" * 999 + b"\n") * lines
 
 
+async def test_a_file_loses_nothing_that_nobody_asked_for(monkeypatch, tmp_path):
+    with open(tmp_path / "kept.txt", "w") as file, monkeypatch.context() as replaced:
+        replaced.setattr(sys, "stdout", file)
+        with output.nonblocking() as made:
+            for number in range(5000):
+                output.write(sys.stdout, f"{number:0999}", spare=True)
+            async with asyncio.timeout(PATIENCE):
+                assert await made.finish(lambda: False) == []
+    kept = (tmp_path / "kept.txt").read_text().splitlines()
+    assert [int(line) for line in kept] == list(range(5000))
+
+
+async def test_a_disk_that_hangs_loses_what_is_over_the_bound_and_it_is_told(monkeypatch):
+    monkeypatch.setattr(outlets, "MOST", 300_000)
+    monkeypatch.setattr(outlets.stat, "S_ISREG", lambda mode: True)  # a pipe that takes 64 kB and then nothing
+    with streams(monkeypatch) as (made, reader, errors):
+        for _ in range(1000):
+            output.write(sys.stdout, "x" * 999, spare=True)
+        assert made.outlets[1].lane.behind, "a script waits"
+        got, told, lost = b"", b"", 0
+        async with asyncio.timeout(PATIENCE):
+            while not lost or got.count(b"\n") < 1000 - lost:
+                got, told = got + taken(reader), told + taken(errors)
+                lost = sum(int(line.split()[0]) for line in told.splitlines())
+                await asyncio.sleep(0.001)
+        assert 300 <= got.count(b"\n") < 700
+
+
+async def test_a_loss_is_an_object_at_its_place_in_a_stream_of_objects(monkeypatch):
+    monkeypatch.setattr(outlets, "as_json", True)
+    with streams(monkeypatch) as (_, reader, errors):
+        for number in range(500):
+            output.write(sys.stdout, json.dumps({"number": number, "text": "x" * 999}), spare=True)
+        output.write(sys.stdout, '{"number": 500}')
+        got = b""
+        async with asyncio.timeout(PATIENCE):
+            while b'"number": 500' not in got:
+                got += taken(reader)
+                await asyncio.sleep(0.001)
+        *objects, loss, last = map(json.loads, got.splitlines())
+        assert [each["number"] for each in objects] == list(range(500 - loss["lost"])) and last == {"number": 500}
+        since, until = (datetime.fromisoformat(loss[name]) for name in ("from", "to"))
+        assert list(loss) == ["lost", "from", "to"] and since <= until and since.tzinfo is not None
+        assert taken(errors).decode().startswith(f"{loss['lost']} lines lost, ")
+
+
 async def test_what_nobody_asked_for_is_dropped_and_told_on_standard_error(monkeypatch):
     with streams(monkeypatch) as (_, reader, errors):
         for _ in range(500):
@@ -188,8 +236,8 @@ async def test_what_nobody_asked_for_is_dropped_and_told_on_standard_error(monke
                 await asyncio.sleep(0.001)
         assert missing
         for line in told.splitlines():
-            assert re.fullmatch(r"1 line is missing here: .*|\d+ lines are missing here: .*", line)
-            assert line.endswith(": the output is not read")
+            times = r"\d\d:\d\d:\d\d\.\d{3}"
+            assert re.fullmatch(rf"(1 line|\d+ lines) lost, {times} to {times}: the output is not read", line)
 
 
 @pytest.mark.parametrize(("hurried", "told"), [(False, 1), (True, 0)])

@@ -19,7 +19,7 @@ from textual._compositor import ChopsUpdate, LayoutUpdate
 from textual.drivers.linux_driver import LinuxDriver
 from textual.geometry import Offset, Size
 
-from shell.outlets import Lane
+from shell.outlets import Lane, Loss
 from tui.terminal.canvas import Canvas, pieces_of
 from tui.terminal.pace import Pace
 
@@ -102,7 +102,7 @@ class ScreenWriter(LinuxDriver):
         """True if the system has taken all output, and a serial line has sent it."""
         return self._out.idle and not _unsent(self._descriptor)
 
-    def _takes_again(self, dropped: int) -> bytes:
+    def _takes_again(self, loss: Loss) -> bytes:
         """Repaint when there is room again after dropped frames. Called in the writing thread."""
         with contextlib.suppress(RuntimeError):  # the loop has ended
             self._loop.call_soon_threadsafe(self.repaint)
