@@ -146,6 +146,8 @@ class Programs(Generic[S]):
     """Return the lines of a file with the present values of variables."""
     annotated: Callable[[str, Held], Sequence[str]]
     """List what the drive holds with the remarks and the layout of its file; empty where `readable` is better."""
+    acts: Callable[[str], bool] = lambda line: False
+    """Whether one of those lines starts motion or a program; a setting does not."""
     save: str = ""
     """The line that makes a download last; empty: it lasts at once."""
     remark: str = ";"

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 from dialects import Diagnostic, Stopped
 from shell.channel import Channel
+from shell.events import By
 from shell.tasks import Tasks
 
 Ask = Callable[[str], Awaitable[bool]]
@@ -58,14 +59,17 @@ class Asking(Channel):
         """The open questions. A stop ends them."""
         self._turn = asyncio.Lock()
 
-    async def confirm(self, what: str, where: str = "", so_far: str = "nothing was sent") -> None:
-        """Return once a person has agreed to `what`, one line that says what will happen.
+    async def confirm(self, what: str, where: str = "", so_far: str = "nothing was sent", by: By = By.OPERATOR) -> None:
+        """Return once a person has agreed to `what`, one line that says what will happen. A script cannot ask.
 
         Raises Diagnostic after any other answer and without a person to ask, Stopped after a stop. `so_far`: what a
         caller that has sent something says instead.
         """
         if self.agreed:
             return
+        if by is not By.OPERATOR:
+            hint = f"{self.way} agrees beforehand, or type the line"
+            raise Diagnostic(f"{what}; a {by.value} cannot ask, {so_far}", where, hint)
         if self.ask is None:
             raise Diagnostic(f"{what}; {so_far}", where, f"{self.way} agrees to it")
         question = f"{where}: {what}" if where else what

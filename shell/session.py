@@ -229,11 +229,7 @@ class Session(Workspace):
         what = self.settings.guards.what(drive.family, drive.state, text)
         if not what:
             return
-        where = self.display_name(drive)
-        if by is not By.OPERATOR and not self.agreed:
-            hint = f"{self.way} agrees beforehand, or type the line"
-            raise Diagnostic(f"{what}; a {by.value} cannot ask, nothing was sent", where, hint)
-        await self.confirm(what, where)
+        await self.confirm(what, self.display_name(drive), by=by)
 
     async def _send(self, drive: Drive, text: str) -> tuple[str, ...]:
         """Send a line and return what it printed. The automation records first what the line may start."""

@@ -22,7 +22,7 @@ from dialects.held import Difference, Held
 from dialects.problems import errors, refuse
 from drives.drive import still
 from shell import backups, sources
-from shell.events import Printed
+from shell.events import By, Printed
 from shell.jobs import running, transferring
 from shell.listings import check_one, read
 from shell.unfinished import marked
@@ -85,10 +85,11 @@ async def download(
     file: str,
     wanted: Wanted = Wanted(),
     text: str | None = None,
+    by: By = By.OPERATOR,
 ) -> None:
     """Send a program file to a drive. `text`: what a file of that name would hold.
 
-    Raises Diagnostic for the file and the backup, and the drive's failures.
+    Raises Diagnostic for the file, the backup and lines that were not agreed to, and the drive's failures.
     """
     text, lines = await checked(workspace, drive, file, text)
     check_one(drive)
@@ -96,7 +97,9 @@ async def download(
         raise Refused(f"{workspace.display_name(drive)}: a download to it is under way (nothing was sent)")
     _under_way.add(drive)
     try:
-        await _Download(workspace, commands, drive, file, wanted).run(text, lines)
+        made = _Download(workspace, commands, drive, file, wanted)
+        await made.agree(lines, by)
+        await made.run(text, lines)
     finally:
         _under_way.discard(drive)
 
@@ -120,7 +123,6 @@ class _Download:
         held = await read(self._workspace, self._drive, "backup", lines)
         if self._wanted.only_changed and not await self._is_changed(lines, held):
             return
-        self._show_guarded(lines)
         backup = await self._back_up(lines, held)
         port = self._workspace.ports.get(self._drive.link.name, "")
         try:
@@ -155,12 +157,24 @@ class _Download:
         self._say(f"{self._file} is sent: {why}" if why else f"holds {self._file} already; nothing was sent")
         return bool(why)
 
-    def _show_guarded(self, lines: Sequence[SourceLine]) -> None:
-        """Publish the lines that would need a yes if they were typed."""
+    async def agree(self, lines: Sequence[SourceLine], by: By) -> None:
+        """Ask before lines outside of a program that act: the drive executes them at once. Raises Diagnostic."""
         guards, drive = self._workspace.settings.guards, self._drive
-        for line in self._programs.executed(lines):
-            if what := guards.what(drive.family, drive.state, line.text):
-                self._workspace.notify(f"{self._file}:{line.number}: {what}", warning=True)
+        found = []
+        for line in self._outside(lines):
+            what = guards.what(drive.family, drive.state, line.text)
+            if what or self._programs.acts(line.text):
+                found.append(f"line {line.number}: " + (what or f"'{line.text}' starts motion or a program"))
+        if not found:
+            return
+        what = f"{self._file}, outside of its program, {'; '.join(found)}"
+        if self._workspace.agreed:
+            self._say(what, warning=True)
+        await self._workspace.confirm(what, self._name, by=by)
+
+    def _outside(self, lines: Sequence[SourceLine]) -> list[SourceLine]:
+        """The lines of a file that the drive executes as they come, without declarations."""
+        return [line for line in self._programs.executed(lines) if not line.text.upper().startswith("VA ")]
 
     async def _back_up(self, lines: Sequence[SourceLine], held: Held) -> Path:
         """Save what the drive holds. Raises Refused for a locked program that the file would overwrite."""
@@ -212,7 +226,10 @@ class _Download:
             text = str(error)
             error.args = (f"{self._file}:{text.removeprefix('line ') if text.startswith('line ') else f' {text}'}",)
             raise
-        self._say(f"{self._file} downloaded, {len(lines)} lines")
+        outside = [line.text for line in self._outside(lines)]
+        more = f" and {len(outside) - MOST} more" if len(outside) > MOST else ""
+        executed = f"; executed at once: {', '.join(outside[:MOST])}{more}" if outside else ""
+        self._say(f"{self._file} downloaded, {len(lines)} lines{executed}")
         return sent
 
     async def _save(self, lines: Sequence[SourceLine]) -> None:

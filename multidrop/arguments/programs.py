@@ -80,6 +80,7 @@ def download(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--run", metavar="LABEL", default="", help="execute the program at this label at the end")
     parser.add_argument("--only-changed", action="store_true", help="send nothing where the drive holds it already")
     parser.add_argument("--no-verify", action="store_true", help="do not read the program back")
+    parts.yes(parser)
 
 
 def sweep(parser: argparse.ArgumentParser) -> None:

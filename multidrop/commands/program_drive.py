@@ -54,7 +54,7 @@ def download(chosen: argparse.Namespace) -> int:
     async def put(session: Session, drive: Drive) -> None:
         await transfers.download(session, session, drive, chosen.file, wanted)
 
-    return _with_drive(chosen, put)
+    return _with_drive(chosen, put, agreed=chosen.yes)
 
 
 def _wrong(file: str) -> Diagnostic | None:
@@ -69,9 +69,11 @@ def _wrong(file: str) -> Diagnostic | None:
     return None
 
 
-def _with_drive(chosen: argparse.Namespace, body: Callable[[Session, Drive], Awaitable[None]]) -> int:
+def _with_drive(
+    chosen: argparse.Namespace, body: Callable[[Session, Drive], Awaitable[None]], agreed: bool = False
+) -> int:
     async def work(session: Session) -> None:
         bus, address = split_target(chosen.drive)
         await body(session, session.drive(bus, address or None))
 
-    return batch.run([chosen.url], work)
+    return batch.run([chosen.url], work, agreed=agreed)

@@ -160,6 +160,7 @@ complete -c multidrop -n '_shtab_multidrop_using program download' -l save -d 's
 complete -c multidrop -n '_shtab_multidrop_using program download' -l run -x -d 'execute the program at this label at the end'
 complete -c multidrop -n '_shtab_multidrop_using program download' -l only-changed -d 'send nothing where the drive holds it already'
 complete -c multidrop -n '_shtab_multidrop_using program download' -l no-verify -d 'do not read the program back'
+complete -c multidrop -n '_shtab_multidrop_using program download' -l yes -d 'answer every question with yes beforehand'
 complete -c multidrop -n '_shtab_multidrop_using program download; and test $_shtab_multidrop_npos -eq 0' -ka "(_multidrop_url)" -d 'what to open'
 complete -c multidrop -n '_shtab_multidrop_using program download; and test $_shtab_multidrop_npos -eq 1' -ka "(__fish_complete_path (commandline -ct))" -d 'MCode (.mxt, .txt) or A-SCRIPT (.prg, .asc)'
 complete -c multidrop -n '_shtab_multidrop_using; and test $_shtab_multidrop_npos -eq 0' -a params -d 'Save, compare and restore the settings of drives.'

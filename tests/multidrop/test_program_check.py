@@ -107,7 +107,7 @@ def test_names_labels_and_what_the_drive_refuses_are_told_in_one_round(check: Ch
         ("VA Q1=5)\nPG 1\nMR Q1\nQ1=7\nIC Q1\nE\nPG\n", [1]),
         ("VA Q1=99999999999\nPG 1\nMR Q1\nQ1=7\nE\nPG\nQ1=8\n", [1]),
         ("VA VM\nPG 1\nE\nPG\n", [1]),
-        ("PG 9999\nLB K1\nBR K1\nE\nPG\nEX K1\n", [1]),
+        ("PG 9999\nLB K1\nBR K1\nE\nPG\nEX K1\n", [1, 6]),
         ("PG\nLB K1\nBR K1\nE\nPG\n", [1]),
         ("PG 1\nLB K1\nE\nPG 50\nLB K2\nBR K1\nE\nPG\n", [4]),
         ("PG 1\nLB K1)\nBR K1\nCL K1,R1=1\nE\nPG\n", [2]),

@@ -7,6 +7,7 @@ from dialects.mcode.host import comparing, holding, listing, names, operations
 from dialects.mcode.host.download import download
 from dialects.mcode.host.state import MCodeState
 from dialects.mcode.host.upload import annotated, file_of, readable, refreshed, upload
+from dialects.mcode.manual import guards
 
 PROGRAMS: Programs[MCodeState] = Programs(
     listing=operations.listing,
@@ -23,6 +24,7 @@ PROGRAMS: Programs[MCodeState] = Programs(
     start=holding.start,
     refreshed=refreshed,
     annotated=annotated,
+    acts=guards.acts,
     save="S",
     remark="'",
     clearing="CP",

@@ -239,7 +239,7 @@ class ReplyLines:
             self.damaged,
             flagged=flagged,
             surplus=surplus,
-            collided=(*self.collided, *pieces),
+            collided=tuple(each for each in (*self.collided, *pieces) if each.strip(">?")),  # a prompt is no print
         )
         return Decoded(reply, used, strays)
 

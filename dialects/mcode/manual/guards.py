@@ -81,6 +81,13 @@ def find(text: str, *, address: str, party: bool, product: str, starts: Callable
     return None
 
 
+def acts(text: str) -> bool:
+    """Whether a line starts motion or a program at once; a setting, OE and what ends a motion do not."""
+    word = word_of(text)
+    row = lookup(word)
+    return row is not None and row.starts and row.kind == "instruction" and word != "OE" and not only_ends(text)
+
+
 def word_of(text: str, product: str = "") -> str:
     """The word at the head of a line, in capitals."""
     return _head(bare(text), product).word

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Container, Iterable, Iterator, Sequence
 
 from dialects.mcode.manual import (
+    guards,
     line_parts,
     program_file,
     program_moves,
@@ -58,10 +59,21 @@ def _forgotten(lines: Sequence[ProgramLine], reader: _Reader, wrong: Container[i
     words_of_drives = [each for each in read if each[1].word not in reader.names]
     yield from program_trips.check(words_of_drives, doubtful)
     yield from _unused(read, doubtful)
+    yield from _at_once(words_of_drives, reader.product)
     if reader.product in EVERY:
         yield from _out_of_range(words_of_drives, reader.product)
         parsed = [(line, reader.statements[line.number]) for line in lines if line.number in reader.statements]
         yield from program_products.check(parsed, reader.names, reader.product)
+
+
+def _at_once(read: Sequence[tuple[ProgramLine, Statement]], product: str) -> Iterator[Problem]:
+    """Warn of lines outside of a program that a download executes, and that act."""
+    programs = any(line.section == "program" for line, _ in read)  # else an instruction is an error
+    for line, statement in read:
+        guard = guards.find(line.text, address="", party=True, product=product, starts=lambda _: False)
+        if line.section != "program" and (guard is not None or (programs and guards.acts(line.text))):
+            what = f"{line.text} is outside of PG: a download executes it at once, and asks before"
+            yield Problem(line.number, line.column + statement.column, what, "move it into the program", warning=True)
 
 
 def _unused(read: Sequence[tuple[ProgramLine, Statement]], doubtful: Container[str]) -> Iterator[Problem]:
