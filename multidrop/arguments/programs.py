@@ -126,6 +126,7 @@ def sweep(parser: argparse.ArgumentParser) -> None:
     where.add_argument(
         "--cluster", metavar="tcp://HOST:PORT", default="", help="the scheduler of a Dask cluster, which runs the cases"
     )
+    parts.yes(parser)
     parser.add_argument("--json", action="store_true", help="print one JSON object a case, and a summary")
     parser.add_argument("--junit", metavar="FILE", default="", help="write the cases to a JUnit XML file")
 

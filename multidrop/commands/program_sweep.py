@@ -6,12 +6,17 @@ A signal ends the sweep: what is done is reported, with exit code 130.
 from __future__ import annotations
 
 import argparse
+import asyncio
+import sys
 from collections.abc import Iterator
+from functools import partial
 
 from dialects import Diagnostic
 from multidrop.commands.failure import fail
 from multidrop.commands.sweep_report import Report
-from shell.output import INTERRUPTED
+from shell.connect import saving, settings
+from shell.front.answer import ask_outside_a_session
+from shell.output import INTERRUPTED, write
 from shell.sweeps import plan as planning
 from shell.sweeps import workers
 from shell.sweeps.interruption import Interruption
@@ -54,6 +59,23 @@ def _results(plan: Plan, chosen: argparse.Namespace, interruption: Interruption)
     if chosen.cluster:
         from shell.sweeps import cluster
 
-        return cluster.results(plan.job, cases, chosen.cluster, interruption)
+        agree = partial(_agree, chosen.cluster, chosen.yes, cluster.TRUST, interruption)
+        return cluster.results(plan.job, cases, chosen.cluster, interruption, agree)
     jobs = chosen.jobs or workers.cores()
     return workers.results(plan.job, cases, plan.count, jobs, interruption)
+
+
+def _agree(address: str, yes: bool, what: str, interruption: Interruption) -> None:
+    """Return once a person has agreed to a cluster: by `--yes`, now, or before. Raises Diagnostic."""
+    known = settings.load().clusters
+    if yes or address in known:
+        return
+    where = f"--cluster {address}"
+    with interruption.open():
+        answer = asyncio.run(ask_outside_a_session(f"{where}: {what}"))
+    if answer is None:
+        raise Diagnostic(f"{what}; nothing was connected", where, "--yes agrees to it")
+    if not answer:
+        raise Diagnostic("the answer was no, so nothing was connected", where)
+    path = saving.keep("sweep", "clusters", [*known, address])
+    write(sys.stderr, f"{path}: sweep.clusters has {address} from now on")

@@ -140,6 +140,7 @@ complete -c multidrop -n '_shtab_multidrop_using program sweep' -l run -x -d 'th
 complete -c multidrop -n '_shtab_multidrop_using program sweep' -l until -x -d 'virtual seconds of a case at most; without it, a case that still runs after 60 s has failed'
 complete -c multidrop -n '_shtab_multidrop_using program sweep' -l jobs -x -d 'processes (default: as many as there are cores)'
 complete -c multidrop -n '_shtab_multidrop_using program sweep' -l cluster -x -d 'the scheduler of a Dask cluster, which runs the cases'
+complete -c multidrop -n '_shtab_multidrop_using program sweep' -l yes -d 'answer every question with yes beforehand'
 complete -c multidrop -n '_shtab_multidrop_using program sweep' -l json -d 'print one JSON object a case, and a summary'
 complete -c multidrop -n '_shtab_multidrop_using program sweep' -l junit -xka "(__fish_complete_path (commandline -ct))" -d 'write the cases to a JUnit XML file'
 complete -c multidrop -n '_shtab_multidrop_using program sweep; and test $_shtab_multidrop_npos -eq 0' -ka "(__fish_complete_path (commandline -ct))" -d 'MCode (.mxt, .txt) or A-SCRIPT (.prg, .asc)'

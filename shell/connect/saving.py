@@ -21,7 +21,7 @@ def save(name: str, url: str) -> Path:
     return _write(_with_connection(name, url))
 
 
-def keep(table: str, key: str, value: str) -> Path:
+def keep(table: str, key: str, value: str | list[str]) -> Path:
     """Set one value of a table; return the file, which is replaced as a whole. Raises Diagnostic."""
     import tomlkit
 

@@ -60,6 +60,8 @@ class Settings:
     log: LogSettings = LogSettings()
     look: Look = look.DEFAULT
     mqtt: MqttSettings = MqttSettings()
+    clusters: tuple[str, ...] = ()
+    """The addresses of the schedulers that may run code here, in `sweep.clusters`."""
 
     @property
     def macros(self) -> Path:
@@ -133,7 +135,7 @@ def placed(message: str, text: str, where: str, hint: str = "") -> Diagnostic:
 
 
 def _read(document: Mapping[str, Any], where: str) -> Settings:
-    _only(document, {"connections", "guards", "keys", "log", "mqtt", "screen"}, where, "")
+    _only(document, {"connections", "guards", "keys", "log", "mqtt", "screen", "sweep"}, where, "")
     tables = document.get("connections", {})
     if not isinstance(tables, dict):
         raise Diagnostic("connections is not a table", where, "write [connections.NAME]")
@@ -144,6 +146,7 @@ def _read(document: Mapping[str, Any], where: str) -> Settings:
         log=log_settings.read(document.get("log", {}), where),
         look=look.read(document.get("screen", {}), document.get("keys", {}), where),
         mqtt=mqtt_settings.read(document.get("mqtt", {}), where),
+        clusters=_clusters(document.get("sweep", {}), where),
     )
 
 
@@ -165,6 +168,16 @@ def _connection(name: str, table: Any, where: str) -> SavedConnection:
             hint = "invalid: spaces, control characters, :, @ and /"
             raise Diagnostic(f"{key}.names: {label!r} is not a name", where, hint)
     return SavedConnection(name, url, names)
+
+
+def _clusters(table: Any, where: str) -> tuple[str, ...]:
+    if not isinstance(table, dict):
+        raise Diagnostic("sweep is not a table", where, "write [sweep] with clusters = [...]")
+    _only(table, {"clusters"}, where, "sweep.")
+    found = table.get("clusters", [])
+    if not isinstance(found, list) or not all(isinstance(each, str) for each in found):
+        raise Diagnostic("sweep.clusters is not a list of addresses", where, 'as in ["tcp://pc:8786"]')
+    return tuple(found)
 
 
 def _only(table: Mapping[str, Any], known: set[str], where: str, prefix: str) -> None:

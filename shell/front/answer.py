@@ -8,6 +8,7 @@ from collections.abc import AsyncIterator
 from functools import partial
 
 from shell.asking import Ask
+from shell.front.interrupts import on_stop_key
 from shell.front.keyboard import Keyboard
 from shell.front.stream import stream_lines
 from shell.output import write
@@ -74,6 +75,23 @@ def at_lines(lines: AsyncIterator[str]) -> Ask:
         return False
 
     return ask
+
+
+async def ask_outside_a_session(question: str) -> bool | None:
+    """Ask at the terminal of a command that has no session; None where there is none. The stop key is a no."""
+    answering: list[asyncio.Future[bool]] = []
+
+    def end() -> None:
+        for each in answering:
+            each.cancel()
+
+    with on_stop_key(lambda: None, end, end) as keyboard:
+        ask = asker(keyboard)
+        if ask is None:
+            return None
+        answering.append(asyncio.ensure_future(ask(question)))
+        await asyncio.wait(answering)
+        return not answering[0].cancelled() and answering[0].result()
 
 
 def asker(keyboard: Keyboard | None) -> Ask | None:

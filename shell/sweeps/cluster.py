@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import logging
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from typing import TYPE_CHECKING, Any
 
@@ -24,15 +24,22 @@ if TYPE_CHECKING:
 
 PATIENCE = 3.0
 """Time for the scheduler to reply, s."""
+TRUST = (
+    "the scheduler, its workers and, without TLS, all computers on the network between can run any code on this "
+    "computer with your rights, because Dask unpickles what they send"
+)
 INSTALL = "pip install 'multidrop[cluster]'"
 
 
-def results(job: Job, cases: Iterator[Case], address: str, interruption: Interruption) -> Iterator[list[Result]]:
+def results(
+    job: Job, cases: Iterator[Case], address: str, interruption: Interruption, agree: Callable[[], None]
+) -> Iterator[list[Result]]:
     """Run cases on the cluster of a scheduler; yield the results of each chunk as it ends.
 
+    `agree` is called before anything is connected; it raises Diagnostic where a person has not agreed to the address.
     Raises Unreachable, TransportLost, and Diagnostic for workers that have another multidrop or none.
     """
-    with _client(address, interruption) as client, _reached(address):
+    with _client(address, interruption, agree) as client, _reached(address):
         with interruption.open():
             _check_workers(client, address)
             first = next(cases)
@@ -45,13 +52,14 @@ def results(job: Job, cases: Iterator[Case], address: str, interruption: Interru
 
 
 @contextmanager
-def _client(address: str, interruption: Interruption) -> Iterator[Client]:
+def _client(address: str, interruption: Interruption, agree: Callable[[], None]) -> Iterator[Client]:
     if not address.startswith(("tcp://", "tls://", "ws://", "wss://")) or not address.rpartition(":")[2].isdecimal():
         raise Diagnostic("is not the address of a scheduler", f"--cluster {address}", "as in tcp://HOST:8786")
     try:
         from distributed import Client
     except ImportError:
         raise Diagnostic("--cluster needs distributed, which is not installed", hint=INSTALL) from None
+    agree()
     for name in [each for each in logging.root.manager.loggerDict if each.startswith("distributed")]:
         logging.getLogger(name).setLevel(logging.CRITICAL)
     try:

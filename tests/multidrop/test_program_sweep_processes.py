@@ -5,13 +5,17 @@ from __future__ import annotations
 import json
 import os
 import signal
+import socket
 import subprocess
 import sys
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
 
+from multidrop.commands import program_sweep
 from shell.sweeps import cluster as cluster_of_cases
 from tests.support.front_door import Command
 from tests.support.front_door import multidrop as multidrop
@@ -66,14 +70,13 @@ def test_an_interrupted_sweep_reports_what_is_done_and_leaves_no_process(folder:
     assert gone(process.pid)
 
 
-@pytest.mark.slow
-def test_a_cluster_runs_the_same_cases(folder: Path, multidrop: Command, monkeypatch: pytest.MonkeyPatch) -> None:
-    pytest.importorskip("distributed", reason="the extra cluster is not installed")
-    script = ROOT / "tests" / "support" / "dask_cluster.py"
+@contextmanager
+def cluster(folder: Path, script: str, *arguments: str) -> Iterator[str]:
+    """Run a cluster of `tests/support`; yield the address of its scheduler."""
     address = folder / "address"
     with open(folder / "cluster.log", "wb") as log:
-        cluster = subprocess.Popen(
-            [sys.executable, str(script), str(address), "2"],
+        process = subprocess.Popen(
+            [sys.executable, str(ROOT / "tests" / "support" / script), str(address), *arguments],
             stdin=subprocess.PIPE,
             stdout=log,
             stderr=log,
@@ -82,20 +85,73 @@ def test_a_cluster_runs_the_same_cases(folder: Path, multidrop: Command, monkeyp
     try:
         until = time.monotonic() + WAIT
         while not (address.exists() and address.read_text()):
-            assert cluster.poll() is None and time.monotonic() < until, (folder / "cluster.log").read_text()
+            assert process.poll() is None and time.monotonic() < until, (folder / "cluster.log").read_text()
             time.sleep(0.05)
-        there = multidrop("program", "sweep", "go.mxt", *WALLS, "--json", "--cluster", address.read_text())
+        yield address.read_text()
     finally:
-        assert cluster.stdin is not None
-        cluster.stdin.close()
-        cluster.wait(WAIT)
+        assert process.stdin is not None
+        process.stdin.close()
+        process.wait(WAIT)
+
+
+@pytest.mark.slow
+def test_a_cluster_runs_the_same_cases(folder: Path, multidrop: Command, monkeypatch: pytest.MonkeyPatch) -> None:
+    pytest.importorskip("distributed", reason="the extra cluster is not installed")
+    with cluster(folder, "dask_cluster.py", "2") as address:
+        there = multidrop("program", "sweep", "go.mxt", *WALLS, "--json", "--yes", "--cluster", address)
     here = multidrop("program", "sweep", "go.mxt", *WALLS, "--json", "--jobs", "1")
     assert (there.returncode, there.stderr) == (1, "")
     assert there.stdout.splitlines()[:-1] == here.stdout.splitlines()[:-1] and there.stdout.count("\n") == 121
     monkeypatch.setattr(cluster_of_cases, "PATIENCE", 0.2)
-    lost = multidrop("program", "sweep", "go.mxt", *WALLS, "--cluster", address.read_text())
+    lost = multidrop("program", "sweep", "go.mxt", *WALLS, "--yes", "--cluster", address)
     assert lost.returncode == 3 and lost.stdout == "" and "no scheduler replies" in lost.stderr
     assert lost.stderr.count("\n") == 2  # and the one about the seed
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("who", ["worker", "scheduler"])
+def test_nothing_of_a_hostile_cluster_runs_here_before_a_person_has_agreed_to_it(
+    folder: Path, multidrop: Command, who: str
+) -> None:
+    pytest.importorskip("distributed", reason="the extra cluster is not installed")
+    proof = folder / "proof"
+    ran_here = folder / f"proof.{os.getpid()}"
+    with cluster(folder, "hostile_cluster.py", str(proof), who) as address:
+        refused = multidrop("program", "sweep", "go.mxt", "--vary", "VM=20000,30000", "--cluster", address)
+        assert refused.returncode == 2 and refused.stdout == "" and refused.stderr.count("\n") == 1
+        assert "can run any code on this computer" in refused.stderr and "--yes agrees to it" in refused.stderr
+        assert not ran_here.exists()
+        multidrop("program", "sweep", "go.mxt", "--vary", "VM=20000,30000", "--cluster", address, "--yes")
+    assert ran_here.exists()  # the sentence is true: agreeing lets their code run
+
+
+def test_an_address_is_asked_for_once_at_a_terminal_and_a_yes_is_kept(
+    folder: Path, multidrop: Command, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pytest.importorskip("distributed", reason="the extra cluster is not installed")
+    questions: list[str] = []
+    answer = False
+
+    async def ask(question: str) -> bool:
+        questions.append(question)
+        return answer
+
+    monkeypatch.setattr(program_sweep, "ask_outside_a_session", ask)
+    monkeypatch.setattr(cluster_of_cases, "PATIENCE", 0.2)
+    with socket.create_server(("127.0.0.1", 0)) as scheduler:
+        scheduler.setblocking(False)
+        address = f"tcp://127.0.0.1:{scheduler.getsockname()[1]}"
+        sweep = ("program", "sweep", "go.mxt", "--vary", "VM=20000,30000", "--cluster", address)
+        no = multidrop(*sweep)
+        assert no.returncode == 2 and no.stderr.endswith("the answer was no, so nothing was connected\n")
+        with pytest.raises(BlockingIOError):
+            scheduler.accept()
+    answer = True
+    yes = multidrop(*sweep)
+    assert yes.returncode == 3 and f"sweep.clusters has {address} from now on" in yes.stderr
+    assert multidrop(*sweep).returncode == 3 and len(questions) == 2
+    assert "can run any code on this computer with your rights" in questions[0]
+    assert f'clusters = ["{address}"]' in multidrop("config", "show").stdout
 
 
 def test_a_wrong_address_and_an_extra_that_is_absent_are_one_line(
@@ -108,6 +164,6 @@ def test_a_wrong_address_and_an_extra_that_is_absent_are_one_line(
         1,
     ) and "tcp://HOST:8786" in wrong.stderr
     monkeypatch.setitem(sys.modules, "distributed", None)
-    absent = multidrop("program", "sweep", "go.mxt", "--cluster", "tcp://127.0.0.1:1", "--json")
+    absent = multidrop("program", "sweep", "go.mxt", "--cluster", "tcp://127.0.0.1:1", "--json", "--yes")
     assert (absent.returncode, absent.stdout, absent.stderr.count("\n")) == (2, "", 1)
     assert "not installed; pip install 'multidrop[cluster]'" in absent.stderr

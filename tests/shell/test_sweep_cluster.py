@@ -40,6 +40,6 @@ def test_a_scheduler_that_ends_in_the_middle_of_a_question_is_lost(monkeypatch: 
     found: list[Result] = []
     job = Job("", "", "", "", "", (), ())
     with Interruption() as interruption, pytest.raises(TransportLost, match=r"^tcp://h:1: the scheduler was lost$"):
-        for chunk in cluster.results(job, cases, "tcp://h:1", interruption):
+        for chunk in cluster.results(job, cases, "tcp://h:1", interruption, lambda: None):
             found += chunk
     assert found == [Result(1)]
