@@ -43,6 +43,8 @@ class Hints:
     """Drives whose settings our last use of the port has not restored."""
     remembered: tuple[Remembered, ...] = ()
     """Drives that replied when the port was last used."""
+    tried: tuple[str, ...] = ()
+    """Names from the command line, to be looked for where `drives` states none."""
     lazy: bool = False
     """Each line that follows names one drive: a drive may be found out when the first line for it comes."""
     first_mark: int = 0

@@ -21,7 +21,7 @@ class Search:
         """Find the drives on the line and how they are set. Raises NoAnswer if none answers."""
         roster = self._roster
         roster.family = family = FAMILIES[hints.family or roster.family.name]
-        roster.probing = hints.drives
+        roster.probing = hints.drives or (*hints.tried, *(each.address for each in hints.remembered))
         unknown = family.new_state(family.codec, "")
         return await self._conversations.run(family.identify(hints), unknown, searching=True)
 

@@ -56,6 +56,20 @@ def each_names_one_drive(lines: Iterable[str]) -> bool:
     return all(_names_one_drive(each) for each in parsed)
 
 
+def targets(lines: Iterable[str]) -> tuple[str, ...]:
+    """The targets of lines, where every line for a drive names one, else none.
+
+    A line without a target goes to the first drive of a bus. The targets of others must not decide which one that is.
+    """
+    try:
+        parsed = [each for each in map(parse, lines) if isinstance(each, DriveLine)]
+    except Diagnostic:
+        return ()
+    if any(each.address is None or each.address in EVERYONE for each in parsed):
+        return ()
+    return tuple(dict.fromkeys(f"{each.bus}:{each.address}" if each.bus else str(each.address) for each in parsed))
+
+
 def _names_one_drive(parsed: VerbLine | DriveLine | None) -> bool:
     if isinstance(parsed, VerbLine):
         return parsed.name in WAITS

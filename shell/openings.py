@@ -14,6 +14,7 @@ from shell import unfinished
 from shell.connect.opening import port_name
 from shell.connect.side_by_side import side_by_side
 from shell.connect.urls import Connection, parse
+from shell.lines import EVERYONE, split_target
 from shell.naming import described, free, named
 from shell.raw import RawLine
 from shell.workspace import BeingOpened
@@ -38,10 +39,11 @@ CUT = (
 class Openings:
     """The URLs that a session opens."""
 
-    def __init__(self, workspace: Workspace, opener: Opener, lazy: bool, raw: bool) -> None:
-        """Open nothing yet. `lazy`: see `Hints`. `raw`: `open_all` looks for no drives."""
+    def __init__(self, workspace: Workspace, opener: Opener, lazy: bool, raw: bool, tried: Sequence[str] = ()) -> None:
+        """Open nothing yet. `lazy`: see `Hints`. `raw`: `open_all` looks for no drives. `tried`: see `Session`."""
         self._workspace = workspace
         self._lazy, self._raw = lazy, raw
+        self._tried = [split_target(each) for each in tried]
         self._opened: dict[Bus, tuple[Opened, Connection]] = {}
         """What was opened, by its bus."""
         self._in_cell: dict[Bus, str] = {}
@@ -85,6 +87,12 @@ class Openings:
         if connection.scheme != SIMULATED:
             opening.reserve(connection.short)
         return partial(self._run, opening, connection, self._raw)
+
+    def _tried_on(self, bus: Bus, opening: _Opening, connection: Connection) -> tuple[str, ...]:
+        """The addresses to try on a bus; one without a bus belongs to the first URL. A label counts as its address."""
+        addresses = {label: address for address, label in connection.labels.items()}
+        own = [address for name, address in self._tried if name == bus.name or (not name and opening.place == 1)]
+        return tuple(dict.fromkeys(addresses.get(each, each) for each in own if each and each not in EVERYONE))
 
     def _place(self) -> int:
         self._places += 1
@@ -143,7 +151,11 @@ class Openings:
             with opening.listed(connection.name or connection.text):
                 async with in_turn:
                     found = await self._opener(connection, opening.named)
-            hinted = [replace(each, hints=replace(each.hints, lazy=self._lazy and not raw)) for each in found]
+            lazy = self._lazy and not raw
+            hinted = [
+                replace(each, hints=replace(each.hints, lazy=lazy, tried=self._tried_on(each.bus, opening, connection)))
+                for each in found
+            ]
             self._opened |= {each.bus: (each, connection) for each in hinted}
             self._in_cell |= {each.bus: opening.bases.get(each.bus.name, each.bus.name) for each in hinted}
             return await opening.identify(hinted, connection, raw)
@@ -157,7 +169,7 @@ class _Opening:
     def __init__(self, workspace: Workspace, reserved: set[str], place: int, name: str | None = None) -> None:
         self._workspace = workspace
         self._reserved = reserved
-        self._place = place
+        self.place = place
         self._name = name
         self._stops = workspace.stops
         self._before = {*workspace.buses, *reserved}
@@ -198,7 +210,7 @@ class _Opening:
             for each in found:
                 failing.push_async_callback(workspace.forget, each.bus)
             for each in found:
-                workspace.adopt(replace(each, warnings=()) if raw else each, self._place)
+                workspace.adopt(replace(each, warnings=()) if raw else each, self.place)
                 if each.limits:
                     workspace.notify(f"{each.bus.name}: {each.limits}", bus=each.bus.name, warning=True)
             late = [self._stop(each.bus) for each in found if self._stops != workspace.stops]

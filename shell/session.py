@@ -52,15 +52,17 @@ class Session(Workspace):
         lazy: bool = False,
         reconnect: bool = False,
         raw: bool = False,
+        tried: Sequence[str] = (),
     ) -> None:
         """Open nothing yet.
 
         `lazy`: each line will name one drive, which may be found out as the line comes. `reconnect`: a bus that is
-        lost is tried again until it is back or closed. `raw`: `open_all` looks for no drives.
+        lost is tried again until it is back or closed. `raw`: `open_all` looks for no drives. `tried`: addresses
+        (ADDR or BUS:ADDR) that the command line mentions, which are looked for where a URL states no drives.
         """
         super().__init__(settings or Settings(), reconnect)
         self.automations, self.twins = Automations(self), Twins(self)
-        self._openings = Openings(self, opener or partial(open_buses, state=self.settings.state), lazy, raw)
+        self._openings = Openings(self, opener or partial(open_buses, state=self.settings.state), lazy, raw, tried)
         self._background: set[asyncio.Task[Any]] = set()
 
     # Buses

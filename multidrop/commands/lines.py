@@ -40,19 +40,20 @@ def send(chosen: argparse.Namespace) -> int:
     with importing():
         from shell.front import batch
         from shell.front.stream import run_lines
-        from shell.lines import each_names_one_drive
+        from shell.lines import each_names_one_drive, targets
 
     lazy = each_names_one_drive(chosen.lines)
     if chosen.json:
         return _send_json(chosen, lazy)
     lines = partial(run_lines, lines=chosen.lines)
-    return batch.run([chosen.url], lines, lazy=lazy, agreed=chosen.yes, asks=False)
+    return batch.run([chosen.url], lines, lazy=lazy, agreed=chosen.yes, asks=False, tried=targets(chosen.lines))
 
 
 def _send_json(chosen: argparse.Namespace, lazy: bool) -> int:
     """Run lines and print an object for each."""
     from shell.front import batch
     from shell.front.report import Report
+    from shell.lines import targets
     from shell.scripts.executor import run_typed
 
     report = Report("send", as_json=True)
@@ -60,7 +61,9 @@ def _send_json(chosen: argparse.Namespace, lazy: bool) -> int:
     async def body(session: Session) -> None:
         await run_typed(session, session, chosen.lines, report.executed)
 
-    return report.finish(batch.run([chosen.url], body, lazy=lazy, agreed=chosen.yes, asks=False, replies=False))
+    tried = targets(chosen.lines)
+    code = batch.run([chosen.url], body, lazy=lazy, agreed=chosen.yes, asks=False, replies=False, tried=tried)
+    return report.finish(code)
 
 
 def run(chosen: argparse.Namespace) -> int:
@@ -93,11 +96,14 @@ def run(chosen: argparse.Namespace) -> int:
 
 def _execute(chosen: argparse.Namespace, script: Script, report: Report) -> int:
     from shell.front import batch
+    from shell.lines import targets
     from shell.scripts.executor import run_script
+    from shell.scripts.model import lines_of
 
     async def body(session: Session) -> None:
         await report.watched(session, chosen.on, chosen.role)
         with report.noting():
             await run_script(session, session, script, report.executed)
 
-    return batch.run([], body, agreed=chosen.yes, asks=False, replies=not chosen.json)
+    tried = targets(each.text for each in lines_of(script.body))
+    return batch.run([], body, agreed=chosen.yes, asks=False, replies=not chosen.json, tried=tried)

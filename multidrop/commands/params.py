@@ -27,7 +27,12 @@ def backup(chosen: argparse.Namespace) -> int:
         work.check_new(chosen.file, chosen.drive)
     except Diagnostic as problem:
         return fail(problem)
-    return batch.run([chosen.url], lambda session: work.backup(session, chosen.file, chosen.drive), unsolicited=False)
+    return batch.run(
+        [chosen.url],
+        lambda session: work.backup(session, chosen.file, chosen.drive),
+        unsolicited=False,
+        tried=[chosen.drive],
+    )
 
 
 def diff(chosen: argparse.Namespace) -> int:
@@ -43,7 +48,8 @@ def diff(chosen: argparse.Namespace) -> int:
         other = await _other(session, chosen)
         differs = await work.diff(session, chosen.drive, name=chosen.file, other=other, as_json=chosen.json)
 
-    code = batch.run([chosen.url], compare, unsolicited=False)
+    tried = [chosen.drive, "" if chosen.against else chosen.other]
+    code = batch.run([chosen.url], compare, unsolicited=False, tried=tried)
     if code == DIFFERS:
         return UNKNOWN
     return code or (DIFFERS if differs else 0)
@@ -88,4 +94,4 @@ def restore(chosen: argparse.Namespace) -> int:
     async def put(session: Session) -> None:
         await work.restore_each(session, session, chosen.file, chosen.drive, options)
 
-    return batch.run([chosen.url], put, agreed=chosen.yes, unsolicited=False)
+    return batch.run([chosen.url], put, agreed=chosen.yes, unsolicited=False, tried=[chosen.drive])

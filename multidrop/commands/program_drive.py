@@ -76,4 +76,4 @@ def _with_drive(
         bus, address = split_target(chosen.drive)
         await body(session, session.drive(bus, address or None))
 
-    return batch.run([chosen.url], work, agreed=agreed)
+    return batch.run([chosen.url], work, agreed=agreed, tried=[chosen.drive])

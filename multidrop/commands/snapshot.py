@@ -43,7 +43,7 @@ def apply(chosen: argparse.Namespace) -> int:
         spec = replacement.chosen(cell, chosen.file, drive, chosen.source)
         await replacement.apply(session, session, drive, chosen.file, spec, wanted)
 
-    return batch.run([chosen.url], work, agreed=chosen.yes)
+    return batch.run([chosen.url], work, agreed=chosen.yes, tried=[chosen.drive])
 
 
 def _drive(session: Session, target: str) -> Drive:

@@ -48,6 +48,7 @@ def run(
     unsolicited: bool = True,
     replies: bool = True,
     raw: bool = False,
+    tried: Sequence[str] = (),
     loop: Callable[[], asyncio.AbstractEventLoop] | None = None,
 ) -> int:
     """Open the URLs, await the body, close, and return the exit code (`interrupted` after a signal).
@@ -56,7 +57,8 @@ def run(
     with it. `agreed`: every question is answered with yes. `asks`: a question is put to the terminal; otherwise, and
     where there is none, what needs an answer is refused. `unsolicited`: what drives send by themselves is printed.
     `replies`: standard output shows replies; otherwise the body writes there itself. `raw`: the URLs are opened
-    in raw mode. `loop` makes the event loop, where it is not the usual one. A failure is one line on standard error.
+    in raw mode. `tried`: see `Session`. `loop` makes the event loop, where it is not the usual one. A failure is one
+    line on standard error.
     """
     try:
         found = settings.load()
@@ -64,7 +66,7 @@ def run(
         write(sys.stderr, report(failure))
         return exit_code(failure)
     try:
-        make = partial(_session, partial(Session, found, lazy=lazy, reconnect=reconnect, raw=raw), agreed)
+        make = partial(_session, partial(Session, found, lazy=lazy, reconnect=reconnect, raw=raw, tried=tried), agreed)
         printer = Printer(unsolicited=unsolicited, replies=replies)
         with asyncio.Runner(loop_factory=loop) as runner:
             return runner.run(_run(make, printer, urls, body, watch_keys, interrupted, asks))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 from macros import Macro
@@ -102,3 +102,17 @@ class MacroScript:
     """Each of them is executed, whatever became of the one before it."""
     values: Mapping[str, str]
     """The values that it takes."""
+
+
+def lines_of(body: Sequence[Node]) -> Iterator[ScriptLine]:
+    """All lines of a body, those of other files and macros included."""
+    for node in body:
+        yield node.line
+        if isinstance(node, If | Repeat):
+            yield from lines_of(node.body)
+        if isinstance(node, If):
+            yield from lines_of(node.otherwise)
+        elif isinstance(node, CallFile):
+            yield from lines_of(node.script.body)
+        elif isinstance(node, CallMacro):
+            yield from lines_of((*node.played.body, *node.played.on_stop))

@@ -11,11 +11,14 @@ Our last use of the port may have sent half a line (`hints.cut`). The host makes
 stops the drives before and after, because an overflow is an error. Otherwise the first line feed to a party line
 follows a tilde, which no drive has as its name. So half a line in a drive's buffer is not executed. One case remains: a
 drive named P on a line that the user does not describe as one. It takes `PR VR` for a command `R VR`, and refuses it.
+Where the user states no names, the host looks for those that the command line mentions, then for those that replied
+last time, before anything else.
 (MCode reference 5.1.33, 5.1.39, 5.1.98, 5.1.105, 5.1.141; facts of real units.)
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 from dialects.codec import Kind, Procedure, Reply, Request
@@ -60,8 +63,10 @@ def _expected(hints: Hints) -> list[Unconfirmed]:
     party, checks = _party(hints), _checks(hints)
     if party is False or (party is None and "" in last and hints.drives in ((), (last[""].name,))):
         return [Unconfirmed(Place(False, "", checks), last.get(""), party is False)]
-    if party or (hints.drives and hints.drives[0] in last):
-        return [Unconfirmed(Place(True, name, checks), last.get(name), party is True) for name in hints.drives]
+    tried = _tried(hints)
+    names = hints.drives or (tried if all(name in last for name in tried) else ())
+    if (party and hints.drives) or (names and names[0] in last):
+        return [Unconfirmed(Place(True, name, checks), last.get(name), party is True) for name in names]
     return []
 
 
@@ -69,16 +74,18 @@ def _not_yet(expected: list[Unconfirmed], hints: Hints) -> Procedure[list[MCodeS
     """Make half a line harmless, and leave each drive to the first line for it."""
     if expected[0].place.party:
         yield from _wake(NOBODY.encode() if expected[0].stated else TEXT)
-    states = []
-    for each in expected:
-        state = _new_state(each.place, hints)
-        if each.last is not None:
-            state.codec_assumed(replace(state.codec, em=each.last.em, checksum=each.last.checksum))
-            state.identified(each.last.product, each.last.version, each.last.part)
-        state.named(each.place.address or (each.last.name if each.last is not None else ""))
-        state.expected(each)
-        states.append(state)
-    return states
+    return [_expected_state(each, hints) for each in expected]
+
+
+def _expected_state(expected: Unconfirmed, hints: Hints) -> MCodeState:
+    """A drive that the host looks for before the first line for it."""
+    state, last = _new_state(expected.place, hints), expected.last
+    if last is not None:
+        state.codec_assumed(replace(state.codec, em=last.em, checksum=last.checksum))
+        state.identified(last.product, last.version, last.part)
+    state.named(expected.place.address or (last.name if last is not None else ""))
+    state.expected(expected)
+    return state
 
 
 def remember(state: MCodeState) -> Remembered | None:
@@ -102,6 +109,10 @@ def _party(hints: Hints) -> bool | None:
 def _look_around(hints: Hints) -> Procedure[list[MCodeState]]:
     """Find the drives on a line that holds no half-sent command."""
     party = _party(hints)
+    if party is not False and not hints.drives:
+        for names in (_tried(hints), _last_names(hints)):
+            if likely := (yield from _likely(names, hints)):
+                return likely
     if party is None and hints.drives:
         sole = yield from _by_name_first(hints)
         if sole is not None:
@@ -127,12 +138,47 @@ def _look_around(hints: Hints) -> Procedure[list[MCodeState]]:
     return [state if state.product else _absent(state, present[0]) for state in found]
 
 
+def _tried(hints: Hints) -> tuple[str, ...]:
+    """Return the names from the command line that a drive can have."""
+    return tuple(name for name in hints.tried if len(name) == 1 and "!" <= name <= "~")
+
+
+def _last_names(hints: Hints) -> tuple[str, ...]:
+    """Return the names of last time's party line, in order: the first is selected, whichever was used last."""
+    return tuple(sorted(each.address for each in hints.remembered if each.party))
+
+
+def _likely(names: Sequence[str], hints: Hints) -> Procedure[list[MCodeState]]:
+    """Find the drives of a party line at names that are likely; nothing where none of them replies.
+
+    Where one replies, those that are silent are listed too: a line for the first of them must not get to the next.
+    """
+    last = {each.address: each for each in hints.remembered}
+    found: list[MCodeState] = []
+    for name in names:
+        own = replace(hints, drives=(name,))
+        state = (yield from _named(name, own)) if found else (yield from _by_name_first(own))
+        if state is not None and state.product:
+            found.append(state)
+            hints = replace(hints, em=state.codec.em)
+    present = {state.address: state for state in found}
+    states = []
+    for name in names if found else ():
+        state = present.get(name) or _new_state(Place(True, name, _checks(hints)), hints)
+        if name not in present and name in last:
+            state = _expected_state(Unconfirmed(Place(True, name, _checks(hints)), last[name]), hints)
+            state.note(f"{who(state)} replied here last time, and does not reply")
+        states.append(state if name in present or name in last else _absent(state, found[0]))
+    return states
+
+
 def _no_reply(hints: Hints, party: bool | None) -> str:
     """Say what was tried, and what to do."""
     names = ", ".join(hints.drives)
     tried = f"none of the drives {names} replies" if names else "no drive replies"
     forms = [] if party else ["outside of party mode"]
-    forms += [] if names else [f"as {UNNAMED} in party mode"]
+    guesses = ", ".join(dict.fromkeys((*_tried(hints), *_last_names(hints), UNNAMED)))
+    forms += [] if names else [f"as {guesses} in party mode"]
     how = f" (MCode {' and '.join(forms)} was tried)" if forms else ""
     advice = " or give party=0 where it is alone and not in party mode" if party and hints.party is None else ""
     return f"{tried}{how}; check power, baud and names (drives=a,b,... for a party line){advice}; {SEARCH}"

@@ -34,8 +34,9 @@ def identify(hints: Hints) -> Procedure[list[PmxState]]:
         return [alone]
     if wrong := [name for name in hints.drives if not re.fullmatch(r"\d\d", name, re.ASCII)]:
         raise Inexpressible(f"no device number '{wrong[0]}'; valid: 00 to 99, as in drives=00,01")
+    named = tuple(name for name in hints.tried if re.fullmatch(r"\d\d", name, re.ASCII))
     found = []
-    for name in hints.drives or (FACTORY,):
+    for name in hints.drives or named or (FACTORY,):
         state = PmxState(Pmx(), name)
         if (yield from find(state)) is None:
             state.note(f"{who(state)} does not reply")

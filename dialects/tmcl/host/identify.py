@@ -18,13 +18,14 @@ IDENTITY = Call(Command.VERSION, Version.BINARY)
 
 
 def identify(hints: Hints) -> Procedure[list[TmclState]]:
-    """The modules at the addresses of `hints.drives`; without any, the one at the factory's address.
+    """The modules at the addresses of `hints.drives`; without any, those tried, or the one at the factory's address.
 
     Raises NoAnswer where none replies, and Inexpressible for hints of other families.
     """
     if hints.checksum is not None or hints.em is not None or not hints.addressed:
         raise Inexpressible("checksum=, em= and address=none are for other families: a module has none of them")
-    names = tuple(dict.fromkeys(hints.drives)) or (FACTORY,)
+    named = [name for name in hints.tried if name.isdecimal()]
+    names = tuple(dict.fromkeys(hints.drives or named)) or (FACTORY,)
     for name in names:  # all, before the first is asked
         number_of(name)
     found = []

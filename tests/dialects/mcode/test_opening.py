@@ -1,5 +1,6 @@
 """Finding drives: nothing moves, nothing is refused or saved, and nobody else's answer is taken for a drive's."""
 
+from dataclasses import replace
 from random import Random
 
 import pytest
@@ -262,3 +263,25 @@ def test_version_and_part_number_tell_an_mdriveplus_from_another(bench, personal
 )  # fmt: skip
 def test_a_part_number_that_says_nothing_is_that_of_a_base_unit(part, product):
     assert identity.mdrive(part) == product
+
+
+@pytest.mark.parametrize(("em", "check"), [(1, 0), (2, 0), (0, 1), (2, 2)])
+def test_names_that_are_likely_are_tried_before_anything_is_absent_and_nothing_moves(bench, em, check):
+    tables = [{"name": name, "party": True, "set": {"EM": em, "CK": check, "ES": 3}} for name in "ab"]
+    desk, _, [state] = opened(bench, *tables, hints=Hints(tried=("b", "left")))
+    assert (state.address, state.product) == ("b", "LMDCM")
+    assert not any(device.error_flag or device.moving(desk.now) for device in desk.devices.values())
+    last = identify.remember(state)
+    both = (replace(last, address="z", name="z"), last, replace(last, address="a", name="a"))
+    found = desk.run(identify.identify(Hints(remembered=both)))
+    assert [each.address for each in found] == ["a", "b", "z"]  # the first is selected, whichever was used last
+    assert [each.unconfirmed is None for each in found] == [True, True, False]
+    assert identify.remember(found[2]) == both[0] and "z replied here last time" in found[2].notes[0]
+    assert not any(device.error_flag for device in desk.devices.values())
+
+
+def test_a_drive_alone_is_found_though_the_line_was_a_party_line_last_time(bench):
+    desk, _, [state] = opened(bench, {"name": "b", "party": True}, hints=Hints(tried=("b",)))
+    alone, device, [found] = opened(bench, {"set": {"EM": 1}}, hints=Hints(remembered=(identify.remember(state),)))
+    assert (found.address, found.product, device.error_flag) == ("", "LMDCM", False)
+    assert alone.devices
