@@ -47,19 +47,23 @@ class Wanted:
     other_product: bool = False
 
 
-def chosen(cell: Cell, file: str, drive: Drive, name: str) -> DriveSpec:
-    """Find a drive of a cell: `NAME`, `BUS:NAME`, or the one with the drive's own name. Raises Diagnostic."""
+def chosen(cell: Cell, file: str, drive: Drive, name: str, several: bool = False) -> DriveSpec:
+    """Find a drive of a cell: `NAME`, `BUS:NAME`, or the one with the drive's own name. Raises Diagnostic.
+
+    `several` drives are written to: each from its own name, even if there is only one in the file.
+    """
     bus, _, own = name.rpartition(":")
     placed = [(each.name, spec) for each in cell.buses for spec in each.drives]
     own = own or drive.address or drive.state.name
     found = [spec for place, spec in placed if spec.name == own and bus in ("", place)]
-    if not name and len(placed) == 1:
+    if not name and len(placed) == 1 and not several:
         found = [placed[0][1]]
     if len(found) == 1:
         return found[0]
     names = ", ".join(f"{place}:{spec.name}" for place, spec in placed)
     what = f'no drive "{name or own}"' if not found else f'"{own}" is the name of several drives'
-    raise Diagnostic(what, file, f"--from names one of {names}")
+    hint = f"the file has {names}; --drive names one drive" if several else f"--from names one of {names}"
+    raise Diagnostic(what, file, hint)
 
 
 async def apply(

@@ -123,7 +123,7 @@ def _speed(text: str) -> float:
 def log_show(parser: argparse.ArgumentParser) -> None:
     """Add a log, and which of its entries are shown."""
     parser.add_argument("file", metavar="FILE", nargs="?", default="", help="a session log (default: the newest)")
-    parser.add_argument("--drive", metavar="ADDR", default="", help="entries of this drive only, ADDR or BUS:ADDR")
+    parts.drives(parser, "entries of this drive only, ADDR or BUS:ADDR")
     parser.add_argument("--all", action="store_true", help="show the bytes of polls, too")
     parser.add_argument("--json", action="store_true", help="print the entries as they are in the file")
 

@@ -31,6 +31,20 @@ def personality(parser: argparse.ArgumentParser, about: str) -> None:
     )
 
 
+class _Several(argparse.Action):
+    """Joins the drives of an option that is repeated: `a,b`."""
+
+    def __call__(self, parser: object, chosen: argparse.Namespace, values: object, option: object = None) -> None:
+        """Add a drive to those before it."""
+        before = getattr(chosen, self.dest)
+        setattr(chosen, self.dest, f"{before},{values}" if before else values)
+
+
+def drives(parser: argparse.ArgumentParser, about: str) -> None:
+    """Add the drives of a command: one, several, or `all`."""
+    parser.add_argument("--drive", metavar="ADDR", default="", action=_Several, help=f"{about}; may be repeated")
+
+
 def run_label(parser: argparse.ArgumentParser) -> None:
     """Add where a program begins."""
     parser.add_argument(

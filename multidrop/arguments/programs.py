@@ -57,15 +57,15 @@ def test(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--json", action="store_true", help="print one JSON object a line")
 
 
-def drive(parser: argparse.ArgumentParser) -> None:
-    """Add a URL and a drive."""
+def drive(parser: argparse.ArgumentParser, several: str = "") -> None:
+    """Add a URL and a drive. `several`: what is different for several drives."""
     parts.url(parser)
-    parser.add_argument("--drive", metavar="ADDR", default="", help="the drive (default: the first)")
+    parts.drives(parser, f"the drive (default: the first), or all{several}")
 
 
 def upload(parser: argparse.ArgumentParser) -> None:
     """Add a drive and the new file."""
-    drive(parser)
+    drive(parser, "; all or several: FILE is a new folder of files")
     parser.add_argument("file", metavar="FILE", help="the new file; it can be downloaded again")
     parser.add_argument("--raw", action="store_true", help="save the lines as they are stored, without remarks")
 

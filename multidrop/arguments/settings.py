@@ -9,9 +9,7 @@ from multidrop.arguments import parts
 
 def _settings_of(parser: argparse.ArgumentParser) -> None:
     parts.url(parser)
-    parser.add_argument(
-        "--drive", metavar="ADDR", default="", help="the drive (default: the first); all: FILE is a folder of files"
-    )
+    parts.drives(parser, "the drive (default: the first); all or several: FILE is a folder of files")
 
 
 def params_backup(parser: argparse.ArgumentParser) -> None:
@@ -63,7 +61,7 @@ def snapshot_apply(parser: argparse.ArgumentParser) -> None:
     """Add the cell file, the replacement drive, and what may be done to it."""
     parser.add_argument("file", metavar="CELL.toml", help="a cell file, as snapshot writes it")
     parts.url(parser)
-    parser.add_argument("--drive", metavar="ADDR", default="", help="the replacement (default: the only drive)")
+    parts.drives(parser, "the replacement (default: the only drive); all or several: each from its own name")
     parser.add_argument(
         "--from", dest="source", metavar="NAME", default="", help="the drive in the file (default: of the same name)"
     )

@@ -101,9 +101,12 @@ def _path(chosen: argparse.Namespace) -> Path:
 
 def _wanted(chosen: argparse.Namespace) -> Callable[[Entry], bool]:
     """The filter of entries: by drive, and without polls unless all are asked for."""
+    named = set(filter(None, chosen.drive.split(",")))
+    every = not named or "all" in named
 
     def wanted(entry: Entry) -> bool:
-        return (chosen.all or not entry.poll) and chosen.drive in ("", entry.drive, f"{entry.bus}:{entry.drive}")
+        own = every or entry.drive in named or f"{entry.bus}:{entry.drive}" in named
+        return (chosen.all or not entry.poll) and own
 
     return wanted
 

@@ -17,8 +17,8 @@ if TYPE_CHECKING:
     from drives.drive import Drive
     from shell.session import Session
 
-DIFFERS, UNKNOWN = 1, 3
-"""Exit codes of a comparison: something differs; a drive did not reply, or refused."""
+DIFFERS = 1
+"""The exit code of a comparison where something differs, as where a drive did not reply or refused."""
 
 
 def backup(chosen: argparse.Namespace) -> int:
@@ -31,7 +31,7 @@ def backup(chosen: argparse.Namespace) -> int:
         [chosen.url],
         lambda session: work.backup(session, chosen.file, chosen.drive),
         unsolicited=False,
-        tried=[chosen.drive],
+        tried=chosen.drive.split(","),
     )
 
 
@@ -48,10 +48,8 @@ def diff(chosen: argparse.Namespace) -> int:
         other = await _other(session, chosen)
         differs = await work.diff(session, chosen.drive, name=chosen.file, other=other, as_json=chosen.json)
 
-    tried = [chosen.drive, "" if chosen.against else chosen.other]
+    tried = [*chosen.drive.split(","), "" if chosen.against else chosen.other]
     code = batch.run([chosen.url], compare, unsolicited=False, tried=tried)
-    if code == DIFFERS:
-        return UNKNOWN
     return code or (DIFFERS if differs else 0)
 
 
@@ -62,7 +60,7 @@ def _check_comparison(chosen: argparse.Namespace) -> None:
         raise Diagnostic(
             "params diff compares with one thing", hint="FILE, --against URL or --other ADDR, or --defaults"
         )
-    if chosen.file and not work.is_all(chosen.drive):
+    if chosen.file and not work.is_several(chosen.drive):
         files.load(chosen.file)
 
 
@@ -86,7 +84,7 @@ def restore(chosen: argparse.Namespace) -> int:
         other_product=chosen.other_product,
     )
     try:
-        if not work.is_all(chosen.drive):
+        if not work.is_several(chosen.drive):
             files.load(chosen.file)
     except Diagnostic as problem:
         return fail(problem)
@@ -94,4 +92,4 @@ def restore(chosen: argparse.Namespace) -> int:
     async def put(session: Session) -> None:
         await work.restore_each(session, session, chosen.file, chosen.drive, options)
 
-    return batch.run([chosen.url], put, agreed=chosen.yes, unsolicited=False, tried=[chosen.drive])
+    return batch.run([chosen.url], put, agreed=chosen.yes, unsolicited=False, tried=chosen.drive.split(","))

@@ -11,7 +11,7 @@ def run(chosen: argparse.Namespace) -> int:
     """Plot until interrupted."""
     return plotting.run(
         chosen.url,
-        chosen.drive,
+        [] if "all" in chosen.drive else chosen.drive,
         to=chosen.to,
         serve=chosen.serve,
         rate=chosen.rate,

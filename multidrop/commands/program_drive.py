@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Awaitable, Callable
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from dialects import Diagnostic
@@ -11,9 +12,9 @@ from dialects.families import program_language_of, program_languages
 from dialects.files import program_text_of
 from dialects.problems import errors
 from multidrop.commands.failure import fail
-from shell import listings, new_file, transfers
+from shell import listings, transfers
 from shell.front import batch
-from shell.lines import split_target
+from shell.params.work import check_new, each, file_of, is_several, targets
 
 if TYPE_CHECKING:
     from drives.drive import Drive
@@ -24,23 +25,27 @@ def list_(chosen: argparse.Namespace) -> int:
     """Print the program, a line each, in its most readable form."""
 
     async def show(session: Session, drive: Drive) -> None:
+        own = f"{session.display_name(drive)}: " if is_several(chosen.drive) else ""
         for line in await listings.readable(session, drive):
-            session.output(line)
+            session.output(f"{own}{line}")
 
     return _with_drive(chosen, show)
 
 
 def upload(chosen: argparse.Namespace) -> int:
-    """Save the program to a new file that can be downloaded again."""
+    """Save the program to a new file that can be downloaded again; several to a folder."""
     try:
-        new_file.check(chosen.file)
+        check_new(chosen.file, chosen.drive)
     except Diagnostic as problem:
         return fail(problem)
 
     async def save(session: Session, drive: Drive) -> None:
         lines = await listings.upload(session, drive, chosen.raw)
-        listings.save_new(chosen.file, lines)
-        session.notify(f"{session.display_name(drive)}: {len(lines)} lines in {chosen.file}", outcome=True)
+        file = file_of(session, drive, chosen.file, chosen.drive, drive.program_files.endings[0])
+        if is_several(chosen.drive):
+            Path(file).parent.mkdir(parents=True, exist_ok=True)
+        listings.save_new(file, lines)
+        session.notify(f"{session.display_name(drive)}: {len(lines)} lines in {file}", outcome=True)
 
     return _with_drive(chosen, save)
 
@@ -73,7 +78,6 @@ def _with_drive(
     chosen: argparse.Namespace, body: Callable[[Session, Drive], Awaitable[None]], agreed: bool = False
 ) -> int:
     async def work(session: Session) -> None:
-        bus, address = split_target(chosen.drive)
-        await body(session, session.drive(bus, address or None))
+        await each(session, targets(session, chosen.drive, "programs"), lambda drive: body(session, drive))
 
-    return batch.run([chosen.url], work, agreed=agreed, tried=[chosen.drive])
+    return batch.run([chosen.url], work, agreed=agreed, tried=chosen.drive.split(","))

@@ -9,7 +9,7 @@ from dialects import Diagnostic
 from multidrop.commands.failure import fail
 from shell import new_file, replacement, snapshots
 from shell.front import batch
-from shell.lines import split_target
+from shell.params.work import each, is_several, targets
 from simulator import cells
 
 if TYPE_CHECKING:
@@ -29,6 +29,8 @@ def take(chosen: argparse.Namespace) -> int:
 def apply(chosen: argparse.Namespace) -> int:
     """Put the state of one drive of a cell file onto a replacement; report a wrong file before anything is opened."""
     try:
+        if chosen.source and is_several(chosen.drive):
+            raise Diagnostic(f"--from {chosen.source} is for one drive", "snapshot apply", "--drive names one")
         cell = cells.load(chosen.file)
     except Diagnostic as problem:
         return fail(problem)
@@ -39,18 +41,21 @@ def apply(chosen: argparse.Namespace) -> int:
     )
 
     async def work(session: Session) -> None:
-        drive = _drive(session, chosen.drive)
-        spec = replacement.chosen(cell, chosen.file, drive, chosen.source)
-        await replacement.apply(session, session, drive, chosen.file, spec, wanted)
+        drives = _drives(session, chosen.drive)
+        several = is_several(chosen.drive)
+        # All are found in the file before the first one is written to.
+        specs = {drive: replacement.chosen(cell, chosen.file, drive, chosen.source, several) for drive in drives}
+        await each(
+            session, drives, lambda drive: replacement.apply(session, session, drive, chosen.file, specs[drive], wanted)
+        )
 
-    return batch.run([chosen.url], work, agreed=chosen.yes, tried=[chosen.drive])
+    return batch.run([chosen.url], work, agreed=chosen.yes, tried=chosen.drive.split(","))
 
 
-def _drive(session: Session, target: str) -> Drive:
-    """Find the replacement. Raises Diagnostic where several drives can be meant."""
-    bus, address = split_target(target)
+def _drives(session: Session, target: str) -> list[Drive]:
+    """Find the replacements. Raises Diagnostic where one of several drives can be meant."""
     drives = [drive for each in session.buses.values() for drive in each.drives.values()]
     if not target and len(drives) > 1:
         names = ", ".join(session.display_name(drive) for drive in drives)
         raise Diagnostic("several drives have replied", hint=f"--drive names one of {names}")
-    return session.drive(bus, address or None)
+    return targets(session, target)

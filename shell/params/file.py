@@ -31,6 +31,8 @@ class SettingsFile:
     path: str
     product: str = ""
     language: str = ""
+    name: str = ""
+    """The name of the drive that it was read from; empty: it has none."""
     named: Mapping[str, Value] = field(default_factory=dict)
     section: Mapping[str, str] = field(default_factory=dict)
     has_variables: bool = False
@@ -103,7 +105,8 @@ def load(path: str | Path) -> SettingsFile:
             if upper in named:
                 raise Diagnostic(f"{upper} is there twice", f"{where}: [{each}]", "keep one of them")
             named[upper], section[upper] = _value(value, f"{where}: [{each}] {name}"), each
-    return SettingsFile(where, _text(drive, "product"), _text(drive, "language"), named, section, VARIABLES in tables)
+    product, language, name = (_text(drive, key) for key in ("product", "language", "name"))
+    return SettingsFile(where, product, language, name, named, section, VARIABLES in tables)
 
 
 def _table(tables: Mapping[str, Any], name: str, where: str) -> Mapping[str, Any]:

@@ -27,37 +27,44 @@ STANDARD_OUTPUT = "-"
 Work = Callable[["Drive"], Awaitable[None]]
 
 
-def targets(workspace: Workspace, target: str) -> list[Drive]:
-    """The drives of a target: `all` is every drive that is open. Raises Diagnostic for an unknown one."""
-    bus, address = split_target(target)
-    if address not in ALL:
-        return [workspace.drive(bus, address or None)]
-    buses = [workspace.bus(bus)] if bus else list(workspace.buses.values())
-    found = [drive for each in buses for drive in each.drives.values() if drive.family.parameters is not None]
-    if not found:
-        raise Diagnostic("no drive with parameters has replied", target)
-    return found
+def targets(workspace: Workspace, target: str, having: str = "parameters") -> list[Drive]:
+    """The drives of a target: one, several (`a,b`), or `all` that are open and whose family has these.
+
+    Raises Diagnostic for an unknown one.
+    """
+    found: dict[Drive, None] = {}
+    for name in target.split(","):
+        bus, address = split_target(name)
+        if address not in ALL:
+            found[workspace.drive(bus, address or None)] = None
+            continue
+        buses = [workspace.bus(bus)] if bus else list(workspace.buses.values())
+        able = [drive for each in buses for drive in each.drives.values() if getattr(drive.family, having) is not None]
+        if not able:
+            raise Diagnostic(f"no drive with {having} has replied", target)
+        found |= dict.fromkeys(able)
+    return list(found)
 
 
-def is_all(target: str) -> bool:
-    """Whether a target is every drive, so that a file's name is a folder's."""
-    return split_target(target)[1] in ALL
+def is_several(target: str) -> bool:
+    """Whether a target is several drives, so that a file's name is a folder's."""
+    return "," in target or split_target(target)[1] in ALL
 
 
-def file_of(workspace: Workspace, drive: Drive, name: str, target: str) -> str:
-    """The file of a drive: for all drives `NAME.toml` in a folder."""
-    if not is_all(target):
+def file_of(workspace: Workspace, drive: Drive, name: str, target: str, ending: str = ".toml") -> str:
+    """The file of a drive: for several drives `NAME.toml` in a folder."""
+    if not is_several(target):
         return name
     own = (workspace.qualified_address(drive) or drive.link.name).rstrip(":").replace(":", "-")
-    return str(Path(name) / f"{own}.toml")
+    return str(Path(name) / f"{own}{ending}")
 
 
 def check_new(name: str, target: str) -> None:
     """Check where a backup goes, before anything is opened. Raises Diagnostic."""
     path = Path(name)
-    if is_all(target):
+    if is_several(target):
         if name == STANDARD_OUTPUT or (path.exists() and not path.is_dir()):
-            raise Diagnostic("is not a folder", name, "all drives need a folder: each gets a file in it")
+            raise Diagnostic("is not a folder", name, "several drives need a folder: each gets a file in it")
     elif name != STANDARD_OUTPUT:
         new_file.check(name)
 
@@ -95,7 +102,7 @@ async def backup(workspace: Workspace, name: str, target: str) -> None:
 
     async def keep(drive: Drive) -> None:
         own = file_of(workspace, drive, name, target)
-        if is_all(target):
+        if is_several(target):
             Path(own).parent.mkdir(parents=True, exist_ok=True)
         if own != STANDARD_OUTPUT:
             new_file.check(own)
@@ -194,16 +201,26 @@ def _line(
     name, here, there = row
     who = workspace.display_name(drive)
     if as_json:
-        return json.dumps({**({"drive": who} if is_all(target) else {}), "name": name, "here": here, "there": there})
+        return json.dumps(
+            {**({"drive": who} if is_several(target) else {}), "name": name, "here": here, "there": there}
+        )
     unit = f" {units[name]}" if units.get(name) else ""
-    own = f"{who}: " if is_all(target) else ""
+    own = f"{who}: " if is_several(target) else ""
     return f"{own}{name}: here {files.shown(here)}, there {files.shown(there)}{unit}"
 
 
 async def restore_each(workspace: Workspace, commands: Commands, name: str, target: str, options: Options) -> None:
-    """Restore drives from their files; every file is read before the first step."""
+    """Restore drives from their files; every file is read before the first step.
+
+    Raises Diagnostic where the file for one of several drives names another drive, or none.
+    """
     drives = targets(workspace, target)
     loaded = {drive: files.load(file_of(workspace, drive, name, target)) for drive in drives}
+    for drive, file in loaded.items() if is_several(target) else ():
+        if file.name != (drive.state.name or drive.address):
+            who, whose = workspace.display_name(drive), f"drive {file.name}" if file.name else "no drive"
+            hint = "for several drives each file names its own; --drive ADDR restores one drive from any file"
+            raise Diagnostic(f"names {whose}, and is to be restored to {who}; nothing was sent", file.path, hint)
 
     async def put(drive: Drive) -> None:
         await restore(workspace, commands, drive, loaded[drive], options)
