@@ -184,7 +184,6 @@ class MultidropApp(Actions):
     def stop_all(self) -> None:
         """Stop everything, now. The banner appears before the next frame."""
         self.session.stop()
-        self.model.stopped(self.session.now())
 
     def _receive(self, event: SessionEvent) -> None:
         self._inbox.append(event)
@@ -192,6 +191,7 @@ class MultidropApp(Actions):
             self.frames.wake(panels=not (isinstance(event, OnBus) and isinstance(event.event, Unsolicited)))
         if self.session.stops != self._stops:
             self._stops = self.session.stops
+            self.model.stopped(self.session.now())
             self._drop_typed()
         elif isinstance(event, StateChanged) and self.selection.changed:
             self.selection.expect(self.outbox.using(self.selection.shown))

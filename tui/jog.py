@@ -59,5 +59,4 @@ class Jog:
             return "it has not been read at rest since the last line"
         if axis.conditions is not None and axis.conditions.disabled:
             return f"no current in the motor ({axis.conditions.disabled})"
-        conditions = readout.conditions
-        return "a program runs" if conditions is not None and conditions.program else ""
+        return "a program runs" if readout.program.name else ""

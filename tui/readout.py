@@ -23,6 +23,8 @@ SWITCHES = ("lim-", "lim+")
 """Functions of lamps that end the travel."""
 BEHIND = 2.0
 """Seconds between the last sample and the last prediction, after which the prediction counts as old."""
+AGED = 1.5
+"""Seconds beyond two periods after which conditions count as old."""
 LIVELY = 3.0
 """Seconds of faster polling after a line was sent to a drive."""
 
@@ -35,6 +37,8 @@ class State(Enum):
     STOPPED = ("■", "stopped", "text")
     NO_CURRENT = ("□", "no current", "strong")
     """At rest, and nothing holds the load: it is disabled, or its current is off at rest."""
+    DWELL = ("▷", "dwell", "motion")
+    """At rest in a program, which can move the drive at any time. Of a line: a program runs in one of its drives."""
     MOVING = ("▶", "moving", "motion")
     STORING = ("◆", "storing", "strong")
     SILENT = ("?", "silent", "error")
@@ -62,7 +66,7 @@ class State(Enum):
         return self.value[2]
 
 
-READ = (State.MOVING, State.STOPPED, State.NO_CURRENT)
+READ = (State.MOVING, State.STOPPED, State.DWELL, State.NO_CURRENT)
 """The states that were read of a drive, which can be outdated."""
 
 
@@ -114,6 +118,24 @@ class ProgramFacts:
     phase: Phase = Phase.EXECUTES
     break_point: str = ""
     seen_at: float = -math.inf
+    name: str = ""
+    """The program that ran or was paused when that was last read, or `running`; empty: none."""
+    ran: bool = False
+    """One ran then, which can move the drive."""
+    known_at: float = -math.inf
+    """When that was read, with the conditions or to confirm a stop."""
+    stopped_at: float = -math.inf
+    """Time of the last stop: no program that was read before it is known to run."""
+
+    @property
+    def runs(self) -> bool:
+        """Whether a program is known to run."""
+        return self.ran and not self.past
+
+    @property
+    def past(self) -> bool:
+        """Whether a stop came since that was read."""
+        return self.known_at <= self.stopped_at
 
 
 @dataclass
@@ -177,6 +199,10 @@ class Readout:
         """Take the reply to a poll. The axis of the first sample becomes the first axis."""
         if self.last is None:
             self.axis = sample.axis
+        if sample.program is not None:
+            for program in (each.program for each in self.axes):
+                program.name = (program.name or "running") if sample.program else ""
+                program.ran, program.known_at = sample.program, sample.at
         if sample.axis != self.axis:
             self.others.setdefault(sample.axis, Readout()).take(sample)
             return
@@ -195,20 +221,25 @@ class Readout:
         if known is None or known.last is None or known.silent_since is not None or self.touched > known.last.at:
             return False
         before = (known.last.position, known.last.velocity, known.trouble)
-        return before == (sample.position, 0, sample.trouble) and sample.velocity == 0
+        ran = known.program.ran if sample.program is None else sample.program
+        return (*before, known.program.ran) == (sample.position, 0, sample.trouble, ran) and sample.velocity == 0
 
     def condition(self, at: float, conditions: Sequence[Conditions]) -> None:
         """Take the conditions of every axis; those of the first one are this readout's."""
+        runs = next((each.runs for each in conditions if each.runs is not None), None)
         for number, each in enumerate(conditions):
             axis = self if number == 0 else self.others.setdefault(each.axis, Readout(axis=each.axis))
             axis.conditions, axis.conditioned_at, axis.watched = each, at, self.watched
+            if runs is not None:
+                axis.program.name, axis.program.ran, axis.program.known_at = each.program, runs, at
             if axis.last is not None and axis.last.velocity == 0:
                 axis.travel.learn(each, axis.last.position)
 
     def recurs(self, event: Conditioned) -> bool:
         """True if conditions say what those before said, which were not outdated yet."""
         known = [axis.conditions for axis in self.axes if axis.conditions is not None]
-        return known == list(event.conditions) and event.at - self.conditioned_at < 2 * max(self.watched, 1.0)
+        current = not self.aged(self.conditioned_at) and event.at - self.conditioned_at < 2 * max(self.watched, 1.0)
+        return current and known == list(event.conditions)
 
     def note(self, event: Sample | Silent | Conditioned) -> None:
         """Take what a bus has read."""
@@ -253,6 +284,17 @@ class Readout:
         """True if a line was sent after the last value was read, and the next value is not about to arrive."""
         return self.last is not None and self.touched > self.last.at and now - self.last.at > SHORTEST
 
+    def aged(self, now: float) -> bool:
+        """Whether the conditions of an axis may be outdated."""
+        return self._aged(self.conditioned_at, now)
+
+    def program_aged(self, now: float) -> bool:
+        """Whether it may be outdated whether a program runs."""
+        return self._aged(self.program.known_at, now)
+
+    def _aged(self, at: float, now: float) -> bool:
+        return at <= self.program.stopped_at or now - at > 2 * max(self.watched, 1.0) + AGED
+
     def busy(self, now: float) -> bool:
         """True if the drive moves, or may have started: a reason to poll it more often."""
         return now - self.touched < LIVELY or self._moves
@@ -277,6 +319,8 @@ class Readout:
         """The state of this axis alone, as last read."""
         if self.last is not None and self.last.velocity != 0:
             return State.MOVING
+        if self.program.runs and not (self.conditions is not None and self.conditions.disabled):
+            return State.DWELL
         return State.NO_CURRENT if self.no_current else State.STOPPED
 
     @property
@@ -302,7 +346,8 @@ class Readout:
             return State.UNKNOWN
         if self._moves:
             return State.MOVING
-        return State.NO_CURRENT if any(each.no_current for each in self.axes) else State.STOPPED
+        states = [each.own_state for each in self.axes]
+        return State.NO_CURRENT if State.NO_CURRENT in states else states[0]
 
     def words(self, now: float, *, storing: bool = False) -> str:
         """The state in words, with its duration, or with its age if it may be outdated."""

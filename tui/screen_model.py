@@ -152,6 +152,8 @@ class ScreenModel:
         """Mark all values as possibly outdated after a stop, so that all drives are polled."""
         for facts in self.buses.values():
             self._touch(facts, EVERYONE[0], at)
+            for axis in (axis for readout in facts.readouts.values() for axis in readout.axes):
+                axis.program.stopped_at = at
         self.changed = True
 
     @staticmethod
@@ -225,7 +227,7 @@ class ScreenModel:
 
 
 def bus_state(facts: BusFacts | None, addresses: list[str], lost: bool) -> State:
-    """The state of a whole bus as last read: idle only if every drive was read as stopped."""
+    """The state of a whole bus as last read: idle only if every drive was read as stopped, and runs no program."""
     if lost:
         return State.LOST
     if facts is None or not addresses:
@@ -238,11 +240,15 @@ def bus_state(facts: BusFacts | None, addresses: list[str], lost: bool) -> State
         return State.TROUBLE
     if any(facts.readout(address).differs for address in addresses):
         return State.DIFFERS
-    if any(state not in READ for state in states):
+    programs = [facts.readout(address).program for address in addresses]
+    if any(program.runs for program in programs):
+        return State.DWELL
+    if any(state not in READ for state in states) or any(program.ran for program in programs):
         return State.UNKNOWN
     return State.OFF if State.NO_CURRENT in states else State.IDLE
 
 
 def bus_old(facts: BusFacts | None, addresses: list[str], now: float) -> bool:
     """True if the state of a bus may be outdated."""
-    return facts is not None and any(facts.readout(address).old(now) for address in addresses)
+    readouts = [] if facts is None else [facts.readout(address) for address in addresses]
+    return any(each.old(now) or (each.program.runs and each.program_aged(now)) for each in readouts)

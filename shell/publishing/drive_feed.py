@@ -49,6 +49,8 @@ class DriveFeed:
     def _sample(self, sample: Sample) -> None:
         at, axis = sample.at, sample.axis
         self._moving[axis] = sample.velocity != 0
+        if sample.program is not None and sample.program != bool(self._program):
+            self._program = "running" if sample.program else ""
         self._say_state(at, self._motion())
         if not self._limits.setdefault(axis, SampleLimit(self._period)).passes(at):
             return

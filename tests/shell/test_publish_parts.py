@@ -14,11 +14,13 @@ from hypothesis import strategies as st
 
 from dialects import Diagnostic
 from dialects.conditions import UNREAD, Conditions
+from drives.events import Conditioned, Sample
 from shell.connect import settings
 from shell.connect.mqtt_settings import MqttSettings
 from shell.log.entries import Entry
 from shell.publishing import messages
 from shell.publishing.backlog import Backlog, Message
+from shell.publishing.drive_feed import DriveFeed
 from shell.publishing.limits import BURST, LINES, UNCHANGED, Curve, LineLimit, Point, SampleLimit, parse_rate
 from shell.publishing.target import Target, parse_target
 from shell.publishing.topics import Topics, escape, unescape
@@ -266,3 +268,18 @@ def test_config_show_hides_the_password_and_config_check_finds_a_missing_file(tm
     shown, checked = multidrop("config", "show"), multidrop("config", "check")
     assert 'username = "u"\npassword = "***"\n' in shown.stdout and "hunter2" not in shown.stdout + shown.stderr
     assert checked.returncode == 2 and ":4: mqtt.ca: " in checked.stderr and "gone.pem" in checked.stderr
+
+
+def test_a_program_that_a_stop_has_ended_is_published_as_ended_before_the_conditions_are_read_again() -> None:
+    said: list[Any] = []
+    feed = DriveFeed(lambda what, at, retain, fields: said.append((at, fields)) if what == "state" else None, 1.0)
+    feed.take(Sample(1.0, "a", 5, 0))
+    feed.take(Conditioned(1.0, "a", (Conditions(program="G1", runs=True),)))
+    feed.take(Sample(2.0, "a", 5, 0))
+    feed.take(Sample(3.0, "a", 5, 0, program=False))
+    rest = messages.AT_REST
+    assert said == [
+        (1.0, {"value": rest}),
+        (1.0, {"value": rest, "program": "G1"}),
+        (3.0, {"value": rest, "program": ""}),
+    ]

@@ -334,6 +334,7 @@ MOVING_TO = Conditions(
         *(Lamp(str(n), "moving" if n == 2 else "", on, output=True) for n, on in enumerate((None, True, None), 1)),
     ),
     program="running",
+    runs=True,
     target=6_000_000,
     limits=(-400_000, 6_400_000),
     run_current=25,
@@ -346,6 +347,7 @@ AT_LIMIT = replace(
     error=UNREAD,
     error_text="PR ER shows and clears it",
     program="",
+    runs=False,
     target=None,
     lamps=(Lamp("1", "home", False), Lamp("2", "lim+", True)),
 )

@@ -76,7 +76,8 @@ def test_what_was_not_read_is_said_and_not_guessed() -> None:
 
 
 def test_a_lost_or_silent_drive_has_no_state_and_an_old_one_has_its_age() -> None:
-    running = Readout(conditions=Conditions(program="G1"), conditioned_at=100.0)
+    running = Readout()
+    running.condition(100.0, [Conditions(program="G1", runs=True)])
     assert state_words(glance(running), 100.0) == "runs G1"
     assert state_words(glance(running), 130.0) == "ran G1 30 s ago"
     assert state_words(glance(running, lost=True), 100.0) == ""
@@ -88,7 +89,7 @@ def test_a_lost_or_silent_drive_has_no_state_and_an_old_one_has_its_age() -> Non
 
 def test_the_place_of_a_program_that_the_drive_reports_is_its_line() -> None:
     readout = seen(None, Phase.EXECUTES)
-    readout.conditions, readout.conditioned_at = Conditions(program="running", line="11"), 100.0
+    readout.condition(100.0, [Conditions(program="running", runs=True, line="11")])
     assert text(program_rows(view(glance(readout)), 40, 3))[1].startswith(" ▶  11")
 
 

@@ -18,6 +18,7 @@ from shell.events import (
     Progressed,
     TwinEnded,
 )
+from tui.panels.lamps import program_words
 from tui.readout import Readout, State
 from tui.screen_model import BusFacts, ScreenModel, bus_old, bus_state
 
@@ -159,6 +160,45 @@ def test_a_bus_is_idle_only_when_every_drive_was_read_as_still() -> None:
     assert bus_state(facts, ["a", "b"], False) is State.MOVING
     assert bus_state(facts, ["a", "b"], True) is State.LOST
     assert bus_state(facts, [], False) is State.UNKNOWN
+
+
+RUNS = Conditions(program="running", runs=True)
+
+
+def test_a_line_is_not_idle_while_a_program_runs_in_a_drive_of_it() -> None:
+    facts, both = BusFacts(), ["a", "b"]
+    for address in both:
+        facts.readout(address).take(Sample(1.0, address, 5, 0))
+    facts.readout("b").condition(1.0, [RUNS])
+    assert bus_state(facts, both, False) is State.DWELL and not bus_old(facts, both, 1.1)
+    assert bus_old(facts, both, 9.0), "the program was read long ago"
+    facts.readout("b").take(Sample(9.0, "b", 5, 0))
+    assert bus_state(facts, both, False) is State.DWELL, "a poll of the motion says nothing of the program"
+    facts.readout("b").condition(10.0, [Conditions(disabled="DE=0", runs=True, program="running")])
+    assert bus_state(facts, both, False) is State.DWELL
+    facts.readout("b").condition(10.0, [Conditions(runs=False)])
+    assert bus_state(facts, both, False) is State.IDLE
+
+
+def test_what_was_read_of_a_program_before_a_stop_is_past_until_the_stop_has_read_it(model: ScreenModel) -> None:
+    for address in "ab":
+        model.take(OnBus("press", Sample(1.0, address, 5, 0)))
+        model.take(OnBus("press", Conditioned(1.0, address, (RUNS,))))
+    facts = model.bus("press")
+    a, b = facts.readout("a"), facts.readout("b")
+    assert (a.state(), program_words(a, 2.0)) == (State.DWELL, "program running")
+    model.stopped(2.0)
+    assert (a.state(), program_words(a, 4.0), a.aged(4.0)) == (State.STOPPED, "program ran 3 s ago", True)
+    assert bus_state(facts, ["a", "b"], False) is State.UNKNOWN
+    stopped = Sample(3.0, "a", 5, 0, program=False)
+    assert not model.quiet(OnBus("press", stopped))
+    model.take(OnBus("press", stopped))
+    model.take(OnBus("press", Sample(3.0, "b", 5, 0, program=True)))
+    assert (a.state(), program_words(a, 4.0)) == (State.STOPPED, "")
+    assert (b.state(), program_words(b, 4.0)) == (State.DWELL, "program running")
+    assert model.quiet(OnBus("press", stopped._replace(at=4.0, program=None)))
+    assert not model.quiet(OnBus("press", stopped._replace(at=4.0, program=True)))
+    assert not model.quiet(OnBus("press", Conditioned(4.0, "b", (RUNS,)))), "the lamps are current again"
 
 
 def test_a_line_with_an_error_shows_it_unless_a_drive_moves_or_is_silent() -> None:

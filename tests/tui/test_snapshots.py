@@ -5,6 +5,10 @@ from collections.abc import Awaitable, Callable
 import pytest
 from textual.pilot import Pilot
 
+from dialects.conditions import Conditions
+from drives.events import Conditioned, Sample
+from drives.halt import Fate
+from shell.events import OnBus
 from tests.support.fake_session import FakeBus, FakeDrive, FakeSession, a_move, a_talk, demo_session, make_app, settle
 from transports import TransportLost
 from tui.app import MultidropApp
@@ -56,6 +60,31 @@ def drawn(snap_compare: Compare, size: str, *keys: str, later: float = 0.0, them
 @pytest.mark.parametrize("name", KEYS)
 def test_snapshot(snap_compare: Compare, size: str, name: str) -> None:
     assert drawn(snap_compare, size, *KEYS[name])
+
+
+@pytest.mark.parametrize("page", ["main", "drives"])
+@pytest.mark.parametrize("size", SIZES)
+def test_snapshot_of_a_stop_that_a_program_survives(snap_compare: Compare, size: str, page: str) -> None:
+    """`a` runs its program on, `b` has ended its own, `c` was not read since: its row is dim and of the past."""
+    session = demo_session()
+    app = make_app(session)
+    fates = {"a": Fate.RUNNING, "b": Fate.STANDING, "c": Fate.NOT_KNOWN}
+    runs = (Conditions(program="running", runs=True),)
+
+    async def act(pilot: Pilot[int]) -> None:
+        await pilot.pause()
+        for name in fates:
+            session.emit(OnBus("press", Sample(session.time - 0.2, name, 100, 0)))
+            session.emit(OnBus("press", Conditioned(session.time - 1.0, name, runs)))
+        await settle(pilot)
+        await pilot.press("ctrl+x", *KEYS[page])
+        session.time += 2.0
+        session.fates = {f"press:{name}": fate for name, fate in fates.items()} | {"eth:": Fate.STANDING}
+        for name in "ab":
+            session.emit(OnBus("press", Sample(session.time - 0.1, name, 200, 0, program=name == "a")))
+        await settle(pilot)
+
+    assert snap_compare(app, terminal_size=SIZES[size], run_before=act)
 
 
 def test_snapshot_of_values_that_have_grown_old(snap_compare: Compare) -> None:

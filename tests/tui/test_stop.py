@@ -8,10 +8,17 @@ from textual import events
 from textual.pilot import Pilot
 
 from drives.halt import Fate
+from shell import stops
 from shell.events import By
+from tests.support.cell_session import CellSession, bus, party
 from tests.support.fake_session import FakeSession, a_move, demo_session, make_app, settle
+from tests.support.virtual import in_virtual_time
 from tui.app import MultidropApp, is_stop
+from tui.panels.glance import glances_of
+from tui.panels.lamps import program_words
 from tui.polling import LIVELY, STATUS
+from tui.readout import State
+from tui.screen_model import ScreenModel, bus_state
 from tui.screens.dialogs import Ask, Choose, Confirm, Search, TooSmall
 from tui.screens.start import Start
 from tui.terminal.keystream import STOP
@@ -129,6 +136,51 @@ async def test_the_banner_follows_what_is_read_without_a_word_from_anybody() -> 
         session.buses["pmx"].lost = None
         await settle(pilot)
         assert banner(app).strip().startswith("■ STOPPED   all 5 read velocity 0")
+
+
+DWELLS = 'program_text = """\nPG 1\nLB G1\nMR 51200\nH\nH 500\nBR G1\nE\nPG\n"""'
+
+
+@in_virtual_time
+async def test_rows_and_tabs_never_say_the_contrary_of_the_banner_on_a_line_of_twelve_programs(tmp_path):
+    names = "abcdefghijkl"
+    async with CellSession(tmp_path, bus("press", *(f"{party(name)}\n{DWELLS}" for name in names))) as shop:
+        session, model = shop.session, ScreenModel(lambda: "press", lambda: {"press"})
+        session.subscribe(model.take)
+        line = session.buses["press"]
+        polls = line.telemetry.subscribe(tuple(names), 2.0), line.telemetry.watch(tuple(names), 12.0)
+        await session.run("@* EX G1")
+        await asyncio.sleep(20.0)
+        readouts = model.bus("press").readouts
+        assert all(readouts[name].program.runs for name in names)
+        deaf, escape = shop.device("press:g"), shop.device("press:g").escape
+        deaf.escape = lambda now: None
+        session.stop()
+        model.stopped(session.now())
+        said = set()
+
+        def agree(_event: object) -> None:
+            tally = session.tally()
+            said.add(stops.headline(tally).split(" ")[1])
+            for glance, found in zip(glances_of(session, model, line), tally.found, strict=True):
+                row = f"{glance.sign(session.now())[0]} {program_words(glance.readout, session.now())}"
+                if found.fate is Fate.STANDING:
+                    assert "■" in row and "program" not in row, (found, row)
+                assert found.fate is not Fate.RUNNING or "program running" in row
+            runs = any(each.fate is Fate.RUNNING for each in tally.found)
+            state = bus_state(model.bus("press"), list(names), False)
+            assert state in (State.MOVING, State.DWELL) if runs else state is not State.IDLE or tally.stand
+
+        session.subscribe(agree)
+        await asyncio.sleep(5.0)
+        assert "STOPPED" not in said and any(each.fate is not Fate.STANDING for each in session.tally().found)
+        deaf.escape = escape
+        session.stop()
+        model.stopped(session.now())
+        await asyncio.sleep(5.0)
+        assert said == {"STOP", "STOPPED"} and bus_state(model.bus("press"), list(names), False) is State.IDLE
+        for each in polls:
+            each.close()
 
 
 @pytest.mark.tui

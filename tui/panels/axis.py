@@ -7,7 +7,7 @@ most, as a low screen cuts the last ones.
 from __future__ import annotations
 
 from tui.panels.glance import Glance, firmware_of, name_of
-from tui.panels.lamps import aged, error_span, facts_groups, flowing, lamp_groups
+from tui.panels.lamps import error_span, facts_groups, flowing, lamp_groups
 from tui.panels.travel import LEARNT, LIMITS, SEEN, bar, phase, to_go_words, travel_of
 from tui.panels.twin import twin_rows
 from tui.panels.view import View
@@ -79,7 +79,7 @@ def _troubles(axis: Readout, now: float) -> list[Span]:
     """The trouble that polls report, and the error with its text."""
     found: list[Span] = [(f"✗ {axis.trouble}", "error")] if axis.trouble else []
     if axis.conditions is not None and axis.conditions.error:
-        found.append(error_span(axis.conditions, aged(axis, now)))
+        found.append(error_span(axis.conditions, axis.aged(now)))
     return found
 
 
@@ -96,14 +96,8 @@ def _state(glance: Glance, axis: Readout, now: float, width: int) -> list[Span]:
         state = axis.own_state
         words, role = (f"{state.sign} {state.word}", state.role) if role != "dim" else (words, role)
     live = role not in ("dim", "error")
-    text = f"{words.rstrip()} {_phase(axis, now) if live else ''}".rstrip()
+    text = f"{words.rstrip()} {phase(axis) if live else ''}".rstrip()
     return [*name, (f" {fit(text, width - width_of(name) - 1)}", role)]
-
-
-def _phase(axis: Readout, now: float) -> str:
-    """The phase of a move; `dwell` at rest in a program."""
-    program = axis.conditions is not None and axis.conditions.program and not aged(axis, now)
-    return phase(axis) or ("dwell" if program and axis.last is not None and not axis.last.velocity else "")
 
 
 def _travel_rows(axis: Readout, role: str, width: int) -> list[Row]:
@@ -122,7 +116,7 @@ def _condition_rows(glance: Glance, axis: Readout, now: float, width: int, *, na
     conditions = axis.conditions
     if conditions is None:
         return []
-    old = aged(axis, now) or glance.lost
+    old = axis.aged(now) or glance.lost
     inputs, outputs = lamp_groups(conditions, old)
     indent = f" {axis.axis} " if named else " "
     facts = flowing(list(facts_groups(axis, now)), width, indent)

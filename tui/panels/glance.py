@@ -39,6 +39,7 @@ class Glance:
         aged = state in READ and self.readout.old(now)
         if state is State.NO_CURRENT and self.readout.touched > self.readout.conditioned_at:
             aged = True  # a line was sent since, which may have switched it on
+        aged = aged or (state is State.DWELL and self.readout.program_aged(now))
         return fit(f"{state.sign} {words}", width), "dim" if aged else state.role
 
     def values(self, now: float, axis: Readout | None = None) -> tuple[str, str, str]:

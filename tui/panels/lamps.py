@@ -13,16 +13,9 @@ from tui.readout import Readout
 from tui.text import age
 from tui.widgets.lines import Row, Span, width_of
 
-AGED = 1.5
-"""Seconds beyond two periods after which conditions count as old."""
 LIMITS = ("lim+", "lim-")
 MANY = 6
 """Lamps without functions that stand close together."""
-
-
-def aged(readout: Readout, now: float) -> bool:
-    """Whether the conditions of an axis may be outdated."""
-    return now - readout.conditioned_at > 2 * max(readout.watched, 1.0) + AGED
 
 
 def flowing(groups: Sequence[Sequence[Span]], width: int, indent: str = " ") -> list[Row]:
@@ -87,14 +80,17 @@ def trouble_of(axis: Readout) -> str:
     return limits[0] if limits else "error" if conditions.error == UNREAD else f"error {conditions.error}"
 
 
-def program_words(readout: Readout) -> str:
-    """`program running`, or `program at 15` where its place is known; empty where none runs."""
-    conditions = readout.conditions
-    if conditions is None or not conditions.program:
+def program_words(readout: Readout, now: float) -> str:
+    """`program running`, `program at 15` where its place is known, `program ran 3 s ago` after a stop; empty: none."""
+    conditions, name = readout.conditions, readout.program.name
+    if not name:
         return ""
-    place = conditions.line or (str(readout.program.line) if readout.program.line is not None else "")
-    name = f" {conditions.program}" if not place or conditions.program != "running" else ""
-    return f"program{name}{f' at {place}' if place else ''}"
+    if readout.program.past:
+        return f"program ran {age(now - readout.program.known_at)} ago"
+    place = conditions.line if conditions is not None else ""
+    place = place or (str(readout.program.line) if readout.program.line is not None else "")
+    shown = f" {name}" if not place or name != "running" else ""
+    return f"program{shown}{f' at {place}' if place else ''}"
 
 
 def facts_groups(readout: Readout, now: float) -> Iterator[list[Span]]:
@@ -102,12 +98,12 @@ def facts_groups(readout: Readout, now: float) -> Iterator[list[Span]]:
     conditions = readout.conditions
     if conditions is None:
         return
-    old = aged(readout, now)
+    old = readout.aged(now)
     role = "dim" if old else "text"
     if not conditions.error:
         yield [error_span(conditions, old)]
-    if words := program_words(readout):
-        yield [(words, "dim" if old else "motion")]
+    if words := program_words(readout, now):
+        yield [(words, "dim" if readout.program_aged(now) else "motion")]
     if conditions.no_current:
         yield [("no current ", "dim" if old else "strong"), (f"({conditions.no_current})", role)]
     for name, value in (("run", conditions.run_current), ("hold", conditions.hold_current)):

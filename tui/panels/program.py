@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 from shell.events import Phase
@@ -34,7 +35,7 @@ def spot_of(readout: Readout) -> Spot | None:
     program, conditions = readout.program, readout.conditions
     if program.line is not None:
         return Spot(program.line, program.phase, program.seen_at)
-    if conditions is not None and conditions.program and conditions.line.isdecimal():
+    if conditions is not None and conditions.line.isdecimal() and program.name and not program.past:
         return Spot(int(conditions.line), Phase.EXECUTES, readout.conditioned_at)
     return None
 
@@ -42,7 +43,7 @@ def spot_of(readout: Readout) -> Spot | None:
 def state_words(glance: Glance, now: float) -> str:
     """The action of a drive's program, in words; empty if it is not known."""
     readout = glance.readout
-    spot, conditions = spot_of(readout), readout.conditions
+    spot = spot_of(readout)
     if glance.lost or readout.silent_since is not None:
         return ""
     if glance.storing:
@@ -50,12 +51,13 @@ def state_words(glance: Glance, now: float) -> str:
     if spot is not None:
         old = spot.phase is Phase.EXECUTES and now - spot.at > OLD
         return f"{spot.phase.value} {spot.address}" + (f", seen {age(now - spot.at)} ago" if old else "")
-    if conditions is None:
+    program = readout.program
+    if program.known_at == -math.inf:
         return ""
-    ago = now - readout.conditioned_at
-    if conditions.program:
-        name = "" if conditions.program == "running" else f" {conditions.program}"
-        return f"ran{name} {age(ago)} ago" if ago > OLD_CONDITIONS else f"runs{name}"
+    ago = now - program.known_at
+    if program.name:
+        name = "" if program.name == "running" else f" {program.name}"
+        return f"ran{name} {age(ago)} ago" if program.past or ago > OLD_CONDITIONS else f"runs{name}"
     return f"not running {age(ago)} ago" if ago > OLD_CONDITIONS else "not running"
 
 

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 
 from tui.panels.axis import NUMBER, poll_words
 from tui.panels.glance import Glance
-from tui.panels.lamps import aged, flowing, lamp_groups, program_words, trouble_of
+from tui.panels.lamps import flowing, lamp_groups, program_words, trouble_of
 from tui.panels.spark import spark
 from tui.panels.travel import bar, to_go_words
 from tui.panels.twin import SIGN, alarm_words, difference_words, differs
@@ -90,8 +90,6 @@ def short_words(glance: Glance, axis: Readout, now: float) -> str:
         if glance.readout.old(now):
             word = "moved" if state is State.MOVING else "stood"
             return fit(f"{state.sign} {word} {age(now - axis.last.at)}", STATE)
-    if state is State.STOPPED and axis.conditions is not None and axis.conditions.program and not aged(axis, now):
-        return fit(f"{state.sign} dwell", STATE)
     if state is State.SILENT and glance.readout.silent_since is not None:
         return fit(f"{state.sign} silent {age(now - glance.readout.silent_since)}", STATE)
     return fit(f"{state.sign} {'not read' if state is State.UNKNOWN else state.word}", STATE)
@@ -105,7 +103,7 @@ def _besides(axis: Readout, now: float, room: int, *, live: bool) -> Span:
     target = axis.conditions.target if axis.conditions is not None else None
     if live and target is not None and axis.last is not None and axis.last.velocity:
         return f"→ {digits(target)}  {to_go_words(axis, now)}".rstrip(), "text"
-    return program_words(axis), "dim" if aged(axis, now) else "motion"
+    return program_words(axis, now), "dim" if axis.program_aged(now) else "motion"
 
 
 def _lamp_row(glance: Glance, now: float, width: int, others: int, rate: str) -> Row:
@@ -116,7 +114,7 @@ def _lamp_row(glance: Glance, now: float, width: int, others: int, rate: str) ->
     groups: list[list[Span]] = []
     for axis in glance.readout.axes:
         if axis.conditions is not None:
-            inputs, outputs = lamp_groups(axis.conditions, aged(axis, now))
+            inputs, outputs = lamp_groups(axis.conditions, axis.aged(now))
             groups += [*inputs, *outputs]
     rows = flowing(groups, width - width_of(right) - 2)
     return spread(list(rows[0]) if rows else [], right, width)

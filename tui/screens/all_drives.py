@@ -24,7 +24,7 @@ from tui.text import fit
 from tui.widgets.lines import Row, Span, spread, width_of
 
 URGENCY = (
-    *(State.LOST, State.SILENT, State.MOVING, State.STORING, State.UNKNOWN),
+    *(State.LOST, State.SILENT, State.MOVING, State.DWELL, State.STORING, State.UNKNOWN),
     *(State.NO_CURRENT, State.STOPPED, State.IDLE),
 )
 """The states, the worst first."""
@@ -58,15 +58,16 @@ class Place(NamedTuple):
         """Its trouble, and the differences of its axes from their twins."""
         return alarm_words(self.trouble, self.glance.readout.axes, room)
 
-    def besides(self, room: int) -> Span:
+    def besides(self, room: int, now: float) -> Span:
         """The fact that matters most besides its state: trouble and its twin, its program, else its product."""
         if alarm := self.alarm(room):
             return alarm, "error"
         released = [each.axis for each in self.glance.readout.others.values() if each.no_current]
         if released:
             return f"{', '.join(released)}: {State.NO_CURRENT.word}", "strong"
-        program = program_words(self.glance.readout)
-        return (program, "motion") if program else (self.glance.product, "dim")
+        if program := program_words(self.glance.readout, now):
+            return program, "dim" if self.glance.readout.program_aged(now) else "motion"
+        return self.glance.product, "dim"
 
     @property
     def urgency(self) -> tuple[bool, int]:
@@ -105,13 +106,13 @@ def drive_row(place: Place, now: float, width: int, chosen: bool) -> Row:
     ]
     if width < NARROW:
         room = width - width_of(row) - 2
-        text, text_role = place.besides(room)
+        text, text_role = place.besides(room, now)
         return (*row, (fit(f"  {text}", room + 2), text_role))
     row.append((f"{velocity:>{VELOCITY}} ", role))
     cells = SPARK if width >= ROOMY else FEW
     row.append((f"{spark(place.glance.readout, now, cells)}  ", "dim" if role == "dim" else "accent"))
     room = width - width_of(row)
-    text, text_role = place.besides(room)
+    text, text_role = place.besides(room, now)
     return (*row, (fit(text, room), text_role))
 
 

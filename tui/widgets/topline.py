@@ -94,8 +94,8 @@ def _folded(tabs: Sequence[Tab], alike: Callable[[Tab, Tab], bool]) -> list[Span
 
 
 def _run(run: Sequence[Tab]) -> list[Span]:
-    """` 4-12 ■`, with the sign of the one that moves if any does."""
-    shown = next((tab for tab in run if tab.state is State.MOVING), run[0])
+    """` 4-12 ■`, with the sign of the one that moves if any does, or else of one that runs a program."""
+    shown = next((tab for state in (State.MOVING, State.DWELL) for tab in run if tab.state is state), run[0])
     return [(f" {run[0].number}-{run[-1].number} ", "text"), (shown.state.sign, shown.role)]
 
 
