@@ -52,13 +52,18 @@ def bytes_of(path: str | Path, largest: int = LARGEST) -> bytes:
     """Read a regular file, or our own standard input by its name. Raises Diagnostic, also for one that is too large."""
     where = str(path) or '""'
     try:
-        mode = os.stat(path).st_mode
-        if not (stat.S_ISREG(mode) or stat.S_ISDIR(mode) or _OWN.fullmatch(where)):
-            raise Diagnostic("is not a regular file", where, "a pipe or a device may have no end; copy it into a file")
-        with open(path, "rb") as file:
+        with opened(path) as file:
             return bounded(file, where, largest)
     except (OSError, ValueError) as error:
         raise Diagnostic(f"cannot be read: {why(error)}", where) from error
+
+
+def opened(path: str | Path) -> IO[bytes]:
+    """Open a regular file, or our own standard input by its name. Raises Diagnostic for a pipe or a device; OSError."""
+    mode = os.stat(path).st_mode
+    if not (stat.S_ISREG(mode) or stat.S_ISDIR(mode) or _OWN.fullmatch(str(path))):
+        raise Diagnostic("is not a regular file", str(path), "a pipe or a device may have no end; copy it into a file")
+    return open(path, "rb")
 
 
 def bounded(file: IO[bytes], where: str, largest: int = LARGEST) -> bytes:

@@ -7,13 +7,12 @@ changes a value. A macro replaces another only on request, and only if the file 
 from __future__ import annotations
 
 import contextlib
-import errno
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
 from dialects.errors import Diagnostic
-from dialects.files import bounded, utf8
+from dialects.files import bounded, opened, utf8
 from macros.atomic import create_atomically, write_atomically
 from macros.model import FIRST_PAGE, KEYS, Macro, check, check_name, describe_clash, page_order
 from macros.toml_edit import with_values
@@ -234,10 +233,8 @@ def _hiding(name: str, folders: Sequence[Path]) -> str:
 
 
 def _bytes(path: Path) -> bytes:
-    """Read a file. Raises OSError, also for a pipe or a device: who reads one may wait forever."""
-    if path.exists() and not (path.is_file() or path.is_dir()):
-        raise OSError(errno.EINVAL, "no file, but a pipe or a device")
-    with path.open("rb") as file:
+    """Read a file. Raises OSError, and Diagnostic for a pipe, a device or a file that is too large."""
+    with opened(path) as file:
         return bounded(file, str(path))
 
 

@@ -13,7 +13,7 @@ from importlib.metadata import PackageNotFoundError, requires, version
 from pathlib import Path
 
 from dialects import Diagnostic
-from dialects.files import why
+from dialects.files import bounded, opened, split_lines, why
 from dialects.visible import visible
 from macros import MacroStore
 from multidrop.commands.failure import fail
@@ -169,11 +169,15 @@ def _state() -> Iterator[str]:
 def _contents(path: Path) -> Iterator[str]:
     """The lines of a file; the reason where it cannot be read."""
     try:
-        lines = without_secrets(path.read_text(encoding="utf-8", errors="backslashreplace")).splitlines()
+        with opened(path) as file:
+            text = bounded(file, str(path)).decode("utf-8", "backslashreplace")
+        lines = split_lines(without_secrets(text))
     except FileNotFoundError:
         yield "no such file"
     except OSError as problem:
         yield f"problem: {why(problem)}"
+    except Diagnostic as problem:
+        yield f"problem: {problem}"
     else:
         yield from lines[:LONGEST]
         if len(lines) > LONGEST:

@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import Any
 
 from dialects import Diagnostic
-from dialects.files import text_of
+from dialects.files import opened, text_of
 
 FILES = ("password_file", "ca", "cert", "key")
 KEYS = ("username", "password", *FILES)
@@ -45,9 +45,11 @@ class MqttSettings:
             path = getattr(self, name)
             try:
                 if path:
-                    open(path, "rb").close()
+                    opened(path).close()
             except OSError as problem:
                 yield f"mqtt.{name}: {path} cannot be read: {problem.strerror}"
+            except Diagnostic as problem:
+                yield f"mqtt.{name}: {problem}"
 
 
 def read(table: Any, where: str) -> MqttSettings:

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
 from dialects import Diagnostic
-from dialects.files import why
+from dialects.files import opened, why
 from shell.log.disk import part
 from shell.log.entries import Entry, entry_of
 
@@ -117,7 +117,7 @@ def parts(path: Path) -> list[Path]:
 def lines(path: Path, offset: int = 0, number: int = 0) -> Iterator[Line]:
     """Yield the lines of one file after so many bytes and lines. Raises Diagnostic where it cannot be read."""
     try:
-        with path.open("rb") as file:
+        with opened(path) as file:
             file.seek(offset)
             while data := file.readline(LONGEST):
                 number += 1

@@ -15,6 +15,7 @@ from typing import TextIO
 from urllib.parse import urlsplit
 
 from dialects import Diagnostic
+from dialects.files import check_line
 from dialects.visible import visible
 from simulator import cells
 from simulator.floor import Floor
@@ -22,6 +23,9 @@ from simulator.serving.endpoints import Served, serve_bus
 from simulator.serving.running import RunningFloor
 from transports.exposure import exposed
 
+INPUT = "standard input"
+LONGEST = 64 * 1024
+"""Bytes of a line of it."""
 SIGNALS = (signal.SIGINT, signal.SIGTERM, getattr(signal, "SIGHUP", signal.SIGTERM))
 
 
@@ -81,11 +85,14 @@ def _print_endpoint(served: Served | None, json: bool, stdout: TextIO) -> None:
 def _carry_out(floor: RunningFloor, line: str) -> None:
     """Carry out a line of standard input; an error in it is printed, and the simulation continues."""
     line = line.strip()
-    if not line or line.startswith("#"):
+    if not line:
         return
     try:
+        check_line(line, INPUT)
+        if line.startswith("#"):
+            return
         if not line.startswith("/sim"):
-            raise Diagnostic(f'not understood: "{line}"', "standard input", "only /sim lines are read here")
+            raise Diagnostic(f'not understood: "{line}"', INPUT, "only /sim lines are read here")
         remark = floor.command(line)
     except Diagnostic as error:
         _warn(str(error))
@@ -120,6 +127,9 @@ def read_lines(loop: asyncio.AbstractEventLoop, stdin: TextIO, take: Callable[[s
     def readable() -> None:
         data = os.read(fd, 4096)
         *lines, rest = (bytes(begun) + data).split(b"\n")
+        if len(rest) > LONGEST:
+            _warn(f"{INPUT}: a line of more than {LONGEST} bytes was dropped")
+            rest = b""
         begun[:] = rest
         if not data:
             loop.remove_reader(fd)

@@ -1,6 +1,7 @@
 """Files that people name: read whole within limits and divided into lines by one rule, or refused in one line."""
 
 import os
+import tempfile
 from pathlib import Path
 
 import pytest
@@ -20,10 +21,12 @@ from dialects.files import (
 )
 from dialects.mcode.manual import program_file
 from dialects.pmx.manual import program_file as pmx_file
+from macros import MacroStore
 from macros.toml_format import parse_macro
 from macros.vendor import imported
 from shell.connect import settings
 from shell.edited_file import EditedFile
+from shell.log import files as log_files
 from shell.params import file as params_file
 from shell.scripts.reading import read_script
 from simulator import cells
@@ -32,9 +35,19 @@ from tests.support.cases import for_each
 ENDLESS = Path("/dev/zero")
 HIDDEN = ("\x0b", "\x0c", "\x1c", "\x1d", "\x1e", "\x1f", "\x85", "\u2028", "\u2029", "\x07", "\x7f", "\x9b", "\x1a")
 """Characters at which some programs end a line, and others that no editor shows."""
+
+
+def store_of(file: str) -> MacroStore:
+    """A store whose macro `m` is that file."""
+    folder = Path(tempfile.mkdtemp())
+    (folder / "m.toml").symlink_to(file)
+    return MacroStore(folder)
+
+
 READERS = {
     "bytes": bytes_of, "text": text_of, "program": encoded_program_of, "script": lambda file: read_script(file, {}),
     "cell": cells.load, "settings": params_file.load, "MCode": program_file.load, "PMX": pmx_file.load,
+    "log": lambda file: list(log_files.lines(Path(file))), "macro": lambda file: store_of(file).load("m"),
     "editor": lambda file: EditedFile(Path(file)),
 }  # fmt: skip
 
