@@ -125,7 +125,11 @@ def test_what_is_no_file_is_told_and_never_waited_for(store: MacroStore) -> None
     (store.folder / "zero.toml").symlink_to("/dev/zero")
     (store.folder / "lost.toml").symlink_to("nowhere")
     problems = "\n".join(map(str, listed(store).broken))
-    for words in ("lost.toml: a link to a file that is not", "pipe.toml: is not a regular file", "zero.toml: cannot"):
+    for words in (
+        "lost.toml: a link to a file that is not",
+        "pipe.toml: is not a regular file",
+        "zero.toml: is not a regular file",
+    ):
         assert words in problems
     with pytest.raises(Diagnostic, match="no file"):
         store.save(Macro("pipe", SHUTTLE.steps), b"")
