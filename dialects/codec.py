@@ -236,5 +236,8 @@ class Codec(Protocol):
     def restarted(self, line: str) -> bool:
         """Whether an unsolicited line is the drive's message after power-up or a reset."""
 
+    def stored_stop(self, line: str) -> str:
+        """The address of a drive that stored a stop instead of executing it, as a line shows; empty: none."""
+
     def invalidate(self) -> bytes:
         """The bytes that make a drive refuse a half-sent line; empty: none are needed."""

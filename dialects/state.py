@@ -13,7 +13,7 @@ from dialects.codec import Codec
 
 @dataclass(frozen=True)
 class Owed:
-    """An echo mode to restore in a drive, and how to recognise that drive.
+    """An echo mode to restore in a drive, or a download to end, and how to recognise that drive.
 
     `serial` is empty where the drive does not report one.
     """
@@ -121,6 +121,13 @@ class DriveState:
         """Return the number of a fresh sync mark."""
         self.sync_marks += 1
         return self.sync_marks
+
+    def stopped(self) -> None:
+        """Record that a stop was written to the drive."""
+
+    def found_storing(self) -> None:
+        """Record that the drive stores what it receives."""
+        self.programming = True
 
     # Settings and error flag
 

@@ -211,7 +211,9 @@ class Drive:
     async def _send(self, text: str) -> tuple[str, ...]:
         to_all = self.address in GLOBAL
         if to_all and not self.codec.broadcasts:
-            return await _to_each(self._neighbours.all_drives, text)
+            drives = self._neighbours.all_drives
+            _refuse_while_stored(drives, "end that mode first")
+            return await _to_each(drives, text)
         procedure = self.family.perform(self.state, text)
         return await self.run(self._to_all(procedure) if to_all else procedure)
 
@@ -234,10 +236,7 @@ class Drive:
     def _to_all(self, procedure: Procedure[T]) -> Procedure[T]:
         """Run a command to all; refuse it if a drive stores a program when it goes out, not when it is typed."""
         others = self._neighbours.all_drives
-        if names := [drive.shown for drive in others if drive.programming]:
-            raise Refused(
-                f"{', '.join(names)}: in program mode a command to all would be stored; leave it with PG first"
-            )
+        _refuse_while_stored(others, "leave it with PG first")
         result = yield from procedure
         for drive in others:
             if self.state.settings_unknown:
@@ -334,6 +333,11 @@ class Drive:
 
 def _no_programs(drive: Drive) -> Inexpressible:
     return Inexpressible(f"{drive.shown}: {drive.family.no_programs}")
+
+
+def _refuse_while_stored(drives: Sequence[Drive], remedy: str) -> None:
+    if names := [drive.shown for drive in drives if drive.programming]:
+        raise Refused(f"{', '.join(names)}: in program mode a command to all would be stored; {remedy}")
 
 
 async def _to_each(drives: Sequence[Drive], text: str) -> tuple[str, ...]:

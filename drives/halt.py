@@ -46,6 +46,8 @@ class Halt:
     """Why it was not written, or not for all."""
     doubts: dict[Drive, str] = field(default_factory=dict)
     """Why a drive could not be read."""
+    stored: int = 0
+    """How often it was written again for a drive that had stored it."""
     vain: bool = False
     """A drive moves on, or its program runs on, after the last attempt to stop it."""
 

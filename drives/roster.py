@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from typing import Any
 
 from dialects import DriveState, Family
@@ -32,6 +32,8 @@ class Roster:
         """Addresses of the drives that are being looked for."""
         self.stated: tuple[str, ...] = ()
         """The addresses that the first search was given."""
+        self.on_stored_stop: Callable[[Drive], None] = lambda drive: None
+        """Called with a drive that has stored a stop instead of executing it."""
         self.link.on_unsolicited = self._unsolicited
 
     @property
@@ -106,8 +108,13 @@ class Roster:
         inbox.codec = next((drive.codec for drive in self.drives.values()), inbox.codec)
 
     def _unsolicited(self, lines: Sequence[str]) -> None:
-        """Note and report a restart: the drive is set as it was saved."""
-        if not any(map(self.link.line.inbox.codec.restarted, lines)):
+        """Note and report a restart: the drive is set as it was saved; and a drive that stored a stop."""
+        codec = self.link.line.inbox.codec
+        for address in dict.fromkeys(filter(None, map(codec.stored_stop, lines))):
+            drive = self.at(address)
+            drive.state.found_storing()
+            self.on_stored_stop(drive)
+        if not any(map(codec.restarted, lines)):
             return
         for drive in self.drives.values():
             drive.state.restarted(alone=len(self.drives) == 1)

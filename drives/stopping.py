@@ -19,6 +19,9 @@ from drives.link import WrittenStop
 from drives.roster import Roster
 from drives.stop_forms import StopForms, stop_forms
 
+AGAIN = 3
+"""How often a stop is written again for drives that stored it."""
+
 
 class Stopping:
     """Stops the drives of one link."""
@@ -33,6 +36,7 @@ class Stopping:
         self._unconfirmed: list[Halt] = []
         """Stops that are not confirmed yet, or that a loss kept from the drives or from being confirmed."""
         self._tasks: set[asyncio.Task[None]] = set()
+        roster.on_stored_stop = self._stored
 
     @property
     def tasks(self) -> set[asyncio.Task[None]]:
@@ -119,6 +123,18 @@ class Stopping:
         self._write(halt)
         self._publish(halt)
 
+    def _stored(self, drive: Drive) -> None:
+        """Write the whole stop again for a drive that stored it; its form now ends that first."""
+        halt = next((each for each in reversed(self._unconfirmed) if drive in each.affected), None)
+        if halt is None:
+            halt = self.halt([drive])
+            self.halted(halt)
+        elif drive.programming and halt.stored < AGAIN:
+            halt.stored += 1
+            text = f"{drive.shown}: it stored the stop; its download is ended and the whole stop sent again"
+            self._link.notify(text, warning=True)
+            self._repeat(halt)
+
     def _superseded(self, halt: Halt) -> bool:
         """Whether a later stop of the whole link confirms it."""
         return self.last is not None and self.last.number > halt.number
@@ -145,6 +161,8 @@ class Stopping:
         if not halt.whole:
             halt.others = self._also_stopped(halt)
         self._link.stopped(stop, at, None if halt.whole else {*GLOBAL, *(drive.address for drive in halt.affected)})
+        for drive in halt.affected:
+            drive.state.stopped()
 
     def _take_over(self, halt: Halt) -> tuple[WrittenStop, StopForms] | None:
         """Return what another thread has written already; only a stop of the whole link takes it over."""

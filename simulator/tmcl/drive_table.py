@@ -86,5 +86,5 @@ def _parameter(word: str) -> Parameter | None:
     if not (number.isascii() and number.isdigit() and len(number) < 4 and str(int(number)) == number):
         return None
     if word.startswith(GLOBAL_PREFIX):
-        return GLOBAL.get(int(number)) if int(number) != Global.ADDRESS else None
+        return GLOBAL.get(int(number)) if int(number) not in (Global.ADDRESS, Global.PROGRAM_STATUS) else None
     return AXIS[int(number)] if int(number) in STORED else None

@@ -7,6 +7,7 @@ commands that set something; global parameters are kept without power; the modul
 from __future__ import annotations
 
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from math import inf
 from types import MappingProxyType
@@ -15,6 +16,7 @@ from dialects.tmcl.manual.commands import FACTORY_CODE, Call, Command, Move, Sea
 from dialects.tmcl.manual.parameters import AXIS, BAUDS, GLOBAL, Axis, Global, Parameter
 from dialects.tmcl.manual.status import Status
 from simulator.tmcl.motor import STORED, Motor
+from simulator.tmcl.program import Program
 from simulator.tmcl.search import ReferenceSearch
 from simulator.world import World
 
@@ -57,6 +59,12 @@ class TmclModule:
         self._version_text = version
         self.powered = False
         self.motor = Motor(world)
+
+        def line(call: Call, now: float) -> None:
+            with suppress(Refused):
+                self._execute(call, now)
+
+        self.program = Program(line, self.motor, lambda: self._search is not None)
         self._search: ReferenceSearch | None = None
         self._notify = 0
         self._notices: list[tuple[float, int]] = []
@@ -121,6 +129,8 @@ class TmclModule:
     def execute(self, call: Call, now: float) -> Answer | None:
         """Carry out a command of a host; its reply, or None where it gives none."""
         self.advance(now)
+        if self.program.storing and call.command != Command.END_DOWNLOAD:
+            return Answer(Status.STORED if self.program.store(call) else Status.MAXIMUM_EXCEEDED, call.value)
         try:
             answer = self._execute(call, now)
         except Refused as refused:
@@ -138,10 +148,14 @@ class TmclModule:
         self.powered = on
         self._search, self._notify = None, 0
         self._notices.clear()
+        self.program.halt(reset=True)
+        self.program.storing = False
         if on:
             self.world.powered_up(now)
             self.motor.parameters.update(self._axis)
         self.motor.power(on, now)
+        if on and self._global[Global.AUTOSTART]:
+            self.program.run(now)
 
     def supply(self, on: bool, now: float) -> None:
         """Do nothing: the module has one supply."""
@@ -162,11 +176,29 @@ class TmclModule:
                 return Answer(value=self._global_parameter(call))
         if call.command not in tuple(Command):
             raise Refused(Status.INVALID_COMMAND)
+        if call.command in range(Command.STOP_PROGRAM, Command.VERSION):
+            return Answer(value=self._program_command(call, now))
         if call.command == Command.NOTIFY:
             return self._watch(call)
         if call.motor != 0:
             raise Refused(Status.INVALID_VALUE)
         return Answer(value=self._motor_command(call, now))
+
+    def _program_command(self, call: Call, now: float) -> int:
+        match call.command:
+            case Command.STOP_PROGRAM | Command.RESET_PROGRAM:
+                self.program.halt(reset=call.command == Command.RESET_PROGRAM)
+            case Command.RUN:
+                self.program.run(now, call.value if call.type else None)
+            case Command.STEP:
+                self.program.step(now)
+            case Command.DOWNLOAD:
+                self.program.download(max(0, call.value))
+            case Command.END_DOWNLOAD:
+                self.program.storing = False
+            case Command.PROGRAM_STATUS:
+                return int(self.program.running)
+        return call.value
 
     def _motor_command(self, call: Call, now: float) -> int:
         match call.command:
@@ -240,6 +272,10 @@ class TmclModule:
         row = GLOBAL.get(call.type)
         if row is None:
             raise Refused(Status.WRONG_TYPE)
+        if call.type == Global.PROGRAM_STATUS:
+            if call.command != Command.GGP:
+                raise Refused(Status.WRONG_TYPE)
+            return int(self.program.running)
         if call.command == Command.SGP:
             _in_range(row, call.value)
             self._global[call.type] = call.value
@@ -271,7 +307,7 @@ class TmclModule:
     # -- time -------------------------------------------------------------------------------------------------------
 
     def _next_event(self, after: float) -> float:
-        return min((at for at in self.motor.events(after) if at > after), default=inf)
+        return min((at for at in (*self.motor.events(after), self.program.due) if at > after), default=inf)
 
     def _live(self, t: float) -> None:
         if not self.powered:
@@ -286,6 +322,7 @@ class TmclModule:
         if self._notify and self.motor.positioning and self.motor.reached(t):
             self._notices.append((t, self._notify))
             self._notify = 0
+        self.program.live(t)
 
 
 STARTERS = frozenset({Axis.TARGET_POSITION, Axis.TARGET_VELOCITY})

@@ -12,6 +12,8 @@ from hypothesis import strategies as st
 from dialects import Owed
 from dialects.mcode.host.codec import MCode
 from dialects.mcode.host.state import MCodeState
+from dialects.tmcl.host.codec import Tmcl
+from dialects.tmcl.host.state import TmclState
 from shell.connect.port_state import MOST, PortState
 
 PORT = "/dev/serial/by-id/usb-FTDI/RS485: 1"
@@ -91,6 +93,19 @@ async def test_what_is_owed_is_written_before_it_is_changed_and_gone_once_it_is_
     drive.restore = None
     await state.owes(drive)
     assert kept(tmp_path) == [] and port().owed == ()
+
+
+async def test_a_download_of_a_module_is_kept_until_the_module_executes_commands_again(port):
+    state, modules = port(), [TmclState(Tmcl(), each, name=each, product="TMCM-1241", version="1.15") for each in "13"]
+    for module in modules:
+        module.found_storing()
+        await state.owes(module)
+    state = port()
+    assert [each.name for each in state.owed] == ["1", "3"]
+    modules[0].executes()
+    modules[0].owes_nothing()
+    await state.owes(modules[0])
+    assert [each.name for each in port().owed] == ["3"]
 
 
 async def test_another_drive_strikes_nothing_out(port):

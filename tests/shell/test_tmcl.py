@@ -7,7 +7,7 @@ import itertools
 
 import pytest
 
-from dialects import Diagnostic, Inexpressible, NoAnswer, Refused, Stopped
+from dialects import Diagnostic, DriveError, Inexpressible, NoAnswer, Refused, Stopped
 from dialects.families import TABLE
 from drives.events import Sample
 from drives.stop_forms import stop_forms
@@ -116,7 +116,7 @@ async def test_position_and_velocity_are_polled(session):
 
 
 async def test_programs_do_not_exist(session):
-    with pytest.raises((Diagnostic, Inexpressible), match="direct mode runs no program"):
+    with pytest.raises((Diagnostic, Inexpressible), match="the host loads no programs into TMCL modules"):
         await say(session, "@1 MST 0", "/list")
 
 
@@ -147,3 +147,67 @@ async def test_a_module_is_followed_to_its_new_address_and_stopped_there(session
     assert await say(session, "@slide:1 SGP 66, 0, 5", "@5 GGP 66, 0") == ["5"]
     forms = stop_forms(session.buses["slide"].roster)
     assert {forms.immediate[0], *(piece.data[0] for piece in forms.repeats)} == {5, 7}
+
+
+SHUTTLE = ("132 0, 0, 0", "MVP ABS, 0, 20000", "27 1, 0, 0", "MVP ABS, 0, 0", "27 1, 0, 0", "22 0, 0, 0", "133 0, 0, 0")
+
+
+def module(session):
+    placed = [each for floor in session.cells.values() for each in floor.floor.drives]
+    return next(each.device for each in placed if (each.bus, each.spec.name) == ("slide", "1"))
+
+
+async def confirmed(session):
+    async with asyncio.timeout(PATIENCE):
+        await session.buses["slide"].stopped()
+    await asyncio.sleep(3.0)
+    return [event.text for event in session.events if isinstance(event, Notified)]
+
+
+async def test_a_stop_ends_the_program_of_a_module_before_its_motor(session):
+    await say(session, *(f"@slide:1 {line}" for line in SHUTTLE), "@slide:1 129 1, 0, 0")
+    await asyncio.sleep(1.0)
+    assert module(session).program.running and await say(session, "@slide:1 135 0, 0, 0") == ["1"]
+    session.stop("Ctrl+X")
+    told = await confirmed(session)
+    assert not module(session).program.running and any("1: stopped, velocity 0" in text for text in told)
+    place = module(session).motor.read(1, module(session)._now)
+    await asyncio.sleep(5.0)
+    assert module(session).motor.read(1, module(session)._now) == place
+
+
+async def test_a_stop_reaches_a_module_that_is_in_download_mode_and_moves(session):
+    await say(session, "@slide:1 ROR 0, 5000", "132 0, 0, 0", "MVP ABS, 0, 5")
+    assert session.buses["slide"].drives["1"].programming
+    session.stop("Ctrl+X")
+    told = await confirmed(session)
+    assert len(module(session).program.memory) == 1, told
+    assert not module(session).program.storing and any("1: stopped, velocity 0" in text for text in told)
+    assert await say(session, "@slide:1 GAP 3, 0") == ["0"]
+
+
+async def test_a_module_that_stores_the_stop_gets_the_end_of_its_download_and_the_whole_stop_again(session):
+    await say(session, "@slide:1 ROR 0, 5000")
+    module(session).program.download(0)
+    before = session.now()
+    session.stop("Ctrl+X")
+    while module(session).motor.parameters[2] and session.now() < before + 5:
+        await asyncio.sleep(0.01)
+    assert session.now() - before < 0.6
+    told = await confirmed(session)
+    assert any("1: it stored the stop" in text for text in told)
+    assert any("1: stopped, velocity 0" in text for text in told) and not module(session).program.storing
+
+
+async def test_nothing_but_the_lines_of_a_download_goes_to_its_module(session):
+    bus = session.buses["slide"]
+    polling = bus.telemetry.subscribe(("1", "7"), 0.05)
+    await say(session, "@slide:1 132 0, 0, 0", "MST 0")
+    await asyncio.sleep(1.0)
+    assert [call.command for call in module(session).program.memory] == [3]
+    with pytest.raises(DriveError, match="program mode"):
+        await say(session, "/wait stopped 5")
+    assert await say(session, "@slide:7 GAP 3, 0") == ["0"]
+    polling.close()
+    await say(session, "@slide:1 133 0, 0, 0")
+    assert not bus.drives["1"].programming and await say(session, "@slide:1 GAP 3, 0") == ["0"]

@@ -193,6 +193,10 @@ class MCode:
         """Whether a line is the sign-on, which a drive in party mode does not send (3.4.4)."""
         return SIGN_ON.match(line) is not None
 
+    def stored_stop(self, line: str) -> str:
+        """Never: no drive of the family replies so to a stop."""
+        return ""
+
     def invalidate(self) -> bytes:
         """Return a full buffer of tildes: the half-sent line overflows, which every drive refuses (5.1.102)."""
         return b"~" * (LONGEST + 1) + self.terminator

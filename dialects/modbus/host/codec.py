@@ -97,6 +97,10 @@ class Modbus:
         """Return False: a drive that restarts closes the connection."""
         return False
 
+    def stored_stop(self, line: str) -> str:
+        """Never: no drive of the family replies so to a stop."""
+        return ""
+
     def invalidate(self) -> bytes:
         """Return nothing: a message that has begun is always sent whole."""
         return b""

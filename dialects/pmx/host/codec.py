@@ -150,6 +150,10 @@ class Pmx:
         """Return False: a controller prints nothing after power-up."""
         return False
 
+    def stored_stop(self, line: str) -> str:
+        """Never: no drive of the family replies so to a stop."""
+        return ""
+
     def invalidate(self) -> bytes:
         """Return the end of a command that no unit knows; should a unit read it otherwise, ABORT follows at once."""
         return b"~~~\r"

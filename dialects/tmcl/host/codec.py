@@ -17,7 +17,7 @@ from dialects.codec import Decoded, End, Kind, Reply, Request, StopPiece
 from dialects.errors import Inexpressible
 from dialects.tmcl.host import framing
 from dialects.tmcl.manual import grammar
-from dialects.tmcl.manual.commands import Call, Command, Version
+from dialects.tmcl.manual.commands import Call, Command, Search, Version
 from dialects.tmcl.manual.status import Status, accepted
 
 FACTORY = "1"
@@ -33,8 +33,11 @@ RESYNC = 1.0
 QUIET = 0.1
 """Seconds of quiet that end a request without a reply."""
 
-STOP_BYTES = re.compile(rb"[\x01-\xff]\x03\x00[\x00-\x05]\x00{4}[\x00-\xff]")
-"""MST for any motor of any module, with any checksum: a module refuses a wrong one."""
+STOP_BYTES = re.compile(rb"[\x01-\xff](?:\x03\x00[\x00-\x05]|\x0d\x01[\x00-\x05]|[\x80\x85]\x00\x00)\x00{4}[\x00-\xff]")
+"""Each frame of a stop for any module, with any checksum: a module refuses a wrong one."""
+STOPS = frozenset({Command.MST, Command.STOP_PROGRAM, Command.END_DOWNLOAD, Command.RFS})
+"""The commands of a stop."""
+STORED_STOP = re.compile(r"module (\d+): in download mode: the stop was stored as a line of its program")
 
 
 @dataclass(frozen=True)
@@ -42,6 +45,8 @@ class Tmcl:
     """The modules of a line. `motors`: how many each has, by address, where that was counted."""
 
     motors: tuple[tuple[str, int], ...] = ()
+    storing: bool = False
+    """The module is in download mode: a stop ends that first."""
     family: ClassVar[str] = "tmcl"
     framed: ClassVar[bool] = True
     numbered: ClassVar[bool] = False
@@ -103,21 +108,29 @@ class Tmcl:
         return tuple(_unsolicited(buffer[:used])), used
 
     def stop(self, addresses: Sequence[str], sure: bool = True, half_sent: bool = False) -> bytes:
-        """MST for the first motor of the first module; the others follow one by one."""
-        return self._stops(addresses)[0]
+        """The first frame: MST for the first motor of the first module, or the end of its download."""
+        return self._first(addresses)[0]
 
     def stop_again(self, addresses: Sequence[str], sure: bool = True) -> Sequence[StopPiece]:
-        """MST for the other motors, then for all once more: a lost byte makes a module swallow the first."""
-        first, *others = self._stops(addresses)
-        following = [StopPiece(each, GAP) for each in others]
-        return [*following, StopPiece(first, RESYNC), *following]
+        """The rest, then all once more: a lost byte makes a module swallow the first frame.
+
+        Programs are halted before the motors, which they would start again. One MST for each module goes ahead of that.
+        """
+        first, whole = self._first(addresses), self._stops(addresses)
+        begun = [StopPiece(each, GAP) for each in (*first[1:], *whole)]
+        again = [*first, *whole] if self.storing else whole
+        return [*begun, StopPiece(again[0], RESYNC), *(StopPiece(each, GAP) for each in again[1:])]
+
+    def _first(self, addresses: Sequence[str]) -> list[bytes]:
+        call = Call(Command.END_DOWNLOAD if self.storing else Command.MST)
+        return [framing.request(int(name), call) for name in _modules(addresses)]
 
     def _stops(self, addresses: Sequence[str]) -> list[bytes]:
-        """MST for the first motor of each module, then for the second of those that may have one, and so on."""
-        counted = dict(self.motors)
-        modules = [name for name in addresses if is_address(name)] or [FACTORY]
-        return [
-            framing.request(int(name), Call(Command.MST, motor=motor))
+        """The end of each program; MST for the first motor of each module, then for the second; so for the searches."""
+        counted, modules = dict(self.motors), _modules(addresses)
+        return [framing.request(int(name), Call(Command.STOP_PROGRAM)) for name in modules] + [
+            framing.request(int(name), Call(command, kind, motor))
+            for command, kind in ((Command.MST, 0), (Command.RFS, Search.STOP))
             for motor in range(MOST_MOTORS)
             for name in modules
             if motor < counted.get(name, MOST_MOTORS)
@@ -125,7 +138,7 @@ class Tmcl:
 
     def hears_stop(self, data: bytes, address: str, sure: bool = True) -> bool:
         """Whether the stop of every motor of this module is in it."""
-        return all(stop in data for stop in self._stops([address]))
+        return all(stop in data for stop in self._stops([address]) if stop[1] == Command.MST)
 
     def starts_motion(self, text: str) -> bool:
         """Look the line up in the table of commands; an invalid line may start anything."""
@@ -142,6 +155,11 @@ class Tmcl:
         """Never: a module says nothing after power-up."""
         return False
 
+    def stored_stop(self, line: str) -> str:
+        """The address of a module whose reply to a stop was status 101."""
+        found = STORED_STOP.match(line)
+        return found[1] if found else ""
+
     def invalidate(self) -> bytes:
         """Nothing: a frame that has begun to leave is sent whole."""
         return b""
@@ -152,6 +170,10 @@ def number_of(address: str) -> int:
     if not is_address(address):
         raise Inexpressible(f"no module address '{address}'; valid: 1 to 255")
     return int(address)
+
+
+def _modules(addresses: Sequence[str]) -> list[str]:
+    return [name for name in addresses if is_address(name)] or [FACTORY]
 
 
 def is_address(text: str) -> bool:
@@ -181,8 +203,10 @@ def _unsolicited(frames: bytes) -> Iterator[str]:
         fields = framing.reply(frame)
         if fields is None:
             yield f"heard {frame.hex(' ')}"
-        elif fields.command != Command.MST:
+        elif fields.command not in STOPS:
             yield _described(fields)
+        elif fields.status == Status.STORED:
+            yield f"module {fields.module}: in download mode: the stop was stored as a line of its program"
 
 
 def _described(fields: framing.Frame) -> str:

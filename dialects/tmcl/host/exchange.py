@@ -17,7 +17,7 @@ from dialects.tmcl.host.codec import late_reply_to
 from dialects.tmcl.host.state import TmclState
 from dialects.tmcl.manual.commands import Call, Command, Search, Version
 from dialects.tmcl.manual.parameters import Axis, Global
-from dialects.tmcl.manual.status import REFUSALS
+from dialects.tmcl.manual.status import REFUSALS, Status
 
 MARKS = (
     Call(Command.GGP, Global.HOST_ADDRESS),
@@ -27,6 +27,8 @@ MARKS = (
 )
 """Reading commands. Each can prove that the replies to all other commands are over."""
 ANY_VALUE = r"-?\d+"
+END = "133 0, 0, 0"
+"""The line that ends download mode."""
 
 
 def who(state: TmclState) -> str:
@@ -36,8 +38,11 @@ def who(state: TmclState) -> str:
 
 def answered(state: TmclState, request: Request) -> Procedure[Reply]:
     """Send a request once; its reply. Raises Refused or NoAnswer."""
-    if state.reply_pending and not (yield from _mark(state, request.priority)):
-        raise NoAnswer(f"{who(state)} does not reply: '{request.text}' was not sent")
+    if state.programming:
+        raise Refused(f"{who(state)} is in download mode and would store '{request.text}'; {END} ends that")
+    yield from synchronised(state, request)
+    if state.programming:
+        raise Refused(f"{who(state)} is in download mode; '{request.text}' was not sent", int(Status.STORED))
     reply = yield from _replied(state, request)
     if reply.end in (End.TIMEOUT, End.DAMAGED):
         state.reply_lost(_command(request))
@@ -50,13 +55,32 @@ def answered(state: TmclState, request: Request) -> Procedure[Reply]:
     return reply
 
 
+def synchronised(state: TmclState, request: Request) -> Procedure[None]:
+    """Make sure that no reply is outstanding before a request. Raises NoAnswer."""
+    if state.reply_pending and not (yield from _mark(state, request.priority)):
+        raise NoAnswer(f"{who(state)} does not reply: '{request.text}' was not sent")
+
+
 def _replied(state: TmclState, request: Request) -> Procedure[Reply]:
     """The reply to a request; a reply that is not awaited to its end is lost."""
     try:
-        return (yield request)
+        reply = yield request
+        status = status_of(reply)
+        if status == Status.STORED:
+            state.found_storing()
+            state.note(f"{who(state)} is in download mode and stored '{request.text}'; {END} or a stop ends that")
+        elif status == Status.DONE and state.restore is not None:
+            state.owes_nothing()
+        return reply
     except (Stopped, GeneratorExit):
         state.reply_lost(_command(request))
         raise
+
+
+def status_of(reply: Reply) -> int | None:
+    """The status in the frame of a reply; None: it is not one."""
+    fields = framing.reply(reply.body) if len(reply.body) == framing.LENGTH else None
+    return fields.status if fields is not None else None
 
 
 def read(state: TmclState, call: Call, priority: Priority = Priority.OPERATOR) -> Procedure[int]:

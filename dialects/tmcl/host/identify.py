@@ -6,7 +6,7 @@ from dialects.codec import End, Procedure
 from dialects.errors import Inexpressible, NoAnswer
 from dialects.family import Hints
 from dialects.tmcl.host.codec import FACTORY, MOST_MOTORS, Tmcl, number_of
-from dialects.tmcl.host.exchange import who
+from dialects.tmcl.host.exchange import END, status_of, who
 from dialects.tmcl.host.motors import motors
 from dialects.tmcl.host.state import TmclState
 from dialects.tmcl.manual.commands import Call, Command, Version
@@ -31,6 +31,9 @@ def identify(hints: Hints) -> Procedure[list[TmclState]]:
     found = []
     for name in names:
         state = TmclState(Tmcl(), name)
+        state.named(name)
+        if any(each.name == name for each in hints.owed):
+            yield from _end_download(state, "the last session left it in download mode")
         if not (yield from _found(state)):
             state.note(f"{who(state)} does not reply")
         found.append(state)
@@ -47,6 +50,9 @@ def _found(state: TmclState) -> Procedure[bool]:
     """Ask one module for its version and count its motors; whether it replied."""
     for _ in range(TRIES):
         reply = yield state.codec.request(state.address, "136 1, 0, 0", IDENTITY)
+        if status_of(reply) == Status.STORED:
+            yield from _end_download(state, "found in download mode, where it stored one command more")
+            reply = yield state.codec.request(state.address, "136 1, 0, 0", IDENTITY)
         damaged = reply.end is End.REFUSED and int(reply.text) == Status.WRONG_CHECKSUM
         if reply.end in (End.DONE, End.REFUSED) and not damaged:
             break
@@ -59,6 +65,12 @@ def _found(state: TmclState) -> Procedure[bool]:
         state.identified("TMCL module", "")
     yield from _count_motors(state)
     return True
+
+
+def _end_download(state: TmclState, why: str) -> Procedure[None]:
+    """End the download mode of a module and say so."""
+    yield state.codec.request(state.address, END, Call(Command.END_DOWNLOAD))
+    state.note(f"{who(state)}: {why}; it was ended with 133: check the program in the module")
 
 
 def _count_motors(state: TmclState) -> Procedure[None]:

@@ -2,15 +2,21 @@
 
 from __future__ import annotations
 
-from dialects.codec import Kind, Priority, Procedure
-from dialects.errors import Inexpressible, Refused
+from dataclasses import replace
+
+from dialects.codec import Kind, Priority, Procedure, Request
+from dialects.errors import Inexpressible, NoAnswer, Refused
 from dialects.family import Motion
-from dialects.tmcl.host.exchange import answered, read, who
+from dialects.tmcl.host.exchange import END, answered, read, refusal, status_of, synchronised, who
 from dialects.tmcl.host.motors import motors
 from dialects.tmcl.host.state import TmclState
 from dialects.tmcl.manual import grammar
-from dialects.tmcl.manual.commands import Call, Command, Search
+from dialects.tmcl.manual.commands import Call, Command, Running, Search
 from dialects.tmcl.manual.parameters import Axis, Global
+from dialects.tmcl.manual.status import Status
+
+LACKS = (Status.INVALID_COMMAND, Status.WRONG_TYPE, Status.INVALID_VALUE)
+"""The statuses of a module that does not know a command or a parameter."""
 
 
 def perform(state: TmclState, text: str) -> Procedure[tuple[str, ...]]:
@@ -23,6 +29,9 @@ def perform(state: TmclState, text: str) -> Procedure[tuple[str, ...]]:
     except grammar.LineError as error:
         raise Inexpressible(f"'{text.strip()}': {error}; nothing was sent") from None
     request = state.codec.request(state.address, text.strip(), call)
+    if state.programming or call.command == Command.DOWNLOAD:
+        yield from _store(state, request, call)
+        return ()
     if call.command == Command.FACTORY or (
         call.command in (Command.SAP, Command.RSAP) and call.type == Axis.RELATIVE_FROM
     ):
@@ -30,6 +39,29 @@ def perform(state: TmclState, text: str) -> Procedure[tuple[str, ...]]:
     reply = yield from answered(state, request)
     _remark(state, call)
     return reply.lines if request.kind is Kind.PRINT else ()
+
+
+def _store(state: TmclState, request: Request, call: Call) -> Procedure[None]:
+    """Begin a download, store a line, or end the download; nothing else may go to the module meanwhile."""
+    if not state.programming:
+        yield from synchronised(state, request)
+        state.found_storing()
+        state.remark(f"{who(state)}: download mode: every command is stored until {END}, or a stop")
+    begins, ends = call.command == Command.DOWNLOAD, call.command == Command.END_DOWNLOAD
+    reply = yield replace(request, kind=Kind.PROGRAM)
+    status = status_of(reply)
+    if status is None:
+        state.reply_lost(call.command)
+        raise NoAnswer(f"{who(state)}: it is not known whether '{request.text}' was stored; it was sent once")
+    if status == Status.STORED or (begins and status == Status.DONE):
+        return
+    if status == Status.DONE or begins:
+        state.executes()
+        state.owes_nothing()
+    if status != Status.DONE:
+        raise refusal(state, request, reply)
+    if not ends:
+        raise Refused(f"{who(state)} was not in download mode any more: '{request.text}' was executed and not stored")
 
 
 def motion(state: TmclState, priority: Priority) -> Procedure[tuple[Motion, ...]]:
@@ -61,8 +93,13 @@ def _searching(state: TmclState, motor: int) -> Procedure[bool]:
 
 
 def busy(state: TmclState) -> Procedure[bool]:
-    """Whether a program runs: direct mode runs none."""
-    yield from ()
+    """Whether its program runs; a module that knows neither question has none."""
+    for call in (Call(Command.PROGRAM_STATUS), Call(Command.GGP, Global.PROGRAM_STATUS)):
+        try:
+            return (yield from read(state, call)) == Running.RUNS
+        except Refused as refused:
+            if refused.code not in LACKS:
+                raise
     return False
 
 

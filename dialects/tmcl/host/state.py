@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
-from dialects.state import DriveState
-from dialects.tmcl.host.codec import Tmcl
+from dialects.state import DriveState, Owed
+from dialects.tmcl.host.codec import STOPS, Tmcl
 
 
 @dataclass(eq=False)
@@ -45,7 +45,22 @@ class TmclState(DriveState):
 
     def readdressed(self, address: int) -> None:
         """The module has another address from now on: requests and stops go there."""
-        self.address = str(address)
+        self.address = self.name = str(address)
+
+    def found_storing(self) -> None:
+        """The module is in download mode, or may be: it stores every command but the end of that mode."""
+        self.programming, self.codec = True, replace(self.codec, storing=True)
+        self.owes(Owed(0, self.name, self.product, self.version, self.part, self.serial))
+
+    def executes(self) -> None:
+        """The module executes commands again."""
+        self.programming, self.codec = False, replace(self.codec, storing=False)
+
+    def stopped(self) -> None:
+        """A stop ends download mode; its replies may be late."""
+        self.executes()
+        self.lost_commands |= STOPS
+        self.reply_outstanding()
 
     def line_counted(self, codec: Tmcl) -> None:
         """Record the codec that all modules of the line share: it has the motors of each."""

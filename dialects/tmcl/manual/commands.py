@@ -28,6 +28,13 @@ class Command(IntEnum):
     STGP = 11
     RSGP = 12
     RFS = 13
+    STOP_PROGRAM = 128
+    RUN = 129
+    STEP = 130
+    RESET_PROGRAM = 131
+    DOWNLOAD = 132
+    END_DOWNLOAD = 133
+    PROGRAM_STATUS = 135
     VERSION = 136
     FACTORY = 137
     NOTIFY = 138
@@ -49,6 +56,15 @@ class Search(IntEnum):
     STATUS = 2
 
 
+class Running(IntEnum):
+    """What a program does: the value of command 135, and of global parameter 128."""
+
+    HALTED = 0
+    RUNS = 1
+    STEPS = 2
+    RESET = 3
+
+
 class Version(IntEnum):
     """The types of command 136."""
 
@@ -56,8 +72,6 @@ class Version(IntEnum):
     BINARY = 1
 
 
-DOWNLOAD = 132
-"""The command that begins a download of a program; the module then stores every command, a stop included."""
 FACTORY_CODE = 1234
 """The value that command 137 needs."""
 TYPE, MOTOR, BANK, VALUE = "type", "motor", "bank", "value"
@@ -156,7 +170,7 @@ class Call:
         """Whether the value of its reply is what was asked for."""
         if self.command == Command.RFS:
             return self.type == Search.STATUS
-        return self.command == Command.VERSION or (self.row is not None and self.row.prints)
+        return self.command in (Command.VERSION, Command.PROGRAM_STATUS) or (self.row is not None and self.row.prints)
 
     @property
     def moves(self) -> bool:
@@ -171,8 +185,22 @@ STARTING_PARAMETERS = frozenset({0, 1, 2, 4})
 """
 
 
+NEVER_MOVE = frozenset(
+    {
+        Command.STOP_PROGRAM,
+        Command.RESET_PROGRAM,
+        Command.DOWNLOAD,
+        Command.END_DOWNLOAD,
+        Command.PROGRAM_STATUS,
+        Command.VERSION,
+        Command.NOTIFY,
+    }
+)
+"""Commands without a word that start neither a motion nor a program; 129 and 130 do."""
+
+
 def _moves(call: Call) -> bool:
-    if call.command in (Command.VERSION, Command.NOTIFY):
+    if call.command in NEVER_MOVE:
         return False
     if call.command in (Command.SAP, Command.RSAP):
         return call.type in STARTING_PARAMETERS

@@ -9,7 +9,7 @@ from __future__ import annotations
 import difflib
 import re
 
-from dialects.tmcl.manual.commands import BANK, DOWNLOAD, INT32, MOTOR, MOTORS, TYPE, VALUE, WORDS, Call, Row
+from dialects.tmcl.manual.commands import BANK, INT32, MOTOR, MOTORS, TYPE, VALUE, WORDS, Call, Row
 
 BYTE = range(256)
 RANGES = {TYPE: BYTE, MOTOR: MOTORS, BANK: BYTE, VALUE: INT32}
@@ -40,8 +40,6 @@ def parse(text: str) -> Call:
 def _by_number(word: str, fields: list[str]) -> Call:
     if int(word) not in BYTE:
         raise LineError(f"no command {word}; valid: 0 to 255")
-    if int(word) == DOWNLOAD:
-        raise LineError(f"{word} is not sent: in download mode a module stores every command, a stop included")
     if len(fields) != len(BY_NUMBER):
         raise LineError(f"a command by its number takes {_count(len(BY_NUMBER))}: {word} {', '.join(BY_NUMBER)}")
     kind, motor, value = (_number(name, field) for name, field in zip(BY_NUMBER, fields, strict=True))

@@ -1,7 +1,7 @@
 """The TMCL lines that a person must agree to before they are sent.
 
-A guarded line wears the EEPROM out, forgets what is stored, or changes how the module is reached. A stop is never
-guarded.
+A guarded line wears the EEPROM out, forgets what is stored, starts programs later, or changes how the module is
+reached. A stop is never guarded.
 """
 
 from __future__ import annotations
@@ -23,6 +23,8 @@ NAMES: Mapping[str, str] = MappingProxyType(
         "STGP": _EEPROM,
         "FACTORY": "restores the factory settings, and gives no reply",
         "BOOTLOADER": "starts the bootloader; the module then obeys no command, a stop included",
+        "DOWNLOAD": "erases the program from that line on; the module then stores every command until 133",
+        "AUTOSTART": "has the module start its program at each power-up",
         "BAUD": "changes the baud rate from the next message on",
         "ADDRESS": "changes the address of the module from the next message on",
         EVERYONE: "can start every drive of the line",
@@ -30,7 +32,13 @@ NAMES: Mapping[str, str] = MappingProxyType(
 )
 """Every guard, and what its lines do."""
 _COMMANDS: Mapping[int, str] = MappingProxyType(
-    {Command.STAP: "STAP", Command.STGP: "STGP", Command.FACTORY: "FACTORY", BOOTLOADER: "BOOTLOADER"}
+    {
+        Command.STAP: "STAP",
+        Command.STGP: "STGP",
+        Command.DOWNLOAD: "DOWNLOAD",
+        Command.FACTORY: "FACTORY",
+        BOOTLOADER: "BOOTLOADER",
+    }
 )
 _PARAMETERS: Mapping[int, str] = MappingProxyType({Global.BAUD: "BAUD", Global.ADDRESS: "ADDRESS"})
 """Guards on setting a global parameter, or restoring it from EEPROM."""
@@ -66,6 +74,8 @@ def word_of(text: str) -> str:
 
 
 def _name(call: Call) -> str:
+    if call.command == Command.SGP and call.type == Global.AUTOSTART and call.value:
+        return "AUTOSTART"
     if call.command in (Command.SGP, Command.RSGP):
         return _PARAMETERS.get(call.type, "")
     return _COMMANDS.get(call.command, "")

@@ -56,6 +56,7 @@ class Global(IntEnum):
     PAUSE = 75
     HOST_ADDRESS = 76
     AUTOSTART = 77
+    PROGRAM_STATUS = 128
 
 
 @dataclass(frozen=True)
@@ -115,6 +116,7 @@ GLOBAL: Mapping[int, Parameter] = MappingProxyType(
         Global.PAUSE: Parameter("pause before a reply", range(256), "ms"),
         Global.HOST_ADDRESS: Parameter("address of the host in replies", range(256), "", 2),
         Global.AUTOSTART: Parameter("1 starts the stored program at power-up", FLAG),
+        Global.PROGRAM_STATUS: Parameter("the program: 0 halted, 1 runs, 2 steps, 3 reset"),
     }
 )
 BAUDS: Mapping[int, int] = MappingProxyType(

@@ -26,7 +26,8 @@ def names(motors: int) -> tuple[str, ...]:
     """The settings of a module, in the order in which they are written."""
     axis = [number for number, each in AXIS.items() if each.writable and number not in MOTION]
     own = [f"{int(number)}{f'_{motor}' if motor else ''}" for motor in range(motors) for number in axis]
-    ordered = sorted(GLOBAL, key=lambda number: (number in WIRE, number == Global.ADDRESS, number == Global.BAUD))
+    own_globals = [number for number, each in GLOBAL.items() if each.writable]
+    ordered = sorted(own_globals, key=lambda number: (number in WIRE, number == Global.ADDRESS, number == Global.BAUD))
     return (*own, *(f"{GLOBAL_PREFIX}{int(number)}" for number in ordered))
 
 

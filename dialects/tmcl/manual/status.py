@@ -47,7 +47,7 @@ REFUSALS: Mapping[int, Refusal] = MappingProxyType(
         Status.MAXIMUM_EXCEEDED: Refusal("maximum exceeded", "too many of them; check the value"),
         Status.STORED: Refusal(
             "stored as a program line, not executed",
-            "the module is in download mode and stores a stop too: switch it off and on",
+            "the module is in download mode; 133 0, 0, 0 or a stop ends that",
         ),
     }
 )

@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 
 from dialects.codec import End
 from dialects.errors import Inexpressible
-from dialects.tmcl.host.codec import Tmcl
+from dialects.tmcl.host.codec import STOP_BYTES, Tmcl
 from dialects.tmcl.manual.grammar import parse
 
 FRAMES = [
@@ -106,14 +106,25 @@ def test_the_stop_goes_to_each_motor_of_each_module_a_frame_at_a_time_and_again(
     assert first == bytes.fromhex("01 03 00 00 00 00 00 00 04")
     again = codec.stop_again(["1", "7"])
     frames = [(data[0], data[1], data[3]) for data in (first, *(piece.data for piece in again))]
-    assert frames == [(1, 3, 0), (7, 3, 0), (1, 3, 1)] * 2
-    assert [piece.quiet for piece in again] == [0.03, 0.03, 1.0, 0.03, 0.03]
+    whole = [(1, 128, 0), (7, 128, 0), (1, 3, 0), (7, 3, 0), (1, 3, 1), (1, 13, 0), (7, 13, 0), (1, 13, 1)]
+    assert frames == [(1, 3, 0), (7, 3, 0), *whole, *whole]
+    assert [piece.quiet for piece in again] == [*[0.03] * 9, 1.0, *[0.03] * 7]
+    assert {data[2] for data in (piece.data for piece in again) if data[1] == 13} == {1}
+
+
+def test_the_stop_of_a_module_in_download_mode_ends_that_first_both_times():
+    codec = Tmcl((("1", 1),), storing=True)
+    pieces = codec.stop_again(["1"])
+    assert [data[1] for data in (codec.stop(["1"]), *(piece.data for piece in pieces))] == [133, 128, 3, 13] * 2
+    assert [piece.quiet for piece in pieces] == [0.03, 0.03, 0.03, 1.0, 0.03, 0.03, 0.03]
+    assert all(STOP_BYTES.fullmatch(piece.data) for piece in pieces)
 
 
 def test_a_module_whose_motors_are_not_counted_is_stopped_with_as_many_as_any_has():
     codec = Tmcl((("1", 1),))
     frames = [codec.stop(["9", "1"]), *(piece.data for piece in codec.stop_again(["9", "1"]))]
-    assert [(data[0], data[3]) for data in frames[:7]] == [(9, 0), (1, 0), *((9, motor) for motor in range(1, 6))]
+    stops = [(data[0], data[3]) for data in frames[4:11]]
+    assert stops == [(9, 0), (1, 0), *((9, motor) for motor in range(1, 6))]
 
 
 @pytest.mark.parametrize("name", ["999", "0", "a", "\u0663", "01"])

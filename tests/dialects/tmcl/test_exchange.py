@@ -14,7 +14,9 @@ from dialects.tmcl.family import TMCL
 from dialects.tmcl.host.codec import Tmcl
 from dialects.tmcl.manual.commands import Call, Command
 from dialects.tmcl.manual.parameters import AXIS, Axis
+from dialects.tmcl.manual.status import Status
 from drives.line import Line
+from simulator.tmcl.module import Refused as Lacking
 from tests.conftest import Bench
 from tests.support.cases import for_each
 
@@ -325,11 +327,52 @@ def test_every_module_of_a_line_is_stopped_with_the_others():
     assert not one.settings_unknown
 
 
-def test_download_mode_is_not_entered():
+def test_a_module_found_in_download_mode_is_taken_out_of_it_and_that_is_said():
+    shop = Shop()
+    program = shop.devices["1"].program
+    program.download(0)
+    (state,) = shop.open()
+    assert (program.storing, state.programming, state.product, state.motors) == (False, False, "TMCM-1241", 1)
+    assert any("found in download mode" in note and "133" in note for note in state.notes)
+
+
+def test_the_last_session_s_download_is_ended_before_anything_is_stored():
+    shop = Shop()
+    program = shop.devices["1"].program
+    (state,) = shop.open()
+    shop.type(state, "132 0, 0, 0")
+    shop.type(state, "MST 0")
+    assert state.restore is not None and state.programming and len(program.memory) == 1
+    (again,) = shop.run(TMCL.identify(Hints(drives=("1",), owed=(state.restore,))))
+    assert (program.storing, len(program.memory), again.programming, again.restore) == (False, 1, False, None)
+
+
+def test_a_line_of_a_download_that_was_executed_is_said():
     shop = Shop()
     (state,) = shop.open()
-    with pytest.raises(Inexpressible, match="in download mode a module stores every command, a stop included"):
-        shop.type(state, "132 0, 0, 0")
+    shop.type(state, "132 0, 0, 0")
+    shop.devices["1"].program.storing = False  # by another host
+    with pytest.raises(Refused, match="was executed and not stored"):
+        shop.type(state, "MVP ABS, 0, 5")
+    assert not state.programming and state.restore is None
+
+
+@pytest.mark.parametrize(("without", "runs"), [((), True), ((135,), True), ((135, 10), False)])
+def test_whether_a_program_runs_is_read_by_135_or_global_parameter_128(without, runs, monkeypatch):
+    shop = Shop()
+    (state,) = shop.open()
+    for line in ("132 0, 0, 0", "27 0, 0, 1000", "133 0, 0, 0", "129 1, 0, 0"):
+        shop.type(state, line)
+    device = shop.devices["1"]
+    execute = device._execute
+
+    def lacking(call, now):
+        if call.command in without:
+            raise Lacking(Status.INVALID_COMMAND)
+        return execute(call, now)
+
+    monkeypatch.setattr(device, "_execute", lacking)
+    assert shop.run(TMCL.busy(state)) is runs
 
 
 def damaged(data, place, how):

@@ -90,6 +90,12 @@ def test_any_text_is_a_command_or_a_line_error(text):
         ("136 1, 0, 0", False),
         ("137 0, 0, 1234", True),
         ("129 0, 0, 0", True),
+        ("130 0, 0, 0", True),
+        ("128 0, 0, 0", False),
+        ("131 0, 0, 0", False),
+        ("132 0, 0, 0", False),
+        ("133 0, 0, 0", False),
+        ("135 0, 0, 0", False),
     ],
 )
 def test_what_can_start_motion(text, moves):

@@ -24,13 +24,17 @@ ONE, EVERY = TmclState(Tmcl(), "1"), TmclState(Tmcl(), "*")
         ("9 66, 0, 5", "address"),
         ("RSGP 66, 0", "address"),
         ("242 0, 0, 0", "bootloader"),
+        ("132 0, 0, 0", "stores every command until 133"),
+        ("SGP 77, 0, 1", "at each power-up"),
     ],
 )
 def test_a_guarded_line_has_a_reason(text, part):
     assert part in FAMILY.guards.find(ONE, text).what
 
 
-@pytest.mark.parametrize("text", ["GAP 1, 0", "ROR 0, 1000", "SGP 75, 0, 5", "GGP 66, 0", "SGP 66", "", "MR 5", "/x"])
+@pytest.mark.parametrize(
+    "text", ["GAP 1, 0", "ROR 0, 1000", "SGP 75, 0, 5", "GGP 66, 0", "SGP 66", "SGP 77, 0, 0", "", "MR 5", "/x"]
+)
 def test_other_lines_have_none(text):
     assert FAMILY.guards.find(ONE, text) is None
 
