@@ -21,6 +21,7 @@ import pytest
 from multidrop.__main__ import main
 from tests.support.paths import ROOT
 from tests.support.processes import environment
+from tests.support.until import PATIENCE
 
 pytestmark = pytest.mark.process
 
@@ -76,7 +77,9 @@ def test_the_commands_of_a_page_print_what_it_says(page: str, tmp_path: Path) ->
             printed = everything(tmp_path, env, *shlex.split(command)[1:])
         else:
             shell = ["bash", "-c", f"exec 2>&1; {command}"]
-            printed = subprocess.run(shell, cwd=tmp_path, env=env, capture_output=True, text=True, timeout=60).stdout
+            printed = subprocess.run(
+                shell, cwd=tmp_path, env=env, capture_output=True, text=True, timeout=PATIENCE
+            ).stdout
         assert doctest.OutputChecker().check_output(expected, printed, doctest.ELLIPSIS), (
             f"{page}: {command}\nexpected:\n{expected}got:\n{printed}"
         )

@@ -19,9 +19,9 @@ from drives.bus import Bus
 from drives.drive import still
 from drives.events import Notice, Traffic, Unsolicited
 from drives.halt import Fate
+from tests.support.until import PATIENCE
 from transports.sockets import open_tcp
 
-PATIENCE = 10.0
 LAST = 0xB8
 logging.getLogger("pymodbus").addHandler(logging.NullHandler())
 

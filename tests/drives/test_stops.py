@@ -15,6 +15,7 @@ from simulator.cells import read
 from simulator.floor import Floor
 from simulator.serving.in_process import SimPipe
 from simulator.serving.running import RunningFloor
+from tests.support.until import PATIENCE
 from tests.support.virtual import in_virtual_time
 
 PROGRAM = "PG 1\nLB G1\nMR 51200\nH\nE\nPG\n"
@@ -269,7 +270,7 @@ async def test_a_second_stop_in_the_middle_of_the_clean_up_does_not_leave_progra
     drive = shop.bus.drives["a"]
     for wait in (0.05, 0.15, 0.22, 0.3, 0.4):
         loading = asyncio.ensure_future(drive.download(program_file.read(PROGRAM, "x")))
-        async with asyncio.timeout(10):
+        async with asyncio.timeout(PATIENCE):
             while not drive.programming:
                 await asyncio.sleep(0.001)
         await asyncio.sleep(0.06)

@@ -1,12 +1,15 @@
-"""What an ordinary run takes of a product of parameters."""
+"""What an ordinary run takes of a product of parameters, and what becomes of a test whose tool is absent."""
 
 from __future__ import annotations
 
+import re
 from itertools import product
 
 import pytest
 
 from tests.support.marks import is_taken, places
+from tests.support.paths import ROOT
+from tests.support.tools import PROMISED, tool
 
 
 @pytest.mark.parametrize("sizes", [(4, 2, 2, 2), (12, 7), (5, 3, 3), (1, 6)], ids=str)
@@ -23,3 +26,26 @@ def test_the_place_of_a_test_is_that_of_its_values(
     request: pytest.FixtureRequest, letter: str, number: int, name: str
 ) -> None:
     assert places(request.node) == [((number - 1), 2), ("xyz".index(letter), 3)]
+
+
+def test_an_absent_tool_skips_a_test_and_fails_it_where_all_are_promised(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv(PROMISED, raising=False)
+    with pytest.raises(pytest.skip.Exception, match="no-such-tool is not installed"):
+        tool("no-such-tool")
+    monkeypatch.setenv(PROMISED, "1")
+    with pytest.raises(pytest.fail.Exception, match="no-such-tool is not installed, and MULTIDROP_ALL_TOOLS"):
+        tool("no-such-tool")
+
+
+def test_ci_installs_every_tool_of_the_tests_and_hides_nothing_by_a_setting_of_python() -> None:
+    texts = [
+        path.read_text(encoding="utf-8") for path in (ROOT / "tests").rglob("*.py") if path.name != "test_marks.py"
+    ]
+    calls = [call for text in texts for call in re.findall(r'(?:mark\.needs|\btool)\(((?:"[\w-]+"(?:, )?)+)\)', text)]
+    named = {name for call in calls for name in re.findall(r'"([\w-]+)"', call)}
+    ci = (ROOT / ".ci" / "run").read_text(encoding="utf-8")
+    installed = set(re.findall(r"([\w-]+):[\w-]+", ci)) | {"mosquitto_passwd"}
+    assert {"mbpoll", "sshd", "fish", "mosquitto"} <= named <= installed
+    assert not [text for text in texts if "skipif(shutil.which" in text or "skipif(not shutil.which" in text]
+    assert f"export {PROMISED}=1" in ci
+    assert "unset" in ci and "${!PYTHON@}" in ci

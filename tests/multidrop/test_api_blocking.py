@@ -16,6 +16,7 @@ from multidrop import Diagnostic, Refused, Session, Stopped, connect
 from multidrop.api import endings, threads
 from tests.support import api_program
 from tests.support.cell_session import bus, moves, party
+from tests.support.until import PATIENCE
 from tests.support.virtual import VirtualLoop
 
 RUN = "SL 1000"
@@ -175,7 +176,7 @@ def test_a_stop_from_another_thread_ends_a_wait(session: Session) -> None:
     thread = threading.Thread(target=wait)
     thread.start()
     report = session.stop()
-    thread.join(10)
+    thread.join(PATIENCE)
     assert report.at_rest and moving(floor(session)) == set()
     with pytest.raises(Stopped):
         a.move(1)

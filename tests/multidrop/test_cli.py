@@ -10,6 +10,7 @@ from multidrop import cli, command_table
 from simulator.families import PROGRAMS, TABLE
 from tests.support.paths import ROOT
 from tests.support.processes import environment
+from tests.support.until import PATIENCE
 
 COMMANDS = ["demo", "tui", "shell", "send", "run", "sim", "program", "macro", "plot", "ports", "report", "completion"]
 RUN = [each.run for one in command_table.COMMANDS.values() for each in (one, *one.parts.values()) if not each.parts]
@@ -25,7 +26,7 @@ def process(tmp_path):
             stdin=subprocess.DEVNULL,
             capture_output=True,
             text=True,
-            timeout=60,
+            timeout=PATIENCE,
             cwd=tmp_path,
             env=environment(tmp_path),
         )
@@ -112,7 +113,7 @@ def test_help_and_version_import_nothing_heavy():
     )
     for asked in ("--version", "--help"):
         done = subprocess.run(
-            [sys.executable, "-c", code, asked], capture_output=True, text=True, timeout=60, cwd=ROOT, check=True
+            [sys.executable, "-c", code, asked], capture_output=True, text=True, timeout=PATIENCE, cwd=ROOT, check=True
         )
         assert done.stdout.splitlines()[-1] == "0 []"
 

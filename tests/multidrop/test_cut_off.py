@@ -17,7 +17,8 @@ from pathlib import Path
 
 import pytest
 
-from tests.support.processes import WAIT, Running, environment
+from tests.support.processes import Running, environment
+from tests.support.until import PATIENCE
 
 pytestmark = pytest.mark.process
 
@@ -65,7 +66,7 @@ class Floor:
 
     def heard(self, process, enough=None):
         """How many bytes the drive says until the process ends, or (`enough`) until they are so many."""
-        heard, ends = 0, time.monotonic() + WAIT
+        heard, ends = 0, time.monotonic() + PATIENCE
         while enough is None or heard < enough:
             assert time.monotonic() < ends
             self.listener.settimeout(0.2)
@@ -88,7 +89,7 @@ class Floor:
     def ask(self, *lines):
         """What a new session prints for these lines, and what it says besides."""
         process = self.start("send", self.url, *lines)
-        out, err = process.communicate(timeout=WAIT)
+        out, err = process.communicate(timeout=PATIENCE)
         assert process.returncode == 0, err
         return out.split("\n")[:-1], err
 
@@ -126,7 +127,7 @@ def test_after_a_download_that_is_killed_the_next_session_finds_the_drive_as_it_
         line.silent()
         whole = line.start(*download)
         sizes.append(line.heard(whole))
-        assert whole.wait(WAIT) == 0 and line.kept() == []
+        assert whole.wait(PATIENCE) == 0 and line.kept() == []
     size, backup = sizes[0], sizes[1] - sizes[0]
     owed = put_back = named = 0
     for number in range(KILLS):
@@ -169,7 +170,7 @@ def test_half_a_line_of_another_program_that_was_killed_is_not_executed(floor, p
 
 def until(condition):
     """Wait for another process."""
-    ends = time.monotonic() + WAIT
+    ends = time.monotonic() + PATIENCE
     while not condition():
         assert time.monotonic() < ends
         time.sleep(0.01)
@@ -182,7 +183,7 @@ def test_a_plug_that_is_pulled_in_the_middle_of_a_line_has_the_next_session_make
     shell.stdin.flush()
     until(lambda: any(b"MR" in path.read_bytes() for path in line.folder.glob("state/ports/*.line")))
     line.sim.say("/sim unplug w")
-    assert shell.wait(WAIT) == 3
+    assert shell.wait(PATIENCE) == 3
     line.sim.say("/sim plug w")
     until(lambda: (line.folder / "w.tty").exists())
     printed, said = line.ask("PR P", "PR MV")

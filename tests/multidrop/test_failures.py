@@ -16,7 +16,8 @@ import pexpect
 import pytest
 
 from tests.support.front_door import command
-from tests.support.processes import WAIT, Running, Tap, environment
+from tests.support.processes import Running, Tap, environment
+from tests.support.until import PATIENCE
 
 pytestmark = pytest.mark.process
 
@@ -86,7 +87,7 @@ class Shop:
     def process(self, *arguments, stdin):
         """The same of a process that reads its standard input."""
         process = self.popen(*arguments, stdin=subprocess.PIPE)
-        out, err = process.communicate(stdin, timeout=60)
+        out, err = process.communicate(stdin, timeout=PATIENCE)
         return process.returncode, out, err
 
     def close(self):
@@ -103,7 +104,7 @@ class Shop:
             ["-m", "multidrop", *arguments],
             cwd=self.folder,
             env=environment(self.folder),
-            timeout=30,
+            timeout=PATIENCE,
             encoding="utf-8",
             dimensions=(24, 120),
         )
@@ -146,7 +147,7 @@ def standing(shop, url, drive="a"):
 
 def eventually(condition):
     """Wait for another process."""
-    ends = time.monotonic() + WAIT
+    ends = time.monotonic() + PATIENCE
     while not condition():
         assert time.monotonic() < ends
 
@@ -163,7 +164,7 @@ def test_what_nobody_answers_is_told_and_not_sent_twice_in_any_mode(shop, tapped
     where = re.escape("nobody.txt:1: " if door == "run" else "")
     fate = "(it is not known whether 'MR 51200' was executed; it was sent once|'MR 51200' was not sent)"
     for tap, process in started:
-        out, err = process.communicate(f"{line}\n@a MR 1\n" if door == "shell" else "", timeout=60)
+        out, err = process.communicate(f"{line}\n@a MR 1\n" if door == "shell" else "", timeout=PATIENCE)
         assert (process.returncode, out) == (1, "")
         *stop, failure = err.splitlines()
         told = re.fullmatch(f"{where}z does not reply: {fate}", failure)
@@ -200,7 +201,7 @@ class Unplugged:
         assert self.process.stdout.readline() == "moves\n"
 
     def end(self):
-        out, err = self.process.communicate(timeout=30)
+        out, err = self.process.communicate(timeout=PATIENCE)
         assert (self.process.returncode, out) == (3, "") and err.count("\n") == 2
         stop, lost = err.splitlines()
         unread = r": stop not sent \(lost\): a started \d+ s ago and not read since - use the E-stop"
@@ -272,7 +273,7 @@ def test_a_script_that_is_stopped_in_a_download_leaves_a_drive_that_listens(shop
 
 def test_a_line_that_is_half_sent_when_the_stop_comes_moves_nothing(shop):
     script = shop.file("half.txt", "@a MR 512000." + "0" * 45 + "\n")
-    with socket.create_connection(shop.ports["echo"], 30) as wire:  # which hears the drive echo what has arrived
+    with socket.create_connection(shop.ports["echo"], PATIENCE) as wire:  # which hears the drive echo what has arrived
         child = shop.terminal(
             "run", script, "--on", f"{shop.folder}/echo.tty?baud=1200&drives=a&party=1&em=0&checksum=0"
         )
@@ -308,7 +309,7 @@ def test_an_ssh_that_drops_in_a_script_stops_the_drive_short_of_its_target(shop)
     script = shop.file("far.txt", '@b P=0\n@b MR 51200000\n@b PR "moves"\n/wait stopped 1000\n')
     multidrop = f"{sys.executable} -m multidrop run {script} --on '{shop.url('press', 'a,b')}'"
     child = pexpect.spawn(
-        "/bin/sh", ["-c", f"{multidrop}; true"], cwd=shop.folder, env=environment(shop.folder), timeout=30
+        "/bin/sh", ["-c", f"{multidrop}; true"], cwd=shop.folder, env=environment(shop.folder), timeout=PATIENCE
     )
     child.expect("moves")
     child.ptyproc.fileobj.close()  # the shell leads the session, as a login shell does; the terminal is gone
@@ -376,7 +377,7 @@ def test_a_rogue_in_place_of_a_drive_is_one_line_and_is_sent_no_command(shop):
             url = f"tcp://127.0.0.1:{tap.port}?timeout=0.3&drives=a"
             started.append(shop.popen("send", url, "MR 51200", "PR P"))
         for process, code in zip(started, ROGUES.values(), strict=True):
-            out, err = process.communicate(timeout=60)
+            out, err = process.communicate(timeout=PATIENCE)
             assert process.returncode == code
             one_line(err)
             assert all(character >= " " for character in out.replace("\n", "")), out
@@ -456,7 +457,7 @@ def test_a_full_disk_ends_the_log_and_spoils_no_macro(shop):
         cwd=shop.folder,
         env=environment(shop.folder),
     )
-    _, err = process.communicate("/record m\nPR P\nPR A\n/record stop\n", timeout=60)
+    _, err = process.communicate("/record m\nPR P\nPR A\n/record stop\n", timeout=PATIENCE)
     assert process.returncode == 2 and "m" in one_line(err)
     assert (shop.folder / "conf" / "macros" / "m.toml").read_text() == kept
     assert {each.name for each in (shop.folder / "conf" / "macros").iterdir()} - {"far.toml"} == {"m.toml"}

@@ -9,7 +9,8 @@ import pytest
 
 from tests.support.front_door import multidrop  # noqa: F401
 from tests.support.hostile_drive import ACTING, HOSTILE, OVERRIDE, hostile_url  # noqa: F401
-from tests.support.processes import WAIT, environment
+from tests.support.processes import environment
+from tests.support.until import PATIENCE
 
 BAD = HOSTILE.decode("latin-1") + OVERRIDE
 QUOTED = json.dumps(BAD)
@@ -37,7 +38,7 @@ def test_a_drive_is_shown_and_not_obeyed(multidrop, hostile_url, tmp_path, door)
 def test_a_drive_is_shown_on_a_terminal_and_not_obeyed(hostile_url, tmp_path, door):  # noqa: F811
     seen = io.BytesIO()
     command = ["-m", "multidrop", door, hostile_url]
-    child = pexpect.spawn(sys.executable, command, env=environment(tmp_path), dimensions=(40, 200), timeout=WAIT)
+    child = pexpect.spawn(sys.executable, command, env=environment(tmp_path), dimensions=(40, 200), timeout=PATIENCE)
     child.logfile_read = seen
     child.expect("LMDCM")
     child.send("PR P\r")

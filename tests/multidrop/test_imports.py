@@ -10,6 +10,7 @@ from dialects.families import TABLE as FAMILIES
 from simulator.families import TABLE as SIMULATED
 from tests.support.paths import ROOT
 from tests.support.processes import environment
+from tests.support.until import PATIENCE
 
 SCREENS = {"textual", "rich", "prompt_toolkit"}
 PLOTS = {"rerun", "numpy", "pyarrow"}
@@ -71,7 +72,7 @@ def test_a_command_imports_nothing_that_it_does_not_need(command, tmp_path):
         stdin=subprocess.DEVNULL,
         capture_output=True,
         text=True,
-        timeout=60,
+        timeout=PATIENCE,
         cwd=tmp_path,
         env=environment(tmp_path),
     )

@@ -23,8 +23,7 @@ from multidrop.lsp.server import Server
 from multidrop.lsp.serving import serve_port
 from tests.support.lsp_session import Editor
 from tests.support.processes import environment
-
-WAIT = 30
+from tests.support.until import PATIENCE
 
 
 def begun(folder: Path) -> subprocess.Popen[bytes]:
@@ -57,7 +56,7 @@ async def test_a_session_of_a_client_of_another_project(tmp_path: Path) -> None:
     await client.shutdown_async(None)
     client.exit(None)
     server = client._server
-    assert server is not None and await asyncio.wait_for(server.wait(), WAIT) == 0
+    assert server is not None and await asyncio.wait_for(server.wait(), PATIENCE) == 0
     await client.stop()
 
 
@@ -91,7 +90,7 @@ def test_a_signal_ends_it_while_a_text_is_checked(tmp_path: Path) -> None:
 def test_an_exit_without_a_shutdown_is_a_failure_and_a_wrong_message_one_line(tmp_path: Path) -> None:
     wrong = b"no header\r\nContent-Length: 5\r\n\r\n{bad}"
     with begun(tmp_path) as process:
-        output, errors = process.communicate(wrong + INITIALIZE + message("exit"), timeout=WAIT)
+        output, errors = process.communicate(wrong + INITIALIZE + message("exit"), timeout=PATIENCE)
     assert process.returncode == 1 and output.count(b'"id"') == 1
     assert re.fullmatch(rb"multidrop: Unable to handle message: [^\n]*\n", errors)
 

@@ -10,6 +10,7 @@ import pytest
 
 from tests.shell.test_interrupts import Shop
 from tests.support.front_door import Command, multidrop
+from tests.support.until import PATIENCE
 
 __all__ = ["multidrop"]
 
@@ -136,7 +137,7 @@ def test_a_signal_stops_the_drives_runs_on_stop_and_is_130_with_no_terminal(shop
     playing = shop.process("macro", "play", "go", "--on", shop.url, "--times", "forever")
     assert playing.stdout.readline() == "1234\n"
     playing.send_signal(signal.SIGTERM)
-    out, err = playing.communicate(timeout=20)
+    out, err = playing.communicate(timeout=PATIENCE)
     assert (playing.returncode, out) == (130, "77\n")
     assert "macro go, step 3 of 3, round 1: ended early" in err and "a stands at " in err
     assert shop.standing() == (0, "0\n0\n", "")
@@ -148,9 +149,9 @@ def test_the_next_opening_explains_a_macro_that_was_killed(shop: Shop) -> None:
     playing = shop.process("macro", "play", "go", "--on", shop.url)
     assert playing.stdout.readline() == "1234\n"
     playing.kill()
-    playing.communicate(timeout=20)
+    playing.communicate(timeout=PATIENCE)
     done = shop.process("send", shop.url, "@a PR V")
-    out, err = done.communicate(timeout=20)
+    out, err = done.communicate(timeout=PATIENCE)
     assert out == "5000\n" and "macro go, begun at " in err and "nothing stopped its drives: they may still move" in err
     again = shop.process("send", shop.url, "@a SL 0")
-    assert again.communicate(timeout=20)[1] == ""
+    assert again.communicate(timeout=PATIENCE)[1] == ""

@@ -6,7 +6,8 @@ import sys
 
 import pytest
 
-from tests.support.processes import WAIT, Running, environment
+from tests.support.processes import Running, environment
+from tests.support.until import PATIENCE
 
 pytestmark = pytest.mark.process
 
@@ -17,7 +18,7 @@ def endpoints(tmp_path):
     found = {}
     try:
         while True:
-            said = json.loads(running.lines.get(timeout=WAIT))
+            said = json.loads(running.lines.get(timeout=PATIENCE))
             if "ready" in said:
                 break
             if said["bus"] == "eth":
@@ -35,7 +36,7 @@ def send(folder, *arguments):
         env=environment(folder),
         capture_output=True,
         text=True,
-        timeout=2 * WAIT,
+        timeout=2 * PATIENCE,
     )
 
 

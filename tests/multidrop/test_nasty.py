@@ -35,7 +35,8 @@ from shell.session import Session
 from simulator import cells
 from simulator.floor import Floor
 from tests.support.front_door import Command
-from tests.support.processes import WAIT, environment
+from tests.support.processes import environment
+from tests.support.until import PATIENCE
 from tests.support.virtual import in_virtual_time
 
 pytestmark = pytest.mark.slow
@@ -188,7 +189,7 @@ def test_bytes_that_are_no_text_end_a_process_with_one_line(tmp_path: Path) -> N
         env=environment(tmp_path),
         stdin=subprocess.DEVNULL,
         capture_output=True,
-        timeout=WAIT,
+        timeout=PATIENCE,
     )
     assert (done.returncode, done.stderr.count(b"\n")) == (2, 1) and b"cannot be read" in done.stderr
 
@@ -206,7 +207,7 @@ def test_the_simulator_outlives_what_it_is_told(tmp_path: Path) -> None:
     while b"ready" not in sim.stdout.readline():
         assert sim.poll() is None
     sim.terminate()
-    _, err = sim.communicate(timeout=WAIT)
+    _, err = sim.communicate(timeout=PATIENCE)
     assert sim.returncode == 0 and b"Traceback" not in err and len(err.splitlines()) == 6
 
 
@@ -222,7 +223,7 @@ def test_a_folder_that_is_gone_is_told(tmp_path: Path) -> None:
         env=environment(tmp_path),
         capture_output=True,
         text=True,
-        timeout=WAIT,
+        timeout=PATIENCE,
     )
     assert done.returncode == 2 and done.stderr == "cell.toml: cannot be read: No such file or directory\n"
 

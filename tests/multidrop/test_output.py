@@ -10,6 +10,7 @@ import pytest
 
 from shell.log.entries import Entry, line_of
 from tests.support.processes import environment
+from tests.support.until import PATIENCE
 
 pytestmark = pytest.mark.process
 
@@ -19,8 +20,8 @@ FULL = Path("/dev/full")
 def run(folder, *arguments, stdout, **variables):
     command = [sys.executable, "-m", "multidrop", *arguments]
     return subprocess.run(
-        command, stdin=subprocess.DEVNULL, stdout=stdout, stderr=subprocess.PIPE, text=True, timeout=60, cwd=folder,
-        env=environment(folder) | variables,
+        command, stdin=subprocess.DEVNULL, stdout=stdout, stderr=subprocess.PIPE, text=True, timeout=PATIENCE,
+        cwd=folder, env=environment(folder) | variables,
     )  # fmt: skip
 
 
@@ -59,7 +60,7 @@ def left(folder, *arguments, typed="", lines=1):
         assert process.stdout.readline()
     process.stdout.close()
     try:
-        code = process.wait(30)
+        code = process.wait(PATIENCE)
     finally:
         process.kill()
     with process.stdin, process.stderr:
@@ -121,7 +122,7 @@ def test_the_reader_of_a_persons_own_program_leaves(tmp_path):
     )  # fmt: skip
     assert process.stdout.readline() == "begun\n"
     process.stdout.close()
-    assert process.wait(30) == 141
+    assert process.wait(PATIENCE) == 141
     with process.stderr:
         assert "stopped b" in process.stderr.read()
 
@@ -139,7 +140,7 @@ def test_the_reader_of_a_persons_own_program_leaves(tmp_path):
 def test_closed_standard_streams_are_no_crash(tmp_path, arguments, closed, code, told):
     words = shlex.join([sys.executable, "-m", "multidrop", *arguments])
     done = subprocess.run(
-        ["/bin/sh", "-c", f"exec {words} {closed}"], capture_output=True, text=True, timeout=60, cwd=tmp_path,
+        ["/bin/sh", "-c", f"exec {words} {closed}"], capture_output=True, text=True, timeout=PATIENCE, cwd=tmp_path,
         env=environment(tmp_path),
     )  # fmt: skip
     assert done.returncode == code

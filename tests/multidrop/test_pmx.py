@@ -7,7 +7,8 @@ import sys
 
 import pytest
 
-from tests.support.processes import WAIT, Running, environment
+from tests.support.processes import Running, environment
+from tests.support.until import PATIENCE
 
 pytestmark = pytest.mark.process
 
@@ -42,7 +43,7 @@ def cell(tmp_path_factory):
     found = {"folder": folder}
     try:
         while True:
-            said = json.loads(running.lines.get(timeout=WAIT))
+            said = json.loads(running.lines.get(timeout=PATIENCE))
             if "ready" in said:
                 break
             found[said["bus"], said["endpoint"].partition(":")[0]] = said["endpoint"]
@@ -59,7 +60,7 @@ def send(folder, *arguments):
         env=environment(folder),
         capture_output=True,
         text=True,
-        timeout=2 * WAIT,
+        timeout=2 * PATIENCE,
     )
 
 
@@ -100,7 +101,7 @@ def test_a_script_that_is_interrupted_stops_both_axes(cell):
     script = cell["folder"] / "run.txt"
     script.write_text("HSPD=2000\nJX+\nJY-\n/sleep 0.2\nPX\n/sleep 600\n")
     running = Running("run", str(script), "--on", url, folder=cell["folder"])
-    assert int(running.lines.get(timeout=WAIT)) > 0
+    assert int(running.lines.get(timeout=PATIENCE)) > 0
     running.process.terminate()
     assert running.end() != 0
     done = send(cell["folder"], url, "MSTX", "MSTY")
@@ -109,7 +110,7 @@ def test_a_script_that_is_interrupted_stops_both_axes(cell):
 
 def test_bytes_as_the_manual_has_them(cell):
     host, port = cell["stages", "tcp"].removeprefix("tcp://").split(":")
-    with socket.create_connection((host, int(port)), timeout=WAIT) as wire:
+    with socket.create_connection((host, int(port)), timeout=PATIENCE) as wire:
         for asked, answer in ((b"@00POLX\r", b"0\r"), (b"@07DN\r", b"2ED07\r"), (b"@00HS\r", b"?HS\r")):
             wire.sendall(asked)
             heard = b""

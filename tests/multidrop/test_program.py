@@ -13,7 +13,8 @@ from typing import Any
 import pytest
 
 from multidrop.__main__ import main
-from tests.support.processes import WAIT, Running
+from tests.support.processes import Running
+from tests.support.until import PATIENCE
 
 GOOD = '\' a remark\nVM=200000\nPG 1\nLB SU\n MR 51200\n H\n PR "at ",P\n E\nLB K1\n PR "k1"\n E\nPG\nS\n'
 BAD = GOOD.replace(" H\n", " H\n VM=5\n")
@@ -99,7 +100,7 @@ def test_json_is_one_object_a_line(program: Program) -> None:
         "instructions": 5,
         "ended": "E",
     }
-    assert summary["virtual_s"] > printed["t"] and summary["real_s"] < WAIT
+    assert summary["virtual_s"] > printed["t"] and summary["real_s"] < PATIENCE
 
 
 def test_a_file_that_is_refused_tells_every_line_and_is_not_run(program: Program, tmp_path: Path) -> None:

@@ -20,7 +20,8 @@ from shell.sweeps import cluster as cluster_of_cases
 from tests.support.front_door import Command
 from tests.support.front_door import multidrop as multidrop
 from tests.support.paths import ROOT
-from tests.support.processes import WAIT, environment
+from tests.support.processes import environment
+from tests.support.until import PATIENCE
 
 pytestmark = pytest.mark.process
 
@@ -62,7 +63,7 @@ def test_an_interrupted_sweep_reports_what_is_done_and_leaves_no_process(folder:
     lines += process.stdout.readlines()
     process.stdout.close()
     *cases, last = [json.loads(line) for line in lines]
-    assert process.wait(WAIT) == 130
+    assert process.wait(PATIENCE) == 130
     errors = (folder / "errors").read_text()
     assert errors.startswith("ended after ") and errors.count("\n") == 1
     assert 20 <= len(cases) == last["summary"]["cases"] < 5000
@@ -83,7 +84,7 @@ def cluster(folder: Path, script: str, *arguments: str) -> Iterator[str]:
             env=environment(folder),
         )
     try:
-        until = time.monotonic() + WAIT
+        until = time.monotonic() + PATIENCE
         while not (address.exists() and address.read_text()):
             assert process.poll() is None and time.monotonic() < until, (folder / "cluster.log").read_text()
             time.sleep(0.05)
@@ -91,7 +92,7 @@ def cluster(folder: Path, script: str, *arguments: str) -> Iterator[str]:
     finally:
         assert process.stdin is not None
         process.stdin.close()
-        process.wait(WAIT)
+        process.wait(PATIENCE)
 
 
 @pytest.mark.slow

@@ -25,7 +25,7 @@ from shell.publishing.target import parse_target
 from shell.publishing.topics import Topics
 from tests.support.mosquitto import PASSWORD, USER, Mosquitto, Subscriber, free_port, retained
 from tests.support.processes import Running
-from tests.support.until import until
+from tests.support.until import PATIENCE, until
 from transports import Unreachable
 
 WILL = Message("t/status", "lost", True)
@@ -140,7 +140,7 @@ async def test_a_broker_that_was_away_gets_what_waited_and_its_retained_states_a
     for number in range(500):
         publisher.put(Message("t/n", str(number)))
     mosquitto.stop()
-    await asyncio.wait_for(made[0].lost.wait(), 10)
+    await asyncio.wait_for(made[0].lost.wait(), PATIENCE)
     for number in range(500, 1000):
         publisher.put(Message("t/n", str(number)))
     await until(lambda: any("still lost" in each for each in said))
@@ -155,7 +155,7 @@ async def test_a_broker_that_was_away_gets_what_waited_and_its_retained_states_a
     broken = made[-1]
     again = Connection(target, MqttSettings(), WILL, "multidrop-t")  # as after a loss that the broker has not seen
     await again.connect()
-    await asyncio.wait_for(broken.lost.wait(), 10)
+    await asyncio.wait_for(broken.lost.wait(), PATIENCE)
     await again.close()
     await asyncio.to_thread(seen.until, lambda: seen.texts("t/status")[-2:] == ["lost", "online"])
     await publisher.end(Message("t/status", "bye", True))

@@ -16,6 +16,7 @@ import pytest
 from multidrop.api import threads
 from tests.support.cell_session import bus, party
 from tests.support.processes import environment
+from tests.support.until import PATIENCE
 from tests.support.virtual import VirtualLoop
 
 HEAD = "from multidrop.script import session, values\na = session.drive('a')\n"
@@ -151,7 +152,7 @@ def in_one_file(shop: Any, *command: str) -> str:
     """What a Python process writes to standard output and standard error, which are the same file."""
     with (shop.folder / "out").open("w") as file:
         environ, python = environment(shop.folder), [sys.executable, *command]
-        subprocess.run(python, cwd=shop.folder, env=environ, stdout=file, stderr=file, timeout=120, check=False)
+        subprocess.run(python, cwd=shop.folder, env=environ, stdout=file, stderr=file, timeout=PATIENCE, check=False)
     return (shop.folder / "out").read_text()
 
 
@@ -212,7 +213,7 @@ def test_a_plain_program_that_crashes_leaves_nothing_moving(shop: Any) -> None:
         env=environment(shop.folder),
         capture_output=True,
         text=True,
-        timeout=60,
+        timeout=PATIENCE,
     )
     assert done.returncode == 1 and "ZeroDivisionError" in done.stderr
     assert done.stderr.endswith("stopped b: b reads velocity 0\n") and shop.velocity() == 0

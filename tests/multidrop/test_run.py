@@ -8,6 +8,7 @@ from xml.etree import ElementTree
 import pytest
 
 from tests.support.processes import environment
+from tests.support.until import PATIENCE
 
 pytestmark = pytest.mark.process
 
@@ -28,7 +29,7 @@ def test_a_script_from_standard_input_reports_its_checks(tmp_path):
         text=True,
         cwd=tmp_path,
         env=environment(tmp_path),
-        timeout=60,
+        timeout=PATIENCE,
         check=False,
     )
     assert done.returncode == 1

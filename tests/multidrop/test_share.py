@@ -12,6 +12,7 @@ import pytest
 
 from tests.support.front_door import command
 from tests.support.processes import Running
+from tests.support.until import PATIENCE
 
 
 @pytest.mark.process
@@ -26,8 +27,8 @@ def test_it_serves_says_who_writes_and_ends_well_on_a_signal(tmp_path: Path) -> 
             socket.create_connection(("127.0.0.1", port)) as writer,
             socket.create_connection(("127.0.0.1", port)) as other,
         ):
-            writer.settimeout(10)
-            other.settimeout(10)
+            writer.settimeout(PATIENCE)
+            other.settimeout(PATIENCE)
             writer.sendall(b"\naPR VM\n")
             assert writer.recv(1) == other.recv(1)  # of a checksummed drive's NAK
             other.sendall(b"MR 51200\r")

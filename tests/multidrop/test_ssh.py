@@ -5,8 +5,8 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import os
-import shutil
 import signal
+import sys
 import tty
 from collections.abc import Iterator
 from functools import partial
@@ -18,7 +18,7 @@ import multidrop
 from multidrop.__main__ import main
 from shell.connect.settings import Settings
 from shell.session import Session
-from tests.support.ssh_server import fake_ssh, far_programs, needs_sshd, ssh_server
+from tests.support.ssh_server import fake_ssh, far_programs, ssh_server
 from tests.support.until import until
 from transports import Limited, Transport, TransportLost, Unreachable
 from transports.far_port import FarPort
@@ -49,7 +49,8 @@ def ssh_here() -> int:
 
 
 @pytest.mark.process
-@needs_sshd
+@pytest.mark.needs("sshd", "ssh")
+@pytest.mark.skipif(sys.platform != "linux", reason="an sshd of the test's own, on Linux")
 async def test_a_drive_behind_a_real_sshd_moves_and_comes_back_after_each_kill_without_an_orphan(
     tmp_path: Path,
 ) -> None:
@@ -141,7 +142,7 @@ async def opened(far: FarPort) -> tuple[Transport, bytearray, list[TransportLost
 
 
 @pytest.mark.process
-@pytest.mark.skipif(not shutil.which("socat"), reason="needs socat")
+@pytest.mark.needs("socat")
 async def test_multidrop_is_started_there_and_without_it_socat_which_says_less(tmp_path: Path, monkeypatch) -> None:
     monkeypatch.chdir(tmp_path)
     programs = {name: far_programs(tmp_path / name, name, "readlink") for name in ("multidrop", "socat")}

@@ -2,7 +2,6 @@
 
 import importlib.util
 import os
-import shutil
 import subprocess
 import sys
 
@@ -10,6 +9,7 @@ import pytest
 
 from multidrop.command_table import COMMANDS
 from tests.support.paths import ROOT
+from tests.support.until import PATIENCE
 
 SHIPPED = ROOT / "multidrop" / "shipped"
 
@@ -66,7 +66,7 @@ CASES = {
 
 def completed(home, *command):
     env = {"HOME": str(home), "PATH": os.environ["PATH"]}
-    done = subprocess.run(command, cwd=home, env=env, capture_output=True, text=True, timeout=30)
+    done = subprocess.run(command, cwd=home, env=env, capture_output=True, text=True, timeout=PATIENCE)
     assert done.stderr == ""
     return done.stdout.split()
 
@@ -80,18 +80,16 @@ def test_bash_completes(home):
 
 
 @pytest.mark.process
+@pytest.mark.needs("fish")
 def test_fish_completes(home):
-    if shutil.which("fish") is None:
-        pytest.skip("fish is not installed")
     command = ("fish", "--no-config", "-c", FISH, str(SHIPPED / "multidrop.fish"))
     found = {line: completed(home, *command, line) for line in CASES}
     assert {line: sorted(each) for line, each in found.items()} == {line: sorted(each) for line, each in CASES.items()}
 
 
 @pytest.mark.process
+@pytest.mark.needs("zsh")
 def test_zsh_takes_the_file(home):
-    if shutil.which("zsh") is None:
-        pytest.skip("zsh is not installed")
     load = "fpath=($1 $fpath); autoload -Uz compinit; compinit -u; print $_comps[multidrop]"
     assert completed(home, "zsh", "-f", "-c", load, "zsh", str(SHIPPED)) == ["_multidrop"]
 

@@ -8,6 +8,7 @@ import pytest
 
 from shell.front import history
 from shell.front.history import History
+from tests.support.until import PATIENCE
 
 
 def test_lines_are_kept_between_runs_oldest_first(tmp_path):
@@ -98,7 +99,7 @@ def test_two_processes_lose_no_line(tmp_path):
     )
     path = tmp_path / "history"
     both = [subprocess.Popen([sys.executable, "-c", script, str(path), name]) for name in "ab"]
-    assert [each.wait(60) for each in both] == [0, 0]
+    assert [each.wait(PATIENCE) for each in both] == [0, 0]
     lines = path.read_text().splitlines()
     assert sorted(lines) == sorted(f"{name} {n}" for name in "ab" for n in range(200))
 

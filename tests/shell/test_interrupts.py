@@ -12,6 +12,7 @@ import pytest
 from tests.support.front_door import command
 from tests.support.processes import Running, environment
 from tests.support.served_cell import until
+from tests.support.until import PATIENCE
 
 pytestmark = pytest.mark.process
 
@@ -66,7 +67,7 @@ class Shop:
             ["-m", "multidrop", *arguments],
             cwd=self.folder,
             env=environment(self.folder),
-            timeout=20,
+            timeout=PATIENCE,
             encoding="utf-8",
         )
 
@@ -94,7 +95,7 @@ class Shop:
         """End the processes; stop the drives and put them back to 0."""
         for each in self.started:
             each.kill()
-            each.communicate(timeout=20)
+            each.communicate(timeout=PATIENCE)
         self.started.clear()
         shutil.rmtree(self.folder / "conf", ignore_errors=True)
         shutil.rmtree(self.folder / "state", ignore_errors=True)
@@ -131,7 +132,7 @@ def test_a_signal_in_a_script_stops_what_it_moved(shop, number):
     assert script.stdout.readline() == "1234\n"
     assert shop.standing()[1] != "0\n0\n"
     script.send_signal(number)
-    _, err = script.communicate(timeout=20)
+    _, err = script.communicate(timeout=PATIENCE)
     assert (script.returncode, err) == (130, "interrupted; stopped a, b: all 2 read velocity 0\n")
     assert shop.standing() == (0, "0\n0\n", "")
 
@@ -163,7 +164,7 @@ def test_a_signal_before_anything_was_sent_stops_nothing(shop):
     waiting.stdin.flush()
     assert waiting.stdout.readline().startswith("* a")
     waiting.send_signal(signal.SIGTERM)
-    out, err = waiting.communicate(timeout=20)
+    out, err = waiting.communicate(timeout=PATIENCE)
     assert (waiting.returncode, err) == (130, "interrupted\n")
     assert shop.standing()[1] != "0\n0\n"
 
@@ -176,7 +177,7 @@ def test_a_macro_that_is_interrupted_stops_what_it_moved(shop):
     playing = shop.process("macro", "play", "go", "--on", shop.url)
     assert playing.stdout.readline() == "1234\n"
     playing.send_signal(signal.SIGTERM)
-    playing.communicate(timeout=20)
+    playing.communicate(timeout=PATIENCE)
     assert playing.returncode == 130
     assert shop.standing() == (0, "0\n0\n", "")
 
@@ -188,7 +189,7 @@ def test_a_plot_runs_until_it_is_interrupted_and_its_file_is_whole(shop):
         plotting.stderr.readline() == "plotting to run.rrd, at most 50 samples a second of each drive; Ctrl+C ends it\n"
     )
     plotting.send_signal(signal.SIGINT)
-    _, err = plotting.communicate(timeout=30)
+    _, err = plotting.communicate(timeout=PATIENCE)
     assert (plotting.returncode, err.partition(" ")[2]) == (0, "samples in run.rrd\n")
     assert (shop.folder / "run.rrd").stat().st_size > 0
 
@@ -198,7 +199,8 @@ def test_a_script_plots_what_it_moves(shop):
     file = shop.script("/plot run.rrd\n@a MR 1000\n/wait stopped\n/plot\n/plot off\n@a PR P\n")
     done = shop.process("run", file, "--on", shop.url)
     assert (
-        done.communicate(timeout=30) == ("plotting to run.rrd, at most 50 samples a second of each drive\n1000\n", "")
+        done.communicate(timeout=PATIENCE)
+        == ("plotting to run.rrd, at most 50 samples a second of each drive\n1000\n", "")
         and done.returncode == 0
     )
     assert (shop.folder / "run.rrd").stat().st_size > 0
@@ -213,7 +215,7 @@ def test_a_port_that_another_process_has_is_one_line_and_exit_3(shop):
     code, out, err = shop.done("send", port, "PR P")
     assert (code, out) == (3, "")
     assert "in use" in err and err.count("\n") == 1
-    first.communicate(timeout=30)
+    first.communicate(timeout=PATIENCE)
     assert first.returncode == 0
 
 
@@ -221,7 +223,7 @@ def test_a_line_that_is_unplugged_in_a_wait_is_exit_3_and_its_drives_are_named(s
     script = shop.process("run", shop.script('SL 1000\nPR "moves"\n/wait stopped\n'), "--on", shop.url)
     assert script.stdout.readline() == "moves\n"
     shop.sim.say("/sim unplug press")
-    _, err = script.communicate(timeout=30)
+    _, err = script.communicate(timeout=PATIENCE)
     assert script.returncode == 3
     stopped, lost = err.splitlines()
     assert stopped.startswith("127.0.0.1: stop not sent (lost): a started ") and "use the E-stop" in stopped
@@ -234,7 +236,7 @@ def test_a_line_that_is_unplugged_in_a_wait_is_exit_3_and_its_drives_are_named(s
 def test_a_refusal_in_a_script_stops_what_it_started_says_so_and_keeps_its_exit_code(shop):
     assert shop.send("@b PR P", "@a SL 100000") == (0, "0\n", "")
     script = shop.process("run", shop.script("@b SL 5000\n@b XX\n"), "--on", shop.url)
-    _, err = script.communicate(timeout=20)
+    _, err = script.communicate(timeout=PATIENCE)
     others = "stopped as well, because the stop of their line has no name: a"
     assert script.returncode == 1
     assert err.splitlines()[:2] == ["stopped b: all 2 read velocity 0", others] and "script.txt:2: b refused" in err
@@ -254,14 +256,14 @@ def test_an_interrupted_reader_stops_nothing(shop):
     script = shop.process("run", shop.script("@a PR V\n/sleep 100\n"), "--on", shop.url)
     assert script.stdout.readline() == "100000\n"
     script.send_signal(signal.SIGINT)
-    _, err = script.communicate(timeout=20)
+    _, err = script.communicate(timeout=PATIENCE)
     assert (script.returncode, err) == (130, "interrupted\n")
     assert shop.standing()[1] == "100000\n0\n"
 
 
 def test_a_piped_shell_that_is_refused_stops_what_it_started(shop):
     piped = shop.process("shell", shop.url, stdin=subprocess.PIPE)
-    _, err = piped.communicate("@b SL 5000\n@b XX\n", timeout=20)
+    _, err = piped.communicate("@b SL 5000\n@b XX\n", timeout=PATIENCE)
     assert piped.returncode == 1 and err.startswith("stopped b: all 2 read velocity 0\n")
     assert shop.standing() == (0, "0\n0\n", "")
 

@@ -13,9 +13,9 @@ import pytest
 from shell.front.answer import PAUSE, at_keyboard
 from shell.front.keyboard import Keyboard
 from shell.front.raw_terminal import _waiting as waiting
+from tests.support.until import PATIENCE
 
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="pseudo-terminals")
-PATIENCE = 20.0
 
 
 class Typed:

@@ -16,6 +16,7 @@ from simulator.cells import load
 from simulator.floor import Floor
 from simulator.serving.endpoints import serve_bus
 from simulator.serving.running import RunningFloor
+from tests.support.until import PATIENCE
 
 pytestmark = pytest.mark.slow
 
@@ -32,7 +33,6 @@ limit_plus = 5000000
 inputs = [[0.0, 3, 0]]
 """
 PROGRAM = "PG 100\nLB A3\nR1=77\nLB A4\nH 20\nBR A4\nE\nPG\n"
-PATIENCE = 20.0
 
 
 @pytest.fixture

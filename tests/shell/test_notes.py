@@ -8,6 +8,7 @@ import sys
 import pytest
 
 from tests.support.processes import Running, environment
+from tests.support.until import PATIENCE
 
 pytestmark = pytest.mark.process
 
@@ -42,7 +43,7 @@ def shop(tmp_path_factory):
 def done(folder, *arguments, stdin=""):
     command = [sys.executable, "-m", "multidrop", *arguments]
     ended = subprocess.run(
-        command, input=stdin, capture_output=True, text=True, timeout=60, cwd=folder, env=environment(folder)
+        command, input=stdin, capture_output=True, text=True, timeout=PATIENCE, cwd=folder, env=environment(folder)
     )
     return ended.returncode, ended.stdout, ended.stderr
 
@@ -54,7 +55,7 @@ def test_an_echo_mode_that_hides_losses_and_an_old_error_are_told(shop, door):
     (folder / "one.txt").write_text("R1=5\nPR R1\n")
     doors = {"send": ["send", url, "R1=5", "PR R1"], "run": ["run", "one.txt", "--on", url], "shell": ["shell", url]}
     host, port = url.removeprefix("tcp://").split(":")
-    with socket.create_connection((host, int(port)), 30) as wire:  # somebody else's error
+    with socket.create_connection((host, int(port)), PATIENCE) as wire:  # somebody else's error
         wire.sendall(b"QQ 5\rPR 3\r")
         while not wire.recv(100).startswith(b"3"):
             pass

@@ -19,8 +19,7 @@ import pytest
 from shell import outlets, output
 from shell.outlets import Lane
 from tests.support.served_cell import until
-
-PATIENCE = 20.0
+from tests.support.until import PATIENCE
 
 
 class Pipe:

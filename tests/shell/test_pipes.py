@@ -11,6 +11,7 @@ import pytest
 
 from tests.support.processes import environment
 from tests.support.served_cell import FLOOD, LOG, SIGNALS, pipe_is_full, until
+from tests.support.until import PATIENCE
 
 pytestmark = pytest.mark.process
 
@@ -58,7 +59,7 @@ def test_automation_waits_for_a_reader_and_no_reply_is_lost(shop, door):
     process = start(shop, *arguments, stdin=stdin)
     until(lambda: pipe_is_full(process.stdout), "the pipe never filled")
     assert shop.velocity() == 0, "what comes behind what is not read has not been sent"
-    out, err = process.communicate(timeout=60)
+    out, err = process.communicate(timeout=PATIENCE)
     told = out.splitlines()
     usages = sum(line.startswith("/stop ") for line in told)
     assert (process.returncode, err, told[0], told[-1], usages) == (0, "", "first", "last", HELP)
@@ -72,7 +73,7 @@ def test_a_signal_ends_a_script_that_waits_for_a_reader_and_stops_what_it_moved(
     until(lambda: pipe_is_full(process.stdout), "the pipe never filled")
     until(lambda: shop.velocity() == 100000, "it does not move")
     process.send_signal(number)
-    assert process.wait(30) == 130
+    assert process.wait(PATIENCE) == 130
     until(lambda: shop.velocity() == 0, "it was not stopped")
 
 
@@ -86,7 +87,7 @@ def test_what_nobody_asked_for_is_dropped_with_a_word_and_replies_are_not(shop):
     reader = threading.Thread(target=process.stdout.read)
     reader.start()
     process.send_signal(signal.SIGTERM)
-    assert process.wait(30) == 130
+    assert process.wait(PATIENCE) == 130
     reader.join()
 
 
@@ -104,8 +105,10 @@ def test_a_simulator_whose_errors_are_not_read_serves_on(tmp_path):
     process.stdin.flush()
     until(lambda: pipe_is_full(process.stderr), "the pipe never filled")
     command = [sys.executable, "-m", "multidrop", "send", "./one.tty", "PR 5"]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=60, cwd=tmp_path, env=environment(tmp_path))
+    done = subprocess.run(
+        command, capture_output=True, text=True, timeout=PATIENCE, cwd=tmp_path, env=environment(tmp_path)
+    )
     process.terminate()
-    code = process.wait(30)
+    code = process.wait(PATIENCE)
     process.communicate()
     assert (done.returncode, done.stdout, code) == (0, "5\n", 0), done.stderr

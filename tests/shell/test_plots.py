@@ -21,6 +21,7 @@ from drives.events import Sample
 from shell.plots.plot import Plot
 from shell.plots.target import PlotTarget, parse_target
 from tests.support.paths import ROOT
+from tests.support.until import PATIENCE
 from transports import Unreachable
 
 EPOCH = 1_800_000_000.0
@@ -35,7 +36,7 @@ def rerun() -> Iterator[Any]:
 @pytest.mark.process
 def test_rerun_is_not_loaded_before_a_plot_is_asked_for() -> None:
     code = "import sys, shell.plots.feed; sys.exit('rerun' in sys.modules or 'pyarrow' in sys.modules)"
-    assert subprocess.run([sys.executable, "-c", code], cwd=ROOT, timeout=60).returncode == 0
+    assert subprocess.run([sys.executable, "-c", code], cwd=ROOT, timeout=PATIENCE).returncode == 0
 
 
 async def test_a_missing_rerun_is_told_with_how_to_install_it(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
@@ -141,7 +142,9 @@ async def test_a_second_plot_is_added_to_the_file_after_the_first(rerun: Any, tm
     assert found.rows["/press/c/position"] == [(6.0, EPOCH + 300, 3.0)]
     assert (found.recordings, found.layouts) == (1, 1)
     assert os.listdir(tmp_path) == ["run.rrd"]
-    subprocess.run([sys.executable, "-m", "rerun", "rrd", "verify", str(tmp_path / "run.rrd")], check=True, timeout=60)
+    subprocess.run(
+        [sys.executable, "-m", "rerun", "rrd", "verify", str(tmp_path / "run.rrd")], check=True, timeout=PATIENCE
+    )
 
 
 @pytest.mark.parametrize("data", [b"this is a text, not a recording" * 9, b"RRF2", b"RRF2" + b"\xff" * 500])
@@ -235,7 +238,7 @@ def kill_when_plotting(process: subprocess.Popen[str]) -> None:
     assert process.stdout is not None
     assert process.stdout.readline() == "plotting\n"
     process.kill()
-    process.wait(10)
+    process.wait(PATIENCE)
 
 
 @pytest.mark.process
@@ -269,7 +272,7 @@ def test_a_file_that_takes_no_more_ends_the_plot_with_one_line_and_stays_readabl
 ) -> None:
     pytest.importorskip("resource")
     process = child(tmp_path / "run.rrd", 60_000)
-    said, _ = process.communicate(timeout=60)
+    said, _ = process.communicate(timeout=PATIENCE)
     assert process.returncode == 0
     assert [line for line in said.splitlines() if line != "plotting"] == [said.splitlines()[-1]]
     assert "failed: plotting ended: cannot write" in said
@@ -362,6 +365,6 @@ def test_a_viewer_that_dies_or_freezes_ends_the_plot_with_one_line_and_holds_up_
     process = child(f"rerun+http://127.0.0.1:{port}/proxy", code=closing)
     assert process.stdout is not None and process.stdout.readline() == "plotting\n"
     viewer.send_signal(getattr(signal, how))
-    said, _ = process.communicate(timeout=60)
+    said, _ = process.communicate(timeout=PATIENCE)
     assert said.splitlines()[0].endswith(f"the viewer at rerun+http://127.0.0.1:{port}/proxy is gone")
     assert process.returncode == (1 if how == "SIGSTOP" else 0)

@@ -12,6 +12,7 @@ from shell.connect.settings import Settings
 from shell.events import By, Notified, OnBus, Output, Printed
 from shell.front.complete import complete, hint
 from shell.session import Session
+from tests.support.until import PATIENCE
 
 pytestmark = pytest.mark.virtual
 
@@ -24,7 +25,6 @@ limit_minus = -100
 """
 CELL = '[[bus]]\nname = "stages"\nbaud = 9600\n' + "".join(DRIVE.format(name) for name in ("00", "01", "02"))
 LEXIUM = '[[bus]]\nname = "press"\n[[bus.drive]]\npersonality = "LMDCM"\n'
-PATIENCE = 20.0
 
 
 @pytest.fixture

@@ -11,6 +11,7 @@ from shell.connect.settings import Settings
 from shell.events import Entered, Output, Progressed, StateChanged
 from shell.front.prompt import Prompt
 from shell.session import Session
+from tests.support.until import PATIENCE
 
 
 class Typist:
@@ -33,13 +34,13 @@ class Typist:
             self.noticed.set()
 
     async def until(self, condition):
-        async with asyncio.timeout(10):
+        async with asyncio.timeout(PATIENCE):
             while not condition():
                 self.noticed.clear()
                 await self.noticed.wait()
 
     async def ends(self):
-        async with asyncio.timeout(10):
+        async with asyncio.timeout(PATIENCE):
             return await self.code
 
 

@@ -9,6 +9,7 @@ from dialects.files import LARGEST
 from shell.front.stream import stream_lines
 from shell.lines import uncommented
 from shell.scripts.reading import read_script
+from tests.support.until import PATIENCE
 
 
 @pytest.fixture
@@ -113,6 +114,6 @@ async def test_standard_input_is_read_ahead_of_the_lines_within_bounds():
         written += os.write(writer, b"x" * 4095 + b"\n")
     os.close(writer)
     assert written < 1_000_000
-    async with asyncio.timeout(10):
+    async with asyncio.timeout(PATIENCE):
         assert sum([len(line) + 1 async for line in lines]) == written
     os.close(reader)

@@ -25,7 +25,7 @@ from shell.sharing.client import Client, Input, Request
 from shell.sharing.exchange import NOT_REACHED, TURN
 from shell.sharing.server import SharedPort
 from shell.sharing.stop_bytes import stop_bytes
-from tests.support.until import until
+from tests.support.until import PATIENCE, until
 from transports import TransportLost, Unreachable, telnet
 from transports.com_port import OPTION, Setting, message
 from transports.rfc2217 import open_rfc2217
@@ -225,7 +225,7 @@ async def test_a_port_that_cannot_be_found_again_ends_it(tmp_path: Path) -> None
     port = SharedPort(await open_port(parse(os.ttyname(line._near))), stop_bytes(""), lambda said: None)
     await port.open("127.0.0.1", 0)
     line.close()
-    loss = await asyncio.wait_for(port.lost_for_good, 10)
+    loss = await asyncio.wait_for(port.lost_for_good, PATIENCE)
     assert "was lost" in str(loss)
     await port.close()
 

@@ -9,6 +9,7 @@ from drives.events import Traffic
 from shell.connect.settings import SavedConnection, Settings
 from shell.events import Failed, Notified, OnBus, Output, Printed
 from shell.session import Session
+from tests.support.until import PATIENCE
 from transports import TransportLost
 
 pytestmark = pytest.mark.virtual
@@ -84,7 +85,7 @@ async def test_a_stop_in_a_download_leaves_a_drive_that_listens(session, tmp_pat
     (tmp_path / "long.mxt").write_text(f"PG 1\n{lines}E\nPG\n")
     await session.open("line")
     loading = asyncio.create_task(session.run("/download long.mxt"))
-    async with asyncio.timeout(10):
+    async with asyncio.timeout(PATIENCE):
         while not session.selected.programming:
             await asyncio.sleep(0.001)
     session.stop()

@@ -7,6 +7,7 @@ import pexpect
 import pytest
 
 from tests.support.paths import ROOT
+from tests.support.until import PATIENCE
 
 pytestmark = pytest.mark.process
 
@@ -25,7 +26,13 @@ def terminal(tmp_path):
     def start(*arguments):
         command = ["-m", "multidrop", *arguments]
         child = pexpect.spawn(
-            sys.executable, command, cwd=tmp_path, env=environment, timeout=20, encoding="utf-8", dimensions=(24, 80)
+            sys.executable,
+            command,
+            cwd=tmp_path,
+            env=environment,
+            timeout=PATIENCE,
+            encoding="utf-8",
+            dimensions=(24, 80),
         )
         started.append(child)
         return child

@@ -16,6 +16,7 @@ from shell.connect.urls import parse as parse_url
 from shell.events import By, Notified, OnBus, Output, Printed
 from shell.front.complete import complete, hint
 from shell.session import Session
+from tests.support.until import PATIENCE
 
 pytestmark = pytest.mark.virtual
 
@@ -34,7 +35,6 @@ name = "press"
 [[bus.drive]]
 personality = "LMDCM"
 """
-PATIENCE = 20.0
 
 
 @pytest.fixture

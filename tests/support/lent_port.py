@@ -7,6 +7,7 @@ import socket
 import threading
 from collections.abc import Iterator
 
+from tests.support.until import PATIENCE
 from transports import TransportLost
 from transports.relay import serve
 from transports.relay_frames import GREETING, SILENCE
@@ -46,4 +47,4 @@ def lent(port: str, baud: int = 9600, silence: float = SILENCE) -> Iterator[Sock
         yield SocketConnection(ours)
     finally:
         ours.close()
-        far.join(10.0)
+        far.join(PATIENCE)

@@ -2,6 +2,7 @@
 
 `process` marks a test that starts a process, `tui` one that runs the app: a test that does so without its marker fails.
 `virtual` marks a test, or a file of tests, that runs on a loop whose clock does not wait.
+`needs` names programs of others, such as `mbpoll`: without them a test is skipped, or fails (`tests.support.tools`).
 `wide` marks a product of parameters. An ordinary run takes its corners and its diagonal; `--nightly` takes all of it,
 and the tests with the marker `nightly`.
 """
@@ -17,6 +18,7 @@ from typing import Any
 
 import pytest
 
+from tests.support.tools import tool
 from tests.support.virtual import VirtualLoop
 
 STARTS = frozenset({"subprocess.Popen", "os.fork", "os.forkpty", "os.posix_spawn", "os.system"})
@@ -50,6 +52,14 @@ def _demand(marker: str, act: str) -> None:
 def pytest_asyncio_loop_factories(item: pytest.Item) -> dict[str, Callable[[], asyncio.AbstractEventLoop]]:
     """Choose the clock of an async test, and of its async fixtures."""
     return {"virtual": VirtualLoop} if item.get_closest_marker("virtual") else {"real": asyncio.new_event_loop}
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_runtest_setup(item: pytest.Item) -> None:
+    """Look for the programs of others that a test needs."""
+    for mark in item.iter_markers("needs"):
+        for name in mark.args:
+            tool(name)
 
 
 @pytest.hookimpl(wrapper=True)

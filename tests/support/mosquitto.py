@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import os
-import shutil
 import socket
 import subprocess
 import threading
@@ -12,10 +10,10 @@ from collections.abc import Callable
 from pathlib import Path
 
 import paho.mqtt.client as mqtt
-import pytest
 
-WAIT = 20.0
-PATH = f"{os.environ.get('PATH', '')}:/usr/sbin:/usr/local/sbin"
+from tests.support.tools import tool
+from tests.support.until import PATIENCE
+
 USER, PASSWORD = "shop", "hunter2"
 CONF = """
 user root
@@ -33,11 +31,6 @@ keyfile {folder}/key.pem
 """
 
 
-def program(name: str) -> str:
-    """The path of a program; skip the test where it is not installed."""
-    return shutil.which(name, path=PATH) or pytest.skip(f"{name} is not installed")
-
-
 def free_port() -> int:
     """A port that is free now."""
     with socket.socket() as trial:
@@ -49,14 +42,14 @@ class Mosquitto:
     """A broker with a plain listener and one with TLS and a login. `stop` it."""
 
     def __init__(self, folder: Path) -> None:
-        self._program = program("mosquitto")
+        self._program = tool("mosquitto")
         self.folder, self.plain, self.tls = folder, free_port(), free_port()
         self.log = folder / "mosquitto.log"
-        _run(program("mosquitto_passwd"), "-b", "-c", str(folder / "users"), USER, PASSWORD)
+        _run(tool("mosquitto_passwd"), "-b", "-c", str(folder / "users"), USER, PASSWORD)
         subject = ["-subj", "/CN=127.0.0.1", "-addext", "subjectAltName=IP:127.0.0.1"]
         curve = ["-newkey", "ec", "-pkeyopt", "ec_paramgen_curve:prime256v1"]
         files = ["-keyout", str(folder / "key.pem"), "-out", str(folder / "cert.pem")]
-        _run(program("openssl"), "req", "-x509", "-nodes", "-days", "2", *curve, *files, *subject)
+        _run(tool("openssl"), "req", "-x509", "-nodes", "-days", "2", *curve, *files, *subject)
         conf = CONF.format(folder=folder, plain=self.plain, tls=self.tls, log=self.log)
         (folder / "mosquitto.conf").write_text(conf)
         self.start()
@@ -69,7 +62,7 @@ class Mosquitto:
             stdout=subprocess.DEVNULL,
             stderr=subprocess.DEVNULL,
         )
-        deadline = time.monotonic() + WAIT
+        deadline = time.monotonic() + PATIENCE
         while not all(map(_listens, (self.plain, self.tls))):
             assert time.monotonic() < deadline and self.process.poll() is None, "mosquitto does not start"
             time.sleep(0.01)
@@ -77,7 +70,7 @@ class Mosquitto:
     def stop(self) -> None:
         """End it at once."""
         self.process.kill()
-        self.process.wait(WAIT)
+        self.process.wait(PATIENCE)
 
 
 def _run(*command: str) -> None:
@@ -106,7 +99,7 @@ class Subscriber:
         self._subscribed = threading.Event()
         self.client.connect("127.0.0.1", port)
         self.client.loop_start()
-        assert self._subscribed.wait(WAIT)
+        assert self._subscribed.wait(PATIENCE)
 
     def _keep(self, message: mqtt.MQTTMessage) -> None:
         with self._changed:
@@ -116,7 +109,7 @@ class Subscriber:
     def until(self, done: Callable[[], bool]) -> None:
         """Wait for a message that makes it true."""
         with self._changed:
-            assert self._changed.wait_for(done, WAIT), self.messages[-20:]
+            assert self._changed.wait_for(done, PATIENCE), self.messages[-20:]
 
     def texts(self, topic: str) -> list[str]:
         """The texts of a topic."""

@@ -16,14 +16,13 @@ import serial
 from serial import rfc2217
 
 from tests.support.lent_port import lent
+from tests.support.until import PATIENCE
 from transports import Transport, TransportLost
 from transports.relay_pipe import RelayPipe
 from transports.rfc2217 import open_rfc2217
 from transports.serial_port import SerialDevice, open_serial
 from transports.sockets import SocketDevice, open_tcp, open_udp, set_socket_options
 from transports.threaded import ThreadedPipe
-
-PATIENCE = 10.0
 
 
 class FarEnd:

@@ -13,8 +13,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from tests.support.paths import ROOT
-
-WAIT = 30.0
+from tests.support.until import PATIENCE
 
 
 def environment(folder: Path) -> dict[str, str]:
@@ -69,7 +68,7 @@ class Running:
         got: list[str] = []
         while not got or got[-1] != text:
             try:
-                got.append(self.lines.get(timeout=WAIT))
+                got.append(self.lines.get(timeout=PATIENCE))
             except queue.Empty:
                 self.kill()
                 raise AssertionError(f"{text!r} did not come; got {got}, errors {self.errors}") from None
@@ -86,12 +85,12 @@ class Running:
         if self.process.stdin:
             self.process.stdin.close()
         try:
-            code = self.process.wait(WAIT)
+            code = self.process.wait(PATIENCE)
         except subprocess.TimeoutExpired:
             self.process.kill()  # nothing that a failing test leaves behind may keep the run from its end
             raise
         for reader in self._readers:
-            reader.join(WAIT)
+            reader.join(PATIENCE)
         self.process.stdout.close()
         self.process.stderr.close()
         while not self.lines.empty():
@@ -123,7 +122,7 @@ class Tap:
     def written(self) -> bytes:
         """What clients have written; all of it, once they are gone."""
         with self._changed:
-            assert self._changed.wait_for(lambda: not self._clients, WAIT), "a client of the tap stays"
+            assert self._changed.wait_for(lambda: not self._clients, PATIENCE), "a client of the tap stays"
             return bytes(self._written)
 
     def forget(self) -> None:
@@ -134,7 +133,7 @@ class Tap:
     def wait_for(self, text: bytes) -> None:
         """Until clients have written this."""
         with self._changed:
-            assert self._changed.wait_for(lambda: text in self._written, WAIT), f"{text!r} was not written"
+            assert self._changed.wait_for(lambda: text in self._written, PATIENCE), f"{text!r} was not written"
 
     def hang_up(self) -> None:
         """Cut all connections."""
@@ -157,7 +156,7 @@ class Tap:
         """Take no more clients."""
         self._server.shutdown(socket.SHUT_RDWR)  # closing alone does not end an accept that waits
         self._server.close()
-        self._thread.join(WAIT)
+        self._thread.join(PATIENCE)
 
     def _accept(self) -> None:
         while True:

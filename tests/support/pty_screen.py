@@ -15,10 +15,9 @@ from textual import events
 from textual.driver import Driver
 from textual.geometry import Size
 
+from tests.support.until import PATIENCE
 from tui.app import MultidropApp
 from tui.terminal.driver import Terminal
-
-PATIENCE = 30.0
 
 
 class PtyScreen:

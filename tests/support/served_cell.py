@@ -18,6 +18,7 @@ import pytest
 from dialects.mcode.host.checksum import sealed
 from dialects.mcode.host.codec import MCode
 from tests.support.processes import Running, environment
+from tests.support.until import PATIENCE
 
 CELL = """
 [[bus]]
@@ -53,7 +54,6 @@ SIGNALS = [signal.SIGTERM, signal.SIGQUIT, *OTHERS]
 FLOOD = 250_000
 """Bytes, more than a terminal and a queue in front of it hold."""
 LOG = "seen.log"
-PATIENCE = 30.0
 
 
 class Shop:

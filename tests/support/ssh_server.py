@@ -16,13 +16,9 @@ from pathlib import Path
 import pytest
 
 from tests.support.paths import ROOT
+from tests.support.tools import absent, tool
+from tests.support.until import PATIENCE
 
-FOLDERS = f"{os.defpath}:/usr/sbin:/sbin"
-SSHD = shutil.which("sshd", path=FOLDERS)
-SSH = shutil.which("ssh")
-needs_sshd = pytest.mark.skipif(
-    not (SSHD and SSH and sys.platform == "linux"), reason="needs OpenSSH (sshd and ssh) on Linux"
-)
 CONFIG = """
 ListenAddress 127.0.0.1
 Port {port}
@@ -81,21 +77,21 @@ def ssh_server(folder: Path) -> Iterator[int]:
         f" UserKnownHostsFile {folder}/known_hosts\n"
     )
     with (folder / "sshd.log").open("wb") as log:
-        server = subprocess.Popen([str(SSHD), "-D", "-e", "-f", folder / "sshd_config"], stdout=log, stderr=log)
+        server = subprocess.Popen([tool("sshd"), "-D", "-e", "-f", folder / "sshd_config"], stdout=log, stderr=log)
         try:
             _until_open(port, server)
             with pytest.MonkeyPatch.context() as patch:
-                patch.setenv("PATH", fake_ssh(folder / "bin", f'exec {SSH} -F "{folder}/ssh_config" "$@"'))
+                patch.setenv("PATH", fake_ssh(folder / "bin", f'exec {tool("ssh")} -F "{folder}/ssh_config" "$@"'))
                 yield port
         finally:
             server.terminate()
-            server.wait(10)
+            server.wait(PATIENCE)
 
 
 def _until_open(port: int, server: subprocess.Popen[bytes]) -> None:
-    deadline = time.monotonic() + 10
+    deadline = time.monotonic() + PATIENCE
     while server.poll() is None and time.monotonic() < deadline:
         with contextlib.suppress(OSError), socket.create_connection(("127.0.0.1", port), timeout=1):
             return
         time.sleep(0.01)
-    pytest.skip("sshd does not start here")
+    absent("sshd does not start here")

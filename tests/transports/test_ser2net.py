@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 import os
-import shutil
 import socket
 import subprocess
 import sys
@@ -14,14 +13,14 @@ from pathlib import Path
 
 import pytest
 
-from tests.support.until import until
+from tests.support.tools import tool
+from tests.support.until import PATIENCE, until
 from transports import TransportLost, Unreachable
 from transports.rfc2217 import Rfc2217Pipe, open_rfc2217
 
-SER2NET = shutil.which("ser2net", path=f"{os.environ.get('PATH', '')}:/usr/sbin")
 pytestmark = [
     pytest.mark.process,
-    pytest.mark.skipif(SER2NET is None, reason="ser2net is not installed"),
+    pytest.mark.needs("ser2net"),
     pytest.mark.skipif(sys.platform == "win32", reason="the far end is a pseudo-terminal"),
 ]
 CONFIGURATION = """connection: &line
@@ -58,7 +57,7 @@ async def test_a_real_ser2net(tmp_path: Path) -> None:
     (tmp_path / "ser2net.yaml").write_text(CONFIGURATION.format(port=port, device=os.ttyname(near)))
     with (tmp_path / "output").open("w") as output:
         server = subprocess.Popen(
-            [str(SER2NET), "-n", "-c", str(tmp_path / "ser2net.yaml")], stdout=output, stderr=output
+            [tool("ser2net"), "-n", "-c", str(tmp_path / "ser2net.yaml")], stdout=output, stderr=output
         )
     got, losses = bytearray(), list[TransportLost]()
     try:
@@ -89,7 +88,7 @@ async def test_a_real_ser2net(tmp_path: Path) -> None:
         await until(lambda: arrived.extend(read(far)) or arrived == b"\x1b")
     finally:
         server.terminate()
-        server.wait(10)
+        server.wait(PATIENCE)
         await until(lambda: losses)
         await pipe.close()
         os.close(far)

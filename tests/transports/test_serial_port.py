@@ -14,6 +14,7 @@ from pathlib import Path
 import pytest
 import serial
 
+from tests.support.until import PATIENCE
 from transports import Controllable, Unreachable
 from transports.pipe import in_thread
 from transports.serial_open import open_error
@@ -180,7 +181,7 @@ async def test_an_opening_that_is_cancelled_leaves_the_port_free(pty: tuple[int,
     opening.cancel()
     with pytest.raises(asyncio.CancelledError):
         await opening
-    async with asyncio.timeout(10):
+    async with asyncio.timeout(PATIENCE):
         while True:
             try:
                 transport = await open_serial(pty[1])
@@ -194,7 +195,7 @@ async def test_what_a_cancelled_opening_opened_late_is_closed_again() -> None:
     go, undone = threading.Event(), asyncio.Queue[str]()
 
     def slow() -> str:
-        go.wait(10)
+        go.wait(PATIENCE)
         return "the port"
 
     opening = asyncio.create_task(in_thread(slow, undone.put_nowait))

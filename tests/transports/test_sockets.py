@@ -10,6 +10,7 @@ from collections.abc import Iterator
 
 import pytest
 
+from tests.support.until import PATIENCE
 from transports import TransportLost, Unreachable, rfc2217, sockets
 from transports.descriptor import DescriptorPipe
 from transports.rfc2217 import open_rfc2217
@@ -19,7 +20,6 @@ pytestmark = [
     pytest.mark.skipif(sys.platform == "win32", reason="looks at descriptors"),
     pytest.mark.filterwarnings(r"ignore:set(Daemon|Name)\(\):DeprecationWarning"),
 ]
-PATIENCE = 10.0
 
 
 class Ear:

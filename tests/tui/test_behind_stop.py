@@ -17,6 +17,7 @@ from shell.session import Session
 from simulator.lexium.device import MCodeDevice
 from tests.support.fake_session import FakeAssist, FakeSession, demo_session
 from tests.support.pty_screen import PtyScreen, on_a_pty
+from tests.support.until import PATIENCE
 from tui.app import MultidropApp
 from tui.assist import ShellAssist
 from tui.screens.dialogs import Confirm, Search
@@ -53,7 +54,7 @@ class Press:
 
     async def stands(self) -> None:
         """Wait until the stop was repeated and read back; then nothing moves, and nothing starts to."""
-        await asyncio.wait_for(self.session.buses["press"].stopped(), 20)
+        await asyncio.wait_for(self.session.buses["press"].stopped(), PATIENCE)
         for _ in range(20):
             await asyncio.sleep(0.01)
             assert self.moving() == []

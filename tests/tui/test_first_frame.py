@@ -8,6 +8,7 @@ from textual.css.stylesheet import Stylesheet
 
 from tests.support.fake_session import demo_session, make_app
 from tests.support.processes import environment
+from tests.support.until import PATIENCE
 from tui.screens.table import PAGES
 
 CHILD = """
@@ -63,7 +64,9 @@ LATER = {
 @pytest.mark.process
 def test_the_first_frame_imports_no_page_no_family_and_no_simulator_and_the_first_letter_nothing(tmp_path):
     child = [sys.executable, "-c", CHILD]
-    done = subprocess.run(child, capture_output=True, text=True, timeout=60, cwd=tmp_path, env=environment(tmp_path))
+    done = subprocess.run(
+        child, capture_output=True, text=True, timeout=PATIENCE, cwd=tmp_path, env=environment(tmp_path)
+    )
     modules, footer, *letter = done.stdout.splitlines() or [done.stderr, ""]
     imported = set(modules.split())
     assert "tui.app" in imported, done.stderr

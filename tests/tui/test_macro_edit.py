@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from tests.support.fake_session import demo_session, make_app, settle
+from tests.support.until import PATIENCE
 from tui.screens.program import ProgramPage
 
 pytestmark = pytest.mark.tui
@@ -24,7 +25,7 @@ async def test_a_wrong_macro_is_not_saved_and_a_right_one_is(tmp_path: Path, mon
         await settle(pilot)
         assert session.edit is not None
         await session.edit(str(path))
-        async with asyncio.timeout(20):
+        async with asyncio.timeout(PATIENCE):
             while not isinstance(app.screen, ProgramPage) or app.screen.text is None:
                 await pilot.pause(0.01)
         page = app.screen

@@ -13,6 +13,7 @@ from textual.pilot import Pilot
 from drives.events import Traffic
 from shell.events import OnBus
 from tests.support.fake_session import FakeMacro, demo_session, make_app, settle
+from tests.support.until import PATIENCE
 from tui.frames import Frames
 from tui.screens.macros import Listed, MacrosPage, macro_row, step_rows
 from tui.screens.program import ProgramPage
@@ -22,7 +23,7 @@ pytestmark = pytest.mark.tui
 
 
 async def until(pilot: Pilot[int], true: Callable[[], bool]) -> None:
-    async with asyncio.timeout(20):
+    async with asyncio.timeout(PATIENCE):
         while not true():
             await pilot.pause(0.01)
             pilot.app.tick()  # type: ignore[attr-defined]
@@ -52,7 +53,7 @@ async def test_what_was_read_is_painted_though_nothing_else_happens(monkeypatch:
     async with app.run_test(size=(80, 24)) as pilot:
         await app.run_action("app.page('macros')")
         assert "no macro yet" not in app.screen.lines("macros").plain  # type: ignore[attr-defined]
-        async with asyncio.timeout(20):
+        async with asyncio.timeout(PATIENCE):
             while "shuttle" not in app.screen.lines("macros").plain:  # type: ignore[attr-defined]
                 await pilot.pause(0.01)
 

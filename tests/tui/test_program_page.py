@@ -14,6 +14,7 @@ from textual.pilot import Pilot
 from shell.drafts import Draft, Drafts
 from shell.events import Phase, ProgramRead, ProgramSeen
 from tests.support.fake_session import FakeAssist, FakeSession, demo_session, settle
+from tests.support.until import PATIENCE
 from tui.app import MultidropApp
 from tui.screens.dialogs import Confirm, Search
 from tui.screens.program import ProgramPage
@@ -59,7 +60,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 async def until(pilot: Pilot[int], true: Callable[[], bool]) -> None:
-    async with asyncio.timeout(20):
+    async with asyncio.timeout(PATIENCE):
         while not true():
             await pilot.pause(0.01)
             pilot.app.tick()  # type: ignore[attr-defined]

@@ -12,6 +12,7 @@ from textual.pilot import Pilot
 from drives.events import Traffic
 from shell.events import OnBus, Phase, ProgramRead, ProgramSeen
 from tests.support.fake_session import FakeSession, a_move, a_talk, demo_session, make_app, settle
+from tests.support.until import PATIENCE
 from tui.screens.program import ProgramPage
 
 pytestmark = pytest.mark.tui
@@ -63,7 +64,7 @@ async def checked(pilot: Pilot[int], file: str) -> ProgramPage:
     app = pilot.app
     app.texts.open(file)  # type: ignore[attr-defined]
     await app.run_action("app.page('program')")
-    async with asyncio.timeout(20):
+    async with asyncio.timeout(PATIENCE):
         while not isinstance(app.screen, ProgramPage) or app.screen.findings.pending:
             await pilot.pause(0.01)
             app.tick()  # type: ignore[attr-defined]
@@ -77,7 +78,7 @@ async def with_errors(pilot: Pilot[int], session: FakeSession) -> None:
 async def traced(pilot: Pilot[int], session: FakeSession) -> None:
     page = await checked(pilot, "shuttle.mxt")
     session.emit(ProgramRead(session.time, "press", "a", ROWS))
-    async with asyncio.timeout(20):
+    async with asyncio.timeout(PATIENCE):
         while not page.findings.addresses:
             await pilot.pause(0.01)
             pilot.app.tick()  # type: ignore[attr-defined]

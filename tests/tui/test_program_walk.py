@@ -12,6 +12,7 @@ from textual.pilot import Pilot
 
 from shell.connect.settings import Settings
 from shell.session import Session
+from tests.support.until import PATIENCE
 from tui.app import MultidropApp
 from tui.assist import ShellAssist
 from tui.screens.dialogs import Confirm, Search
@@ -23,7 +24,7 @@ TEXT = "PG 1\nLB G1\n MA 5120000\n H\n MA 0\n H\n BR G1\n E\nPG\n"
 
 
 async def until(pilot: Pilot[int], true: Callable[[], bool]) -> None:
-    async with asyncio.timeout(30):
+    async with asyncio.timeout(PATIENCE):
         while not true():
             await pilot.pause(0.02)
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import shlex
-import shutil
 import subprocess
 import sys
 import time
@@ -14,9 +13,9 @@ from pathlib import Path
 import pytest
 
 from tests.support.paths import SUPPORT
+from tests.support.until import PATIENCE
 
-pytestmark = [pytest.mark.process, pytest.mark.skipif(shutil.which("tmux") is None, reason="needs tmux")]
-PATIENCE = 60.0
+pytestmark = [pytest.mark.process, pytest.mark.needs("tmux")]
 
 
 class Tmux:

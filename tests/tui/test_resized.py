@@ -10,6 +10,7 @@ import pytest
 
 from tests.support.fake_session import FakeAssist, demo_session
 from tests.support.pty_screen import PtyScreen, on_a_pty
+from tests.support.until import PATIENCE
 from tui.app import MultidropApp
 from tui.widgets.signs import Signs
 
@@ -48,7 +49,7 @@ class Shown:
     async def agrees(self) -> None:
         """Wait until the terminal shows what the app has."""
         try:
-            await asyncio.wait_for(self.screen.until(lambda: not self.wrong()), 10)
+            await asyncio.wait_for(self.screen.until(lambda: not self.wrong()), PATIENCE)
         except TimeoutError:
             assert self.wrong() == []
 

@@ -15,12 +15,12 @@ from textual.pilot import Pilot
 from dialects.mcode.host.checksum import sealed
 from shell.connect.settings import Settings
 from shell.session import Session
+from tests.support.until import PATIENCE
 from tui.app import MultidropApp
 from tui.assist import ShellAssist
 
 pytestmark = pytest.mark.tui
 
-PATIENCE = 20.0
 NAMED = frozenset({"enter", "ctrl+p", "ctrl+x", "f4"})
 
 

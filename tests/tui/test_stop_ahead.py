@@ -8,11 +8,10 @@ import pytest
 
 from tests.support.fake_session import FakeAssist, demo_session
 from tests.support.pty_screen import on_a_pty
+from tests.support.until import PATIENCE
 from tui.app import MultidropApp
 
 pytestmark = pytest.mark.tui
-
-PATIENCE = 20.0
 
 
 async def test_the_stop_is_written_while_the_event_loop_is_held_up() -> None:

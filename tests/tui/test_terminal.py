@@ -14,6 +14,7 @@ import pexpect
 import pytest
 
 from tests.support.paths import SUPPORT
+from tests.support.until import PATIENCE
 
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="pseudo-terminals")
 PROGRAM = SUPPORT / "screen_program.py"
@@ -27,7 +28,7 @@ class Screen:
         environment.pop("NO_COLOR", None)
         arguments = ["-W", "error", str(PROGRAM), str(told), "busy" if busy else "idle"]
         self.child = pexpect.spawn(
-            sys.executable, arguments, dimensions=(24, 80), env=environment, encoding="utf-8", timeout=30
+            sys.executable, arguments, dimensions=(24, 80), env=environment, encoding="utf-8", timeout=PATIENCE
         )
         self.child.expect("STOP ALL")
         self.before = self.child.before + self.child.after
@@ -63,7 +64,7 @@ def test_the_stop_byte_stops_whatever_came_before_it(screen: Screen) -> None:
     screen.child.expect("✗ STOP SENT")
     for number, before in enumerate(("MR 5", "\x1b", "\x1b[", "\x1b[200~a paste that never ends "), 2):
         screen.child.send(before + STOP)
-        deadline = time.monotonic() + 20
+        deadline = time.monotonic() + PATIENCE
         while len(screen.stops()) < number and time.monotonic() < deadline:
             screen.child.expect([pexpect.TIMEOUT, "."], timeout=0.02)
         assert len(screen.stops()) == number, f"after {before!r}"

@@ -31,6 +31,7 @@ from dialects.modbus.host.messages import pdu_codec
 from dialects.modbus.host.state import ModbusState
 from dialects.modbus.manual.registers import REGISTERS
 from tests.support.paths import ROOT
+from tests.support.until import PATIENCE
 
 
 def h(text: str) -> bytes:
@@ -196,7 +197,12 @@ def test_requests_are_the_bytes_of_the_standard(address: int, values: list[int])
 
 def python(code: str, **more: str) -> subprocess.CompletedProcess[str]:
     return subprocess.run(
-        [sys.executable, "-c", code], capture_output=True, text=True, timeout=60, cwd=ROOT, env={**os.environ, **more}
+        [sys.executable, "-c", code],
+        capture_output=True,
+        text=True,
+        timeout=PATIENCE,
+        cwd=ROOT,
+        env={**os.environ, **more},
     )
 
 

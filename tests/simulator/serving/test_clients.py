@@ -16,7 +16,8 @@ import serial
 
 from tests.support.foreign_python import foreign_python
 from tests.support.paths import SUPPORT
-from tests.support.processes import WAIT, Running
+from tests.support.processes import Running
+from tests.support.until import PATIENCE
 
 pytestmark = pytest.mark.process
 
@@ -41,7 +42,11 @@ def serve(cell: str, folder: Path) -> Running:
 def run(python: Path, script: str, port: Path) -> dict[str, object]:
     """What a client's script says, which is JSON on its last line."""
     done = subprocess.run(
-        [str(python), str(SUPPORT / script), str(port)], capture_output=True, text=True, timeout=120, cwd=port.parent
+        [str(python), str(SUPPORT / script), str(port)],
+        capture_output=True,
+        text=True,
+        timeout=PATIENCE,
+        cwd=port.parent,
     )
     assert done.returncode == 0, done.stdout + done.stderr
     facts = json.loads(done.stdout.splitlines()[-1])
@@ -267,7 +272,7 @@ CONVERSATIONS: dict[str, tuple[str, list[tuple[bytes, bytes]]]] = {
 @pytest.mark.parametrize("conversation", CONVERSATIONS)
 def test_what_clients_write_is_answered_byte_for_byte(units: Path, conversation: str) -> None:
     bus, steps = CONVERSATIONS[conversation]
-    with serial.Serial(str(units / f"{bus}.tty"), 9600, timeout=WAIT) as port:
+    with serial.Serial(str(units / f"{bus}.tty"), 9600, timeout=PATIENCE) as port:
         for written, expected in steps:
             port.write(written)
             assert heard(port, len(expected)) == expected, written

@@ -25,6 +25,7 @@ from simulator.serving import input_queue
 from simulator.serving.endpoints import BACKLOG, serve_bus
 from simulator.serving.running import RunningFloor
 from simulator.wire.wire import Wire
+from tests.support.until import PATIENCE
 
 pytestmark = pytest.mark.slow
 
@@ -45,7 +46,6 @@ personality = "LMDCE"
 [bus.faults]
 delay = [0.0, {delay}]
 """
-PATIENCE = 30.0
 FLOOD = b"PR P\r" * 60_000
 MOST = 512
 """Bytes of a client that may wait in the simulator."""

@@ -5,7 +5,6 @@ from __future__ import annotations
 import asyncio
 import json
 import re
-import shutil
 import socket
 import struct
 import subprocess
@@ -22,6 +21,7 @@ from simulator.floor import Floor
 from simulator.serving.endpoints import serve_bus
 from simulator.serving.running import RunningFloor
 from tests.support.processes import Running
+from tests.support.until import PATIENCE
 
 CELL = """
 [[bus]]
@@ -32,7 +32,6 @@ personality = "LMDCE"
 set = { EM = 1 }
 [bus.faults]
 """
-PATIENCE = 10.0
 POSITION = bytes.fromhex("0001 0000 0006 01 03 0057 0002")
 STANDING = bytes.fromhex("0001 0000 0007 01 03 04 0000 0000")
 
@@ -251,7 +250,7 @@ async def test_pymodbus(sim):
 
 
 @pytest.mark.process
-@pytest.mark.skipif(shutil.which("mbpoll") is None, reason="mbpoll is not installed (Debian package mbpoll)")
+@pytest.mark.needs("mbpoll")
 def test_mbpoll(sim):
     def mbpoll(*arguments: str, fails: bool = False) -> str:
         host, *values = arguments[-1].split()

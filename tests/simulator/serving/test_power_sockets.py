@@ -17,6 +17,7 @@ from simulator.lexium.power import ETHERNET_BOOT
 from simulator.serving.endpoints import serve_bus
 from simulator.serving.in_process import connect
 from simulator.serving.running import RunningFloor
+from tests.support.until import PATIENCE
 
 CELL = """
 [[bus]]
@@ -34,7 +35,6 @@ personality = "LMDCM"
 name = "s"
 set = { EM = 1 }
 """
-PATIENCE = 10.0
 POSITION = bytes.fromhex("0001 0000 0006 01 03 0057 0002")
 STANDING = bytes.fromhex("0001 0000 0007 01 03 04 0000 0000")
 

@@ -10,7 +10,8 @@ import pytest
 
 from tests.support.foreign_python import foreign_python
 from tests.support.paths import SUPPORT
-from tests.support.processes import WAIT, Running
+from tests.support.processes import Running
+from tests.support.until import PATIENCE
 
 pytestmark = pytest.mark.process
 
@@ -65,7 +66,7 @@ def test_its_stage_moves_stops_meets_limits_and_homes(python, tmp_path, way):
         (endpoint,) = [each["endpoint"] for each in said if each["endpoint"].startswith(way)]
         target = "stage.tty" if way == "pty" else endpoint.removeprefix("tcp://")
         done = subprocess.run(
-            [str(python), str(CLIENT), target], capture_output=True, text=True, timeout=4 * WAIT, cwd=tmp_path
+            [str(python), str(CLIENT), target], capture_output=True, text=True, timeout=4 * PATIENCE, cwd=tmp_path
         )
         assert done.returncode == 0, done.stdout + done.stderr
         assert json.loads(done.stdout.splitlines()[-1]) == EXPECTED

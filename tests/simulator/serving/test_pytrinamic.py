@@ -11,6 +11,7 @@ import pytest
 from tests.support.foreign_python import foreign_python
 from tests.support.paths import SUPPORT
 from tests.support.processes import Running
+from tests.support.until import PATIENCE
 
 pytestmark = pytest.mark.process
 
@@ -47,7 +48,7 @@ def test_the_makers_client_works_on_a_pseudo_terminal_and_over_tcp(tmp_path: Pat
     for place in places:
         where = place.removeprefix("pty:").removeprefix("tcp://")
         script = [str(python), str(SUPPORT / "client_pytrinamic.py"), where]
-        done = subprocess.run(script, capture_output=True, text=True, timeout=120)
+        done = subprocess.run(script, capture_output=True, text=True, timeout=PATIENCE)
         assert done.returncode == 0, done.stdout + done.stderr
         assert json.loads(done.stdout.splitlines()[-1]) == FACTS
     running.process.terminate()

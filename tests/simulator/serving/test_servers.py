@@ -27,6 +27,7 @@ from simulator.serving.endpoints import Served, serve_bus
 from simulator.serving.in_process import connect
 from simulator.serving.running import RunningFloor
 from tests.support.paths import ROOT
+from tests.support.until import PATIENCE
 from transports import TransportLost
 
 CELL = """
@@ -39,7 +40,6 @@ personality = "LMDCM"
 name = "a"
 set = {{ EM = 1 }}
 """
-PATIENCE = 5.0
 
 Serve = Callable[..., Awaitable[tuple[RunningFloor, dict[str, str]]]]
 
@@ -418,7 +418,7 @@ async def start_sim(cell: Path, speed: float = 1.0) -> tuple[asyncio.subprocess.
     )
     assert process.stdout is not None
     served = {}
-    async with asyncio.timeout(20):
+    async with asyncio.timeout(PATIENCE):
         while "ready" not in (fact := json.loads(await process.stdout.readline())):
             served[fact["endpoint"].partition(":")[0]] = fact["endpoint"]
             assert fact["bus"] == "press"
