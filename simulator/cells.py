@@ -11,7 +11,7 @@ from dialects import Diagnostic
 from dialects.files import toml_of, utf8_of
 from simulator.cell.reader import Reader
 from simulator.cell.spec import Cell, DriveSpec
-from simulator.cell.table import Table
+from simulator.cell.table import Folder, Table
 from simulator.families import BY_PERSONALITY
 
 _READER = Reader(BY_PERSONALITY)
@@ -42,31 +42,31 @@ class Placed(NamedTuple):
         return f"{self.cell}#{self.bus}:{self.spec.name}"
 
 
-def placed(cell: str) -> Placed:
+def placed(cell: str, allow: Sequence[Path] = ()) -> Placed:
     """Find a drive: `CELL` if it has only one, else `CELL#BUS` or `CELL#BUS:NAME`. Raises Diagnostic.
 
-    No CELL before the # means the demo cell, as in `sim:#press`.
+    No CELL before the # means the demo cell, as in `sim:#press`. `allow`: as for `load`.
     """
-    found = matching(cell)
+    found = matching(cell, allow)
     if len(found) == 1:
         return found[0]
     path, _, place = cell.partition("#")
     where = path or "demo cell"
-    names = ", ".join(each.place for each in found or matching(path))
+    names = ", ".join(each.place for each in found or matching(path, allow))
     what = f"{len(found)} drives match" if found else "no such drive"
     raise Diagnostic(what, f"{where}#{place}" if place else where, f"valid for --cell: {names}" if names else "")
 
 
-def matching(cell: str) -> Sequence[Placed]:
+def matching(cell: str, allow: Sequence[Path] = ()) -> Sequence[Placed]:
     """All drives that `CELL`, `CELL#BUS` or `CELL#BUS:NAME` means. Raises Diagnostic."""
     path, _, place = cell.partition("#")
     bus, _, name = place.partition(":")
-    return [each for each in _drives(path) if bus in ("", each.bus) and name in ("", each.spec.name)]
+    return [each for each in _drives(path, allow) if bus in ("", each.bus) and name in ("", each.spec.name)]
 
 
-def _drives(path: str) -> list[Placed]:
+def _drives(path: str, allow: Sequence[Path]) -> list[Placed]:
     text = utf8_of(path) if path else _demo_text()
-    shop = read(text, path, Path(path).absolute().parent) if path else demo()
+    shop = read(text, path, Path(path).absolute().parent, allow) if path else demo()
     tables = toml_of(text, path).get("bus", [])
     return [
         Placed(path, bus.name, spec, table)
@@ -77,4 +77,4 @@ def _drives(path: str) -> list[Placed]:
 
 def read_drive(table: Mapping[str, Any], where: str) -> DriveSpec:
     """Read the table of a drive, of which no file is read. Raises Diagnostic."""
-    return BY_PERSONALITY[table["personality"]].read_drive(Table(table, where), Path())
+    return BY_PERSONALITY[table["personality"]].read_drive(Table(table, where), Folder(Path()))

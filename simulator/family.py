@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from importlib.resources.abc import Traversable
 from typing import Protocol
 
 from dialects.family import Motion
 from dialects.parameters import Value
 from dialects.snapshots import Snapshot
 from simulator.cell.spec import DriveSpec
-from simulator.cell.table import Table
+from simulator.cell.table import Folder, Table
 from simulator.cell.writer import DriveText
 from simulator.wire.wire import Port
 from simulator.world import World
@@ -112,7 +111,7 @@ class Family:
     """
 
     name: str
-    read_drive: Callable[[Table, Traversable], DriveSpec]
+    read_drive: Callable[[Table, Folder], DriveSpec]
     build: Callable[[DriveSpec, Place], Unit]
     ethernet: frozenset[str] = frozenset()
     addressed: bool = False

@@ -10,6 +10,7 @@ from types import TracebackType
 from dialects import Diagnostic
 from dialects.families import TABLE
 from multidrop.api.threads import LoopThread
+from shell.connect import settings
 from simulator import cells
 from simulator.cell.spec import BusSpec, Cell, Endpoint
 from simulator.floor import Floor
@@ -103,7 +104,7 @@ class SimulatedCell:
 def _read(file: str | os.PathLike[str], text: str) -> Cell:
     if text:
         return cells.read(text, os.fspath(file) or "cell")
-    return cells.load(os.fspath(file)) if os.fspath(file) else cells.demo()
+    return cells.load(os.fspath(file), settings.load().allowed) if os.fspath(file) else cells.demo()
 
 
 def _everywhere(bus: BusSpec, ethernet: bool) -> BusSpec:

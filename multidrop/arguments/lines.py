@@ -48,6 +48,13 @@ def run(parser: argparse.ArgumentParser) -> None:
 def sim(parser: argparse.ArgumentParser) -> None:
     """Add a cell, and how to serve it."""
     parser.add_argument("cell", metavar="CELL", nargs="?", help="a cell file (TOML)")
+    parser.add_argument(
+        "--allow",
+        metavar="PATH",
+        action="append",
+        default=[],
+        help="let paths of the cell lead there, too: a file or a folder outside its own; may be repeated",
+    )
     parser.add_argument("--json", action="store_true", help="print the endpoints as JSON objects, one a line")
     parser.add_argument("--speed", metavar="N", type=_speed, default=1.0, help="run time N times as fast")
 

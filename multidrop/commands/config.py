@@ -65,6 +65,7 @@ def shown(found: Settings, keys: dict[str, str], text: str) -> list[str]:
     lines += rows("log", {"always": log.always, "megabytes": log.size / 1e6, "files": log.files})
     login = {key: HIDDEN if key == "password" and value else value for key, value in asdict(found.mqtt).items()}
     lines += rows("mqtt", login)
+    lines += rows("simulator", {"allow": list(map(str, found.allowed))})
     lines += rows("sweep", {"clusters": list(found.clusters)})
     return lines + rows("guards", {"off": sorted(guards.off), "also": sorted(guards.also)})
 

@@ -6,7 +6,6 @@ A signal ends the sweep: what is done is reported, with exit code 130.
 from __future__ import annotations
 
 import argparse
-import asyncio
 import sys
 from collections.abc import Iterator
 from functools import partial
@@ -15,7 +14,6 @@ from dialects import Diagnostic
 from multidrop.commands.failure import fail
 from multidrop.commands.sweep_report import Report
 from shell.connect import saving, settings
-from shell.front.answer import ask_outside_a_session
 from shell.output import INTERRUPTED, write
 from shell.sweeps import plan as planning
 from shell.sweeps import workers
@@ -70,6 +68,10 @@ def _agree(address: str, yes: bool, what: str, interruption: Interruption) -> No
     known = settings.load().clusters
     if yes or address in known:
         return
+    import asyncio
+
+    from shell.front.answer import ask_outside_a_session
+
     where = f"--cluster {address}"
     with interruption.open():
         answer = asyncio.run(ask_outside_a_session(f"{where}: {what}"))

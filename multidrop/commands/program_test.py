@@ -17,6 +17,7 @@ from dialects import Diagnostic
 from dialects.families import program_language_of
 from dialects.files import program_text_of
 from multidrop.commands.failure import fail
+from shell.connect import settings
 from shell.output import reader_left, write
 from simulator import cells
 from simulator.cell.spec import DriveSpec
@@ -41,7 +42,7 @@ def drive(cell: str | None, personality: str | None) -> DriveSpec:
 
     No CELL before the # means the demo cell, as in `sim:#press`. No cell means an LMDCM in empty surroundings.
     """
-    spec = DriveSpec() if cell is None else cells.placed(cell).spec
+    spec = DriveSpec() if cell is None else cells.placed(cell, settings.load().allowed).spec
     return spec if personality is None else replace(spec, personality=personality)
 
 

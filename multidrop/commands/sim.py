@@ -5,9 +5,11 @@ from __future__ import annotations
 import argparse
 import asyncio
 import sys
+from pathlib import Path
 
 from dialects import Diagnostic
 from multidrop.commands.failure import fail
+from shell.connect import settings
 from shell.output import finish, nonblocking
 from simulator.serving.command import serve
 
@@ -20,7 +22,9 @@ def run(chosen: argparse.Namespace) -> int:
 async def _serve(chosen: argparse.Namespace) -> int:
     with nonblocking() as streams:
         try:
-            await serve(chosen.cell, json=chosen.json, speed=chosen.speed, stdin=sys.stdin, stdout=sys.stdout)
+            allow = (*map(Path, chosen.allow), *(settings.load().allowed if chosen.cell else ()))
+            out = sys.stdout
+            await serve(chosen.cell, json=chosen.json, speed=chosen.speed, stdin=sys.stdin, stdout=out, allow=allow)
         except Diagnostic as problem:
             return fail(problem)
         finally:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 from dialects import Diagnostic
 from multidrop.commands.failure import fail
 from shell import new_file, replacement, snapshots
+from shell.connect import settings
 from shell.front import batch
 from shell.params.work import each, is_several, targets
 from simulator import cells
@@ -31,7 +32,7 @@ def apply(chosen: argparse.Namespace) -> int:
     try:
         if chosen.source and is_several(chosen.drive):
             raise Diagnostic(f"--from {chosen.source} is for one drive", "snapshot apply", "--drive names one")
-        cell = cells.load(chosen.file)
+        cell = cells.load(chosen.file, settings.load().allowed)
     except Diagnostic as problem:
         return fail(problem)
     wanted = replacement.Wanted(

@@ -66,7 +66,7 @@ function _shtab_multidrop_using
 end
 
 set -g _shtab_multidrop_commands demo tui shell send run sim program 'program check' 'program test' 'program sweep' 'program list' 'program upload' 'program download' params 'params backup' 'params diff' 'params restore' macro 'macro list' 'macro show' 'macro play' 'macro edit' 'macro describe' 'macro rename' 'macro copy' 'macro delete' 'macro key' 'macro import' 'macro export' plot publish share snapshot ports relay scan rescue log 'log show' 'log follow' 'log grep' 'log replay' config 'config path' 'config show' 'config check' lsp report completion
-set -g _shtab_multidrop_opts_with_value --against --baud --break --cell --cluster --dialect --drive --expect --jobs --junit --language --on --other --output --page --personality --random --rate --rfc2217 --role --run --save --seed --serve --set --speed --tcp --times --to --until --vary --watch --with -o
+set -g _shtab_multidrop_opts_with_value --against --allow --baud --break --cell --cluster --dialect --drive --expect --jobs --junit --language --on --other --output --page --personality --random --rate --rfc2217 --role --run --save --seed --serve --set --speed --tcp --times --to --until --vary --watch --with -o
 
 complete -c multidrop -e
 complete -c multidrop -f
@@ -104,6 +104,7 @@ complete -c multidrop -n '_shtab_multidrop_using run' -l yes -d 'answer every qu
 complete -c multidrop -n '_shtab_multidrop_using run; and test $_shtab_multidrop_npos -eq 0' -ka "(__fish_complete_path (commandline -ct))" -d 'a file of lines as typed at the prompt, or a Python program (.py); -: standard input'
 complete -c multidrop -n '_shtab_multidrop_using; and test $_shtab_multidrop_npos -eq 0' -a sim -d 'Serve a simulated cell to other programs; the demo cell without CELL.'
 complete -c multidrop -n '_shtab_multidrop_using sim' -s h -l help -d 'show this help message and exit'
+complete -c multidrop -n '_shtab_multidrop_using sim' -l allow -x -d 'let paths of the cell lead there, too: a file or a folder outside its own; may be repeated'
 complete -c multidrop -n '_shtab_multidrop_using sim' -l json -d 'print the endpoints as JSON objects, one a line'
 complete -c multidrop -n '_shtab_multidrop_using sim' -l speed -x -d 'run time N times as fast'
 complete -c multidrop -n '_shtab_multidrop_using sim; and test $_shtab_multidrop_npos -eq 0' -ka "(__fish_complete_path (commandline -ct))" -d 'a cell file (TOML)'

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 from dialects import Diagnostic, Family, Hints
 from dialects.families import DEFAULT, FAMILIES
 from drives.bus import Bus
+from shell.connect import settings
 from shell.connect.port_state import PortState
 from shell.connect.reopening import HostAgain, LoginAgain, Reopen, SerialAgain, simulated, timed
 from shell.connect.urls import Connection
@@ -106,7 +107,8 @@ async def open_port(connection: Connection) -> OpenedPort:
     if connection.scheme == "sim":
         from simulator.serving.in_process import connect
 
-        found = await connect(connection.target + (f"#{connection.bus}" if connection.bus else ""))
+        target = connection.target + (f"#{connection.bus}" if connection.bus else "")
+        found = await connect(target, settings.load().allowed if connection.target else ())
         first, *others = found
         if others:
             for each in found:
@@ -195,7 +197,7 @@ async def _simulated(connection: Connection, naming: Naming) -> list[Opened]:
 
     target = connection.target + (f"#{connection.bus}" if connection.bus else "")
     found = []
-    for each in await connect(target):
+    for each in await connect(target, settings.load().allowed if connection.target else ()):
         given = connection.hints
         hints = replace(
             given,

@@ -60,6 +60,8 @@ class Settings:
     log: LogSettings = LogSettings()
     look: Look = look.DEFAULT
     mqtt: MqttSettings = MqttSettings()
+    allowed: tuple[Path, ...] = ()
+    """Where paths of cell files may lead, too, in `simulator.allow`."""
     clusters: tuple[str, ...] = ()
     """The addresses of the schedulers that may run code here, in `sweep.clusters`."""
 
@@ -135,7 +137,7 @@ def placed(message: str, text: str, where: str, hint: str = "") -> Diagnostic:
 
 
 def _read(document: Mapping[str, Any], where: str) -> Settings:
-    _only(document, {"connections", "guards", "keys", "log", "mqtt", "screen", "sweep"}, where, "")
+    _only(document, {"connections", "guards", "keys", "log", "mqtt", "screen", "simulator", "sweep"}, where, "")
     tables = document.get("connections", {})
     if not isinstance(tables, dict):
         raise Diagnostic("connections is not a table", where, "write [connections.NAME]")
@@ -146,7 +148,10 @@ def _read(document: Mapping[str, Any], where: str) -> Settings:
         log=log_settings.read(document.get("log", {}), where),
         look=look.read(document.get("screen", {}), document.get("keys", {}), where),
         mqtt=mqtt_settings.read(document.get("mqtt", {}), where),
-        clusters=_clusters(document.get("sweep", {}), where),
+        allowed=tuple(
+            Path(where).parent / os.path.expanduser(each) for each in _texts(document, "simulator", "allow", where)
+        ),
+        clusters=_texts(document, "sweep", "clusters", where),
     )
 
 
@@ -170,13 +175,15 @@ def _connection(name: str, table: Any, where: str) -> SavedConnection:
     return SavedConnection(name, url, names)
 
 
-def _clusters(table: Any, where: str) -> tuple[str, ...]:
+def _texts(document: Mapping[str, Any], name: str, key: str, where: str) -> tuple[str, ...]:
+    """The list of texts that is the only key of a table."""
+    table = document.get(name, {})
     if not isinstance(table, dict):
-        raise Diagnostic("sweep is not a table", where, "write [sweep] with clusters = [...]")
-    _only(table, {"clusters"}, where, "sweep.")
-    found = table.get("clusters", [])
-    if not isinstance(found, list) or not all(isinstance(each, str) for each in found):
-        raise Diagnostic("sweep.clusters is not a list of addresses", where, 'as in ["tcp://pc:8786"]')
+        raise Diagnostic(f"{name} is not a table", where, f"write [{name}] with {key} = [...]")
+    _only(table, {key}, where, f"{name}.")
+    found = table.get(key, [])
+    if not isinstance(found, list) or not all(isinstance(each, str) and each for each in found):
+        raise Diagnostic(f"{name}.{key} is not a list of texts", where, f'as in {key} = ["..."]')
     return tuple(found)
 
 

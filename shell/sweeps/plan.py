@@ -10,11 +10,13 @@ from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from math import prod
+from pathlib import Path
 from random import Random
 
 from dialects import Diagnostic
 from dialects.families import program_language_of
 from dialects.files import program_text_of
+from shell.connect import settings
 from shell.sweeps import values, variation
 from shell.sweeps.trial import Case, Job, bench
 from shell.sweeps.values import Value, Values
@@ -84,11 +86,12 @@ def make(asked: Asked) -> Plan:
     language = asked.language or program_language_of(asked.file)
     program = program_text_of(asked.file)
     default = PROGRAMS[language].drive
+    allow = settings.load().allowed if asked.cell else ()
     bare = Placed("", "", default, {"personality": default.personality, "name": default.name})
-    everyone = [bare] if asked.cell is None else cells.matching(asked.cell.partition("#")[0])
+    everyone = [bare] if asked.cell is None else cells.matching(asked.cell.partition("#")[0], allow)
     names = {name: each for each in everyone for name in _names(each)}
     parsed = [(*_parsed(key, names), _values(key, text, asked)) for key, text in asked.vary]
-    chosen = bare if asked.cell is None else _chosen(asked.cell, {drive for drive, _, _ in parsed} - {""})
+    chosen = bare if asked.cell is None else _chosen(asked.cell, allow, {drive for drive, _, _ in parsed} - {""})
     keys = tuple(key for _, key, _ in parsed)
     _check_keys(keys)
     for named, key, _ in parsed:
@@ -98,7 +101,7 @@ def make(asked: Asked) -> Plan:
     expects = tuple(asked.expect) or EXPECTED
     where = f"drive {chosen.spec.name}"
     job = Job(asked.file, program, language, json.dumps(drive), where, keys, expects, asked.run, asked.until)
-    made = Plan(asked, job, _place(asked.cell, chosen), tuple(each for _, _, each in parsed), drive)
+    made = Plan(asked, job, _place(asked.cell, allow, chosen), tuple(each for _, _, each in parsed), drive)
     _check(made)
     return made
 
@@ -124,18 +127,18 @@ def _names(drive: Placed) -> tuple[str, ...]:
     return (name, f"{drive.bus}:{name}") if drive.bus else (name,)
 
 
-def _chosen(cell: str, named: set[str]) -> Placed:
+def _chosen(cell: str, allow: Sequence[Path], named: set[str]) -> Placed:
     """The drive that runs the program: the only one, or else the only one that a key names. Raises Diagnostic."""
-    candidates = cells.matching(cell)
+    candidates = cells.matching(cell, allow)
     chosen = [each for each in candidates if named.intersection(_names(each))]
-    return chosen[0] if len(candidates) > 1 and len(chosen) == 1 else cells.placed(cell)
+    return chosen[0] if len(candidates) > 1 and len(chosen) == 1 else cells.placed(cell, allow)
 
 
-def _place(cell: str | None, chosen: Placed) -> str:
+def _place(cell: str | None, allow: Sequence[Path], chosen: Placed) -> str:
     """The shortest `--cell` that means the drive."""
     if cell is None:
         return ""
-    return cell if len(cells.matching(cell)) == 1 else chosen.place
+    return cell if len(cells.matching(cell, allow)) == 1 else chosen.place
 
 
 def _check_keys(keys: Sequence[Key]) -> None:

@@ -5,7 +5,8 @@ Every error in a file is a `Diagnostic` of one line that names the key and its p
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+import shlex
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import fields
 from importlib.resources.abc import Traversable
 from pathlib import Path
@@ -14,7 +15,7 @@ from typing import Any, Protocol
 from dialects import Diagnostic
 from dialects.files import LARGEST_PROGRAM, bounded, program_of, toml_of, utf8_of
 from simulator.cell.spec import BusSpec, Cell, DriveSpec, Endpoint, Faults
-from simulator.cell.table import Table, quoted
+from simulator.cell.table import Folder, Table, quoted
 
 SCHEMES = ("pty", "tcp", "udp", "modbus")
 DRIVE_KEYS = (
@@ -43,7 +44,7 @@ class DriveRules(Protocol):
     def addressed(self) -> bool:
         """Whether each drive replies only to its own address. Otherwise a shared bus needs party mode."""
 
-    def read_drive(self, table: Table, folder: Traversable) -> DriveSpec:
+    def read_drive(self, table: Table, folder: Folder) -> DriveSpec:
         """Read a `[[bus.drive]]` whose personality is one of these. Raises Diagnostic."""
 
 
@@ -53,19 +54,24 @@ class Reader:
     def __init__(self, rules: Mapping[str, DriveRules]) -> None:
         self._rules = rules
 
-    def load(self, path: str | Path) -> Cell:
-        """Read a cell file. Raises Diagnostic."""
+    def load(self, path: str | Path, allow: Sequence[Path] = ()) -> Cell:
+        """Read a cell file; `allow`: its paths may lead there, too. Raises Diagnostic."""
         path = Path(path)
-        cell = self.read(utf8_of(path), str(path), path.absolute().parent)
+        cell = self.read(utf8_of(path), str(path), path.absolute().parent, allow)
         if not cell.buses:
             raise Diagnostic("has no bus", str(path), "each begins with [[bus]]")
         return cell
 
-    def read(self, text: str, where: str = "cell", folder: Traversable | None = None) -> Cell:
-        """Read the text of a cell; its paths are relative to `folder` (None: the current one). Raises Diagnostic."""
+    def read(
+        self, text: str, where: str = "cell", folder: Traversable | None = None, allow: Sequence[Path] = ()
+    ) -> Cell:
+        """Read the text of a cell; its paths are relative to `folder` (None: the current one). Raises Diagnostic.
+
+        They stay in that folder, or in what is `allow`ed by the person who opens the cell.
+        """
         table = Table(toml_of(text, where), where)
         table.only("seed", "bus")
-        here = Path.cwd() if folder is None else folder
+        here = Folder(Path.cwd() if folder is None else folder, tuple(allow))
         cell = Cell(
             seed=table.integer("seed", 0),
             buses=tuple(self._bus(each, where, here) for each in table.tables("bus", "[[bus]]")),
@@ -73,7 +79,7 @@ class Reader:
         _check_cell(cell, where)
         return cell
 
-    def _bus(self, table: Table, where: str, folder: Traversable) -> BusSpec:
+    def _bus(self, table: Table, where: str, folder: Folder) -> BusSpec:
         name = table.values.get("name")
         if isinstance(name, str) and name:
             table = Table(table.values, f"{where}: [[bus]] {quoted(name)}")
@@ -91,7 +97,7 @@ class Reader:
         self._check_bus(bus, table)
         return bus
 
-    def _drive(self, table: Table, folder: Traversable) -> DriveSpec:
+    def _drive(self, table: Table, folder: Folder) -> DriveSpec:
         table.only(*DRIVE_KEYS)
         personality = table.choice("personality", tuple(self._rules))
         return self._rules[personality].read_drive(table, folder)
@@ -125,7 +131,7 @@ class Reader:
             raise Diagnostic(what, where, "add party = true")
 
 
-def common_keys(table: Table, folder: Traversable) -> dict[str, Any]:
+def common_keys(table: Table, folder: Folder) -> dict[str, Any]:
     """Read the keys of a drive that mean the same in every family, as arguments of DriveSpec. Raises Diagnostic."""
     name = table.text("program", "")
     text = table.text(PROGRAM_TEXT, "")
@@ -139,12 +145,12 @@ def common_keys(table: Table, folder: Traversable) -> dict[str, Any]:
     }
 
 
-def _program(name: str, table: Table, folder: Traversable) -> str:
+def _program(name: str, table: Table, folder: Folder) -> str:
     if not name:
         return ""
     try:
-        _check_inside(name, "program", table, folder)
-        file = folder.joinpath(name)
+        _check_inside(Path(folder.real, name).resolve(), name, "program", table, folder)
+        file = folder.path.joinpath(name)
         if not file.is_file():
             raise table.wrong("program", f"{quoted(name)} does not exist", "paths are relative to the cell file")
         with file.open("rb") as stream:
@@ -154,14 +160,15 @@ def _program(name: str, table: Table, folder: Traversable) -> str:
         raise table.wrong("program", f"{quoted(name)} cannot be read ({why})") from None
 
 
-def _check_inside(name: str, key: str, table: Table, folder: Traversable) -> None:
+def _check_inside(place: Path, name: str, key: str, table: Table, folder: Folder) -> None:
     """Refuse a path that leaves the folder of the cell file: the file may be another person's. Raises Diagnostic."""
-    home = Path(str(folder)).resolve()
-    if not Path(home, name).resolve().is_relative_to(home):
-        raise table.wrong(key, f"{quoted(name)} leaves the folder of the cell file", "use a path inside it")
+    if not folder.holds(place):
+        own = f"if the cell is your own: multidrop sim CELL --allow {shlex.quote(str(place))}"
+        hint = f"use a path inside it; {own}, or simulator.allow in the configuration"
+        raise table.wrong(key, f"{quoted(name)} leaves the folder of the cell file", hint)
 
 
-def _endpoint(text: str, table: Table, folder: Traversable) -> Endpoint:
+def _endpoint(text: str, table: Table, folder: Folder) -> Endpoint:
     scheme, colon, rest = text.partition(":")
     if not colon or scheme not in SCHEMES:
         raise table.wrong(
@@ -170,8 +177,10 @@ def _endpoint(text: str, table: Table, folder: Traversable) -> Endpoint:
     if scheme == "pty":
         if not rest.isprintable():
             raise table.wrong("serve", f"cannot be {quoted(text)}")
-        _check_inside(str(Path(rest).parent), "serve", table, folder)
-        return Endpoint(text, scheme, path=Path(str(folder), rest) if rest else None)
+        link = Path(str(folder.path), rest)
+        if rest:
+            _check_inside(link.parent.resolve() / link.name, rest, "serve", table, folder)
+        return Endpoint(text, scheme, path=link if rest else None)
     host, colon, port = rest.removeprefix("//").rpartition(":")
     if not (colon and port.isascii() and port.isdigit() and len(port) < 6 and int(port) < 65536):
         raise table.wrong("serve", f"{quoted(text)} has no port", f"for any free port: {scheme}://127.0.0.1:0")

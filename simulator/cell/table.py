@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from difflib import get_close_matches
+from importlib.resources.abc import Traversable
 from math import inf, isfinite
+from pathlib import Path
 from typing import Any
 
 from dialects import Diagnostic
@@ -14,6 +17,29 @@ Column = tuple[str, float, float]
 
 PLACES = (-(2.0**40), 2.0**40)
 """The range of positions, motor steps."""
+
+
+@dataclass(frozen=True)
+class Folder:
+    """The folder of a cell file, and where its paths may lead, too."""
+
+    path: Traversable
+    allowed: tuple[Path, ...] = ()
+
+    @property
+    def real(self) -> Path:
+        """The folder without symbolic links."""
+        return Path(str(self.path)).resolve()
+
+    def holds(self, place: Path) -> bool:
+        """Whether a path may be used; its folder is free of symbolic links."""
+        allowed = (self.real, *(way for each in self.allowed for way in (each.resolve(), _link(each))))
+        return any(place.is_relative_to(each) for each in allowed)
+
+
+def _link(path: Path) -> Path:
+    """A path that may be a symbolic link itself, in a folder without any."""
+    return path.parent.resolve() / path.name
 
 
 class Table:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from difflib import get_close_matches
 from functools import partial
-from importlib.resources.abc import Traversable
 
 from dialects.mcode.manual.grammar import is_name
 from dialects.mcode.manual.table import Mnemonic, lookup, words
@@ -12,7 +11,7 @@ from simulator.cell.identities import read_identity, read_variables
 from simulator.cell.reader import common_keys
 from simulator.cell.settings import Check, read_settings
 from simulator.cell.spec import DriveSpec, Value
-from simulator.cell.table import Table, quoted, shown
+from simulator.cell.table import Folder, Table, quoted, shown
 from simulator.cell.worlds import KEYS, read_world
 from simulator.lexium.state.models import MODELS
 
@@ -20,7 +19,7 @@ KEY_OF = {"DN": "name", "PY": "party"}
 """Mnemonics that have a key of their own in the table."""
 
 
-def read_drive(table: Table, folder: Traversable) -> DriveSpec:
+def read_drive(table: Table, folder: Folder) -> DriveSpec:
     """Read the table of one drive. Raises Diagnostic."""
     common = common_keys(table, folder)
     personality = common["personality"]

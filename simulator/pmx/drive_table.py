@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from importlib.resources.abc import Traversable
-
 from simulator.cell.identities import read_identity, read_variables
 from simulator.cell.reader import common_keys
 from simulator.cell.settings import read_settings
 from simulator.cell.spec import DriveSpec, Value
-from simulator.cell.table import Table, quoted
+from simulator.cell.table import Folder, Table, quoted
 from simulator.cell.worlds import ENCODER_KEYS, KEYS, read_worlds
 from simulator.pmx.settings import AXES, VARIABLES
 
@@ -18,7 +16,7 @@ NAMES = tuple(f"V{n}" for n in range(VARIABLES))
 """The variables of its programs."""
 
 
-def read_drive(table: Table, folder: Traversable) -> DriveSpec:
+def read_drive(table: Table, folder: Folder) -> DriveSpec:
     """Read the table of one controller. Raises Diagnostic."""
     common = common_keys(table, folder)
     name = table.text("name", "00")

@@ -10,7 +10,8 @@ import os
 import signal
 import sys
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from pathlib import Path
 from typing import TextIO
 from urllib.parse import urlsplit
 
@@ -29,15 +30,23 @@ LONGEST = 64 * 1024
 SIGNALS = (signal.SIGINT, signal.SIGTERM, getattr(signal, "SIGHUP", signal.SIGTERM))
 
 
-async def serve(cell_path: str | None, *, json: bool, speed: float, stdin: TextIO | None, stdout: TextIO) -> None:
-    """Serve a cell (None: the demo cell) until SIGINT, SIGTERM or SIGHUP.
+async def serve(
+    cell_path: str | None,
+    *,
+    json: bool,
+    speed: float,
+    stdin: TextIO | None,
+    stdout: TextIO,
+    allow: Sequence[Path] = (),
+) -> None:
+    """Serve a cell (None: the demo cell) until SIGINT, SIGTERM or SIGHUP; `allow`: its paths may lead there, too.
 
     Print the endpoints on `stdout`, carry out the `/sim` lines of `stdin` (their errors go to standard error), and
     remove the links at the end. Raises Diagnostic for an error in the cell, and for an endpoint that cannot be served.
     """
     if not speed > 0:
         raise Diagnostic(f"no speed {speed:g}", "--speed", "valid: above 0; 1 is real time, 10 ten times as fast")
-    cell = cells.demo() if cell_path is None else cells.load(cell_path)
+    cell = cells.demo() if cell_path is None else cells.load(cell_path, allow)
     loop = asyncio.get_running_loop()
     over = asyncio.Event()
     async with contextlib.AsyncExitStack() as stack:

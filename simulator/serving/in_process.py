@@ -8,8 +8,9 @@ from __future__ import annotations
 
 import asyncio
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 from dialects import Diagnostic
 from simulator import cells
@@ -58,16 +59,17 @@ class _Running:
 _running: dict[str, _Running] = {}
 
 
-async def connect(target: str) -> list[SimBus]:
+async def connect(target: str, allow: Sequence[Path] = ()) -> list[SimBus]:
     """Open the buses of a `sim:` URL: all of the demo cell, `#BUS`, `CELL.toml` or `CELL.toml#BUS`.
 
-    Raises Diagnostic for an error in the cell file, and for a bus that does not exist.
+    `allow`: its paths may lead there, too. Raises Diagnostic for an error in the cell file, and for a bus that does not
+    exist.
     """
     path, _, bus = target.removeprefix("sim:").partition("#")
     key = _key(path)
     running = _running.get(key)
     if running is None or running.floor.loop is not asyncio.get_running_loop():
-        cell = cells.load(path) if path else cells.demo()
+        cell = cells.load(path, allow) if path else cells.demo()
         running = _Running(cell, RunningFloor(Floor(cell)))
     try:
         specs = _chosen(running.cell, bus, path or "demo cell")

@@ -7,14 +7,13 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
-from importlib.resources.abc import Traversable
 
 from dialects.tmcl.manual.parameters import AXIS, GLOBAL, Global, Parameter
 from simulator.cell.identities import read_identity
 from simulator.cell.reader import common_keys
 from simulator.cell.settings import read_settings
 from simulator.cell.spec import DriveSpec, Identity, Value
-from simulator.cell.table import Table, quoted
+from simulator.cell.table import Folder, Table, quoted
 from simulator.cell.worlds import read_world
 from simulator.tmcl.motor import STORED
 
@@ -25,7 +24,7 @@ NO_INPUTS = (1,)
 """A range that `read_world` needs and no key uses: the module has no inputs but its switches."""
 
 
-def read_drive(table: Table, folder: Traversable) -> DriveSpec:
+def read_drive(table: Table, folder: Folder) -> DriveSpec:
     """Read the table of one module. Raises Diagnostic."""
     common = common_keys(table, folder)
     if common["program"]:

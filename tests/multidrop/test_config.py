@@ -1,13 +1,16 @@
 """`multidrop config`: path, show and check."""
 
 import re
+import signal
 import sys
 
 import pytest
 import tomlkit
 
 from multidrop.__main__ import main
+from tests.support.front_door import command
 from tests.support.paths import ROOT
+from tests.support.processes import Running
 
 
 @pytest.fixture
@@ -83,3 +86,52 @@ def test_the_example_of_the_page_is_right(file, capsys):
     (example,) = re.findall(r"```toml\n(.*?)```", page, re.DOTALL)
     file.write_text(example, encoding="utf-8")
     assert main(["config", "check"]) == 0, capsys.readouterr().err
+
+
+OWN = '[[bus]]\nname = "p"\nserve = ["pty:../p.tty"]\n[[bus.drive]]\npersonality = "LMDCM"\nprogram = "../feed.mxt"\n'
+
+
+@pytest.fixture
+def own_cell(tmp_path):
+    """A folder with a cell whose paths leave the folder of the cell."""
+    (tmp_path / "cell").mkdir()
+    (tmp_path / "feed.mxt").write_text("PG 1\nLB G1\n PR 7\nE\nPG\n")
+    (tmp_path / "cell" / "own.toml").write_text(OWN)
+    return tmp_path
+
+
+def test_paths_of_a_cell_leave_its_folder_where_the_configuration_allows_it(own_cell):
+    commands = (
+        ("send", "sim:cell/own.toml", "PR P"),
+        ("program", "test", "feed.mxt", "--cell", "cell/own.toml", "--run", "G1"),
+        ("program", "sweep", "feed.mxt", "--cell", "cell/own.toml", "--vary", "VM=20000", "--run", "G1"),
+    )
+    for each in commands:
+        refused = command(own_cell, *each)
+        assert refused.returncode == 2 and refused.stderr.count("\n") == 1
+        assert "simulator.allow in the configuration" in refused.stderr
+    (own_cell / "conf").mkdir(exist_ok=True)
+    (own_cell / "conf" / "multidrop.toml").write_text('[simulator]\nallow = ["../feed.mxt", "../p.tty"]\n')
+    for each in commands:
+        assert command(own_cell, *each).returncode == 0, each
+
+
+@pytest.mark.process
+@pytest.mark.skipif(sys.platform == "win32", reason="serves a pseudo-terminal")
+def test_paths_of_a_cell_leave_its_folder_where_its_server_is_given_allow(own_cell):
+    running = Running("sim", "cell/own.toml", "--allow", "feed.mxt", "--allow", "p.tty", "--json", folder=own_cell)
+    try:
+        running.until('{"ready": true}')
+        assert (own_cell / "p.tty").is_symlink()
+        running.process.send_signal(signal.SIGINT)
+        assert running.end() == 0
+    finally:
+        running.process.kill()
+
+
+def test_a_list_of_the_configuration_that_is_none_is_one_line(file, capsys):
+    for text in ('[simulator]\nallow = "x"\n', "[sweep]\nclusters = [1]\n", "simulator = 1\n", "[sweep]\nx = 1\n"):
+        file.write_text(text)
+        assert main(["config", "check"]) == 2
+        [line] = capsys.readouterr().err.splitlines()
+        assert re.search(r"multidrop.toml:\d: .*(simulator|sweep)", line)

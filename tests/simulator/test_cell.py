@@ -427,8 +427,37 @@ def test_a_path_that_leaves_the_folder_of_the_cell_is_refused(tmp_path, path):
     (tmp_path / "x").write_text("")
     drive = '[[bus.drive]]\npersonality = "LMDCM"\n'
     for text in (f'[[bus]]\nname = "p"\nserve = ["pty:{path}"]\n', f'[[bus]]\nname = "p"\n{drive}program = "{path}"\n'):
-        with pytest.raises(Diagnostic, match="leaves the folder of the cell file; use a path inside it"):
+        with pytest.raises(
+            Diagnostic, match="leaves the folder of the cell file; use a path inside it.*sim CELL --allow"
+        ):
             cell.read(text, "cell.toml", tmp_path / "cell")
+
+
+@pytest.mark.parametrize("allowed", ["x", ".", "link"])
+def test_a_path_that_the_person_allows_may_leave_the_folder_of_the_cell(tmp_path, allowed):
+    (tmp_path / "cell").mkdir()
+    (tmp_path / "x").write_text("PG 1\n")
+    (tmp_path / "link").symlink_to(tmp_path)
+    allow = [tmp_path / allowed]
+    drive = f'[[bus.drive]]\npersonality = "LMDCM"\nprogram = "{tmp_path}/x"\n'
+    found = cell.read(f'[[bus]]\nname = "p"\n{drive}', "cell.toml", tmp_path / "cell", allow)
+    assert found.buses[0].drives[0].program == "PG 1\n"
+    found = cell.read('[[bus]]\nname = "p"\nserve = ["pty:../x"]\n', "cell.toml", tmp_path / "cell", allow)
+    assert found.buses[0].serve[0].path == tmp_path / "cell" / ".." / "x"
+    with pytest.raises(Diagnostic, match=r"leaves the folder.*--allow '?/etc/"):
+        cell.read('[[bus]]\nname = "p"\nserve = ["pty:/etc/x"]\n', "cell.toml", tmp_path / "cell", allow)
+
+
+def test_a_link_that_is_there_is_allowed_by_its_own_name(tmp_path):
+    (tmp_path / "cell").mkdir()
+    (tmp_path / "line.tty").symlink_to("/dev/pts/99")  # of a server that was killed
+    text = f'[[bus]]\nname = "p"\nserve = ["pty:{tmp_path}/line.tty"]\n'
+    found = cell.read(text, "cell.toml", tmp_path / "cell", [tmp_path / "line.tty"])
+    assert found.buses[0].serve[0].path == tmp_path / "line.tty"
+    (tmp_path / "cell" / "inside").symlink_to("/etc/passwd")
+    with pytest.raises(Diagnostic, match="leaves the folder"):
+        text = '[[bus]]\nname = "p"\n[[bus.drive]]\npersonality = "LMDCM"\nprogram = "inside"\n'
+        cell.read(text, "cell.toml", tmp_path / "cell", [tmp_path / "line.tty"])
 
 
 def test_a_path_inside_the_folder_of_the_cell_may_be_absolute(tmp_path):
