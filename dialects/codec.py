@@ -233,6 +233,9 @@ class Codec(Protocol):
     def damaged(self, line: str) -> bool:
         """Whether a checksum shows that an unsolicited line was damaged on the wire."""
 
+    def answers_host(self, line: str) -> bool:
+        """Whether an unsolicited line is a late reply: only a question of multidrop has this form."""
+
     def restarted(self, line: str) -> bool:
         """Whether an unsolicited line is the drive's message after power-up or a reset."""
 

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from dialects import End, Priority, Request, StopPiece
 from drives.alarm import Alarm
 from drives.apart import apart
-from drives.debris import Debris
+from drives.debris import Debris, Leftovers
 from drives.events import Changed, Ended, Lost, Notice, Sent, Traffic, Transaction, Unsolicited
 from drives.flight import Finished
 from drives.keeping import Departure, Keeper
@@ -71,6 +71,7 @@ class Link:
         """The note on the command that is on its way."""
         self._keeper = keeper
         self._debris = Debris()
+        self.leftovers = Leftovers()
         self._orderly = False
         """The port was still open when it was shut."""
         self._loop = asyncio.get_running_loop()
@@ -83,6 +84,7 @@ class Link:
 
     def start(self) -> None:
         """Begin to read."""
+        self.leftovers.opened(self.now())
         self.transport.start(self._received, self._broke)
 
     @property
@@ -236,11 +238,14 @@ class Link:
             return
         self.departure.begins(request)
         self._debris.request_written(data, request, now)
+        self.leftovers.request_written(data, now)
         self.publish(Sent(now, request))
         self.publish(Traffic(now, True, data))
 
     def _finished(self, event: Finished) -> None:
         transaction = event.transaction
+        if transaction.reply.raw:
+            self.leftovers.recovering = False
         if transaction.sent and transaction.reply.end is not End.STOPPED:
             self.departure.arrived()
         if transaction.reply.end is End.DAMAGED:  # by a sign-on, perhaps
@@ -259,6 +264,9 @@ class Link:
             if damaged := [each for each in lines if codec.damaged(each)]:
                 self.notify(f"a printed line was damaged on the line (received {_short(damaged)})", warning=True)
                 lines = tuple(each for each in lines if each not in damaged)
+        lines, left = self.leftovers.divided(lines, self.line.inbox.codec.answers_host, now)
+        if left:
+            self.notify(f"left by a session before, not printed by a program: {_short(left)}", warning=True)
         if lines:
             self.publish(Unsolicited(event.at, lines))
 

@@ -68,6 +68,7 @@ async def open_buses(connection: Connection, naming: Naming, state: Path | None 
     kept = PortState(state, port_name(connection), _baud(connection))
     bus = _bus(name, transport, connection, hints.family, kept)
     kept.notify = partial(bus.notify, warning=True)
+    bus.link.leftovers.recovering = bool(kept.owed) and not family.codec.framed
     cut = "" if family.codec.framed else kept.cut  # a part of a frame is dropped after a pause
     warnings = (*kept.remarks, *([CUT.format(cut)] if cut else []))
     found = replace(hints, cut=cut, owed=kept.owed, remembered=kept.memory.drives, first_mark=_first_mark())

@@ -29,6 +29,8 @@ LIST_PROMPT = re.compile(rb"[\n\x06\x15][>?]|[>?]\Z")
 NOBODY = "~"
 """A character that no drive has as its name."""
 
+ANSWER = re.compile(r'(?:[^\s"]"[!-~]"|~\w?\d{0,4}(?:"[!-~]")?|PR [^\r\n]*,(?:DN|"~\w*"))[\x80-\xff]?\Z')
+"""The end of a signed print: a name after a value, or a mark (`signatures`); of its repetition."""
 STOP_BYTES = re.compile(rb"(?<![ -~])(?:[!-~][\x05\x1b])+\n?|[\x03\x05\x1b]|~{%d}[\r\n]" % (LONGEST + 1))
 """Any key that stops, alone or after names, Ctrl+C, which resets, and what makes a half-sent line overflow."""
 
@@ -188,6 +190,10 @@ class MCode:
     def damaged(self, line: str) -> bool:
         """Whether the check byte is still there, because it does not fit."""
         return self.checksum > 0 and UNPRINTED.search(line) is not None and not self.restarted(line)
+
+    def answers_host(self, line: str) -> bool:
+        """Whether a signature ends the line: the name after a value, or a mark; a check byte may follow."""
+        return ANSWER.search(line) is not None
 
     def restarted(self, line: str) -> bool:
         """Whether a line is the sign-on, which a drive in party mode does not send (3.4.4)."""

@@ -93,6 +93,10 @@ class Modbus:
         """No: no line carries a checksum."""
         return False
 
+    def answers_host(self, line: str) -> bool:
+        """No: nothing marks the reply to a question."""
+        return False
+
     def restarted(self, line: str) -> bool:
         """Return False: a drive that restarts closes the connection."""
         return False

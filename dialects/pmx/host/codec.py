@@ -146,6 +146,10 @@ class Pmx:
         """No: no line carries a checksum."""
         return False
 
+    def answers_host(self, line: str) -> bool:
+        """No: nothing marks the reply to a question."""
+        return False
+
     def restarted(self, line: str) -> bool:
         """Return False: a controller prints nothing after power-up."""
         return False

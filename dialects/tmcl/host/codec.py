@@ -151,6 +151,10 @@ class Tmcl:
         """No: no line carries a checksum."""
         return False
 
+    def answers_host(self, line: str) -> bool:
+        """No: nothing marks the reply to a question."""
+        return False
+
     def restarted(self, line: str) -> bool:
         """Never: a module says nothing after power-up."""
         return False
