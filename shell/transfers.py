@@ -122,6 +122,7 @@ class _Download:
             ends_program = False
         held = await read(self._workspace, self._drive, "backup", lines)
         if self._wanted.only_changed and not await self._is_changed(lines, held):
+            await self._use_held(start)
             return
         backup = await self._back_up(lines, held)
         port = self._workspace.ports.get(self._drive.link.name, "")
@@ -154,8 +155,18 @@ class _Download:
     async def _is_changed(self, lines: Sequence[SourceLine], held: Held) -> bool:
         """Whether the file must be sent; publish why, or that the drive holds it."""
         why = await transferring(self._drive, self._programs.to_send(self._drive.state, lines, held))
-        self._say(f"{self._file} is sent: {why}" if why else f"holds {self._file} already; nothing was sent")
+        more = "the program is not sent again" if self._wanted.save or self._wanted.run else "nothing was sent"
+        self._say(f"{self._file} is sent: {why}" if why else f"holds {self._file} already; {more}")
         return bool(why)
+
+    async def _use_held(self, start: str) -> None:
+        """Save and start the program that the drive holds already, where that is wanted."""
+        if start:
+            await self._end_program()
+        if self._wanted.save:
+            await self._save(())
+        if start:
+            await self._start(start)
 
     async def agree(self, lines: Sequence[SourceLine], by: By) -> None:
         """Ask before lines outside of a program that act: the drive executes them at once. Raises Diagnostic."""

@@ -166,6 +166,34 @@ async def test_progress_ends_with_each_part(tmp_path: Path) -> None:
         assert any(event.left and event.what == "a: download" for event in seen)
 
 
+@in_virtual_time
+async def test_what_the_drive_holds_already_is_saved_and_executed_where_that_is_wanted(tmp_path: Path) -> None:
+    async with shop_with(tmp_path) as shop:
+        await load(shop, tmp_path)
+        assert await load(shop, tmp_path, "--only-changed --save") == [
+            "a: holds p.mxt already; the program is not sent again",
+            "a: saved (S)",
+        ]
+        assert b"PG" not in shop.written("line") and len(kept(tmp_path)) == 1
+        shop.device("line:a").reset(shop.session.now())
+        assert shop.device("line:a").program.listing() == LISTED
+        with pytest.raises(Diagnostic, match=r"no label G9 in the file"):
+            await load(shop, tmp_path, "--only-changed --run G9")
+        told = await load(shop, tmp_path, "--only-changed --run G1")
+        assert told[-2:] == ["a: holds p.mxt already; the program is not sent again", "a: started (EX G1)"]
+        await shop.session.run("/wait idle")
+        await shop.session.run("@a PR P")
+        assert shop.printed()[-1] == "100"
+
+
+@in_virtual_time
+async def test_a_held_program_that_runs_is_ended_before_it_is_executed_again(tmp_path: Path) -> None:
+    async with shop_with(tmp_path, "PG 1\nLB G1\nH 100\nBR G1\nE\nPG\n") as shop:
+        await load(shop, tmp_path, "--run G1")
+        told = await load(shop, tmp_path, "--only-changed --save --run G1")
+        assert told[-3:] == ["a: its program ran and was ended", "a: saved (S)", "a: started (EX G1)"]
+
+
 PMX_FILE = "; ten times\nPRG 0\n  V1=1   ; from one\n  WHILE V1<1000\n    V1=V1*10\n  ENDWHILE\nEND\n"
 
 
