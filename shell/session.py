@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 
 from dialects import Diagnostic, DriveError, Refused, Stopped
 from macros import Macro
-from shell.automation import Automations, only_ends
+from shell.automation import ENDING, Automations, only_ends
 from shell.connect.opening import open_buses
 from shell.connect.settings import Settings
 from shell.events import FAILURES, By, Entered, Failed, Printed
@@ -311,7 +311,8 @@ class Session(Workspace):
         self.questions.cancel()
 
     async def in_motion(self) -> list[str]:
-        """A line for each drive that moves or may move; takes two seconds at most."""
+        """A line for each drive that moves or may move; takes two seconds at most, once what was stopped has ended."""
+        await self.tasks.stopped(ENDING)
         return await in_motion(self)
 
     def quit(self) -> None:

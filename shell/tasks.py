@@ -46,6 +46,11 @@ class Tasks:
             self._stopped.add(task)
             task.cancel()
 
+    async def stopped(self, limit: float) -> None:
+        """Wait for the work that a stop has ended: it reads where drives stand, or leaves program mode."""
+        if self._stopped:
+            await asyncio.wait(self._stopped, timeout=limit)
+
     def cancel(self) -> None:
         """Cancel all work except the caller's."""
         for task in self._others():

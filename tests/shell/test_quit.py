@@ -7,6 +7,7 @@ import signal
 import pexpect
 import pytest
 
+from dialects import Stopped
 from drives.drive import confirmed_motion
 from tests.support.cell_session import CellSession, bus, party, pmx
 from tests.support.processes import Running
@@ -46,6 +47,25 @@ async def test_a_fresh_reading_is_not_asked_for_again(tmp_path):
         await shop.session.run("SL 5000")
         await asyncio.sleep(0.5)
         assert await shop.session.in_motion() == ["a moves at 5000 a second"], "what was sent since makes it old"
+
+
+@in_virtual_time
+async def test_what_a_stop_ends_is_waited_for_and_no_reason_to_ask(tmp_path):
+    async def macro():
+        try:
+            await asyncio.sleep(100)
+        finally:
+            await asyncio.sleep(1.5)  # its drives are read, for the report of its end
+
+    async with CellSession(tmp_path, bus("press", party("a"))) as shop:
+        playing = asyncio.create_task(shop.session.tasks.run(macro()))
+        await asyncio.sleep(0.1)
+        shop.session.stop("Ctrl+X")
+        await asyncio.sleep(0.1)
+        assert shop.session.busy
+        assert await shop.session.in_motion() == [] and not shop.session.busy
+        with pytest.raises(Stopped):
+            await playing
 
 
 @pytest.mark.skipif(os.name != "posix", reason="pseudo-terminals")

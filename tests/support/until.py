@@ -9,9 +9,6 @@ from typing import Any
 PATIENCE = 120.0
 """The longest wait in real time, s: it ends a test that hangs on a busy machine, and judges no speed."""
 
-PATIENCE = 120.0
-"""The longest wait in real time, s: it ends a test that hangs on a busy machine, and judges no speed."""
-
 
 async def until(done: Callable[[], Any], limit: float = PATIENCE) -> float:
     """Wait until it is done; return how long that took, s."""
