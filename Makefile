@@ -4,8 +4,8 @@
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
-# Three test processes a core: tests that start processes mostly wait for them.
-WORKERS := $(shell $(PYTHON) -c 'import os; print(3 * (os.cpu_count() or 1))')
+# One test process more than cores: tests that start processes wait for them, and simulated drives work in real time.
+WORKERS := $(shell $(PYTHON) -c 'import os; print((os.cpu_count() or 1) + 1)')
 PYTEST = $(BIN)/python -m pytest --dist worksteal -n $(WORKERS)
 PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check
 
@@ -48,11 +48,8 @@ types-darwin types-win32: types-%: $(VENV)/.dev
 contracts: $(VENV)/.dev
 	$(BIN)/lint-imports
 
-# Fewer processes than `make test` has: measuring slows the simulated drives down, and some tests run in real time.
-measured: WORKERS := $(shell $(PYTHON) -c 'import os; print((os.cpu_count() or 1) + 1)')
-# What failed beside others runs once more alone (docs/decisions/0049); the first run has named it.
 measured: $(VENV)/.dev
-	$(PYTEST) --cov --cov-report= || { [ $$? -eq 1 ] && $(BIN)/python -m pytest --last-failed --last-failed-no-failures none; }
+	$(PYTEST) --cov --cov-report=
 
 coverage: measured
 	$(BIN)/coverage report
