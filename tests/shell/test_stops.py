@@ -9,6 +9,7 @@ from dialects import Motion, Stopped
 from drives.drive import Drive, confirmed_motion
 from drives.halt import Fate
 from shell import stops
+from shell.automation import outcome
 from shell.events import OnBus
 from tests.support.cell_session import ETHERNET, CellSession, bus, party, pmx
 from tests.support.virtual import in_virtual_time
@@ -225,6 +226,28 @@ async def test_a_drive_that_slows_down_is_waited_for_and_one_that_does_not_is_st
         shop.session.stop()
         await asyncio.sleep(10.0)
         assert [text.removeprefix("press: ") for text in shop.told()[1:]] == said
+
+
+DWELLS = 'program_text = """\nPG 1\nLB G1\nH 60000\nBR G1\nE\nPG\n"""'
+
+
+@in_virtual_time
+async def test_a_program_that_a_stop_does_not_end_is_named_in_every_report_of_it(tmp_path):
+    async with CellSession(tmp_path, bus("press", f"{party('a')}\n{DWELLS}", party("b"))) as shop:
+        await shop.session.run("@a EX G1")
+        await asyncio.sleep(0.5)
+        shop.device("press:a").escape = lambda now: None
+        shop.session.stop()
+        await asyncio.sleep(10.0)
+        tally = shop.session.tally()
+        assert stops.words(tally) == "1 stands, 1 RUNS A PROGRAM: a - use the E-stop"
+        assert "STOPPED" not in stops.headline(tally) and stops.headline(tally, 60).endswith("E-stop")
+        assert any(text.endswith("STILL RUNNING after 3 stops: a; cut the power") for text in shop.warned())
+        drive = shop.session.buses["press"].drives["a"]
+        halt = shop.session.buses["press"].stop([drive])
+        await asyncio.sleep(10.0)
+        assert outcome(shop.session, [halt])[0].startswith("stop sent to a: ")
+        assert "1 RUNS A PROGRAM: a" in outcome(shop.session, [halt])[0]
 
 
 @in_virtual_time
