@@ -23,8 +23,9 @@ WHOLE = re.compile(r"p=\d+")
 class Printing(CellSession):
     """Three drives on a party line; a program in c prints p=1, p=2 and so on, one every `pause` ms."""
 
-    def __init__(self, folder, pause, **settings):
-        super().__init__(folder, bus("line", *(party(name, **settings) for name in "abc")))
+    def __init__(self, folder, pause, c=None, **settings):
+        drives = (party(name, **(c if c and name == "c" else settings)) for name in "abc")
+        super().__init__(folder, bus("line", *drives))
         self.pause = pause
 
     async def __aenter__(self):
@@ -84,6 +85,16 @@ async def test_a_destroyed_print_names_the_drive_that_was_polled_and_what_was_re
                 r"line: beside a poll of [abc] something was damaged on the line: .* may be lost \(received .+\)", text
             )
         assert all(WHOLE.fullmatch(line) for line in cell.shown)
+
+
+@pytest.mark.virtual
+async def test_a_print_with_a_checksum_is_shown_without_it_beside_drives_that_have_none(tmp_path):
+    async with Printing(tmp_path, 97, c={"EM": 1, "CK": 1}, EM=1, CK=0) as cell:
+        cell.poll(0.05)
+        await cell.session.run("@c EX G1")
+        await asyncio.sleep(LINES * 0.12 + 5)
+        assert len(cell.shown) > LINES / 2 and all(WHOLE.fullmatch(line) for line in cell.shown)
+        assert set(cell.received) <= set(cell.shown)
 
 
 @pytest.mark.virtual

@@ -6,7 +6,7 @@ import re
 from dataclasses import dataclass
 from os.path import commonprefix
 
-from dialects.mcode.host.checksum import unsealed
+from dialects.mcode.host.checksum import stripped, unsealed
 
 ACK, NAK, CR, LF = b"\x06", b"\x15", b"\r", b"\n"
 ADDRESS_PROMPT = re.compile(rb"\d{1,9}  ")
@@ -124,7 +124,10 @@ def unasked(buffer: bytes, echo: int, checksum: int) -> tuple[tuple[str, ...], i
 def _unasked_plain(buffer: bytes, echo: int) -> tuple[tuple[str, ...], int]:
     """Whole lines without checksum, all at once: a program may print a thousand at a time."""
     used = buffer.rfind(LF) + 1
-    lines = printable(buffer[:used]).split("\n")
+    if buffer.isascii():
+        lines = printable(buffer[:used]).split("\n")
+    else:
+        lines = [printable(stripped(line.replace(CR, b""))) for line in buffer[:used].split(LF)]
     if echo == 0:
         lines = [line[1:] if line.startswith((">", "?")) else line for line in lines]
         if buffer[used:].replace(CR, b"") in (b">", b"?"):

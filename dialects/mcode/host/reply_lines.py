@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 from dialects.codec import Decoded, End, Kind, Reply, Request
 from dialects.mcode.host import classify
-from dialects.mcode.host.checksum import checksum, unsealed
+from dialects.mcode.host.checksum import checksum, stripped, unsealed
 from dialects.mcode.host.framing import SIGN_ON, UNPRINTED, Piece, printable
 
 SIGNED = re.compile(r'["~]')
@@ -47,7 +47,7 @@ class ReplyLines:
 
     def add_earlier(self, data: bytes) -> None:
         """Add a line from before the reply: part of it where the request gathers it, otherwise a stray."""
-        plain = unsealed(data) if self.sealed else data
+        plain = unsealed(data) if self.sealed else stripped(data)
         if plain is None:
             self.collided.append(printable(data))
         else:
@@ -112,7 +112,7 @@ class ReplyLines:
         return rest
 
     def _sealed_line(self, data: bytes) -> None:
-        found = unsealed(data) if self.sealed else data
+        found = unsealed(data) if self.sealed else stripped(data)
         if found is None:
             self.damaged = f"checksum of {printable(data)!r} is wrong"
             self.collided.append(printable(data))
@@ -252,7 +252,7 @@ class ReplyLines:
         collected, self.lines = self.lines, []
         for line in collected:
             data = line.lstrip(">?\x06\x15").encode("latin-1")
-            plain = printable(unsealed(data) or data)
+            plain = printable(stripped(data))
             if re.fullmatch(request.expect or "", plain) or request.text in plain:
                 self.lines.append(line)
             else:
