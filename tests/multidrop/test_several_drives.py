@@ -1,5 +1,7 @@
 """`--drive` that is repeated, and `--drive all`: every drive named is meant, and none gets what is another's."""
 
+import socket
+
 import pytest
 
 PROGRAM = "PG 1\nLB G1\nPR P\nE\nPG\n"
@@ -60,3 +62,23 @@ def test_a_snapshot_goes_to_several_drives_only_by_their_own_names(run, tmp_path
         assert done.returncode == 2 and said in done.stderr and done.stderr.count("\n") == 1
     done = run("snapshot", "apply", "cell.toml", URL, "--drive", "all", "--yes")
     assert done.returncode == 0
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "words",
+    [
+        ("send", "URL", "PR P"),
+        ("program", "list", "URL"),
+        ("params", "diff", "URL", "--defaults"),
+        ("params", "backup", "URL", "x"),
+    ],
+    ids=lambda words: " ".join(words),
+)
+def test_no_reply_on_an_open_port_is_1_and_a_port_that_cannot_be_opened_3(run, words):
+    with socket.create_server(("127.0.0.1", 0)) as silent:  # connects, and never replies
+        url = f"tcp://127.0.0.1:{silent.getsockname()[1]}?party=0"
+        done = run(*(url if word == "URL" else word for word in words))
+        assert done.returncode == 1 and "no drive replies" in done.stderr
+    done = run(*(url if word == "URL" else word for word in words))
+    assert done.returncode == 3 and done.stderr.count("\n") == 1
