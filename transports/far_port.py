@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from dataclasses import dataclass
 
 from transports.base import Unreachable
@@ -43,9 +44,9 @@ class FarPort:
 
     @property
     def login(self) -> str:
-        """The arguments of an `ssh` by hand."""
+        """The arguments of an `ssh` by hand, quoted for a shell."""
         user = f"{self.user}@" if self.user else ""
-        return (f"-p {self.port} " if self.port else "") + user + self.host
+        return (f"-p {self.port} " if self.port else "") + shlex.quote(user + self.host)
 
 
 def wrong_path(path: str) -> str:

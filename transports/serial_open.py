@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import errno
 import os
+import shlex
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -36,7 +37,7 @@ def _why(port: str, error: OSError) -> str:
     if number in (errno.EBUSY, errno.EAGAIN, errno.EWOULDBLOCK):
         return f"{port} is in use by {_owner(port)}; close it there"
     if number in (errno.EACCES, errno.EPERM):
-        return f"no permission to open {port}; `sudo usermod -aG {_group(port)} $USER`, then log in again"
+        return f"no permission to open {port}; `sudo usermod -aG {shlex.quote(_group(port))} $USER`, then log in again"
     if number in (errno.ENOENT, errno.ENODEV, errno.ENXIO, errno.ENOTDIR):
         return _nothing(port)
     if number in (errno.EISDIR, errno.ENOTTY) or "configure" in str(error):

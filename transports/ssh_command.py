@@ -99,4 +99,5 @@ def reason(far: FarPort, status: int | None, words: str, way: str = "") -> str:
         return f"ssh was ended by signal {-status}"
     if words:
         return words + hint
-    return f"the far side ended with status {status}; try `ssh {far.login} multidrop relay {far.path}`"
+    there = shlex.quote(far.path)  # for the far shell; this one has to pass it on as it is
+    return f"the far side ended with status {status}; try: ssh {far.login} multidrop relay {shlex.quote(there)}"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import shlex
 from dataclasses import replace
 from functools import partial
 
@@ -54,7 +55,7 @@ def conclude(chosen: argparse.Namespace, session: Session, found: list[FoundDriv
         path = saving.save(chosen.save, url)
         session.notify(f"{path}: connection {chosen.save} is saved: {url}", outcome=True)
     elif not chosen.json:
-        session.notify(f"open with: multidrop shell '{url}'", outcome=True)
+        session.notify(f"open with: multidrop shell {shlex.quote(url)}", outcome=True)
     if (others := len(found) - len(same)) and not chosen.json:
         session.notify(f"{others} more replied in another form; --json shows a URL for each", outcome=True)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shlex
 import socket
 from dataclasses import dataclass
 from ipaddress import ip_address
@@ -40,7 +41,8 @@ class PlotTarget:
         """The line that a person types at another desk to see a plot that only this machine can reach; else empty."""
         if not self.serves or not ip_address(self.host).is_loopback:
             return ""
-        return f"ssh -L {self.port}:{bracketed(self.host)}:{self.port} {_reached_at()}"
+        forward = f"{self.port}:{bracketed(self.host)}:{self.port}"
+        return shlex.join(("ssh", "-L", forward, _reached_at()))
 
 
 def _reached_at() -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Awaitable, Callable
 
 from dialects import Diagnostic
@@ -105,7 +106,7 @@ async def _edit(call: Call, words: list[str]) -> list[str]:
     if workspace.edit is not None:
         await workspace.edit(str(workspace.macros.path(name)))
         return []
-    hint = f"in another terminal: multidrop macro edit {name}"
+    hint = f"in another terminal: multidrop macro edit {shlex.quote(name)}"
     raise Diagnostic("an editor would take Ctrl+X, which must stop the drives", f"/macro edit {name}", hint)
 
 

@@ -1,9 +1,11 @@
 """The front door of scan and rescue: what goes where, and how it ends."""
 
 import json
+import shlex
 
 import pytest
 
+CELL = '[[bus]]\nname = "press"\n[[bus.drive]]\npersonality = "LMDCM"\n'
 CONTRACT = {"port", "baud", "address", "product", "version", "serial", "party", "checksum", "em"}
 
 
@@ -20,6 +22,13 @@ def test_a_person_sees_the_drive_and_how_to_open_it_and_may_save_that(multidrop,
     assert multidrop("send", "cell", "PR VR").stdout == "LMDCE 6.002, Hw: 3.2\n"
     again = multidrop("scan", "sim:#eth", "--save", "cell")
     assert again.returncode == 2 and "exists already" in again.stderr and again.stdout == ""
+
+
+def test_the_command_that_opens_a_drive_is_quoted(multidrop, tmp_path):
+    name = "it's $(touch ran).toml"
+    (tmp_path / name).write_text(CELL)
+    done = multidrop("scan", f"sim:{name}")
+    assert shlex.split(done.stderr.partition("open with: ")[2]) == ["multidrop", "shell", f"sim:{name}?party=0#press"]
 
 
 def test_a_rescue_names_its_steps_and_ends_once_a_drive_replies(multidrop):

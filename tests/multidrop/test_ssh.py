@@ -6,6 +6,7 @@ import asyncio
 import contextlib
 import os
 import signal
+import subprocess
 import sys
 import tty
 from collections.abc import Iterator
@@ -18,12 +19,13 @@ import multidrop
 from multidrop.__main__ import main
 from shell.connect.settings import Settings
 from shell.session import Session
-from tests.support.ssh_server import fake_ssh, far_programs, ssh_server
+from tests.support.ssh_server import fake_ssh, far_programs, script, ssh_server
 from tests.support.until import until
 from transports import Limited, Transport, TransportLost, Unreachable
 from transports.far_port import FarPort
 from transports.serial_posix import lock_owner
 from transports.ssh import open_ssh
+from transports.ssh_command import reason
 
 CELL = """
 [[bus]]
@@ -65,7 +67,7 @@ async def test_a_drive_behind_a_real_sshd_moves_and_comes_back_after_each_kill_w
         for victim in (lambda: pid_of(lock_owner(port)), ssh_here):
             relay = pid_of(lock_owner(port))
             os.kill(victim(), signal.SIGKILL)
-            await until(lambda: bus.lost, 5.0)
+            await until(lambda: bus.lost)
             await until(lambda: not bus.link.away)
             assert pid_of(lock_owner(port)) not in (0, relay)
             assert [each.position for each in await bus.drives["a"].motion()] == [5120]
@@ -119,6 +121,19 @@ async def test_what_goes_wrong_before_the_greeting_is_one_line_that_quotes_it(tm
     with pytest.raises(Unreachable, match="the program ssh cannot be started"):
         await open_ssh(FarPort("pc", "/dev/tty9"))
     assert len(os.listdir("/dev/fd")) == before
+
+
+@pytest.mark.process
+def test_the_command_to_try_by_hand_runs_nothing_of_the_ports_name(tmp_path: Path, monkeypatch) -> None:
+    """A person pastes it: the shell here and the one there each take the path as one word."""
+    path = f"/dev/$(touch {tmp_path}/ran) `touch {tmp_path}/ran` it's"
+    fake_ssh(tmp_path / "bin", 'shift; exec /bin/sh -c "$*"')
+    script(tmp_path / "bin" / "multidrop", 'printf "%s\\n" "$@"')
+    hint = reason(FarPort("pc", path), 7, "").partition("try: ")[2]
+    assert reason(FarPort("pc", "/dev/ttyUSB0"), 7, "").endswith("try: ssh pc multidrop relay /dev/ttyUSB0")
+    env = {"PATH": f"{tmp_path / 'bin'}:/usr/bin:/bin"}
+    done = subprocess.run(["/bin/sh", "-c", hint], capture_output=True, text=True, env=env)
+    assert (done.stdout.splitlines(), (tmp_path / "ran").exists()) == (["relay", path], False), hint
 
 
 @contextlib.contextmanager

@@ -88,4 +88,5 @@ def test_the_line_for_the_desk(connection: str, host: str, monkeypatch: pytest.M
     monkeypatch.setenv("SSH_CONNECTION", connection)
     monkeypatch.setattr("socket.gethostname", lambda: "shop-pc")
     assert parse_target(None, "9876").desk == f"ssh -L 9876:127.0.0.1:9876 {host}"
+    assert parse_target(None, "[::1]:9876").desk == f"ssh -L '9876:[::1]:9876' {host}"
     assert parse_target(None, "0.0.0.0:9876").desk == "" == parse_target("run.rrd", None).desk
