@@ -7,6 +7,8 @@ from typing import NamedTuple
 
 from dialects.errors import Refused
 
+LOCKED = "its program is locked (LK=1); LK=0 opens a lock that was not saved; CP opens any, and erases the program"
+
 
 class Stored(NamedTuple):
     """A line in a drive: its address, or its number in memory, and its text as the drive lists it."""
@@ -28,9 +30,7 @@ class Held:
     def check_listed(self, who: str) -> None:
         """Raise Refused where the drive is locked; `who` names it for a person."""
         if self.locked:
-            raise Refused(
-                f"{who}: its program is locked (LK=1) and is not listed; CP or FD erases it and opens the lock"
-            )
+            raise Refused(f"{who}: no listing: {LOCKED}")
 
     def check_program(self, who: str) -> None:
         """Raise Refused where the drive is locked or holds no program."""

@@ -15,6 +15,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from dialects import Diagnostic, DriveError, Inexpressible, Refused
+from dialects.held import LOCKED
 from dialects.parameters import Permission, Plan, Readings, differing
 from shell import jobs, snapshots, transfers
 from shell.params.file import shown
@@ -142,7 +143,7 @@ class _Replacement:
         if self._program.lines and self._drive.family.programs is None:
             raise Inexpressible(f"{self._name}: {self._drive.family.no_programs}")
         if now.readings.values.get("LK") and self._program.lines:
-            raise Refused(f"{self._name}: its program is locked (LK=1): CP erases it and opens the lock")
+            raise Refused(f"{self._name}: {LOCKED} (nothing was sent)")
         if now.program and self._clearing and not self._program.lines:
             raise Refused(
                 f"{self._name}: it holds a program of {len(now.program)} lines, and {spec.name!r} in {self._file} has "

@@ -18,7 +18,7 @@ from dialects import Diagnostic, DriveError, Refused, SourceLine
 from dialects.errors import Differs
 from dialects.families import program_languages
 from dialects.files import program_text_of
-from dialects.held import Difference, Held
+from dialects.held import LOCKED, Difference, Held
 from dialects.problems import errors, refuse
 from drives.drive import still
 from shell import backups, sources
@@ -190,10 +190,7 @@ class _Download:
     async def _back_up(self, lines: Sequence[SourceLine], held: Held) -> Path:
         """Save what the drive holds. Raises Refused for a locked program that the file would overwrite."""
         if held.locked and self._programs.size(lines):
-            raise Refused(
-                f"{self._name}: its program is locked (LK=1) and cannot be saved to a backup; CP erases it and opens "
-                "the lock (nothing was sent)"
-            )
+            raise Refused(f"{self._name}: no backup is possible: {LOCKED} (nothing was sent)")
         state, workspace = self._drive.state, self._workspace
         parts = (state.product, state.version, f"part {state.part}" * bool(state.part), f"serial {state.serial}")
         backup = backups.Backup(

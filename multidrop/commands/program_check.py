@@ -13,6 +13,8 @@ from shell.checking import Checked, examine, rewrite
 from shell.output import shortened, write
 
 WRONG = 1
+MOST = 100
+"""The largest number of problems of a file that are shown."""
 
 
 def run(chosen: argparse.Namespace) -> int:
@@ -33,14 +35,16 @@ def _file(file: str, chosen: argparse.Namespace) -> int:
 
 
 def _report(checked: Checked, json: bool) -> None:
-    """Write each problem."""
-    for each in checked.problems:
+    """Write each problem; for a person MOST of them."""
+    for each in checked.problems if json else checked.problems[:MOST]:
         if json:
             kind = "warning" if each.warning else "error"
             fact = {"file": checked.file, "line": each.line, "column": each.column, kind: each.what, "hint": each.hint}
             _write_fact({key: value for key, value in fact.items() if value != ""})
         else:
             write(sys.stderr, shortened(each.line_for(checked.file)))
+    if not json and (more := len(checked.problems) - MOST) > 0:
+        write(sys.stderr, f"{checked.file}: {more} more problem{'' if more == 1 else 's'}, not shown")
 
 
 def _summarize(checked: Checked, chosen: argparse.Namespace) -> None:

@@ -17,7 +17,9 @@ from typing import Any, NamedTuple
 from dialects import Diagnostic
 from dialects.files import split_lines
 from dialects.mcode.manual import error_texts, program_file
-from dialects.mcode.manual.grammar import Name, Number, words
+from dialects.mcode.manual.errors import ErrorNumber
+from dialects.mcode.manual.grammar import LineError, Name, Number, Statement, parse, words
+from dialects.mcode.manual.line_size import size_of
 from dialects.mcode.manual.program_file import ProgramLine
 from dialects.mcode.manual.remedies import remedy
 from dialects.numbers import whole
@@ -28,6 +30,7 @@ from simulator.lexium.state.errors import Failure, Fault
 from simulator.lexium.state.expressions import Read
 from simulator.lexium.state.models import MODELS
 from simulator.lexium.state.printer import CRLF
+from simulator.lexium.state.program_memory import SPACE
 from simulator.program_run import (
     LONGEST,
     MOST_LINES,
@@ -310,9 +313,9 @@ class ProgramRun:
             self._follow(debugging)
         yield from self._execute(until)
 
-    def refusals(self) -> list[Failed]:
+    def refusals(self) -> Iterator[Failed]:
         """Load the file without running it; give the refused lines. A refused PG counts as PG 1."""
-        return [each for each in self._load(anywhere=True) if isinstance(each, Failed)]
+        return (each for each in self._load(anywhere=True) if isinstance(each, Failed))
 
     # Loading.
 
@@ -458,11 +461,29 @@ def refusals(text: str, file: str, personality: str, found: Sequence[Problem]) -
     problems, numbered = [], {line.number: line for line in lines}
     for failed in ProgramRun(DriveSpec(personality=personality), tried, file).refusals():
         line = numbered[failed.line]
+        if failed.code == ErrorNumber.PROGRAM_MEMORY_FULL:  # the drive takes none of the others either
+            problems.append(_too_big(line, lines, personality))
+            break
         if line.number not in wrong and not missing & words(line.text):
             what = f"{failed.text}: {failed.meaning}"
             problems.append(Problem(line.number, line.column, what, remedy(failed.code, failed.text, personality)))
         missing.add(line.declares)
     return problems
+
+
+def _statement(text: str) -> Statement | None:
+    try:
+        return parse(text)
+    except LineError:
+        return None
+
+
+def _too_big(line: ProgramLine, lines: Sequence[ProgramLine], personality: str) -> Problem:
+    """The first line that has no room in the drive."""
+    inside = [each for each in lines if each.section == "program" and each.mark is None]
+    size = sum(size_of(statement, personality) for each in inside if (statement := _statement(each.text)) is not None)
+    what = f"program too big: {len(inside)} lines take {size} bytes, the drive holds {SPACE}"
+    return Problem(line.number, line.column, what, "shorten the program; this line is the first without room")
 
 
 RUNS = Programs(drive=DriveSpec(), read=read, refusals=refusals)

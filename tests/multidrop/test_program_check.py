@@ -222,3 +222,17 @@ def test_a_script_of_the_pmx_is_formatted_too(check: Check) -> None:
     text = "WHILE  V1 < 10 ; ten\n  V1 = V1 + 1\nENDWHILE\nEND\n"
     assert check(text, "--format", name="a.prg")[0] == 0
     assert Path("a.prg").read_text() == "WHILE V1<10    ; ten\n  V1=V1+1\nENDWHILE\nEND\n"
+
+
+def test_a_program_that_is_too_big_is_one_line_with_its_size_and_that_of_the_drive(multidrop, tmp_path):
+    (tmp_path / "big.mxt").write_text("PG 1\nLB G1\n" + "R1=1\n" * 5000 + "E\nPG\n")
+    done = multidrop("program", "check", "big.mxt")
+    assert done.returncode == 1 and done.stderr.count("\n") == 1
+    assert "program too big: 5002 lines take " in done.stderr and "bytes, the drive holds 6384;" in done.stderr
+
+
+def test_of_many_problems_a_hundred_are_shown(multidrop, tmp_path):
+    (tmp_path / "odd.mxt").write_text("PG 1\nLB G1\n" + "FROB 7\n" * 150 + "E\nPG\n")
+    done = multidrop("program", "check", "odd.mxt")
+    shown = done.stderr.splitlines()
+    assert len(shown) == 101 and shown[-1] == "odd.mxt: 50 more problems, not shown"

@@ -114,7 +114,7 @@ async def test_without_a_yes_nothing_is_sent(tmp_path):
             "line: product LMDOM, and 'b' in machine.toml is LMDCM; nothing was sent; --other-product",
         ),
         ('personality = "PMX"\nname = "00"', "product PMX, and 'b' .* a drive of its family is needed"),
-        ('personality = "LMDCM"\nset = { LK = 1 }', "its program is locked .LK=1.: CP erases it"),
+        ('personality = "LMDCM"\nset = { LK = 1 }', "its program is locked .LK=1.; LK=0 opens"),
     ],
 )
 async def test_what_is_refused_changes_nothing(tmp_path, present, message):

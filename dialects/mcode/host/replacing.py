@@ -18,7 +18,7 @@ from dataclasses import dataclass, field
 from dialects.codec import Procedure
 from dialects.errors import Refused
 from dialects.files import SourceLine
-from dialects.held import Held
+from dialects.held import LOCKED, Held
 from dialects.mcode.host import classify
 from dialects.mcode.host.listing import (
     GLOBAL,
@@ -83,7 +83,7 @@ def concerns_programs(lines: Sequence[SourceLine]) -> bool:
 def prepare(state: MCodeState, lines: Sequence[SourceLine], held: Held) -> Procedure[Sequence[SourceLine]]:
     """Return the lines to send, after clearing the drive's programs if needed. Raises Refused before that."""
     if held.locked and programs_of(lines):
-        raise Refused(f"{who(state)}: its program is locked (LK=1); CP erases it and opens the lock (nothing was sent)")
+        raise Refused(f"{who(state)}: {LOCKED} (nothing was sent)")
     made = plan(lines, held, who(state), state.product)
     if not made.clears:
         return made.lines

@@ -10,6 +10,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 from dialects.codec import Procedure
+from dialects.held import LOCKED
 from dialects.mcode.host import parameters
 from dialects.mcode.host.attend import attend
 from dialects.mcode.host.exchange import answered
@@ -89,7 +90,7 @@ def _program(
 ) -> Procedure[tuple[tuple[tuple[int, str], ...], list[str]]]:
     """Read the listing; one that a running program's prints may have come into is read twice."""
     if _whole(readings, "LK"):
-        return (), ["its program is locked (LK=1) and was not read; only CP or FD opens it, and both erase it"]
+        return (), [f"not read: {LOCKED}"]
     first = yield from parameters.listed(state, "L")
     if running and first != (yield from parameters.listed(state, "L")):
         return (), ["its program was not read: it runs, and its prints came between the lines"]

@@ -171,7 +171,7 @@ _HINTS: dict[int, str] = {
     E.PROGRAM_RUNNING: "end the program first, with E or a stop",
     E.NO_SUCH_ADDRESS: "check the address or label; L lists the program",
     E.STACK_FULL: "leave every subroutine with RT",
-    E.PROGRAM_LOCKED: "CP of everything, or FD, unlocks it and erases it",
+    E.PROGRAM_LOCKED: "LK=0 opens a lock that was not saved; else CP or FD, which erase the program",
     E.PROGRAM_MEMORY_FULL: "CP clears program memory",
     E.UNKNOWN_COMMAND: "check the spelling; /help NAME explains a word",
     E.NO_SUCH_BAUD: "BD takes 48, 96, 19, 38 or 11",
