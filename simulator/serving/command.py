@@ -16,7 +16,7 @@ from typing import TextIO
 from urllib.parse import urlsplit
 
 from dialects import Diagnostic
-from dialects.files import check_line
+from dialects.files import bounded, check_line
 from dialects.visible import visible
 from simulator import cells
 from simulator.floor import Floor
@@ -128,7 +128,7 @@ def _on_signals(loop: asyncio.AbstractEventLoop, end: Callable[[], None]) -> Cal
 def read_lines(loop: asyncio.AbstractEventLoop, stdin: TextIO, take: Callable[[str], None]) -> Callable[[], None]:
     """Pass on the lines of a stream as they come; its end has no effect. Call what is returned to stop.
 
-    A file never blocks, so it is read at once. `stdin` needs a descriptor.
+    A file never blocks, so it is read at once. `stdin` needs a descriptor. Raises Diagnostic for one that is too large.
     """
     fd = stdin.fileno()
     begun = bytearray()
@@ -160,7 +160,9 @@ def read_lines(loop: asyncio.AbstractEventLoop, stdin: TextIO, take: Callable[[s
     except NotImplementedError:  # Windows waits for sockets only.
         threading.Thread(target=read_all, daemon=True).start()
     except OSError:
-        read_all()
+        with open(fd, "rb", closefd=False) as file:
+            for line in bounded(file, INPUT).decode("utf-8", "replace").split("\n"):
+                loop.call_soon(take, line)
     else:
         return end
     return lambda: None

@@ -1,5 +1,6 @@
 """Files that people name: read whole within limits and divided into lines by one rule, or refused in one line."""
 
+import asyncio
 import os
 import tempfile
 from pathlib import Path
@@ -30,6 +31,7 @@ from shell.log import files as log_files
 from shell.params import file as params_file
 from shell.scripts.reading import read_script
 from simulator import cells
+from simulator.serving.command import read_lines
 from tests.support.cases import for_each
 
 ENDLESS = Path("/dev/zero")
@@ -157,3 +159,15 @@ def test_texts_and_remarks_nest_nothing() -> None:
 def test_a_name_that_is_empty_is_shown_as_one():
     with pytest.raises(Diagnostic, match='^"": cannot be read: '):
         bytes_of("")
+
+
+@pytest.mark.skipif(not ENDLESS.exists(), reason="no /dev/zero here")
+async def test_a_simulation_refuses_an_endless_standard_input_and_reads_a_file(tmp_path: Path) -> None:
+    loop, taken = asyncio.get_running_loop(), []
+    with ENDLESS.open() as stdin, pytest.raises(Diagnostic, match="standard input: is larger than 1 MB"):
+        read_lines(loop, stdin, taken.append)
+    (tmp_path / "lines").write_text("/sim push b 1\n/sim unplug press")
+    with (tmp_path / "lines").open() as stdin:
+        read_lines(loop, stdin, taken.append)
+    await asyncio.sleep(0)
+    assert taken == ["/sim push b 1", "/sim unplug press"]
