@@ -64,6 +64,15 @@ class Motion:
     """Whether a program runs in the drive; None: not read together with the motion."""
 
 
+@dataclass(frozen=True)
+class Referencing:
+    """A line that gives an axis a reference: by a homing, which takes its time, or by setting the position."""
+
+    axis: str
+    """As in `Motion.axis`."""
+    homing: bool
+
+
 Printed = Procedure[tuple[str, ...]]
 """A conversation that returns lines to print."""
 Progress = Callable[[int, int], None]
@@ -229,6 +238,10 @@ class Family(Generic[S]):
     """Whether the drive reports motion. At rest: none in two readings, `drives.drive.REST` apart."""
     busy: Callable[[S], Procedure[bool]]
     """Whether a program runs, which can move the drive. A stop is confirmed by it; Refused or NoAnswer: not known."""
+    referencing: Callable[[S, str], Referencing | None]
+    """Find the axis to which a typed line gives a reference; None: the line gives none."""
+    homed: Callable[[S], Procedure[bool]]
+    """Whether a homing after which the drive is at rest ended well, as far as the drive shows it."""
     language: Language
     """Help and completion for what a person types to it."""
     rests_in_place: bool

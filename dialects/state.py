@@ -6,6 +6,7 @@ know extends the class (`mcode.host.state.MCodeState`). No other module assigns 
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 
 from dialects.codec import Codec
@@ -68,6 +69,10 @@ class DriveState:
     """A reply is outstanding and may arrive late; the next reply must be distinguished from it."""
     settings_unknown: bool = False
     """Its settings may have changed: they are read before the next request, and a stop takes every form."""
+    running: bool = False
+    """A program was started or seen to run."""
+    unreferenced: frozenset[str] = frozenset()
+    """The axes whose position does not count since a restart; the empty name is an only axis."""
     restore: Owed | None = None
     """Its settings before a conversation changed them for a while; None once they are restored."""
     sync_marks: int = 0
@@ -146,6 +151,16 @@ class DriveState:
     def error_flag_read(self, flag: bool) -> None:
         """Record the drive's error flag."""
         self.error = flag
+
+    # Reference
+
+    def reference_lost(self, axes: Iterable[str]) -> None:
+        """Record that positions of these axes count from wherever the drive was at its restart."""
+        self.unreferenced |= frozenset(axes)
+
+    def referenced(self, *axes: str) -> None:
+        """Record that a homing of these axes has ended, or that their position was set; none: of all axes."""
+        self.unreferenced = self.unreferenced - frozenset(axes) if axes else frozenset()
 
     # What is to be restored
 

@@ -213,6 +213,7 @@ class Bus:
         """Remember the drives, end telemetry and conversations, and close the port."""
         self._search.remember()
         self.telemetry.close()
+        self.roster.restarts.close()
         conversations, tasks = self._conversations.under_way, self._stopping.tasks
         for conversation in conversations:
             conversation.interrupt()

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol, TypeVar
 
@@ -14,6 +14,7 @@ from dialects import (
     Family,
     Inexpressible,
     Motion,
+    NoAnswer,
     Priority,
     Procedure,
     Refused,
@@ -23,6 +24,7 @@ from dialects import (
 from dialects.families import family_of, program_languages
 from dialects.family import Programs
 from dialects.held import Held
+from dialects.parameters import Value
 from dialects.program_files import ProgramFiles
 from drives.conclusions import Outcome
 from drives.conversations import ASKING, Conversation, Conversations, OnEnded, OnOver, awaited
@@ -47,6 +49,12 @@ class Neighbours(Protocol):
 
     def conversation_begins(self, drive: Drive) -> bool:
         """List the drive for the stop; return whether it was addressed before without being listed."""
+
+    def replied_again(self, drive: Drive) -> None:
+        """Look for a restart of a drive after a missing reply."""
+
+    def homes(self, drive: Drive, axis: str) -> None:
+        """Watch a homing of an axis whose position does not count."""
 
     def conversation_ended(self, drive: Drive, before: str, commanded: bool) -> None:
         """Update the list. `before`: the address at the start; `commanded`: more was sent than questions."""
@@ -113,6 +121,14 @@ class Drive:
         """A program is being transferred: the drive stays busy for a while."""
         self.seen: Seen | None = None
         self.running: Running | None = None
+        self.resting: tuple[float, dict[str, int]] = (float("-inf"), {})
+        """When its positions were last requested, and those of the axes, if all were at rest."""
+        self.calm = False
+        """No program was known to run at that time."""
+        self.settings: dict[str, tuple[Mapping[str, Value], int]] = {}
+        """Settings as last read, by the part of the conditions, and the number of `commands` then."""
+        self.missing = False
+        """It did not reply to the last request; replies since then are not compared yet."""
         self.started_at = float("-inf")
         """When something that can start motion or a program was last sent to it, even if the drive refused it."""
         self.commanded_at = float("-inf")
@@ -215,7 +231,21 @@ class Drive:
             _refuse_while_stored(drives, "end that mode first")
             return await _to_each(drives, text)
         procedure = self.family.perform(self.state, text)
-        return await self.run(self._to_all(procedure) if to_all else procedure)
+        if to_all:
+            return await self.run(self._to_all(procedure))
+        stored = self.programming
+        printed = await self.run(procedure)
+        if self.state.unreferenced and not stored:
+            self._give_reference(text)
+        return printed
+
+    def _give_reference(self, text: str) -> None:
+        """Note that a line was executed that sets a position; watch a homing that it began."""
+        found = self.family.referencing(self.state, text)
+        if found is not None and found.homing:
+            self._neighbours.homes(self, found.axis)
+        elif found is not None:
+            self.state.referenced(found.axis)
 
     def starts(self, text: str) -> bool:
         """Whether a line can start motion or a program in it; in program mode the line is stored."""
@@ -284,11 +314,26 @@ class Drive:
             if outcome.error is None:
                 axes, at = outcome.value(), transactions[0].sent_at
                 self.seen = self._judged.reading(at, axes, self.family.rests_in_place)
+                rests = self.seen.velocity == 0
+                self.calm = not (self.state.running or (self.running is not None and self.running.runs))
+                self.resting = (at, {axis.axis: axis.position for axis in axes} if rests else {})
                 if axes[0].program is not None:
                     self.running = Running(at, axes[0].program)
             on_over(outcome)
 
         return self.start(self.family.motion(self.state, priority), over, watch)
+
+    @property
+    def rested(self) -> Mapping[str, int]:
+        """Its last positions at rest, if no program ran and nothing was sent since that can move it; else none."""
+        at, positions = self.resting
+        return positions if self.calm and self.started_at <= at else {}
+
+    @property
+    def unchanged(self) -> Mapping[str, Value]:
+        """Its settings as last read, if no program ran and nothing was sent since that can set them; else none."""
+        known = [facts for facts, commands in self.settings.values() if self.calm and commands == self.commands]
+        return {name: value for facts in known for name, value in facts.items()}
 
     async def rest(self) -> tuple[int, ...] | None:
         """Read whether it rests: None while it moves; else what a reading REST later must show again, too."""
@@ -324,6 +369,11 @@ class Drive:
 
         def over(outcome: Outcome[T]) -> None:
             self._neighbours.conversation_ended(self, address, commanded or isinstance(outcome.error, Stopped))
+            if isinstance(outcome.error, NoAnswer):
+                self.missing = True
+            elif outcome.error is None and self.missing and not self.programming:
+                self.missing = False
+                self._neighbours.replied_again(self)
             if (self.address, self.programming, self.codec) != before:
                 self.link.publish(Changed(self.link.now(), self.address))
             on_over(outcome)

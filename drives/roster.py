@@ -11,6 +11,7 @@ from drives.conversations import Conversations
 from drives.drive import Drive
 from drives.keeping import GLOBAL
 from drives.link import Link
+from drives.restarts import Restarts
 
 PRINT_QUIET = 0.1
 """Quiet time after a print before the next poll of a party line, s."""
@@ -30,6 +31,7 @@ class Roster:
         """Drives that were addressed and are not among those found: a stop must reach them, too."""
         self.probing: tuple[str, ...] = ()
         """Addresses of the drives that are being looked for."""
+        self.restarts = Restarts(self.link)
         self.stated: tuple[str, ...] = ()
         """The addresses that the first search was given."""
         self.on_stored_stop: Callable[[Drive], None] = lambda drive: None
@@ -70,7 +72,9 @@ class Roster:
                 drive = Drive(self.conversations, self, state)
             else:
                 _compare(drive.state, state)
-                drive.state = state
+                state.reference_lost(drive.state.unreferenced)
+                self.restarts.replied_again(drive)
+                drive.state, drive.missing = state, False
             self.drives[state.address] = drive
         self.unlisted |= {drive.address: drive for drive in before.values() if drive not in self.drives.values()}
         self.settings_may_have_changed(self.unlisted.values())
@@ -93,6 +97,15 @@ class Roster:
         if drive.address not in GLOBAL and drive.address not in self.drives:
             self.unlisted[drive.address] = drive
         return commanded
+
+    def replied_again(self, drive: Drive) -> None:
+        """Look for a restart of a drive after a missing reply."""
+        if self.drives.get(drive.address) is drive:
+            self.restarts.replied_again(drive)
+
+    def homes(self, drive: Drive, axis: str) -> None:
+        """Watch a homing of an axis whose position does not count."""
+        self.restarts.homes(drive, axis)
 
     def conversation_ended(self, drive: Drive, before: str, commanded: bool) -> None:
         """Update the list. `before`: the address at the start, which DN and PY change."""
@@ -117,6 +130,7 @@ class Roster:
         if not any(map(codec.restarted, lines)):
             return
         for drive in self.drives.values():
+            self.restarts.replied_again(drive, "sign-on" if len(self.drives) == 1 else "")
             drive.state.restarted(alone=len(self.drives) == 1)
         which = f"one of {', '.join(self.drives)}" if len(self.drives) > 1 else next(iter(self.drives), "")
         text = f"{which or 'the drive'} was restarted (sign-on); its settings are read before the next line"

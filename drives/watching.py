@@ -173,7 +173,10 @@ class Watching:
         drive = watched.drive
         commands = drive.commands
         try:
-            watched.facts |= await drive.run(part.read(drive.state))
+            found = await drive.run(part.read(drive.state))
+            watched.facts |= found
+            if part.slow:
+                drive.settings[part.name] = (found, commands)
         except Refused:
             watched.refused.add(part.name)
         except NoAnswer:

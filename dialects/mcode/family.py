@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from functools import partial
 
+from dialects.codec import Procedure
 from dialects.family import Family, Guards, Sentences
 from dialects.guards import Guard
 from dialects.mcode.host import classify, operations
@@ -19,6 +20,11 @@ def guarded(state: MCodeState, text: str) -> Guard | None:
     return guards.find(text, address=state.address, party=party, product=product, starts=starts)
 
 
+def homed(state: MCodeState) -> Procedure[bool]:
+    """Whether no error is set after a homing."""
+    return not (yield from operations.flag(state, "EF"))
+
+
 MCODE = Family(
     name=MCode.family,
     codec=MCode(),
@@ -29,6 +35,8 @@ MCODE = Family(
     moving=partial(operations.flag, name="MV"),
     busy=partial(operations.flag, name="BY"),
     status=operations.status,
+    referencing=classify.referencing,
+    homed=homed,
     language=help,
     rests_in_place=False,
     question="PR {}".format,

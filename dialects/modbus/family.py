@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from functools import partial
 
+from dialects.codec import Procedure
 from dialects.family import Family, Guards, Registers, Sentences
 from dialects.guards import Guard
+from dialects.mcode.host.classify import referencing
 from dialects.mcode.manual import guards, help, sentences
 from dialects.modbus.host import operations
 from dialects.modbus.host.codec import Modbus
@@ -23,6 +25,11 @@ def guarded(state: ModbusState, text: str) -> Guard | None:
     return guards.find(text, address=state.address, party=False, product=state.product, starts=lambda line: True)
 
 
+def homed(state: ModbusState) -> Procedure[bool]:
+    """Whether no error is set after a homing."""
+    return not (yield from operations.flag(state, "EF"))
+
+
 MODBUS = Family(
     name=Modbus.family,
     codec=Modbus(),
@@ -33,6 +40,8 @@ MODBUS = Family(
     moving=partial(operations.flag, name="MV"),
     busy=partial(operations.flag, name="BY"),
     status=operations.status,
+    referencing=referencing,
+    homed=homed,
     language=help,
     rests_in_place=False,
     question="PR {}".format,

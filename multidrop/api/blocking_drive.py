@@ -59,6 +59,11 @@ class Drive:
         return self._drive.product
 
     @property
+    def referenced(self) -> bool:
+        """False after a restart that was seen, until a homing has ended or the position was set."""
+        return self._drive.referenced
+
+    @property
     def version(self) -> str:
         """The version that it reports."""
         return self._drive.version

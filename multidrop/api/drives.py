@@ -132,6 +132,12 @@ class AsyncDrive:
         """Read the position."""
         return (await self.motion()).position
 
+    @property
+    def referenced(self) -> bool:
+        """False after a restart that was seen, until a homing has ended or the position was set."""
+        lost = self.drive.state.unreferenced
+        return not (lost & {self.axis.lower(), ""} if self.axis else lost)
+
     async def velocity(self) -> int:
         """Read the velocity, signed, per second."""
         return (await self.motion()).velocity

@@ -75,6 +75,7 @@ async def drives(call: Call) -> None:
         for drive in bus.drives.values():
             mark = "*" if drive is workspace.selected else " "
             mode = " (in program mode)" if drive.programming else ""
+            mode += " (position not referenced)" if drive.state.unreferenced else ""
             words = (mark, workspace.display_name(drive), drive.label, model(drive))
             workspace.output(" ".join(word for word in words if word) + mode)
 
@@ -93,6 +94,21 @@ async def scan(call: Call) -> None:
         workspace.output(f"{bus.name}: {address} {model(bus.drives[address])}")
     if not found:
         workspace.notify(f"{bus.name}: no other drive replies", outcome=True)
+
+
+@verb("/referenced [ADDR]", immediate=True)
+async def referenced(call: Call) -> None:
+    """Take the position of a drive for right again after a restart; nothing is sent.
+
+    A homing that ends well, or a position that is set, does the same. Until then `~` is before the position.
+    """
+    words = call.words(0, 1)
+    drive = call.drive(words[0] if words else "")
+    name = call.workspace.display_name(drive) or drive.shown
+    lost = bool(drive.state.unreferenced)
+    drive.state.referenced()
+    call.workspace.notify(f"{name}: its position {'counts again' if lost else 'was not marked as not referenced'}")
+    call.workspace.changed()
 
 
 def _reports_status(workspace: Workspace) -> bool:

@@ -39,6 +39,7 @@ class FakeDrive:
     product: str = "LMDCM"
     version: str = "6.002"
     programming: bool = False
+    unreferenced: frozenset[str] = frozenset()
 
     @property
     def family(self) -> Family[Any]:
@@ -46,7 +47,9 @@ class FakeDrive:
 
     @property
     def state(self) -> DriveState:
-        return self.family.new_state(self.family.codec, self.address)
+        state: DriveState = self.family.new_state(self.family.codec, self.address)
+        state.reference_lost(self.unreferenced)
+        return state
 
 
 @dataclass

@@ -1,15 +1,18 @@
 """The lines of the main screen as functions of the facts."""
 
 from datetime import datetime
+from typing import cast
 
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from rich.style import Style
 
 from drives.events import Sample
 from drives.halt import Fate
+from shell.events import OnBus, StateChanged
 from shell.stops import Found, Tally
-from tests.support.fake_session import demo_session
+from tests.support.fake_session import FakeDrive, demo_session, make_app, settle
 from tui.panels.column import column_rows
 from tui.panels.glance import Glance, firmware_of
 from tui.panels.status import narrow_rows
@@ -197,3 +200,26 @@ def test_a_row_from_elsewhere_acts_on_no_terminal() -> None:
     lines.style_of = lambda role: Style()  # type: ignore[method-assign]
     strip = lines.strip((("left \x1b]0;x\x07\u202e", "text"),), 40)
     assert strip.text.rstrip() == r"left \x1b]0;x\x07\u202e"
+
+
+@pytest.mark.tui
+async def test_a_position_without_reference_has_its_sign_everywhere() -> None:
+    session = demo_session()
+    drive = cast(FakeDrive, session.buses["press"].drives["a"])
+    app = make_app(session)
+    async with app.run_test(size=(120, 40)) as pilot:
+        for address in "ab":
+            session.emit(OnBus("press", Sample(session.time - 0.05, address, 1234, 0)))
+        await settle(pilot)
+        assert "~1234" not in app.main.lines("side").plain
+        drive.unreferenced = frozenset({""})
+        session.emit(StateChanged(session.time))
+        await settle(pilot)
+        side = app.main.lines("side").plain
+        assert side.count("~1234") == 2 and "not referenced: home it, set it, or /referenced a" in side
+        await pilot.press("ctrl+a")
+        await settle(pilot)
+        shown = app.screen.lines("drives").plain.splitlines()  # type: ignore[attr-defined]
+        marked = [row for row in shown if "~1234" in row]
+        assert len(marked) == 1 and "press:a" in marked[0] and "not referenced" in marked[0]
+        assert session.sent == []

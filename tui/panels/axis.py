@@ -6,7 +6,7 @@ most, as a low screen cuts the last ones.
 
 from __future__ import annotations
 
-from tui.panels.glance import Glance, firmware_of, name_of
+from tui.panels.glance import NOT_REFERENCED, Glance, firmware_of, name_of
 from tui.panels.lamps import error_span, facts_groups, flowing, lamp_groups
 from tui.panels.travel import LEARNT, LIMITS, SEEN, bar, phase, to_go_words, travel_of
 from tui.panels.twin import twin_rows
@@ -66,6 +66,9 @@ def axis_rows(glance: Glance, axis: Readout, now: float, width: int) -> list[Row
     speed: list[Span] = [(velocity, role), (f" {unit}/s ", "dim")]
     rows: list[Row] = [spread(_state(glance, axis, now, width - width_of(speed) - 1), speed, width)]
     rows += [((f"{name} {text}", role_of),) for text, role_of in _troubles(axis, now)]
+    if not glance.counts(axis):
+        verb = f"/referenced {glance.address}".rstrip()
+        rows.append(((f"{name} {NOT_REFERENCED}: home it, set it, or {verb}", "strong"),))
     target = axis.conditions.target if axis.conditions is not None and live else None
     arrow = f"   → {digits(target)}" if target is not None else ""
     togo = to_go_words(axis, now) if live else ""

@@ -14,6 +14,11 @@ STATE = 17
 """Width of a sign and its words: `■ stood 0.9 s ago`."""
 
 
+UNREFERENCED = "~"
+"""The sign of a position that has lost its reference."""
+NOT_REFERENCED = "not referenced"
+
+
 @dataclass(frozen=True)
 class Glance:
     """The facts that are shown of one drive."""
@@ -27,6 +32,12 @@ class Glance:
     storing: bool = False
     lost: bool = False
     unit: str = "steps"
+    unreferenced: frozenset[str] = frozenset()
+    """The axes whose position does not count since a restart."""
+
+    def counts(self, axis: Readout) -> bool:
+        """Whether the position of an axis is not known to have lost its reference."""
+        return not self.unreferenced & {axis.axis, ""}
 
     def state(self) -> State:
         """The state as last read; LOST on a lost bus, where nothing else is known."""
@@ -46,7 +57,8 @@ class Glance:
         """Position, velocity, and their role: dim unless they are known to be current."""
         last = (axis or self.readout).last
         dim = self.lost or self.readout.silent_since is not None or self.readout.old(now) or self.storing
-        position = digits(None if last is None else last.position)
+        sign = "" if last is None or self.counts(axis or self.readout) else UNREFERENCED
+        position = sign + digits(None if last is None else last.position)
         velocity = digits(None if last is None else last.velocity)
         return position, velocity, "dim" if dim else "strong"
 
@@ -75,6 +87,7 @@ def glances_of(session: SessionView, model: ScreenModel, bus: BusView) -> list[G
             selected=chosen is not None and drive.address == chosen.address,
             storing=drive.programming,
             lost=bus.lost is not None,
+            unreferenced=drive.state.unreferenced,
         )
         for address, drive in bus.drives.items()
     ]

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from tui.panels.axis import NUMBER, poll_words
-from tui.panels.glance import Glance
+from tui.panels.glance import NOT_REFERENCED, Glance
 from tui.panels.lamps import flowing, lamp_groups, program_words, trouble_of
 from tui.panels.spark import spark
 from tui.panels.travel import bar, to_go_words
@@ -57,17 +57,17 @@ def _drive_rows(glance: Glance, now: float, width: int) -> list[Row]:
 
 def _axis_row(glance: Glance, axis: Readout, now: float, width: int, *, first: bool) -> Row:
     """Name, state, place in the travel, position, velocity, and what matters most besides."""
-    _, velocity, role = glance.values(now, axis)
+    position, velocity, role = glance.values(now, axis)
     moves = axis.last is not None and axis.last.velocity != 0
     row: list[Span] = [
         _name(glance, axis, first=first),
         (short_words(glance, axis, now), _state_role(glance, now)),
         (f"{bar(axis, BAR)} ", "dim" if role == "dim" else "text"),
-        (f"{digits(None if axis.last is None else axis.last.position):>{NUMBER}}", role),
+        (f"{position:>{NUMBER}}", role),
         (f"{f'{velocity}/s' if moves else '':>{VELOCITY}} ", role),
     ]
     room = width - width_of(row)
-    text, text_role = _besides(axis, now, room, live=role != "dim")
+    text, text_role = _besides(glance, axis, now, room, live=role != "dim")
     return (*row, (fit(text, room), text_role))
 
 
@@ -95,11 +95,13 @@ def short_words(glance: Glance, axis: Readout, now: float) -> str:
     return fit(f"{state.sign} {'not read' if state is State.UNKNOWN else state.word}", STATE)
 
 
-def _besides(axis: Readout, now: float, room: int, *, live: bool) -> Span:
-    """The trouble of an axis and its difference from its twin, the way to its target, or its program."""
+def _besides(glance: Glance, axis: Readout, now: float, room: int, *, live: bool) -> Span:
+    """The trouble of an axis and its difference from its twin, a lost reference, the way to its target, its program."""
     trouble = trouble_of(axis)
     if text := alarm_words(trouble, [axis], room):
         return text, "error" if live or trouble else "dim"
+    if not glance.counts(axis):
+        return NOT_REFERENCED, "strong"
     target = axis.conditions.target if axis.conditions is not None else None
     if live and target is not None and axis.last is not None and axis.last.velocity:
         return f"→ {digits(target)}  {to_go_words(axis, now)}".rstrip(), "text"
@@ -138,7 +140,7 @@ def _panel_row(glance: Glance, now: float, width: int) -> Row:
         (f"{position:>{NUMBER}} ", "text" if role == "strong" else role),
     ]
     room = width - width_of(row)
-    text, text_role = _besides(glance.readout, now, room - 1, live=role != "dim")
+    text, text_role = _besides(glance, glance.readout, now, room - 1, live=role != "dim")
     if text.startswith("→"):
         text = to_go_words(glance.readout, now)
     elif text.startswith(SIGN):

@@ -11,7 +11,7 @@ from textual.app import ComposeResult
 from textual.binding import Binding, BindingType
 
 from dialects.visible import visible
-from tui.panels.glance import Glance, glances_of
+from tui.panels.glance import NOT_REFERENCED, Glance, glances_of
 from tui.panels.lamps import program_words, trouble_of
 from tui.panels.spark import spark
 from tui.panels.status import STATE, short_words
@@ -62,6 +62,8 @@ class Place(NamedTuple):
         """The fact that matters most besides its state: trouble and its twin, its program, else its product."""
         if alarm := self.alarm(room):
             return alarm, "error"
+        if self.glance.unreferenced:
+            return NOT_REFERENCED, "strong"
         released = [each.axis for each in self.glance.readout.others.values() if each.no_current]
         if released:
             return f"{', '.join(released)}: {State.NO_CURRENT.word}", "strong"

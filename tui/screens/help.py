@@ -37,6 +37,7 @@ SIGNS: Sequence[Entry] = (
     ("· !", "progress; warning"),
     ("▶ ■", "velocity last read: not 0; 0"),
     ("□", "at rest without current: nothing holds the load"),
+    ("~", "the position does not count since a restart: home it, set it, or /referenced"),
     ("? ·", "does not reply; not read lately"),
     ("≠", "the position differs from that of the drive's twin by more than the limit"),
     ("◆", "program mode: lines are stored, not executed"),

@@ -6,9 +6,11 @@ import re
 from dataclasses import dataclass
 
 from dialects.codec import Kind
+from dialects.family import Referencing
 from dialects.mcode.manual.device_name import device_name
 from dialects.mcode.manual.grammar import Argument, LineError, Name, Number, Statement, Text, parse, tokens
 from dialects.mcode.manual.table import PRINTS_LINES, lookup
+from dialects.state import DriveState
 
 WORD = re.compile(r"\s*([A-Za-z_]+)\s*=?\s*(.*)", re.S)
 BLANK = re.compile(r'\s*PR[\s,"]*;?', re.I)
@@ -18,6 +20,7 @@ WIRE = {"EM": r"[0-3]", "PY": r"[01]", "CK": r"[0-2]", "ES": r"[0-3]", "DN": r"[
 """Communication settings, and the values that a drive accepts for them."""
 WHOLE = {"FD", "IP"}
 """Words that restore all settings at once."""
+HOMINGS = {"HM", "HI"}
 STEPS = {"IC", "DC"}
 SCALE = {"P", "C1", "C2", "MS", "EE", "AS", "RD"}
 """Words that change what positions count."""
@@ -42,6 +45,14 @@ def _statement(text: str) -> Statement | None:
         return parse(text)
     except LineError:
         return None
+
+
+def referencing(state: DriveState, text: str) -> Referencing | None:
+    """Find out whether a line homes the axis or sets its position; the same over Modbus."""
+    word, rest = word_of(text)
+    if word in HOMINGS or (word == "P" and rest):
+        return Referencing("", word in HOMINGS)
+    return None
 
 
 def setting_of(text: str) -> Setting | None:

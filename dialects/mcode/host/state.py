@@ -39,8 +39,6 @@ class MCodeState(DriveState):
     """One MCode drive: what its conversations learn beside the common state."""
 
     codec: MCode
-    running: bool = False
-    """A program was started or seen to run: it may set the error flag at any time."""
     signs: bool = False
     """The drive prints its own name, which distinguishes its replies from another drive's."""
     candidates: Sequence[Candidate] = field(default_factory=tuple)

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import re
+
 from dialects.codec import Priority, Procedure, Request
 from dialects.errors import Inexpressible, Refused
-from dialects.family import Motion
+from dialects.family import Motion, Referencing
 from dialects.pmx.host.exchange import answered, beyond_doubt, number, who
 from dialects.pmx.host.state import PmxState
 from dialects.pmx.manual import status as words
@@ -13,6 +15,8 @@ from dialects.pmx.manual.table import AXES, grouped
 OK = "OK"
 LATER = ("DN", "DB")
 """Words that take effect after STORE and a power cycle (6.2.2, 6.3)."""
+HOMING = re.compile(r"(?:H|L|ZH|Z|HL)([XY])[+-]", re.ASCII)
+SETS = re.compile(r"P([XY])=", re.ASCII)
 PROGRAMS = (0, 1)
 POINTS = (("DI", "inputs on"), ("DO", "outputs on"), ("EO", "motor drivers on"))
 
@@ -42,6 +46,19 @@ def motion(known: PmxState, priority: Priority) -> Procedure[tuple[Motion, ...]]
     if doubts:
         yield from beyond_doubt(known, doubts[0])
     return tuple(found)
+
+
+def referencing(known: PmxState, text: str) -> Referencing | None:
+    """Find out whether a command homes an axis or sets its position. (7.10.)"""
+    if found := HOMING.fullmatch(text.strip()):
+        return Referencing(found[1].lower(), homing=True)
+    found = SETS.match(text.strip())
+    return Referencing(found[1].lower(), homing=False) if found else None
+
+
+def homed(known: PmxState) -> Procedure[bool]:
+    """Whether no axis has an error after a homing."""
+    return not any(axis.trouble for axis in (yield from motion(known, Priority.OPERATOR)))
 
 
 def moving(known: PmxState) -> Procedure[bool]:

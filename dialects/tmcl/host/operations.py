@@ -6,7 +6,7 @@ from dataclasses import replace
 
 from dialects.codec import Kind, Priority, Procedure, Request
 from dialects.errors import Inexpressible, NoAnswer, Refused
-from dialects.family import Motion
+from dialects.family import Motion, Referencing
 from dialects.tmcl.host.exchange import END, answered, read, refusal, status_of, synchronised, who
 from dialects.tmcl.host.motors import motors
 from dialects.tmcl.host.state import TmclState
@@ -73,6 +73,24 @@ def motion(state: TmclState, priority: Priority) -> Procedure[tuple[Motion, ...]
         velocity = yield from read(state, Call(Command.GAP, Axis.ACTUAL_VELOCITY, motor), priority)
         found.append(Motion(position, velocity, str(motor) if count > 1 else ""))
     return tuple(found)
+
+
+def referencing(state: TmclState, text: str) -> Referencing | None:
+    """Find out whether a command searches the reference of a motor or sets its position."""
+    try:
+        call = grammar.parse(text)
+    except grammar.LineError:
+        return None
+    searches = call.command == Command.RFS and call.type == Search.START
+    if searches or (call.command == Command.SAP and call.type == Axis.ACTUAL_POSITION):
+        return Referencing(str(call.motor) if state.motors > 1 else "", searches)
+    return None
+
+
+def homed(state: TmclState) -> Procedure[bool]:
+    """A module shows no failure of a search: its end is all that is seen."""
+    yield from ()
+    return True
 
 
 def moving(state: TmclState) -> Procedure[bool]:
