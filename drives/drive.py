@@ -121,8 +121,8 @@ class Drive:
         """A program is being transferred: the drive stays busy for a while."""
         self.seen: Seen | None = None
         self.running: Running | None = None
-        self.resting: tuple[float, dict[str, int]] = (float("-inf"), {})
-        """When its positions were last requested, and those of the axes, if all were at rest."""
+        self.resting: tuple[float, int, dict[str, int]] = (float("-inf"), 0, {})
+        """When its positions were last requested, `commands` then, and the positions, if all axes were at rest."""
         self.calm = False
         """No program was known to run at that time."""
         self.settings: dict[str, tuple[Mapping[str, Value], int]] = {}
@@ -269,6 +269,8 @@ class Drive:
         _refuse_while_stored(others, "leave it with PG first")
         result = yield from procedure
         for drive in others:
+            drive.calm = False  # what was read of it before says nothing of what is read next
+            drive.settings.clear()
             if self.state.settings_unknown:
                 drive.state.settings_may_have_changed()
         return result
@@ -314,20 +316,20 @@ class Drive:
             if outcome.error is None:
                 axes, at = outcome.value(), transactions[0].sent_at
                 self.seen = self._judged.reading(at, axes, self.family.rests_in_place)
-                rests = self.seen.velocity == 0
-                self.calm = not (self.state.running or (self.running is not None and self.running.runs))
-                self.resting = (at, {axis.axis: axis.position for axis in axes} if rests else {})
                 if axes[0].program is not None:
                     self.running = Running(at, axes[0].program)
+                self.calm = not (self.state.running or (self.running is not None and self.running.runs))
+                at_rest = self.seen.velocity == 0
+                self.resting = (at, self.commands, {axis.axis: axis.position for axis in axes} if at_rest else {})
             on_over(outcome)
 
         return self.start(self.family.motion(self.state, priority), over, watch)
 
     @property
     def rested(self) -> Mapping[str, int]:
-        """Its last positions at rest, if no program ran and nothing was sent since that can move it; else none."""
-        at, positions = self.resting
-        return positions if self.calm and self.started_at <= at else {}
+        """Its last positions at rest, if no program ran and nothing was sent since that can change them; else none."""
+        at, commands, positions = self.resting
+        return positions if self.calm and self.started_at <= at and commands == self.commands else {}
 
     @property
     def unchanged(self) -> Mapping[str, Value]:

@@ -158,13 +158,14 @@ def test_the_lines_that_give_a_reference(family: str, line: str, found: tuple[st
     assert (None if given is None else (given.axis, given.homing)) == found
 
 
-async def test_a_move_to_0_during_a_silence_is_no_restart(tmp_path: Path) -> None:
+@pytest.mark.parametrize("line", ["@b MA 0", "@b P=0", "@b VM=5000", "@* P=0", "@* VM=5000"])
+async def test_what_was_sent_before_a_silence_is_no_restart(tmp_path: Path, line: str) -> None:
     async with Polled(tmp_path, party("b")) as cell:
         await cell.session.run("@b MA 51200")
         await asyncio.sleep(8)
-        await cell.session.run("@b MA 0")
+        await cell.session.run(line)
         drive = cell.session.buses[LINE].drives["b"]
-        drive.missing = True
+        drive.missing = True  # as after a reply that noise has eaten
         await asyncio.sleep(8)
         assert cell.restarts() == []
 
