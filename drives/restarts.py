@@ -24,6 +24,8 @@ from transports import TransportLost
 
 PAUSE = 0.25
 """Seconds between two looks at a line that is away, or at a drive that homes."""
+BOOT = 1.0
+"""Seconds after a sign-on before the drive is asked."""
 NAMED = 4
 """Most settings that a message names."""
 
@@ -80,6 +82,7 @@ class Restarts:
 
     async def _look(self, drive: Drive, before: Before) -> None:
         """Read the drive once; say a restart that shows, once."""
+        await asyncio.sleep(BOOT if before.sign else 0)
         while self._link.away is not None or drive.programming or drive.transferring:
             await asyncio.sleep(PAUSE)
         try:
