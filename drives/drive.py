@@ -235,17 +235,12 @@ class Drive:
             return await self.run(self._to_all(procedure))
         stored = self.programming
         printed = await self.run(procedure)
-        if self.state.unreferenced and not stored:
-            self._give_reference(text)
-        return printed
-
-    def _give_reference(self, text: str) -> None:
-        """Note that a line was executed that sets a position; watch a homing that it began."""
-        found = self.family.referencing(self.state, text)
+        found = self.family.referencing(self.state, text) if self.state.unreferenced and not stored else None
         if found is not None and found.homing:
             self._neighbours.homes(self, found.axis)
         elif found is not None:
             self.state.referenced(found.axis)
+        return printed
 
     def starts(self, text: str) -> bool:
         """Whether a line can start motion or a program in it; in program mode the line is stored."""
@@ -324,18 +319,6 @@ class Drive:
             on_over(outcome)
 
         return self.start(self.family.motion(self.state, priority), over, watch)
-
-    @property
-    def rested(self) -> Mapping[str, int]:
-        """Its last positions at rest, if no program ran and nothing was sent since that can change them; else none."""
-        at, commands, positions = self.resting
-        return positions if self.calm and self.started_at <= at and commands == self.commands else {}
-
-    @property
-    def unchanged(self) -> Mapping[str, Value]:
-        """Its settings as last read, if no program ran and nothing was sent since that can set them; else none."""
-        known = [facts for facts, commands in self.settings.values() if self.calm and commands == self.commands]
-        return {name: value for facts in known for name, value in facts.items()}
 
     async def rest(self) -> tuple[int, ...] | None:
         """Read whether it rests: None while it moves; else what a reading REST later must show again, too."""

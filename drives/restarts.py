@@ -52,7 +52,7 @@ class Restarts:
 
     def replied_again(self, drive: Drive, sign: str = "") -> None:
         """Compare a drive with what was known of it; `sign`: it has shown already that it restarted."""
-        before = Before(drive.rested, drive.unchanged, sign)
+        before = Before(_rested(drive), _unchanged(drive), sign)
         running = self._tasks.get(drive)
         if (sign or before.rested or before.settings) and (running is None or running.done()):
             self._tasks[drive] = self._begin(f"looking for a restart of {drive.shown}", self._look(drive, before))
@@ -137,6 +137,18 @@ class Restarts:
             drive.state.referenced(axis)
             name = f" {axis}" if axis else ""
             self._link.notify(f"{drive.shown}{name} is referenced: the homing has ended", drive.address)
+
+
+def _rested(drive: Drive) -> Mapping[str, int]:
+    """The last positions at rest, if no program ran and nothing was sent since that can change them; else none."""
+    at, commands, positions = drive.resting
+    return positions if drive.calm and drive.started_at <= at and commands == drive.commands else {}
+
+
+def _unchanged(drive: Drive) -> Mapping[str, Value]:
+    """The settings as last read, if no program ran and nothing was sent since that can set them; else none."""
+    known = [facts for facts, commands in drive.settings.values() if drive.calm and commands == drive.commands]
+    return {name: value for facts in known for name, value in facts.items()}
 
 
 def _shown(name: str) -> str:
