@@ -68,6 +68,8 @@ class Seen:
     """When it was requested, s of the link's clock."""
     velocity: int
     """Velocity of the fastest axis, signed, per second; where it reads 0 on the way, as the positions show it."""
+    velocities: tuple[int, ...] = ()
+    """That of each axis."""
     confirms: float = float("-inf")
     """When the latest reading was requested that shows the same rest, and at least REST earlier; -inf: none does."""
 
@@ -88,17 +90,19 @@ class Judged:
         """Judge a reading. `in_place`: at rest the position must stay, too."""
         (before, places), here = self._last, tuple(axis.position for axis in axes)
         self._last = at, here
-        velocity = max((axis.velocity for axis in axes), key=abs)
+        velocities = [axis.velocity for axis in axes]
         displaced = in_place and here != places
-        if not velocity and displaced and 0 < at - before < RECENT:
-            ways = [after - earlier for earlier, after in zip(places, here, strict=False)]
-            velocity = round(max(ways, key=abs) / (at - before)) or 1
+        if displaced and len(here) == len(places) and 0 < at - before < RECENT:
+            for number, way in enumerate(after - earlier for earlier, after in zip(places, here, strict=True)):
+                if way and not velocities[number]:
+                    velocities[number] = round(way / (at - before)) or (1 if way > 0 else -1)
+        velocity = max(velocities, key=abs)
         if velocity or displaced:
             self.still.clear()
         earlier = [each for each in self.still if each <= at - REST]
         if not velocity:
             self.still = [*earlier[-1:], *self.still[len(earlier) :], at]
-        return Seen(at, velocity, *earlier[-1:])
+        return Seen(at, velocity, tuple(velocities), earlier[-1] if earlier else float("-inf"))
 
 
 @dataclass(frozen=True)

@@ -160,9 +160,11 @@ class Telemetry:
         poll.silences = 0
         poll.times.append(at)
         loop = asyncio.get_running_loop()
+        seen = self._roster.at(address).seen
+        velocities = seen.velocities if seen is not None else [axis.velocity for axis in axes]
         self._next()
-        for axis in axes:
-            sample = Sample(at, address, axis.position, axis.velocity, axis.axis, axis.trouble, axis.program)
+        for axis, velocity in zip(axes, velocities, strict=True):
+            sample = Sample(at, address, axis.position, velocity, axis.axis, axis.trouble, axis.program)
             loop.call_soon(self._publish, sample)
 
     def _publish(self, sample: Sample) -> None:

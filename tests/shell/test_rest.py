@@ -12,7 +12,9 @@ import pytest
 from dialects import Motion, Priority
 from dialects.families import FAMILIES
 from drives.drive import Drive
+from drives.events import Sample
 from drives.halt import Fate
+from shell.events import OnBus
 from shell.motion import standings
 from tests.support.cell_session import CellSession, bus, party
 from tests.support.virtual import in_virtual_time
@@ -88,6 +90,12 @@ async def test_a_module_that_reads_velocity_0_in_motion_is_at_rest_in_one_place_
         read = motor.read
         monkeypatch.setattr(motor, "read", lambda number, t: 0 if number == 3 else read(number, t))
         await shop.session.run("MVP ABS, 0, 200000")
+        polling = shop.session.buses["slide"].telemetry.subscribe(("1",), 0.1)
+        await asyncio.sleep(2.0)
+        polling.close()
+        samples = [each.event for each in shop.events if isinstance(each, OnBus) and isinstance(each.event, Sample)]
+        assert len(samples) > 10 and all(each.velocity > 0 for each in samples[1:]), "rows say that it moves"
+        await asyncio.sleep(2.0)
         (found,) = await standings(shop.session, [module])
         assert found.text.startswith("1 reads velocity 0, but not twice at one position")
         await shop.session.run("/wait stopped")
