@@ -19,7 +19,7 @@ from macros import MacroStore
 from multidrop.commands.failure import fail
 from shell.connect import settings
 from shell.output import write
-from shell.secrets import without_secrets
+from shell.secrets import toml_without_secrets, without_secrets
 
 TERMINAL = ("TERM", "COLORTERM", "TERM_PROGRAM", "LANG", "LC_ALL", "LC_CTYPE", "NO_COLOR", "PYTHONUTF8")
 PRESENT = ("SSH_CONNECTION", "TMUX", "STY")
@@ -171,7 +171,7 @@ def _contents(path: Path) -> Iterator[str]:
     try:
         with opened(path) as file:
             text = bounded(file, str(path)).decode("utf-8", "backslashreplace")
-        lines = split_lines(without_secrets(text))
+        lines = split_lines(toml_without_secrets(text))
     except FileNotFoundError:
         yield "no such file"
     except OSError as problem:

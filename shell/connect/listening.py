@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dialects import Diagnostic
 from dialects.numbers import whole
+from shell.secrets import url_without_secrets
 
 HOST = "127.0.0.1"
 
@@ -13,5 +14,5 @@ def listening(text: str) -> tuple[str, int]:
     host, _, port = text.rpartition(":")
     number = whole(port, 0, 65535)
     if number is None:
-        raise Diagnostic(f"no port {text!r} to serve at", hint="valid: PORT or HOST:PORT, as 9876")
+        raise Diagnostic(f"no port {url_without_secrets(text)!r} to serve at", hint="valid: PORT or HOST:PORT, as 9876")
     return host.removeprefix("[").removesuffix("]") or HOST, number

@@ -16,6 +16,7 @@ from dialects import Diagnostic, Hints
 from dialects.families import TABLE
 from dialects.numbers import whole
 from shell.connect.url_forms import URL_FORMS, sentence
+from shell.secrets import holds_password, url_without_secrets, without_secrets
 from transports.far_port import WAYS, wrong_path
 
 if TYPE_CHECKING:
@@ -71,10 +72,20 @@ class Connection:
 
 
 def parse(text: str, saved: Mapping[str, SavedConnection] | None = None) -> Connection:
-    """Parse a URL, a bare port or a saved name. Raises Diagnostic."""
+    """Parse a URL, a bare port or a saved name. Raises Diagnostic, which never holds a password."""
     text = text.strip()
     if saved and text in saved:
         return _saved(saved[text])
+    try:
+        return _parsed(text)
+    except Diagnostic as problem:
+        if holds_password(text):
+            hint = "write it without the password; for ssh, set up a key with ssh-copy-id"
+            raise Diagnostic("no URL here has a password", url_without_secrets(text), hint) from None
+        raise Diagnostic(problem.message, without_secrets(problem.where), problem.hint) from None
+
+
+def _parsed(text: str) -> Connection:
     scheme, rest = _scheme(text)
     body, query, fragment = _pieces(rest)
     if fragment and scheme != "sim":

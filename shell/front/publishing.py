@@ -19,7 +19,7 @@ from shell.publishing.limits import parse_rate
 from shell.publishing.publisher import Publisher
 from shell.publishing.target import Target, parse_target
 from shell.publishing.topics import Topics
-from shell.secrets import without_secrets
+from shell.secrets import url_without_secrets
 
 if TYPE_CHECKING:
     from drives.bus import Bus
@@ -61,7 +61,7 @@ async def open_lines(session: Session, urls: Sequence[str], later: bool) -> list
         raise [*fatal, *failures.values()][0]
     absent = [urls[number] for number in sorted(failures)]
     for number in sorted(failures):
-        url, reason = without_secrets(urls[number]), str(failures[number])
+        url, reason = url_without_secrets(urls[number]), str(failures[number])
         where = "" if url.partition("?")[0] in reason else f"{url}: "
         session.notify(f"{where}{reason}; tried again every {AGAIN:g} s", warning=True)
     return absent
@@ -75,7 +75,7 @@ async def open_later(session: Session, url: str, add: Callable[[Bus], None]) -> 
             opened = await session.open(url)
         except FAILURES:
             continue
-        session.notify(f"{without_secrets(url)} is open", warning=True)
+        session.notify(f"{url_without_secrets(url)} is open", warning=True)
         for bus in opened:
             add(bus)
         return

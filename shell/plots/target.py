@@ -12,6 +12,7 @@ from urllib.parse import urlsplit
 
 from dialects import Diagnostic
 from shell.connect.listening import listening
+from shell.secrets import url_without_secrets
 
 
 @dataclass(frozen=True)
@@ -90,7 +91,7 @@ def _server(text: str) -> PlotTarget:
 
 
 def _viewer(text: str) -> PlotTarget:
-    wrong = Diagnostic(f"no viewer address {text!r}", hint="valid: rerun+http://HOST:PORT/proxy")
+    wrong = Diagnostic(f"no viewer address {url_without_secrets(text)!r}", hint="valid: rerun+http://HOST:PORT/proxy")
     try:
         parts = urlsplit(text)
         host, port = parts.hostname, parts.port

@@ -36,7 +36,7 @@ def parse_target(text: str) -> Target:
     scheme, mark, rest = text.partition("://")
     place, _, prefix = rest.partition("/")
     user, _, address = place.rpartition("@")
-    if ":" in user:
+    if ":" in user or (":" in place and "@" in prefix):  # a password may hold a /
         hint = "write it in multidrop.toml: [mqtt] with password or password_file"
         raise Diagnostic("a password in a URL can be seen by everybody on this machine", "--to", hint)
     if not mark or scheme not in PORTS:

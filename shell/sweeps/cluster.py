@@ -13,6 +13,7 @@ from contextlib import contextmanager, suppress
 from typing import TYPE_CHECKING, Any
 
 from dialects import Diagnostic
+from shell.secrets import url_without_secrets
 from shell.sweeps import trial
 from shell.sweeps.interruption import Interruption
 from shell.sweeps.trial import DIED, Case, Job, Result
@@ -54,7 +55,9 @@ def results(
 @contextmanager
 def _client(address: str, interruption: Interruption, agree: Callable[[], None]) -> Iterator[Client]:
     if not address.startswith(("tcp://", "tls://", "ws://", "wss://")) or not address.rpartition(":")[2].isdecimal():
-        raise Diagnostic("is not the address of a scheduler", f"--cluster {address}", "as in tcp://HOST:8786")
+        raise Diagnostic(
+            "is not the address of a scheduler", f"--cluster {url_without_secrets(address)}", "as in tcp://HOST:8786"
+        )
     try:
         from distributed import Client
     except ImportError:

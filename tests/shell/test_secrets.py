@@ -1,10 +1,16 @@
 """Secrets are taken out of text that leaves this machine."""
 
+import tomllib
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from shell.secrets import without_secrets
+from dialects import Diagnostic
+from shell.connect.urls import parse
+from shell.plots.target import parse_target as plot_target
+from shell.publishing.target import parse_target as broker
+from shell.secrets import HIDDEN, toml_without_secrets, without_secrets
 
 
 @pytest.mark.parametrize(
@@ -12,6 +18,12 @@ from shell.secrets import without_secrets
     [
         ('url = "ssh://me:pw@host/dev/ttyUSB0"', 'url = "ssh://***@host/dev/ttyUSB0"'),
         ("mqtt://user@broker/press", "mqtt://***@broker/press"),
+        ("opened mqtt://user:p/w@broker/press now", "opened mqtt://***@broker/press now"),
+        ("mqtt://user:12/p@w?x#y@broker/press", "mqtt://***@broker/press"),
+        ("ssh://me:p\"w'@pc/dev/ttyUSB0", "ssh://***@pc/dev/ttyUSB0"),
+        ('mqtt."password" = "pw"', 'mqtt."password" = ***'),
+        ('mqtt . "pass\\u0077ord" = "pw"', 'mqtt . "pass\\u0077ord" = ***'),
+        ('"my \\U00000070assword"="pw"', '"my \\U00000070assword"=***'),
         ('password = "pw"', "password = ***"),
         ("mqtt.Password='pw' # mine", "mqtt.Password=***"),
         ('"api-token" = "pw"', '"api-token" = ***'),
@@ -32,3 +44,54 @@ def test_secrets_are_replaced_and_nothing_else(text, clean):
 def test_what_is_clean_stays_as_it_is(text):
     clean = without_secrets(text)
     assert without_secrets(clean) == clean
+
+
+CONFIGURATION = """# a remark
+[connections.press]
+url = "ssh://me:p w/PW@host/dev/ttyUSB0?drives=a"   # its line
+names = { a = "gantry" }
+[mqtt]
+username = "shop-7"
+"pass\\u0077ord" = '''PW
+PW'''
+[other.'api token']
+deep = ["PW", { x = "PW" }]
+"""
+
+
+def test_a_configuration_keeps_its_form_and_loses_its_secrets() -> None:
+    clean = toml_without_secrets(CONFIGURATION)
+    assert "PW" not in clean and clean.startswith("# a remark\n[connections.press]\n")
+    found = tomllib.loads(clean)
+    assert found["connections"]["press"] == {
+        "url": "ssh://***@host/dev/ttyUSB0?drives=a",
+        "names": {"a": "gantry"},
+    }
+    assert found["mqtt"] == {"username": "shop-7", "password": HIDDEN}
+
+
+def test_a_configuration_that_is_no_toml_shows_keys_only() -> None:
+    clean = toml_without_secrets(CONFIGURATION + "x = \n")
+    assert "PW" not in clean and "gantry" not in clean
+    assert "[mqtt]" in clean and "username = ***" in clean
+
+
+SECRET = "xyzzy"
+
+
+@given(st.text(alphabet="abz/@:?#&=%\\ '\"[]{},", max_size=12), st.text(alphabet="abz/@:?#&=% ", max_size=12))
+def test_no_refusal_of_a_url_quotes_its_password(before: str, after: str) -> None:
+    password = f"{before}{SECRET}{after}"
+    for scheme in ("tcp", "udp", "modbus", "rfc2217", "ssh", "mqtt", "mqtts", "rerun+http", "ftp"):
+        url = f"{scheme}://me:{password}@10.0.0.5:503/proxy"
+        for read in (parse, broker, lambda text: plot_target(text, None)):
+            with pytest.raises(Diagnostic) as refused:
+                read(url)
+            assert SECRET not in str(refused.value), url
+
+
+def test_a_refused_url_keeps_what_is_no_secret() -> None:
+    with pytest.raises(Diagnostic, match=r"^tcp://\*\*\*@pc:503: no URL here has a password; write it without"):
+        parse("tcp://me:pw@pc:503")
+    with pytest.raises(Diagnostic, match=r"^tcp://10.0.0.5:503\?token=\*\*\*: no key token"):
+        parse("tcp://10.0.0.5:503?token=pw")
