@@ -14,7 +14,7 @@ from multidrop.commands.failure import fail
 from shell.connect import settings
 from shell.connect.settings import Settings
 from shell.output import write
-from shell.secrets import HIDDEN
+from shell.secrets import HIDDEN, holds_password, url_without_secrets
 
 REFUSED = "   # default; the file's does not count"
 WRONG = 2
@@ -53,7 +53,8 @@ def shown(found: Settings, keys: dict[str, str], text: str) -> list[str]:
 
     lines = [f"# {settings.config_file()}" + ("" if text else " does not exist: all settings are the defaults")]
     for name, each in found.connections.items():
-        lines += ["", f"[connections.{name}]", f"url = {tomlkit.item(each.url).as_string()}"]
+        url = url_without_secrets(each.url) if holds_password(each.url) else each.url
+        lines += ["", f"[connections.{name}]", f"url = {tomlkit.item(url).as_string()}"]
         if each.names:
             names = ", ".join(f"{key} = {tomlkit.item(value).as_string()}" for key, value in each.names.items())
             lines.append(f"names = {{ {names} }}")

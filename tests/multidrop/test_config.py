@@ -37,6 +37,15 @@ def test_what_counts_is_shown_as_toml_with_its_origin(file, capsys):
     assert 'palette = "Alt+p"\n' in out and 'drive = "^O"   # default\n' in out
 
 
+def test_the_password_of_a_url_is_not_shown(file, capsys):
+    file.write_text(
+        '[connections.press]\nurl = "ssh://me:p/w@pc/dev/ttyUSB0"\n[connections.far]\nurl = "ssh://me@pc/dev/x"\n'
+    )
+    assert main(["config", "show"]) == 0
+    shown = tomlkit.parse(capsys.readouterr().out)["connections"]
+    assert [each["url"] for each in shown.values()] == ["ssh://***@pc/dev/ttyUSB0", "ssh://me@pc/dev/x"]
+
+
 def test_what_does_not_count_is_shown_as_the_default(file, capsys):
     file.write_text('[screen]\ntheme = "pink"\n[keys]\npalette = "^G"\npalete = "F9"\n')
     assert main(["config", "show"]) == 0

@@ -6,7 +6,7 @@ import time
 
 from dvg_devices.MDrive_stepper_protocol_RS422 import MDrive_Controller
 
-WAIT = 30.0
+WAIT = 120.0
 controller = MDrive_Controller()
 controller.serial_settings["timeout"] = 2.0  # a busy machine; its own are 0.1 s
 facts = {"connected": controller.connect_at_port(sys.argv[1])}

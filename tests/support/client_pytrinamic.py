@@ -8,7 +8,7 @@ from pytrinamic.connections import SerialTmclInterface, SocketTmclInterface
 from pytrinamic.modules import TMCM1241
 from pytrinamic.tmcl import TMCLReplyStatusError
 
-WAIT = 30.0
+WAIT = 120.0
 
 
 def until(done):
