@@ -56,10 +56,10 @@ class Doubt:
         for evidence in self._evidence.values():
             evidence += lines[: MOST_EVIDENCE - len(evidence)]
 
-    def without_late_polls(self, lines: tuple[str, ...]) -> tuple[str, ...]:
-        """Remove late replies to signed polls: no program prints them."""
-        polls = [late.request.expect for late in self._late if late.request.signed and late.request.is_poll]
-        return tuple(line for line in lines if not any(each and re.fullmatch(each, line) for each in polls))
+    def without_late(self, lines: tuple[str, ...]) -> tuple[str, ...]:
+        """Remove late replies to signed requests, which were reported as missing: no program prints them."""
+        signed = [late.request.expect for late in self._late if late.request.signed]
+        return tuple(line for line in lines if not any(each and re.fullmatch(each, line) for each in signed))
 
     def weigh(self, request: Request, reply: Reply, now: float) -> Weight:
         """Weigh a reply against those outstanding, and update these."""

@@ -270,7 +270,7 @@ class Line:
     def _publish(self, now: float, lines: Iterable[str]) -> None:
         """Publish unsolicited lines. They are evidence against a doubtful reply."""
         if lines := tuple(filter(None, lines)):
-            if shown := self._doubt.without_late_polls(lines):
+            if shown := self._doubt.without_late(lines):
                 self._events.append(Unsolicited(now, shown))
                 self.printed_at = now
             self._doubt.stray(lines)

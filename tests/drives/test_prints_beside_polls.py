@@ -125,13 +125,14 @@ async def test_the_prints_of_a_drive_are_shown_while_another_one_is_searched_for
         assert [line for line in cell.shown if not WHOLE.fullmatch(line)] == []
 
 
-def test_a_late_reply_to_a_poll_is_no_line_of_a_program(bench):
+@pytest.mark.parametrize("priority", [Priority.POLL, Priority.OPERATOR])
+def test_a_late_reply_to_a_signed_request_is_no_line_of_a_program(bench, priority):
     wired = bench([{"name": "a", "party": True, "set": {"EM": 1}}], timeout=0.3)
     wired.wire.receive(b"\n\n", 0.0)
     wired.wait(0.1)
     wired.wire._faults = Faults(delay=(0.5, 0.5))
     state = MCodeState(MCode(em=1, party=True, escape=1), "a", "a", "LMDCM")
-    asked = ProcedureRunner(family_of(state.codec).motion(state, Priority.POLL)).request
+    asked = ProcedureRunner(family_of(state.codec).motion(state, priority)).request
     assert asked is not None
     wired.line.ask(asked)
     wired.events()

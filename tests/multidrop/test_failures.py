@@ -395,6 +395,7 @@ def test_a_late_answer_is_not_the_next_ones(shop, tapped):
     shell.expect("does not reply")
     shell.send('PR "R1 is ",R1\r')
     shell.expect("R1 is 17\r\n")
+    tap.hold(b"aPR BY,P")
     shell.send("/quit\r")  # which reads the drive, whose answer is late again
     shell.expect("a is not known: .*/quit again leaves them moving")
     shell.send("/quit\r")
