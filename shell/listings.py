@@ -82,6 +82,7 @@ def check_one(drive: Drive) -> None:
         raise Diagnostic("programs are those of one drive (nothing was sent)", drive.address, "name one")
 
 
-def save_new(file: str, lines: Sequence[str]) -> None:
-    """Write lines to a new file. Raises Diagnostic; then there is no such file."""
-    new_file.write(file, "".join(f"{line}\n" for line in lines))
+def save_new(workspace: Workspace, drive: Drive, file: str, lines: Sequence[str]) -> None:
+    """Write the lines of a drive to a new file (`-`: standard output), or raise Diagnostic: then there is none."""
+    new_file.write(file, "".join(f"{line}\n" for line in lines), workspace.output)
+    workspace.notify(f"{workspace.display_name(drive)}: {len(lines)} lines{new_file.place(file)}", outcome=True)

@@ -6,7 +6,7 @@ import os
 import shlex
 import shutil
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -144,21 +144,19 @@ def _undo(store: MacroStore, before: dict[str, bytes | None]) -> None:
             write_atomically(store.path(name), data)
 
 
-def export(store: MacroStore, file: str, names: Sequence[str] = ()) -> list[str]:
-    """Write macros into a new file of function keys; by default those that are on a key, or named as one."""
-    text = export_text(store, file, names)
-    new_file.check(file)
-    new_file.write(file, text)
-    count = text.count("\n")
-    return [f"{count} {'macro' if count == 1 else 'macros'} in {file}"]
+def export(store: MacroStore, file: str, names: Sequence[str], output: Callable[[str], None]) -> list[str]:
+    """Write macros into a new file of function keys; by default those that are on a key, or named as one.
 
-
-def export_text(store: MacroStore, file: str, names: Sequence[str] = ()) -> str:
-    """Macros as the lines of such a file, which messages name `file`."""
+    `output` takes the lines of the file `-`.
+    """
+    new_file.check(file, printed=True)
     chosen = [store.load(name) for name in names] or _on_keys(store)
     if not chosen:
         raise Diagnostic("no macro is on a function key", file, "/key F3 MACRO puts one there, or name the macros")
-    return exported(chosen)
+    text = exported(chosen)
+    new_file.write(file, text, output)
+    count = text.count("\n")
+    return [f"{count} {'macro' if count == 1 else 'macros'}{new_file.place(file)}"]
 
 
 def _on_keys(store: MacroStore) -> list[Macro]:

@@ -3,22 +3,48 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Callable
 from pathlib import Path
 
 from dialects import Diagnostic
 from dialects.files import why
 
+STANDARD_OUTPUT = "-"
+"""The file that is standard output, wherever a text is written."""
 
-def check(path: str | Path) -> None:
-    """Check that a new file can have this name, before there is a text for it. Raises Diagnostic."""
+
+def check(path: str | Path, *, printed: bool = False) -> None:
+    """Check that a new file can have this name, before there is a text for it. Raises Diagnostic.
+
+    `printed`: `-` is standard output; otherwise it is refused, and no file has this name.
+    """
+    if path == STANDARD_OUTPUT:
+        if not printed:
+            raise Diagnostic("is standard output, which is not written to here", path, "name a new file")
+        return
+    check_folder(path)
     if os.path.lexists(path):
         raise Diagnostic("exists already", str(path), "name a new file")
+
+
+def check_folder(path: str | Path) -> None:
+    """Raise Diagnostic where the folder of a file to write does not exist: a wrong name makes no folders."""
     if not os.path.isdir(os.path.dirname(os.path.abspath(path))):
         raise Diagnostic("its folder does not exist", str(path), "make the folder first")
 
 
-def write(path: str | Path, text: str) -> None:
-    """Write it. Raises Diagnostic; then there is no such file, or it is another's."""
+def place(path: str) -> str:
+    """The words for where a text is now: ` in FILE`, or nothing on standard output."""
+    return "" if path == STANDARD_OUTPUT else f" in {path}"
+
+
+def write(path: str | Path, text: str, output: Callable[[str], None] | None = None) -> None:
+    """Write it. Raises Diagnostic; then there is no such file, or it is another's. `output` takes the lines of `-`."""
+    if path == STANDARD_OUTPUT and output is not None:
+        for line in text.removesuffix("\n").split("\n"):
+            output(line)
+        return
+    check(path)
     from macros.atomic import create_atomically  # more than most commands need
 
     try:

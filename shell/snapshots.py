@@ -28,11 +28,11 @@ async def save(workspace: Workspace, file: str) -> None:
 
     A drive that cannot be read is named in the file and raised when the file is written.
     """
-    new_file.check(file)
+    new_file.check(file, printed=True)
     failures: list[DriveError] = []
     buses = [await _bus(workspace, bus, failures) for bus in workspace.buses.values()]
     text = write(buses)
-    new_file.write(file, text)
+    new_file.write(file, text, workspace.output)
     _say(workspace, buses, file)
     if failures:
         raise failures[0]
@@ -81,7 +81,8 @@ def _say(workspace: Workspace, buses: list[BusText], file: str) -> None:
                     f"{place}: not read: {', '.join(name for name, _ in drive.unread)}; the file says why", warning=True
                 )
     count = sum(len(bus.drives) for bus in buses)
-    workspace.notify(f"{count} drive{'s' * (count != 1)} in {file}; sim:{file} opens it", outcome=True)
+    opens = "" if file == new_file.STANDARD_OUTPUT else f"; sim:{file} opens it"
+    workspace.notify(f"{count} drive{'s' * (count != 1)}{new_file.place(file)}{opens}", outcome=True)
 
 
 def _check(text: str, file: str) -> None:

@@ -38,7 +38,7 @@ class AsyncPrograms:
         shell = self._owner.shell
         lines = await self._owner.call(lambda: listings.upload(shell, self._drive, raw))
         if file:
-            listings.save_new(file, lines)
+            new_file.write(file, "".join(f"{line}\n" for line in lines))
         return lines
 
     async def download(

@@ -66,7 +66,7 @@ def drive(parser: argparse.ArgumentParser, several: str = "") -> None:
 def upload(parser: argparse.ArgumentParser) -> None:
     """Add a drive and the new file."""
     drive(parser, "; all or several: FILE is a new folder of files")
-    parser.add_argument("file", metavar="FILE", help="the new file; it can be downloaded again")
+    parser.add_argument("file", metavar="FILE", help="the new file; it can be downloaded again; -: standard output")
     parser.add_argument("--raw", action="store_true", help="save the lines as they are stored, without remarks")
 
 

@@ -54,7 +54,7 @@ def params_restore(parser: argparse.ArgumentParser) -> None:
 def snapshot(parser: argparse.ArgumentParser) -> None:
     """Add what to open, and the new file."""
     parser.add_argument("urls", metavar="URL", nargs="+", help="what to open")
-    parser.add_argument("-o", "--output", metavar="CELL.toml", required=True, help="the new file")
+    parser.add_argument("-o", "--output", metavar="CELL.toml", required=True, help="the new file; -: standard output")
 
 
 def snapshot_apply(parser: argparse.ArgumentParser) -> None:

@@ -16,8 +16,6 @@ from shell import macro_changes
 from shell.connect.settings import Settings
 from shell.output import INTERRUPTED, write
 
-STANDARD = "-"
-"""The file that is standard input, or standard output."""
 INPUT = "standard input"
 
 
@@ -100,7 +98,7 @@ def import_(chosen: argparse.Namespace) -> int:
     """Make macros of a file of function keys; `-` is standard input."""
 
     def work(store: MacroStore) -> list[str]:
-        if chosen.file != STANDARD:
+        if chosen.file != "-":
             return macro_changes.import_(store, chosen.file, chosen.force)
         return macro_changes.import_text(store, utf8(bounded(sys.stdin.buffer, INPUT), INPUT), INPUT, chosen.force)
 
@@ -111,12 +109,7 @@ def export(chosen: argparse.Namespace) -> int:
     """Write macros into a new file of function keys; `-` is standard output."""
 
     def work(store: MacroStore) -> list[str]:
-        if chosen.file != STANDARD:
-            return macro_changes.export(store, chosen.file, chosen.names)
-        text = macro_changes.export_text(store, "standard output", chosen.names)
-        for line in text.splitlines():
-            write(sys.stdout, line)
-        return []
+        return macro_changes.export(store, chosen.file, chosen.names, lambda line: write(sys.stdout, line))
 
     return _told(work)
 

@@ -14,6 +14,7 @@ from dialects.problems import errors
 from multidrop.commands.failure import fail
 from shell import listings, transfers
 from shell.front import batch
+from shell.new_file import STANDARD_OUTPUT
 from shell.params.work import check_new, each, file_of, is_several, targets
 
 if TYPE_CHECKING:
@@ -44,10 +45,9 @@ def upload(chosen: argparse.Namespace) -> int:
         file = file_of(session, drive, chosen.file, chosen.drive, drive.program_files.endings[0])
         if is_several(chosen.drive):
             Path(file).parent.mkdir(parents=True, exist_ok=True)
-        listings.save_new(file, lines)
-        session.notify(f"{session.display_name(drive)}: {len(lines)} lines in {file}", outcome=True)
+        listings.save_new(session, drive, file, lines)
 
-    return _with_drive(chosen, save)
+    return _with_drive(chosen, save, unsolicited=chosen.file != STANDARD_OUTPUT)
 
 
 def download(chosen: argparse.Namespace) -> int:
@@ -75,9 +75,12 @@ def _wrong(file: str) -> Diagnostic | None:
 
 
 def _with_drive(
-    chosen: argparse.Namespace, body: Callable[[Session, Drive], Awaitable[None]], agreed: bool = False
+    chosen: argparse.Namespace,
+    body: Callable[[Session, Drive], Awaitable[None]],
+    agreed: bool = False,
+    unsolicited: bool = True,
 ) -> int:
     async def work(session: Session) -> None:
         await each(session, targets(session, chosen.drive, "programs"), lambda drive: body(session, drive))
 
-    return batch.run([chosen.url], work, agreed=agreed, tried=chosen.drive.split(","))
+    return batch.run([chosen.url], work, agreed=agreed, unsolicited=unsolicited, tried=chosen.drive.split(","))

@@ -18,6 +18,7 @@ from dialects.visible import visible
 from macros import MacroStore
 from multidrop.commands.failure import fail
 from shell.connect import settings
+from shell.new_file import STANDARD_OUTPUT
 from shell.output import write
 from shell.secrets import toml_without_secrets, without_secrets
 
@@ -33,6 +34,8 @@ def run(chosen: argparse.Namespace) -> int:
     text = report()
     for line in text.splitlines():
         write(sys.stdout, line)
+    if chosen.output == STANDARD_OUTPUT:
+        return 0
     asked = sys.stdin.isatty() and sys.stdout.isatty()
     if not (chosen.output or asked):
         return 0

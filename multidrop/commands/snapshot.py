@@ -21,10 +21,11 @@ if TYPE_CHECKING:
 def take(chosen: argparse.Namespace) -> int:
     """Read every drive of the URLs into one new file."""
     try:
-        new_file.check(chosen.output)
+        new_file.check(chosen.output, printed=True)
     except Diagnostic as problem:
         return fail(problem)
-    return batch.run(chosen.urls, lambda session: snapshots.save(session, chosen.output))
+    printed = chosen.output == new_file.STANDARD_OUTPUT
+    return batch.run(chosen.urls, lambda session: snapshots.save(session, chosen.output), unsolicited=not printed)
 
 
 def apply(chosen: argparse.Namespace) -> int:

@@ -9,6 +9,7 @@ from pathlib import Path
 from dialects import Diagnostic
 from dialects.files import LARGEST_PROGRAM, bytes_of, why
 from macros.atomic import write_atomically
+from shell import new_file
 from shell.front.junit import Case, junit
 
 
@@ -50,6 +51,9 @@ class JUnitFile:
 
 def _check_place(path: Path) -> None:
     """Check that a report may be written to a path: it replaces a report only. Raises Diagnostic."""
+    if str(path) == new_file.STANDARD_OUTPUT:
+        raise Diagnostic("standard output has the replies", "--junit -", "name a file for the report")
+    new_file.check_folder(path)
     if not path.exists():
         return
     if not path.is_file():

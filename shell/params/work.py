@@ -23,7 +23,6 @@ if TYPE_CHECKING:
     from shell.workspace import Workspace
 
 ALL = ("all", "*")
-STANDARD_OUTPUT = "-"
 Work = Callable[["Drive"], Awaitable[None]]
 
 
@@ -63,10 +62,10 @@ def check_new(name: str, target: str) -> None:
     """Check where a backup goes, before anything is opened. Raises Diagnostic."""
     path = Path(name)
     if is_several(target):
-        if name == STANDARD_OUTPUT or (path.exists() and not path.is_dir()):
+        if name == new_file.STANDARD_OUTPUT or (path.exists() and not path.is_dir()):
             raise Diagnostic("is not a folder", name, "several drives need a folder: each gets a file in it")
-    elif name != STANDARD_OUTPUT:
-        new_file.check(name)
+    else:
+        new_file.check(name, printed=True)
 
 
 async def each(workspace: Workspace, drives: Sequence[Drive], work: Work) -> None:
@@ -104,15 +103,10 @@ async def backup(workspace: Workspace, name: str, target: str) -> None:
         own = file_of(workspace, drive, name, target)
         if is_several(target):
             Path(own).parent.mkdir(parents=True, exist_ok=True)
-        if own != STANDARD_OUTPUT:
-            new_file.check(own)
+        new_file.check(own, printed=True)
         found = await readings.read(workspace, drive, "backup")
         text = files.formatted(files.identity(drive.state, readings.parameters(drive).language), found)
-        if own == STANDARD_OUTPUT:
-            for line in text.splitlines():
-                workspace.output(line)
-        else:
-            new_file.write(own, text)
+        new_file.write(own, text, workspace.output)
         _say_backup(workspace, drive, found, own)
 
     await each(workspace, targets(workspace, target), keep)
@@ -142,7 +136,7 @@ async def save(workspace: Workspace, target: str) -> None:
 
 def _say_backup(workspace: Workspace, drive: Drive, found: Readings, own: str) -> None:
     who = workspace.display_name(drive)
-    workspace.notify(f"{who}: {len(found.readings)} settings{'' if own == STANDARD_OUTPUT else f' in {own}'}")
+    workspace.notify(f"{who}: {len(found.readings)} settings{new_file.place(own)}")
     if found.unread:
         names = readings.listed([name for name, _ in found.unread])
         workspace.notify(f"{who}: not read: {names}; [unread] in the file has the reasons", warning=True)

@@ -96,7 +96,8 @@ async def _delete(call: Call, words: list[str]) -> list[str]:
 
 
 async def _export(call: Call, words: list[str]) -> list[str]:
-    return macro_changes.export(call.workspace.macros, call.output_file(words[0]), words[1:])
+    file, workspace = call.output_file(words[0]), call.workspace
+    return macro_changes.export(workspace.macros, file, words[1:], workspace.output)
 
 
 async def _edit(call: Call, words: list[str]) -> list[str]:

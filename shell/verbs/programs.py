@@ -32,14 +32,13 @@ async def list_(call: Call) -> None:
     """
     drive, file = _list_parts(call)
     if file:
-        new_file.check(call.output_file(file))
+        new_file.check(call.output_file(file), printed=True)
     lines = await listings.readable(call.workspace, drive)
     if not file:
         for line in lines:
             call.workspace.output(line)
         return
-    listings.save_new(file, lines)
-    call.workspace.notify(f"{call.workspace.display_name(drive)}: {len(lines)} lines in {file}")
+    listings.save_new(call.workspace, drive, file, lines)
 
 
 def _upload_recorded(call: Call) -> str:
@@ -56,10 +55,8 @@ async def upload(call: Call) -> None:
     """
     words = call.words(1, 2)
     file, drive = call.output_file(words[0]), call.drive(words[1] if len(words) > 1 else "")
-    new_file.check(file)
-    lines = await listings.upload(call.workspace, drive)
-    listings.save_new(file, lines)
-    call.workspace.notify(f"{call.workspace.display_name(drive)}: {len(lines)} lines in {file}")
+    new_file.check(file, printed=True)
+    listings.save_new(call.workspace, drive, file, await listings.upload(call.workspace, drive))
 
 
 OPTIONS = {

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from dialects import Stopped
+from dialects import Diagnostic, Stopped
 from shell import stops
 from shell.events import By
 from shell.log import files
 from shell.log.writer import SessionLog
+from shell.new_file import STANDARD_OUTPUT
 from shell.verbs.registry import Call, verb
 
 
@@ -48,6 +49,8 @@ async def log(call: Call) -> None:
         workspace.output(f"log: {workspace.log.path if workspace.log else 'off'}")
         return
     path = call.output_file(words[0])
+    if path == STANDARD_OUTPUT:
+        raise Diagnostic("standard output has the replies", "/log -", "name a file")
     log, before = None, workspace.log
     if words[0] != "off":
         log = SessionLog(workspace, files.fresh(workspace.settings) if words[0] == "on" else path)
