@@ -70,7 +70,10 @@ class Debris:
 
 
 class Leftovers:
-    """Echoes of what this session has sent, and replies to the questions of one before. Times are seconds."""
+    """Echoes of what this session has sent, and replies to the questions of one before. Times are seconds.
+
+    A drive replies in the order of the questions: once it has replied to this session, it owes the last one nothing.
+    """
 
     def __init__(self) -> None:
         self._sent: deque[str] = deque(maxlen=32)
@@ -82,6 +85,10 @@ class Leftovers:
     def opened(self, now: float) -> None:
         """Note that the port is open: a reply to a session before may still come."""
         self._opened_at = now
+
+    def drives_found(self) -> None:
+        """Note that the drives have replied to this session: of one before, nothing comes any more."""
+        self._opened_at = float("-inf")
 
     def request_written(self, data: bytes, now: float) -> None:
         """Note a request, which a drive may repeat."""

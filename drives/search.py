@@ -50,6 +50,7 @@ class Search:
             await self._conversations.keep(drive.state)
         self._roster.probing = ()
         self._conversations.link.departure.cleared()
+        self._conversations.link.leftovers.drives_found()
         self.remember()
 
     def remember(self) -> None:

@@ -81,9 +81,8 @@ async def test_the_echo_of_what_was_just_sent_is_no_print(tmp_path):
         assert cell.shown == ["b is fast"]
 
 
-async def test_ten_seconds_after_opening_a_line_of_that_form_is_a_print(tmp_path):
+async def test_once_the_drives_have_replied_a_line_of_that_form_is_a_print(tmp_path):
     async with Left(tmp_path, b"", EM=1, CK=0) as cell:
-        await asyncio.sleep(11)
         cell.session.buses["line"].link._received(b'0"b"\r\n')
         await asyncio.sleep(1)
         assert cell.shown == ['0"b"'] and cell.warned() == []

@@ -56,8 +56,8 @@ class FakeDrive:
     async def motion(self):
         return (Motion(0, 0),)
 
-    async def still(self):
-        return self.bus.standing.pop(0) if self.bus.standing else True
+    async def rest(self):
+        return () if not self.bus.standing or self.bus.standing.pop(0) else None
 
     async def busy(self):
         return self.bus.programs.pop(0) if self.bus.programs else False

@@ -196,7 +196,8 @@ class ReplyParser:
             prompt = ""  # the address of the next listed line
         if self.request.kind is Kind.LIST and not prompt and self._list_goes_on:
             return None
-        if self.rest and not prompt:
+        stored = self.request.rows is not None and ADDRESS_PROMPT.fullmatch(self.rest)  # the prompt of program mode
+        if self.rest and not prompt and not stored:
             self.got.add_line(self.rest)
         end = End.REFUSED if prompt == "?" and not self.got.lines and not self.got.acks else End.DONE
         if self.got.naks:
