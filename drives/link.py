@@ -238,7 +238,8 @@ class Link:
             return
         self.departure.begins(request)
         self._debris.request_written(data, request, now)
-        self.leftovers.request_written(data, now)
+        if request.address:  # the trace of a lone drive repeats lines that were sent to be stored
+            self.leftovers.request_written(data, now)
         self.publish(Sent(now, request))
         self.publish(Traffic(now, True, data))
 

@@ -22,7 +22,7 @@ SIMULATORS = {place.record.partition(":")[0] for place in SIMULATED.values()} | 
 NO_LINE = HEAVY | LOOP | HOSTS | SIMULATORS | {"serial"}
 MCODE = {"dialects.mcode.family"}
 OTHERS = HOSTS - MCODE - {"drives.bus", "shell.session"}
-VERBS = {"shell.verbs.table", "shell.plots", "shell.transfers", "secrets", "hashlib", "difflib", "shlex", "tempfile"}
+VERBS = {"shell.verbs.table", "shell.plots", "shell.transfers", "secrets", "hashlib", "difflib", "tempfile"}
 IDLE = "dialects.errors", "shutil", "dataclasses", "json", "pathlib"
 
 TABLE = {

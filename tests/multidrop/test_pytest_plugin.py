@@ -23,7 +23,7 @@ import pytest
 
 def test_a_client_of_its_own(multidrop_cell):
     host, _, port = multidrop_cell.url().removeprefix("tcp://").rpartition(":")
-    with socket.create_connection((host, int(port)), PATIENCE) as wire:
+    with socket.create_connection((host, int(port)), 10) as wire:
         wire.sendall(b"\\naPR P\\n")
         seen = b""
         while not seen.endswith(b"0\\r\\n>"):
