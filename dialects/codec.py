@@ -10,6 +10,7 @@ its result and raises what a person must read. A line, a bus or a test can run i
 
 from __future__ import annotations
 
+import re
 from collections.abc import Generator, Sequence
 from dataclasses import dataclass, field, replace
 from enum import Enum, IntEnum
@@ -194,8 +195,8 @@ class Codec(Protocol):
         """Drives reply to a stop, so two stops that are written at once have replies that collide."""
 
     @property
-    def stop_sign(self) -> str:
-        """The end of the line that a drive sends after a stop; empty: it sends none."""
+    def stop_debris(self) -> re.Pattern[str] | None:
+        """Unsolicited lines that a stop leaves and no program prints: replies to it, damaged ones; None: none."""
 
     def encode(self, request: Request) -> bytes:
         """Return the whole frame: address, text, checksum, terminator."""
@@ -235,6 +236,9 @@ class Codec(Protocol):
 
     def answers_host(self, line: str) -> bool:
         """Whether an unsolicited line is a late reply: only a question of multidrop has this form."""
+
+    def answers(self, request: Request, line: str) -> bool:
+        """Whether an unsolicited line is a late reply to this question, which no program prints."""
 
     def restarted(self, line: str) -> bool:
         """Whether an unsolicited line is the drive's message after power-up or a reset."""

@@ -48,16 +48,16 @@ class Debris:
         """Note that the stop was written once more."""
         self._until = transmitted + LASTS
 
-    def removed(self, lines: tuple[str, ...], stop_sign: str, now: float) -> tuple[str, ...]:
-        """Unsolicited lines without debris. `stop_sign` is what ends a drive's reply to a stop."""
+    def removed(self, lines: tuple[str, ...], known: re.Pattern[str] | None, now: float) -> tuple[str, ...]:
+        """Unsolicited lines without debris. `known`: what only a stop leaves in this language."""
         if now > self._until:
             return lines
-        return tuple(text for text in lines if not self._holds(text, stop_sign))
+        return tuple(text for text in lines if not self._holds(text, known))
 
-    def _holds(self, text: str, stop_sign: str) -> bool:
+    def _holds(self, text: str, known: re.Pattern[str] | None) -> bool:
         text = text.lstrip(">?").strip()
         return (
-            (bool(stop_sign) and text.endswith(stop_sign))
+            (known is not None and known.fullmatch(text) is not None)
             or text in self._sent
             or GARBLED.search(text) is not None
             or SCRAP.fullmatch(text) is not None

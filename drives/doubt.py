@@ -57,9 +57,9 @@ class Doubt:
             evidence += lines[: MOST_EVIDENCE - len(evidence)]
 
     def without_late(self, lines: tuple[str, ...]) -> tuple[str, ...]:
-        """Remove late replies to signed requests, which were reported as missing: no program prints them."""
-        signed = [late.request.expect for late in self._late if late.request.signed]
-        return tuple(line for line in lines if not any(each and re.fullmatch(each, line) for each in signed))
+        """Remove late replies to questions, which were reported as missing: no program prints them."""
+        late = [each.request for each in self._late]
+        return tuple(line for line in lines if not any(each.codec.answers(each, line) for each in late))
 
     def weigh(self, request: Request, reply: Reply, now: float) -> Weight:
         """Weigh a reply against those outstanding, and update these."""

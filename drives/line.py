@@ -219,10 +219,9 @@ class Line:
 
     def _finish(self, flight: Flight, found: Decoded, now: float) -> None:
         """End the flight with a reply."""
+        self._publish(now, found.strays)  # first: a proof forgets which replies are outstanding
         weight = self._doubt.weigh(flight.request, found.reply, now)
         reply = found.reply.heard(self.inbox.buffer[: found.used], weight.doubtful)
-        if found.strays:
-            self._publish(now, found.strays)
         reply = self._doubt.with_evidence(flight.request, reply)
         self._events.append(flight.finished(reply, now))
         self.inbox.consume(found.used, now)

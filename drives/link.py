@@ -260,7 +260,7 @@ class Link:
 
     def _unsolicited(self, event: Unsolicited, now: float) -> None:
         self.on_unsolicited(event.lines)
-        if lines := self._debris.removed(event.lines, self.line.inbox.codec.stop_sign, now):
+        if lines := self._debris.removed(event.lines, self.line.inbox.codec.stop_debris, now):
             codec = self.line.inbox.codec
             if damaged := [each for each in lines if codec.damaged(each)]:
                 self.notify(f"a printed line was damaged on the line (received {_short(damaged)})", warning=True)

@@ -113,5 +113,5 @@ def test_what_counts_as_debris(text, debris):
     left = Debris()
     left.request_written(b'aPR P,"a ",V\n', asked, 1.0)
     left.stop_written(b"\x1b~~~~~~\n", 2.0)
-    assert left.removed(("x 1", text), "#", 2.0 + LASTS) == (("x 1",) if debris else ("x 1", text))
-    assert left.removed((text,), "#", 2.1 + LASTS) == (text,), "later, everything is shown"
+    assert left.removed(("x 1", text), MCode.stop_debris, 2.0 + LASTS) == (("x 1",) if debris else ("x 1", text))
+    assert left.removed((text,), MCode.stop_debris, 2.1 + LASTS) == (text,), "later, everything is shown"

@@ -9,7 +9,7 @@ import pytest
 
 from dialects import Diagnostic, DriveError, Inexpressible, NoAnswer, Refused, Stopped
 from dialects.families import TABLE
-from drives.events import Sample
+from drives.events import Sample, Unsolicited
 from drives.stop_forms import stop_forms
 from shell.connect.settings import Settings
 from shell.connect.urls import parse as parse_url
@@ -211,3 +211,16 @@ async def test_nothing_but_the_lines_of_a_download_goes_to_its_module(session):
     polling.close()
     await say(session, "@slide:1 133 0, 0, 0")
     assert not bus.drives["1"].programming and await say(session, "@slide:1 GAP 3, 0") == ["0"]
+
+
+@pytest.mark.parametrize("after", range(0, 40, 3))
+async def test_the_reply_to_a_poll_that_a_stop_cuts_off_is_no_line(session, after):
+    polled = session.buses["slide"].telemetry.subscribe(["1", "7"], 0.001)
+    await asyncio.sleep(0.5 + after / 1000)
+    session.stop("Ctrl+X")
+    await confirmed(session)
+    polled.close()
+    shown = [
+        each.event.lines for each in session.events if isinstance(each, OnBus) and isinstance(each.event, Unsolicited)
+    ]
+    assert shown == []

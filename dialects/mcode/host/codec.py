@@ -48,7 +48,7 @@ class MCode:
     numbered: ClassVar[bool] = False
     broadcasts: ClassVar[bool] = True
     stop_replies: ClassVar[bool] = False
-    stop_sign: ClassVar[str] = "#"
+    stop_debris: ClassVar[re.Pattern[str]] = re.compile(r".*#")
 
     @property
     def shown(self) -> str:
@@ -194,6 +194,10 @@ class MCode:
     def answers_host(self, line: str) -> bool:
         """Whether a signature ends the line: the name after a value, or a mark; a check byte may follow."""
         return ANSWER.search(line) is not None
+
+    def answers(self, request: Request, line: str) -> bool:
+        """Whether the line has the values that were asked for, with their signature."""
+        return request.signed and request.expect is not None and re.fullmatch(request.expect, line) is not None
 
     def restarted(self, line: str) -> bool:
         """Whether a line is the sign-on, which a drive in party mode does not send (3.4.4)."""

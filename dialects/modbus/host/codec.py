@@ -29,7 +29,7 @@ class Modbus:
     numbered: ClassVar[bool] = True
     broadcasts: ClassVar[bool] = False
     stop_replies: ClassVar[bool] = False
-    stop_sign: ClassVar[str] = ""
+    stop_debris: ClassVar[None] = None
 
     def encode(self, request: Request) -> bytes:
         """Return the whole message, numbered by the request's tag."""
@@ -94,6 +94,10 @@ class Modbus:
         return False
 
     def answers_host(self, line: str) -> bool:
+        """No: nothing marks the reply to a question."""
+        return False
+
+    def answers(self, request: Request, line: str) -> bool:
         """No: nothing marks the reply to a question."""
         return False
 

@@ -42,7 +42,7 @@ class Pmx:
     numbered: ClassVar[bool] = False
     broadcasts: ClassVar[bool] = False
     stop_replies: ClassVar[bool] = True
-    stop_sign: ClassVar[str] = ""
+    stop_debris: ClassVar[None] = None
 
     def request(self, address: str, text: str) -> Request:
         """Build the request for a command, as typed: case matters. Raises Inexpressible where it cannot be sent."""
@@ -147,6 +147,10 @@ class Pmx:
         return False
 
     def answers_host(self, line: str) -> bool:
+        """No: nothing marks the reply to a question."""
+        return False
+
+    def answers(self, request: Request, line: str) -> bool:
         """No: nothing marks the reply to a question."""
         return False
 

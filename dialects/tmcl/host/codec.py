@@ -52,7 +52,7 @@ class Tmcl:
     numbered: ClassVar[bool] = False
     broadcasts: ClassVar[bool] = False
     stop_replies: ClassVar[bool] = True
-    stop_sign: ClassVar[str] = ""
+    stop_debris: ClassVar[re.Pattern[str]] = re.compile(r"heard .*")
 
     def request(self, address: str, text: str, call: Call) -> Request:
         """The request for a command; `text` is what it means to a person. Raises Inexpressible."""
@@ -154,6 +154,13 @@ class Tmcl:
     def answers_host(self, line: str) -> bool:
         """No: nothing marks the reply to a question."""
         return False
+
+    def answers(self, request: Request, line: str) -> bool:
+        """Whether the line is a reply of this module to a command that only reads."""
+        _, call = framing.call_of(request.body)
+        return request.kind is Kind.PRINT and line.startswith(
+            f"module {request.address}: {late_reply_to(call.command)}:"
+        )
 
     def restarted(self, line: str) -> bool:
         """Never: a module says nothing after power-up."""
