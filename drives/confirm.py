@@ -31,6 +31,13 @@ class Activity(NamedTuple):
     """Unsigned, of its fastest axis."""
     runs: bool = False
     """A program runs."""
+    places: str = ""
+    """The positions of its axes; empty: not read."""
+
+    @property
+    def none(self) -> bool:
+        """Whether it neither moves nor runs a program, or nothing is known."""
+        return not self.speed and not self.runs
 
     def lessens(self, before: Activity | None) -> bool:
         """Whether it slows down, as far as two readings show, and no program runs that can move it again."""
@@ -53,9 +60,10 @@ async def confirm_stop(halt: Halt, repeat: Callable[[Halt], None], superseded: C
     tries, until = 0, link.now() + RAMP
     while unconfirmed and link.now() < until:
         found = {drive: await _read(drive, halt) for drive in unconfirmed if not halt.started_since(drive)}
+        _announce(halt, found)
         if superseded(halt) and not link.lost:
             return
-        active = {drive: each for drive, each in found.items() if each != NOTHING and not halt.started_since(drive)}
+        active = {drive: each for drive, each in found.items() if not each.none and not halt.started_since(drive)}
         slow_down = all(each.lessens(before.get(drive)) for drive, each in active.items())
         before = found
         if active and not slow_down and tries < TRIES:
@@ -63,13 +71,20 @@ async def confirm_stop(halt: Halt, repeat: Callable[[Halt], None], superseded: C
             _once_more(halt, active, tries, repeat)
         # The line of an operator that may start a drive may also be refused, and then nothing has started it.
         undecided = [drive for drive in unconfirmed if halt.started_since(drive) and drive.starting]
-        once = [drive for drive, each in found.items() if each == NOTHING and halt.fate(drive) is Fate.SENT]
+        once = [drive for drive, each in found.items() if each.none and halt.fate(drive) is Fate.SENT]
         unconfirmed = [*active, *undecided, *once]
         if unconfirmed:
             await asyncio.sleep(BETWEEN)
     if active and tries < TRIES:
         names = ", ".join(drive.shown for drive in active)
         link.notify(f"{names}: slows down for more than {RAMP:g} s", warning=True)
+
+
+def _announce(halt: Halt, found: Mapping[Drive, Activity]) -> None:
+    """Say which drives stand, whether this reading or a poll after it has confirmed that."""
+    for drive, each in found.items():
+        if each.places and each.none and halt.fate(drive) is Fate.STANDING:
+            halt.link.notify(f"{drive.shown}: stopped, velocity 0 at {each.places}")
 
 
 def _once_more(halt: Halt, active: Mapping[Drive, Activity], tries: int, repeat: Callable[[Halt], None]) -> None:
@@ -105,10 +120,8 @@ async def _read(drive: Drive, halt: Halt) -> Activity:
     if why:
         return _not_known(drive, halt, why)
     halt.doubts.pop(drive, None)
-    found = Activity(abs(drive.seen.velocity) if drive.seen is not None else 0, bool(runs))
-    if halt.fate(drive) is Fate.STANDING:
-        drive.link.notify(f"{drive.shown}: stopped, velocity 0 at {', '.join(str(each.position) for each in axes)}")
-    return found
+    speed = abs(drive.seen.velocity) if drive.seen is not None else 0
+    return Activity(speed, bool(runs), ", ".join(str(each.position) for each in axes))
 
 
 async def _program(drive: Drive, axes: Sequence[Motion]) -> tuple[bool | None, str]:

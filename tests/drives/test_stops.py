@@ -146,6 +146,25 @@ async def test_a_line_that_is_refused_after_a_stop_does_not_end_its_confirmation
 
 
 @in_virtual_time
+async def test_a_drive_whose_rest_a_poll_confirms_is_reported_as_stopped_like_the_others():
+    shop = Shop(*(party(name, EM=1, CK=1) for name in "abc"))
+    await shop.open(*"abc")
+    a = shop.bus.drives["a"]
+
+    async def polls():
+        while True:
+            await a.motion(Priority.POLL)
+            await asyncio.sleep(0.02)
+
+    await a.send("SL 50000")
+    task = asyncio.create_task(polls())
+    shop.bus.stop()
+    await shop.bus.stopped()
+    task.cancel()
+    assert [shop.said.count(f"{name}: stopped, velocity 0") for name in "abc"] == [1, 1, 1]
+
+
+@in_virtual_time
 async def test_a_drive_that_is_plotted_and_started_again_after_a_stop_is_not_said_to_slow_down():
     shop = Shop(party("a", EM=1, CK=1))
     await shop.open("a")

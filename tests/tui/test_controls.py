@@ -180,8 +180,9 @@ async def test_a_control_sends_its_line_and_a_wrong_number_sends_nothing() -> No
             session.emit(OnBus("press", Sample(session.time - 0.05, "a", 1000, 0)))
             await settle(pilot)
             session.sent.clear()
-            await pilot.press(*keys)
-            await settle(pilot)
+            for key in keys:
+                await pilot.press(key)
+                await settle(pilot)
             assert session.sent == sent, keys
             assert sent or keys[-1] == "escape" or "nothing was sent" in page.lines("said").plain
 
@@ -198,6 +199,15 @@ async def test_a_letter_alone_neither_moves_nor_lets_go_and_a_stop_or_another_dr
                 assert session.sent == [], (letter, after)
                 if not after:
                     assert "Enter sends" in page.lines("said").plain
+        for keys in ("halt", "load", "/enable", "hd"):
+            await pilot.press(*keys, "enter")  # a line that was typed to the wrong screen, in one read
+            await settle(pilot)
+            assert session.sent == [], keys
+            await pilot.press("x")
+        for key in ("h", "a", "enter"):
+            await pilot.press(key)
+            await settle(pilot)
+        assert session.sent == [] and "nothing was sent" in page.lines("said").plain
         await pilot.press("d")
         session.select("b")
         await pilot.press("enter")

@@ -78,6 +78,20 @@ async def test_macros_are_played_put_on_a_key_deleted_and_edited_by_keys(tmp_pat
         assert isinstance(app.screen, ProgramPage) and "after" in app.screen.findings.problems[0].what
 
 
+async def test_a_name_that_is_typed_on_the_page_plays_no_other_macro() -> None:
+    session = demo_session()
+    app = make_app(session)
+    async with app.run_test(size=(80, 24)) as pilot:
+        await app.run_action("app.page('macros')")
+        await until(pilot, lambda: "shuttle" in app.screen.lines("macros").plain)  # type: ignore[attr-defined]
+        await pilot.press(*"go", "enter")
+        await settle(pilot)
+        assert session.lines == [] and "▸" not in app.screen.lines("macros").plain  # type: ignore[attr-defined]
+        assert "nothing plays" in app.screen.lines("heading").plain  # type: ignore[attr-defined]
+        await pilot.press("down", "enter")
+        await until(pilot, lambda: len(session.lines) == 1)
+
+
 async def test_a_held_enter_plays_once_and_the_end_of_a_macro_waits_for_no_line_before_it() -> None:
     session = demo_session()
     session.gate = asyncio.Event()

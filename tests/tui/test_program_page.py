@@ -207,7 +207,10 @@ async def test_a_program_is_run_or_traced_from_a_label_by_the_line_that_is_shown
     async with page(folder) as pilot:
         typed(pilot, "ctrl+r", "run g1", "enter")
         await until(pilot, lambda: sent(pilot) == ["@press:a EX G1"])
-        typed(pilot, "ctrl+r", "trace", "enter")
+        typed(pilot, "ctrl+r", "un g1", "enter")  # it is inside `Run`, and no word begins so
+        await settle(pilot)
+        assert len(sent(pilot)) == 1
+        typed(pilot, "escape", "ctrl+r", "trace", "enter")
         await until(pilot, lambda: sent(pilot)[1:] == ["/trace press:a G1"])
 
 

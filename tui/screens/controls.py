@@ -7,6 +7,7 @@ shows it. To leave the page stops nothing: a move ends by itself.
 from __future__ import annotations
 
 import re
+from string import ascii_letters, digits
 from typing import ClassVar, NamedTuple
 
 from textual.app import ComposeResult
@@ -68,6 +69,7 @@ class ControlsPage(Page):
         *(Binding(key, f"ask('{key}')", show=False) for key in NUMBERED),
         *(Binding(key, f"do('{key}')", show=False) for key in KEYED),
         Binding("enter", "go", show=False),
+        *(Binding(each, "drop", show=False) for each in ascii_letters + digits if each not in {*NUMBERED, *KEYED}),
     ]
     KEYS = (("←→", "jog"), ("↑↓", "step"), ("Space", "stop"))
     WANTS = frozenset({"motion", "conditions"})
@@ -80,6 +82,8 @@ class ControlsPage(Page):
         self._asked: Asked | None = None
         self._begun: Asked | None = None
         """The control that Enter would send."""
+        self._painted = False
+        """The line of that control was shown."""
         self._said: Span = ("", "dim")
         self._place = selected_place(host.session)
         self._view: View | None = None
@@ -125,6 +129,7 @@ class ControlsPage(Page):
         drive.put(rows)
         self.lines("controls").put(self._rows(view, glance, width))
         self.lines("said").put([((" ", "text"), (fit(self._said[0], width - 2), self._said[1]))])
+        self._painted = self._begun is not None
 
     def _follow(self, view: View) -> None:
         """Forget a number that was begun before a stop, or for another drive."""
@@ -230,11 +235,14 @@ class ControlsPage(Page):
             self._tell(control.filled())
         else:
             self._begun = Asked(key, self.host.session.stops, selected_place(self.host.session))
+            self._painted = False
             about = f" - {control.about}" if control.about else ""
             self._say(f"Enter sends {', '.join(control.filled())}{about}   Esc: nothing", "!")
 
     def action_go(self) -> None:
         """Send the control that was begun, unless a stop or another drive came in between."""
+        if self._begun is not None and not self._painted:
+            return  # an Enter that was typed before the line was seen
         begun, self._begun = self._begun, None
         session = self.host.session
         if begun is None:
@@ -247,6 +255,12 @@ class ControlsPage(Page):
             self._move(name, 0)
         elif (control := self._controls().get(name)) is not None:
             self._send(control.filled())
+
+    def action_drop(self) -> None:
+        """Drop the control that waits for Enter: a key that means nothing here is part of a word, such as `halt`."""
+        if self._begun is not None:
+            self._begun = None
+            self._say("nothing was sent", "!")
 
     def action_ask(self, key: str) -> None:
         """Ask for a number."""
@@ -319,8 +333,7 @@ class ControlsPage(Page):
     def action_leave(self) -> None:
         """Leave the number or the control that waits for Enter, then the page."""
         if self._begun is not None:
-            self._begun = None
-            self._say("nothing was sent", "!")
+            self.action_drop()
             return
         if self._asked is not None:
             self._close("")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Sequence
+from string import ascii_letters, digits
 from typing import ClassVar, NamedTuple
 
 from textual.app import ComposeResult
@@ -96,7 +97,10 @@ ENTER = "enter"
 
 
 class MacrosPage(Page):
-    """The macros. Enter plays the chosen one."""
+    """The macros. Enter plays the chosen one.
+
+    A letter or a digit that is no key here leaves none chosen: a name that is typed plays no other macro.
+    """
 
     AUTO_FOCUS = ""
     BINDINGS: ClassVar[list[BindingType]] = [
@@ -110,6 +114,7 @@ class MacrosPage(Page):
         Binding("n", "app.record", show=False),
         Binding("s", "end", show=False),
         Binding("delete", "delete", show=False),
+        *(Binding(each, "unchoose", show=False) for each in ascii_letters + digits if each not in "ekns"),
     ]
     KEYS = (("Enter", "play"), ("s", "end it"), ("n", "record"), ("e", "edit"), ("k", "key"), ("Del", "delete"))
     WANTS = frozenset({"motion"})
@@ -118,6 +123,8 @@ class MacrosPage(Page):
         super().__init__(host)
         self._macros: list[Listed] = []
         self._at = 0
+        self._typed = False
+        """What was typed is no key here: none is chosen until an arrow chooses one."""
         self._read_for: object = None
         """The facts of the app at the last reading: it makes new ones whenever a macro may have changed."""
         self._reading = self._known = False
@@ -142,15 +149,16 @@ class MacrosPage(Page):
         width, height = self.size.width, max(2, self.size.height - NEWS - 5)
         playing = {each.name: each for each in view.session.playing}
         self._at = min(self._at, max(0, len(self._macros) - 1))
-        recording = f"● recording {view.session.recording}: n ends it " if view.session.recording else "Enter plays "
+        enter = "↑↓ choose one; nothing plays " if self._typed else "Enter plays "
+        recording = f"● recording {view.session.recording}: n ends it " if view.session.recording else enter
         heading: Row = ((" MACROS   ", "strong"), (f"{len(self._macros)}", "text"))
         self.lines("heading").put(
             [spread(heading, [(recording, "motion" if view.session.recording else "dim")], width)]
         )
         room = min(max(len(self._macros), 2), height // 2)
         first = max(0, min(self._at - room // 2, len(self._macros) - room))
-        shown = enumerate(self._macros[first : first + room], first)
-        rows = [macro_row(each, playing.get(each.name), width, n == self._at) for n, each in shown]
+        shown, chosen = self._macros[first : first + room], self._chosen()
+        rows = [macro_row(each, playing.get(each.name), width, each is chosen) for each in shown]
         self.lines("macros").put(rows or (NOTHING if self._known else []))
         self._show_steps(playing, width, height - room)
         self._show_news(view, width)
@@ -181,13 +189,18 @@ class MacrosPage(Page):
             self._reading = False
 
     def _chosen(self) -> Listed | None:
-        return self._macros[self._at] if self._at < len(self._macros) else None
+        return self._macros[self._at] if self._at < len(self._macros) and not self._typed else None
 
     # Keys
 
     def action_step(self, by: int) -> None:
-        """Choose another macro."""
+        """Choose another macro; after letters the one that was chosen before them."""
+        by, self._typed = 0 if self._typed else by, False
         self._at = min(max(self._at + by, 0), max(0, len(self._macros) - 1))
+
+    def action_unchoose(self) -> None:
+        """Choose no macro."""
+        self._typed = True
 
     def _type(self, *words: str) -> None:
         self.host.outbox.type(" ".join(words))

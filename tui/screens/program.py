@@ -21,7 +21,7 @@ from tui.panels.table import panel
 from tui.panels.view import View
 from tui.readout import ProgramFacts
 from tui.screens import program_choices as choices
-from tui.screens.dialogs import Ask, Confirm, Search
+from tui.screens.dialogs import Ask, Confirm, Offer, Search, offers_like
 from tui.screens.edit import EditPage
 from tui.screens.page import Host
 from tui.screens.program_rows import marks_of
@@ -166,7 +166,8 @@ class ProgramPage(EditPage):
                 self._start(found[int(key)].line)
 
         hint = "type to narrow   ↑↓ choose   Enter do it   Esc close"
-        await self.app.push_screen(Search(heading, partial(choices.choices_like, found), hint), taken)
+        offers = [Offer(str(number), f"{each.title:<30}  {each.line}") for number, each in enumerate(found)]
+        await self.app.push_screen(Search(heading, partial(offers_like, offers), hint), taken)
 
     async def action_step(self) -> None:
         """Execute one line of a program that waits; else choose where to begin. One press is one line at most."""

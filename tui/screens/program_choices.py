@@ -158,13 +158,3 @@ def run_choices(entries: Sequence[Entry], target: str, program: ProgramFacts) ->
     if program.break_point:
         found.append(Choice(f"Remove the break point {program.break_point}", with_target("/break", target, "off")))
     return [*found, Choice("List what the drive holds", with_target("/list", target))]
-
-
-def choices_like(choices: Sequence[Choice], typed: str) -> list[Match]:
-    """The choices that contain every typed word; the key of each is its number."""
-    words = typed.casefold().split()
-    return [
-        Match(str(number), Text.assemble(f"{each.title:<30}  ", (visible(each.line), "dim")))
-        for number, each in enumerate(choices)
-        if all(word in f"{each.title} {each.line}".casefold() for word in words)
-    ]
