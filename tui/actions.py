@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from tui.screens.questions import Questions
     from tui.selection import Selection
     from tui.session_view import SessionView
+    from tui.terminal.keyboard import Keyboard
 
 FAILURES = (DriveError, Diagnostic, TransportLost)
 
@@ -52,6 +53,7 @@ class Actions(ViewActions):
     opener: Opener
     texts: Texts
     frames: Frames
+    keyboard: Keyboard
 
     def last_records(self, number: int) -> Sequence[Record]:
         """The last records of the transcript that is shown."""

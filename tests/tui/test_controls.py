@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from textual import events
 from textual.pilot import Pilot
 
 from dialects.conditions import Conditions
@@ -200,10 +201,14 @@ async def test_a_letter_alone_neither_moves_nor_lets_go_and_a_stop_or_another_dr
                 if not after:
                     assert "Enter sends" in page.lines("said").plain
         for keys in ("halt", "load", "/enable", "hd"):
-            await pilot.press(*keys, "enter")  # a line that was typed to the wrong screen, in one read
+            for key in (*keys, "enter"):  # a line that was typed to the wrong screen, in one read
+                pilot.app.post_message(events.Key(key, key if len(key) == 1 else None))
             await settle(pilot)
             assert session.sent == [], keys
             await pilot.press("x")
+        await pilot.press("ctrl+o", "escape")
+        await settle(pilot)
+        assert pilot.app.screen is page
         for key in ("h", "a", "enter"):
             await pilot.press(key)
             await settle(pilot)

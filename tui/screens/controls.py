@@ -83,7 +83,7 @@ class ControlsPage(Page):
         self._begun: Asked | None = None
         """The control that Enter would send."""
         self._painted = False
-        """The line of that control was shown."""
+        """The line of that control was shown, and no key waited then that was typed before."""
         self._said: Span = ("", "dim")
         self._place = selected_place(host.session)
         self._view: View | None = None
@@ -129,7 +129,7 @@ class ControlsPage(Page):
         drive.put(rows)
         self.lines("controls").put(self._rows(view, glance, width))
         self.lines("said").put([((" ", "text"), (fit(self._said[0], width - 2), self._said[1]))])
-        self._painted = self._begun is not None
+        self._painted = self._begun is not None and (self._painted or self.host.keyboard.idle)
 
     def _follow(self, view: View) -> None:
         """Forget a number that was begun before a stop, or for another drive."""
@@ -289,7 +289,8 @@ class ControlsPage(Page):
             return
         name, what = NUMBERED[asked.key]
         if not WHOLE.fullmatch(text):
-            self._say(f"nothing was sent: no {what} {text[:20]}; type a whole number such as -1500", "!")
+            wrong = f"no {what} {text[:20]}; " if text else ""
+            self._say(f"nothing was sent: {wrong}type a whole number such as -1500", "!")
             return
         number = int(text)
         if not LOW <= number <= HIGH or (not name and number <= 0):

@@ -22,6 +22,7 @@ from tui.panels.view import View
 from tui.screen_model import Record, ScreenModel
 from tui.screens.framed import Framed
 from tui.session_view import SessionView
+from tui.terminal.keyboard import Keyboard
 from tui.widgets.banner import Banner
 from tui.widgets.lines import Lines
 
@@ -35,6 +36,7 @@ class Host(Protocol):
     texts: Texts
     macros: FunctionKeys
     frames: Frames
+    keyboard: Keyboard
 
     def last_records(self, number: int) -> Sequence[Record]:
         """The last records of the transcript that is shown."""
@@ -52,6 +54,7 @@ class Page(Framed):
     BINDINGS: ClassVar[list[BindingType]] = [
         Binding("escape", "leave", show=False),
         named_key("help", "f1", "app.help", "help for where you are"),
+        Binding("ctrl+o", "app.choose_drive", show=False, priority=True),
         named_key("palette", "ctrl+p", "app.palette", "everything by name: type some letters of it"),
     ]
     KEYS: ClassVar[Sequence[tuple[str, str]]] = ()

@@ -35,7 +35,6 @@ class ProgramPage(EditPage):
         Binding("ctrl+r", "run", show=False, priority=True),
         Binding("ctrl+t", "step", show=False, priority=True),
         Binding("ctrl+b", "break", show=False, priority=True),
-        Binding("ctrl+o", "app.choose_drive", show=False, priority=True),
     ]
     KEYS = (
         ("^S", "save"),
