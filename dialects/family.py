@@ -229,6 +229,8 @@ class Family(Generic[S]):
     """Find the drives on a line and their settings. Raises NoAnswer where none replies."""
     perform: Callable[[S, str], Printed]
     """Carry out a typed line, and make sure of the outcome."""
+    check: Callable[[S, str], object]
+    """Raise Inexpressible for a typed line that is refused before anything of it is sent."""
     motion: Callable[[S, Priority], Procedure[tuple[Motion, ...]]]
     """Position and velocity of every axis, in as few bytes as the language allows.
 

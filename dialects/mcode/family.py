@@ -31,6 +31,7 @@ MCODE = Family(
     new_state=MCodeState,
     identify=identify,
     perform=operations.perform,
+    check=operations.parsed,
     motion=operations.motion,
     moving=partial(operations.flag, name="MV"),
     busy=partial(operations.flag, name="BY"),

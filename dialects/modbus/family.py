@@ -36,6 +36,7 @@ MODBUS = Family(
     new_state=ModbusState,
     identify=identify,
     perform=operations.perform,
+    check=operations.parsed,
     motion=operations.motion,
     moving=partial(operations.flag, name="MV"),
     busy=partial(operations.flag, name="BY"),

@@ -16,6 +16,7 @@ PMX = Family(
     new_state=PmxState,
     identify=identify,
     perform=operations.perform,
+    check=operations.parsed,
     motion=operations.motion,
     moving=operations.moving,
     busy=operations.busy,

@@ -18,6 +18,7 @@ TMCL = Family(
     new_state=TmclState,
     identify=identify,
     perform=operations.perform,
+    check=operations.parsed,
     motion=operations.motion,
     moving=operations.moving,
     busy=operations.busy,

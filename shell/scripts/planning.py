@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING
 
-from dialects import Diagnostic, NoAnswer
-from macros import Macro, fill
+from dialects import Diagnostic, Inexpressible, NoAnswer
+from macros import Macro, fill, value_names
 from shell import casting
 from shell.automation import Claim, only_ends
 from shell.lines import DriveLine, parse
@@ -112,7 +112,10 @@ class _Planning:
             raise Diagnostic(str(problem), node.line.where) from None
 
     def _started(self, line: ScriptLine, values: Values) -> Drive | None:
-        """The drive that a line can start; None: it starts none, or it is not known yet."""
+        """The drive that a line can start; None: it starts none, or it is not known yet.
+
+        Raises Diagnostic for a line that its drive never gets.
+        """
         self._opens = self._opens or line.word in OPENING
         self._selected = self._selected and line.word not in SELECTING
         if line.text.startswith("/"):
@@ -128,9 +131,14 @@ class _Planning:
             if self._opens:
                 return None
             raise Diagnostic(problem.message, line.where, problem.hint) from None
-        if drive.link.name in self._workspace.raw or not drive.starts(parsed.text):
+        if drive.link.name in self._workspace.raw:
             return None
-        return drive
+        if value_names(line.text) <= dict.keys(values):
+            try:
+                drive.family.check(drive.state, parsed.text)
+            except Inexpressible as problem:
+                raise Diagnostic(str(problem), line.where) from None
+        return drive if drive.starts(parsed.text) else None
 
 
 def _text_of(line: ScriptLine, values: Values) -> str:

@@ -17,6 +17,8 @@ from dialects.pmx.manual.table import grouped
 from dialects.tmcl.manual import grammar as tmcl
 from macros import Macro, Step
 from shell.events import By
+from shell.scripts.executor import run_script
+from shell.scripts.reading import read_script
 from tests.support.cases import for_each
 from tests.support.cell_session import CellSession, bus, party, pmx
 from tests.support.virtual import in_virtual_time
@@ -36,6 +38,8 @@ FIELDS = (
     "PF=10,100", "EX 100,1", "CP 1,100", "BR 100,P=200", "BP 100,200", "TI=1,100", "MU=1,1",
 )  # fmt: skip
 TMCL = ("MVP ABS, 0, 200", "ROR 0,100", "ROL 1,100", "SAP 140, 100, 100", "137 0, 0, 123", "138 1,200,300", "GAP 1,100")
+
+MODULE = 'personality = "TMCM"\nname = "1"'
 
 
 def why(line: str) -> str:
@@ -91,7 +95,7 @@ async def test_nothing_is_sent_however_the_line_comes(tmp_path) -> None:
             for by in (By.OPERATOR, By.SCRIPT):
                 with pytest.raises(Inexpressible, match="nothing was sent"):
                     await shop.session.run(line, by)
-        with pytest.raises(Inexpressible, match="write 200000"):
+        with pytest.raises(Diagnostic, match="write 200000"):
             await shop.session.play(Macro("go", (Step(0.0, "@a MA 200,000"),)), {})
         await asyncio.sleep(1.0)
         assert b"200" not in shop.written("press") + shop.written("stages") and not shop.moving()
@@ -108,3 +112,20 @@ async def test_a_line_for_the_program_is_refused_too(tmp_path) -> None:
         await shop.session.run("E")
         await shop.session.run("PG")
         assert b"200" not in shop.written("press")
+
+
+@for_each(
+    "wrong", ["@a MA 200,000", "@a MA {FAR}", "@stages:00 X200,000", "@a MR 5\u00b0", "@lab:1 MVP ABS, 0, 200,000"]
+)
+@in_virtual_time
+async def test_a_line_that_no_drive_gets_is_found_before_the_script_moves_anything(tmp_path, wrong: str) -> None:
+    (tmp_path / "s.txt").write_text(f"@a MR 51200\n/if 1 == 1\n  {wrong}\n/end\n", encoding="utf-8")
+    async with CellSession(tmp_path, bus("press", party("a")), bus("stages", pmx("00")), bus("lab", MODULE)) as shop:
+        script = read_script(str(tmp_path / "s.txt"), {"FAR": "200,000"})
+        with pytest.raises(Diagnostic, match=r"s.txt:3: .*nothing was sent|s.txt:3: .*printable ASCII"):
+            await run_script(shop.session, shop.session, script)
+        macro = Macro("go", (Step(0.0, "@a MR 51200"), Step(0.0, wrong)))
+        with pytest.raises(Diagnostic, match="go, step 2: "):
+            await shop.session.play(macro, {"FAR": "200,000"} if "{" in wrong else {})
+        await asyncio.sleep(1.0)
+        assert b"MR 51200" not in shop.written("press")

@@ -33,11 +33,7 @@ def perform(state: MCodeState, text: str) -> Procedure[tuple[str, ...]]:
 
     Raises Refused, NoAnswer, Stopped or Inexpressible.
     """
-    try:
-        grammar.check_groups(text)
-    except grammar.LineError as error:
-        raise Inexpressible(f"'{text}': {error.why}; nothing was sent") from None
-    request = state.codec.request(state.address, text)
+    request = parsed(state, text)
     if state.address in GLOBAL:
         yield from _broadcast(state, request)
         return ()
@@ -51,6 +47,15 @@ def perform(state: MCodeState, text: str) -> Procedure[tuple[str, ...]]:
     if classify.word_of(request.text)[0] == "PG":
         raise Refused(f"{who(state)} is not in program mode: 'PG' alone would enter it; type PG and an address")
     return (yield from immediate(state, request))
+
+
+def parsed(state: MCodeState, text: str) -> Request:
+    """Build the request for a typed line. Raises Inexpressible for a line that no drive gets."""
+    try:
+        grammar.check_groups(text)
+    except grammar.LineError as error:
+        raise Inexpressible(f"'{text}': {error.why}; nothing was sent") from None
+    return state.codec.request(state.address, text)
 
 
 def immediate(state: MCodeState, request: Request) -> Procedure[tuple[str, ...]]:

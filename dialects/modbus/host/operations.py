@@ -28,11 +28,7 @@ _ESCAPES = {"b": "\b", "c": "\x03", "e": "\x1b", "g": "\a", "n": "\n", "r": "\r"
 def perform(state: ModbusState, text: str) -> Procedure[tuple[str, ...]]:
     """Carry out a line of MCode; return the printed lines. Raises Refused, NoAnswer, Stopped or Inexpressible."""
     text = grammar.strip(text)
-    try:
-        grammar.check_groups(text, USER)
-        statement = grammar.parse(text, USER)
-    except grammar.LineError as error:
-        raise Inexpressible(f"'{text}': {error.why}; nothing was sent") from None
+    statement = parsed(state, text)
     if statement is None:
         return ()
     if not statement.word:
@@ -41,6 +37,15 @@ def perform(state: ModbusState, text: str) -> Procedure[tuple[str, ...]]:
         return (yield from _printed(state, statement))
     yield from carried_out(state, text, mapping.command(statement))
     return ()
+
+
+def parsed(state: ModbusState, text: str) -> grammar.Statement | None:
+    """Parse a line of MCode. Raises Inexpressible for one that is wrong in the language."""
+    try:
+        grammar.check_groups(text, USER)
+        return grammar.parse(text, USER)
+    except grammar.LineError as error:
+        raise Inexpressible(f"'{text}': {error.why}; nothing was sent") from None
 
 
 def _printed(state: ModbusState, statement: grammar.Statement) -> Procedure[tuple[str, ...]]:

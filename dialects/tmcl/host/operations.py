@@ -24,11 +24,7 @@ def perform(state: TmclState, text: str) -> Procedure[tuple[str, ...]]:
 
     Raises Refused, NoAnswer, Stopped or Inexpressible.
     """
-    try:
-        call = grammar.parse(text)
-    except grammar.LineError as error:
-        raise Inexpressible(f"'{text.strip()}': {error}; nothing was sent") from None
-    request = state.codec.request(state.address, text.strip(), call)
+    request, call = parsed(state, text)
     if state.programming or call.command == Command.DOWNLOAD:
         yield from _store(state, request, call)
         return ()
@@ -39,6 +35,15 @@ def perform(state: TmclState, text: str) -> Procedure[tuple[str, ...]]:
     reply = yield from answered(state, request)
     _remark(state, call)
     return reply.lines if request.kind is Kind.PRINT else ()
+
+
+def parsed(state: TmclState, text: str) -> tuple[Request, Call]:
+    """Build the request for a command. Raises Inexpressible for one that no module gets."""
+    try:
+        call = grammar.parse(text)
+    except grammar.LineError as error:
+        raise Inexpressible(f"'{text.strip()}': {error}; nothing was sent") from None
+    return state.codec.request(state.address, text.strip(), call), call
 
 
 def _store(state: TmclState, request: Request, call: Call) -> Procedure[None]:
