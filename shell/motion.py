@@ -16,11 +16,13 @@ from transports import TransportLost
 if TYPE_CHECKING:
     from dialects import Motion
     from drives.bus import Bus
-    from drives.drive import Drive
+    from drives.drive import Drive, Running
     from shell.workspace import Workspace
 
 FRESH = 1.0
 """The age up to which a reading counts, s."""
+PROGRAM_FRESH = 10.0
+"""The age up to which it counts whether a program runs, s: the longest time between two readings of conditions."""
 LIMIT = 2.0
 """The longest time to read the drives of a bus, s; a silent drive takes half of it."""
 
@@ -108,7 +110,7 @@ def _unasked(drive: Drive) -> str:
 
 
 async def in_motion(workspace: Workspace) -> list[str]:
-    """A line for each drive that moves, and for each known drive whose motion cannot be read."""
+    """A line for each drive that moves or runs a program, and for each known drive whose motion cannot be read."""
     begun = workspace.now()
     await asyncio.gather(*(_read(bus) for bus in workspace.buses.values()))
     lines = []
@@ -127,6 +129,17 @@ async def _read(bus: Bus) -> None:
                 if (not _fresh(drive, bus.now()) or _unconfirmed(drive)) and _answers(drive):
                     with contextlib.suppress(DriveError, TransportLost):
                         await confirmed_motion(drive)
+            for drive in bus.all_drives:
+                at_rest = _fresh(drive, bus.now()) and drive.seen is not None and not drive.seen.velocity
+                if at_rest and _answers(drive) and _program(drive, bus.now()) is None:
+                    with contextlib.suppress(DriveError, TransportLost):
+                        await drive.busy()
+
+
+def _program(drive: Drive, now: float) -> Running | None:
+    """Whether a program runs in a drive, if that was read lately and after its last start."""
+    running = drive.running
+    return running if running is not None and running.at > max(now - PROGRAM_FRESH, drive.started_at) else None
 
 
 def _answers(drive: Drive) -> bool:
@@ -148,6 +161,9 @@ def _described(drive: Drive, begun: float, now: float) -> str:
     if _fresh(drive, begun) and drive.seen is not None:
         if _unconfirmed(drive):
             return UNCONFIRMED
-        return f"moves at {drive.seen.velocity} a second" if drive.seen.velocity else ""
+        if drive.seen.velocity:
+            return f"moves at {drive.seen.velocity} a second"
+        running = _program(drive, begun)
+        return "runs a program, which may move it" if running is not None and running.runs else ""
     known = bool(drive.product) or drive.seen is not None or drive.commands
     return f"is not known: {last_seen(drive, now)}" if known else ""

@@ -125,3 +125,17 @@ def test_a_signal_stops_what_a_macro_started_and_not_what_an_operator_did(shop, 
     assert child.exitstatus == 130
     assert shop.velocity() == (0 if mine else 5000)
     assert ("stopped b: b reads velocity 0" in child.before) is mine
+
+
+DWELLS = 'program_text = """\nPG 1\nLB G1\nH 60000\nBR G1\nE\nPG\n"""'
+
+
+@in_virtual_time
+async def test_a_program_that_dwells_is_a_reason_to_ask_and_one_that_was_stopped_is_not(tmp_path):
+    async with CellSession(tmp_path, bus("press", f"{party('a')}\n{DWELLS}", party("b"))) as shop:
+        await shop.session.run("@a EX G1")
+        await asyncio.sleep(5.0)
+        assert await shop.session.in_motion() == ["a runs a program, which may move it"]
+        shop.session.stop()
+        await asyncio.sleep(2.0)
+        assert await shop.session.in_motion() == []
