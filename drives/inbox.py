@@ -36,6 +36,8 @@ class Inbox:
         """When the last bytes came."""
         self.echo = LocalEcho() if local_echo else None
         self._begun_at = float("-inf")
+        self._tail = b""
+        """The beginning of a line that was published before its end came: its check byte covers both parts."""
         self._cut_off: _CutOff | None = None
         self._publish = publish
 
@@ -132,13 +134,18 @@ class Inbox:
     def _publish_lines(self, now: float) -> None:
         """Publish whole lines, and the unterminated rest once it is overdue or too long."""
         lines, used = self.codec.parse_unsolicited(self.buffer)
+        if self._tail and lines and self.codec.damaged(lines[0]):
+            whole, _ = self.codec.parse_unsolicited(self._tail + self.buffer)
+            lines = (whole[0].removeprefix(self._tail.decode("latin-1")), *lines[1:])
         self._publish(now, lines)
         if used:
+            self._tail = b""
             self.consume(used, now)
         if self.codec.numbered or not self.buffer:
             return
         if not self.awaits_tail(now) or len(self.buffer) > LONGEST_TAIL:
             self._publish_rest(self.buffer, now)
+            self._tail = (self._tail + self.buffer)[-LONGEST_TAIL:]
             self.buffer = b""
 
     def _publish_rest(self, data: bytes, now: float) -> None:

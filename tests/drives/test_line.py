@@ -3,6 +3,7 @@
 import pytest
 
 from dialects import End, Kind, Priority, Request, StopPiece
+from dialects.mcode.host.checksum import sealed
 from dialects.mcode.host.codec import MCode
 from drives.events import Unsolicited
 from drives.flight import Finished
@@ -114,6 +115,17 @@ def test_lines_that_nobody_asked_for_are_handed_on():
     assert line.events(1.0) == [Unsolicited(1.0, ("Logic 000",))]
     assert line.deadline == 1.05
     assert line.events(1.05) == [Unsolicited(1.05, ("Log",))]
+
+
+def test_the_check_byte_of_a_line_in_two_parts_covers_both():
+    """On a busy machine the parts of a line may come a while apart: the second one was called damaged."""
+    line, data = Line(MCode(em=1, checksum=1)), sealed(b"noise noise") + b"\r\n"
+    shown = []
+    for at, part in ((0.0, data[:8]), (1.0, data[8:]), (2.0, data)):
+        line.receive(part, at)
+        for now in (at, at + 0.2):
+            shown += [text for event in line.events(now) if isinstance(event, Unsolicited) for text in event.lines]
+    assert shown == ["noise no", "ise", "noise noise"]
 
 
 def test_a_stop_fails_what_is_queued_and_in_flight_and_is_repeated_once_it_is_quiet():
