@@ -24,20 +24,44 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 from dialects import Diagnostic
-from dialects.files import toml_of, utf8_of
+from dialects.files import split_lines, toml_of, utf8_of
 from dialects.visible import visible
 from shell.connect import guards, log_settings, look, mqtt_settings
 from shell.connect.guards import Guarding
 from shell.connect.log_settings import LogSettings
 from shell.connect.look import Look
 from shell.connect.mqtt_settings import MqttSettings
-from shell.connect.toml_lines import line_of
+
+# The line of a key in a TOML file, for messages: the parser that reads the values does not report it.
+
+
+def line_of(text: str, key: Sequence[str]) -> int:
+    """The number of the line with a key, given with its tables (`screen`, `theme`), or with its table; 0: not found."""
+    table: tuple[str, ...] = ()
+    best = 0
+    for number, line in enumerate(split_lines(text), 1):
+        if header := re.match(r"\s*\[\[?([^\]]+)\]", line):
+            table = _parts(header[1])
+            found = table
+        elif pair := re.match(r"\s*([^=#]+?)\s*=", line):
+            found = (*table, *_parts(pair[1]))
+        else:
+            continue
+        if found == tuple(key):
+            return number
+        if not best and found and found == tuple(key[: len(found)]):
+            best = number
+    return best
+
+
+def _parts(dotted: str) -> tuple[str, ...]:
+    return tuple(part.strip().strip("\"'") for part in dotted.split("."))
 
 
 @dataclass(frozen=True)

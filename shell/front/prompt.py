@@ -39,9 +39,8 @@ from shell.front.keyboard import Keyboard, terminal
 from shell.front.line_queue import LineQueue, shown
 from shell.front.prompt_keys import KeyboardInput
 from shell.front.prompt_lines import LinesAbove
-from shell.front.prompt_parts import SessionCompleter, SharedHistory
+from shell.front.prompt_parts import SessionCompleter, SharedHistory, Toolbar
 from shell.front.prompt_question import PromptQuestion
-from shell.front.prompt_toolbar import Toolbar
 from shell.log.writer import begin as begin_log
 from shell.output import INTERRUPTED, exit_code, finish, nonblocking, report, write
 from shell.printer import Printer

@@ -14,6 +14,7 @@ from typing import TypeVar
 
 from dialects import Diagnostic, DriveError, Stopped
 from macros import checked_values, fill
+from shell import waits
 from shell.events import FAILURES, By, Failed
 from shell.playing import Playing, cast
 from shell.roles import Commands
@@ -22,13 +23,32 @@ from shell.scripts.asking import drive_of, known
 from shell.scripts.expression import Expression, Name, Word, evaluate, unknowns
 from shell.scripts.hearing import Hearing
 from shell.scripts.model import CallFile, CallMacro, If, MacroScript, Node, Repeat, ScriptLine
-from shell.scripts.pace import Pace
 from shell.scripts.place import Place
 from shell.scripts.planning import bind
 from shell.scripts.progress import StepProgress
 from shell.scripts.results import Executed, Result
 from shell.scripts.values import Value, number, quoted, written
 from shell.workspace import LATCHED, Workspace
+
+# The pace of a macro: as recorded, or as fast as its lines are done.
+
+
+class Pace:
+    """Waits before each line. A line starts its time after the start of the line before it, or when that is done."""
+
+    def __init__(self, now: Callable[[], float], fast: bool = False) -> None:
+        """Begin now. `fast`: recorded pauses are left out."""
+        self.fast = fast
+        self._now = now
+        self._begun = now()
+
+    async def before(self, after: float) -> None:
+        """Wait until a line may start that was recorded `after` seconds after the one before it."""
+        wait = 0.0 if self.fast else self._begun + after - self._now()
+        if wait > 0:
+            await waits.sleep(wait)
+        self._begun = self._now()
+
 
 SHOWN = 3
 """The number of lines that a failed `/expect` shows."""

@@ -25,7 +25,7 @@ from transports import Limited, Transport, TransportLost, Unreachable
 from transports.far_port import FarPort
 from transports.serial_posix import lock_owner
 from transports.ssh import open_ssh
-from transports.ssh_command import reason
+from transports.ssh_session import reason
 
 CELL = """
 [[bus]]

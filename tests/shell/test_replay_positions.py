@@ -21,7 +21,7 @@ from shell.front.replay import replay
 from shell.front.replay_report import ReplayReport
 from shell.log.steps import Exchange, read
 from shell.log.writer import SessionLog
-from shell.twins.measured import Decoding
+from shell.twins.after import Decoding
 from tests.support.cell_session import ETHERNET, CellSession, bus, party, pmx
 from tests.support.twin_cell import encoder, run
 

@@ -15,8 +15,7 @@ from textual._compositor import ChopsUpdate, LayoutUpdate
 from textual.geometry import Region
 from textual.strip import Strip
 
-from tui.terminal.canvas import Canvas, pieces_of
-from tui.terminal.pens import Pens
+from tui.terminal.canvas import Canvas, Pens, pieces_of
 
 WIDTH, HEIGHT = 30, 8
 STYLES = [

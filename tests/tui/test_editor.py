@@ -14,10 +14,10 @@ from dialects.families import program_languages
 from dialects.program_files import Part
 from shell.drafts import Drafts
 from shell.program_text import ProgramGrammar
-from tui.editor.alignment import aligned
 from tui.editor.grammar import MacroGrammar, grammar_of
 from tui.editor.texts import Texts
 from tui.screens.dialogs import Match
+from tui.screens.edit import aligned
 from tui.screens.program_choices import UPLOAD, Finder, files_in
 
 LINES = st.text(st.characters(min_codepoint=9, max_codepoint=0x17F, exclude_characters="\n\r"), max_size=40)

@@ -7,7 +7,7 @@ disk (`shell.drafts`).
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import ClassVar
 
@@ -17,8 +17,8 @@ from textual.containers import Horizontal, Vertical
 
 from dialects import Diagnostic
 from dialects.problems import Problem
+from dialects.program_files import Part
 from shell.edited_file import ChangedMeanwhile, real_text
-from tui.editor.alignment import aligned
 from tui.editor.grammar import Grammar, MacroGrammar, grammar_of
 from tui.editor.texts import OpenText
 from tui.editor.widget import Editor
@@ -29,6 +29,29 @@ from tui.screens.dialogs import Confirm, Search
 from tui.screens.page import Host, Page
 from tui.screens.program_rows import Findings, heading_row, news_rows, problem_rows, rule
 from tui.session_view import SessionView
+
+# The lines of a file and those in a drive: which line of the file has which address, where both hold one program.
+
+
+Parts = Callable[[str], Sequence[Part]]
+
+
+def aligned(text: str, rows: Sequence[tuple[int, str]], parts: Parts) -> Mapping[int, int]:
+    """Return the line of the file, from 0, by address; empty unless the lines of the drive are there once, in a row."""
+    file = [(number, bare) for number, line in enumerate(text.split("\n")) if (bare := _bare(line, parts))]
+    held = [_bare(line, parts) for _, line in rows]
+    size = len(held)
+    found = [at for at in range(len(file) - size + 1) if size and [bare for _, bare in file[at : at + size]] == held]
+    if len(found) != 1:
+        return {}
+    return {address: number for (address, _), (number, _) in zip(rows, file[found[0] :], strict=False)}
+
+
+def _bare(line: str, parts: Parts) -> str:
+    """A line without its remark and its blanks, in capitals; `=` is a blank in most places."""
+    end = next((part.start for part in parts(line) if part.kind == "remark"), len(line))
+    return "".join(line[:end].upper().replace("=", " ").split())
+
 
 PAUSE = 0.4
 """Seconds without an edit after which a text is checked, and its copy is kept."""

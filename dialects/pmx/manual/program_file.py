@@ -7,16 +7,36 @@ the form that the maker's program copies (manual 8.1.9). A remark begins with a 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Container, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 from dialects.files import SourceLine, program_text_of, split_lines, wrong_characters
 from dialects.layout import respelled
 from dialects.pmx.manual import line_parts, script_checker, script_decompiler
-from dialects.pmx.manual.canonical import canonical
 from dialects.pmx.manual.script_compiler import EMPTY, ERASED, LINES, looks_compiled, split
+from dialects.pmx.manual.script_parser import parse
 from dialects.problems import Problem, refuse
+
+# The canonical spelling of a line of A-SCRIPT: no blanks but the one before a number or a condition.
+
+
+_STORED = re.compile(r"SA\d+=", re.ASCII)
+
+
+def canonical(text: str, names: Container[str] = ()) -> str:  # noqa: ARG001
+    """Return a line in canonical spelling, without its remark. The language has no names of the user's.
+
+    A compiled line and a line with an error stay as they are.
+    """
+    bare = text.partition(";")[0].strip(" \t")
+    if _STORED.match(bare) or looks_compiled(bare):
+        return bare
+    statements, problems = parse(text)
+    if problems or len(statements) != 1:
+        return bare
+    return str(statements[0])
+
 
 LONGEST = 40
 """Characters of a compiled line, far more than the ten seen from units."""

@@ -9,9 +9,8 @@ from hypothesis import strategies as st
 from dialects.codec import Decoded, End
 from dialects.debugging import Row
 from dialects.mcode.host.codec import MCode
-from dialects.mcode.host.debugging import entry, hold, may_follow, traced
+from dialects.mcode.host.debugging import ENTER, SPACE, entry, hold, key, may_follow, traced
 from dialects.mcode.host.state import MCodeState
-from dialects.mcode.host.step_key import ENTER, SPACE, key
 
 PROGRAM = [
     Row(1, "LB SU"),

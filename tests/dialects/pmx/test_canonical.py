@@ -5,7 +5,7 @@ from __future__ import annotations
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dialects.pmx.manual.canonical import canonical
+from dialects.pmx.manual.program_file import canonical
 from dialects.pmx.manual.script_compiler import compile_
 from dialects.pmx.manual.script_parser import parse
 from tests.support.cases import for_each
