@@ -23,8 +23,15 @@ def check(path: str | Path, *, printed: bool = False) -> None:
             raise Diagnostic("is standard output, which is not written to here", path, "name a new file")
         return
     check_folder(path)
-    if os.path.lexists(path):
-        raise Diagnostic("exists already", str(path), "name a new file")
+    if not os.path.basename(path):
+        raise Diagnostic("is not a file's name", str(path) or '""', "name a new file")
+    try:
+        os.lstat(path)
+    except FileNotFoundError:
+        return
+    except (OSError, ValueError) as problem:
+        raise Diagnostic(f"cannot be written: {why(problem)}", str(path)) from None
+    raise Diagnostic("exists already", str(path), "name a new file")
 
 
 def check_folder(path: str | Path) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import os
 
 from multidrop.arguments import parts
 
@@ -53,6 +54,7 @@ def sim(parser: argparse.ArgumentParser) -> None:
         metavar="PATH",
         action="append",
         default=[],
+        type=_existing,
         help="let paths of the cell lead there, too: a file or a folder outside its own; may be repeated",
     )
     parser.add_argument("--json", action="store_true", help="print the endpoints as JSON objects, one a line")
@@ -118,6 +120,12 @@ def _searched(parser: argparse.ArgumentParser) -> None:
     languages = [name for name, family in FAMILIES.items() if family.scan is not None]
     parser.add_argument("--dialect", choices=languages, help="this language only")
     parser.add_argument("--json", action="store_true", help="print one JSON object a drive")
+
+
+def _existing(text: str) -> str:
+    if not os.path.exists(text):  # an empty one, too: it would allow the current folder
+        raise argparse.ArgumentTypeError(f"{text!r} does not exist")
+    return text
 
 
 def _speed(text: str) -> float:

@@ -106,10 +106,11 @@ def _changed(path: Path) -> float:
 
 def parts(path: Path) -> list[Path]:
     """The parts of a log that exist, the oldest first."""
-    if path.is_dir():  # it cannot be read, and `.` and `/` have no name that a number could follow
+    # Path's own methods raise for a name that is too long.
+    if os.path.isdir(path):  # it cannot be read, and `.` and `/` have no name that a number could follow
         return [path]
     number = 1
-    while part(path, number).exists():
+    while os.path.exists(part(path, number)):
         number += 1
     return [part(path, each) for each in range(number - 1, -1, -1)]
 

@@ -15,8 +15,8 @@ from tests.support.transfers import kept, load, shop_with
 from tests.support.virtual import in_virtual_time
 
 PROGRAM = "PG 1\nLB G1\nMR 100\nH\nE\nPG\n"
-ACTING = ("SL 5000", "MA 200", "MR -5", "HM 1", "EX G1", 'DN="q"', "FD", "CP", "BD=96", "AS=3", "LK=1", "IP")
-SETTING = ("VM=500000", "VA Q1=5", "Q1=7", "OE G1", "SL 0", "DE=1", "AS=1", "IS=1,16,1", "S")
+ACTING = ("SL 5000", "MA 200", "MR -5", "HM 1", "EX G1", 'DN="q"', "FD", "CP", "BD=96", "AS=3", "LK=1", "IP", "TE=1")
+SETTING = ("VM=500000", "VA Q1=5", "Q1=7", "OE G1", "SL 0", "DE=1", "AS=1", "IS=1,16,1", "S", "TE=0")
 
 
 @for_each("line", ACTING)

@@ -82,9 +82,14 @@ def find(text: str, *, address: str, party: bool, product: str, starts: Callable
 
 
 def acts(text: str) -> bool:
-    """Whether a line starts motion or a program at once; a setting, OE and what ends a motion do not."""
-    word = word_of(text)
+    """Whether a line starts motion or a program at once; a setting, OE and what ends a motion do not.
+
+    TE is no setting: it enables trips, and one that is due executes its subroutine.
+    """
+    _, word, value = _head(bare(text), "")
     row = lookup(word)
+    if word == "TE":
+        return value not in ("", 0)
     return row is not None and row.starts and row.kind == "instruction" and word != "OE" and not only_ends(text)
 
 

@@ -1,4 +1,4 @@
-"""The output file `-` is standard output, or refused; no command makes a file of that name, or a folder."""
+"""Names of files on the command line: `-` is standard output or refused; none makes a folder or a late failure."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from multidrop.__main__ import main
+from tests.support.cases import for_each
 
 CELL = """
 [[bus]]
@@ -22,6 +23,7 @@ E
 PG
 '''
 """
+LONG = "x" * 300
 URL = "sim:cell.toml#press"
 
 
@@ -70,6 +72,7 @@ def test_a_report_is_shown_once(folder: Path, capsys: pytest.CaptureFixture[str]
     [
         ("none/r.xml", "none/r.xml: its folder does not exist; make the folder first\n"),
         ("-", "--junit -: standard output has the replies; name a file for the report\n"),
+        (LONG, f"{LONG}: the report cannot be written: File name too long\n"),
     ],
 )
 def test_a_place_that_takes_no_report_is_refused_before_anything_is_sent(
@@ -78,3 +81,25 @@ def test_a_place_that_takes_no_report_is_refused_before_anything_is_sent(
     assert main(["run", "moves.txt", "--on", URL, "--junit", file]) == 2
     assert capsys.readouterr() == ("", said)
     assert _files(folder) == ["cell.toml", "moves.txt"]
+
+
+@for_each("name", ["", LONG, "none/f"])
+def test_a_name_that_no_file_can_have_is_refused_before_a_drive_is_read(
+    capsys: pytest.CaptureFixture[str], name: str
+) -> None:
+    for command in (["program", "upload", URL], ["params", "backup", URL], ["snapshot", URL, "-o"]):
+        assert main([*command, name]) == 2
+        (said,) = capsys.readouterr().err.splitlines()
+        assert said.partition(": ")[0] == (name or '""')
+
+
+def test_a_log_of_such_a_name_is_refused(capsys: pytest.CaptureFixture[str]) -> None:
+    for command in (["show"], ["replay", "--to", "sim:"]):
+        assert main(["log", *command, LONG]) == 2
+        assert capsys.readouterr() == ("", f"{LONG}: cannot be read: File name too long\n")
+
+
+@for_each("path", ["", "none"])
+def test_an_empty_path_allows_a_cell_nothing(capsys: pytest.CaptureFixture[str], path: str) -> None:
+    assert main(["sim", "cell.toml", "--allow", path]) == 2
+    assert f"{path!r} does not exist" in capsys.readouterr().err
