@@ -280,6 +280,11 @@ class Readout:
             return True
         return now - self.last.at > 2 * max(self.period, SHORTEST) or self.overtaken(now)
 
+    @property
+    def stopped_since(self) -> bool:
+        """Whether a stop came after the last value was read."""
+        return self.last is not None and self.last.at <= self.program.stopped_at
+
     def overtaken(self, now: float) -> bool:
         """True if a line was sent after the last value was read, and the next value is not about to arrive."""
         return self.last is not None and self.touched > self.last.at and now - self.last.at > SHORTEST

@@ -227,7 +227,10 @@ class ScreenModel:
 
 
 def bus_state(facts: BusFacts | None, addresses: list[str], lost: bool) -> State:
-    """The state of a whole bus as last read: idle only if every drive was read as stopped, and runs no program."""
+    """The state of a whole bus as last read: idle only if every drive was read as stopped, and runs no program.
+
+    What was read before a stop counts for none that is at rest: the banner says that it is not read yet.
+    """
     if lost:
         return State.LOST
     if facts is None or not addresses:
@@ -240,10 +243,10 @@ def bus_state(facts: BusFacts | None, addresses: list[str], lost: bool) -> State
         return State.TROUBLE
     if any(facts.readout(address).differs for address in addresses):
         return State.DIFFERS
-    programs = [facts.readout(address).program for address in addresses]
-    if any(program.runs for program in programs):
+    readouts = [facts.readout(address) for address in addresses]
+    if any(each.program.runs for each in readouts):
         return State.DWELL
-    if any(state not in READ for state in states) or any(program.ran for program in programs):
+    if any(state not in READ for state in states) or any(each.program.ran or each.stopped_since for each in readouts):
         return State.UNKNOWN
     return State.OFF if State.NO_CURRENT in states else State.IDLE
 

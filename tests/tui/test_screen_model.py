@@ -180,6 +180,18 @@ def test_a_line_is_not_idle_while_a_program_runs_in_a_drive_of_it() -> None:
     assert bus_state(facts, both, False) is State.IDLE
 
 
+def test_a_line_is_not_idle_after_a_stop_before_each_drive_was_read(model: ScreenModel) -> None:
+    for address in "ab":
+        model.take(OnBus("press", Sample(1.0, address, 5, 0)))
+    facts = model.bus("press")
+    assert bus_state(facts, ["a", "b"], False) is State.IDLE
+    model.stopped(2.0)
+    model.take(OnBus("press", Sample(2.1, "a", 5, 0)))
+    assert bus_state(facts, ["a", "b"], False) is State.UNKNOWN
+    model.take(OnBus("press", Sample(2.2, "b", 5, 0)))
+    assert bus_state(facts, ["a", "b"], False) is State.IDLE
+
+
 def test_what_was_read_of_a_program_before_a_stop_is_past_until_the_stop_has_read_it(model: ScreenModel) -> None:
     for address in "ab":
         model.take(OnBus("press", Sample(1.0, address, 5, 0)))
