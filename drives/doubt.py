@@ -41,6 +41,8 @@ class _Late:
     nak: bool = False
     taken: bool = False
     """Its reply may have been taken for another drive's."""
+    came: bool = False
+    """A line came that seems to be its reply."""
 
 
 class Doubt:
@@ -57,9 +59,16 @@ class Doubt:
             evidence += lines[: MOST_EVIDENCE - len(evidence)]
 
     def without_late(self, lines: tuple[str, ...]) -> tuple[str, ...]:
-        """Remove late replies to questions, which were reported as missing: no program prints them."""
-        late = [each.request for each in self._late]
-        return tuple(line for line in lines if not any(each.codec.answers(each, line) for each in late))
+        """Remove late replies to questions, which were reported as missing, each once: a print may look like one."""
+        shown = []
+        for line in lines:
+            for number, late in enumerate(self._late):
+                if not late.came and late.request.codec.answers(late.request, line):
+                    self._late[number] = replace(late, came=True)
+                    break
+            else:
+                shown.append(line)
+        return tuple(shown)
 
     def weigh(self, request: Request, reply: Reply, now: float) -> Weight:
         """Weigh a reply against those outstanding, and update these."""
@@ -78,9 +87,9 @@ class Doubt:
             self._late = others
             return Weight(doubtful or any(late.taken for late in own), request.gather and bool(own))
         if _outstanding(request, reply, doubtful):
-            requests = (*(late.request for late in own), request)  # none comes before the first
-            nak = reply.end is End.NAK
-            self._late = others + [_Late(now + LATE, each, nak) for each in requests]
+            late = _Late(now + LATE, request, nak=reply.end is End.NAK)
+            own = [replace(late, request=each.request, came=each.came) for each in own]  # none comes before the first
+            self._late = [*others, *own, late]
         return Weight(doubtful)
 
     def with_evidence(self, request: Request, reply: Reply) -> Reply:

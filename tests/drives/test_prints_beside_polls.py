@@ -138,3 +138,20 @@ def test_a_late_reply_to_a_signed_request_is_no_line_of_a_program(bench, priorit
     wired.events()
     wired.wait(1.0)
     assert (wired.ended[-1].reply.end, wired.strays) == (End.TIMEOUT, [])
+
+
+@pytest.mark.virtual
+@pytest.mark.parametrize("em", [0, 1, 2, 3])
+async def test_prints_with_a_name_which_replies_to_polls_have_too_are_shown(em, tmp_path):
+    async with Printing(tmp_path, 29, EM=em, CK=0) as cell:
+        for line in ("CP", "R1=0", "PG 1", "LB G1", "IC R1", "PR R1,DN", "H 29", f"BR G1,R1<{LINES}", "E", "PG"):
+            cell.device("line:c").execute(line, 0.0)
+        polls = cell.poll(0.02)
+        await asyncio.sleep(0.5)
+        cell.events.clear()
+        await cell.session.run("@c EX G1")
+        await asyncio.sleep(6)
+        for each in polls:
+            each.close()
+        missing = [n for n in range(1, LINES + 1) if f'{n}"c"' not in cell.shown]
+        assert len(missing) <= 3 * len(cell.warned()), cell.warned()

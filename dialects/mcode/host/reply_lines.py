@@ -12,6 +12,8 @@ from dialects.mcode.host.framing import SIGN_ON, UNPRINTED, Piece, printable
 
 SIGNED = re.compile(r'["~]')
 """The sign of a signature: the quotation marks of a drive's name, or the host's own mark."""
+NAME = re.compile(r'"([!-~])"')
+"""A drive's name, as it prints it."""
 ENDLESS = {Kind.LIST, Kind.SETTING, Kind.QUIET}
 """Kinds whose reply has no end of its own."""
 
@@ -19,14 +21,20 @@ ENDLESS = {Kind.LIST, Kind.SETTING, Kind.QUIET}
 def divided(request: Request, strays: Sequence[str], whole: bool) -> tuple[tuple[str, ...], tuple[str, ...]]:
     """Divide lines that are not the reply into programs' prints and pieces of the reply that a print ran into.
 
-    `whole`: the reply was received, so there are no pieces. A signed line is the request's own.
+    `whole`: the reply was received, so there are no pieces: a line that looks like it is a print all the same.
     """
-    if request.kind is not Kind.PRINT or not request.expect or (whole and not request.signed):
+    if request.kind is not Kind.PRINT or not request.expect or whole:
         return tuple(strays), ()
-    expect = request.expect
-    prints = [line for line in strays if re.fullmatch(expect, line) is None]
-    own = [] if whole else [line for line in prints if request.text in line or (request.signed and SIGNED.search(line))]
-    return tuple(line for line in prints if line not in own), tuple(own)
+    own = [line for line in strays if _is_piece(request, line)]
+    return tuple(line for line in strays if line not in own), tuple(own)
+
+
+def _is_piece(request: Request, line: str) -> bool:
+    """Whether a line may be the destroyed reply, or a part of it. One with another drive's name is none."""
+    if request.text in line or re.fullmatch(request.expect or "", line):
+        return True
+    named = NAME.search(line)
+    return request.signed and SIGNED.search(line) is not None and (named is None or named[1] == request.address)
 
 
 class ReplyLines:
