@@ -33,6 +33,12 @@ def _serve(chosen: argparse.Namespace) -> int:
                 "multidrop relay",
                 f"open ssh://THIS-HOST{chosen.port} on the other machine",
             )
+        if "://" in chosen.port:
+            from shell.secrets import url_without_secrets
+
+            raise Diagnostic(
+                "is no serial port of this machine", url_without_secrets(chosen.port), "as in /dev/ttyUSB0"
+            )
         from transports.relay import serve
         from transports.serial_open import opened
         from transports.serial_posix import SerialEndpoint

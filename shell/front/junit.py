@@ -31,7 +31,7 @@ class Case:
     def of(cls, result: Result) -> Case:
         """The case of a line."""
         failure, error = (result.error, "") if result.failed_check else ("", result.error)
-        name = f"{result.where}: {result.sent}"
+        name = f"{result.where}: {result.reported}"
         suite = f"macro {result.line.macro}" if result.line.macro else result.line.file
         return cls(name, suite, result.seconds, failure, error, result.printed)
 

@@ -9,6 +9,7 @@ from typing import Any, Protocol
 
 from shell.motion import Standing
 from shell.scripts.model import ScriptLine
+from shell.secrets import without_secrets
 
 
 @dataclass(frozen=True)
@@ -35,6 +36,11 @@ class Result:
         return self.line.where + (f", round {self.round}" if self.round > 1 else "")
 
     @property
+    def reported(self) -> str:
+        """The line for a report: a verb's URL without its secrets."""
+        return without_secrets(self.sent) if self.sent.startswith("/") else self.sent
+
+    @property
     def ok(self) -> bool:
         """Whether the line succeeded."""
         return not self.error
@@ -53,7 +59,7 @@ class Result:
         where = {key: value for key, value in (("bus", self.bus), ("drive", self.drive)) if value}
         time = {"time": self.time.isoformat(timespec="milliseconds")}
         error = {"error": self.error} if self.error else {}
-        fields = {"line": self.line.number, "sent": self.sent, "printed": list(self.printed), "ok": self.ok}
+        fields = {"line": self.line.number, "sent": self.reported, "printed": list(self.printed), "ok": self.ok}
         return place | fields | where | time | error
 
 

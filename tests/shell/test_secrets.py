@@ -7,6 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from dialects import Diagnostic
+from multidrop.__main__ import main
 from shell.connect.urls import parse
 from shell.plots.target import parse_target as plot_target
 from shell.publishing.target import parse_target as broker
@@ -95,3 +96,14 @@ def test_a_refused_url_keeps_what_is_no_secret() -> None:
         parse("tcp://me:pw@pc:503")
     with pytest.raises(Diagnostic, match=r"^tcp://10.0.0.5:503\?token=\*\*\*: no key token"):
         parse("tcp://10.0.0.5:503?token=pw")
+
+
+def test_reports_quote_no_password_of_a_url(tmp_path, monkeypatch, capsys) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "s.txt").write_text("/open tcp://me:xyzzy@10.0.0.5:503\n")
+    assert main(["run", "s.txt", "--on", "sim:#press", "--json", "--junit", "r.xml"]) == 2
+    said = capsys.readouterr()
+    assert '"sent": "/open tcp://***@10.0.0.5:503"' in said.out
+    assert SECRET not in said.out + said.err + (tmp_path / "r.xml").read_text()
+    assert main(["relay", "tcp://me:xyzzy@10.0.0.5:503"]) == 2
+    assert SECRET not in capsys.readouterr().err
