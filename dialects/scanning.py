@@ -66,3 +66,5 @@ class Scan(Generic[S]):
     """What `clear` does, for a person."""
     erase: Callable[[], Procedure[None]] | None = None
     """Set every drive on the line to its factory defaults; None: the language has no word for it."""
+    names: tuple[str, ...] = ()
+    """The addresses that a stop names for drives that have not replied."""

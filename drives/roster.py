@@ -50,7 +50,7 @@ class Roster:
 
     def probes(self, address: str) -> None:
         """Have a stop reach a drive that replied and is not listed."""
-        self.probing = (*self.probing, address)
+        self.probing = tuple(dict.fromkeys((*self.probing, address)))
 
     def found(self, state: DriveState) -> None:
         """List a drive that identification has found."""

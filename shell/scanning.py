@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from dialects import Diagnostic, DriveState, Procedure
 from dialects.families import DEFAULT, FAMILIES
 from dialects.scanning import WINDOW, Reach, Scan
-from shell import jobs
+from shell import jobs, stops
 from shell.connect.opening import BAUDED, port_name
 from shell.connect.port_state import memory_of
 from shell.connect.urls import Connection
@@ -25,6 +25,7 @@ from transports import Remote, Transport, TransportLost
 
 if TYPE_CHECKING:
     from drives.bus import Bus
+    from drives.halt import Halt
     from shell.connect.opening import Opened, Opener
     from shell.workspace import Workspace
 
@@ -39,7 +40,7 @@ BYTES = 20
 """The mean size of the questions to one address, bytes; for the estimate."""
 REPEATED = 0.2
 """The time in which a stop is repeated once the line is quiet, s."""
-UNLISTED = "A drive that has not replied gets it without its name, which ES=2 and ES=3 need, and nothing confirms it"
+UNLISTED = "It was not confirmed for drives that have not replied"
 SO_FAR = "nothing more was sent"
 """What a refused question says in the middle of a search."""
 HAZARD = (
@@ -107,6 +108,8 @@ class Scanning:
         """The stages at which the port was opened."""
         self._stopped: dict[Stage, None] = {}
         """The stages at which a stop was sent."""
+        self._read: list[Halt] = []
+        """The stops whose drives were read."""
         self._said: set[str] = set()
 
     async def run(self, bauds: Sequence[int], everything: bool) -> None:
@@ -203,7 +206,9 @@ class Scanning:
         if self._stopped:
             left_out = [each for each in self.stages(()) if each not in {**self._stopped, **self._agreed_to}]
             why = f"; not with {listed(left_out)}: no search there was agreed to" if left_out else ""
-            self._warn(self.port, [f"the stop was sent with {listed(self._stopped)}{why}. {UNLISTED}"])
+            tally = stops.of_halts(self._read, self._workspace.wall(self._workspace.stopped_at), False)
+            read = f"; {stops.words(tally)}" if tally.found else ""
+            self._warn(self.port, [f"the stop was sent with {listed(self._stopped)}{why}{read}. {UNLISTED}"])
 
     async def _stop_at(self, stage: Stage, confirm: bool) -> None:
         """Send a stop at a stage, to the drives that replied there by name; `confirm`: read them."""
@@ -217,9 +222,12 @@ class Scanning:
                 for found in self.found:
                     if _stage_of(found.connection) == stage:
                         each.bus.roster.found(found.state)
-                each.bus.halted(each.bus.halt(), confirm=confirm and bool(each.bus.drives))
+                halt = each.bus.halt()
+                each.bus.halted(halt, confirm=confirm and bool(each.bus.drives))
                 await each.bus.stopped()
-                await asyncio.sleep(REPEATED)
+                await asyncio.sleep(REPEATED + 2 * len(halt.data) * 10 / (stage.baud or 1_000_000))
+                if confirm and each.bus.drives:
+                    self._read.append(halt)
 
     def _remembered(self) -> list[Stage]:
         """The stage at which the last session's drives replied on this port."""
@@ -250,6 +258,7 @@ class Scanning:
         """Have a stop reach a bus, and close it in the end."""
         bus = opened.bus
         self._tried[stage] = None
+        bus.roster.probing = stage.scan.names
         self._workspace.adopt(opened, PLACE)
         if opened.limits and opened.limits not in self._said:
             self._said.add(opened.limits)

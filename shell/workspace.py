@@ -289,7 +289,8 @@ class Workspace(Asking):
         unreached = stops.unreached(halts, self.now())
         opening = _still_opening(self.opening, self.stops)
         sent = "stop" if not (unreached or opening) and len(halts) == len(self.buses) else "stop not"
-        self.notify(f"{why}: {sent} sent to every drive; macros and scripts wait for /resume")
+        to_all = f"{sent} sent to every drive" if halts or unreached or opening else "no drive is open"
+        self.notify(f"{why}: {to_all}; macros and scripts wait for /resume")
         for text in (*unreached, *map(stops.not_open, opening)):
             self.notify(text, warning=True)
         for name, raw in self.raw.items():

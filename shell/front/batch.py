@@ -139,8 +139,8 @@ class _Host:
             await settled(self._session)
         if self.interrupted:
             code, lines = self._code, self._interruption()
-        elif self._session.latched:
-            lines.insert(0, f"stop: {stops.words(self._session.tally())}")
+        elif self._session.latched and (tally := self._session.tally()).found:  # a search has closed its port by now
+            lines.insert(0, f"stop: {stops.words(tally)}")
         for each in lines:
             if each:
                 self._printer.notify(each)

@@ -149,6 +149,45 @@ async def test_a_stop_ends_the_search_and_keeps_what_was_found(tmp_path):
     assert "no search there was agreed to" in text
 
 
+@pytest.mark.parametrize("escape", [2, 3])
+@pytest.mark.parametrize("rate", [4800, 9600])
+@in_virtual_time
+async def test_a_stop_reaches_a_drive_that_has_not_replied_and_needs_its_name_before_the_key(tmp_path, escape, rate):
+    port = Port(tmp_path, bus("b", party("Z"), baud=rate))
+    [device] = port.devices
+    device.execute(f"ES={escape}", 0.0)
+    device.execute("SL 5000", 0.0)
+    _, search = scanning(port)
+    [at, *_] = search.stages([rate])
+    with pytest.raises(Stopped):
+        async with search.stopping_all(), search.opened(search.connection(at)):
+            assert device.moving(port.floor.now())
+            port.session.stop("Ctrl+X")
+            raise Stopped("Ctrl+X")
+    await asyncio.sleep(1)
+    assert not device.moving(port.floor.now())
+
+
+@in_virtual_time
+async def test_a_stop_of_a_search_says_what_the_drives_that_replied_were_read_at(tmp_path):
+    port = Port(tmp_path, bus("b", party("a"), party("z")))
+    found, search = scanning(port)
+    running = asyncio.create_task(port.session.tasks.run(search.run([], False)))
+    await asyncio.sleep(0.7)
+    port.session.stop("Ctrl+X")
+    with pytest.raises(Stopped):
+        await running
+    [text] = [text for text in port.told() if "the stop was sent with" in text]
+    assert "; a reads velocity 0. It was not confirmed for drives that have not replied" in text
+
+
+@in_virtual_time
+async def test_a_stop_with_no_drive_open_does_not_say_that_it_was_sent(tmp_path):
+    port = Port(tmp_path, bus("b", party("a")))
+    port.session.stop("Ctrl+X")
+    assert port.told()[-1] == "Ctrl+X: no drive is open; macros and scripts wait for /resume"
+
+
 @in_virtual_time
 async def test_no_drive_that_hears_its_own_language_and_baud_rate_moves(tmp_path):
     drives = [party(name, EM=em) + f"\n{MOVES}" for em, name in enumerate("PRa")]

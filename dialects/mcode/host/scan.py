@@ -304,4 +304,6 @@ def _identified(own: _Search, place: Place) -> Procedure[MCodeState | None]:
     return None
 
 
-SCAN = Scan("MCode", (4800, 9600, 19200, 38400, 115200), _places, search, rescue.clear, rescue.CLEARS, rescue.erase)
+SCAN = Scan(
+    "MCode", (4800, 9600, 19200, 38400, 115200), _places, search, rescue.clear, rescue.CLEARS, rescue.erase, NAMES
+)
