@@ -119,6 +119,7 @@ async def macros(hand: Hand) -> None:
 
 async def plays(hand: Hand) -> None:
     """A macro plays, and its steps show."""
+    await hand.line("VM=180000")
     await hand.line("/play shuttle steps=900000", 1.2)
 
 
@@ -132,7 +133,7 @@ async def stopped(hand: Hand) -> None:
 async def program(hand: Hand) -> None:
     """A program was downloaded, and runs."""
     await hand.line("/download shuttle.mxt", 6.0)
-    await hand.line("R1=3")
+    await hand.line("R1=9")
     await hand.line("EX GO", 2.2)
     await hand.page("program")
     await hand.press(*"shuttle.mxt", "enter")
