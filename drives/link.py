@@ -316,7 +316,7 @@ def _destroyed(transaction: Transaction) -> str:
     request, reply = transaction.request, transaction.reply
     asked = "a poll" if request.is_poll else f"'{request.text}'"
     whose = f" of {request.address}" if request.address else ""
-    text = f"beside {asked}{whose} something was damaged on the line: a printed line may be lost"
+    text = f"beside {asked}{whose} something was damaged on the line: printed lines may be lost"
     return f"{text} (received {_short(reply.collided)})"
 
 
