@@ -7,6 +7,7 @@ four times run alone, so that the one that kills them is named.
 from __future__ import annotations
 
 import logging
+import re
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
@@ -54,7 +55,7 @@ def results(
 
 @contextmanager
 def _client(address: str, interruption: Interruption, agree: Callable[[], None]) -> Iterator[Client]:
-    if not address.startswith(("tcp://", "tls://", "ws://", "wss://")) or not address.rpartition(":")[2].isdecimal():
+    if not re.fullmatch(r"(?:tcp|tls|ws|wss)://[^@]+:[0-9]+", address):  # no user: Dask takes none
         raise Diagnostic(
             "is not the address of a scheduler", f"--cluster {url_without_secrets(address)}", "as in tcp://HOST:8786"
         )

@@ -7,6 +7,7 @@ from contextlib import contextmanager
 
 import pytest
 
+from dialects import Diagnostic
 from shell.sweeps import cluster
 from shell.sweeps.interruption import Interruption
 from shell.sweeps.trial import Case, Job, Result
@@ -43,3 +44,11 @@ def test_a_scheduler_that_ends_in_the_middle_of_a_question_is_lost(monkeypatch: 
         for chunk in cluster.results(job, cases, "tcp://h:1", interruption, lambda: None):
             found += chunk
     assert found == [Result(1)]
+
+
+def test_an_address_with_a_password_is_refused_before_it_is_shown_or_agreed_to() -> None:
+    asked: list[str] = []
+    with Interruption() as interruption, pytest.raises(Diagnostic) as refused:
+        job = Job("", "", "", "", "", (), ())
+        next(cluster.results(job, iter(()), "tcp://me:pw@h:1", interruption, lambda: asked.append("asked")))
+    assert "pw" not in str(refused.value) and not asked
