@@ -105,6 +105,8 @@ async def referenced(call: Call) -> None:
     words = call.words(0, 1)
     drive = call.drive(words[0] if words else "")
     name = call.workspace.display_name(drive) or drive.shown
+    if drive not in call.workspace.bus(drive.link.name).drives.values():
+        raise Diagnostic(f"no drive {name}", hint="/drives lists them")
     lost = bool(drive.state.unreferenced)
     drive.state.referenced()
     call.workspace.notify(f"{name}: its position {'counts again' if lost else 'was not marked as not referenced'}")

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from dialects import Diagnostic
 from dialects.families import FAMILIES
 from tests.support.cell_session import CellSession, bus, party, pmx
 
@@ -182,3 +183,9 @@ async def test_a_lost_line_that_comes_back_with_a_restarted_drive_says_so(tmp_pa
         await asyncio.sleep(20)
         (said,) = cell.restarts()
         assert "position 51200 before, 0 now" in said
+
+
+async def test_a_drive_that_the_line_lacks_is_not_referenced(tmp_path: Path) -> None:
+    async with Polled(tmp_path, party("a"), party("b")) as cell:
+        with pytest.raises(Diagnostic, match="no drive zz"):
+            await cell.session.run("/referenced zz")
