@@ -31,6 +31,7 @@ from shell.output import (
 )
 from shell.printer import Printer
 from shell.session import Session
+from shell.signals import early_ends
 
 Body = Callable[[Session], Awaitable[None]]
 
@@ -68,7 +69,7 @@ def run(
     try:
         make = partial(_session, partial(Session, found, lazy=lazy, reconnect=reconnect, raw=raw, tried=tried), agreed)
         printer = Printer(unsolicited=unsolicited, replies=replies)
-        with asyncio.Runner(loop_factory=loop) as runner:
+        with early_ends(), asyncio.Runner(loop_factory=loop) as runner:  # before the log has its thread
             return runner.run(_run(make, printer, urls, body, watch_keys, interrupted, asks))
     except KeyboardInterrupt:
         return interrupted

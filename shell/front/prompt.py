@@ -45,6 +45,7 @@ from shell.log.writer import begin as begin_log
 from shell.output import INTERRUPTED, exit_code, finish, nonblocking, report, write
 from shell.printer import Printer
 from shell.session import Session
+from shell.signals import early_ends
 
 FIRST_FRAME = 0.05
 """The longest wait for the first frame, s."""
@@ -64,7 +65,8 @@ def run(
         write(sys.stderr, report(failure))
         return exit_code(failure)
     try:
-        return asyncio.run(_run(partial(Session, found, reconnect=reconnect, raw=raw), urls, agreed, twin))
+        with early_ends():  # before the log has its thread
+            return asyncio.run(_run(partial(Session, found, reconnect=reconnect, raw=raw), urls, agreed, twin))
     except KeyboardInterrupt:
         return INTERRUPTED
 

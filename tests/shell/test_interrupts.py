@@ -5,6 +5,7 @@ import shutil
 import signal
 import subprocess
 import sys
+from pathlib import Path
 
 import pexpect
 import pytest
@@ -135,6 +136,21 @@ def test_a_signal_in_a_script_stops_what_it_moved(shop, number):
     _, err = script.communicate(timeout=PATIENCE)
     assert (script.returncode, err) == (130, "interrupted; stopped a, b: all 2 read velocity 0\n")
     assert shop.standing() == (0, "0\n0\n", "")
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="reads the signal masks of threads in /proc")
+def test_a_log_swallows_no_signal(shop):
+    (shop.folder / "conf").mkdir()
+    (shop.folder / "conf" / "multidrop.toml").write_text("[log]\nalways = true\n")
+    script = shop.process("run", shop.script(RUNAWAY), "--on", shop.url)
+    assert script.stdout.readline() == "1234\n"
+    threads = Path(f"/proc/{script.pid}/task")
+    masks = [(each / "status").read_text().partition("SigBlk:\t")[2][:16] for each in threads.iterdir()]
+    open_ = [mask for mask in masks if not int(mask, 16) >> (signal.SIGPIPE - 1) & 1]
+    assert len(open_) == 2 < len(masks), "the threads that wait for the signal, and no other"
+    script.send_signal(signal.SIGPIPE)
+    _, err = script.communicate(timeout=PATIENCE)
+    assert (script.returncode, err) == (130, "interrupted; stopped a, b: all 2 read velocity 0\n")
 
 
 def test_a_terminal_that_hangs_up_stops_what_the_script_moved(shop):
