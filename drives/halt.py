@@ -46,8 +46,8 @@ class Halt:
     """Why it was not written, or not for all."""
     doubts: dict[Drive, str] = field(default_factory=dict)
     """Why a drive could not be read."""
-    stored: int = 0
-    """How often it was written again for a drive that had stored it."""
+    stored: list[Drive] = field(default_factory=list)
+    """The drives that had stored it, once for each time that it was written again for them."""
     vain: bool = False
     """A drive moves on, or its program runs on, after the last attempt to stop it."""
 

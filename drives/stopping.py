@@ -20,7 +20,7 @@ from drives.roster import Roster
 from drives.stop_forms import StopForms, stop_forms
 
 AGAIN = 3
-"""How often a stop is written again for drives that stored it."""
+"""How often a stop is written again for a drive that stored it."""
 
 
 class Stopping:
@@ -124,16 +124,19 @@ class Stopping:
         self._publish(halt)
 
     def _stored(self, drive: Drive) -> None:
-        """Write the whole stop again for a drive that stored it; its form now ends that first."""
+        """Write the whole stop again for a drive that stored it; its form now ends that first.
+
+        Only its own: the frames for the others go on, and each of several such drives has the end of its download.
+        """
         halt = next((each for each in reversed(self._unconfirmed) if drive in each.affected), None)
         if halt is None:
             halt = self.halt([drive])
             self.halted(halt)
-        elif drive.programming and halt.stored < AGAIN:
-            halt.stored += 1
+        elif drive.programming and halt.stored.count(drive) < AGAIN:
+            halt.stored.append(drive)
             text = f"{drive.shown}: it stored the stop; its download is ended and the whole stop sent again"
             self._link.notify(text, warning=True)
-            self._repeat(halt)
+            self._repeat(Halt(halt.link, halt.at, halt.number, False, (drive,), trouble=halt.trouble))
 
     def _superseded(self, halt: Halt) -> bool:
         """Whether a later stop of the whole link confirms it."""

@@ -199,6 +199,19 @@ async def test_a_module_that_stores_the_stop_gets_the_end_of_its_download_and_th
     assert any("1: stopped, velocity 0" in text for text in told) and not module(session).program.storing
 
 
+async def test_two_modules_that_store_the_stop_both_get_the_end_of_their_download_and_the_whole_stop(session):
+    await say(session, "@slide:1 ROR 0, 5000", "@slide:7 ROR 0, 5000")
+    floors = [each for floor in session.cells.values() for each in floor.floor.drives]
+    both = list({each.spec.name: each.device for each in floors if each.bus == "slide"}.values())
+    for device in both:
+        device.program.download(0)
+    session.stop("Ctrl+X")
+    told = await confirmed(session)
+    assert [name for name in "17" if any(f"{name}: stopped, velocity 0" in text for text in told)] == ["1", "7"], told
+    assert not any(device.program.storing or device.motor.parameters[2] for device in both)
+    assert [[call.command for call in device.program.memory] for device in both] == [[3], [3]]
+
+
 async def test_nothing_but_the_lines_of_a_download_goes_to_its_module(session):
     bus = session.buses["slide"]
     polling = bus.telemetry.subscribe(("1", "7"), 0.05)
