@@ -17,6 +17,7 @@ import subprocess
 import sys
 import tempfile
 import time
+from collections.abc import Iterator
 
 from transports.base import Transport, Unreachable
 from transports.descriptor import DescriptorPipe
@@ -142,6 +143,16 @@ _PREFIX = re.compile(r"multidrop: |\S+ \S+ socat\[\d+\] [A-Z] ")
 """The beginning of each line of the far side."""
 
 
+@contextlib.contextmanager
+def _pipe_signal_open() -> Iterator[None]:
+    """Let SIGPIPE through to a program that starts here: it inherits the mask of this thread, which may block it."""
+    before = signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGPIPE})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
 class SshSession:
     """A running `ssh` with a socket to it. Its start may block; raises Unreachable."""
 
@@ -153,7 +164,7 @@ class SshSession:
                 self._socket, theirs = socket.socketpair()
                 failing.enter_context(self._socket)
                 self._words = failing.enter_context(tempfile.TemporaryFile())
-                with theirs:
+                with theirs, _pipe_signal_open():
                     self._process = subprocess.Popen(
                         arguments(far, baud, way),
                         stdin=theirs.fileno(),

@@ -19,6 +19,7 @@ import multidrop
 from multidrop.__main__ import main
 from shell.connect.settings import Settings
 from shell.session import Session
+from shell.signals import early_ends
 from tests.support.ssh_server import fake_ssh, far_programs, script, ssh_server
 from tests.support.until import until
 from transports import Limited, Transport, TransportLost, Unreachable
@@ -84,6 +85,15 @@ def running(file: Path) -> bool:
         return Path(f"/proc/{int(file.read_text())}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
     except (OSError, ValueError):
         return False
+
+
+@pytest.mark.process
+@pytest.mark.skipif(sys.platform != "linux", reason="reads signal masks in /proc")
+async def test_ssh_does_not_inherit_that_a_script_blocks_sigpipe(tmp_path: Path, monkeypatch) -> None:
+    body = "exec grep SigBlk /proc/self/status >&2"
+    monkeypatch.setenv("PATH", fake_ssh(tmp_path / "bin", body))
+    with early_ends(), pytest.raises(Unreachable, match="SigBlk: 0000000000000000"):
+        await open_ssh(FarPort("pc", "/dev/tty9"))
 
 
 FAILURES = [
