@@ -230,7 +230,7 @@ class Family(Generic[S]):
     perform: Callable[[S, str], Printed]
     """Carry out a typed line, and make sure of the outcome."""
     check: Callable[[S, str], object]
-    """Raise Inexpressible for a typed line that is refused before anything of it is sent."""
+    """Raise Inexpressible for a line that is wrong in the language; a script is checked by it before its first line."""
     motion: Callable[[S, Priority], Procedure[tuple[Motion, ...]]]
     """Position and velocity of every axis, in as few bytes as the language allows.
 

@@ -31,7 +31,7 @@ MCODE = Family(
     new_state=MCodeState,
     identify=identify,
     perform=operations.perform,
-    check=operations.parsed,
+    check=operations.check,
     motion=operations.motion,
     moving=partial(operations.flag, name="MV"),
     busy=partial(operations.flag, name="BY"),

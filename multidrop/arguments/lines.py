@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import os
 
 from multidrop.arguments import parts
 
@@ -54,7 +53,7 @@ def sim(parser: argparse.ArgumentParser) -> None:
         metavar="PATH",
         action="append",
         default=[],
-        type=_existing,
+        type=_allowed,
         help="let paths of the cell lead there, too: a file or a folder outside its own; may be repeated",
     )
     parser.add_argument("--json", action="store_true", help="print the endpoints as JSON objects, one a line")
@@ -122,9 +121,9 @@ def _searched(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--json", action="store_true", help="print one JSON object a drive")
 
 
-def _existing(text: str) -> str:
-    if not os.path.exists(text):  # an empty one, too: it would allow the current folder
-        raise argparse.ArgumentTypeError(f"{text!r} does not exist")
+def _allowed(text: str) -> str:
+    if not text:
+        raise argparse.ArgumentTypeError("an empty path would allow the current folder; name the path")
     return text
 
 

@@ -114,15 +114,13 @@ async def test_a_line_for_the_program_is_refused_too(tmp_path) -> None:
         assert b"200" not in shop.written("press")
 
 
-@for_each(
-    "wrong", ["@a MA 200,000", "@a MA {FAR}", "@stages:00 X200,000", "@a MR 5\u00b0", "@lab:1 MVP ABS, 0, 200,000"]
-)
+@for_each("wrong", ["@a MA 200,000", "@a MA {FAR}", "@stages:00 X200,000", "@lab:1 MVP ABS, 0, 200,000"])
 @in_virtual_time
 async def test_a_line_that_no_drive_gets_is_found_before_the_script_moves_anything(tmp_path, wrong: str) -> None:
     (tmp_path / "s.txt").write_text(f"@a MR 51200\n/if 1 == 1\n  {wrong}\n/end\n", encoding="utf-8")
     async with CellSession(tmp_path, bus("press", party("a")), bus("stages", pmx("00")), bus("lab", MODULE)) as shop:
         script = read_script(str(tmp_path / "s.txt"), {"FAR": "200,000"})
-        with pytest.raises(Diagnostic, match=r"s.txt:3: .*nothing was sent|s.txt:3: .*printable ASCII"):
+        with pytest.raises(Diagnostic, match=r"s.txt:3: .*nothing was sent"):
             await run_script(shop.session, shop.session, script)
         macro = Macro("go", (Step(0.0, "@a MR 51200"), Step(0.0, wrong)))
         with pytest.raises(Diagnostic, match="go, step 2: "):

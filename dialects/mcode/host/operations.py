@@ -33,7 +33,8 @@ def perform(state: MCodeState, text: str) -> Procedure[tuple[str, ...]]:
 
     Raises Refused, NoAnswer, Stopped or Inexpressible.
     """
-    request = parsed(state, text)
+    check(state, text)
+    request = state.codec.request(state.address, text)
     if state.address in GLOBAL:
         yield from _broadcast(state, request)
         return ()
@@ -49,13 +50,12 @@ def perform(state: MCodeState, text: str) -> Procedure[tuple[str, ...]]:
     return (yield from immediate(state, request))
 
 
-def parsed(state: MCodeState, text: str) -> Request:
-    """Build the request for a typed line. Raises Inexpressible for a line that no drive gets."""
+def check(state: MCodeState, text: str) -> None:
+    """Raise Inexpressible for a line with a number in groups of digits."""
     try:
         grammar.check_groups(text)
     except grammar.LineError as error:
         raise Inexpressible(f"'{text}': {error.why}; nothing was sent") from None
-    return state.codec.request(state.address, text)
 
 
 def immediate(state: MCodeState, request: Request) -> Procedure[tuple[str, ...]]:

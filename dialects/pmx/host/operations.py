@@ -23,18 +23,18 @@ POINTS = (("DI", "inputs on"), ("DO", "outputs on"), ("EO", "motor drivers on"))
 
 def perform(known: PmxState, text: str) -> Procedure[tuple[str, ...]]:
     """Send a command as typed; return the printed lines. Raises Refused, NoAnswer, Stopped or Inexpressible."""
-    reply = yield from answered(known, parsed(known, text))
+    check(known, text)
+    reply = yield from answered(known, known.codec.request(known.address, text))
     name, sets, _ = text.strip().partition("=")
     if sets and name in LATER:
         known.remark(f"{who(known)}: {name} acts after STORE and a power cycle")
     return () if reply.text == OK else reply.lines
 
 
-def parsed(known: PmxState, text: str) -> Request:
-    """Build the request for a command. Raises Inexpressible for one that no controller gets."""
+def check(known: PmxState, text: str) -> None:
+    """Raise Inexpressible for a command with a number in groups of digits."""
     if wrong := grouped(text):
         raise Inexpressible(f"'{text}': {wrong}; nothing was sent")
-    return known.codec.request(known.address, text)
 
 
 def motion(known: PmxState, priority: Priority) -> Procedure[tuple[Motion, ...]]:
