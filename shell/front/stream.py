@@ -24,9 +24,12 @@ AHEAD = 4
 
 
 async def run_lines(session: Session, lines: Iterable[str]) -> None:
-    """Run lines from the command line in turn. Raises the first failure."""
+    """Run lines from the command line in turn. Raises the first failure, and the loss of a bus that they went to."""
     for line in lines:
         await session.run(line)
+        for name in sorted({bus for bus, _ in session.addressed} & session.buses.keys()):
+            if (loss := session.buses[name].link.lost) is not None:  # while no line used it: in a /sleep
+                raise loss.again()
         if session.quitting:
             return
 

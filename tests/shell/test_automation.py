@@ -162,6 +162,15 @@ async def test_what_could_not_be_reached_is_named(tmp_path):
 
 
 @in_virtual_time
+async def test_lines_do_not_end_well_where_their_bus_was_lost_in_a_pause(tmp_path):
+    async with CellSession(tmp_path, *FLOOR) as shop:
+        asyncio.get_running_loop().call_later(1.0, shop.world, "/sim unplug press")
+        with pytest.raises(TransportLost):
+            await sent(shop.session, GO["press:a"], "/sleep 6")
+        assert "press: stop not sent (lost)" in shop.warned()[-1]
+
+
+@in_virtual_time
 async def test_an_automation_that_ends_well_leaves_what_it_moved(tmp_path):
     async with CellSession(tmp_path, *FLOOR) as shop:
         await sent(shop.session, *GO.values())
