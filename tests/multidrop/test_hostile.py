@@ -3,6 +3,7 @@
 import io
 import json
 import sys
+import time
 
 import pexpect
 import pyte
@@ -37,26 +38,40 @@ def test_a_drive_is_shown_and_not_obeyed(multidrop, hostile_url, tmp_path, door)
 @pytest.mark.process
 @pytest.mark.parametrize("door", ["tui", "shell"])
 def test_a_drive_is_shown_on_a_terminal_and_not_obeyed(hostile_url, tmp_path, door):  # noqa: F811
+    tries = (conversation(hostile_url, tmp_path, door) for _ in range(3))
+    seen = next(filter(None, tries))
+    assert rb"\x1b]52" in seen
+    assert [each for each in ACTING if each in seen] == []
+
+
+def conversation(url, folder, door):
+    """All bytes that a terminal got in a short session; None where a line that was typed at its start was not shown.
+
+    On a busy machine a screen has twice shown nothing of what was typed right after its start; why is not known.
+    """
     seen, screen = io.BytesIO(), pyte.Screen(200, 40)
-    command = ["-m", "multidrop", door, hostile_url]
-    child = pexpect.spawn(sys.executable, command, env=environment(tmp_path), dimensions=(40, 200), timeout=PATIENCE)
+    command = ["-m", "multidrop", door, url]
+    child = pexpect.spawn(sys.executable, command, env=environment(folder), dimensions=(40, 200), timeout=PATIENCE)
     child.logfile_read = seen
     terminal = pyte.ByteStream(screen)
 
     def shows(text):
+        deadline = time.monotonic() + PATIENCE / 2
         while not any(text in row for row in screen.display):  # the bytes of a word may leave in pieces
+            if time.monotonic() > deadline:
+                return False
             terminal.feed(child.read_nonblocking(65536, PATIENCE))
+        return True
 
-    shows("LMDCM")
-    child.send("PR P\r")
-    shows("51200")
-    child.send("/drives\r/status\r")
-    shows("/status")
+    for typed, shown in (("", "LMDCM"), ("PR P\r", "51200"), ("/drives\r/status\r", "/status")):
+        child.send(typed)
+        if not shows(shown):
+            child.close(force=True)
+            return None
     child.send("/quit\r")
     child.expect(pexpect.EOF)
     child.close()
-    assert rb"\x1b]52" in seen.getvalue()
-    assert [each for each in ACTING if each in seen.getvalue()] == []
+    return seen.getvalue()
 
 
 FILES = {
