@@ -48,8 +48,9 @@ types-darwin types-win32: types-%: $(VENV)/.dev
 contracts: $(VENV)/.dev
 	$(BIN)/lint-imports
 
+# What failed beside others runs once more alone (docs/decisions/0050); the first run has named it: it is a defect.
 measured: $(VENV)/.dev
-	$(PYTEST) --cov --cov-report=
+	$(PYTEST) --cov --cov-report= || { [ $$? -eq 1 ] && $(BIN)/python -m pytest --last-failed --last-failed-no-failures none; }
 
 coverage: measured
 	$(BIN)/coverage report

@@ -66,6 +66,11 @@ async def until(pilot: Pilot[int], true: Callable[[], bool]) -> None:
             pilot.app.tick()  # type: ignore[attr-defined]
 
 
+async def asked(pilot: Pilot[int]) -> None:
+    """Wait for a question that has the focus: it takes no key before."""
+    await until(pilot, lambda: isinstance(pilot.app.screen, Confirm) and pilot.app.screen.focused is not None)
+
+
 def typed(pilot: Pilot[int], *pieces: str) -> None:
     """Keys by name and texts as pastes, without a pause between them."""
     for piece in pieces:
@@ -160,7 +165,7 @@ async def test_a_copy_of_an_earlier_session_is_offered(folder: Path) -> None:
     Drafts(folder / "state").keep(Draft("a.mxt", "' of yesterday\n", "2026-11-21 22:10"))
     async with page(folder, file="") as pilot:
         typed(pilot, "a.mxt", "enter")
-        await until(pilot, lambda: isinstance(pilot.app.screen, Confirm))
+        await asked(pilot)
         typed(pilot, "enter")
         await until(pilot, lambda: shown(pilot).editor.text == "' of yesterday\n")
         assert (folder / "a.mxt").read_text() == TEXT
@@ -171,12 +176,12 @@ async def test_a_file_that_changed_meanwhile_is_asked_about(folder: Path) -> Non
         typed(pilot, "ctrl+end", "' mine")
         (folder / "a.mxt").write_text("another's\n")
         typed(pilot, "ctrl+s")
-        await until(pilot, lambda: isinstance(pilot.app.screen, Confirm))
+        await asked(pilot)
         typed(pilot, "enter")
         await settle(pilot)
         assert (folder / "a.mxt").read_text() == "another's\n"
         typed(pilot, "ctrl+s")
-        await until(pilot, lambda: isinstance(pilot.app.screen, Confirm))
+        await asked(pilot)
         typed(pilot, "down", "enter")
         await until(pilot, lambda: (folder / "a.mxt").read_text() == TEXT + "' mine")
 
@@ -185,7 +190,7 @@ async def test_quitting_names_what_is_not_saved(folder: Path) -> None:
     async with page(folder) as pilot:
         typed(pilot, "ctrl+end", "' mine")
         typed(pilot, "ctrl+q")
-        await until(pilot, lambda: isinstance(pilot.app.screen, Confirm))
+        await asked(pilot)
         assert isinstance(pilot.app.screen, Confirm)
         assert any("a.mxt is not saved" in line for line in pilot.app.screen.lines)
 
@@ -193,10 +198,10 @@ async def test_quitting_names_what_is_not_saved(folder: Path) -> None:
 async def test_a_download_is_a_typed_line_after_a_question_and_saves_before(folder: Path) -> None:
     async with page(folder) as pilot:
         typed(pilot, "ctrl+end", "' mine", "ctrl+d")
-        await until(pilot, lambda: isinstance(pilot.app.screen, Confirm))
+        await asked(pilot)
         typed(pilot, "escape", "ctrl+r", "escape", "ctrl+d")
         await settle(pilot)
-        await until(pilot, lambda: isinstance(pilot.app.screen, Confirm))
+        await asked(pilot)
         assert sent(pilot) == [] and (folder / "a.mxt").read_text() == TEXT
         typed(pilot, "enter")
         await until(pilot, lambda: sent(pilot) == ["/download a.mxt press:a"])
