@@ -62,6 +62,17 @@ async def test_who_looks_back_is_not_disturbed_and_is_told_of_more() -> None:
         assert app.page.sight.following
 
 
+async def test_lines_that_come_before_the_first_layout_are_taken() -> None:
+    """A line that is typed right at the start of the screen comes before the view has a size."""
+    app = Reader()
+    app.CSS = "Transcript { height: 0; }"
+    async with app.run_test(size=(40, 5)) as pilot:
+        app.page.extend(numbered(range(4)))
+        assert "".join(await shown(pilot, app.page)) == ""
+        app.page.styles.height = 5
+        assert (await shown(pilot, app.page))[-1].endswith("line 3")
+
+
 async def test_pages_overlap_so_that_no_line_is_missed() -> None:
     app = Reader()
     async with app.run_test(size=(40, 6)) as pilot:

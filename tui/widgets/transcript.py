@@ -161,7 +161,7 @@ class Transcript(Lines, can_focus=False):
             made = before.get(number) or self.rows_of(self.records[number], above, size.width)
             self._made[number] = made
             rows.extend(reversed(self._decorated(number, made)))
-        sight.top = numbers[place] if len(numbers) else 0
+        sight.top = numbers[min(place, len(numbers) - 1)] if len(numbers) else 0  # a view without rows shows none
         rows.reverse()
         rows = rows[max(0, len(rows) - height) :]
         blank: list[Row] = [()] * (height - len(rows)) if foot else []
