@@ -17,9 +17,9 @@ sys.path.insert(0, str(Path(__file__).parent.parent))
 
 from report import Row, compared, main
 
-from simulator.cell.spec import DriveSpec
-from simulator.lexium.device import MCodeDevice
-from simulator.world import World
+from multidrop.simulator.cell.spec import DriveSpec
+from multidrop.simulator.lexium.device import MCodeDevice
+from multidrop.simulator.world import World
 
 AIM = 300_000
 ROUNDS = 5

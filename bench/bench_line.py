@@ -22,11 +22,11 @@ sys.path.insert(0, str(Path(__file__).parent.parent))
 import serial
 from report import Row, compared, main
 
-from dialects.mcode.host.codec import MCode
-from drives.bus import Bus
-from transports import Transport
-from transports.serial_port import open_serial
-from transports.sockets import open_tcp
+from multidrop.dialects.mcode.host.codec import MCode
+from multidrop.drives.bus import Bus
+from multidrop.transports import Transport
+from multidrop.transports.serial_port import open_serial
+from multidrop.transports.sockets import open_tcp
 
 ROUNDS = 7
 TRIPS = 2000

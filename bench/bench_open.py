@@ -27,12 +27,12 @@ import serial
 from report import Row, compared, main
 from sim_process import ROOT, all_served, served
 
-from dialects import Hints
-from drives.bus import Bus
-from drives.events import BusEvent, Traffic
-from shell.connect.settings import Settings
-from shell.session import Session
-from transports.serial_port import open_serial
+from multidrop.dialects import Hints
+from multidrop.drives.bus import Bus
+from multidrop.drives.events import BusEvent, Traffic
+from multidrop.shell.connect.settings import Settings
+from multidrop.shell.session import Session
+from multidrop.transports.serial_port import open_serial
 
 NAMES = string.ascii_letters + string.digits
 BUS = '[[bus]]\nname = "line{number}"\nserve = ["pty:line{number}.tty"]\nbaud = {baud}\n'

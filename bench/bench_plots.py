@@ -21,16 +21,16 @@ sys.path.insert(0, str(Path(__file__).parent.parent))
 from report import Row, alone, compared, main
 from textual.app import App, ComposeResult
 
-from drives.events import Sample
-from shell.events import OnBus
-from shell.roles import Series
+from multidrop.drives.events import Sample
+from multidrop.shell.events import OnBus
+from multidrop.shell.roles import Series
+from multidrop.tui.panels.glance import glances_of
+from multidrop.tui.panels.plot import plot_rows
+from multidrop.tui.panels.view import View
+from multidrop.tui.screen_model import ScreenModel
+from multidrop.tui.widgets.lines import Lines, Roles
+from multidrop.tui.widgets.theme import DARK, DEFAULTS
 from tests.support.fake_session import FakeSession, demo_session
-from tui.panels.glance import glances_of
-from tui.panels.plot import plot_rows
-from tui.panels.view import View
-from tui.screen_model import ScreenModel
-from tui.widgets.lines import Lines, Roles
-from tui.widgets.theme import DARK, DEFAULTS
 
 AIM = 0.05
 """The share of a core."""

@@ -28,11 +28,11 @@ import paho.mqtt.client as mqtt
 from report import Row, compared, main
 from sim_process import ROOT, all_served, busy
 
-from shell.connect.mqtt_settings import MqttSettings
-from shell.publishing.backlog import Backlog, Message
-from shell.publishing.broker import WINDOW, Connection
-from shell.publishing.publisher import Publisher
-from shell.publishing.target import parse_target
+from multidrop.shell.connect.mqtt_settings import MqttSettings
+from multidrop.shell.publishing.backlog import Backlog, Message
+from multidrop.shell.publishing.broker import WINDOW, Connection
+from multidrop.shell.publishing.publisher import Publisher
+from multidrop.shell.publishing.target import parse_target
 
 MOSQUITTO = shutil.which("mosquitto", path=f"{os.environ.get('PATH', '')}:/usr/sbin") or ""
 NAMES = "abc"

@@ -25,11 +25,11 @@ sys.path.insert(0, str(Path(__file__).parent.parent))
 from bench_line import ANSWER, FRAME, PEER, REQUEST, timed
 from report import Row, alone, compared, main
 
-from drives.bus import Bus
+from multidrop.drives.bus import Bus
+from multidrop.transports.far_port import RELAY, SOCAT, FarPort
+from multidrop.transports.serial_posix import lock_owner
+from multidrop.transports.ssh import open_ssh
 from tests.support.ssh_server import SSH, SSHD, ssh_server
-from transports.far_port import RELAY, SOCAT, FarPort
-from transports.serial_posix import lock_owner
-from transports.ssh import open_ssh
 
 ROUNDS = 5
 TRIPS = 1000

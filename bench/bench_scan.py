@@ -22,13 +22,13 @@ import serial
 from report import Row, compared, main
 from sim_process import served
 
-from dialects.mcode.host.checksum import sealed
-from dialects.mcode.manual.device_name import NAMES
-from shell.connect.opening import open_buses
-from shell.connect.settings import Settings
-from shell.connect.urls import parse
-from shell.scanning import NothingFound, Scanning
-from shell.session import Session
+from multidrop.dialects.mcode.host.checksum import sealed
+from multidrop.dialects.mcode.manual.device_name import NAMES
+from multidrop.shell.connect.opening import open_buses
+from multidrop.shell.connect.settings import Settings
+from multidrop.shell.connect.urls import parse
+from multidrop.shell.scanning import NothingFound, Scanning
+from multidrop.shell.session import Session
 
 CELL = '[[bus]]\nname = "line"\nserve = ["pty:line.tty"]\nbaud = {baud}\n' + "".join(
     f'[[bus.drive]]\npersonality = "PMX"\nname = "{number}"\n' for number in ("00", "01")

@@ -27,14 +27,14 @@ import serial
 from report import Row, compared, main
 from sim_process import served
 
-from dialects.family import Hints
-from dialects.mcode.family import MCODE
-from dialects.mcode.host.codec import MCode
-from dialects.mcode.manual import program_file
-from drives.bus import Bus
-from drives.drive import Drive
-from drives.events import BusEvent, Ended
-from transports.serial_port import open_serial
+from multidrop.dialects.family import Hints
+from multidrop.dialects.mcode.family import MCODE
+from multidrop.dialects.mcode.host.codec import MCode
+from multidrop.dialects.mcode.manual import program_file
+from multidrop.drives.bus import Bus
+from multidrop.drives.drive import Drive
+from multidrop.drives.events import BusEvent, Ended
+from multidrop.transports.serial_port import open_serial
 
 AIM = 1.2
 ROUNDS = {9600: 3, 115200: 7}

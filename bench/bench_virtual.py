@@ -15,9 +15,9 @@ sys.path.insert(0, str(Path(__file__).parent.parent))
 
 from report import Row, alone, main
 
-from dialects.mcode.manual import program_file
-from simulator.cell.spec import DriveSpec, WorldSpec
-from simulator.lexium.program_run import Printed, ProgramRun, Summary
+from multidrop.dialects.mcode.manual import program_file
+from multidrop.simulator.cell.spec import DriveSpec, WorldSpec
+from multidrop.simulator.lexium.program_run import Printed, ProgramRun, Summary
 
 AIM = 1.0
 MINUTES = 10

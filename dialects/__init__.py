@@ -7,14 +7,14 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from dialects.on_demand import imported
+from multidrop.dialects.on_demand import imported
 
 if TYPE_CHECKING:
-    from dialects.codec import Codec, Decoded, End, Kind, Priority, Procedure, Reply, Request, StopPiece
-    from dialects.errors import Diagnostic, DriveError, Inexpressible, NoAnswer, Refused, Stopped
-    from dialects.family import Family, Hints, Motion, Progress
-    from dialects.files import SourceLine
-    from dialects.state import DriveState, Owed
+    from multidrop.dialects.codec import Codec, Decoded, End, Kind, Priority, Procedure, Reply, Request, StopPiece
+    from multidrop.dialects.errors import Diagnostic, DriveError, Inexpressible, NoAnswer, Refused, Stopped
+    from multidrop.dialects.family import Family, Hints, Motion, Progress
+    from multidrop.dialects.files import SourceLine
+    from multidrop.dialects.state import DriveState, Owed
 
 _MODULES = {
     "codec": ("Codec", "Decoded", "End", "Kind", "Priority", "Procedure", "Reply", "Request", "StopPiece"),

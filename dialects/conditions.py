@@ -10,9 +10,9 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Generic, TypeVar
 
-from dialects.codec import Procedure
-from dialects.parameters import Value
-from dialects.state import DriveState
+from multidrop.dialects.codec import Procedure
+from multidrop.dialects.parameters import Value
+from multidrop.dialects.state import DriveState
 
 UNREAD = -1
 """An error is set, and to read its number would clear it."""

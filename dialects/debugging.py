@@ -6,9 +6,9 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Generic, NamedTuple, TypeVar
 
-from dialects.codec import Procedure
-from dialects.held import Held
-from dialects.state import DriveState
+from multidrop.dialects.codec import Procedure
+from multidrop.dialects.held import Held
+from multidrop.dialects.state import DriveState
 
 S = TypeVar("S", bound=DriveState)
 

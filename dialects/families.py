@@ -9,12 +9,12 @@ import os
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from dialects.on_demand import OnDemand
-from dialects.program_files import ProgramFiles
+from multidrop.dialects.on_demand import OnDemand
+from multidrop.dialects.program_files import ProgramFiles
 
 if TYPE_CHECKING:
-    from dialects.codec import Codec
-    from dialects.family import Family, Language
+    from multidrop.dialects.codec import Codec
+    from multidrop.dialects.family import Family, Language
 
 
 class Row(NamedTuple):
@@ -29,27 +29,27 @@ class Row(NamedTuple):
 
 TABLE: Mapping[str, Row] = {
     "mcode": Row(
-        "dialects.mcode.family:MCODE",
+        "multidrop.dialects.mcode.family:MCODE",
         files=ProgramFiles(
             "MCode",
             (".mxt", ".txt"),
-            "dialects.mcode.manual.program_checker",
-            "dialects.mcode.manual.editing",
+            "multidrop.dialects.mcode.manual.program_checker",
+            "multidrop.dialects.mcode.manual.editing",
             ("mcode", "mxt"),
         ),
     ),
-    "modbus": Row("dialects.modbus.family:MODBUS", scheme="modbus"),
+    "modbus": Row("multidrop.dialects.modbus.family:MODBUS", scheme="modbus"),
     "pmx": Row(
-        "dialects.pmx.family:PMX",
+        "multidrop.dialects.pmx.family:PMX",
         files=ProgramFiles(
             "A-SCRIPT",
             (".prg", ".asc"),
-            "dialects.pmx.manual.program_file",
-            "dialects.pmx.manual.editing",
+            "multidrop.dialects.pmx.manual.program_file",
+            "multidrop.dialects.pmx.manual.editing",
             ("ascript", "a-script", "pmx"),
         ),
     ),
-    "tmcl": Row("dialects.tmcl.family:TMCL"),
+    "tmcl": Row("multidrop.dialects.tmcl.family:TMCL"),
 }
 FAMILIES: Mapping[str, Family[Any]] = OnDemand({name: row.record for name, row in TABLE.items()})
 """By name. Nothing tries one family after another: a URL names the family, or the drives are `DEFAULT`."""

@@ -10,21 +10,21 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Generic, Protocol, TypeVar
 
-from dialects.codec import Codec, Priority, Procedure
-from dialects.files import SourceLine
-from dialects.guards import Guard
-from dialects.on_demand import imported_if
-from dialects.state import DriveState, Owed, Remembered
+from multidrop.dialects.codec import Codec, Priority, Procedure
+from multidrop.dialects.files import SourceLine
+from multidrop.dialects.guards import Guard
+from multidrop.dialects.on_demand import imported_if
+from multidrop.dialects.state import DriveState, Owed, Remembered
 
 if TYPE_CHECKING:
-    from dialects.conditions import Reader
-    from dialects.controls import Controls
-    from dialects.debugging import Debugging
-    from dialects.held import Difference, Held
-    from dialects.parameters import Parameters
-    from dialects.readings import Readings
-    from dialects.scanning import Scan
-    from dialects.snapshots import TakeSnapshot
+    from multidrop.dialects.conditions import Reader
+    from multidrop.dialects.controls import Controls
+    from multidrop.dialects.debugging import Debugging
+    from multidrop.dialects.held import Difference, Held
+    from multidrop.dialects.parameters import Parameters
+    from multidrop.dialects.readings import Readings
+    from multidrop.dialects.scanning import Scan
+    from multidrop.dialects.snapshots import TakeSnapshot
 
 
 @dataclass(frozen=True)

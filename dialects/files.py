@@ -12,7 +12,7 @@ from codecs import BOM_UTF8
 from collections.abc import Iterable, Iterator
 from typing import IO, TYPE_CHECKING, Any, Protocol
 
-from dialects.errors import Diagnostic
+from multidrop.dialects.errors import Diagnostic
 
 if TYPE_CHECKING:
     from pathlib import Path

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from dialects.errors import Refused
+from multidrop.dialects.errors import Refused
 
 LOCKED = "its program is locked (LK=1); LK=0 opens a lock that was not saved; CP opens any, and erases the program"
 

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 from math import isclose
 from typing import Generic, TypeVar
 
-from dialects.codec import Procedure
-from dialects.state import DriveState
+from multidrop.dialects.codec import Procedure
+from multidrop.dialects.state import DriveState
 
 Scalar = int | float | str
 Value = Scalar | tuple[Scalar, ...]

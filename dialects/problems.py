@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
-from dialects.errors import Diagnostic
+from multidrop.dialects.errors import Diagnostic
 
 
 class Problem(NamedTuple):

@@ -6,13 +6,13 @@ import importlib
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, NamedTuple, Protocol, cast
 
-from dialects.files import SourceLine
-from dialects.problems import Problem
+from multidrop.dialects.files import SourceLine
+from multidrop.dialects.problems import Problem
 
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from dialects.program_editing import EditingLanguage
+    from multidrop.dialects.program_editing import EditingLanguage
 
 
 class Part(NamedTuple):

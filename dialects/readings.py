@@ -6,8 +6,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Generic, TypeVar
 
-from dialects.codec import Priority, Procedure
-from dialects.state import DriveState
+from multidrop.dialects.codec import Priority, Procedure
+from multidrop.dialects.state import DriveState
 
 S = TypeVar("S", bound=DriveState)
 

@@ -7,9 +7,9 @@ from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import Protocol, TypeVar
 
-from dialects.codec import Procedure
-from dialects.parameters import Progress, Readings
-from dialects.state import DriveState
+from multidrop.dialects.codec import Procedure
+from multidrop.dialects.parameters import Progress, Readings
+from multidrop.dialects.state import DriveState
 
 S_contra = TypeVar("S_contra", bound=DriveState, contravariant=True)
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 
-from dialects.codec import Codec
+from multidrop.dialects.codec import Codec
 
 
 @dataclass(frozen=True)

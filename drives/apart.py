@@ -5,7 +5,7 @@ from __future__ import annotations
 import logging
 from types import TracebackType
 
-from transports import TransportLost
+from multidrop.transports import TransportLost
 
 LOG = logging.getLogger("multidrop")
 

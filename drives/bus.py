@@ -6,20 +6,20 @@ import asyncio
 from collections.abc import Callable, Iterable
 from typing import TypeVar
 
-from dialects import DriveState, Hints, Procedure
-from dialects.families import DEFAULT, FAMILIES
-from drives.conversations import Conversations
-from drives.drive import Drive
-from drives.events import BusEvent, Changed
-from drives.halt import Halt
-from drives.keeping import Keeper, NoKeeper
-from drives.line import Line
-from drives.link import Link, Reserved, loss_of
-from drives.roster import Roster
-from drives.search import Search
-from drives.stopping import Stopping
-from drives.telemetry import Telemetry
-from transports import Transport, TransportLost
+from multidrop.dialects import DriveState, Hints, Procedure
+from multidrop.dialects.families import DEFAULT, FAMILIES
+from multidrop.drives.conversations import Conversations
+from multidrop.drives.drive import Drive
+from multidrop.drives.events import BusEvent, Changed
+from multidrop.drives.halt import Halt
+from multidrop.drives.keeping import Keeper, NoKeeper
+from multidrop.drives.line import Line
+from multidrop.drives.link import Link, Reserved, loss_of
+from multidrop.drives.roster import Roster
+from multidrop.drives.search import Search
+from multidrop.drives.stopping import Stopping
+from multidrop.drives.telemetry import Telemetry
+from multidrop.transports import Transport, TransportLost
 
 T = TypeVar("T")
 

@@ -6,9 +6,9 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Generic, TypeVar
 
-from dialects import DriveState
-from drives.apart import apart
-from drives.events import Transaction
+from multidrop.dialects import DriveState
+from multidrop.drives.apart import apart
+from multidrop.drives.events import Transaction
 
 T = TypeVar("T")
 

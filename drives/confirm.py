@@ -11,11 +11,11 @@ import asyncio
 from collections.abc import Callable, Mapping, Sequence
 from typing import NamedTuple
 
-from dialects import DriveError, Motion, Priority, Stopped
-from drives.drive import Drive
-from drives.events import Sample, Transaction
-from drives.halt import Fate, Halt
-from transports import TransportLost
+from multidrop.dialects import DriveError, Motion, Priority, Stopped
+from multidrop.drives.drive import Drive
+from multidrop.drives.events import Sample, Transaction
+from multidrop.drives.halt import Fate, Halt
+from multidrop.transports import TransportLost
 
 TRIES = 3
 BETWEEN = 0.1

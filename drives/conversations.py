@@ -14,13 +14,13 @@ from dataclasses import replace
 from typing import Any, Generic, TypeVar
 from weakref import WeakKeyDictionary
 
-from dialects import DriveState, End, Kind, Owed, Procedure, Request, Stopped
-from drives.conclusions import Concluded, Outcome, Witnesses
-from drives.events import Transaction
-from drives.keeping import Keeper
-from drives.link import Link, LostInFlight
-from drives.procedure import ProcedureRunner
-from transports import TransportLost
+from multidrop.dialects import DriveState, End, Kind, Owed, Procedure, Request, Stopped
+from multidrop.drives.conclusions import Concluded, Outcome, Witnesses
+from multidrop.drives.events import Transaction
+from multidrop.drives.keeping import Keeper
+from multidrop.drives.link import Link, LostInFlight
+from multidrop.drives.procedure import ProcedureRunner
+from multidrop.transports import TransportLost
 
 T = TypeVar("T")
 OnEnded = Callable[[Transaction], None]

@@ -10,8 +10,8 @@ import re
 from collections import deque
 from collections.abc import Callable
 
-from dialects import Request
-from drives.doubt import LATE
+from multidrop.dialects import Request
+from multidrop.drives.doubt import LATE
 
 LASTS = 0.5
 """How long after the last byte of a stop its debris may come, s."""

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
-from dialects import End, Kind, Reply, Request
+from multidrop.dialects import End, Kind, Reply, Request
 
 LATE = 10.0
 """How long a missing reply may still come and be taken for another, s."""

@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol, TypeVar
 
-from dialects import (
+from multidrop.dialects import (
     Codec,
     DriveError,
     DriveState,
@@ -21,17 +21,17 @@ from dialects import (
     SourceLine,
     Stopped,
 )
-from dialects.families import family_of, program_languages
-from dialects.family import Programs
-from dialects.held import Held
-from dialects.parameters import Value
-from dialects.program_files import ProgramFiles
-from drives.conclusions import Outcome
-from drives.conversations import ASKING, Conversation, Conversations, OnEnded, OnOver, awaited
-from drives.events import Changed, Transaction
-from drives.keeping import GLOBAL
-from drives.link import Link
-from transports import TransportLost
+from multidrop.dialects.families import family_of, program_languages
+from multidrop.dialects.family import Programs
+from multidrop.dialects.held import Held
+from multidrop.dialects.parameters import Value
+from multidrop.dialects.program_files import ProgramFiles
+from multidrop.drives.conclusions import Outcome
+from multidrop.drives.conversations import ASKING, Conversation, Conversations, OnEnded, OnOver, awaited
+from multidrop.drives.events import Changed, Transaction
+from multidrop.drives.keeping import GLOBAL
+from multidrop.drives.link import Link
+from multidrop.transports import TransportLost
 
 T = TypeVar("T")
 REST = 0.05

@@ -7,9 +7,9 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from dialects import Reply, Request
-from dialects.conditions import Conditions
-from transports import TransportLost
+from multidrop.dialects import Reply, Request
+from multidrop.dialects.conditions import Conditions
+from multidrop.transports import TransportLost
 
 
 class Transaction(NamedTuple):

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from dialects import Kind, Reply, Request
-from drives.events import Transaction
+from multidrop.dialects import Kind, Reply, Request
+from multidrop.drives.events import Transaction
 
 TAIL = 0.05
 """Quiet time after which no more of an unterminated line is awaited, s."""

@@ -9,8 +9,8 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from enum import Enum
 
-from drives.drive import Drive
-from drives.link import Link
+from multidrop.drives.drive import Drive
+from multidrop.drives.link import Link
 
 
 class Fate(Enum):

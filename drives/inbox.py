@@ -9,9 +9,9 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
-from dialects import Codec, Kind, Request
-from drives.echo import LocalEcho
-from drives.flight import NEVER_QUIET, TAIL
+from multidrop.dialects import Codec, Kind, Request
+from multidrop.drives.echo import LocalEcho
+from multidrop.drives.flight import NEVER_QUIET, TAIL
 
 LONGEST_TAIL = 4096
 """Longest unsolicited line without an end, in characters; a longer one is published in pieces."""

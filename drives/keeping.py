@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Protocol
 
-from dialects import DriveState, Kind, Request
-from dialects.state import Remembered
+from multidrop.dialects import DriveState, Kind, Request
+from multidrop.dialects.state import Remembered
 
 GLOBAL = ("*", "^")
 """Addresses that several drives hear: all of them, and all that are queued (MCode QD=1)."""

@@ -20,12 +20,12 @@ from collections.abc import Container, Iterable, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from dialects import Codec, Decoded, End, Reply, Request, StopPiece
-from drives.doubt import Doubt
-from drives.events import Transaction, Unsolicited
-from drives.flight import NEVER_QUIET, Finished, Flight
-from drives.inbox import Inbox
-from drives.request_queue import RequestQueue
+from multidrop.dialects import Codec, Decoded, End, Reply, Request, StopPiece
+from multidrop.drives.doubt import Doubt
+from multidrop.drives.events import Transaction, Unsolicited
+from multidrop.drives.flight import NEVER_QUIET, Finished, Flight
+from multidrop.drives.inbox import Inbox
+from multidrop.drives.request_queue import RequestQueue
 
 QUIET = 0.1
 """Quiet time after which a recovering line is written to again, s."""

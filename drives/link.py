@@ -9,16 +9,16 @@ import asyncio
 from collections.abc import Callable, Container, Sequence
 from dataclasses import dataclass
 
-from dialects import End, Priority, Request, StopPiece
-from drives.alarm import Alarm
-from drives.apart import apart
-from drives.debris import Debris, Leftovers
-from drives.events import Changed, Ended, Lost, Notice, Sent, Traffic, Transaction, Unsolicited
-from drives.flight import Finished
-from drives.keeping import Departure, Keeper
-from drives.line import Line, Write
-from drives.news import News
-from transports import Preemptible, Transport, TransportLost
+from multidrop.dialects import End, Priority, Request, StopPiece
+from multidrop.drives.alarm import Alarm
+from multidrop.drives.apart import apart
+from multidrop.drives.debris import Debris, Leftovers
+from multidrop.drives.events import Changed, Ended, Lost, Notice, Sent, Traffic, Transaction, Unsolicited
+from multidrop.drives.flight import Finished
+from multidrop.drives.keeping import Departure, Keeper
+from multidrop.drives.line import Line, Write
+from multidrop.drives.news import News
+from multidrop.transports import Preemptible, Transport, TransportLost
 
 OnAnswer = Callable[[Transaction | TransportLost], None]
 """Called with the end of a request that was queued, in the turn of the event loop in which it ends."""

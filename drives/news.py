@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable
 
-from drives.apart import apart
-from drives.events import BusEvent
+from multidrop.drives.apart import apart
+from multidrop.drives.events import BusEvent
 
 Watcher = Callable[[BusEvent], None]
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Generic, TypeVar
 
-from dialects import Procedure, Reply, Request
+from multidrop.dialects import Procedure, Reply, Request
 
 T = TypeVar("T")
 

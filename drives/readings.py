@@ -11,13 +11,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from dialects import DriveError, End, NoAnswer, Priority, Refused
-from drives.conclusions import Outcome
-from drives.conversations import Conversation
-from drives.events import Transaction, Valued
-from drives.roster import PrintWait, Roster
-from drives.subscriptions import Subscription, Subscriptions
-from transports import TransportLost
+from multidrop.dialects import DriveError, End, NoAnswer, Priority, Refused
+from multidrop.drives.conclusions import Outcome
+from multidrop.drives.conversations import Conversation
+from multidrop.drives.events import Transaction, Valued
+from multidrop.drives.roster import PrintWait, Roster
+from multidrop.drives.subscriptions import Subscription, Subscriptions
+from multidrop.transports import TransportLost
 
 USUAL = 0.05
 """Default period of a value, s."""

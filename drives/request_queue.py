@@ -6,7 +6,7 @@ from bisect import insort
 from collections.abc import Container, Sequence
 from typing import NamedTuple
 
-from dialects import Priority, Request
+from multidrop.dialects import Priority, Request
 
 
 class Waiting(NamedTuple):

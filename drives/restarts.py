@@ -15,12 +15,12 @@ from collections.abc import Coroutine, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from dialects import DriveError, NoAnswer
-from dialects.parameters import Value
-from drives.apart import apart
-from drives.drive import Drive, still
-from drives.link import Link
-from transports import TransportLost
+from multidrop.dialects import DriveError, NoAnswer
+from multidrop.dialects.parameters import Value
+from multidrop.drives.apart import apart
+from multidrop.drives.drive import Drive, still
+from multidrop.drives.link import Link
+from multidrop.transports import TransportLost
 
 PAUSE = 0.25
 """Seconds between two looks at a line that is away, or at a drive that homes."""

@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Sequence
 from typing import Any
 
-from dialects import DriveState, Family
-from dialects.families import family_of
-from drives.conversations import Conversations
-from drives.drive import Drive
-from drives.keeping import GLOBAL
-from drives.link import Link
-from drives.restarts import Restarts
+from multidrop.dialects import DriveState, Family
+from multidrop.dialects.families import family_of
+from multidrop.drives.conversations import Conversations
+from multidrop.drives.drive import Drive
+from multidrop.drives.keeping import GLOBAL
+from multidrop.drives.link import Link
+from multidrop.drives.restarts import Restarts
 
 PRINT_QUIET = 0.1
 """Quiet time after a print before the next poll of a party line, s."""

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from dialects import DriveState, Hints, NoAnswer
-from dialects.families import FAMILIES
-from drives.conversations import Conversations
-from drives.keeping import Keeper
-from drives.roster import Roster
+from multidrop.dialects import DriveState, Hints, NoAnswer
+from multidrop.dialects.families import FAMILIES
+from multidrop.drives.conversations import Conversations
+from multidrop.drives.keeping import Keeper
+from multidrop.drives.roster import Roster
 
 
 class Search:

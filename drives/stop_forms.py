@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-from dialects import Codec, StopPiece
-from drives.apart import apart
-from drives.drive import Drive
-from drives.link import WrittenStop
-from drives.roster import Roster
+from multidrop.dialects import Codec, StopPiece
+from multidrop.drives.apart import apart
+from multidrop.drives.drive import Drive
+from multidrop.drives.link import WrittenStop
+from multidrop.drives.roster import Roster
 
 
 @dataclass(frozen=True)

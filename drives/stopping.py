@@ -9,15 +9,15 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Iterable
 
-from drives.apart import apart
-from drives.confirm import confirm_stop
-from drives.drive import Drive
-from drives.events import Traffic
-from drives.halt import Halt
-from drives.keeping import GLOBAL
-from drives.link import WrittenStop
-from drives.roster import Roster
-from drives.stop_forms import StopForms, stop_forms
+from multidrop.drives.apart import apart
+from multidrop.drives.confirm import confirm_stop
+from multidrop.drives.drive import Drive
+from multidrop.drives.events import Traffic
+from multidrop.drives.halt import Halt
+from multidrop.drives.keeping import GLOBAL
+from multidrop.drives.link import WrittenStop
+from multidrop.drives.roster import Roster
+from multidrop.drives.stop_forms import StopForms, stop_forms
 
 AGAIN = 3
 """How often a stop is written again for a drive that stored it."""

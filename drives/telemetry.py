@@ -13,16 +13,16 @@ from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
-from dialects import DriveError, Motion, NoAnswer, Priority
-from drives.apart import apart
-from drives.conclusions import Outcome
-from drives.conversations import Conversation
-from drives.events import Sample, Silent, Transaction
-from drives.readings import USUAL, Readings, Value
-from drives.roster import PrintWait, Roster
-from drives.subscriptions import Subscription, Subscriptions
-from drives.watching import PERIOD, Watching
-from transports import TransportLost
+from multidrop.dialects import DriveError, Motion, NoAnswer, Priority
+from multidrop.drives.apart import apart
+from multidrop.drives.conclusions import Outcome
+from multidrop.drives.conversations import Conversation
+from multidrop.drives.events import Sample, Silent, Transaction
+from multidrop.drives.readings import USUAL, Readings, Value
+from multidrop.drives.roster import PrintWait, Roster
+from multidrop.drives.subscriptions import Subscription, Subscriptions
+from multidrop.drives.watching import PERIOD, Watching
+from multidrop.transports import TransportLost
 
 MODEST = 0.02
 """Default period of a drive, s: a screen shows no more, and others need the wire."""

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import asyncio
 
-from drives.events import Traffic
-from drives.link import Link, loss_of
+from multidrop.drives.events import Traffic
+from multidrop.drives.link import Link, loss_of
 
 TERMINATORS = (b"\r", b"\n")
 

@@ -15,15 +15,15 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from dialects import DriveError, NoAnswer, Refused
-from dialects.conditions import Part, Reader
-from dialects.parameters import Value
-from drives.apart import apart
-from drives.drive import Drive, Running
-from drives.events import Conditioned
-from drives.roster import PrintWait, Roster
-from drives.subscriptions import Subscription, Subscriptions
-from transports import TransportLost
+from multidrop.dialects import DriveError, NoAnswer, Refused
+from multidrop.dialects.conditions import Part, Reader
+from multidrop.dialects.parameters import Value
+from multidrop.drives.apart import apart
+from multidrop.drives.drive import Drive, Running
+from multidrop.drives.events import Conditioned
+from multidrop.drives.roster import PrintWait, Roster
+from multidrop.drives.subscriptions import Subscription, Subscriptions
+from multidrop.transports import TransportLost
 
 PERIOD = 1.0
 """Default seconds between two readings of a drive."""

@@ -13,22 +13,22 @@ from collections.abc import Callable, Mapping
 from dataclasses import replace
 from itertools import islice
 
-from dialects import DriveError, Request
-from dialects.codec import Codec
-from dialects.errors import Diagnostic
-from dialects.families import FAMILIES, program_languages
-from dialects.mcode.host.codec import MCode
-from dialects.pmx.host.codec import Pmx
-from dialects.tmcl.host.codec import Tmcl
-from drives.line import Line
-from macros.model import Macro
-from macros.toml_edit import with_value
-from macros.toml_format import format_macro, parse_macro
-from macros.vendor import exported, imported
-from shell import lines
-from shell.connect import settings, urls
-from simulator import cells
-from simulator.floor import Floor
+from multidrop.dialects import DriveError, Request
+from multidrop.dialects.codec import Codec
+from multidrop.dialects.errors import Diagnostic
+from multidrop.dialects.families import FAMILIES, program_languages
+from multidrop.dialects.mcode.host.codec import MCode
+from multidrop.dialects.pmx.host.codec import Pmx
+from multidrop.dialects.tmcl.host.codec import Tmcl
+from multidrop.drives.line import Line
+from multidrop.macros.model import Macro
+from multidrop.macros.toml_edit import with_value
+from multidrop.macros.toml_format import format_macro, parse_macro
+from multidrop.macros.vendor import exported, imported
+from multidrop.shell import lines
+from multidrop.shell.connect import settings, urls
+from multidrop.simulator import cells
+from multidrop.simulator.floor import Floor
 
 Target = Callable[[bytes], object]
 REPLY_LIMIT = 1 << 20

@@ -1,7 +1,7 @@
 """Macros: record, store and play lines of text. The room knows times, files and a `run(line)` that it is given."""
 
-from macros.braces import escape, fill, value_names
-from macros.model import (
+from multidrop.macros.braces import escape, fill, value_names
+from multidrop.macros.model import (
     FIRST_PAGE,
     KEYS,
     Macro,
@@ -14,10 +14,10 @@ from macros.model import (
     missing,
     page_order,
 )
-from macros.parameters import Parameter
-from macros.recorder import Recorder
-from macros.store import MacroStore
-from macros.toml_format import format_macro, parse_macro
+from multidrop.macros.parameters import Parameter
+from multidrop.macros.recorder import Recorder
+from multidrop.macros.store import MacroStore
+from multidrop.macros.toml_format import format_macro, parse_macro
 
 __all__ = [
     "FIRST_PAGE",

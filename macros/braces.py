@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 
-from dialects.errors import Diagnostic
+from multidrop.dialects.errors import Diagnostic
 
 _BRACES = re.compile(r"\{\{|\}\}|\{(?P<name>[A-Za-z0-9_-]+)\}|[{}]")
 

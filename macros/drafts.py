@@ -9,11 +9,11 @@ import contextlib
 from pathlib import Path
 from typing import NamedTuple
 
-from dialects.errors import Diagnostic
-from dialects.files import utf8
-from macros.atomic import write_atomically
-from macros.store import MacroStore
-from macros.toml_format import parse_macro
+from multidrop.dialects.errors import Diagnostic
+from multidrop.dialects.files import utf8
+from multidrop.macros.atomic import write_atomically
+from multidrop.macros.store import MacroStore
+from multidrop.macros.toml_format import parse_macro
 
 MODE = 0o600
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from dialects.errors import Diagnostic
-from dialects.visible import visible
-from macros.store import MacroStore
+from multidrop.dialects.errors import Diagnostic
+from multidrop.dialects.visible import visible
+from multidrop.macros.store import MacroStore
 
 
 class Listing(NamedTuple):

@@ -7,10 +7,10 @@ import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
-from dialects.errors import Diagnostic
-from macros.braces import fill, value_names
-from macros.parameters import Parameter, begins_with_value, declared, plain, written
-from macros.places import At, nowhere
+from multidrop.dialects.errors import Diagnostic
+from multidrop.macros.braces import fill, value_names
+from multidrop.macros.parameters import Parameter, begins_with_value, declared, plain, written
+from multidrop.macros.places import At, nowhere
 
 NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_-]{0,63}")
 KEYS = tuple(f"F{number}" for number in range(2, 13))

@@ -10,8 +10,8 @@ import re
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 
-from dialects.errors import Diagnostic
-from dialects.visible import visible
+from multidrop.dialects.errors import Diagnostic
+from multidrop.dialects.visible import visible
 
 Value = int | float | str
 LARGEST = 10**15

@@ -12,8 +12,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import Protocol
 
-from macros.braces import escape
-from macros.model import Macro, Step
+from multidrop.macros.braces import escape
+from multidrop.macros.model import Macro, Step
 
 LONG = 1.0
 """The shortest pause in whose place a wait is offered, s."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable
 
-from dialects.files import split_lines
+from multidrop.dialects.files import split_lines
 
 At = Callable[[str, int], str]
 """The place of a key: at the top, or in the step of that number. An empty key is the step itself."""

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 
-from dialects.errors import Diagnostic
-from dialects.visible import visible
-from macros.braces import escape
-from macros.model import Macro, Step, check_name
-from macros.pauses import Observed, Offer, offers
+from multidrop.dialects.errors import Diagnostic
+from multidrop.dialects.visible import visible
+from multidrop.macros.braces import escape
+from multidrop.macros.model import Macro, Step, check_name
+from multidrop.macros.pauses import Observed, Offer, offers
 
 REPLIES = 20
 """The number of replies that a step keeps."""

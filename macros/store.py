@@ -11,12 +11,12 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from dialects.errors import Diagnostic
-from dialects.files import bounded, opened, utf8
-from macros.atomic import create_atomically, write_atomically
-from macros.model import FIRST_PAGE, KEYS, Macro, check, check_name, describe_clash, page_order
-from macros.toml_edit import with_values
-from macros.toml_format import format_macro, parse_macro
+from multidrop.dialects.errors import Diagnostic
+from multidrop.dialects.files import bounded, opened, utf8
+from multidrop.macros.atomic import create_atomically, write_atomically
+from multidrop.macros.model import FIRST_PAGE, KEYS, Macro, check, check_name, describe_clash, page_order
+from multidrop.macros.toml_edit import with_values
+from multidrop.macros.toml_format import format_macro, parse_macro
 
 
 class MacroStore:

@@ -6,8 +6,8 @@ import re
 import tomllib
 from collections.abc import Mapping
 
-from dialects.errors import Diagnostic
-from macros.toml_format import quoted
+from multidrop.dialects.errors import Diagnostic
+from multidrop.macros.toml_format import quoted
 
 MARK = "\ufeff"
 """Byte order mark, which some editors write at the start."""

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from dialects.errors import Diagnostic
-from dialects.files import toml_of
-from macros.model import FIRST_PAGE, Macro, Step, check
-from macros.places import At, in_text
+from multidrop.dialects.errors import Diagnostic
+from multidrop.dialects.files import toml_of
+from multidrop.macros.model import FIRST_PAGE, Macro, Step, check
+from multidrop.macros.places import At, in_text
 
 _HEAD = "# a macro of multidrop: lines as typed, with the seconds after the line before\n"
 _SHORT = {"\\": "\\\\", '"': '\\"', "\t": "\\t", "\n": "\\n", "\r": "\\r", "\b": "\\b", "\f": "\\f"}

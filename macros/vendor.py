@@ -10,11 +10,11 @@ import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 
-from dialects.errors import Diagnostic
-from dialects.files import lines_of
-from dialects.visible import visible
-from macros.braces import escape, fill
-from macros.model import KEYS, Macro, Step
+from multidrop.dialects.errors import Diagnostic
+from multidrop.dialects.files import lines_of
+from multidrop.dialects.visible import visible
+from multidrop.macros.braces import escape, fill
+from multidrop.macros.model import KEYS, Macro, Step
 
 MOST = 10_000
 """The largest number of lines that repetitions make of a string."""

@@ -13,20 +13,12 @@ from __future__ import annotations
 
 import importlib
 import os
-import sys
 
 TYPE_CHECKING = False  # `typing` is not imported: this file runs at the start of every command
 
 if TYPE_CHECKING:
     from typing import Any
 
-    from dialects.errors import Diagnostic as Diagnostic
-    from dialects.errors import Differs as Differs
-    from dialects.errors import DriveError as DriveError
-    from dialects.errors import Inexpressible as Inexpressible
-    from dialects.errors import NoAnswer as NoAnswer
-    from dialects.errors import Refused as Refused
-    from dialects.errors import Stopped as Stopped
     from multidrop.api.blocking import Session as Session
     from multidrop.api.blocking import connect as connect
     from multidrop.api.blocking_drive import Drive as Drive
@@ -42,13 +34,29 @@ if TYPE_CHECKING:
     from multidrop.api.simulated import simulate as simulate
     from multidrop.api.stopping import StopReport as StopReport
     from multidrop.api.telemetry import AsyncTelemetry as AsyncTelemetry
-    from transports import TransportLost as TransportLost
-    from transports import Unreachable as Unreachable
+    from multidrop.dialects.errors import Diagnostic as Diagnostic
+    from multidrop.dialects.errors import Differs as Differs
+    from multidrop.dialects.errors import DriveError as DriveError
+    from multidrop.dialects.errors import Inexpressible as Inexpressible
+    from multidrop.dialects.errors import NoAnswer as NoAnswer
+    from multidrop.dialects.errors import Refused as Refused
+    from multidrop.dialects.errors import Stopped as Stopped
+    from multidrop.transports import TransportLost as TransportLost
+    from multidrop.transports import Unreachable as Unreachable
 
 __version__ = "0.1.0"
-ROOMS = ("dialects", "transports", "drives", "simulator", "macros", "shell", "tui")
+if not os.path.isdir(os.path.join(__path__[0], "shell")):  # a checkout without symbolic links: the rooms lie beside
+    __path__.append(os.path.dirname(os.path.abspath(__path__[0])))
 _PLACES = {
-    "dialects.errors": ("Diagnostic", "Differs", "DriveError", "Inexpressible", "NoAnswer", "Refused", "Stopped"),
+    "multidrop.dialects.errors": (
+        "Diagnostic",
+        "Differs",
+        "DriveError",
+        "Inexpressible",
+        "NoAnswer",
+        "Refused",
+        "Stopped",
+    ),
     "multidrop.api.blocking": ("Session", "connect"),
     "multidrop.api.blocking_drive": ("Drive",),
     "multidrop.api.blocking_telemetry": ("Telemetry",),
@@ -91,32 +99,7 @@ __all__ = [
 ]
 
 
-def hidden(rooms: tuple[str, ...] = ROOMS) -> str:
-    """Return the remedy if a file of the same name hides one of the rooms; empty if none does.
-
-    The rooms are packages with plain names, so a `drives.py` beside a person's own script comes first.
-    """
-    home = os.path.dirname(os.path.dirname(os.path.realpath(__file__)))
-    for room in rooms:
-        origin = _origin(room)
-        if origin is None:
-            return f"the part of multidrop that is called {room} is missing: install multidrop again"
-        if os.path.dirname(os.path.realpath(origin)) != os.path.join(home, room):
-            return f"{origin} hides a part of multidrop that is called {room}: rename that file"
-    return ""
-
-
-def _origin(room: str) -> str | None:
-    """Find the file that an import of the room runs or ran. `importlib.util` does it in twice the time of a start."""
-    if room in sys.modules:
-        return getattr(sys.modules[room], "__file__", None)
-    specs = (finder.find_spec(room, None) for finder in sys.meta_path)
-    return next((spec.origin for spec in specs if spec is not None), None)
-
-
 def __getattr__(name: str) -> Any:
     if name not in _PUBLIC:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    if found := hidden():
-        raise ImportError(found, name=__name__)
     return getattr(importlib.import_module(_PUBLIC[name]), name)

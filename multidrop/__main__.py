@@ -9,8 +9,6 @@ import signal
 import sys
 from collections.abc import Sequence
 
-import multidrop
-
 PROTOCOLS = ("relay.run", "lsp.run")
 """Commands whose standard output is a connection: they notice its end themselves."""
 
@@ -32,17 +30,14 @@ def _guarded(arguments: Sequence[str], own: bool) -> int:
     """Run a command. `own`: it is the one of this process, whose reader is watched."""
     try:
         _complete_streams()
-        if hidden := multidrop.hidden():
-            sys.stderr.write(f"multidrop: {hidden}\n")
-            return 2
         code = _run(arguments, own)
         sys.stdout.flush()
     except KeyboardInterrupt:
-        from shell.output import INTERRUPTED, final
+        from multidrop.shell.output import INTERRUPTED, final
 
         return final(INTERRUPTED)
     except BrokenPipeError:  # the reader of the output is gone
-        from shell.output import READER_GONE, silence
+        from multidrop.shell.output import READER_GONE, silence
 
         silence(sys.stdout)
         return READER_GONE
@@ -69,7 +64,7 @@ def _run(arguments: Sequence[str], own: bool) -> int:
 
     try:
         chosen = parse(arguments)
-        from shell import outlets, output
+        from multidrop.shell import outlets, output
 
         outlets.as_json = getattr(chosen, "json", False) is True
         if own and chosen.run_by not in PROTOCOLS:
@@ -84,7 +79,7 @@ def _run(arguments: Sequence[str], own: bool) -> int:
 
 def _unwritten(problem: OSError | None = None) -> int:
     """Return 1, and report it, if output could not be written (a full disk)."""
-    from shell import output
+    from multidrop.shell import output
 
     if problem is not None:
         output.lose(sys.stdout, problem)

@@ -14,8 +14,8 @@ from collections.abc import Callable, Mapping, Sequence
 from importlib.machinery import PathFinder
 from typing import TYPE_CHECKING, Any, NoReturn
 
-from dialects.on_demand import imported
 from multidrop.command_table import COMMANDS, Command
+from multidrop.dialects.on_demand import imported
 
 if TYPE_CHECKING:
     from _typeshed import SupportsWrite
@@ -75,7 +75,7 @@ class Parser(argparse.ArgumentParser):
 
     def error(self, message: str) -> NoReturn:
         """Report wrong usage and where to look, and exit with 2."""
-        from shell.output import shortened, write
+        from multidrop.shell.output import shortened, write
 
         write(sys.stderr, f"{self.prog}: {shortened(' '.join(message.split()))}; see {self.prog} --help")
         self.exit(2)
@@ -174,7 +174,7 @@ def _add_arguments(parser: Parser, command: Command, given: Sequence[str]) -> No
 
 def urls() -> str:
     """Explain URLs."""
-    from shell.connect.url_forms import sentence
+    from multidrop.shell.connect.url_forms import sentence
 
     return URLS.format(sentence())
 

@@ -24,7 +24,7 @@ from argparse_manpage.manpage import Manpage
 import multidrop
 from multidrop.cli import build, urls
 from multidrop.commands.completion import FILES
-from shell.connect.url_forms import URL_FORMS
+from multidrop.shell.connect.url_forms import URL_FORMS
 
 SHIPPED = ROOT / "multidrop" / "shipped"
 PATHS = {"FILE", "SCRIPT", "CELL", "FILE.rrd|rerun+http://HOST:PORT/proxy"}

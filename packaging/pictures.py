@@ -24,11 +24,11 @@ sys.path.insert(0, str(ROOT))
 from textual import _time
 from textual.pilot import Pilot
 
-from shell.connect.settings import Settings
-from shell.session import Session
+from multidrop.shell.connect.settings import Settings
+from multidrop.shell.session import Session
+from multidrop.tui.app import MultidropApp
+from multidrop.tui.assist import ShellAssist
 from tests.support.virtual import VirtualLoop
-from tui.app import MultidropApp
-from tui.assist import ShellAssist
 
 PICTURES = ROOT / "docs" / "pictures"
 BEGUN = datetime(2026, 11, 2, 12, 40, 50)

@@ -6,10 +6,10 @@ import asyncio
 from collections.abc import Awaitable, Callable, Mapping, Sequence
 from dataclasses import dataclass
 
-from dialects import Diagnostic, Stopped
-from shell.channel import Channel
-from shell.events import By
-from shell.tasks import Tasks
+from multidrop.dialects import Diagnostic, Stopped
+from multidrop.shell.channel import Channel
+from multidrop.shell.events import By
+from multidrop.shell.tasks import Tasks
 
 Ask = Callable[[str], Awaitable[bool]]
 """Puts one question to a person, and returns whether the answer is yes. A stop cancels it."""

@@ -15,17 +15,17 @@ from contextvars import ContextVar
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
-from dialects import Diagnostic
-from drives.apart import apart
-from drives.halt import Halt
-from drives.keeping import GLOBAL
-from shell import stops
+from multidrop.dialects import Diagnostic
+from multidrop.drives.apart import apart
+from multidrop.drives.halt import Halt
+from multidrop.drives.keeping import GLOBAL
+from multidrop.shell import stops
 
 if TYPE_CHECKING:
-    from drives.bus import Bus
-    from drives.drive import Drive
-    from drives.link import Link
-    from shell.workspace import Workspace
+    from multidrop.drives.bus import Bus
+    from multidrop.drives.drive import Drive
+    from multidrop.drives.link import Link
+    from multidrop.shell.workspace import Workspace
 
 LINGER = 3.0
 """The longest wait for a stop to be sent and confirmed, s."""

@@ -12,9 +12,9 @@ from itertools import count
 from pathlib import Path
 from urllib.parse import quote
 
-from dialects import Diagnostic
-from dialects.files import why
-from macros.atomic import create_atomically
+from multidrop.dialects import Diagnostic
+from multidrop.dialects.files import why
+from multidrop.macros.atomic import create_atomically
 
 FOLDER = "backups"
 

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from functools import partial
 
-from dialects import Diagnostic
-from macros import Macro, Parameter, checked_values, missing
-from macros.parameters import written
-from shell.asking import Field
-from shell.workspace import Workspace
+from multidrop.dialects import Diagnostic
+from multidrop.macros import Macro, Parameter, checked_values, missing
+from multidrop.macros.parameters import written
+from multidrop.shell.asking import Field
+from multidrop.shell.workspace import Workspace
 
 
 async def settled(

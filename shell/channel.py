@@ -6,8 +6,8 @@ import asyncio
 from collections.abc import Callable
 from datetime import datetime, timedelta
 
-from drives.apart import apart
-from shell.events import Notified, Output, SessionEvent, StateChanged
+from multidrop.drives.apart import apart
+from multidrop.shell.events import Notified, Output, SessionEvent, StateChanged
 
 Callback = Callable[[SessionEvent], None]
 

@@ -10,12 +10,12 @@ import os
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from dialects import Diagnostic
-from dialects.families import program_language_of, program_languages
-from dialects.files import encoded_program_of, split_lines, why
-from dialects.problems import Problem, errors, in_order
-from simulator.cell.spec import DriveSpec
-from simulator.families import PROGRAMS, TABLE
+from multidrop.dialects import Diagnostic
+from multidrop.dialects.families import program_language_of, program_languages
+from multidrop.dialects.files import encoded_program_of, split_lines, why
+from multidrop.dialects.problems import Problem, errors, in_order
+from multidrop.simulator.cell.spec import DriveSpec
+from multidrop.simulator.families import PROGRAMS, TABLE
 
 USUAL = DriveSpec().personality
 """The product for which programs are checked unless another one is named."""
@@ -109,7 +109,7 @@ def rewrite(checked: Checked) -> None:
         return
     from pathlib import Path  # both are more than a mere check needs
 
-    from macros.atomic import write_atomically
+    from multidrop.macros.atomic import write_atomically
 
     if not os.path.isfile(checked.file):
         raise Diagnostic("is not a regular file", checked.file, "only a regular file is rewritten")

@@ -12,17 +12,17 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
-from dialects import Diagnostic, DriveError, Inexpressible, Procedure, Refused
-from dialects.debugging import Debugging, Look, Neighbours, Row
-from drives.events import Lost
-from shell.events import OnBus, Phase, SessionEvent
-from shell.observed import Listing, Sight, Watched
-from transports import TransportLost
+from multidrop.dialects import Diagnostic, DriveError, Inexpressible, Procedure, Refused
+from multidrop.dialects.debugging import Debugging, Look, Neighbours, Row
+from multidrop.drives.events import Lost
+from multidrop.shell.events import OnBus, Phase, SessionEvent
+from multidrop.shell.observed import Listing, Sight, Watched
+from multidrop.transports import TransportLost
 
 if TYPE_CHECKING:
-    from drives.drive import Drive
-    from shell.roles import Commands
-    from shell.workspace import Workspace
+    from multidrop.drives.drive import Drive
+    from multidrop.shell.roles import Commands
+    from multidrop.shell.workspace import Workspace
 
 PERIOD = 0.1
 """The time between two looks at a running program, s."""

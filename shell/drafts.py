@@ -11,9 +11,9 @@ import json
 from pathlib import Path
 from typing import NamedTuple
 
-from dialects import Diagnostic
-from dialects.files import why
-from macros.atomic import write_atomically
+from multidrop.dialects import Diagnostic
+from multidrop.dialects.files import why
+from multidrop.macros.atomic import write_atomically
 
 FOLDER = "drafts"
 MOST = 50

@@ -10,9 +10,9 @@ import os
 import re
 from pathlib import Path
 
-from dialects import Diagnostic
-from dialects.files import bytes_of, decoded, why
-from dialects.visible import ACTING
+from multidrop.dialects import Diagnostic
+from multidrop.dialects.files import bytes_of, decoded, why
+from multidrop.dialects.visible import ACTING
 
 LARGEST = 512 * 1024
 """Bytes; many times what a drive holds, and as much as an editor takes with ease."""
@@ -49,7 +49,7 @@ class EditedFile:
 
         Raises ChangedMeanwhile, or Diagnostic where it cannot be written; the file is then as it was.
         """
-        from macros.atomic import create_atomically, write_atomically
+        from multidrop.macros.atomic import create_atomically, write_atomically
 
         data = self._encoded(text)
         now = _content(self.path)

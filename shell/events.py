@@ -10,10 +10,10 @@ from enum import Enum
 from math import ceil
 from typing import NamedTuple
 
-from dialects import Diagnostic, DriveError
-from dialects.parameters import Readings
-from drives.events import BusEvent
-from transports import TransportLost
+from multidrop.dialects import Diagnostic, DriveError
+from multidrop.dialects.parameters import Readings
+from multidrop.drives.events import BusEvent
+from multidrop.transports import TransportLost
 
 FAILURES = (DriveError, Diagnostic, TransportLost)
 """The failures that `Session.run` raises, each with one line for a person; anything else is a bug."""

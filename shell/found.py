@@ -6,10 +6,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from dialects import DriveState
-from dialects.families import DEFAULT
-from shell.connect.opening import far_port, port_name
-from shell.connect.urls import Connection
+from multidrop.dialects import DriveState
+from multidrop.dialects.families import DEFAULT
+from multidrop.shell.connect.opening import far_port, port_name
+from multidrop.shell.connect.urls import Connection
 
 
 @dataclass(frozen=True)

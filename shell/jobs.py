@@ -6,12 +6,12 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, TypeVar
 
-from dialects import Procedure
-from shell.events import Progressed
+from multidrop.dialects import Procedure
+from multidrop.shell.events import Progressed
 
 if TYPE_CHECKING:
-    from drives.drive import Drive
-    from shell.channel import Channel
+    from multidrop.drives.drive import Drive
+    from multidrop.shell.channel import Channel
 
 T = TypeVar("T")
 

@@ -8,13 +8,13 @@ from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 from weakref import WeakKeyDictionary
 
-from dialects import DriveError, Priority
-from dialects.codec import at_priority
-from transports import TransportLost
+from multidrop.dialects import DriveError, Priority
+from multidrop.dialects.codec import at_priority
+from multidrop.transports import TransportLost
 
 if TYPE_CHECKING:
-    from dialects.held import Held
-    from drives.drive import Drive
+    from multidrop.dialects.held import Held
+    from multidrop.drives.drive import Drive
 
 
 class KnownNames:

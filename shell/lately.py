@@ -7,8 +7,8 @@ import contextlib
 from collections import deque
 from contextvars import ContextVar
 
-from drives.events import Unsolicited
-from shell.events import OnBus, Printed, SessionEvent
+from multidrop.drives.events import Unsolicited
+from multidrop.shell.events import OnBus, Printed, SessionEvent
 
 KEPT = 1000
 """The number of lines kept."""

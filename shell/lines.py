@@ -11,7 +11,7 @@ import re
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-from dialects import Diagnostic
+from multidrop.dialects import Diagnostic
 
 EVERYONE = ("*", "^")
 WAITS = ("/wait", "/sleep")

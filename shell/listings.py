@@ -5,16 +5,16 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from dialects import Diagnostic, SourceLine
-from dialects.held import Held
-from shell import new_file, sources
-from shell.jobs import running, transferring
-from shell.lines import EVERYONE
-from shell.observed import Listing, Sight
+from multidrop.dialects import Diagnostic, SourceLine
+from multidrop.dialects.held import Held
+from multidrop.shell import new_file, sources
+from multidrop.shell.jobs import running, transferring
+from multidrop.shell.lines import EVERYONE
+from multidrop.shell.observed import Listing, Sight
 
 if TYPE_CHECKING:
-    from drives.drive import Drive
-    from shell.workspace import Workspace
+    from multidrop.drives.drive import Drive
+    from multidrop.shell.workspace import Workspace
 
 
 async def readable(workspace: Workspace, drive: Drive) -> list[str]:

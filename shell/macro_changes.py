@@ -10,12 +10,12 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from dialects import Diagnostic
-from dialects.files import text_of
-from macros import FIRST_PAGE, Macro, MacroStore, format_macro
-from macros.atomic import write_atomically
-from macros.vendor import REMARK, STOP, exported, imported, is_key_name
-from shell import new_file
+from multidrop.dialects import Diagnostic
+from multidrop.dialects.files import text_of
+from multidrop.macros import FIRST_PAGE, Macro, MacroStore, format_macro
+from multidrop.macros.atomic import write_atomically
+from multidrop.macros.vendor import REMARK, STOP, exported, imported, is_key_name
+from multidrop.shell import new_file
 
 OFF = "off"
 """In place of a macro: the key is freed."""

@@ -8,16 +8,16 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from dialects import DriveError
-from drives.drive import confirmed_motion
-from shell.stops import UNCONFIRMED, last_seen
-from transports import TransportLost
+from multidrop.dialects import DriveError
+from multidrop.drives.drive import confirmed_motion
+from multidrop.shell.stops import UNCONFIRMED, last_seen
+from multidrop.transports import TransportLost
 
 if TYPE_CHECKING:
-    from dialects import Motion
-    from drives.bus import Bus
-    from drives.drive import Drive, Running
-    from shell.workspace import Workspace
+    from multidrop.dialects import Motion
+    from multidrop.drives.bus import Bus
+    from multidrop.drives.drive import Drive, Running
+    from multidrop.shell.workspace import Workspace
 
 FRESH = 1.0
 """The age up to which a reading counts, s."""

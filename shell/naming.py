@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from dialects import Diagnostic
+from multidrop.dialects import Diagnostic
 
 if TYPE_CHECKING:
-    from drives.bus import Bus
-    from drives.drive import Drive
+    from multidrop.drives.bus import Bus
+    from multidrop.drives.drive import Drive
 
 
 def free(name: str, taken: set[str]) -> str:

@@ -6,8 +6,8 @@ import os
 from collections.abc import Callable
 from pathlib import Path
 
-from dialects import Diagnostic
-from dialects.files import why
+from multidrop.dialects import Diagnostic
+from multidrop.dialects.files import why
 
 STANDARD_OUTPUT = "-"
 """The file that is standard output, wherever a text is written."""
@@ -52,7 +52,7 @@ def write(path: str | Path, text: str, output: Callable[[str], None] | None = No
             output(line)
         return
     check(path)
-    from macros.atomic import create_atomically  # more than most commands need
+    from multidrop.macros.atomic import create_atomically  # more than most commands need
 
     try:
         create_atomically(Path(path), text.encode())

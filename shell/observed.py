@@ -7,15 +7,15 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from dialects.debugging import Row
-from dialects.family import Programs
-from dialects.held import Held, Stored
-from shell import sources
-from shell.channel import Channel
-from shell.events import Phase, ProgramRead, ProgramSeen
+from multidrop.dialects.debugging import Row
+from multidrop.dialects.family import Programs
+from multidrop.dialects.held import Held, Stored
+from multidrop.shell import sources
+from multidrop.shell.channel import Channel
+from multidrop.shell.events import Phase, ProgramRead, ProgramSeen
 
 if TYPE_CHECKING:
-    from drives.drive import Drive
+    from multidrop.drives.drive import Drive
 
 AROUND = 3
 """Lines that are shown before and after the current one."""

@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING
 
-from drives.events import Conditioned, Sample, Unsolicited
-from macros import Recorder
-from shell.events import OnBus, SessionEvent
-from shell.lines import join_target
+from multidrop.drives.events import Conditioned, Sample, Unsolicited
+from multidrop.macros import Recorder
+from multidrop.shell.events import OnBus, SessionEvent
+from multidrop.shell.lines import join_target
 
 if TYPE_CHECKING:
-    from drives.bus import Bus
+    from multidrop.drives.bus import Bus
 
 
 class Observing:

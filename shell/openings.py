@@ -9,22 +9,22 @@ from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
-from dialects import Diagnostic, DriveError
-from shell import unfinished
-from shell.connect.opening import port_name
-from shell.connect.side_by_side import side_by_side
-from shell.connect.urls import Connection, parse
-from shell.lines import EVERYONE, split_target
-from shell.naming import described, free, named
-from shell.raw import RawLine
-from shell.workspace import BeingOpened
-from transports import TransportLost
+from multidrop.dialects import Diagnostic, DriveError
+from multidrop.shell import unfinished
+from multidrop.shell.connect.opening import port_name
+from multidrop.shell.connect.side_by_side import side_by_side
+from multidrop.shell.connect.urls import Connection, parse
+from multidrop.shell.lines import EVERYONE, split_target
+from multidrop.shell.naming import described, free, named
+from multidrop.shell.raw import RawLine
+from multidrop.shell.workspace import BeingOpened
+from multidrop.transports import TransportLost
 
 if TYPE_CHECKING:
-    from drives.bus import Bus
-    from drives.halt import Halt
-    from shell.connect.opening import Opened, Opener
-    from shell.workspace import Workspace
+    from multidrop.drives.bus import Bus
+    from multidrop.drives.halt import Halt
+    from multidrop.shell.connect.opening import Opened, Opener
+    from multidrop.shell.workspace import Workspace
 
 Failed = Callable[[int, BaseException], None]
 """Takes the number of a URL, from 0, and the failure to open it."""

@@ -19,10 +19,10 @@ import time
 from collections.abc import Callable
 from typing import TextIO
 
-from dialects import Diagnostic, DriveError, Stopped
-from dialects.visible import visible
-from shell import outlets
-from transports import TransportLost
+from multidrop.dialects import Diagnostic, DriveError, Stopped
+from multidrop.dialects.visible import visible
+from multidrop.shell import outlets
+from multidrop.transports import TransportLost
 
 CODES: tuple[tuple[type[BaseException], int], ...] = (
     (Stopped, 4),

@@ -5,12 +5,12 @@ from __future__ import annotations
 import sys
 from typing import TextIO
 
-from dialects.visible import visible
-from drives.events import Unsolicited
-from shell.events import Bytes, Failed, Notified, OnBus, Output, Printed, Progressed, SessionEvent
-from shell.layout import laid_out
-from shell.output import write
-from shell.status_line import StatusLine
+from multidrop.dialects.visible import visible
+from multidrop.drives.events import Unsolicited
+from multidrop.shell.events import Bytes, Failed, Notified, OnBus, Output, Printed, Progressed, SessionEvent
+from multidrop.shell.layout import laid_out
+from multidrop.shell.output import write
+from multidrop.shell.status_line import StatusLine
 
 
 class Printer:

@@ -10,12 +10,12 @@ from functools import cached_property
 from os.path import commonprefix
 from typing import NamedTuple
 
-from dialects import Diagnostic
-from dialects.families import program_language_of, program_languages
-from dialects.files import split_lines
-from dialects.problems import Problem, errors
-from dialects.program_editing import Block, EditingLanguage, Offer, Span, UserName
-from dialects.program_files import Entry, Part
+from multidrop.dialects import Diagnostic
+from multidrop.dialects.families import program_language_of, program_languages
+from multidrop.dialects.files import split_lines
+from multidrop.dialects.problems import Problem, errors
+from multidrop.dialects.program_editing import Block, EditingLanguage, Offer, Span, UserName
+from multidrop.dialects.program_files import Entry, Part
 
 BYTE_ORDER_MARK = "\ufeff"
 
@@ -37,7 +37,10 @@ class ProgramGrammar:
 
     def check(self, text: str, product: str) -> Sequence[Problem]:
         """Return the problems of `multidrop program check`; none for an empty text, which a person has just begun."""
-        from shell.checking import examine_text, personality_of  # a screen without an editor needs no simulator
+        from multidrop.shell.checking import (
+            examine_text,
+            personality_of,
+        )  # a screen without an editor needs no simulator
 
         if not text.strip():
             return ()

@@ -11,17 +11,17 @@ from collections.abc import Callable, Iterator, Sequence
 from enum import Enum
 from typing import TYPE_CHECKING
 
-from dialects import Diagnostic, Priority, Stopped
-from drives import typed
-from drives.events import Ended, Sent, Traffic
-from shell.events import Bytes
+from multidrop.dialects import Diagnostic, Priority, Stopped
+from multidrop.drives import typed
+from multidrop.drives.events import Ended, Sent, Traffic
+from multidrop.shell.events import Bytes
 
 if TYPE_CHECKING:
     from datetime import datetime
 
-    from drives.bus import Bus
-    from drives.events import BusEvent
-    from transports import PortControl
+    from multidrop.drives.bus import Bus
+    from multidrop.drives.events import BusEvent
+    from multidrop.transports import PortControl
 
 GAP = 0.05
 """The quiet time after which a piece without an end is shown, s."""
@@ -185,7 +185,7 @@ class RawLine(ByteView):
 
     def control(self) -> PortControl:
         """The settings of the port. Raises Diagnostic where it is not a serial port."""
-        from transports import Controllable
+        from multidrop.transports import Controllable
 
         transport = self.bus.link.transport
         found = transport.control if isinstance(transport, Controllable) else None

@@ -14,23 +14,23 @@ from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
-from dialects import Diagnostic, DriveError, Inexpressible, Refused
-from dialects.held import LOCKED
-from dialects.parameters import Permission, Plan, Readings, differing
-from shell import jobs, snapshots, transfers
-from shell.params.file import shown
-from shell.params.readings import parameters, read
-from simulator import cells
-from simulator.cell.writer import BusText, write
-from simulator.families import family_of, snapshots_of
+from multidrop.dialects import Diagnostic, DriveError, Inexpressible, Refused
+from multidrop.dialects.held import LOCKED
+from multidrop.dialects.parameters import Permission, Plan, Readings, differing
+from multidrop.shell import jobs, snapshots, transfers
+from multidrop.shell.params.file import shown
+from multidrop.shell.params.readings import parameters, read
+from multidrop.simulator import cells
+from multidrop.simulator.cell.writer import BusText, write
+from multidrop.simulator.families import family_of, snapshots_of
 
 if TYPE_CHECKING:
-    from dialects.snapshots import Snapshot
-    from drives.drive import Drive
-    from shell.roles import Commands
-    from shell.workspace import Workspace
-    from simulator.cell.spec import Cell, DriveSpec
-    from simulator.family import Snapshots
+    from multidrop.dialects.snapshots import Snapshot
+    from multidrop.drives.drive import Drive
+    from multidrop.shell.roles import Commands
+    from multidrop.shell.workspace import Workspace
+    from multidrop.simulator.cell.spec import Cell, DriveSpec
+    from multidrop.simulator.family import Snapshots
 
 UNNAMED = "!"
 """The name of a drive that has none of its own."""

@@ -10,15 +10,15 @@ import asyncio
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from dialects import Diagnostic, Procedure
-from dialects.families import FAMILIES, family_of
-from drives.events import Traffic
-from shell.found import FoundDrive
-from shell.scanning import HAZARD, SO_FAR, Scanning, Stage, listed
+from multidrop.dialects import Diagnostic, Procedure
+from multidrop.dialects.families import FAMILIES, family_of
+from multidrop.drives.events import Traffic
+from multidrop.shell.found import FoundDrive
+from multidrop.shell.scanning import HAZARD, SO_FAR, Scanning, Stage, listed
 
 if TYPE_CHECKING:
-    from drives.events import BusEvent
-    from shell.workspace import Workspace
+    from multidrop.drives.events import BusEvent
+    from multidrop.shell.workspace import Workspace
 
 LISTENS = 20.0
 """The time to listen for a sign-on after a question, s: the user walks to a switch."""

@@ -7,12 +7,12 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, NamedTuple, Protocol
 
-from shell.events import By
+from multidrop.shell.events import By
 
 if TYPE_CHECKING:
-    from drives.bus import Bus
-    from drives.drive import Drive
-    from macros import Macro
+    from multidrop.drives.bus import Bus
+    from multidrop.drives.drive import Drive
+    from multidrop.macros import Macro
 
 
 NO_ROLES: Mapping[str, str] = MappingProxyType({})

@@ -13,21 +13,21 @@ from contextlib import AsyncExitStack, asynccontextmanager, suppress
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from dialects import Diagnostic, DriveState, Procedure
-from dialects.families import DEFAULT, FAMILIES
-from dialects.scanning import WINDOW, Reach, Scan
-from shell import jobs, stops
-from shell.connect.opening import BAUDED, port_name
-from shell.connect.port_state import memory_of
-from shell.connect.urls import Connection
-from shell.found import FoundDrive, port_of
-from transports import Remote, Transport, TransportLost
+from multidrop.dialects import Diagnostic, DriveState, Procedure
+from multidrop.dialects.families import DEFAULT, FAMILIES
+from multidrop.dialects.scanning import WINDOW, Reach, Scan
+from multidrop.shell import jobs, stops
+from multidrop.shell.connect.opening import BAUDED, port_name
+from multidrop.shell.connect.port_state import memory_of
+from multidrop.shell.connect.urls import Connection
+from multidrop.shell.found import FoundDrive, port_of
+from multidrop.transports import Remote, Transport, TransportLost
 
 if TYPE_CHECKING:
-    from drives.bus import Bus
-    from drives.halt import Halt
-    from shell.connect.opening import Opened, Opener
-    from shell.workspace import Workspace
+    from multidrop.drives.bus import Bus
+    from multidrop.drives.halt import Halt
+    from multidrop.shell.connect.opening import Opened, Opener
+    from multidrop.shell.workspace import Workspace
 
 SLOWEST = 0.2
 """The longest time for which a network's reply is waited, s; `timeout=` in the URL replaces it."""

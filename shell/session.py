@@ -15,27 +15,27 @@ from contextvars import ContextVar
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
-from dialects import Diagnostic, DriveError, Refused, Stopped
-from macros import Macro
-from shell.automation import ENDING, Automations, only_ends
-from shell.connect.opening import open_buses
-from shell.connect.settings import Settings
-from shell.events import FAILURES, By, Entered, Failed, Printed
-from shell.lines import EVERYONE, DriveLine, VerbLine, join_target, parse, split_target
-from shell.motion import in_motion
-from shell.openings import Openings
-from shell.playing import played_by
-from shell.roles import NO_ROLES
-from shell.twins import Twins
-from shell.workspace import LATCHED, Workspace
+from multidrop.dialects import Diagnostic, DriveError, Refused, Stopped
+from multidrop.macros import Macro
+from multidrop.shell.automation import ENDING, Automations, only_ends
+from multidrop.shell.connect.opening import open_buses
+from multidrop.shell.connect.settings import Settings
+from multidrop.shell.events import FAILURES, By, Entered, Failed, Printed
+from multidrop.shell.lines import EVERYONE, DriveLine, VerbLine, join_target, parse, split_target
+from multidrop.shell.motion import in_motion
+from multidrop.shell.openings import Openings
+from multidrop.shell.playing import played_by
+from multidrop.shell.roles import NO_ROLES
+from multidrop.shell.twins import Twins
+from multidrop.shell.workspace import LATCHED, Workspace
 
 if TYPE_CHECKING:
-    from drives.bus import Bus
-    from drives.drive import Drive
-    from shell.connect.opening import Opener
-    from shell.openings import Failed as OpeningFailed
-    from shell.raw import RawLine
-    from shell.scripts.results import Watcher
+    from multidrop.drives.bus import Bus
+    from multidrop.drives.drive import Drive
+    from multidrop.shell.connect.opening import Opener
+    from multidrop.shell.openings import Failed as OpeningFailed
+    from multidrop.shell.raw import RawLine
+    from multidrop.shell.scripts.results import Watcher
 
 _published: ContextVar[list[BaseException] | None] = ContextVar("published", default=None)
 """The failures published so far in this task's outermost `run`."""
@@ -97,7 +97,7 @@ class Session(Workspace):
     async def close(self) -> None:
         """Close everything: tasks, plots, log, buses. Moves nothing, stops no drive. May be called again."""
         if self.recording:
-            from shell.verbs.recording import keep_unended
+            from multidrop.shell.verbs.recording import keep_unended
 
             self.notify(keep_unended(self), warning=True)
         for task in [*self._background]:
@@ -149,7 +149,7 @@ class Session(Workspace):
                 raise
 
     async def _run_verb(self, line: str, parsed: VerbLine, by: By) -> None:
-        from shell.verbs.table import Call, find
+        from multidrop.shell.verbs.table import Call, find
 
         self.publish(Entered(self.now(), line, by))
         verb = find(parsed.name)
@@ -296,8 +296,8 @@ class Session(Workspace):
         for each role. A line without an address goes to the drive that was selected when the macro began, or by a
         `/use` in it.
         """
-        from shell.scripts.executor import Playback, play_macro
-        from shell.scripts.reading import read_macro
+        from multidrop.shell.scripts.executor import Playback, play_macro
+        from multidrop.shell.scripts.reading import read_macro
 
         played = read_macro(macro, values, self.macros)
         await play_macro(self, self, played, Playback(times, fast, roles), watcher)

@@ -5,19 +5,19 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from dialects import Diagnostic, DriveError, Inexpressible, Stopped
-from dialects.held import Held, Stored
-from shell import jobs, listings, new_file
-from simulator import cells
-from simulator.cell.writer import BusText, DriveText, write
-from simulator.families import FAMILIES, snapshots_of
-from simulator.floor import Floor
+from multidrop.dialects import Diagnostic, DriveError, Inexpressible, Stopped
+from multidrop.dialects.held import Held, Stored
+from multidrop.shell import jobs, listings, new_file
+from multidrop.simulator import cells
+from multidrop.simulator.cell.writer import BusText, DriveText, write
+from multidrop.simulator.families import FAMILIES, snapshots_of
+from multidrop.simulator.floor import Floor
 
 if TYPE_CHECKING:
-    from dialects.snapshots import Snapshot
-    from drives.bus import Bus
-    from drives.drive import Drive
-    from shell.workspace import Workspace
+    from multidrop.dialects.snapshots import Snapshot
+    from multidrop.drives.bus import Bus
+    from multidrop.drives.drive import Drive
+    from multidrop.shell.workspace import Workspace
 
 FORBIDDEN = "#@:/ "
 """Characters that the name of a bus in a cell file lacks."""

@@ -12,8 +12,8 @@ import json
 from pathlib import Path
 from typing import NamedTuple
 
-from dialects.held import Held
-from macros.atomic import write_atomically
+from multidrop.dialects.held import Held
+from multidrop.macros.atomic import write_atomically
 
 FOLDER = "sources"
 MOST = 200

@@ -6,8 +6,8 @@ import contextlib
 import sys
 from shutil import get_terminal_size
 
-from dialects.visible import visible
-from shell.outlets import Outlet
+from multidrop.dialects.visible import visible
+from multidrop.shell.outlets import Outlet
 
 
 class StatusLine:

@@ -11,12 +11,12 @@ from dataclasses import dataclass
 from datetime import datetime
 from typing import TYPE_CHECKING
 
-from drives.halt import Fate, Halt
-from drives.link import loss_of
+from multidrop.drives.halt import Fate, Halt
+from multidrop.drives.link import loss_of
 
 if TYPE_CHECKING:
-    from drives.bus import Bus
-    from drives.drive import Drive
+    from multidrop.drives.bus import Bus
+    from multidrop.drives.drive import Drive
 
 E_STOP = " - use the E-stop"
 NOT_OPEN = "still being opened"

@@ -5,11 +5,11 @@ from __future__ import annotations
 import re
 from typing import TYPE_CHECKING
 
-from dialects import Diagnostic
+from multidrop.dialects import Diagnostic
 
 if TYPE_CHECKING:
-    from drives.bus import Bus
-    from shell.workspace import Workspace
+    from multidrop.drives.bus import Bus
+    from multidrop.shell.workspace import Workspace
 
 
 def move(workspace: Workspace, bus: Bus, by: int) -> None:

@@ -6,7 +6,7 @@ import asyncio
 from collections.abc import Callable, Coroutine
 from typing import Any, TypeVar
 
-from dialects import Stopped
+from multidrop.dialects import Stopped
 
 T = TypeVar("T")
 

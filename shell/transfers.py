@@ -14,23 +14,23 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 from weakref import WeakSet
 
-from dialects import Diagnostic, DriveError, Refused, SourceLine
-from dialects.errors import Differs
-from dialects.families import program_languages
-from dialects.files import program_text_of
-from dialects.held import LOCKED, Difference, Held
-from dialects.problems import errors, refuse
-from drives.drive import still
-from shell import backups, sources
-from shell.events import By, Printed
-from shell.jobs import running, transferring
-from shell.listings import check_one, read
-from shell.unfinished import marked
+from multidrop.dialects import Diagnostic, DriveError, Refused, SourceLine
+from multidrop.dialects.errors import Differs
+from multidrop.dialects.families import program_languages
+from multidrop.dialects.files import program_text_of
+from multidrop.dialects.held import LOCKED, Difference, Held
+from multidrop.dialects.problems import errors, refuse
+from multidrop.drives.drive import still
+from multidrop.shell import backups, sources
+from multidrop.shell.events import By, Printed
+from multidrop.shell.jobs import running, transferring
+from multidrop.shell.listings import check_one, read
+from multidrop.shell.unfinished import marked
 
 if TYPE_CHECKING:
-    from drives.drive import Drive
-    from shell.roles import Commands
-    from shell.workspace import Workspace
+    from multidrop.drives.drive import Drive
+    from multidrop.shell.roles import Commands
+    from multidrop.shell.workspace import Workspace
 
 LIMIT = 10.0
 """The longest wait for a running program and its motion to end, s."""

@@ -11,7 +11,7 @@ from datetime import datetime
 from pathlib import Path
 from urllib.parse import quote
 
-from macros.atomic import write_atomically
+from multidrop.macros.atomic import write_atomically
 
 FOLDER = "unfinished"
 

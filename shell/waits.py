@@ -9,12 +9,12 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from dialects import Diagnostic, DriveError
-from drives.drive import REST
+from multidrop.dialects import Diagnostic, DriveError
+from multidrop.drives.drive import REST
 
 if TYPE_CHECKING:
-    from drives.drive import Drive
-    from shell.workspace import Workspace
+    from multidrop.drives.drive import Drive
+    from multidrop.shell.workspace import Workspace
 
 LIMIT = 60.0
 """The default time limit, s."""

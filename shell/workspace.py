@@ -15,31 +15,31 @@ from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING
 
-from dialects import Diagnostic, NoAnswer
-from drives.apart import apart
-from drives.events import BusEvent, Changed, Lost, Notice, Unsolicited
-from macros import MacroStore, Recorder
-from shell import stops
-from shell.asking import Asking
-from shell.connect.reconnect import Reconnections
-from shell.connect.settings import Settings
-from shell.events import Failed, Notified, OnBus, StateChanged
-from shell.known_names import KnownNames
-from shell.lately import Lately
-from shell.lines import EVERYONE, join_target
-from shell.observing import Observing
-from shell.playing import Playing, played_by
-from shell.tasks import Tasks
+from multidrop.dialects import Diagnostic, NoAnswer
+from multidrop.drives.apart import apart
+from multidrop.drives.events import BusEvent, Changed, Lost, Notice, Unsolicited
+from multidrop.macros import MacroStore, Recorder
+from multidrop.shell import stops
+from multidrop.shell.asking import Asking
+from multidrop.shell.connect.reconnect import Reconnections
+from multidrop.shell.connect.settings import Settings
+from multidrop.shell.events import Failed, Notified, OnBus, StateChanged
+from multidrop.shell.known_names import KnownNames
+from multidrop.shell.lately import Lately
+from multidrop.shell.lines import EVERYONE, join_target
+from multidrop.shell.observing import Observing
+from multidrop.shell.playing import Playing, played_by
+from multidrop.shell.tasks import Tasks
 
 if TYPE_CHECKING:
-    from drives.bus import Bus
-    from drives.drive import Drive
-    from drives.halt import Halt
-    from shell.connect.opening import Opened
-    from shell.raw import RawLine, Watched
-    from shell.roles import Observer, OpenLog, RunningPlot, RunningTwins, Series
-    from shell.transcripts import Transcripts
-    from simulator.serving.running import RunningFloor
+    from multidrop.drives.bus import Bus
+    from multidrop.drives.drive import Drive
+    from multidrop.drives.halt import Halt
+    from multidrop.shell.connect.opening import Opened
+    from multidrop.shell.raw import RawLine, Watched
+    from multidrop.shell.roles import Observer, OpenLog, RunningPlot, RunningTwins, Series
+    from multidrop.shell.transcripts import Transcripts
+    from multidrop.simulator.serving.running import RunningFloor
 
 LATCHED = "stopped; /resume lets macros and scripts run again"
 """The refusal of automation after a stop."""

@@ -7,12 +7,12 @@ from importlib import resources
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from dialects import Diagnostic
-from dialects.files import toml_of, utf8_of
-from simulator.cell.reader import Reader
-from simulator.cell.spec import Cell, DriveSpec
-from simulator.cell.table import Folder, Table
-from simulator.families import BY_PERSONALITY
+from multidrop.dialects import Diagnostic
+from multidrop.dialects.files import toml_of, utf8_of
+from multidrop.simulator.cell.reader import Reader
+from multidrop.simulator.cell.spec import Cell, DriveSpec
+from multidrop.simulator.cell.table import Folder, Table
+from multidrop.simulator.families import BY_PERSONALITY
 
 _READER = Reader(BY_PERSONALITY)
 load = _READER.load

@@ -8,12 +8,12 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, NamedTuple
 
-from dialects import Diagnostic
-from dialects.on_demand import OnDemand
+from multidrop.dialects import Diagnostic
+from multidrop.dialects.on_demand import OnDemand
 
 if TYPE_CHECKING:
-    from simulator.family import Family, Snapshots
-    from simulator.program_run import Programs
+    from multidrop.simulator.family import Family, Snapshots
+    from multidrop.simulator.program_run import Programs
 
 
 class Row(NamedTuple):
@@ -27,12 +27,12 @@ class Row(NamedTuple):
 
 TABLE: Mapping[str, Row] = {
     "mcode": Row(
-        "simulator.lexium.family:MCODE",
+        "multidrop.simulator.lexium.family:MCODE",
         ("LMDOM", "LMDCM", "LMDOE", "LMDCE", "LMM", "MDI", "MDIE", "MDIX"),
-        "simulator.lexium.program_run:RUNS",
+        "multidrop.simulator.lexium.program_run:RUNS",
     ),
-    "pmx": Row("simulator.pmx.family:PMX", ("PMX",), "simulator.pmx.program_run:RUNS"),
-    "tmcl": Row("simulator.tmcl.family:TMCL", ("TMCM",)),
+    "pmx": Row("multidrop.simulator.pmx.family:PMX", ("PMX",), "multidrop.simulator.pmx.program_run:RUNS"),
+    "tmcl": Row("multidrop.simulator.tmcl.family:TMCL", ("TMCM",)),
 }
 FAMILIES: Mapping[str, Family] = OnDemand({name: row.record for name, row in TABLE.items()})
 """By name."""

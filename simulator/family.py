@@ -6,14 +6,14 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
-from dialects.family import Motion
-from dialects.parameters import Value
-from dialects.snapshots import Snapshot
-from simulator.cell.spec import DriveSpec
-from simulator.cell.table import Folder, Table
-from simulator.cell.writer import DriveText
-from simulator.wire.wire import Port
-from simulator.world import World
+from multidrop.dialects.family import Motion
+from multidrop.dialects.parameters import Value
+from multidrop.dialects.snapshots import Snapshot
+from multidrop.simulator.cell.spec import DriveSpec
+from multidrop.simulator.cell.table import Folder, Table
+from multidrop.simulator.cell.writer import DriveText
+from multidrop.simulator.wire.wire import Port
+from multidrop.simulator.world import World
 
 
 class Device(Protocol):

@@ -10,14 +10,14 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from random import Random
 
-from dialects import Diagnostic
-from dialects.numbers import whole
-from simulator.cell.spec import BusSpec, Cell, DriveSpec
-from simulator.families import BY_PERSONALITY, family_of
-from simulator.family import Connection, Device, Place, Unit
-from simulator.sim_words import USAGES
-from simulator.wire.wire import Wire
-from simulator.world import World
+from multidrop.dialects import Diagnostic
+from multidrop.dialects.numbers import whole
+from multidrop.simulator.cell.spec import BusSpec, Cell, DriveSpec
+from multidrop.simulator.families import BY_PERSONALITY, family_of
+from multidrop.simulator.family import Connection, Device, Place, Unit
+from multidrop.simulator.sim_words import USAGES
+from multidrop.simulator.wire.wire import Wire
+from multidrop.simulator.world import World
 
 LEVELS: dict[str, int | None] = {"0": 0, "1": 1, "open": None}
 

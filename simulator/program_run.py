@@ -6,8 +6,8 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple, Protocol
 
-from dialects.problems import Problem
-from simulator.cell.spec import DriveSpec
+from multidrop.dialects.problems import Problem
+from multidrop.simulator.cell.spec import DriveSpec
 
 LONGEST = 3600.0
 """Virtual seconds after which a run without a time of its own is given up."""

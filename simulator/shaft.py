@@ -11,8 +11,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 from math import copysign
 
-from simulator.kinematics.profile import Profile, halt
-from simulator.world import World
+from multidrop.simulator.kinematics.profile import Profile, halt
+from multidrop.simulator.world import World
 
 TOUCH = 1e-6
 """Steps; less than this is rounding."""

@@ -12,8 +12,8 @@ from math import ceil, floor, inf, nextafter
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from simulator.cell.spec import WorldSpec
-    from simulator.kinematics.profile import Profile
+    from multidrop.simulator.cell.spec import WorldSpec
+    from multidrop.simulator.kinematics.profile import Profile
 
 REVOLUTION = 51200.0
 """Motor steps of a turn: 200 full steps of 256 microsteps."""

@@ -14,7 +14,7 @@ from dataclasses import dataclass, field
 from enum import Enum
 from typing import Any
 
-from dialects import Refused
+from multidrop.dialects import Refused
 
 
 class Word(Enum):

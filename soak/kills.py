@@ -21,17 +21,17 @@ from pathlib import Path
 from random import Random
 from typing import Any
 
-from dialects import Diagnostic
-from macros import MacroStore
-from shell.connect.settings import Settings
-from shell.events import Notified
-from shell.front.history import History
-from shell.log.entries import entry_of
-from shell.session import Session
-from simulator import cells
-from simulator.floor import Floor
-from simulator.serving.endpoints import serve_bus
-from simulator.serving.running import RunningFloor
+from multidrop.dialects import Diagnostic
+from multidrop.macros import MacroStore
+from multidrop.shell.connect.settings import Settings
+from multidrop.shell.events import Notified
+from multidrop.shell.front.history import History
+from multidrop.shell.log.entries import entry_of
+from multidrop.shell.session import Session
+from multidrop.simulator import cells
+from multidrop.simulator.floor import Floor
+from multidrop.simulator.serving.endpoints import serve_bus
+from multidrop.simulator.serving.running import RunningFloor
 
 PROGRAM = "VM=400000\nPG 1\nLB G1\n" + "".join(f"R1={number}\n" for number in range(30)) + "E\nPG\nS\n"
 CELL = '[[bus]]\nname = "w"\n{serve}baud = {baud}\n[[bus.drive]]\npersonality = "LMDCM"\nname = "a"\nparty = true\n'

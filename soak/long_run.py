@@ -18,16 +18,16 @@ from contextlib import AsyncExitStack
 from pathlib import Path
 from typing import Any
 
-from drives.events import Sample
-from macros import Macro
-from macros.model import Step
-from shell.connect.settings import Settings
-from shell.events import Failed, OnBus
-from shell.session import Session
-from simulator import cells
-from simulator.floor import Floor
-from simulator.serving.endpoints import serve_bus
-from simulator.serving.running import RunningFloor
+from multidrop.drives.events import Sample
+from multidrop.macros import Macro
+from multidrop.macros.model import Step
+from multidrop.shell.connect.settings import Settings
+from multidrop.shell.events import Failed, OnBus
+from multidrop.shell.session import Session
+from multidrop.simulator import cells
+from multidrop.simulator.floor import Floor
+from multidrop.simulator.serving.endpoints import serve_bus
+from multidrop.simulator.serving.running import RunningFloor
 from tests.support.virtual import VirtualLoop
 
 TABS = 8
@@ -152,7 +152,7 @@ def in_real_time(minutes: float) -> tuple[dict[str, Any], list[str]]:
 
 
 async def _shown(folder: Path, seconds: float) -> tuple[dict[str, Any], list[str]]:
-    from tui.app import MultidropApp
+    from multidrop.tui.app import MultidropApp
 
     _write(folder, served=True)
     spec = cells.load(str(folder / "cell.toml"))

@@ -16,22 +16,22 @@ from pathlib import Path
 from random import Random
 from typing import Any
 
-from dialects import DriveError
-from drives.events import Notice
-from shell.connect.opening import open_port
-from shell.connect.settings import Settings
-from shell.connect.urls import parse
-from shell.session import Session
-from shell.sharing.server import SharedPort
-from shell.sharing.stop_bytes import stop_bytes
-from simulator import cells
-from simulator.cell.spec import Faults
-from simulator.floor import Floor
-from simulator.serving.endpoints import serve_bus
-from simulator.serving.running import RunningFloor
+from multidrop.dialects import DriveError
+from multidrop.drives.events import Notice
+from multidrop.shell.connect.opening import open_port
+from multidrop.shell.connect.settings import Settings
+from multidrop.shell.connect.urls import parse
+from multidrop.shell.session import Session
+from multidrop.shell.sharing.server import SharedPort
+from multidrop.shell.sharing.stop_bytes import stop_bytes
+from multidrop.simulator import cells
+from multidrop.simulator.cell.spec import Faults
+from multidrop.simulator.floor import Floor
+from multidrop.simulator.serving.endpoints import serve_bus
+from multidrop.simulator.serving.running import RunningFloor
+from multidrop.transports import TransportLost
 from soak.judge import Judge, Ledger, Witness
 from soak.languages import LANGUAGES, PROGRAM, TICKS
-from transports import TransportLost
 
 BUS = "line"
 NUMBER = r"\d{7,8}"
@@ -217,7 +217,7 @@ class NoisyLine:
 @contextlib.asynccontextmanager
 async def in_memory(setup: Setup, folder: Path) -> AsyncIterator[NoisyLine]:
     """A line in memory, for a loop with virtual time. A pipe of our own keeps the cell alive over hang-ups."""
-    from simulator.serving.in_process import connect
+    from multidrop.simulator.serving.in_process import connect
 
     url = f"sim:{setup.write(folder)}"
     [keep] = await connect(url)

@@ -12,16 +12,16 @@ from typing import Any
 import pytest
 from hypothesis import HealthCheck, settings
 
-from dialects import DriveState, End, Procedure, Reply, Stopped
-from dialects.families import family_of
-from dialects.mcode.host.codec import MCode
-from drives.events import Unsolicited
-from drives.flight import Finished
-from drives.line import Line, Write
-from drives.procedure import ProcedureRunner
-from simulator.cell.spec import Faults
-from simulator.cells import read
-from simulator.floor import Floor
+from multidrop.dialects import DriveState, End, Procedure, Reply, Stopped
+from multidrop.dialects.families import family_of
+from multidrop.dialects.mcode.host.codec import MCode
+from multidrop.drives.events import Unsolicited
+from multidrop.drives.flight import Finished
+from multidrop.drives.line import Line, Write
+from multidrop.drives.procedure import ProcedureRunner
+from multidrop.simulator.cell.spec import Faults
+from multidrop.simulator.cells import read
+from multidrop.simulator.floor import Floor
 
 pytest_plugins = ["tests.support.marks", "tests.support.front_door"]
 if os.name == "posix":

@@ -1,6 +1,6 @@
 """Byte pipes: serial, TCP, UDP, RFC 2217, ssh. They carry bytes and interpret none."""
 
-from transports.base import (
+from multidrop.transports.base import (
     Controllable,
     Limited,
     Lost,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from enum import IntEnum
 
-from transports import telnet
+from multidrop.transports import telnet
 
 OPTION = 44
 REPLY = 100

@@ -13,9 +13,9 @@ import threading
 from collections import deque
 from collections.abc import Callable
 
-from transports.base import PortControl
-from transports.endpoint import Endpoint
-from transports.pipe import Pipe
+from multidrop.transports.base import PortControl
+from multidrop.transports.endpoint import Endpoint
+from multidrop.transports.pipe import Pipe
 
 _READS = 64
 """Greatest number of reads of a broken pipe, for what arrived before the break."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import shlex
 from dataclasses import dataclass
 
-from transports.base import Unreachable
+from multidrop.transports.base import Unreachable
 
 RELAY = "multidrop"
 SOCAT = "socat"

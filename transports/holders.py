@@ -17,7 +17,7 @@ def holder(device: str, root: Path = Path("/")) -> str:
     if sys.platform == "win32":
         return ""
     else:
-        from transports.serial_posix import lock_owner
+        from multidrop.transports.serial_posix import lock_owner
 
         return lock_owner(device) or _with_lock_file(device, root) or _with_open_file(device, root)
 

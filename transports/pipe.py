@@ -13,7 +13,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable
 from typing import TypeVar
 
-from transports.base import Lost, PortControl, Received, TransportLost
+from multidrop.transports.base import Lost, PortControl, Received, TransportLost
 
 LINGER = 1.0
 """Seconds that closing waits for bytes that were written and have not left: 960 bytes at 9600 baud."""

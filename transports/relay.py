@@ -19,9 +19,9 @@ import time
 from collections.abc import Callable
 from typing import Protocol
 
-from transports.base import PortControl, TransportLost
-from transports.endpoint import Endpoint
-from transports.relay_frames import GREETING, SILENCE, Frames, Garbled, Kind, Setting, data_frames, frame
+from multidrop.transports.base import PortControl, TransportLost
+from multidrop.transports.endpoint import Endpoint
+from multidrop.transports.relay_frames import GREETING, SILENCE, Frames, Garbled, Kind, Setting, data_frames, frame
 
 assert sys.platform != "win32"
 

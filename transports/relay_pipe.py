@@ -11,8 +11,8 @@ import threading
 from collections.abc import Callable
 from typing import Protocol
 
-from transports.descriptor import DescriptorPipe
-from transports.relay_frames import BEAT, CREDIT, MISSED, MOST, Frames, Garbled, Kind, Setting, frame
+from multidrop.transports.descriptor import DescriptorPipe
+from multidrop.transports.relay_frames import BEAT, CREDIT, MISSED, MOST, Frames, Garbled, Kind, Setting, frame
 
 _READ = 4096
 _PATIENCE = 5.0

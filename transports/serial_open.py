@@ -11,7 +11,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TypeVar
 
-from transports.base import Unreachable
+from multidrop.transports.base import Unreachable
 
 T = TypeVar("T")
 
@@ -57,7 +57,7 @@ def _nothing(port: str) -> str:
 
 
 def _owner(port: str) -> str:
-    from transports.holders import holder
+    from multidrop.transports.holders import holder
 
     return holder(port) or "another program"
 

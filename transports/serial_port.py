@@ -7,15 +7,15 @@ import sys
 
 import serial
 
-from transports.base import Transport, Unreachable
-from transports.control import SerialControl
-from transports.pipe import in_thread
-from transports.serial_open import opened
-from transports.threaded import ThreadedPipe
+from multidrop.transports.base import Transport, Unreachable
+from multidrop.transports.control import SerialControl
+from multidrop.transports.pipe import in_thread
+from multidrop.transports.serial_open import opened
+from multidrop.transports.threaded import ThreadedPipe
 
 if sys.platform != "win32":
-    from transports.descriptor import DescriptorPipe
-    from transports.serial_posix import SerialEndpoint
+    from multidrop.transports.descriptor import DescriptorPipe
+    from multidrop.transports.serial_posix import SerialEndpoint
 
 _PIECE = 256
 _PATIENCE = 0.5

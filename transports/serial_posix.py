@@ -11,10 +11,10 @@ from pathlib import Path
 
 import serial
 
-from transports.control import SerialControl
+from multidrop.transports.control import SerialControl
 
 if sys.platform != "win32":
-    from transports.output_queue import output_queue
+    from multidrop.transports.output_queue import output_queue
 
 assert sys.platform != "win32"
 

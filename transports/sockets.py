@@ -10,12 +10,12 @@ import socket
 import sys
 from typing import Any
 
-from transports.base import Transport, Unreachable
-from transports.threaded import ThreadedPipe
+from multidrop.transports.base import Transport, Unreachable
+from multidrop.transports.threaded import ThreadedPipe
 
 if sys.platform != "win32":
-    from transports.descriptor import DescriptorPipe
-    from transports.output_queue import output_queue
+    from multidrop.transports.descriptor import DescriptorPipe
+    from multidrop.transports.output_queue import output_queue
 
 CONNECT = 5.0
 """Greatest time in seconds to connect: name look-up and all addresses of a host together."""

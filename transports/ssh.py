@@ -5,9 +5,9 @@ from __future__ import annotations
 import asyncio
 import sys
 
-from transports.base import Transport, Unreachable
-from transports.far_port import SOCAT, FarPort, NotInstalled
-from transports.pipe import in_thread
+from multidrop.transports.base import Transport, Unreachable
+from multidrop.transports.far_port import SOCAT, FarPort, NotInstalled
+from multidrop.transports.pipe import in_thread
 
 OPENING = 20.0
 """Seconds until the greeting: several hosts on the way, a slow machine."""
@@ -32,7 +32,7 @@ async def open_ssh(far: FarPort, baud: int = 9600, within: float | None = None, 
 if sys.platform != "win32":
 
     async def _opened(far: FarPort, baud: int, within: float, way: str) -> Transport:
-        from transports.ssh_session import SshSession, greeted
+        from multidrop.transports.ssh_session import SshSession, greeted
 
         session = await in_thread(lambda: SshSession(far, baud, way), lambda late: late.close(True))
         try:

@@ -19,11 +19,11 @@ import tempfile
 import time
 from collections.abc import Iterator
 
-from transports.base import Transport, Unreachable
-from transports.descriptor import DescriptorPipe
-from transports.far_port import RELAY, SOCAT, FarPort, NotInstalled
-from transports.relay_frames import GREETING, WORD, Frames, Garbled, Kind, frame
-from transports.relay_pipe import RelayPipe
+from multidrop.transports.base import Transport, Unreachable
+from multidrop.transports.descriptor import DescriptorPipe
+from multidrop.transports.far_port import RELAY, SOCAT, FarPort, NotInstalled
+from multidrop.transports.relay_frames import GREETING, WORD, Frames, Garbled, Kind, frame
+from multidrop.transports.relay_pipe import RelayPipe
 
 # The command lines of `ssh` and of the far machine, and the reasons of a failure.
 #
@@ -124,7 +124,7 @@ def reason(far: FarPort, status: int | None, words: str, way: str = "") -> str:
 
 
 if sys.platform != "win32":
-    from transports.output_queue import output_queue
+    from multidrop.transports.output_queue import output_queue
 
 assert sys.platform != "win32"
 

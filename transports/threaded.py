@@ -11,8 +11,8 @@ from collections import deque
 from collections.abc import Callable
 from typing import Any, Protocol
 
-from transports.base import PortControl
-from transports.pipe import Pipe
+from multidrop.transports.base import PortControl
+from multidrop.transports.pipe import Pipe
 
 _JOIN = 2.0
 """Seconds that closing waits for a thread that a driver holds up; then the thread is abandoned."""

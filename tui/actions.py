@@ -6,32 +6,32 @@ import asyncio
 from functools import partial
 from typing import TYPE_CHECKING
 
-from dialects import Diagnostic, DriveError
-from transports import TransportLost
-from tui.palette import PADDING, PALETTE, Command, Recent, Switches, all_commands, commands_like
-from tui.panels.glance import glances_of
-from tui.screens.dialogs import Search
-from tui.screens.page import Page
-from tui.screens.table import page_entry
-from tui.view_actions import ViewActions
+from multidrop.dialects import Diagnostic, DriveError
+from multidrop.transports import TransportLost
+from multidrop.tui.palette import PADDING, PALETTE, Command, Recent, Switches, all_commands, commands_like
+from multidrop.tui.panels.glance import glances_of
+from multidrop.tui.screens.dialogs import Search
+from multidrop.tui.screens.page import Page
+from multidrop.tui.screens.table import page_entry
+from multidrop.tui.view_actions import ViewActions
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from tui.assist import Assist
-    from tui.editor.texts import Texts
-    from tui.frames import Frames
-    from tui.function_keys import FunctionKeys
-    from tui.keymap import Keymap
-    from tui.opening import Opener
-    from tui.outbox import Outbox
-    from tui.polling import Polling
-    from tui.screen_model import Record, ScreenModel
-    from tui.screens.main_screen import MainScreen
-    from tui.screens.questions import Questions
-    from tui.selection import Selection
-    from tui.session_view import SessionView
-    from tui.terminal.keyboard import Keyboard
+    from multidrop.tui.assist import Assist
+    from multidrop.tui.editor.texts import Texts
+    from multidrop.tui.frames import Frames
+    from multidrop.tui.function_keys import FunctionKeys
+    from multidrop.tui.keymap import Keymap
+    from multidrop.tui.opening import Opener
+    from multidrop.tui.outbox import Outbox
+    from multidrop.tui.polling import Polling
+    from multidrop.tui.screen_model import Record, ScreenModel
+    from multidrop.tui.screens.main_screen import MainScreen
+    from multidrop.tui.screens.questions import Questions
+    from multidrop.tui.selection import Selection
+    from multidrop.tui.session_view import SessionView
+    from multidrop.tui.terminal.keyboard import Keyboard
 
 FAILURES = (DriveError, Diagnostic, TransportLost)
 

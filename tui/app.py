@@ -25,41 +25,41 @@ from textual.geometry import Size
 from textual.message import Message
 from textual.screen import Screen
 
-from drives.events import Unsolicited
-from shell.connect.look import DEFAULT, Look
-from shell.events import Failed, OnBus, Printed, SessionEvent, StateChanged
-from tui.actions import Actions
-from tui.assist import Assist
-from tui.editor.texts import Texts
-from tui.frames import AGEING, Frames
-from tui.function_keys import FunctionKeys
-from tui.hooks import Hooks
-from tui.keymap import keymap, named_key
-from tui.opening import Opener
-from tui.outbox import Outbox
-from tui.palette import Recent
-from tui.polling import Polling
-from tui.presenter import Presenter
-from tui.screen_model import Record, ScreenModel
-from tui.screens.dialogs import LEAST, Over, TooSmall
-from tui.screens.framed import Framed
-from tui.screens.main_screen import MainScreen
-from tui.screens.page import Page
-from tui.screens.questions import Questions
-from tui.screens.reading import Reading
-from tui.screens.start import Start
-from tui.screens.table import PAGES
-from tui.selection import Selection
-from tui.session_view import SessionView
-from tui.terminal.keyboard import Keyboard
-from tui.tour import Tour
-from tui.transcripts import Transcripts
-from tui.typist import Typist
-from tui.unsent import Unsent
-from tui.widgets.banner import Banner
-from tui.widgets.entry import Entry
-from tui.widgets.footer import Footer
-from tui.widgets.theme import wrong_theme
+from multidrop.drives.events import Unsolicited
+from multidrop.shell.connect.look import DEFAULT, Look
+from multidrop.shell.events import Failed, OnBus, Printed, SessionEvent, StateChanged
+from multidrop.tui.actions import Actions
+from multidrop.tui.assist import Assist
+from multidrop.tui.editor.texts import Texts
+from multidrop.tui.frames import AGEING, Frames
+from multidrop.tui.function_keys import FunctionKeys
+from multidrop.tui.hooks import Hooks
+from multidrop.tui.keymap import keymap, named_key
+from multidrop.tui.opening import Opener
+from multidrop.tui.outbox import Outbox
+from multidrop.tui.palette import Recent
+from multidrop.tui.polling import Polling
+from multidrop.tui.presenter import Presenter
+from multidrop.tui.screen_model import Record, ScreenModel
+from multidrop.tui.screens.dialogs import LEAST, Over, TooSmall
+from multidrop.tui.screens.framed import Framed
+from multidrop.tui.screens.main_screen import MainScreen
+from multidrop.tui.screens.page import Page
+from multidrop.tui.screens.questions import Questions
+from multidrop.tui.screens.reading import Reading
+from multidrop.tui.screens.start import Start
+from multidrop.tui.screens.table import PAGES
+from multidrop.tui.selection import Selection
+from multidrop.tui.session_view import SessionView
+from multidrop.tui.terminal.keyboard import Keyboard
+from multidrop.tui.tour import Tour
+from multidrop.tui.transcripts import Transcripts
+from multidrop.tui.typist import Typist
+from multidrop.tui.unsent import Unsent
+from multidrop.tui.widgets.banner import Banner
+from multidrop.tui.widgets.entry import Entry
+from multidrop.tui.widgets.footer import Footer
+from multidrop.tui.widgets.theme import wrong_theme
 
 INTERRUPTED = 130
 """The exit code after a signal."""

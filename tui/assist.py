@@ -9,13 +9,13 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple, Protocol
 
-from dialects.on_demand import imported
-from shell.drafts import Drafts
-from tui.text import ago
+from multidrop.dialects.on_demand import imported
+from multidrop.shell.drafts import Drafts
+from multidrop.tui.text import ago
 
 if TYPE_CHECKING:
-    from shell.connect.settings import Settings
-    from shell.session import Session
+    from multidrop.shell.connect.settings import Settings
+    from multidrop.shell.session import Session
 
 
 ANY_LETTER = "P"
@@ -102,14 +102,14 @@ class ShellAssist(Assist):
     """The help that the prompt gives, too."""
 
     def __init__(self, session: Session, settings: Settings) -> None:
-        from shell.front.history import History
+        from multidrop.shell.front.history import History
 
         self._session, self._settings = session, settings
         self._history = History(settings.history)
 
     def complete(self, text: str, learned: Callable[[], None] | None = None) -> Sequence[CompletionView]:
         """Complete the typed text. `learned`: a person asks; it is called when a drive has reported its names."""
-        from shell.front.complete import complete, names_of
+        from multidrop.shell.front.complete import complete, names_of
 
         if learned is not None and (drive := names_of(self._session, text)) is not None:
             self._session.names.ask(drive, learned)
@@ -117,7 +117,7 @@ class ShellAssist(Assist):
 
     def hint(self, text: str) -> str:
         """Usage and meaning of the typed text, in one line."""
-        from shell.front.complete import hint
+        from multidrop.shell.front.complete import hint
 
         return hint(self._session, text)
 
@@ -139,7 +139,7 @@ class ShellAssist(Assist):
 
     def lately(self) -> Sequence[StartEntry]:
         """URLs opened lately, the newest first; saved connections are listed themselves."""
-        from shell.connect.opened import lately
+        from multidrop.shell.connect.opened import lately
 
         now, saved = time.time(), self._settings.connections
         found = [each for each in lately(self._settings.state) if each.url not in saved]
@@ -147,16 +147,16 @@ class ShellAssist(Assist):
 
     async def opened(self, url: str) -> None:
         """Keep a URL that was opened."""
-        from shell.connect.opened import note
+        from multidrop.shell.connect.opened import note
 
         await asyncio.to_thread(note, self._settings.state, url)
 
     async def scan(self, url: str, found: Callable[[str], None]) -> str:
         """Search a port for drives, without a question: at its own baud rate, then at the others. Raises Diagnostic."""
-        from shell.connect.opening import open_buses
-        from shell.connect.urls import parse
-        from shell.found import FoundDrive, url_of
-        from shell.scanning import Scanning
+        from multidrop.shell.connect.opening import open_buses
+        from multidrop.shell.connect.urls import parse
+        from multidrop.shell.found import FoundDrive, url_of
+        from multidrop.shell.scanning import Scanning
 
         opener = partial(open_buses, state=self._settings.state)
         connection = parse(url, self._settings.connections)
@@ -171,7 +171,7 @@ class ShellAssist(Assist):
 
     def verbs(self) -> Sequence[tuple[str, str, str]]:
         """The host's commands: name, usage, meaning."""
-        from shell.verbs.table import VERBS
+        from multidrop.shell.verbs.table import VERBS
 
         return [(verb.name, verb.usage, verb.meaning) for verb in VERBS.values()]
 
@@ -181,15 +181,15 @@ class ShellAssist(Assist):
 
     async def prepare(self) -> None:
         """Import it in a thread; the rest depends on the drive and is less."""
-        await asyncio.to_thread(imported, "shell.front.complete:complete")
+        await asyncio.to_thread(imported, "multidrop.shell.front.complete:complete")
         self.hint(ANY_LETTER)
         self.complete(ANY_LETTER)
 
 
 def _ports(state: Path) -> list[StartEntry]:
-    from shell.connect.port_state import memory_of
-    from transports.holders import holder
-    from transports.listing import list_ports
+    from multidrop.shell.connect.port_state import memory_of
+    from multidrop.transports.holders import holder
+    from multidrop.transports.listing import list_ports
 
     entries = []
     for port in list_ports():

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import math
 
-from dialects import Diagnostic
-from dialects.visible import visible
-from macros.model import FIRST_PAGE, KEYS, describe_clash, page_order
-from tui.session_view import MacrosView, MacroView
+from multidrop.dialects import Diagnostic
+from multidrop.dialects.visible import visible
+from multidrop.macros.model import FIRST_PAGE, KEYS, describe_clash, page_order
+from multidrop.tui.session_view import MacrosView, MacroView
 
 HELD = 0.2
 """Seconds between two presses below which the second is the repetition of a held key."""

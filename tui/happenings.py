@@ -9,9 +9,9 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from typing import NamedTuple, Protocol
 
-from dialects.conditions import UNREAD, Conditions
-from drives.events import Conditioned, Sample, Silent
-from tui.text import digits
+from multidrop.dialects.conditions import UNREAD, Conditions
+from multidrop.drives.events import Conditioned, Sample, Silent
+from multidrop.tui.text import digits
 
 LIMITS = {"lim+": "limit+", "lim-": "limit-"}
 """Lamps whose lighting is reported, by function."""

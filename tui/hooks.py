@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
-from shell.asking import Field
-from tui.actions import Actions
-from tui.presenter import Presenter
-from tui.terminal.keyboard import Keyboard
+from multidrop.shell.asking import Field
+from multidrop.tui.actions import Actions
+from multidrop.tui.presenter import Presenter
+from multidrop.tui.terminal.keyboard import Keyboard
 
 
 class Hooks:

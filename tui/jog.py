@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from tui.readout import READ, Readout, State
+from multidrop.tui.readout import READ, Readout, State
 
 REPETITION = 0.2
 """Seconds between two presses below which the second is the repetition of a held key."""

@@ -14,8 +14,8 @@ from dataclasses import dataclass, field
 from textual.binding import Binding, BindingType
 from textual.keys import Keys
 
-from dialects.visible import visible
-from tui.text import key_words
+from multidrop.dialects.visible import visible
+from multidrop.tui.text import key_words
 
 FIXED = {"escape", "enter", "tab", "space", "up", "down", "left", "right", "backspace", "delete"}
 FIXED |= {"ctrl+h", "ctrl+i", "ctrl+j", "ctrl+m", "ctrl+z"}

@@ -11,15 +11,15 @@ from typing import TYPE_CHECKING
 
 from textual.driver import Driver
 
-from dialects import Diagnostic
-from dialects.on_demand import importing
-from shell.signals import SIGNALS, early_ends
-from tui.app import MultidropApp
-from tui.assist import ShellAssist
+from multidrop.dialects import Diagnostic
+from multidrop.dialects.on_demand import importing
+from multidrop.shell.signals import SIGNALS, early_ends
+from multidrop.tui.app import MultidropApp
+from multidrop.tui.assist import ShellAssist
 
 if TYPE_CHECKING:
-    from shell.connect.settings import Settings
-    from shell.session import Session
+    from multidrop.shell.connect.settings import Settings
+    from multidrop.shell.session import Session
 
 
 def run(urls: Sequence[str], reconnect: bool = True, raw: bool = False, twin: bool = False) -> int:
@@ -29,8 +29,8 @@ def run(urls: Sequence[str], reconnect: bool = True, raw: bool = False, twin: bo
 
     Raises Diagnostic if there is no terminal, or if the configuration is wrong.
     """
-    from shell.connect.settings import load
-    from shell.front.keyboard import SWITCH
+    from multidrop.shell.connect.settings import load
+    from multidrop.shell.front.keyboard import SWITCH
 
     if not (sys.stdin.isatty() and sys.stdout.isatty()):
         raise Diagnostic("the screen needs a terminal", "tui", "multidrop shell reads lines from standard input")
@@ -41,9 +41,9 @@ def run(urls: Sequence[str], reconnect: bool = True, raw: bool = False, twin: bo
 
 async def _run(urls: Sequence[str], settings: Settings, reconnect: bool, raw: bool, twin: bool) -> int:
     with importing():
-        from shell.front.collector import collected_at_rest
-        from shell.log.writer import begin
-        from shell.session import Session
+        from multidrop.shell.front.collector import collected_at_rest
+        from multidrop.shell.log.writer import begin
+        from multidrop.shell.session import Session
 
     session = Session(settings, reconnect=reconnect, raw=raw)
     session.twins.wanted = twin
@@ -62,10 +62,10 @@ async def _leave(session: Session) -> None:
 
     A terminal that is not read delays neither the stop nor the end.
     """
-    from shell import stops
-    from shell.automation import outcome, settled
-    from shell.output import finish, nonblocking, write
-    from shell.verbs.recording import keep_unended
+    from multidrop.shell import stops
+    from multidrop.shell.automation import outcome, settled
+    from multidrop.shell.output import finish, nonblocking, write
+    from multidrop.shell.verbs.recording import keep_unended
 
     if not session.automations.was_interrupted:
         session.interrupt()
@@ -93,7 +93,7 @@ def driver() -> type[Driver] | None:
     if sys.platform == "win32":
         return None
     else:
-        from tui.terminal.driver import Terminal
+        from multidrop.tui.terminal.driver import Terminal
 
         return Terminal
 

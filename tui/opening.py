@@ -6,12 +6,12 @@ from collections.abc import Awaitable, Callable, Sequence
 
 from textual.app import App
 
-from dialects import Diagnostic, DriveError
-from transports import TransportLost
-from tui.assist import Assist
-from tui.screens.start import DEMO, TOUR, Start
-from tui.session_view import SessionView
-from tui.terminal.keyboard import Keyboard
+from multidrop.dialects import Diagnostic, DriveError
+from multidrop.transports import TransportLost
+from multidrop.tui.assist import Assist
+from multidrop.tui.screens.start import DEMO, TOUR, Start
+from multidrop.tui.session_view import SessionView
+from multidrop.tui.terminal.keyboard import Keyboard
 
 FAILURES = (DriveError, Diagnostic, TransportLost)
 TRY = "try PR P, MR 51200 and @b PR P, each with Enter; /tour walks through everything"

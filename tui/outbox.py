@@ -18,9 +18,9 @@ from collections.abc import Callable, Coroutine, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-from dialects import Diagnostic
-from shell.lines import DriveLine, VerbLine, parse, pinned
-from tui.session_view import Place, SessionView, selected_place
+from multidrop.dialects import Diagnostic
+from multidrop.shell.lines import DriveLine, VerbLine, parse, pinned
+from multidrop.tui.session_view import Place, SessionView, selected_place
 
 BURST = 0.5
 """Seconds between two Enters below which no person typed the second line after reading the first answer."""

@@ -8,13 +8,13 @@ from typing import NamedTuple
 from rich.text import Text
 from textual.fuzzy import Matcher
 
-from tui.function_keys import FunctionKeys
-from tui.keymap import Keymap
-from tui.panels.table import PANELS
-from tui.screens.dialogs import Match
-from tui.screens.table import PAGES
-from tui.session_view import SessionView
-from tui.text import fit, visible
+from multidrop.tui.function_keys import FunctionKeys
+from multidrop.tui.keymap import Keymap
+from multidrop.tui.panels.table import PANELS
+from multidrop.tui.screens.dialogs import Match
+from multidrop.tui.screens.table import PAGES
+from multidrop.tui.session_view import SessionView
+from multidrop.tui.text import fit, visible
 
 PALETTE, PADDING = 90, 7
 """Greatest width of the palette in cells, and what border, padding and scroll bar take of it."""

@@ -11,10 +11,10 @@ from collections.abc import Callable, Container, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TypeVar
 
-from drives.readings import Value
-from shell.roles import Series
-from tui.screen_model import ScreenModel
-from tui.session_view import BusView, Closable, SessionView, TelemetryView
+from multidrop.drives.readings import Value
+from multidrop.shell.roles import Series
+from multidrop.tui.screen_model import ScreenModel
+from multidrop.tui.session_view import BusView, Closable, SessionView, TelemetryView
 
 PLOT = 0.02
 """Seconds between the samples of a plotted drive; a slow wire gives fewer."""

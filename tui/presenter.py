@@ -4,24 +4,24 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from tui.function_keys import FunctionKeys
-from tui.keymap import Keymap
-from tui.panels.column import column_rows
-from tui.panels.glance import glances_of
-from tui.panels.lamps import trouble_of
-from tui.panels.status import narrow_rows
-from tui.panels.view import View
-from tui.polling import Polling
-from tui.readout import State
-from tui.screen_model import BusFacts, ScreenModel, bus_old, bus_state
-from tui.screens.framed import Framed
-from tui.screens.main_screen import MainScreen
-from tui.screens.page import Page
-from tui.session_view import BusView, SessionView
-from tui.widgets.banner import banner_row
-from tui.widgets.footer import footer_row
-from tui.widgets.lines import Row
-from tui.widgets.topline import Tab, top_row
+from multidrop.tui.function_keys import FunctionKeys
+from multidrop.tui.keymap import Keymap
+from multidrop.tui.panels.column import column_rows
+from multidrop.tui.panels.glance import glances_of
+from multidrop.tui.panels.lamps import trouble_of
+from multidrop.tui.panels.status import narrow_rows
+from multidrop.tui.panels.view import View
+from multidrop.tui.polling import Polling
+from multidrop.tui.readout import State
+from multidrop.tui.screen_model import BusFacts, ScreenModel, bus_old, bus_state
+from multidrop.tui.screens.framed import Framed
+from multidrop.tui.screens.main_screen import MainScreen
+from multidrop.tui.screens.page import Page
+from multidrop.tui.session_view import BusView, SessionView
+from multidrop.tui.widgets.banner import banner_row
+from multidrop.tui.widgets.footer import footer_row
+from multidrop.tui.widgets.lines import Row
+from multidrop.tui.widgets.topline import Tab, top_row
 
 FLOOD = 3
 """The number of lines in one frame that are too many to read."""

@@ -9,11 +9,11 @@ from dataclasses import dataclass, field
 from enum import Enum
 from typing import NamedTuple
 
-from dialects.conditions import Conditions, Pace
-from dialects.parameters import Readings
-from drives.events import Conditioned, Sample, Silent
-from shell.events import Agreed, Diverged, Phase, Predicted, TwinEnded, TwinEvent
-from tui.text import age
+from multidrop.dialects.conditions import Conditions, Pace
+from multidrop.dialects.parameters import Readings
+from multidrop.drives.events import Conditioned, Sample, Silent
+from multidrop.shell.events import Agreed, Diverged, Phase, Predicted, TwinEnded, TwinEvent
+from multidrop.tui.text import age
 
 SPAN = 20.0
 """Seconds of samples that the plot keeps."""

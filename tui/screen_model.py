@@ -12,8 +12,8 @@ from collections.abc import Callable, Container
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
-from drives.events import Conditioned, Ended, Sample, Sent, Silent, Traffic, Unsolicited, Valued
-from shell.events import (
+from multidrop.drives.events import Conditioned, Ended, Sample, Sent, Silent, Traffic, Unsolicited, Valued
+from multidrop.shell.events import (
     By,
     Bytes,
     Entered,
@@ -31,12 +31,12 @@ from shell.events import (
     StateChanged,
     TwinEvent,
 )
-from shell.lines import EVERYONE
-from tui import happenings
-from tui.curves.look import Look
-from tui.curves.trace import Traces
-from tui.readout import READ, Readout, State
-from tui.traffic import TrafficStore
+from multidrop.shell.lines import EVERYONE
+from multidrop.tui import happenings
+from multidrop.tui.curves.look import Look
+from multidrop.tui.curves.trace import Traces
+from multidrop.tui.readout import READ, Readout, State
+from multidrop.tui.traffic import TrafficStore
 
 KEPT = 50_000
 """Records that a transcript keeps."""

@@ -9,10 +9,10 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from tui.screen_model import ScreenModel
-from tui.screens.main_screen import MainScreen
-from tui.session_view import Place, SessionView, selected_place
-from tui.widgets.lines import Row
+from multidrop.tui.screen_model import ScreenModel
+from multidrop.tui.screens.main_screen import MainScreen
+from multidrop.tui.session_view import Place, SessionView, selected_place
+from multidrop.tui.widgets.lines import Row
 
 
 class Selection:

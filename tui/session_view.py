@@ -8,15 +8,15 @@ from datetime import datetime
 from pathlib import Path
 from typing import Any, NamedTuple, Protocol
 
-from dialects.controls import Controls
-from dialects.family import Language
-from dialects.parameters import Parameters
-from drives.readings import Value
-from shell.asking import Fill
-from shell.events import By, SessionEvent
-from shell.roles import RunningPlot, Series
-from shell.stops import Tally
-from shell.transcripts import Transcripts
+from multidrop.dialects.controls import Controls
+from multidrop.dialects.family import Language
+from multidrop.dialects.parameters import Parameters
+from multidrop.drives.readings import Value
+from multidrop.shell.asking import Fill
+from multidrop.shell.events import By, SessionEvent
+from multidrop.shell.roles import RunningPlot, Series
+from multidrop.shell.stops import Tally
+from multidrop.shell.transcripts import Transcripts
 
 
 class Closable(Protocol):

@@ -9,14 +9,14 @@ from typing import TYPE_CHECKING
 from textual.app import App
 from textual.filter import LineFilter
 
-from shell.connect.look import Look
-from tui.curves.ink import INKS
-from tui.widgets.signs import SignFilter, Signs, signs_for
-from tui.widgets.theme import DEFAULTS, THEMES, theme_for
+from multidrop.shell.connect.look import Look
+from multidrop.tui.curves.ink import INKS
+from multidrop.tui.widgets.signs import SignFilter, Signs, signs_for
+from multidrop.tui.widgets.theme import DEFAULTS, THEMES, theme_for
 
 if TYPE_CHECKING:
-    from tui.screen_model import ScreenModel
-    from tui.screens.main_screen import MainScreen
+    from multidrop.tui.screen_model import ScreenModel
+    from multidrop.tui.screens.main_screen import MainScreen
 
 
 class Themed(App[int]):

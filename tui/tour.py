@@ -9,11 +9,11 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import NamedTuple
 
-from shell.events import By, Entered, SessionEvent
-from tui.keymap import Keymap
-from tui.session_view import SessionView
-from tui.text import at_words
-from tui.widgets.lines import Row
+from multidrop.shell.events import By, Entered, SessionEvent
+from multidrop.tui.keymap import Keymap
+from multidrop.tui.session_view import SessionView
+from multidrop.tui.text import at_words
+from multidrop.tui.widgets.lines import Row
 
 LINE = "press"
 """The line of the demo cell that it is on."""

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections import deque
 from typing import NamedTuple
 
-from dialects import Priority, Request
-from drives.events import BusEvent, Ended, Sent, Traffic
+from multidrop.dialects import Priority, Request
+from multidrop.drives.events import BusEvent, Ended, Sent, Traffic
 
 MOST = 4000
 """Pieces that are kept."""

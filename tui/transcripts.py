@@ -6,15 +6,15 @@ import asyncio
 from collections.abc import Awaitable, Callable, Sequence
 from datetime import datetime, timedelta
 
-from dialects import Diagnostic
-from dialects.visible import visible
-from shell import new_file
-from shell.transcripts import Filter
-from tui.outbox import Outbox
-from tui.screen_model import Record
-from tui.screens.main_screen import MainScreen
-from tui.session_view import SessionView
-from tui.widgets.gutter import MARKS
+from multidrop.dialects import Diagnostic
+from multidrop.dialects.visible import visible
+from multidrop.shell import new_file
+from multidrop.shell.transcripts import Filter
+from multidrop.tui.outbox import Outbox
+from multidrop.tui.screen_model import Record
+from multidrop.tui.screens.main_screen import MainScreen
+from multidrop.tui.session_view import SessionView
+from multidrop.tui.widgets.gutter import MARKS
 
 
 class Transcripts:

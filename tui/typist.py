@@ -8,15 +8,15 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Callable
 
-from tui.assist import Assist
-from tui.outbox import Outbox
-from tui.screens.main_screen import MainScreen
-from tui.screens.questions import Questions
-from tui.selection import Selection
-from tui.session_view import SessionView
-from tui.terminal.keyboard import Keyboard
-from tui.unsent import Unsent
-from tui.widgets.entry import LONGEST
+from multidrop.tui.assist import Assist
+from multidrop.tui.outbox import Outbox
+from multidrop.tui.screens.main_screen import MainScreen
+from multidrop.tui.screens.questions import Questions
+from multidrop.tui.selection import Selection
+from multidrop.tui.session_view import SessionView
+from multidrop.tui.terminal.keyboard import Keyboard
+from multidrop.tui.unsent import Unsent
+from multidrop.tui.widgets.entry import LONGEST
 
 
 class Typist:

@@ -5,10 +5,10 @@ from __future__ import annotations
 import re
 from collections.abc import Callable
 
-from dialects.files import split_lines
-from tui.outbox import not_sent
-from tui.screen_model import Record, ScreenModel
-from tui.screens.main_screen import MainScreen
+from multidrop.dialects.files import split_lines
+from multidrop.tui.outbox import not_sent
+from multidrop.tui.screen_model import Record, ScreenModel
+from multidrop.tui.screens.main_screen import MainScreen
 
 KEPT = 20
 """Greatest number of lines that go into the history of those that a stop dropped before their Enter counted."""

@@ -7,21 +7,21 @@ from typing import TYPE_CHECKING
 
 from textual.widgets import Input, TextArea
 
-from tui.palette import PADDING, PALETTE
-from tui.panels.glance import glances_of
-from tui.screens.framed import Framed
-from tui.screens.help import entries
-from tui.screens.help import found as help_on
-from tui.session_view import selected_place
-from tui.themed import Themed
+from multidrop.tui.palette import PADDING, PALETTE
+from multidrop.tui.panels.glance import glances_of
+from multidrop.tui.screens.framed import Framed
+from multidrop.tui.screens.help import entries
+from multidrop.tui.screens.help import found as help_on
+from multidrop.tui.session_view import selected_place
+from multidrop.tui.themed import Themed
 
 if TYPE_CHECKING:
-    from tui.function_keys import FunctionKeys
-    from tui.keymap import Keymap
-    from tui.polling import Polling
-    from tui.screens.questions import Questions
-    from tui.session_view import SessionView
-    from tui.tour import Tour
+    from multidrop.tui.function_keys import FunctionKeys
+    from multidrop.tui.keymap import Keymap
+    from multidrop.tui.polling import Polling
+    from multidrop.tui.screens.questions import Questions
+    from multidrop.tui.session_view import SessionView
+    from multidrop.tui.tour import Tour
 
 CTRL_C = "Ctrl+Q quits, Ctrl+X stops all drives"
 

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from functools import partial
 
-from dialects.codec import Procedure
-from dialects.family import Family, Guards, Sentences
-from dialects.guards import Guard
-from dialects.mcode.host import classify, operations
-from dialects.mcode.host.codec import STOP_BYTES, MCode
-from dialects.mcode.host.identify import identify, remember
-from dialects.mcode.host.state import MCodeState
-from dialects.mcode.manual import guards, help, sentences
+from multidrop.dialects.codec import Procedure
+from multidrop.dialects.family import Family, Guards, Sentences
+from multidrop.dialects.guards import Guard
+from multidrop.dialects.mcode.host import classify, operations
+from multidrop.dialects.mcode.host.codec import STOP_BYTES, MCode
+from multidrop.dialects.mcode.host.identify import identify, remember
+from multidrop.dialects.mcode.host.state import MCodeState
+from multidrop.dialects.mcode.manual import guards, help, sentences
 
 
 def guarded(state: MCodeState, text: str) -> Guard | None:
@@ -42,16 +42,16 @@ MCODE = Family(
     rests_in_place=False,
     question="PR {}".format,
     sentences=Sentences(sentences.move, sentences.move_to, sentences.assign),
-    programs_at="dialects.mcode.host.programs:PROGRAMS",
-    parameters_at="dialects.mcode.host.parameter_writing:PARAMETERS",
-    snapshot_at="dialects.mcode.host.snapshot:take",
-    readings_at="dialects.mcode.host.readings:READINGS",
+    programs_at="multidrop.dialects.mcode.host.programs:PROGRAMS",
+    parameters_at="multidrop.dialects.mcode.host.parameter_writing:PARAMETERS",
+    snapshot_at="multidrop.dialects.mcode.host.snapshot:take",
+    readings_at="multidrop.dialects.mcode.host.readings:READINGS",
     guards=Guards(guards.NAMES, guarded, guards.word_of, guards.only_ends),
-    debugging_at="dialects.mcode.host.debugging:DEBUGGING",
+    debugging_at="multidrop.dialects.mcode.host.debugging:DEBUGGING",
     repairs=True,
     remember=remember,
-    scan_at="dialects.mcode.host.scan:SCAN",
-    conditions_at="dialects.mcode.host.conditions:READER",
-    controls_at="dialects.mcode.manual.controls:controls",
+    scan_at="multidrop.dialects.mcode.host.scan:SCAN",
+    conditions_at="multidrop.dialects.mcode.host.conditions:READER",
+    controls_at="multidrop.dialects.mcode.manual.controls:controls",
     stop_bytes=STOP_BYTES,
 )

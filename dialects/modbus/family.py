@@ -4,18 +4,18 @@ from __future__ import annotations
 
 from functools import partial
 
-from dialects.codec import Procedure
-from dialects.family import Family, Guards, Registers, Sentences
-from dialects.guards import Guard
-from dialects.mcode.host.classify import referencing
-from dialects.mcode.manual import guards, help, sentences
-from dialects.modbus.host import operations
-from dialects.modbus.host.codec import Modbus
-from dialects.modbus.host.identify import identify
-from dialects.modbus.host.mapping import ALTERNATIVE, lines_of
-from dialects.modbus.host.messages import pdu_codec
-from dialects.modbus.host.state import ModbusState
-from dialects.modbus.manual.registers import REGISTERS
+from multidrop.dialects.codec import Procedure
+from multidrop.dialects.family import Family, Guards, Registers, Sentences
+from multidrop.dialects.guards import Guard
+from multidrop.dialects.mcode.host.classify import referencing
+from multidrop.dialects.mcode.manual import guards, help, sentences
+from multidrop.dialects.modbus.host import operations
+from multidrop.dialects.modbus.host.codec import Modbus
+from multidrop.dialects.modbus.host.identify import identify
+from multidrop.dialects.modbus.host.mapping import ALTERNATIVE, lines_of
+from multidrop.dialects.modbus.host.messages import pdu_codec
+from multidrop.dialects.modbus.host.state import ModbusState
+from multidrop.dialects.modbus.manual.registers import REGISTERS
 
 
 def guarded(state: ModbusState, text: str) -> Guard | None:
@@ -48,9 +48,9 @@ MODBUS = Family(
     question="PR {}".format,
     sentences=Sentences(sentences.move, sentences.move_to, sentences.assign),
     no_programs=f"programs are neither listed nor written over Modbus; {ALTERNATIVE} does both with the same drive",
-    parameters_at="dialects.modbus.host.parameters:PARAMETERS",
-    snapshot_at="dialects.modbus.host.snapshot:take",
-    readings_at="dialects.modbus.host.readings:READINGS",
+    parameters_at="multidrop.dialects.modbus.host.parameters:PARAMETERS",
+    snapshot_at="multidrop.dialects.modbus.host.snapshot:take",
+    readings_at="multidrop.dialects.modbus.host.readings:READINGS",
     registers=Registers(
         read=operations.read_registers,
         write=operations.write_registers,
@@ -61,6 +61,6 @@ MODBUS = Family(
     ),
     guards=Guards(guards.NAMES, guarded, guards.word_of, guards.only_ends),
     prepare=pdu_codec,
-    conditions_at="dialects.modbus.host.conditions:READER",
-    controls_at="dialects.mcode.manual.controls:controls",
+    conditions_at="multidrop.dialects.modbus.host.conditions:READER",
+    controls_at="multidrop.dialects.mcode.manual.controls:controls",
 )

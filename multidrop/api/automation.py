@@ -12,12 +12,12 @@ from collections.abc import Callable, Coroutine
 from contextvars import Context, ContextVar, copy_context
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from dialects import Stopped
-from shell.automation import ENDING, outcome, settled
-from shell.events import Output, Printed, SessionEvent
+from multidrop.dialects import Stopped
+from multidrop.shell.automation import ENDING, outcome, settled
+from multidrop.shell.events import Output, Printed, SessionEvent
 
 if TYPE_CHECKING:
-    from shell.session import Session
+    from multidrop.shell.session import Session
 
 T = TypeVar("T")
 _printed: ContextVar[list[str] | None] = ContextVar("printed", default=None)

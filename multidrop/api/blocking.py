@@ -7,7 +7,6 @@ from collections.abc import Callable, Coroutine
 from types import TracebackType
 from typing import Any, TypeVar
 
-from dialects import Diagnostic
 from multidrop.api import endings
 from multidrop.api.blocking_drive import Drive
 from multidrop.api.blocking_telemetry import Telemetry
@@ -17,6 +16,7 @@ from multidrop.api.sessions import CLOSED, AsyncSession, Notice, log
 from multidrop.api.stopping import StopReport
 from multidrop.api.telemetry import RATE, AsyncTelemetry
 from multidrop.api.threads import LoopThread, Notices
+from multidrop.dialects import Diagnostic
 
 T = TypeVar("T")
 

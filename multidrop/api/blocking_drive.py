@@ -8,15 +8,15 @@ from typing import TYPE_CHECKING, Protocol
 from multidrop.api.blocking_telemetry import Caller, Telemetry
 from multidrop.api.drives import AsyncDrive
 from multidrop.api.stopping import StopReport
-from shell import waits
+from multidrop.shell import waits
 
 if TYPE_CHECKING:
-    from dialects import Motion
-    from dialects.parameters import Readings
     from multidrop.api.parameters import AsyncParameters
     from multidrop.api.programs import AsyncPrograms
-    from shell.params.readings import Difference
-    from shell.scripts.values import Value
+    from multidrop.dialects import Motion
+    from multidrop.dialects.parameters import Readings
+    from multidrop.shell.params.readings import Difference
+    from multidrop.shell.scripts.values import Value
 
 Lines = list[str]
 

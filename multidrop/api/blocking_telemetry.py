@@ -6,9 +6,9 @@ import contextlib
 from collections.abc import Callable, Coroutine, Iterator
 from typing import Any, Protocol, TypeVar
 
-from dialects import Diagnostic
 from multidrop.api.samples import Sample, Samples
 from multidrop.api.telemetry import AsyncTelemetry
+from multidrop.dialects import Diagnostic
 
 T = TypeVar("T")
 

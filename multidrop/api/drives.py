@@ -6,23 +6,23 @@ import operator
 import re
 from typing import TYPE_CHECKING, Protocol
 
-from dialects import Diagnostic, Motion, Refused
-from drives.drive import still
 from multidrop.api import owner
 from multidrop.api.parameters import AsyncParameters
 from multidrop.api.pictures import table
 from multidrop.api.programs import AsyncPrograms
 from multidrop.api.stopping import Stopping
-from shell import stops, waits
-from shell.events import By
-from shell.lines import join_target
-from shell.scripts.asking import ask
-from shell.scripts.expression import Word
-from shell.scripts.values import Value, written
+from multidrop.dialects import Diagnostic, Motion, Refused
+from multidrop.drives.drive import still
+from multidrop.shell import stops, waits
+from multidrop.shell.events import By
+from multidrop.shell.lines import join_target
+from multidrop.shell.scripts.asking import ask
+from multidrop.shell.scripts.expression import Word
+from multidrop.shell.scripts.values import Value, written
 
 if TYPE_CHECKING:
-    from drives.drive import Drive as Wire
     from multidrop.api.telemetry import AsyncTelemetry
+    from multidrop.drives.drive import Drive as Wire
 
 _WORD = re.compile(r"[A-Za-z]\w*", re.ASCII)
 

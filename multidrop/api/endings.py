@@ -16,8 +16,8 @@ import threading
 from collections.abc import Callable
 from typing import Protocol
 
-from shell import output
-from shell.signals import SIGNALS
+from multidrop.shell import output
+from multidrop.shell.signals import SIGNALS
 
 SIGNALLED = 128
 """The exit code after a signal is this and its number."""

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any, Protocol, TypeVar
 if TYPE_CHECKING:
     import asyncio
 
-    from drives.drive import Drive
-    from shell.session import Session as Shell
+    from multidrop.drives.drive import Drive
+    from multidrop.shell.session import Session as Shell
 
 T = TypeVar("T")
 

@@ -5,16 +5,16 @@ from __future__ import annotations
 from collections.abc import Collection
 from typing import TYPE_CHECKING
 
-from shell import new_file
-from shell.params import file as files
-from shell.params import readings
-from shell.params.readings import Difference
-from shell.params.restore import Options, restore
+from multidrop.shell import new_file
+from multidrop.shell.params import file as files
+from multidrop.shell.params import readings
+from multidrop.shell.params.readings import Difference
+from multidrop.shell.params.restore import Options, restore
 
 if TYPE_CHECKING:
-    from dialects.parameters import Readings
-    from drives.drive import Drive
     from multidrop.api.owner import Owner
+    from multidrop.dialects.parameters import Readings
+    from multidrop.drives.drive import Drive
 
 
 class AsyncParameters:

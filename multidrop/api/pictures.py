@@ -7,7 +7,7 @@ from html import escape
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from shell.session import Session as Shell
+    from multidrop.shell.session import Session as Shell
 
 ROWS = 200
 """The largest number of rows of a table."""

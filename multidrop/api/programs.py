@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from shell import listings, transfers
-from shell.transfers import Wanted
+from multidrop.shell import listings, transfers
+from multidrop.shell.transfers import Wanted
 
 if TYPE_CHECKING:
-    from drives.drive import Drive
     from multidrop.api.owner import Owner
+    from multidrop.drives.drive import Drive
 
 
 Lines = list[str]
@@ -31,7 +31,7 @@ class AsyncPrograms:
 
         `raw`: as they are stored. Raises Diagnostic for a file that exists.
         """
-        from shell import new_file
+        from multidrop.shell import new_file
 
         if file:
             new_file.check(file)

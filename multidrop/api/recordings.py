@@ -6,11 +6,11 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from dialects import Diagnostic
-from dialects.files import why
 from multidrop.api.samples import Sample, Samples
-from shell.plots.layout import TWIN
-from shell.plots.sink import load
+from multidrop.dialects import Diagnostic
+from multidrop.dialects.files import why
+from multidrop.shell.plots.layout import TWIN
+from multidrop.shell.plots.sink import load
 
 QUANTITIES = ("position", "velocity")
 """Both are in every sample of a drive, and of its twin."""

@@ -10,7 +10,7 @@ from multidrop.api.pictures import table
 
 if TYPE_CHECKING:
     from multidrop.api.owner import Owner
-    from shell.scripts.results import Result
+    from multidrop.shell.scripts.results import Result
 
 
 @dataclass(frozen=True)
@@ -37,8 +37,8 @@ class Run:
 
 async def run_file(owner: Owner, file: str, values: Mapping[str, str]) -> Run:
     """Check a script whole, then execute it. Raises WrongScript, or the failure that ended it."""
-    from shell.scripts.executor import run_script
-    from shell.scripts.reading import read_script  # with all verbs, which few programs need
+    from multidrop.shell.scripts.executor import run_script
+    from multidrop.shell.scripts.reading import read_script  # with all verbs, which few programs need
 
     shell = owner.shell
     script = read_script(file, values, shell.macros)

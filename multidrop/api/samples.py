@@ -7,8 +7,8 @@ from array import array
 from collections.abc import Iterable, Iterator, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple, overload
 
-from dialects import Diagnostic
 from multidrop.api.pictures import Curve, plot
+from multidrop.dialects import Diagnostic
 
 if TYPE_CHECKING:
     from typing import SupportsIndex

@@ -10,7 +10,6 @@ from types import TracebackType
 from typing import TYPE_CHECKING, Any, TypeVar
 from weakref import WeakKeyDictionary, WeakSet
 
-from dialects import Diagnostic
 from multidrop.api import endings
 from multidrop.api.automation import Calls
 from multidrop.api.drives import AsyncDrive
@@ -18,14 +17,15 @@ from multidrop.api.pictures import drives_table
 from multidrop.api.runs import Run, run_file
 from multidrop.api.stopping import Stopping
 from multidrop.api.telemetry import RATE, AsyncTelemetry
-from shell import stops
-from shell.automation import settled
-from shell.connect.settings import load
-from shell.events import By, Notified, SessionEvent
-from shell.session import Session as Shell
+from multidrop.dialects import Diagnostic
+from multidrop.shell import stops
+from multidrop.shell.automation import settled
+from multidrop.shell.connect.settings import load
+from multidrop.shell.events import By, Notified, SessionEvent
+from multidrop.shell.session import Session as Shell
 
 if TYPE_CHECKING:
-    from drives.drive import Drive
+    from multidrop.drives.drive import Drive
 
 T = TypeVar("T")
 CLOSED = ("the session is closed", "session", "connect(URL) opens one")
@@ -81,7 +81,7 @@ class AsyncSession:
         """Open the connections and find their drives. Moves nothing."""
         if self._shell is not None:
             return
-        from shell.log.writer import begin as begin_log
+        from multidrop.shell.log.writer import begin as begin_log
 
         shell = Shell(load())
         shell.agreed, shell.way = self._yes, "connect(URL, yes=True)"
@@ -168,7 +168,7 @@ class AsyncSession:
 
     def found(self, address: str) -> Drive:
         """The drive at an address, if there is one. Raises Diagnostic, NoAnswer."""
-        from shell.lines import EVERYONE, split_target
+        from multidrop.shell.lines import EVERYONE, split_target
 
         bus, own = split_target(address)
         drive = self.shell.drive(bus, own or None)

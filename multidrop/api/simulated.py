@@ -7,15 +7,15 @@ import sys
 from contextlib import AsyncExitStack
 from types import TracebackType
 
-from dialects import Diagnostic
-from dialects.families import TABLE
 from multidrop.api.threads import LoopThread
-from shell.connect import settings
-from simulator import cells
-from simulator.cell.spec import BusSpec, Cell, Endpoint
-from simulator.floor import Floor
-from simulator.serving.endpoints import Served, serve_bus
-from simulator.serving.running import RunningFloor
+from multidrop.dialects import Diagnostic
+from multidrop.dialects.families import TABLE
+from multidrop.shell.connect import settings
+from multidrop.simulator import cells
+from multidrop.simulator.cell.spec import BusSpec, Cell, Endpoint
+from multidrop.simulator.floor import Floor
+from multidrop.simulator.serving.endpoints import Served, serve_bus
+from multidrop.simulator.serving.running import RunningFloor
 
 HOST = "127.0.0.1"
 PTY = "pty"

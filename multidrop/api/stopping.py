@@ -6,11 +6,11 @@ from collections.abc import Callable, Generator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from shell import stops
-from shell.automation import settled
+from multidrop.shell import stops
+from multidrop.shell.automation import settled
 
 if TYPE_CHECKING:
-    from shell.session import Session as Shell
+    from multidrop.shell.session import Session as Shell
 
 
 @dataclass(frozen=True)

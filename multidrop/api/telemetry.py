@@ -7,15 +7,15 @@ from collections import deque
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from drives.events import Lost
-from drives.events import Sample as Read
 from multidrop.api.samples import Sample, Samples
-from shell.events import OnBus, SessionEvent
+from multidrop.drives.events import Lost
+from multidrop.drives.events import Sample as Read
+from multidrop.shell.events import OnBus, SessionEvent
 
 if TYPE_CHECKING:
-    from drives.drive import Drive
-    from drives.subscriptions import Subscription
     from multidrop.api.owner import Owner
+    from multidrop.drives.drive import Drive
+    from multidrop.drives.subscriptions import Subscription
 
 RATE = 50.0
 """Samples of each drive a second, at most."""

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import argparse
 
-from dialects.numbers import whole
 from multidrop.arguments import parts
+from multidrop.dialects.numbers import whole
 
 HOST = "127.0.0.1"
 

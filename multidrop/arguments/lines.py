@@ -112,7 +112,7 @@ def rescue(parser: argparse.ArgumentParser) -> None:
 
 
 def _searched(parser: argparse.ArgumentParser) -> None:
-    from dialects.families import FAMILIES
+    from multidrop.dialects.families import FAMILIES
 
     parser.add_argument("url", metavar="PORT-OR-URL", help="the port to search; its baud rate is tried first")
     parser.add_argument("--baud", metavar="N", type=parts.baud, help="this baud rate only")

@@ -8,13 +8,13 @@ from collections.abc import Collection, Mapping
 from dataclasses import asdict
 from pathlib import Path
 
-from dialects import Diagnostic
-from dialects.files import toml_of, utf8_of
 from multidrop.commands.failure import fail
-from shell.connect import settings
-from shell.connect.settings import Settings
-from shell.output import write
-from shell.secrets import HIDDEN, holds_password, url_without_secrets
+from multidrop.dialects import Diagnostic
+from multidrop.dialects.files import toml_of, utf8_of
+from multidrop.shell.connect import settings
+from multidrop.shell.connect.settings import Settings
+from multidrop.shell.output import write
+from multidrop.shell.secrets import HIDDEN, holds_password, url_without_secrets
 
 REFUSED = "   # default; the file's does not count"
 WRONG = 2
@@ -42,7 +42,7 @@ def shown(found: Settings, keys: dict[str, str], text: str) -> list[str]:
     """The settings, line by line. `keys`: those that count; `text`: the file."""
     import tomlkit
 
-    from tui.widgets.theme import wrong_theme
+    from multidrop.tui.widgets.theme import wrong_theme
 
     given = toml_of(text, "")
 
@@ -89,9 +89,9 @@ def check(chosen: argparse.Namespace) -> int:
 
 def _troubles(found: Settings) -> list[str]:
     """The errors in keys and theme, which only the screen knows, and files that cannot be read."""
-    from tui.app import bindings
-    from tui.keymap import keymap
-    from tui.widgets.theme import wrong_theme
+    from multidrop.tui.app import bindings
+    from multidrop.tui.keymap import keymap
+    from multidrop.tui.widgets.theme import wrong_theme
 
     look = found.look
     return [*keymap(bindings(), look.keys).troubles, *wrong_theme(look.theme), *found.mqtt.unreadable()]
@@ -99,8 +99,8 @@ def _troubles(found: Settings) -> list[str]:
 
 def _keys(found: Settings) -> dict[str, str]:
     """The keys that count by the names of their functions: as the file writes them, else the program's own."""
-    from tui.app import bindings
-    from tui.keymap import keymap
+    from multidrop.tui.app import bindings
+    from multidrop.tui.keymap import keymap
 
     kept = keymap(bindings(), found.look.keys)
     return {name: found.look.keys[name] if name in kept.changed else kept.shown(name) for name in sorted(kept.keys)}

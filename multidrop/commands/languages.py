@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from dialects.families import DEFAULT, program_languages
-from simulator.cell.spec import DriveSpec
-from simulator.families import PROGRAMS, TABLE
+from multidrop.dialects.families import DEFAULT, program_languages
+from multidrop.simulator.cell.spec import DriveSpec
+from multidrop.simulator.families import PROGRAMS, TABLE
 
 DEFAULT_PERSONALITY = DriveSpec().personality
 

@@ -7,24 +7,24 @@ import sys
 from functools import partial
 from typing import TYPE_CHECKING
 
-from dialects import Diagnostic
-from dialects.on_demand import importing
 from multidrop.commands.failure import fail
+from multidrop.dialects import Diagnostic
+from multidrop.dialects.on_demand import importing
 
 if TYPE_CHECKING:
-    from shell.front.report import Report
-    from shell.scripts.model import Script
-    from shell.session import Session
+    from multidrop.shell.front.report import Report
+    from multidrop.shell.scripts.model import Script
+    from multidrop.shell.session import Session
 
 
 def shell(chosen: argparse.Namespace) -> int:
     """Show the prompt, or run lines from standard input."""
     if sys.stdin.isatty():
         with importing():
-            from shell.front.prompt import run
+            from multidrop.shell.front.prompt import run
         return run(chosen.urls, reconnect=not chosen.no_reconnect, agreed=chosen.yes, raw=chosen.raw, twin=chosen.twin)
-    from shell.front import batch
-    from shell.front.stream import run_stream
+    from multidrop.shell.front import batch
+    from multidrop.shell.front.stream import run_stream
 
     async def lines(session: Session) -> None:
         if chosen.twin:
@@ -38,9 +38,9 @@ def shell(chosen: argparse.Namespace) -> int:
 def send(chosen: argparse.Namespace) -> int:
     """Run lines and print the replies."""
     with importing():
-        from shell.front import batch
-        from shell.front.stream import run_lines
-        from shell.lines import each_names_one_drive, targets
+        from multidrop.shell.front import batch
+        from multidrop.shell.front.stream import run_lines
+        from multidrop.shell.lines import each_names_one_drive, targets
 
     lazy = each_names_one_drive(chosen.lines)
     if chosen.json:
@@ -51,10 +51,10 @@ def send(chosen: argparse.Namespace) -> int:
 
 def _send_json(chosen: argparse.Namespace, lazy: bool) -> int:
     """Run lines and print an object for each."""
-    from shell.front import batch
-    from shell.front.report import Report
-    from shell.lines import targets
-    from shell.scripts.executor import run_typed
+    from multidrop.shell.front import batch
+    from multidrop.shell.front.report import Report
+    from multidrop.shell.lines import targets
+    from multidrop.shell.scripts.executor import run_typed
 
     report = Report("send", as_json=True)
 
@@ -68,10 +68,10 @@ def _send_json(chosen: argparse.Namespace, lazy: bool) -> int:
 
 def run(chosen: argparse.Namespace) -> int:
     """Run a script."""
-    from macros import MacroStore
-    from shell.connect.settings import Settings
-    from shell.front.report import Report
-    from shell.scripts.reading import WrongScript, read_script
+    from multidrop.macros import MacroStore
+    from multidrop.shell.connect.settings import Settings
+    from multidrop.shell.front.report import Report
+    from multidrop.shell.scripts.reading import WrongScript, read_script
 
     if not (chosen.on or chosen.role):
         return fail(Diagnostic("nothing to open", "multidrop run", "--on URL, or --role NAME=URL"))
@@ -95,10 +95,10 @@ def run(chosen: argparse.Namespace) -> int:
 
 
 def _execute(chosen: argparse.Namespace, script: Script, report: Report) -> int:
-    from shell.front import batch
-    from shell.lines import targets
-    from shell.scripts.executor import run_script
-    from shell.scripts.model import lines_of
+    from multidrop.shell.front import batch
+    from multidrop.shell.lines import targets
+    from multidrop.shell.scripts.executor import run_script
+    from multidrop.shell.scripts.model import lines_of
 
     async def body(session: Session) -> None:
         await report.watched(session, chosen.on, chosen.role)

@@ -9,17 +9,17 @@ from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from dialects import Diagnostic
 from multidrop.commands.failure import fail
-from shell.connect import settings
-from shell.log import files, steps
-from shell.log import show as showing
-from shell.log.entries import Entry
-from shell.log.files import Line
-from shell.output import lose, write
+from multidrop.dialects import Diagnostic
+from multidrop.shell.connect import settings
+from multidrop.shell.log import files, steps
+from multidrop.shell.log import show as showing
+from multidrop.shell.log.entries import Entry
+from multidrop.shell.log.files import Line
+from multidrop.shell.output import lose, write
 
 if TYPE_CHECKING:
-    from shell.session import Session
+    from multidrop.shell.session import Session
 
 NOTHING_FOUND = 1
 
@@ -70,10 +70,10 @@ def replay(chosen: argparse.Namespace) -> int:
             raise Diagnostic("no line of the log was sent to a drive", chosen.file, "/log before the lines keeps them")
     except Diagnostic as problem:
         return fail(problem)
-    from shell.front import batch
-    from shell.front.replay import replay as run
-    from shell.front.replay_report import ReplayReport
-    from shell.front.virtual import VirtualLoop
+    from multidrop.shell.front import batch
+    from multidrop.shell.front.replay import replay as run
+    from multidrop.shell.front.replay_report import ReplayReport
+    from multidrop.shell.front.virtual import VirtualLoop
 
     async def body(session: Session) -> None:
         await run(session, found, fast=chosen.fast, positions=bool(chosen.against), report=ReplayReport(chosen.json))

@@ -5,9 +5,9 @@ from __future__ import annotations
 import argparse
 import sys
 
-from dialects import Diagnostic
 from multidrop.commands.failure import fail
-from shell.output import write
+from multidrop.dialects import Diagnostic
+from multidrop.shell.output import write
 
 INSTALL = "pipx install 'multidrop[lsp]'"
 

@@ -7,16 +7,16 @@ import sys
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
-from dialects import Diagnostic
-from macros import Macro, MacroStore, format_macro, missing
-from macros.listing import listed
 from multidrop.commands.failure import fail
-from shell.connect.settings import Settings
-from shell.output import INTERRUPTED, write
+from multidrop.dialects import Diagnostic
+from multidrop.macros import Macro, MacroStore, format_macro, missing
+from multidrop.macros.listing import listed
+from multidrop.shell.connect.settings import Settings
+from multidrop.shell.output import INTERRUPTED, write
 
 if TYPE_CHECKING:
-    from shell.front.report import Report
-    from shell.session import Session
+    from multidrop.shell.front.report import Report
+    from multidrop.shell.session import Session
 
 
 def list_(chosen: argparse.Namespace) -> int:
@@ -45,8 +45,8 @@ def show(chosen: argparse.Namespace) -> int:
 
 def play(chosen: argparse.Namespace) -> int:
     """Play a macro; report wrong values and lines before anything is opened."""
-    from shell.front.report import Report
-    from shell.scripts.reading import WrongScript, read_macro
+    from multidrop.shell.front.report import Report
+    from multidrop.shell.scripts.reading import WrongScript, read_macro
 
     if not (chosen.on or chosen.role):
         return fail(Diagnostic("nothing to open", "multidrop macro play", "--on URL, or --role NAME=URL"))
@@ -74,8 +74,8 @@ def _asked(macro: Macro, values: Mapping[str, str]) -> dict[str, str]:
     """Ask at the terminal for the values, if one is missing that must be given."""
     if not missing(macro, values):
         return {}
-    from shell.casting import value_fields
-    from shell.front import form
+    from multidrop.shell.casting import value_fields
+    from multidrop.shell.front import form
 
     if not form.can_ask():
         return {}
@@ -83,7 +83,7 @@ def _asked(macro: Macro, values: Mapping[str, str]) -> dict[str, str]:
 
 
 def _play(chosen: argparse.Namespace, macro: Macro, values: Mapping[str, str], report: Report) -> int:
-    from shell.front import batch
+    from multidrop.shell.front import batch
 
     async def body(session: Session) -> None:
         await report.watched(session, chosen.on, chosen.role)

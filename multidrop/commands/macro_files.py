@@ -8,13 +8,13 @@ import subprocess
 import sys
 from collections.abc import Callable
 
-from dialects import Diagnostic
-from dialects.files import bounded, utf8, why
-from macros import MacroStore, drafts
 from multidrop.commands.failure import fail
-from shell import macro_changes
-from shell.connect.settings import Settings
-from shell.output import INTERRUPTED, write
+from multidrop.dialects import Diagnostic
+from multidrop.dialects.files import bounded, utf8, why
+from multidrop.macros import MacroStore, drafts
+from multidrop.shell import macro_changes
+from multidrop.shell.connect.settings import Settings
+from multidrop.shell.output import INTERRUPTED, write
 
 INPUT = "standard input"
 

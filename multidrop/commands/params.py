@@ -5,17 +5,17 @@ from __future__ import annotations
 import argparse
 from typing import TYPE_CHECKING
 
-from dialects import Diagnostic
 from multidrop.commands.failure import fail
-from shell.front import batch
-from shell.lines import split_target
-from shell.params import file as files
-from shell.params import work
-from shell.params.restore import Options
+from multidrop.dialects import Diagnostic
+from multidrop.shell.front import batch
+from multidrop.shell.lines import split_target
+from multidrop.shell.params import file as files
+from multidrop.shell.params import work
+from multidrop.shell.params.restore import Options
 
 if TYPE_CHECKING:
-    from drives.drive import Drive
-    from shell.session import Session
+    from multidrop.drives.drive import Drive
+    from multidrop.shell.session import Session
 
 DIFFERS = 1
 """The exit code of a comparison where something differs, as where a drive did not reply or refused."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 
-from shell.front import plotting
+from multidrop.shell.front import plotting
 
 
 def run(chosen: argparse.Namespace) -> int:

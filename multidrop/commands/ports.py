@@ -5,8 +5,8 @@ from __future__ import annotations
 import argparse
 import sys
 
-from shell.output import write
-from transports.listing import list_ports
+from multidrop.shell.output import write
+from multidrop.transports.listing import list_ports
 
 
 def run(chosen: argparse.Namespace) -> int:

@@ -6,11 +6,11 @@ import argparse
 import sys
 from collections.abc import Mapping
 
-from dialects import Diagnostic
-from dialects.problems import errors
 from multidrop.commands.failure import fail
-from shell.checking import Checked, examine, rewrite
-from shell.output import shortened, write
+from multidrop.dialects import Diagnostic
+from multidrop.dialects.problems import errors
+from multidrop.shell.checking import Checked, examine, rewrite
+from multidrop.shell.output import shortened, write
 
 WRONG = 1
 MOST = 100

@@ -7,19 +7,19 @@ from collections.abc import Awaitable, Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from dialects import Diagnostic
-from dialects.families import program_language_of, program_languages
-from dialects.files import program_text_of
-from dialects.problems import errors
 from multidrop.commands.failure import fail
-from shell import listings, transfers
-from shell.front import batch
-from shell.new_file import STANDARD_OUTPUT
-from shell.params.work import check_new, each, file_of, is_several, targets
+from multidrop.dialects import Diagnostic
+from multidrop.dialects.families import program_language_of, program_languages
+from multidrop.dialects.files import program_text_of
+from multidrop.dialects.problems import errors
+from multidrop.shell import listings, transfers
+from multidrop.shell.front import batch
+from multidrop.shell.new_file import STANDARD_OUTPUT
+from multidrop.shell.params.work import check_new, each, file_of, is_several, targets
 
 if TYPE_CHECKING:
-    from drives.drive import Drive
-    from shell.session import Session
+    from multidrop.drives.drive import Drive
+    from multidrop.shell.session import Session
 
 
 def list_(chosen: argparse.Namespace) -> int:

@@ -10,17 +10,17 @@ import sys
 from collections.abc import Iterator
 from functools import partial
 
-from dialects import Diagnostic
 from multidrop.commands.failure import fail
 from multidrop.commands.sweep_report import Report
-from shell.connect import saving, settings
-from shell.output import INTERRUPTED, write
-from shell.sweeps import plan as planning
-from shell.sweeps import workers
-from shell.sweeps.interruption import Interruption
-from shell.sweeps.plan import Asked, Plan
-from shell.sweeps.trial import Result
-from transports import TransportLost
+from multidrop.dialects import Diagnostic
+from multidrop.shell.connect import saving, settings
+from multidrop.shell.output import INTERRUPTED, write
+from multidrop.shell.sweeps import plan as planning
+from multidrop.shell.sweeps import workers
+from multidrop.shell.sweeps.interruption import Interruption
+from multidrop.shell.sweeps.plan import Asked, Plan
+from multidrop.shell.sweeps.trial import Result
+from multidrop.transports import TransportLost
 
 
 def run(chosen: argparse.Namespace) -> int:
@@ -55,7 +55,7 @@ def run(chosen: argparse.Namespace) -> int:
 def _results(plan: Plan, chosen: argparse.Namespace, interruption: Interruption) -> Iterator[list[Result]]:
     cases = (plan.case(number) for number in range(1, plan.count + 1))
     if chosen.cluster:
-        from shell.sweeps import cluster
+        from multidrop.shell.sweeps import cluster
 
         agree = partial(_agree, chosen.cluster, chosen.yes, cluster.TRUST, interruption)
         return cluster.results(plan.job, cases, chosen.cluster, interruption, agree)
@@ -70,7 +70,7 @@ def _agree(address: str, yes: bool, what: str, interruption: Interruption) -> No
         return
     import asyncio
 
-    from shell.front.answer import ask_outside_a_session
+    from multidrop.shell.front.answer import ask_outside_a_session
 
     where = f"--cluster {address}"
     with interruption.open():

@@ -13,16 +13,16 @@ import time
 from collections.abc import Iterator
 from dataclasses import replace
 
-from dialects import Diagnostic
-from dialects.families import program_language_of
-from dialects.files import program_text_of
 from multidrop.commands.failure import fail
-from shell.connect import settings
-from shell.output import reader_left, write
-from simulator import cells
-from simulator.cell.spec import DriveSpec
-from simulator.families import PROGRAMS
-from simulator.program_run import Debugging, Line
+from multidrop.dialects import Diagnostic
+from multidrop.dialects.families import program_language_of
+from multidrop.dialects.files import program_text_of
+from multidrop.shell.connect import settings
+from multidrop.shell.output import reader_left, write
+from multidrop.simulator import cells
+from multidrop.simulator.cell.spec import DriveSpec
+from multidrop.simulator.families import PROGRAMS
+from multidrop.simulator.program_run import Debugging, Line
 
 FAILED = 1
 

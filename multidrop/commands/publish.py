@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 
-from shell.front import publishing
+from multidrop.shell.front import publishing
 
 
 def run(chosen: argparse.Namespace) -> int:

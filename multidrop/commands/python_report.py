@@ -14,13 +14,13 @@ from types import FrameType
 from typing import Any, TypeVar
 
 import multidrop
-from dialects import Stopped
 from multidrop.api.blocking import Session
 from multidrop.api.sessions import Notice
-from shell.events import FAILURES, Entered, Output, Printed, SessionEvent
-from shell.front.report import Report
-from shell.scripts.model import ScriptLine
-from shell.scripts.results import Result
+from multidrop.dialects import Stopped
+from multidrop.shell.events import FAILURES, Entered, Output, Printed, SessionEvent
+from multidrop.shell.front.report import Report
+from multidrop.shell.scripts.model import ScriptLine
+from multidrop.shell.scripts.results import Result
 
 HOME = os.path.dirname(os.path.dirname(os.path.realpath(multidrop.__file__)))
 OURS = tuple(os.path.join(HOME, room, "") for room in ("multidrop", *multidrop.ROOMS))

@@ -17,18 +17,18 @@ from pathlib import Path
 from types import CodeType, ModuleType
 
 import multidrop
-from dialects import Diagnostic, Stopped
-from dialects.files import bytes_of
 from multidrop import script
 from multidrop.api.blocking import Session
 from multidrop.commands.failure import fail
 from multidrop.commands.python_report import HOME, ReportedSession, place, replaced, result_of, traceback_of
-from shell.events import FAILURES
-from shell.front.interrupts import on_stop_key
-from shell.front.report import Report
-from shell.output import INTERRUPTED, exit_code, lost_reader, why_interrupted, work_done, write
-from shell.scripts.results import Result
-from shell.signals import SIGNALS, early_ends
+from multidrop.dialects import Diagnostic, Stopped
+from multidrop.dialects.files import bytes_of
+from multidrop.shell.events import FAILURES
+from multidrop.shell.front.interrupts import on_stop_key
+from multidrop.shell.front.report import Report
+from multidrop.shell.output import INTERRUPTED, exit_code, lost_reader, why_interrupted, work_done, write
+from multidrop.shell.scripts.results import Result
+from multidrop.shell.signals import SIGNALS, early_ends
 
 
 def run(chosen: argparse.Namespace, report: Report) -> int:

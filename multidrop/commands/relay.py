@@ -7,8 +7,8 @@ import signal
 import sys
 from types import FrameType
 
-from dialects.errors import Diagnostic
-from transports.base import TransportLost
+from multidrop.dialects.errors import Diagnostic
+from multidrop.transports.base import TransportLost
 
 
 def run(chosen: argparse.Namespace) -> int:
@@ -34,14 +34,14 @@ def _serve(chosen: argparse.Namespace) -> int:
                 f"open ssh://THIS-HOST{chosen.port} on the other machine",
             )
         if "://" in chosen.port:
-            from shell.secrets import url_without_secrets
+            from multidrop.shell.secrets import url_without_secrets
 
             raise Diagnostic(
                 "is no serial port of this machine", url_without_secrets(chosen.port), "as in /dev/ttyUSB0"
             )
-        from transports.relay import serve
-        from transports.serial_open import opened
-        from transports.serial_posix import SerialEndpoint
+        from multidrop.transports.relay import serve
+        from multidrop.transports.serial_open import opened
+        from multidrop.transports.serial_posix import SerialEndpoint
 
         for number in (signal.SIGTERM, signal.SIGHUP):
             signal.signal(number, _ended)

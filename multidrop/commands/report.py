@@ -12,15 +12,15 @@ from datetime import date, datetime
 from importlib.metadata import PackageNotFoundError, requires, version
 from pathlib import Path
 
-from dialects import Diagnostic
-from dialects.files import bounded, opened, split_lines, why
-from dialects.visible import visible
-from macros import MacroStore
 from multidrop.commands.failure import fail
-from shell.connect import settings
-from shell.new_file import STANDARD_OUTPUT
-from shell.output import write
-from shell.secrets import toml_without_secrets, without_secrets
+from multidrop.dialects import Diagnostic
+from multidrop.dialects.files import bounded, opened, split_lines, why
+from multidrop.dialects.visible import visible
+from multidrop.macros import MacroStore
+from multidrop.shell.connect import settings
+from multidrop.shell.new_file import STANDARD_OUTPUT
+from multidrop.shell.output import write
+from multidrop.shell.secrets import toml_without_secrets, without_secrets
 
 TERMINAL = ("TERM", "COLORTERM", "TERM_PROGRAM", "LANG", "LC_ALL", "LC_CTYPE", "NO_COLOR", "PYTHONUTF8")
 PRESENT = ("SSH_CONNECTION", "TMUX", "STY")
@@ -148,7 +148,7 @@ def _macros() -> Iterator[str]:
 
 
 def _ports() -> Iterator[str]:
-    from transports.listing import list_ports
+    from multidrop.transports.listing import list_ports
 
     found = list_ports()
     for port in found:

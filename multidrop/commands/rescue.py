@@ -5,11 +5,11 @@ from __future__ import annotations
 import argparse
 from functools import partial
 
-from dialects import Diagnostic
 from multidrop.commands.scan import conclude, made
-from shell.front import batch
-from shell.rescuing import Rescue
-from shell.session import Session
+from multidrop.dialects import Diagnostic
+from multidrop.shell.front import batch
+from multidrop.shell.rescuing import Rescue
+from multidrop.shell.session import Session
 
 
 def run(chosen: argparse.Namespace) -> int:

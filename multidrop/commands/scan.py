@@ -8,15 +8,15 @@ import shlex
 from dataclasses import replace
 from functools import partial
 
-from dialects import Diagnostic
 from multidrop.commands.failure import fail
-from shell.connect import saving
-from shell.connect.opening import open_buses
-from shell.connect.urls import parse
-from shell.found import FoundDrive, url_of
-from shell.front import batch
-from shell.scanning import Scanning
-from shell.session import Session
+from multidrop.dialects import Diagnostic
+from multidrop.shell.connect import saving
+from multidrop.shell.connect.opening import open_buses
+from multidrop.shell.connect.urls import parse
+from multidrop.shell.found import FoundDrive, url_of
+from multidrop.shell.front import batch
+from multidrop.shell.scanning import Scanning
+from multidrop.shell.session import Session
 
 
 def run(chosen: argparse.Namespace) -> int:

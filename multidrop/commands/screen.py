@@ -5,9 +5,9 @@ from __future__ import annotations
 import argparse
 import sys
 
-from dialects import Diagnostic
-from dialects.on_demand import importing
 from multidrop.commands.failure import fail
+from multidrop.dialects import Diagnostic
+from multidrop.dialects.on_demand import importing
 
 
 def start(chosen: argparse.Namespace) -> int:
@@ -29,7 +29,7 @@ def _screen(urls: list[str], reconnect: bool = True, raw: bool = False, twin: bo
     if not (sys.stdin.isatty() and sys.stdout.isatty()):
         return fail(Diagnostic("the screen needs a terminal", hint="multidrop shell reads lines from anywhere"))
     with importing():
-        from tui.launch import run
+        from multidrop.tui.launch import run
 
     try:
         return run(urls, reconnect, raw, twin)

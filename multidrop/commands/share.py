@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 
-from shell.front import sharing
+from multidrop.shell.front import sharing
 
 
 def run(chosen: argparse.Namespace) -> int:

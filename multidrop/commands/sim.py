@@ -7,11 +7,11 @@ import asyncio
 import sys
 from pathlib import Path
 
-from dialects import Diagnostic
 from multidrop.commands.failure import fail
-from shell.connect import settings
-from shell.output import finish, nonblocking
-from simulator.serving.command import serve
+from multidrop.dialects import Diagnostic
+from multidrop.shell.connect import settings
+from multidrop.shell.output import finish, nonblocking
+from multidrop.simulator.serving.command import serve
 
 
 def run(chosen: argparse.Namespace) -> int:

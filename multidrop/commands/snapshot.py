@@ -5,17 +5,17 @@ from __future__ import annotations
 import argparse
 from typing import TYPE_CHECKING
 
-from dialects import Diagnostic
 from multidrop.commands.failure import fail
-from shell import new_file, replacement, snapshots
-from shell.connect import settings
-from shell.front import batch
-from shell.params.work import each, is_several, targets
-from simulator import cells
+from multidrop.dialects import Diagnostic
+from multidrop.shell import new_file, replacement, snapshots
+from multidrop.shell.connect import settings
+from multidrop.shell.front import batch
+from multidrop.shell.params.work import each, is_several, targets
+from multidrop.simulator import cells
 
 if TYPE_CHECKING:
-    from drives.drive import Drive
-    from shell.session import Session
+    from multidrop.drives.drive import Drive
+    from multidrop.shell.session import Session
 
 
 def take(chosen: argparse.Namespace) -> int:

@@ -8,18 +8,18 @@ import time
 from collections.abc import Iterator
 from datetime import datetime
 
-from dialects import Diagnostic
 from multidrop.commands.failure import fail
-from shell.front.junit import Case as JUnitCase
-from shell.front.junit_file import JUnitFile
-from shell.output import INTERRUPTED, write
-from shell.status_line import StatusLine
-from shell.sweeps.failures import Failures, command, grouped, rows
-from shell.sweeps.interruption import Interruption
-from shell.sweeps.plan import Plan
-from shell.sweeps.trial import Case, Result, bench
-from shell.sweeps.values import spelled
-from shell.sweeps.variation import SEED
+from multidrop.dialects import Diagnostic
+from multidrop.shell.front.junit import Case as JUnitCase
+from multidrop.shell.front.junit_file import JUnitFile
+from multidrop.shell.output import INTERRUPTED, write
+from multidrop.shell.status_line import StatusLine
+from multidrop.shell.sweeps.failures import Failures, command, grouped, rows
+from multidrop.shell.sweeps.interruption import Interruption
+from multidrop.shell.sweeps.plan import Plan
+from multidrop.shell.sweeps.trial import Case, Result, bench
+from multidrop.shell.sweeps.values import spelled
+from multidrop.shell.sweeps.variation import SEED
 
 FAILED = 1
 PERIOD = 0.1

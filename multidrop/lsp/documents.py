@@ -8,10 +8,10 @@ from functools import partial
 from math import inf
 from typing import NamedTuple, TypeVar
 
-from dialects.families import program_languages
-from dialects.problems import Problem
-from shell.program_text import ProgramGrammar, ProgramText
-from shell.threads import in_thread
+from multidrop.dialects.families import program_languages
+from multidrop.dialects.problems import Problem
+from multidrop.shell.program_text import ProgramGrammar, ProgramText
+from multidrop.shell.threads import in_thread
 
 T = TypeVar("T")
 DELAY = 0.25

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 
 from lsprotocol import types
 
-from dialects.program_editing import Span
+from multidrop.dialects.program_editing import Span
 
 _LIMITS: Mapping[str, tuple[int, ...]] = {
     types.PositionEncodingKind.Utf8: (0x80, 0x800, 0x10000),

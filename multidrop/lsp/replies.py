@@ -7,11 +7,11 @@ from collections.abc import Iterable, Sequence
 
 from lsprotocol import types
 
-from dialects.problems import Problem
-from dialects.program_editing import Block, Offer, Span
+from multidrop.dialects.problems import Problem
+from multidrop.dialects.program_editing import Block, Offer, Span
 from multidrop.lsp.documents import Document
 from multidrop.lsp.positions import Positions
-from shell.program_text import Coloured, Edit, Fold
+from multidrop.shell.program_text import Coloured, Edit, Fold
 
 SOURCE = "multidrop"
 TOKENS = {

@@ -15,13 +15,13 @@ from pygls.exceptions import JsonRpcException
 from pygls.lsp.server import LanguageServer
 
 import multidrop
-from dialects import Diagnostic
-from dialects.problems import Problem
+from multidrop.dialects import Diagnostic
+from multidrop.dialects.problems import Problem
 from multidrop.lsp import replies
 from multidrop.lsp.documents import DELAY, Document, Documents
 from multidrop.lsp.positions import Positions
-from shell.output import shortened
-from simulator.families import TABLE
+from multidrop.shell.output import shortened
+from multidrop.simulator.families import TABLE
 
 TRIGGERS = (" ", ",", "=")
 Found = list[types.Location]

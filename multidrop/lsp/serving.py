@@ -21,10 +21,10 @@ from typing import BinaryIO, Protocol
 from pygls.exceptions import JsonRpcException
 from pygls.io_ import run_async
 
-from dialects import Diagnostic
+from multidrop.dialects import Diagnostic
 from multidrop.lsp.server import Server
-from shell.signals import SIGNALS
-from transports.exposure import exposed
+from multidrop.shell.signals import SIGNALS
+from multidrop.transports.exposure import exposed
 
 PIECE = 65536
 

@@ -11,10 +11,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from dialects import Diagnostic
+from multidrop.dialects import Diagnostic
 
 if TYPE_CHECKING:
-    from dialects import DriveState, Family
+    from multidrop.dialects import DriveState, Family
 
 KEYS = ("also", "off")
 
@@ -73,6 +73,6 @@ def _also(words: frozenset[str], where: str) -> frozenset[str]:
 
 def _families() -> list[Family[Any]]:
     """Every family; only a configuration with guards imports them all."""
-    from dialects.families import FAMILIES
+    from multidrop.dialects.families import FAMILIES
 
     return list(FAMILIES.values())

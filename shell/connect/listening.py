@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from dialects import Diagnostic
-from dialects.numbers import whole
-from shell.secrets import url_without_secrets
+from multidrop.dialects import Diagnostic
+from multidrop.dialects.numbers import whole
+from multidrop.shell.secrets import url_without_secrets
 
 HOST = "127.0.0.1"
 

@@ -11,7 +11,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from dialects import Diagnostic
+from multidrop.dialects import Diagnostic
 
 MEGABYTE = 1_000_000
 

@@ -16,8 +16,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from dialects import Diagnostic
-from shell.transcripts import TIMES
+from multidrop.dialects import Diagnostic
+from multidrop.shell.transcripts import TIMES
 
 SIGNS = ("auto", "full", "boxes", "ascii")
 CHOICES = {"signs": SIGNS, "times": tuple(TIMES)}

@@ -17,8 +17,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from dialects import Diagnostic
-from dialects.files import opened, text_of
+from multidrop.dialects import Diagnostic
+from multidrop.dialects.files import opened, text_of
 
 FILES = ("password_file", "ca", "cert", "key")
 KEYS = ("username", "password", *FILES)

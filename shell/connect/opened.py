@@ -11,7 +11,7 @@ import time
 from dataclasses import dataclass
 from pathlib import Path
 
-from macros.atomic import write_atomically
+from multidrop.macros.atomic import write_atomically
 
 MOST = 12
 

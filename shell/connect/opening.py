@@ -10,20 +10,20 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from dialects import Diagnostic, Family, Hints
-from dialects.families import DEFAULT, FAMILIES
-from drives.bus import Bus
-from shell.connect import settings
-from shell.connect.port_state import PortState
-from shell.connect.reopening import HostAgain, LoginAgain, Reopen, SerialAgain, simulated, timed
-from shell.connect.urls import Connection
-from transports import Limited
-from transports.far_port import FarPort
+from multidrop.dialects import Diagnostic, Family, Hints
+from multidrop.dialects.families import DEFAULT, FAMILIES
+from multidrop.drives.bus import Bus
+from multidrop.shell.connect import settings
+from multidrop.shell.connect.port_state import PortState
+from multidrop.shell.connect.reopening import HostAgain, LoginAgain, Reopen, SerialAgain, simulated, timed
+from multidrop.shell.connect.urls import Connection
+from multidrop.transports import Limited
+from multidrop.transports.far_port import FarPort
 
 if TYPE_CHECKING:
-    from drives.keeping import Keeper
-    from simulator.serving.running import RunningFloor
-    from transports import Transport
+    from multidrop.drives.keeping import Keeper
+    from multidrop.simulator.serving.running import RunningFloor
+    from multidrop.transports import Transport
 
 Naming = Callable[[str], str]
 """Returns a free name for a bus."""
@@ -106,7 +106,7 @@ async def open_port(connection: Connection) -> OpenedPort:
     """Open the byte pipe of a connection. Raises Unreachable, Diagnostic for a URL of several pipes or of none."""
     family, baud = connection.hints.family, connection.baud or _family(connection).baud
     if connection.scheme == "sim":
-        from simulator.serving.in_process import connect
+        from multidrop.simulator.serving.in_process import connect
 
         target = connection.target + (f"#{connection.bus}" if connection.bus else "")
         found = await connect(target, settings.load().allowed if connection.target else ())
@@ -128,7 +128,7 @@ def port_name(connection: Connection) -> str:
         return replace(far_port(connection), user="", host=connection.host.lower()).name
     if connection.scheme != "serial":
         return f"{connection.host.lower()}:{connection.port}"
-    from transports.listing import stable_name
+    from multidrop.transports.listing import stable_name
 
     return stable_name(connection.target)
 
@@ -166,18 +166,18 @@ async def _transport(
     """Open a transport; a serial port by another name than it was given, a host within a time, s."""
     baud = baud or connection.baud or _family(connection).baud
     if connection.scheme == "serial":
-        from transports.serial_port import open_serial
+        from multidrop.transports.serial_port import open_serial
 
         return await open_serial(port or connection.target, baud)
     if connection.scheme == "rfc2217":
-        from transports.rfc2217 import open_rfc2217
+        from multidrop.transports.rfc2217 import open_rfc2217
 
         return await open_rfc2217(connection.host, connection.port, baud, within)
     if connection.scheme == "ssh":
-        from transports.ssh import open_ssh
+        from multidrop.transports.ssh import open_ssh
 
         return await open_ssh(far_port(connection), baud, within, connection.relay)
-    from transports.sockets import open_tcp, open_udp
+    from multidrop.transports.sockets import open_tcp, open_udp
 
     if connection.scheme == "udp":
         return await open_udp(connection.host, connection.port)
@@ -194,7 +194,7 @@ def _reopen(connection: Connection, took: float) -> Reopen | None:
 
 
 async def _simulated(connection: Connection, naming: Naming) -> list[Opened]:
-    from simulator.serving.in_process import connect
+    from multidrop.simulator.serving.in_process import connect
 
     target = connection.target + (f"#{connection.bus}" if connection.bus else "")
     found = []

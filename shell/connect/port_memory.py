@@ -13,7 +13,7 @@ from collections.abc import Mapping
 from dataclasses import asdict, fields
 from pathlib import Path
 
-from dialects.state import Remembered
+from multidrop.dialects.state import Remembered
 
 MOST = 64
 """The largest number of drives remembered for a port; the oldest are dropped."""

@@ -19,9 +19,9 @@ from dataclasses import asdict, fields
 from pathlib import Path
 from urllib.parse import quote
 
-from dialects import DriveState, Owed
-from dialects.state import Remembered
-from shell.connect.port_memory import PortMemory
+from multidrop.dialects import DriveState, Owed
+from multidrop.dialects.state import Remembered
+from multidrop.shell.connect.port_memory import PortMemory
 
 if sys.platform == "win32":
     import msvcrt

@@ -11,17 +11,17 @@ import asyncio
 from collections.abc import Callable, Collection
 from typing import TYPE_CHECKING
 
-from dialects import DriveError, Hints, Stopped
-from drives.apart import apart
-from drives.drive import confirmed_motion
-from drives.events import Changed
-from shell.connect.reopening import Absent, Reopen
-from shell.stops import E_STOP, UNCONFIRMED, last_seen
-from transports import TransportLost
+from multidrop.dialects import DriveError, Hints, Stopped
+from multidrop.drives.apart import apart
+from multidrop.drives.drive import confirmed_motion
+from multidrop.drives.events import Changed
+from multidrop.shell.connect.reopening import Absent, Reopen
+from multidrop.shell.stops import E_STOP, UNCONFIRMED, last_seen
+from multidrop.transports import TransportLost
 
 if TYPE_CHECKING:
-    from drives.bus import Bus
-    from drives.drive import Drive
+    from multidrop.drives.bus import Bus
+    from multidrop.drives.drive import Drive
 
 FIRST = 0.1
 """The pause before the first attempt, s; each further one is twice as long."""

@@ -13,10 +13,10 @@ import os
 from collections.abc import Awaitable, Callable
 from typing import TYPE_CHECKING
 
-from transports import Controllable, Transport, Unreachable
+from multidrop.transports import Controllable, Transport, Unreachable
 
 if TYPE_CHECKING:
-    from simulator.serving.in_process import SimBus
+    from multidrop.simulator.serving.in_process import SimBus
 
 Reopen = Callable[[Transport], Awaitable[Transport]]
 """Opens the port again in place of a broken transport, which it closes. Raises Unreachable, or Absent."""
@@ -43,7 +43,7 @@ class SerialAgain:
     """A serial port, by a name that follows its adapter."""
 
     def __init__(self, port: str, open_: Callable[[str], Awaitable[Transport]]) -> None:
-        from transports.listing import stable_name
+        from multidrop.transports.listing import stable_name
 
         self._name = stable_name(port)
         self._open = open_

@@ -5,10 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from dialects import Diagnostic
-from dialects.files import toml_of, utf8_of, why
-from macros.atomic import write_atomically
-from shell.connect import settings
+from multidrop.dialects import Diagnostic
+from multidrop.dialects.files import toml_of, utf8_of, why
+from multidrop.macros.atomic import write_atomically
+from multidrop.shell.connect import settings
 
 
 def check_new(name: str) -> None:

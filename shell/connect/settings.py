@@ -29,14 +29,14 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from dialects import Diagnostic
-from dialects.files import split_lines, toml_of, utf8_of
-from dialects.visible import visible
-from shell.connect import guards, log_settings, look, mqtt_settings
-from shell.connect.guards import Guarding
-from shell.connect.log_settings import LogSettings
-from shell.connect.look import Look
-from shell.connect.mqtt_settings import MqttSettings
+from multidrop.dialects import Diagnostic
+from multidrop.dialects.files import split_lines, toml_of, utf8_of
+from multidrop.dialects.visible import visible
+from multidrop.shell.connect import guards, log_settings, look, mqtt_settings
+from multidrop.shell.connect.guards import Guarding
+from multidrop.shell.connect.log_settings import LogSettings
+from multidrop.shell.connect.look import Look
+from multidrop.shell.connect.mqtt_settings import MqttSettings
 
 # The line of a key in a TOML file, for messages: the parser that reads the values does not report it.
 

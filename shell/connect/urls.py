@@ -12,15 +12,15 @@ from pathlib import PurePath
 from typing import TYPE_CHECKING, Any
 from urllib.parse import unquote
 
-from dialects import Diagnostic, Hints
-from dialects.families import TABLE
-from dialects.numbers import whole
-from shell.connect.url_forms import URL_FORMS, sentence
-from shell.secrets import holds_password, url_without_secrets, without_secrets
-from transports.far_port import WAYS, wrong_path
+from multidrop.dialects import Diagnostic, Hints
+from multidrop.dialects.families import TABLE
+from multidrop.dialects.numbers import whole
+from multidrop.shell.connect.url_forms import URL_FORMS, sentence
+from multidrop.shell.secrets import holds_password, url_without_secrets, without_secrets
+from multidrop.transports.far_port import WAYS, wrong_path
 
 if TYPE_CHECKING:
-    from shell.connect.settings import SavedConnection
+    from multidrop.shell.connect.settings import SavedConnection
 
 DEFAULT_PORTS = {scheme: form.port or None for scheme, form in URL_FORMS.items() if form.port is not None}
 SCHEMES = tuple(URL_FORMS)

@@ -7,11 +7,11 @@ import sys
 from collections.abc import AsyncIterator
 from functools import partial
 
-from shell.asking import Ask
-from shell.front.interrupts import on_stop_key
-from shell.front.keyboard import Keyboard
-from shell.front.stream import stream_lines
-from shell.output import write
+from multidrop.shell.asking import Ask
+from multidrop.shell.front.interrupts import on_stop_key
+from multidrop.shell.front.keyboard import Keyboard
+from multidrop.shell.front.stream import stream_lines
+from multidrop.shell.output import write
 
 GO_ON = "Go on? [y/N]"
 PAUSE = 0.5

@@ -12,14 +12,14 @@ from collections.abc import Awaitable, Callable, Sequence
 from contextlib import nullcontext
 from functools import partial
 
-from shell import stops
-from shell.automation import outcome, settled
-from shell.connect import settings
-from shell.events import FAILURES
-from shell.front.answer import asker
-from shell.front.interrupts import on_signals, on_stop_key
-from shell.log.writer import begin as begin_log
-from shell.output import (
+from multidrop.shell import stops
+from multidrop.shell.automation import outcome, settled
+from multidrop.shell.connect import settings
+from multidrop.shell.events import FAILURES
+from multidrop.shell.front.answer import asker
+from multidrop.shell.front.interrupts import on_signals, on_stop_key
+from multidrop.shell.log.writer import begin as begin_log
+from multidrop.shell.output import (
     INTERRUPTED,
     exit_code,
     finish,
@@ -29,9 +29,9 @@ from shell.output import (
     work_done,
     write,
 )
-from shell.printer import Printer
-from shell.session import Session
-from shell.signals import early_ends
+from multidrop.shell.printer import Printer
+from multidrop.shell.session import Session
+from multidrop.shell.signals import early_ends
 
 Body = Callable[[Session], Awaitable[None]]
 

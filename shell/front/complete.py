@@ -6,15 +6,15 @@ import re
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from dialects import Diagnostic
-from shell.lines import EVERYONE, DriveLine, VerbLine, parse
-from shell.verbs.offers import PLACEHOLDERS, Found, meant, spoken, targets, verbs
-from shell.verbs.table import VERBS
-from shell.verbs.usage import following, narrowed
+from multidrop.dialects import Diagnostic
+from multidrop.shell.lines import EVERYONE, DriveLine, VerbLine, parse
+from multidrop.shell.verbs.offers import PLACEHOLDERS, Found, meant, spoken, targets, verbs
+from multidrop.shell.verbs.table import VERBS
+from multidrop.shell.verbs.usage import following, narrowed
 
 if TYPE_CHECKING:
-    from drives.drive import Drive
-    from shell.workspace import Workspace
+    from multidrop.drives.drive import Drive
+    from multidrop.shell.workspace import Workspace
 
 MOST = 200
 """The largest number of completions."""

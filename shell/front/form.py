@@ -5,8 +5,8 @@ from __future__ import annotations
 import sys
 from collections.abc import Awaitable, Callable, Sequence
 
-from dialects.visible import visible
-from shell.asking import Field
+from multidrop.dialects.visible import visible
+from multidrop.shell.asking import Field
 
 NEEDED = "a value is needed; Ctrl+C gives up"
 

@@ -12,7 +12,7 @@ import sys
 from collections.abc import Iterator
 from pathlib import Path
 
-from macros.atomic import write_atomically
+from multidrop.macros.atomic import write_atomically
 
 if sys.platform != "win32":
     import fcntl

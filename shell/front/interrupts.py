@@ -8,8 +8,8 @@ import signal
 import sys
 from collections.abc import Callable, Iterator
 
-from shell.front.keyboard import Keyboard, foreground_terminal
-from shell.signals import SIGNALS, early_ends
+from multidrop.shell.front.keyboard import Keyboard, foreground_terminal
+from multidrop.shell.signals import SIGNALS, early_ends
 
 
 @contextlib.contextmanager

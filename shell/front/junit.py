@@ -8,10 +8,10 @@ from datetime import datetime
 from typing import TYPE_CHECKING
 from xml.etree import ElementTree
 
-from dialects.visible import visible
+from multidrop.dialects.visible import visible
 
 if TYPE_CHECKING:
-    from shell.scripts.results import Result
+    from multidrop.shell.scripts.results import Result
 
 
 @dataclass(frozen=True)

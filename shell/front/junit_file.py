@@ -7,11 +7,11 @@ from collections.abc import Sequence
 from datetime import datetime
 from pathlib import Path
 
-from dialects import Diagnostic
-from dialects.files import LARGEST_PROGRAM, bytes_of, why
-from macros.atomic import write_atomically
-from shell import new_file
-from shell.front.junit import Case, junit
+from multidrop.dialects import Diagnostic
+from multidrop.dialects.files import LARGEST_PROGRAM, bytes_of, why
+from multidrop.macros.atomic import write_atomically
+from multidrop.shell import new_file
+from multidrop.shell.front.junit import Case, junit
 
 
 class JUnitFile:

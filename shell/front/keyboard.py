@@ -17,7 +17,7 @@ from codecs import getincrementaldecoder
 from collections.abc import Callable
 
 if sys.platform != "win32":
-    from shell.front.raw_terminal import hold, in_foreground, in_loop
+    from multidrop.shell.front.raw_terminal import hold, in_foreground, in_loop
 
 STOP_KEY = b"\x18"
 """Ctrl+X: one control byte, which no slow link can split."""

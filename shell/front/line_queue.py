@@ -10,13 +10,13 @@ import asyncio
 import re
 from collections.abc import Sequence
 
-from dialects import Diagnostic
-from dialects.files import lines_of
-from dialects.visible import visible
-from shell.events import FAILURES
-from shell.lines import VerbLine, parse
-from shell.session import Session
-from shell.verbs.table import VERBS, Verb
+from multidrop.dialects import Diagnostic
+from multidrop.dialects.files import lines_of
+from multidrop.dialects.visible import visible
+from multidrop.shell.events import FAILURES
+from multidrop.shell.lines import VerbLine, parse
+from multidrop.shell.session import Session
+from multidrop.shell.verbs.table import VERBS, Verb
 
 BURST = 0.5
 """The time between two Enters, s, below which no person can have read the reply to the first."""

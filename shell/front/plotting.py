@@ -7,19 +7,19 @@ import sys
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from dialects import Diagnostic, DriveError
-from shell.events import SessionEvent, StateChanged
-from shell.front import batch
-from shell.output import report, write
-from shell.plots.feed import begin
-from shell.plots.plot import Plot
-from shell.plots.rate import parse_rate
-from shell.plots.series import parse_series, read_first
-from shell.plots.target import PlotTarget, parse_target
+from multidrop.dialects import Diagnostic, DriveError
+from multidrop.shell.events import SessionEvent, StateChanged
+from multidrop.shell.front import batch
+from multidrop.shell.output import report, write
+from multidrop.shell.plots.feed import begin
+from multidrop.shell.plots.plot import Plot
+from multidrop.shell.plots.rate import parse_rate
+from multidrop.shell.plots.series import parse_series, read_first
+from multidrop.shell.plots.target import PlotTarget, parse_target
 
 if TYPE_CHECKING:
-    from shell.workspace import Workspace
-    from transports import TransportLost
+    from multidrop.shell.workspace import Workspace
+    from multidrop.transports import TransportLost
 
 
 def run(

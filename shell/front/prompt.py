@@ -26,26 +26,26 @@ from prompt_toolkit.keys import Keys
 from prompt_toolkit.output import create_output
 from prompt_toolkit.search import stop_search
 
-from dialects import Diagnostic
-from dialects.files import lines_of
-from shell.automation import outcome, settled
-from shell.connect import settings
-from shell.events import FAILURES, Progressed, SessionEvent, StateChanged
-from shell.front.collector import collected_at_rest
-from shell.front.form import filled
-from shell.front.history import History
-from shell.front.interrupts import on_signals
-from shell.front.keyboard import Keyboard, terminal
-from shell.front.line_queue import LineQueue, shown
-from shell.front.prompt_keys import KeyboardInput
-from shell.front.prompt_lines import LinesAbove
-from shell.front.prompt_parts import SessionCompleter, SharedHistory, Toolbar
-from shell.front.prompt_question import PromptQuestion
-from shell.log.writer import begin as begin_log
-from shell.output import INTERRUPTED, exit_code, finish, nonblocking, report, write
-from shell.printer import Printer
-from shell.session import Session
-from shell.signals import early_ends
+from multidrop.dialects import Diagnostic
+from multidrop.dialects.files import lines_of
+from multidrop.shell.automation import outcome, settled
+from multidrop.shell.connect import settings
+from multidrop.shell.events import FAILURES, Progressed, SessionEvent, StateChanged
+from multidrop.shell.front.collector import collected_at_rest
+from multidrop.shell.front.form import filled
+from multidrop.shell.front.history import History
+from multidrop.shell.front.interrupts import on_signals
+from multidrop.shell.front.keyboard import Keyboard, terminal
+from multidrop.shell.front.line_queue import LineQueue, shown
+from multidrop.shell.front.prompt_keys import KeyboardInput
+from multidrop.shell.front.prompt_lines import LinesAbove
+from multidrop.shell.front.prompt_parts import SessionCompleter, SharedHistory, Toolbar
+from multidrop.shell.front.prompt_question import PromptQuestion
+from multidrop.shell.log.writer import begin as begin_log
+from multidrop.shell.output import INTERRUPTED, exit_code, finish, nonblocking, report, write
+from multidrop.shell.printer import Printer
+from multidrop.shell.session import Session
+from multidrop.shell.signals import early_ends
 
 FIRST_FRAME = 0.05
 """The longest wait for the first frame, s."""

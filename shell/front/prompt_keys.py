@@ -12,7 +12,7 @@ from prompt_toolkit.input.typeahead import clear_typeahead
 from prompt_toolkit.input.vt100_parser import Vt100Parser
 from prompt_toolkit.key_binding import KeyPress
 
-from shell.front.keyboard import Keyboard
+from multidrop.shell.front.keyboard import Keyboard
 
 BEGIN, END = "\x1b[200~", "\x1b[201~"
 """The marks around a paste."""

@@ -18,7 +18,7 @@ from typing import Any, TextIO, cast
 
 from prompt_toolkit.application import Application, in_terminal
 
-from shell.outlets import LineStream, Loss, Outlet
+from multidrop.shell.outlets import LineStream, Loss, Outlet
 
 MOST = 1000
 """The largest number of lines that wait for a terminal that takes none."""

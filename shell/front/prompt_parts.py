@@ -10,14 +10,14 @@ from prompt_toolkit.completion import CompleteEvent, Completer, Completion
 from prompt_toolkit.document import Document
 from prompt_toolkit.history import History as PromptHistory
 
-from shell import stops
-from shell.events import Progressed
-from shell.front import complete
-from shell.front.history import History
-from shell.front.line_queue import LineQueue
-from shell.naming import model
-from shell.session import Session
-from shell.workspace import Workspace
+from multidrop.shell import stops
+from multidrop.shell.events import Progressed
+from multidrop.shell.front import complete
+from multidrop.shell.front.history import History
+from multidrop.shell.front.line_queue import LineQueue
+from multidrop.shell.naming import model
+from multidrop.shell.session import Session
+from multidrop.shell.workspace import Workspace
 
 # The last line of the prompt: the stop key, what runs, and a hint for the line that is being typed.
 

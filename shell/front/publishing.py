@@ -8,25 +8,25 @@ from collections.abc import Callable, Sequence
 from ipaddress import ip_address
 from typing import TYPE_CHECKING
 
-from dialects import Diagnostic
-from shell.events import FAILURES, SessionEvent, StateChanged
-from shell.front import batch
-from shell.output import report, write
-from shell.publishing import broker, messages
-from shell.publishing.backlog import Message
-from shell.publishing.feed import Feed
-from shell.publishing.limits import parse_rate
-from shell.publishing.publisher import Publisher
-from shell.publishing.target import Target, parse_target
-from shell.publishing.topics import Topics
-from shell.secrets import url_without_secrets
+from multidrop.dialects import Diagnostic
+from multidrop.shell.events import FAILURES, SessionEvent, StateChanged
+from multidrop.shell.front import batch
+from multidrop.shell.output import report, write
+from multidrop.shell.publishing import broker, messages
+from multidrop.shell.publishing.backlog import Message
+from multidrop.shell.publishing.feed import Feed
+from multidrop.shell.publishing.limits import parse_rate
+from multidrop.shell.publishing.publisher import Publisher
+from multidrop.shell.publishing.target import Target, parse_target
+from multidrop.shell.publishing.topics import Topics
+from multidrop.shell.secrets import url_without_secrets
 
 if TYPE_CHECKING:
-    from drives.bus import Bus
-    from shell.connect.mqtt_settings import MqttSettings
-    from shell.session import Session
-    from shell.workspace import Workspace
-    from transports import TransportLost
+    from multidrop.drives.bus import Bus
+    from multidrop.shell.connect.mqtt_settings import MqttSettings
+    from multidrop.shell.session import Session
+    from multidrop.shell.workspace import Workspace
+    from multidrop.transports import TransportLost
 
 AGAIN = 30.0
 """The time between two attempts to open a line that was not there, s."""

@@ -13,21 +13,21 @@ from collections.abc import AsyncIterator, Mapping, Sequence
 from datetime import datetime
 from typing import TYPE_CHECKING
 
-from dialects import Diagnostic, DriveError, Stopped
-from shell import waits
-from shell.automation import outcome, settled
-from shell.events import By, Printed, SessionEvent
-from shell.front.replay_report import ReplayReport
-from shell.lines import EVERYONE, join_target
-from shell.log.steps import WORLD, Step, Steps, compared, errors_differ
-from shell.naming import model
-from shell.workspace import LATCHED
+from multidrop.dialects import Diagnostic, DriveError, Stopped
+from multidrop.shell import waits
+from multidrop.shell.automation import outcome, settled
+from multidrop.shell.events import By, Printed, SessionEvent
+from multidrop.shell.front.replay_report import ReplayReport
+from multidrop.shell.lines import EVERYONE, join_target
+from multidrop.shell.log.steps import WORLD, Step, Steps, compared, errors_differ
+from multidrop.shell.naming import model
+from multidrop.shell.workspace import LATCHED
 
 if TYPE_CHECKING:
-    from drives.bus import Bus
-    from drives.drive import Drive
-    from shell.session import Session
-    from shell.twins.after import Positions, Reading
+    from multidrop.drives.bus import Bus
+    from multidrop.drives.drive import Drive
+    from multidrop.shell.session import Session
+    from multidrop.shell.twins.after import Positions, Reading
 
 
 async def replay(
@@ -114,7 +114,7 @@ class Replay:
         return self._report.words(len(self.steps), differences, measured)
 
     def _positions(self) -> Positions:
-        from shell.twins.after import Positions
+        from multidrop.shell.twins.after import Positions
 
         targets = {place: drive for place, drive in self._targets.items() if drive.address not in EVERYONE}
         polls = [each for each in self._found.polls if (each.bus, each.drive) in targets]

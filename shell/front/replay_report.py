@@ -6,12 +6,12 @@ import json
 import sys
 from typing import TYPE_CHECKING
 
-from shell.log.steps import Step
-from shell.output import write
+from multidrop.shell.log.steps import Step
+from multidrop.shell.output import write
 
 if TYPE_CHECKING:
-    from shell.channel import Channel
-    from shell.twins.after import Divergence, Positions
+    from multidrop.shell.channel import Channel
+    from multidrop.shell.twins.after import Divergence, Positions
 
 
 class ReplayReport:

@@ -9,14 +9,14 @@ import sys
 from collections.abc import Iterator
 from datetime import datetime
 
-from dialects import Diagnostic
-from shell.events import FAILURES
-from shell.front.junit import Case
-from shell.front.junit_file import JUnitFile
-from shell.output import report as described
-from shell.output import write
-from shell.scripts.results import Ending, Result
-from shell.session import Session
+from multidrop.dialects import Diagnostic
+from multidrop.shell.events import FAILURES
+from multidrop.shell.front.junit import Case
+from multidrop.shell.front.junit_file import JUnitFile
+from multidrop.shell.output import report as described
+from multidrop.shell.output import write
+from multidrop.shell.scripts.results import Ending, Result
+from multidrop.shell.session import Session
 
 
 class Report:

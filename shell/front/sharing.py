@@ -8,20 +8,20 @@ import sys
 import time
 from typing import Any
 
-from dialects import Diagnostic
-from shell.connect import settings
-from shell.connect.listening import listening
-from shell.connect.opening import open_port
-from shell.connect.urls import parse
-from shell.events import FAILURES
-from shell.front.interrupts import on_signals, on_stop_key
-from shell.output import exit_code, finish, nonblocking, report, write
-from shell.sharing.actions import Say
-from shell.sharing.server import SharedPort
-from shell.sharing.stop_bytes import stop_bytes
-from transports import Limited, TransportLost
-from transports.exposure import exposed
-from transports.sockets import explain
+from multidrop.dialects import Diagnostic
+from multidrop.shell.connect import settings
+from multidrop.shell.connect.listening import listening
+from multidrop.shell.connect.opening import open_port
+from multidrop.shell.connect.urls import parse
+from multidrop.shell.events import FAILURES
+from multidrop.shell.front.interrupts import on_signals, on_stop_key
+from multidrop.shell.output import exit_code, finish, nonblocking, report, write
+from multidrop.shell.sharing.actions import Say
+from multidrop.shell.sharing.server import SharedPort
+from multidrop.shell.sharing.stop_bytes import stop_bytes
+from multidrop.transports import Limited, TransportLost
+from multidrop.transports.exposure import exposed
+from multidrop.transports.sockets import explain
 
 AGAIN = 10.0
 """Seconds for which a client that tries again and again is refused without another line."""

@@ -8,12 +8,12 @@ import threading
 from collections.abc import AsyncIterator, Iterable
 from typing import TYPE_CHECKING
 
-from dialects import Diagnostic
-from dialects.files import LARGEST, check_line, split_lines
-from shell.lines import uncommented
+from multidrop.dialects import Diagnostic
+from multidrop.dialects.files import LARGEST, check_line, split_lines
+from multidrop.shell.lines import uncommented
 
 if TYPE_CHECKING:
-    from shell.session import Session
+    from multidrop.shell.session import Session
 
 
 QUIET = 0.5

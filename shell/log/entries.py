@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from datetime import datetime
 from typing import Any
 
-from shell.secrets import without_secrets
+from multidrop.shell.secrets import without_secrets
 
 FORMAT = 1
 """The version of the format, in the first entry of each file."""

@@ -9,13 +9,13 @@ from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
-from dialects import Diagnostic
-from dialects.files import opened, why
-from shell.log.disk import part
-from shell.log.entries import Entry, entry_of
+from multidrop.dialects import Diagnostic
+from multidrop.dialects.files import opened, why
+from multidrop.shell.log.disk import part
+from multidrop.shell.log.entries import Entry, entry_of
 
 if TYPE_CHECKING:
-    from shell.connect.settings import Settings
+    from multidrop.shell.connect.settings import Settings
 
 PROCESS = os.getpid()
 NOTED = 50

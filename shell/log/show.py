@@ -12,12 +12,12 @@ from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
 from pathlib import Path
 
-from dialects.visible import visible
-from shell.lines import join_target
-from shell.log import files
-from shell.log.entries import KINDS, TRAFFIC, Entry
-from shell.log.files import Line
-from shell.raw import text_of
+from multidrop.dialects.visible import visible
+from multidrop.shell.lines import join_target
+from multidrop.shell.log import files
+from multidrop.shell.log.entries import KINDS, TRAFFIC, Entry
+from multidrop.shell.log.files import Line
+from multidrop.shell.raw import text_of
 
 PERIOD = 0.1
 """The time between two looks at a log that is followed, s."""

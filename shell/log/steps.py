@@ -11,13 +11,13 @@ from dataclasses import dataclass, field
 from datetime import datetime
 from pathlib import Path
 
-from dialects import Diagnostic
-from dialects.visible import visible
-from shell.lines import WAITS
-from shell.log.entries import BEGIN, TRAFFIC, Entry
-from shell.log.files import Line
-from shell.log.show import whole
-from shell.secrets import HIDDEN
+from multidrop.dialects import Diagnostic
+from multidrop.dialects.visible import visible
+from multidrop.shell.lines import WAITS
+from multidrop.shell.log.entries import BEGIN, TRAFFIC, Entry
+from multidrop.shell.log.files import Line
+from multidrop.shell.log.show import whole
+from multidrop.shell.secrets import HIDDEN
 
 WORLD = "/sim"
 """The verb that acts on simulated drives; it is a step for those only."""

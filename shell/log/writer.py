@@ -8,20 +8,30 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from dialects import Diagnostic, Priority
-from dialects.files import why
-from dialects.visible import visible
-from drives.events import BusEvent, Ended, Sent, Traffic, Unsolicited
-from shell.events import Entered, Failed, Notified, OnBus, Output, Printed, SessionEvent, StateChanged, TwinEvent
-from shell.log import files
-from shell.log.disk import Disk
-from shell.log.entries import BEGIN, KINDS, TRAFFIC, Entry, line_of
-from shell.naming import model
+from multidrop.dialects import Diagnostic, Priority
+from multidrop.dialects.files import why
+from multidrop.dialects.visible import visible
+from multidrop.drives.events import BusEvent, Ended, Sent, Traffic, Unsolicited
+from multidrop.shell.events import (
+    Entered,
+    Failed,
+    Notified,
+    OnBus,
+    Output,
+    Printed,
+    SessionEvent,
+    StateChanged,
+    TwinEvent,
+)
+from multidrop.shell.log import files
+from multidrop.shell.log.disk import Disk
+from multidrop.shell.log.entries import BEGIN, KINDS, TRAFFIC, Entry, line_of
+from multidrop.shell.naming import model
 
 if TYPE_CHECKING:
-    from dialects import Request
-    from drives.bus import Bus
-    from shell.workspace import Workspace
+    from multidrop.dialects import Request
+    from multidrop.drives.bus import Bus
+    from multidrop.shell.workspace import Workspace
 
 LAST = 50
 """Entries that are kept for a screen."""

@@ -10,12 +10,12 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from dialects import Diagnostic
-from dialects.files import escaped_toml, text_of, toml_of
-from dialects.parameters import SECTIONS, VARIABLES, Reading, Readings, Scalar, Value
+from multidrop.dialects import Diagnostic
+from multidrop.dialects.files import escaped_toml, text_of, toml_of
+from multidrop.dialects.parameters import SECTIONS, VARIABLES, Reading, Readings, Scalar, Value
 
 if TYPE_CHECKING:
-    from dialects import DriveState
+    from multidrop.dialects import DriveState
 
 DRIVE, UNREAD = "drive", "unread"
 HEAD = (

@@ -10,9 +10,19 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol
 
-from dialects import Diagnostic
-from dialects.parameters import ORDINARY, Change, Parameters, Permission, Reading, Readings, Scalar, Value, same
-from shell.params.file import shown
+from multidrop.dialects import Diagnostic
+from multidrop.dialects.parameters import (
+    ORDINARY,
+    Change,
+    Parameters,
+    Permission,
+    Reading,
+    Readings,
+    Scalar,
+    Value,
+    same,
+)
+from multidrop.shell.params.file import shown
 
 _NUMBER = re.compile(r"[+-]?\d{1,20}")
 _FRACTION = re.compile(r"[+-]?(?:\d{1,20}\.\d*|\.\d+)(?:[eE][+-]?\d{1,3})?")

@@ -5,15 +5,15 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-from dialects import Diagnostic, Inexpressible
-from dialects.parameters import VARIABLES, Parameters, Readings, Value, same
-from shell import jobs
-from shell.events import SettingsRead
-from shell.params.file import SettingsFile
+from multidrop.dialects import Diagnostic, Inexpressible
+from multidrop.dialects.parameters import VARIABLES, Parameters, Readings, Value, same
+from multidrop.shell import jobs
+from multidrop.shell.events import SettingsRead
+from multidrop.shell.params.file import SettingsFile
 
 if TYPE_CHECKING:
-    from drives.drive import Drive
-    from shell.workspace import Workspace
+    from multidrop.drives.drive import Drive
+    from multidrop.shell.workspace import Workspace
 
 Difference = tuple[str, Value | None, Value | None]
 """A name, the value here, and the value there; None where one side has none."""

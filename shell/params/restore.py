@@ -12,16 +12,16 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
-from dialects import Diagnostic, DriveError, NoAnswer, Refused
-from dialects.parameters import COMMUNICATION, IO, PARAMETERS, Change, Permission, Plan, Readings, Value, same
-from shell import jobs
-from shell.params.file import SettingsFile, shown
-from shell.params.readings import listed, parameters, read
+from multidrop.dialects import Diagnostic, DriveError, NoAnswer, Refused
+from multidrop.dialects.parameters import COMMUNICATION, IO, PARAMETERS, Change, Permission, Plan, Readings, Value, same
+from multidrop.shell import jobs
+from multidrop.shell.params.file import SettingsFile, shown
+from multidrop.shell.params.readings import listed, parameters, read
 
 if TYPE_CHECKING:
-    from drives.drive import Drive
-    from shell.roles import Commands
-    from shell.workspace import Workspace
+    from multidrop.drives.drive import Drive
+    from multidrop.shell.roles import Commands
+    from multidrop.shell.workspace import Workspace
 
 
 CLOSE = 0.5

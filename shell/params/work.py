@@ -7,20 +7,20 @@ from collections.abc import Awaitable, Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from dialects import Diagnostic, DriveError, Stopped
-from dialects.parameters import Readings
-from shell import jobs, new_file
-from shell.lines import split_target
-from shell.params import file as files
-from shell.params import readings
-from shell.params.readings import Difference
-from shell.params.restore import Options, restore
-from transports import TransportLost
+from multidrop.dialects import Diagnostic, DriveError, Stopped
+from multidrop.dialects.parameters import Readings
+from multidrop.shell import jobs, new_file
+from multidrop.shell.lines import split_target
+from multidrop.shell.params import file as files
+from multidrop.shell.params import readings
+from multidrop.shell.params.readings import Difference
+from multidrop.shell.params.restore import Options, restore
+from multidrop.transports import TransportLost
 
 if TYPE_CHECKING:
-    from drives.drive import Drive
-    from shell.roles import Commands
-    from shell.workspace import Workspace
+    from multidrop.drives.drive import Drive
+    from multidrop.shell.roles import Commands
+    from multidrop.shell.workspace import Workspace
 
 ALL = ("all", "*")
 Work = Callable[["Drive"], Awaitable[None]]

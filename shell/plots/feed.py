@@ -8,12 +8,12 @@ from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING
 
-from dialects import Diagnostic
-from drives.events import Conditioned, Lost, Sample, Unsolicited, Valued
-from drives.readings import USUAL, Value
-from drives.subscriptions import Subscription
-from drives.telemetry import MODEST, Telemetry
-from shell.events import (
+from multidrop.dialects import Diagnostic
+from multidrop.drives.events import Conditioned, Lost, Sample, Unsolicited, Valued
+from multidrop.drives.readings import USUAL, Value
+from multidrop.drives.subscriptions import Subscription
+from multidrop.drives.telemetry import MODEST, Telemetry
+from multidrop.shell.events import (
     Diverged,
     Entered,
     Failed,
@@ -25,16 +25,16 @@ from shell.events import (
     TwinEnded,
     TwinEvent,
 )
-from shell.plots.layout import AGREES, DIFFERS, TWIN
-from shell.plots.plot import Plot
-from shell.plots.rate import shown
-from shell.plots.states import states_of
-from shell.plots.target import PlotTarget
-from shell.roles import DIFFERENCE, Series
-from transports.exposure import exposed
+from multidrop.shell.plots.layout import AGREES, DIFFERS, TWIN
+from multidrop.shell.plots.plot import Plot
+from multidrop.shell.plots.rate import shown
+from multidrop.shell.plots.states import states_of
+from multidrop.shell.plots.target import PlotTarget
+from multidrop.shell.roles import DIFFERENCE, Series
+from multidrop.transports.exposure import exposed
 
 if TYPE_CHECKING:
-    from shell.workspace import Workspace
+    from multidrop.shell.workspace import Workspace
 
 
 STATES, SPARING = 1.0, 2.0

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Set
 from typing import Any
 
-from shell.roles import DIFFERENCE
+from multidrop.shell.roles import DIFFERENCE
 
 UNITS = {"position": "steps", "velocity": "steps/s", DIFFERENCE: "steps"}
 """The quantities of every drive, and the difference from its twin, with their units."""

@@ -12,15 +12,15 @@ import contextlib
 from collections.abc import Callable
 from datetime import datetime
 
-from dialects import Diagnostic
-from drives.events import Sample, Valued
-from shell.events import Predicted
-from shell.plots.file import SinkBroken
-from shell.plots.layout import COLOURS, RUNS, TWIN
-from shell.plots.sink import Batch, Curve, Sink, State
-from shell.plots.target import PlotTarget
-from shell.roles import DIFFERENCE
-from shell.threads import in_thread
+from multidrop.dialects import Diagnostic
+from multidrop.drives.events import Sample, Valued
+from multidrop.shell.events import Predicted
+from multidrop.shell.plots.file import SinkBroken
+from multidrop.shell.plots.layout import COLOURS, RUNS, TWIN
+from multidrop.shell.plots.sink import Batch, Curve, Sink, State
+from multidrop.shell.plots.target import PlotTarget
+from multidrop.shell.roles import DIFFERENCE
+from multidrop.shell.threads import in_thread
 
 FILE_PERIOD, LIVE_PERIOD = 0.4, 0.1
 """The time between batches, s: longer makes a smaller file, shorter a smoother view."""

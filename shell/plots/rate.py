@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from dialects import Diagnostic
-from drives.telemetry import FASTEST, MODEST
+from multidrop.dialects import Diagnostic
+from multidrop.drives.telemetry import FASTEST, MODEST
 
 MAX = "max"
 SLOWEST = 0.01

@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from dialects import Diagnostic
-from shell.lines import EVERYONE, split_target
-from shell.roles import DIFFERENCE, Series
+from multidrop.dialects import Diagnostic
+from multidrop.shell.lines import EVERYONE, split_target
+from multidrop.shell.roles import DIFFERENCE, Series
 
 if TYPE_CHECKING:
-    from drives.drive import Drive
-    from shell.workspace import Workspace
+    from multidrop.drives.drive import Drive
+    from multidrop.shell.workspace import Workspace
 
 
 FORMS = "valid: ADDR, ADDR.VALUE or VALUE, with BUS: before ADDR if it is on another bus; as b, b.I1, VM"

@@ -16,10 +16,10 @@ import warnings
 from dataclasses import dataclass, field, replace
 from typing import Any, NamedTuple
 
-from dialects import Diagnostic
-from dialects.files import why
-from shell.plots.file import APPLICATION, FLUSH, GAP, RecordingFile, SinkBroken
-from shell.plots.layout import (
+from multidrop.dialects import Diagnostic
+from multidrop.dialects.files import why
+from multidrop.shell.plots.file import APPLICATION, FLUSH, GAP, RecordingFile, SinkBroken
+from multidrop.shell.plots.layout import (
     BAND,
     COLOURS,
     LINES,
@@ -33,9 +33,9 @@ from shell.plots.layout import (
     is_state,
     layout,
 )
-from shell.plots.target import PlotTarget, bracketed
-from shell.roles import DIFFERENCE
-from transports import Unreachable
+from multidrop.shell.plots.target import PlotTarget, bracketed
+from multidrop.shell.roles import DIFFERENCE
+from multidrop.transports import Unreachable
 
 _INSTALL = "pip install 'multidrop[rerun]'"
 

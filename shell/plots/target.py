@@ -10,9 +10,9 @@ from ipaddress import ip_address
 from pathlib import Path
 from urllib.parse import urlsplit
 
-from dialects import Diagnostic
-from shell.connect.listening import listening
-from shell.secrets import url_without_secrets
+from multidrop.dialects import Diagnostic
+from multidrop.shell.connect.listening import listening
+from multidrop.shell.secrets import url_without_secrets
 
 
 @dataclass(frozen=True)

@@ -15,14 +15,14 @@ from collections import deque
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
-from dialects import Diagnostic
-from dialects.files import why
-from dialects.on_demand import importing
-from shell.connect.mqtt_settings import MqttSettings
-from shell.publishing.backlog import Message
-from shell.publishing.target import Target
-from shell.threads import in_thread
-from transports import Unreachable
+from multidrop.dialects import Diagnostic
+from multidrop.dialects.files import why
+from multidrop.dialects.on_demand import importing
+from multidrop.shell.connect.mqtt_settings import MqttSettings
+from multidrop.shell.publishing.backlog import Message
+from multidrop.shell.publishing.target import Target
+from multidrop.shell.threads import in_thread
+from multidrop.transports import Unreachable
 
 if TYPE_CHECKING:
     from paho.mqtt.client import Client, MQTTMessageInfo

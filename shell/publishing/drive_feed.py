@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from drives.events import Conditioned, Sample, Silent
-from shell.publishing import messages
-from shell.publishing.limits import Curve, Point, SampleLimit
-from shell.publishing.messages import Fields
+from multidrop.drives.events import Conditioned, Sample, Silent
+from multidrop.shell.publishing import messages
+from multidrop.shell.publishing.limits import Curve, Point, SampleLimit
+from multidrop.shell.publishing.messages import Fields
 
 Put = Callable[[str, float, bool, Fields], None]
 """Publishes a value: `position`, its time, whether it is retained, and its facts."""

@@ -9,19 +9,19 @@ from datetime import datetime
 from functools import partial
 from typing import TYPE_CHECKING
 
-from drives.events import Changed, Conditioned, Lost, Sample, Silent, Unsolicited
-from shell.events import Entered, Failed, Notified, OnBus, Printed, SessionEvent
-from shell.log.entries import Entry
-from shell.publishing import messages
-from shell.publishing.backlog import Message
-from shell.publishing.drive_feed import DriveFeed
-from shell.publishing.limits import LINES, LineLimit
-from shell.publishing.publisher import Publisher
-from shell.publishing.topics import Topics
+from multidrop.drives.events import Changed, Conditioned, Lost, Sample, Silent, Unsolicited
+from multidrop.shell.events import Entered, Failed, Notified, OnBus, Printed, SessionEvent
+from multidrop.shell.log.entries import Entry
+from multidrop.shell.publishing import messages
+from multidrop.shell.publishing.backlog import Message
+from multidrop.shell.publishing.drive_feed import DriveFeed
+from multidrop.shell.publishing.limits import LINES, LineLimit
+from multidrop.shell.publishing.publisher import Publisher
+from multidrop.shell.publishing.topics import Topics
 
 if TYPE_CHECKING:
-    from drives.bus import Bus
-    from shell.workspace import Workspace
+    from multidrop.drives.bus import Bus
+    from multidrop.shell.workspace import Workspace
 
 KINDS = {Entered: "typed", Printed: "printed", Notified: "notice", Failed: "failed"}
 CONDITIONS = 1.0

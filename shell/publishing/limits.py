@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
-from dialects import Diagnostic
+from multidrop.dialects import Diagnostic
 
 DEFAULT = "2"
 """The usual rate, samples a second of each drive."""

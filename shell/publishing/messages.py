@@ -7,9 +7,9 @@ from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from datetime import datetime
 
-from dialects.conditions import UNREAD, Conditions
-from shell.log.entries import Entry, line_of
-from shell.output import shortened
+from multidrop.dialects.conditions import UNREAD, Conditions
+from multidrop.shell.log.entries import Entry, line_of
+from multidrop.shell.output import shortened
 
 ONLINE, LOST, BYE = "online", "lost", "bye"
 """Plain words: the states of this program, and of a line."""

@@ -13,9 +13,9 @@ from collections import Counter
 from collections.abc import Callable
 from typing import Protocol
 
-from dialects import Diagnostic
-from shell.publishing.backlog import Backlog, Message
-from transports import TransportLost
+from multidrop.dialects import Diagnostic
+from multidrop.shell.publishing.backlog import Backlog, Message
+from multidrop.transports import TransportLost
 
 FIRST, LONGEST = 1.0, 30.0
 """The pause before the first attempt to connect again, s; each further one is twice as long, up to the longest."""

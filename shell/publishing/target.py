@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from urllib.parse import unquote, urlsplit
 
-from dialects import Diagnostic
-from dialects.visible import visible
-from shell.publishing.topics import MOST
+from multidrop.dialects import Diagnostic
+from multidrop.dialects.visible import visible
+from multidrop.shell.publishing.topics import MOST
 
 PORTS = {"mqtt": 1883, "mqtts": 8883}
 """The usual port of each scheme; `mqtts` is encrypted."""

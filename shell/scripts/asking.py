@@ -4,15 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from dialects import Diagnostic, DriveError
-from drives.drive import Drive
-from shell.events import By
-from shell.lines import split_target
-from shell.roles import Commands
-from shell.scripts.expression import Expression, Name, Word, unknowns
-from shell.scripts.place import Place
-from shell.scripts.values import Value, value_of
-from shell.workspace import Workspace
+from multidrop.dialects import Diagnostic, DriveError
+from multidrop.drives.drive import Drive
+from multidrop.shell.events import By
+from multidrop.shell.lines import split_target
+from multidrop.shell.roles import Commands
+from multidrop.shell.scripts.expression import Expression, Name, Word, unknowns
+from multidrop.shell.scripts.place import Place
+from multidrop.shell.scripts.values import Value, value_of
+from multidrop.shell.workspace import Workspace
 
 
 async def known(

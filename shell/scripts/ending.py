@@ -12,16 +12,16 @@ from collections.abc import AsyncIterator, Callable, Iterator
 from dataclasses import replace
 from itertools import islice
 
-from dialects import Diagnostic, NoAnswer, Stopped
-from drives.drive import Drive
-from drives.halt import Halt
-from shell.automation import outcome, settled
-from shell.events import FAILURES
-from shell.motion import Standing, standings
-from shell.playing import cast
-from shell.scripts.execution import CUT, Execution, Unfinished
-from shell.scripts.results import Ending, Result
-from shell.scripts.runner import Runner
+from multidrop.dialects import Diagnostic, NoAnswer, Stopped
+from multidrop.drives.drive import Drive
+from multidrop.drives.halt import Halt
+from multidrop.shell.automation import outcome, settled
+from multidrop.shell.events import FAILURES
+from multidrop.shell.motion import Standing, standings
+from multidrop.shell.playing import cast
+from multidrop.shell.scripts.execution import CUT, Execution, Unfinished
+from multidrop.shell.scripts.results import Ending, Result
+from multidrop.shell.scripts.runner import Runner
 
 SHOWN = 3
 """The number of printed lines that the report of a step shows."""

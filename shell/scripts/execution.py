@@ -12,23 +12,23 @@ from collections.abc import Awaitable, Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TypeVar
 
-from dialects import Diagnostic, DriveError, Stopped
-from macros import checked_values, fill
-from shell import waits
-from shell.events import FAILURES, By, Failed
-from shell.playing import Playing, cast
-from shell.roles import Commands
-from shell.scripts import words
-from shell.scripts.asking import drive_of, known
-from shell.scripts.expression import Expression, Name, Word, evaluate, unknowns
-from shell.scripts.hearing import Hearing
-from shell.scripts.model import CallFile, CallMacro, If, MacroScript, Node, Repeat, ScriptLine
-from shell.scripts.place import Place
-from shell.scripts.planning import bind
-from shell.scripts.progress import StepProgress
-from shell.scripts.results import Executed, Result
-from shell.scripts.values import Value, number, quoted, written
-from shell.workspace import LATCHED, Workspace
+from multidrop.dialects import Diagnostic, DriveError, Stopped
+from multidrop.macros import checked_values, fill
+from multidrop.shell import waits
+from multidrop.shell.events import FAILURES, By, Failed
+from multidrop.shell.playing import Playing, cast
+from multidrop.shell.roles import Commands
+from multidrop.shell.scripts import words
+from multidrop.shell.scripts.asking import drive_of, known
+from multidrop.shell.scripts.expression import Expression, Name, Word, evaluate, unknowns
+from multidrop.shell.scripts.hearing import Hearing
+from multidrop.shell.scripts.model import CallFile, CallMacro, If, MacroScript, Node, Repeat, ScriptLine
+from multidrop.shell.scripts.place import Place
+from multidrop.shell.scripts.planning import bind
+from multidrop.shell.scripts.progress import StepProgress
+from multidrop.shell.scripts.results import Executed, Result
+from multidrop.shell.scripts.values import Value, number, quoted, written
+from multidrop.shell.workspace import LATCHED, Workspace
 
 # The pace of a macro: as recorded, or as fast as its lines are done.
 

@@ -7,19 +7,19 @@ import contextlib
 from collections.abc import AsyncIterator, Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 
-from dialects import Stopped
-from drives.events import Lost
-from shell import unfinished
-from shell.events import By, OnBus, SessionEvent
-from shell.scripts.ending import ending
-from shell.scripts.execution import Execution, Frame
-from shell.scripts.hearing import hearing
-from shell.scripts.model import MacroScript, Script, ScriptLine
-from shell.scripts.planning import bind, macro_claims, script_claims
-from shell.scripts.results import Ending, Executed, Result, Watcher
-from shell.scripts.runner import Runner
-from shell.workspace import LATCHED, Workspace
-from transports import TransportLost
+from multidrop.dialects import Stopped
+from multidrop.drives.events import Lost
+from multidrop.shell import unfinished
+from multidrop.shell.events import By, OnBus, SessionEvent
+from multidrop.shell.scripts.ending import ending
+from multidrop.shell.scripts.execution import Execution, Frame
+from multidrop.shell.scripts.hearing import hearing
+from multidrop.shell.scripts.model import MacroScript, Script, ScriptLine
+from multidrop.shell.scripts.planning import bind, macro_claims, script_claims
+from multidrop.shell.scripts.results import Ending, Executed, Result, Watcher
+from multidrop.shell.scripts.runner import Runner
+from multidrop.shell.workspace import LATCHED, Workspace
+from multidrop.transports import TransportLost
 
 # A connection that is lost while no line uses it: that ends a script or macro too, and not only its next line.
 

@@ -13,9 +13,19 @@ from collections.abc import Container, Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
-from dialects import Diagnostic
-from shell.lines import EVERYONE, split_target
-from shell.scripts.values import ARITHMETIC, EQUAL, LARGEST, ORDER, Value, calculated, compared, number, value_of
+from multidrop.dialects import Diagnostic
+from multidrop.shell.lines import EVERYONE, split_target
+from multidrop.shell.scripts.values import (
+    ARITHMETIC,
+    EQUAL,
+    LARGEST,
+    ORDER,
+    Value,
+    calculated,
+    compared,
+    number,
+    value_of,
+)
 
 DEEPEST = 20
 """The deepest nesting."""

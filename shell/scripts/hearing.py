@@ -9,9 +9,9 @@ from collections.abc import Callable, Iterator
 from contextvars import ContextVar
 from itertools import islice
 
-from drives.events import Unsolicited
-from shell.channel import Callback
-from shell.events import Entered, OnBus, Output, Printed, SessionEvent
+from multidrop.drives.events import Unsolicited
+from multidrop.shell.channel import Callback
+from multidrop.shell.events import Entered, OnBus, Output, Printed, SessionEvent
 
 KEPT = 10_000
 """The number of lines kept."""

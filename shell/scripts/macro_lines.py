@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from dialects import Diagnostic
-from macros import Macro, MacroStore, parse_macro
-from macros.parameters import Parameter, plain, written
-from macros.places import in_text
-from shell.scripts.model import ScriptLine
+from multidrop.dialects import Diagnostic
+from multidrop.macros import Macro, MacroStore, parse_macro
+from multidrop.macros.parameters import Parameter, plain, written
+from multidrop.macros.places import in_text
+from multidrop.shell.scripts.model import ScriptLine
 
 UNKNOWN = "0"
 """Stands for a value that is only known when the line is executed."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
-from macros import Macro
+from multidrop.macros import Macro
 
 
 @dataclass(frozen=True)

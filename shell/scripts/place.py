@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from shell.lines import join_target, pinned, split_target
-from shell.playing import played_by
-from shell.workspace import Workspace
+from multidrop.shell.lines import join_target, pinned, split_target
+from multidrop.shell.playing import played_by
+from multidrop.shell.workspace import Workspace
 
 
 class Place:

@@ -5,22 +5,22 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING
 
-from dialects import Diagnostic, Inexpressible, NoAnswer
-from macros import Macro, fill, value_names
-from shell import casting
-from shell.automation import Claim, only_ends
-from shell.lines import DriveLine, parse
-from shell.playing import cast, played_by
-from shell.roles import NO_ROLES
-from shell.scripts.macro_lines import UNKNOWN
-from shell.scripts.model import CallFile, CallMacro, If, MacroScript, Node, Repeat, Script, ScriptLine
-from shell.scripts.words import macro_call
-from shell.workspace import Workspace
+from multidrop.dialects import Diagnostic, Inexpressible, NoAnswer
+from multidrop.macros import Macro, fill, value_names
+from multidrop.shell import casting
+from multidrop.shell.automation import Claim, only_ends
+from multidrop.shell.lines import DriveLine, parse
+from multidrop.shell.playing import cast, played_by
+from multidrop.shell.roles import NO_ROLES
+from multidrop.shell.scripts.macro_lines import UNKNOWN
+from multidrop.shell.scripts.model import CallFile, CallMacro, If, MacroScript, Node, Repeat, Script, ScriptLine
+from multidrop.shell.scripts.words import macro_call
+from multidrop.shell.workspace import Workspace
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from drives.drive import Drive
+    from multidrop.drives.drive import Drive
 
 OPENING = ("/open", "/close")
 SELECTING = (*OPENING, "/use")

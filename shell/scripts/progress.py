@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import asyncio
 
-from shell.channel import Channel
-from shell.events import Progressed
-from shell.jobs import PERIOD
-from shell.playing import Playing
+from multidrop.shell.channel import Channel
+from multidrop.shell.events import Progressed
+from multidrop.shell.jobs import PERIOD
+from multidrop.shell.playing import Playing
 
 
 class StepProgress:

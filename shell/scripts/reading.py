@@ -12,15 +12,15 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from functools import partial
 from typing import NamedTuple, TypeVar
 
-from dialects import Diagnostic
-from dialects.files import bounded, bytes_of, lines_of, utf8, why
-from macros import Macro, MacroStore, check_name, checked_values, fill, value_names
-from shell.lines import VerbLine, parse, uncommented
-from shell.scripts import words
-from shell.scripts.expression import evaluate, unknowns
-from shell.scripts.macro_lines import UNKNOWN, stand_in, steps_of
-from shell.scripts.model import CallFile, CallMacro, If, MacroScript, Node, Repeat, Script, ScriptLine, Step
-from shell.verbs.table import find
+from multidrop.dialects import Diagnostic
+from multidrop.dialects.files import bounded, bytes_of, lines_of, utf8, why
+from multidrop.macros import Macro, MacroStore, check_name, checked_values, fill, value_names
+from multidrop.shell.lines import VerbLine, parse, uncommented
+from multidrop.shell.scripts import words
+from multidrop.shell.scripts.expression import evaluate, unknowns
+from multidrop.shell.scripts.macro_lines import UNKNOWN, stand_in, steps_of
+from multidrop.shell.scripts.model import CallFile, CallMacro, If, MacroScript, Node, Repeat, Script, ScriptLine, Step
+from multidrop.shell.verbs.table import find
 
 T = TypeVar("T")
 INPUT = "-"

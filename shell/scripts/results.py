@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from datetime import datetime
 from typing import Any, Protocol
 
-from shell.motion import Standing
-from shell.scripts.model import ScriptLine
-from shell.secrets import without_secrets
+from multidrop.shell.motion import Standing
+from multidrop.shell.scripts.model import ScriptLine
+from multidrop.shell.secrets import without_secrets
 
 
 @dataclass(frozen=True)

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Protocol
 
-from shell.automation import Automations
-from shell.roles import Commands
+from multidrop.shell.automation import Automations
+from multidrop.shell.roles import Commands
 
 
 class Runner(Commands, Protocol):

@@ -6,7 +6,7 @@ import operator
 import re
 from collections.abc import Callable, Mapping
 
-from dialects import Diagnostic
+from multidrop.dialects import Diagnostic
 
 Value = int | float | str
 LARGEST = 10**15

@@ -7,14 +7,14 @@ from collections.abc import Callable, Collection
 from functools import cache
 from typing import TypeVar
 
-from dialects import Diagnostic
-from dialects.families import FAMILIES
-from shell import waits
-from shell.scripts.expression import Comparison, Expression, Name, parse, parse_check, unknowns
-from shell.scripts.values import Value, quoted
-from shell.verbs.macros import PLAY, PlayCall, play_call
-from shell.verbs.registry import split
-from shell.verbs.script_words import SCRIPT_WORDS
+from multidrop.dialects import Diagnostic
+from multidrop.dialects.families import FAMILIES
+from multidrop.shell import waits
+from multidrop.shell.scripts.expression import Comparison, Expression, Name, parse, parse_check, unknowns
+from multidrop.shell.scripts.values import Value, quoted
+from multidrop.shell.verbs.macros import PLAY, PlayCall, play_call
+from multidrop.shell.verbs.registry import split
+from multidrop.shell.verbs.script_words import SCRIPT_WORDS
 
 T = TypeVar("T", bound=Expression)
 NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]*", re.ASCII)

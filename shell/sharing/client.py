@@ -10,8 +10,8 @@ from __future__ import annotations
 from collections import deque
 from dataclasses import dataclass
 
-from transports import telnet
-from transports.com_port import OPTION, PURGE_BOTH, REPLY, Setting, message, parsed
+from multidrop.transports import telnet
+from multidrop.transports.com_port import OPTION, PURGE_BOTH, REPLY, Setting, message, parsed
 
 HELD = 1 << 16
 """Bytes that are kept for a client that has suspended the flow to it."""

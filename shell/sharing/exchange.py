@@ -10,12 +10,12 @@ port is back.
 
 from __future__ import annotations
 
-from dialects.visible import visible
-from shell.sharing.actions import Action, Close, Purge, Say, Send, Set, Stop, Write
-from shell.sharing.client import Client, Input, Request
-from shell.sharing.half_line import ENDS, HalfLine
-from shell.sharing.stop_bytes import OwedStop, StopBytes
-from transports.com_port import FLOW, FLOW_IN, GROUPS, NEEDED, PURGE_RECEIVED, Control, Setting, group_of
+from multidrop.dialects.visible import visible
+from multidrop.shell.sharing.actions import Action, Close, Purge, Say, Send, Set, Stop, Write
+from multidrop.shell.sharing.client import Client, Input, Request
+from multidrop.shell.sharing.half_line import ENDS, HalfLine
+from multidrop.shell.sharing.stop_bytes import OwedStop, StopBytes
+from multidrop.transports.com_port import FLOW, FLOW_IN, GROUPS, NEEDED, PURGE_RECEIVED, Control, Setting, group_of
 
 SILENT = 10.0
 """Seconds of silence after which another client may write."""

@@ -8,16 +8,16 @@ from collections.abc import Callable, Coroutine, Sequence
 from functools import partial
 from typing import Any, cast
 
-from dialects import StopPiece
-from shell.connect.opening import OpenedPort
-from shell.connect.reconnect import FIRST, GLANCE, LONGEST
-from shell.connect.reopening import Absent
-from shell.sharing.actions import Action, Close, Purge, Say, Send, Set, Stop, Write
-from shell.sharing.exchange import NEVER, NOT_REACHED, Exchange
-from shell.sharing.stop_bytes import StopBytes
-from transports import Controllable, PortControl, Queueing, Transport, TransportLost
-from transports.com_port import Control, Setting
-from transports.sockets import host_port, set_socket_options
+from multidrop.dialects import StopPiece
+from multidrop.shell.connect.opening import OpenedPort
+from multidrop.shell.connect.reconnect import FIRST, GLANCE, LONGEST
+from multidrop.shell.connect.reopening import Absent
+from multidrop.shell.sharing.actions import Action, Close, Purge, Say, Send, Set, Stop, Write
+from multidrop.shell.sharing.exchange import NEVER, NOT_REACHED, Exchange
+from multidrop.shell.sharing.stop_bytes import StopBytes
+from multidrop.transports import Controllable, PortControl, Queueing, Transport, TransportLost
+from multidrop.transports.com_port import Control, Setting
+from multidrop.transports.sockets import host_port, set_socket_options
 
 UNREAD = 1 << 18
 """Bytes that a client may leave unread before it is disconnected."""

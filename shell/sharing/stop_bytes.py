@@ -10,8 +10,8 @@ import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-from dialects import Diagnostic, StopPiece
-from dialects.families import DEFAULT, FAMILIES, TABLE
+from multidrop.dialects import Diagnostic, StopPiece
+from multidrop.dialects.families import DEFAULT, FAMILIES, TABLE
 
 KEYS = rb"[\x03\x1b]"
 """Ctrl+C and ESC, which stop on every line of text."""

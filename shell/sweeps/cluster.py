@@ -13,13 +13,13 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from typing import TYPE_CHECKING, Any
 
-from dialects import Diagnostic
-from shell.secrets import url_without_secrets
-from shell.sweeps import trial
-from shell.sweeps.interruption import Interruption
-from shell.sweeps.trial import DIED, Case, Job, Result
-from shell.sweeps.workers import CHUNK, chunks
-from transports import TransportLost, Unreachable
+from multidrop.dialects import Diagnostic
+from multidrop.shell.secrets import url_without_secrets
+from multidrop.shell.sweeps import trial
+from multidrop.shell.sweeps.interruption import Interruption
+from multidrop.shell.sweeps.trial import DIED, Case, Job, Result
+from multidrop.shell.sweeps.workers import CHUNK, chunks
+from multidrop.transports import TransportLost, Unreachable
 
 if TYPE_CHECKING:
     from distributed import Client, Future

@@ -9,10 +9,19 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 
-from dialects import Diagnostic
-from shell.scripts.expression import Comparison, Expression, Known, Name, Word, evaluate, parse_check, unknowns
-from shell.scripts.values import EQUAL, Value, compared, number, quoted, value_of
-from shell.sweeps.outcome import BY_ITSELF, ENDS, Outcome
+from multidrop.dialects import Diagnostic
+from multidrop.shell.scripts.expression import (
+    Comparison,
+    Expression,
+    Known,
+    Name,
+    Word,
+    evaluate,
+    parse_check,
+    unknowns,
+)
+from multidrop.shell.scripts.values import EQUAL, Value, compared, number, quoted, value_of
+from multidrop.shell.sweeps.outcome import BY_ITSELF, ENDS, Outcome
 
 NAMES = Outcome._fields
 LISTS = ("errors", "prints")

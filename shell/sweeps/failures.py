@@ -8,11 +8,11 @@ import sys
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 
-from shell.sweeps.plan import Plan
-from shell.sweeps.shrink import Run, World, shrunk
-from shell.sweeps.trial import DIED, Case, Result
-from shell.sweeps.values import spelled
-from shell.sweeps.variation import SEED
+from multidrop.shell.sweeps.plan import Plan
+from multidrop.shell.sweeps.shrink import Run, World, shrunk
+from multidrop.shell.sweeps.trial import DIED, Case, Result
+from multidrop.shell.sweeps.values import spelled
+from multidrop.shell.sweeps.variation import SEED
 
 MOST = 20
 """The largest number of groups whose simplest world is looked for."""

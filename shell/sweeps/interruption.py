@@ -9,7 +9,7 @@ from contextlib import contextmanager
 from types import FrameType
 from typing import Any
 
-from shell.signals import SIGNALS
+from multidrop.shell.signals import SIGNALS
 
 
 class Interruption:

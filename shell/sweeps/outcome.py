@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import NamedTuple
 
-from simulator.program_run import Event
+from multidrop.simulator.program_run import Event
 
 BY_ITSELF = ("E", "END")
 """The ends of a program that has ended by itself."""

@@ -13,17 +13,17 @@ from math import prod
 from pathlib import Path
 from random import Random
 
-from dialects import Diagnostic
-from dialects.families import program_language_of
-from dialects.files import program_text_of
-from shell.connect import settings
-from shell.sweeps import values, variation
-from shell.sweeps.trial import Case, Job, bench
-from shell.sweeps.values import Value, Values
-from shell.sweeps.variation import OWN_KEYS, Drive, Key
-from simulator import cells
-from simulator.cells import Placed
-from simulator.families import PROGRAMS
+from multidrop.dialects import Diagnostic
+from multidrop.dialects.families import program_language_of
+from multidrop.dialects.files import program_text_of
+from multidrop.shell.connect import settings
+from multidrop.shell.sweeps import values, variation
+from multidrop.shell.sweeps.trial import Case, Job, bench
+from multidrop.shell.sweeps.values import Value, Values
+from multidrop.shell.sweeps.variation import OWN_KEYS, Drive, Key
+from multidrop.simulator import cells
+from multidrop.simulator.cells import Placed
+from multidrop.simulator.families import PROGRAMS
 
 MOST = 100_000
 """The largest number of cases."""

@@ -19,11 +19,11 @@ from multiprocessing import connection
 from multiprocessing.context import BaseContext
 from typing import ParamSpec, TypeVar
 
-from shell.output import WATCHER
-from shell.signals import FROM_TERMINAL, SIGNALS
-from shell.sweeps import trial
-from shell.sweeps.interruption import Interruption
-from shell.sweeps.trial import DIED, Case, Job, Result
+from multidrop.shell.output import WATCHER
+from multidrop.shell.signals import FROM_TERMINAL, SIGNALS
+from multidrop.shell.sweeps import trial
+from multidrop.shell.sweeps.interruption import Interruption
+from multidrop.shell.sweeps.trial import DIED, Case, Job, Result
 
 AHEAD = 3
 """Chunks for each process that are submitted and not done."""

@@ -8,8 +8,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
-from shell.sweeps.trial import Case, Result
-from shell.sweeps.values import Value, Values, simpler
+from multidrop.shell.sweeps.trial import Case, Result
+from multidrop.shell.sweeps.values import Value, Values, simpler
 
 MOST = 60
 """The largest number of runs for one case."""

@@ -12,16 +12,16 @@ from dataclasses import dataclass
 from functools import lru_cache
 from typing import NamedTuple
 
-from dialects import Diagnostic
-from dialects.on_demand import imported
-from shell.sweeps import conditions
-from shell.sweeps.conditions import Condition
-from shell.sweeps.outcome import Outcome, outcome_of
-from shell.sweeps.values import Value
-from shell.sweeps.variation import Drive, Key
-from simulator.cells import read_drive
-from simulator.families import PROGRAMS
-from simulator.program_run import Load, ProgramRun
+from multidrop.dialects import Diagnostic
+from multidrop.dialects.on_demand import imported
+from multidrop.shell.sweeps import conditions
+from multidrop.shell.sweeps.conditions import Condition
+from multidrop.shell.sweeps.outcome import Outcome, outcome_of
+from multidrop.shell.sweeps.values import Value
+from multidrop.shell.sweeps.variation import Drive, Key
+from multidrop.simulator.cells import read_drive
+from multidrop.simulator.families import PROGRAMS
+from multidrop.simulator.program_run import Load, ProgramRun
 
 UNTIL = 60.0
 """Virtual seconds after which a case has failed, unless the sweep sets a time."""

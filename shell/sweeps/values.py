@@ -14,8 +14,8 @@ from decimal import Decimal
 from random import Random
 from typing import Any
 
-from dialects import Diagnostic
-from dialects.files import toml_of
+from multidrop.dialects import Diagnostic
+from multidrop.dialects.files import toml_of
 
 Value = int | float | str | list[Any]
 FINE = 5

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from difflib import get_close_matches
 from typing import Any
 
-from dialects import Diagnostic
-from shell.sweeps.values import Value
-from simulator.cell.worlds import ENCODER_KEYS, KEYS
+from multidrop.dialects import Diagnostic
+from multidrop.shell.sweeps.values import Value
+from multidrop.simulator.cell.worlds import ENCODER_KEYS, KEYS
 
 SEED = "seed"
 WORLD, SETTINGS = "world", "set"

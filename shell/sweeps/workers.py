@@ -11,9 +11,9 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from itertools import islice
 
-from shell.sweeps import trial
-from shell.sweeps.interruption import Interruption
-from shell.sweeps.trial import Case, Job, Result
+from multidrop.shell.sweeps import trial
+from multidrop.shell.sweeps.interruption import Interruption
+from multidrop.shell.sweeps.trial import Case, Job, Result
 
 CHUNK = 0.075
 """The work of one chunk, s of processor time."""
@@ -45,7 +45,7 @@ def results(
     work = seconds * (count - FIRST)
     if jobs > 1 and work > WORTH:
         size = max(1, round(min(CHUNK, work / jobs / 8) / max(seconds, 1e-6)))
-        from shell.sweeps.pools import Pools  # 20 ms, which a small sweep is spared
+        from multidrop.shell.sweeps.pools import Pools  # 20 ms, which a small sweep is spared
 
         yield from Pools(job, jobs, interruption, run).results(chunks(cases, size))
     for case in cases:

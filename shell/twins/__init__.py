@@ -2,6 +2,6 @@
 
 from __future__ import annotations
 
-from shell.twins.twins import Twins
+from multidrop.shell.twins.twins import Twins
 
 __all__ = ["Twins"]

@@ -9,19 +9,19 @@ from dataclasses import dataclass
 from datetime import datetime, timedelta
 from typing import NamedTuple
 
-from dialects import DriveError, Priority, Request
-from dialects.codec import Reply
-from dialects.family import Motion
-from dialects.numbers import whole
-from drives.drive import Drive
-from drives.events import Sample
-from drives.procedure import ProcedureRunner
-from shell.events import Diverged
-from shell.lines import EVERYONE, join_target
-from shell.log.steps import Exchange, Step
-from shell.twins.beside import Compared
-from shell.twins.comparing import LIMIT, Verdict
-from simulator.family import Shadow
+from multidrop.dialects import DriveError, Priority, Request
+from multidrop.dialects.codec import Reply
+from multidrop.dialects.family import Motion
+from multidrop.dialects.numbers import whole
+from multidrop.drives.drive import Drive
+from multidrop.drives.events import Sample
+from multidrop.drives.procedure import ProcedureRunner
+from multidrop.shell.events import Diverged
+from multidrop.shell.lines import EVERYONE, join_target
+from multidrop.shell.log.steps import Exchange, Step
+from multidrop.shell.twins.beside import Compared
+from multidrop.shell.twins.comparing import LIMIT, Verdict
+from multidrop.simulator.family import Shadow
 
 # The positions that a log holds: polls as their bytes, decoded by the conversation that once made them.
 

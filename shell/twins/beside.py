@@ -6,17 +6,17 @@ from collections.abc import Iterator
 from math import copysign, inf
 from typing import Generic, Protocol, TypeVar
 
-from dialects import End, Priority
-from dialects.conditions import Conditions
-from dialects.family import Motion
-from drives.conclusions import Concluded
-from drives.conversations import ASKING
-from drives.drive import Drive
-from drives.events import Sample, Transaction
-from shell.events import Agreed, Diverged, Predicted, TwinEvent
-from shell.twins.causes import Known, Pair, causes
-from shell.twins.comparing import Comparison, Verdict
-from shell.twins.twin import Twin
+from multidrop.dialects import End, Priority
+from multidrop.dialects.conditions import Conditions
+from multidrop.dialects.family import Motion
+from multidrop.drives.conclusions import Concluded
+from multidrop.drives.conversations import ASKING
+from multidrop.drives.drive import Drive
+from multidrop.drives.events import Sample, Transaction
+from multidrop.shell.events import Agreed, Diverged, Predicted, TwinEvent
+from multidrop.shell.twins.causes import Known, Pair, causes
+from multidrop.shell.twins.comparing import Comparison, Verdict
+from multidrop.shell.twins.twin import Twin
 
 # The requests of a conversation that the drive has taken: only these reach its twin.
 #

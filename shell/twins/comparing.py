@@ -13,7 +13,7 @@ from collections import deque
 from dataclasses import dataclass, field
 from enum import Enum
 
-from shell.twins.causes import SKEW, Pair
+from multidrop.shell.twins.causes import SKEW, Pair
 
 LIMIT = 50
 """Default limit at rest, steps."""

@@ -9,16 +9,16 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from dialects.snapshots import Snapshot
-from drives.bus import Bus
-from drives.conclusions import Concluded
-from drives.drive import Drive
-from drives.events import BusEvent, Changed, Conditioned, Lost, Sample, Sent, Traffic, Valued
-from drives.keeping import GLOBAL
-from drives.readings import Value
-from drives.subscriptions import Subscription
-from shell.events import TwinEnded, TwinEvent
-from shell.twins.beside import Beside
+from multidrop.dialects.snapshots import Snapshot
+from multidrop.drives.bus import Bus
+from multidrop.drives.conclusions import Concluded
+from multidrop.drives.drive import Drive
+from multidrop.drives.events import BusEvent, Changed, Conditioned, Lost, Sample, Sent, Traffic, Valued
+from multidrop.drives.keeping import GLOBAL
+from multidrop.drives.readings import Value
+from multidrop.drives.subscriptions import Subscription
+from multidrop.shell.events import TwinEnded, TwinEvent
+from multidrop.shell.twins.beside import Beside
 
 PERIOD = 0.1
 """Seconds between two samples of a drive, at most."""

@@ -5,14 +5,14 @@ It has no clock: it lives up to the times that it is given. The host's clock cou
 
 from __future__ import annotations
 
-from dialects import Inexpressible
-from dialects.family import Motion
-from dialects.snapshots import Levels, Snapshot
-from simulator import cells
-from simulator.cell.writer import BusText, write
-from simulator.families import FAMILIES, family_of, snapshots_of
-from simulator.family import Place, Shadow, Unit
-from simulator.wire.wire import Transmission
+from multidrop.dialects import Inexpressible
+from multidrop.dialects.family import Motion
+from multidrop.dialects.snapshots import Levels, Snapshot
+from multidrop.simulator import cells
+from multidrop.simulator.cell.writer import BusText, write
+from multidrop.simulator.families import FAMILIES, family_of, snapshots_of
+from multidrop.simulator.family import Place, Shadow, Unit
+from multidrop.simulator.wire.wire import Transmission
 
 NAME = "twin"
 

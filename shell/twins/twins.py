@@ -5,17 +5,17 @@ from __future__ import annotations
 import asyncio
 from typing import TYPE_CHECKING
 
-from dialects import Diagnostic, DriveError, Stopped
-from shell.events import FAILURES, Agreed, Diverged, OnBus, TwinEvent
-from shell.twins.comparing import LIMIT
+from multidrop.dialects import Diagnostic, DriveError, Stopped
+from multidrop.shell.events import FAILURES, Agreed, Diverged, OnBus, TwinEvent
+from multidrop.shell.twins.comparing import LIMIT
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
-    from drives.bus import Bus
-    from drives.drive import Drive
-    from shell.twins.on_bus import BusTwins
-    from shell.workspace import Workspace
+    from multidrop.drives.bus import Bus
+    from multidrop.drives.drive import Drive
+    from multidrop.shell.twins.on_bus import BusTwins
+    from multidrop.shell.workspace import Workspace
 
 
 class Twins:
@@ -96,7 +96,7 @@ class Twins:
             twins.close()
 
     def _of(self, bus: Bus) -> BusTwins:
-        from shell.twins.on_bus import BusTwins
+        from multidrop.shell.twins.on_bus import BusTwins
 
         if bus not in self._buses:
             self._buses[bus] = BusTwins(
@@ -113,9 +113,9 @@ class Twins:
 
     async def _start(self, twins: BusTwins, drive: Drive) -> tuple[str, ...]:
         """Read a drive, and run a twin beside it; return the gaps of the twin."""
-        from shell import snapshots
-        from shell.twins.beside import Beside
-        from shell.twins.twin import make
+        from multidrop.shell import snapshots
+        from multidrop.shell.twins.beside import Beside
+        from multidrop.shell.twins.twin import make
 
         name, bus = self._workspace.display_name(drive), twins.bus
         twins.expect(drive)

@@ -4,16 +4,16 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from dialects import Diagnostic, Inexpressible
-from shell import scanning
-from shell.connect.url_forms import table
-from shell.lines import split_target
-from shell.naming import model
-from shell.verbs.registry import Call, verb
+from multidrop.dialects import Diagnostic, Inexpressible
+from multidrop.shell import scanning
+from multidrop.shell.connect.url_forms import table
+from multidrop.shell.lines import split_target
+from multidrop.shell.naming import model
+from multidrop.shell.verbs.registry import Call, verb
 
 if TYPE_CHECKING:
-    from drives.bus import Bus
-    from shell.workspace import Workspace
+    from multidrop.drives.bus import Bus
+    from multidrop.shell.workspace import Workspace
 
 
 @verb("/open URL [NAME]", table=table)

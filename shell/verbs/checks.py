@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import asyncio
 
-from dialects import Diagnostic, Inexpressible
-from dialects.families import program_language_of
-from dialects.problems import errors
-from shell.checking import examine
-from shell.verbs.registry import Call, as_typed, verb
-from simulator.families import PROGRAMS, TABLE
+from multidrop.dialects import Diagnostic, Inexpressible
+from multidrop.dialects.families import program_language_of
+from multidrop.dialects.problems import errors
+from multidrop.shell.checking import examine
+from multidrop.shell.verbs.registry import Call, as_typed, verb
+from multidrop.simulator.families import PROGRAMS, TABLE
 
 
 @verb("/check FILE [PERSONALITY]", recorded=as_typed, concurrent=True)

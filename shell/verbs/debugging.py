@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from shell import debugging
-from shell.debugging import LEFT, Debugger
-from shell.lines import split_target
-from shell.verbs.registry import Call, verb
+from multidrop.shell import debugging
+from multidrop.shell.debugging import LEFT, Debugger
+from multidrop.shell.lines import split_target
+from multidrop.shell.verbs.registry import Call, verb
 
 
 def _parts(call: Call, low: int = 0, high: int | None = None) -> tuple[Debugger, list[str]]:

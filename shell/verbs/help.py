@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import difflib
 
-from dialects import Diagnostic
-from dialects.families import DEFAULT, FAMILIES, languages
-from dialects.family import Language
-from shell.verbs.registry import VERBS, Call, verb
+from multidrop.dialects import Diagnostic
+from multidrop.dialects.families import DEFAULT, FAMILIES, languages
+from multidrop.dialects.family import Language
+from multidrop.shell.verbs.registry import VERBS, Call, verb
 
 WIDTH = 28
 """Columns for usages in the overview."""

@@ -5,12 +5,12 @@ from __future__ import annotations
 import shlex
 from collections.abc import Awaitable, Callable
 
-from dialects import Diagnostic
-from macros import FIRST_PAGE, KEYS
-from macros.listing import listed
-from shell import macro_changes
-from shell.events import By
-from shell.verbs.registry import Call, verb
+from multidrop.dialects import Diagnostic
+from multidrop.macros import FIRST_PAGE, KEYS
+from multidrop.macros.listing import listed
+from multidrop.shell import macro_changes
+from multidrop.shell.events import By
+from multidrop.shell.verbs.registry import Call, verb
 
 Work = Callable[[Call, list[str]], Awaitable[list[str]]]
 PAGE_MEANING = "on another page of keys"

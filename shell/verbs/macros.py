@@ -5,14 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
-from dialects import Diagnostic, Stopped
-from dialects.numbers import whole
-from macros import Macro
-from shell import casting
-from shell.events import By
-from shell.playing import FOREVER
-from shell.verbs.registry import Call, as_typed, verb
-from shell.workspace import LATCHED
+from multidrop.dialects import Diagnostic, Stopped
+from multidrop.dialects.numbers import whole
+from multidrop.macros import Macro
+from multidrop.shell import casting
+from multidrop.shell.events import By
+from multidrop.shell.playing import FOREVER
+from multidrop.shell.verbs.registry import Call, as_typed, verb
+from multidrop.shell.workspace import LATCHED
 
 MOST_ROUNDS = 10**9
 """The largest number of rounds."""

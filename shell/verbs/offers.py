@@ -6,18 +6,18 @@ import os
 from collections.abc import Callable, Iterable, Mapping
 from typing import TYPE_CHECKING
 
-from dialects import Diagnostic
-from dialects.families import DEFAULT, FAMILIES
-from macros import KEYS
-from shell.connect.url_forms import URL_FORMS
-from shell.lines import DriveLine, join_target
-from shell.verbs.registry import VERBS
-from simulator.families import PROGRAMS, TABLE
+from multidrop.dialects import Diagnostic
+from multidrop.dialects.families import DEFAULT, FAMILIES
+from multidrop.macros import KEYS
+from multidrop.shell.connect.url_forms import URL_FORMS
+from multidrop.shell.lines import DriveLine, join_target
+from multidrop.shell.verbs.registry import VERBS
+from multidrop.simulator.families import PROGRAMS, TABLE
 
 if TYPE_CHECKING:
-    from dialects.family import Language
-    from drives.drive import Drive
-    from shell.workspace import Workspace
+    from multidrop.dialects.family import Language
+    from multidrop.drives.drive import Drive
+    from multidrop.shell.workspace import Workspace
 
 Found = Iterable[tuple[str, str]]
 """Texts, each with its meaning."""

@@ -5,10 +5,10 @@ from __future__ import annotations
 import shlex
 from collections.abc import Sequence
 
-from dialects import Diagnostic
-from shell.params import work
-from shell.params.restore import Options
-from shell.verbs.registry import Call, verb
+from multidrop.dialects import Diagnostic
+from multidrop.shell.params import work
+from multidrop.shell.params.restore import Options
+from multidrop.shell.verbs.registry import Call, verb
 
 USAGE = (
     "/params read [ADDR] | save [ADDR] | backup FILE [ADDR] | diff FILE [ADDR] | diff --against ADDR [ADDR] | "

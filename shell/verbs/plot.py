@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dialects import Diagnostic
-from shell.events import By
-from shell.plots.feed import begin
-from shell.plots.rate import DEFAULT, parse_rate
-from shell.plots.series import parse_series, read_first
-from shell.plots.target import parse_target
-from shell.verbs.registry import Call, as_typed, verb
+from multidrop.dialects import Diagnostic
+from multidrop.shell.events import By
+from multidrop.shell.plots.feed import begin
+from multidrop.shell.plots.rate import DEFAULT, parse_rate
+from multidrop.shell.plots.series import parse_series, read_first
+from multidrop.shell.plots.target import parse_target
+from multidrop.shell.verbs.registry import Call, as_typed, verb
 
 USAGE = (
     "/plot [[ADDR ...] --to FILE.rrd|rerun+http://HOST:PORT/proxy [--rate N|max] | "

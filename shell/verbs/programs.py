@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import shlex
 
-from drives.drive import Drive
-from shell import listings, new_file, transfers
-from shell.verbs.registry import Call, verb
+from multidrop.drives.drive import Drive
+from multidrop.shell import listings, new_file, transfers
+from multidrop.shell.verbs.registry import Call, verb
 
 
 def _list_parts(call: Call) -> tuple[Drive, str]:

@@ -6,13 +6,13 @@ import asyncio
 from collections.abc import Callable, Coroutine
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from dialects import Diagnostic
-from dialects.numbers import whole
-from shell.raw import TERMINATORS, Form, RawLine, Watched, parse_bytes
-from shell.verbs.registry import Call, verb
+from multidrop.dialects import Diagnostic
+from multidrop.dialects.numbers import whole
+from multidrop.shell.raw import TERMINATORS, Form, RawLine, Watched, parse_bytes
+from multidrop.shell.verbs.registry import Call, verb
 
 if TYPE_CHECKING:
-    from shell.workspace import Workspace
+    from multidrop.shell.workspace import Workspace
 
 BREAK = 250
 """The length of a break, ms."""

@@ -5,11 +5,11 @@ from __future__ import annotations
 import re
 from dataclasses import replace
 
-from dialects import Diagnostic
-from macros import Macro, check_name, is_role, parse_macro
-from macros.pauses import Offer, with_waits
-from shell.verbs.registry import Call, verb
-from shell.workspace import Workspace
+from multidrop.dialects import Diagnostic
+from multidrop.macros import Macro, check_name, is_role, parse_macro
+from multidrop.macros.pauses import Offer, with_waits
+from multidrop.shell.verbs.registry import Call, verb
+from multidrop.shell.workspace import Workspace
 
 
 @verb(

@@ -5,14 +5,14 @@ from __future__ import annotations
 import re
 from typing import TYPE_CHECKING, Any
 
-from dialects import Inexpressible, Procedure
-from dialects.families import FAMILIES, TABLE
-from dialects.family import Registers
-from drives.drive import Drive
-from shell.verbs.registry import Call, as_typed, verb
+from multidrop.dialects import Inexpressible, Procedure
+from multidrop.dialects.families import FAMILIES, TABLE
+from multidrop.dialects.family import Registers
+from multidrop.drives.drive import Drive
+from multidrop.shell.verbs.registry import Call, as_typed, verb
 
 if TYPE_CHECKING:
-    from shell.workspace import Workspace
+    from multidrop.shell.workspace import Workspace
 
 
 def _has_registers(workspace: Workspace) -> bool:

@@ -9,14 +9,14 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from dialects import Diagnostic
-from shell.events import By
-from shell.lines import split_target
+from multidrop.dialects import Diagnostic
+from multidrop.shell.events import By
+from multidrop.shell.lines import split_target
 
 if TYPE_CHECKING:
-    from drives.drive import Drive
-    from shell.roles import Commands
-    from shell.workspace import Workspace
+    from multidrop.drives.drive import Drive
+    from multidrop.shell.roles import Commands
+    from multidrop.shell.workspace import Workspace
 
 
 def split(text: str, where: str) -> list[str]:

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from dialects import Diagnostic
-from shell.verbs.registry import Call, verb
-from shell.workspace import Workspace
+from multidrop.dialects import Diagnostic
+from multidrop.shell.verbs.registry import Call, verb
+from multidrop.shell.workspace import Workspace
 
 
 def _on_screen(workspace: Workspace) -> bool:

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dialects import Diagnostic, Stopped
-from shell import stops
-from shell.events import By
-from shell.log import files
-from shell.log.writer import SessionLog
-from shell.new_file import STANDARD_OUTPUT
-from shell.verbs.registry import Call, verb
+from multidrop.dialects import Diagnostic, Stopped
+from multidrop.shell import stops
+from multidrop.shell.events import By
+from multidrop.shell.log import files
+from multidrop.shell.log.writer import SessionLog
+from multidrop.shell.new_file import STANDARD_OUTPUT
+from multidrop.shell.verbs.registry import Call, verb
 
 
 @verb("/stop", immediate=True)

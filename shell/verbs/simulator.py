@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from dialects import Diagnostic
-from shell.verbs.registry import Call, as_typed, verb
-from simulator.sim_words import MEANINGS, SIM, table
+from multidrop.dialects import Diagnostic
+from multidrop.shell.verbs.registry import Call, as_typed, verb
+from multidrop.simulator.sim_words import MEANINGS, SIM, table
 
 
 @verb(

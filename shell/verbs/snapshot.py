@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from shell.verbs.registry import Call, as_typed, verb
+from multidrop.shell.verbs.registry import Call, as_typed, verb
 
 
 @verb("/snapshot FILE", recorded=as_typed)
@@ -11,7 +11,7 @@ async def snapshot(call: Call) -> None:
 
     Nothing moves. The file has identity, settings, variables, program, position and inputs of each drive.
     """
-    from shell import snapshots  # and with it the simulator, which no other verb needs
+    from multidrop.shell import snapshots  # and with it the simulator, which no other verb needs
 
     (file,) = call.words(1, 1)
     await snapshots.save(call.workspace, call.output_file(file))

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import difflib
 
-from dialects import Diagnostic
-from shell.verbs import (
+from multidrop.dialects import Diagnostic
+from multidrop.shell.verbs import (
     buses,
     checks,
     debugging,
@@ -27,8 +27,8 @@ from shell.verbs import (
     twin,
     waiting,
 )
-from shell.verbs.registry import VERBS, Call, Verb
-from shell.verbs.script_words import SCRIPT_WORDS
+from multidrop.shell.verbs.registry import VERBS, Call, Verb
+from multidrop.shell.verbs.script_words import SCRIPT_WORDS
 
 __all__ = ["GROUPS", "VERBS", "Call", "Verb", "find"]
 GROUPS = (

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from shell import tabs
-from shell.connect import saving
-from shell.verbs.registry import Call, verb
+from multidrop.shell import tabs
+from multidrop.shell.connect import saving
+from multidrop.shell.verbs.registry import Call, verb
 
 
 @verb("/rename NAME [BUS]", immediate=True)

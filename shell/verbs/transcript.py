@@ -5,14 +5,14 @@ from __future__ import annotations
 import asyncio
 from typing import TYPE_CHECKING
 
-from dialects import Diagnostic
-from shell.connect import saving
-from shell.events import By
-from shell.transcripts import EVERYTHING, TIMES, Filter, Transcripts
-from shell.verbs.registry import Call, verb
+from multidrop.dialects import Diagnostic
+from multidrop.shell.connect import saving
+from multidrop.shell.events import By
+from multidrop.shell.transcripts import EVERYTHING, TIMES, Filter, Transcripts
+from multidrop.shell.verbs.registry import Call, verb
 
 if TYPE_CHECKING:
-    from shell.workspace import Workspace
+    from multidrop.shell.workspace import Workspace
 
 
 def _has_screen(workspace: Workspace) -> bool:

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from dialects import Diagnostic
-from dialects.numbers import whole
-from shell.roles import RunningTwins
-from shell.verbs.registry import Call, as_typed, verb
+from multidrop.dialects import Diagnostic
+from multidrop.dialects.numbers import whole
+from multidrop.shell.roles import RunningTwins
+from multidrop.shell.verbs.registry import Call, as_typed, verb
 
 MOST = 1_000_000_000
 """The largest limit, steps."""

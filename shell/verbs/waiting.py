@@ -5,9 +5,9 @@ from __future__ import annotations
 import re
 from typing import NamedTuple
 
-from shell import waits
-from shell.lines import split_target
-from shell.verbs.registry import Call, Verb, as_typed, verb
+from multidrop.shell import waits
+from multidrop.shell.lines import split_target
+from multidrop.shell.verbs.registry import Call, Verb, as_typed, verb
 
 _TEXT = re.compile(r"""(?P<quote>["'])(?P<text>.+?)(?P=quote)(?:\s+(?P<seconds>\S+))?""")
 _VALUE = re.compile(r"(?P<condition>(?:@\S+\s+)?[^\s=!<>]+\s*[=!<>]=?\s*\S+)(?:\s+(?P<seconds>\S+))?")

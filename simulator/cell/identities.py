@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Mapping
 from types import MappingProxyType
 
-from simulator.cell.spec import Identity
-from simulator.cell.table import Table, quoted
+from multidrop.simulator.cell.spec import Identity
+from multidrop.simulator.cell.table import Table, quoted
 
 LONGEST = 60
 """Characters of a text."""

@@ -12,10 +12,10 @@ from importlib.resources.abc import Traversable
 from pathlib import Path
 from typing import Any, Protocol
 
-from dialects import Diagnostic
-from dialects.files import LARGEST_PROGRAM, bounded, program_of, toml_of, utf8_of
-from simulator.cell.spec import BusSpec, Cell, DriveSpec, Endpoint, Faults
-from simulator.cell.table import Folder, Table, quoted
+from multidrop.dialects import Diagnostic
+from multidrop.dialects.files import LARGEST_PROGRAM, bounded, program_of, toml_of, utf8_of
+from multidrop.simulator.cell.spec import BusSpec, Cell, DriveSpec, Endpoint, Faults
+from multidrop.simulator.cell.table import Folder, Table, quoted
 
 SCHEMES = ("pty", "tcp", "udp", "modbus")
 DRIVE_KEYS = (

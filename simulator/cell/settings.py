@@ -6,9 +6,9 @@ from collections.abc import Callable, Mapping
 from types import MappingProxyType
 from typing import Any
 
-from dialects import Diagnostic
-from simulator.cell.spec import Scalar, Value
-from simulator.cell.table import Table, quoted
+from multidrop.dialects import Diagnostic
+from multidrop.simulator.cell.spec import Scalar, Value
+from multidrop.simulator.cell.table import Table, quoted
 
 Check = Callable[[Table, str, Value], None]
 """Refuses a word, or its value, that the product does not know. Raises Diagnostic."""

@@ -10,7 +10,7 @@ from math import inf, isfinite
 from pathlib import Path
 from typing import Any
 
-from dialects import Diagnostic
+from multidrop.dialects import Diagnostic
 
 Column = tuple[str, float, float]
 """A column of a row: its word, lowest and highest value; whole numbers only if the highest is an int."""

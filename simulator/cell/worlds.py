@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from simulator.cell.spec import WorldSpec
-from simulator.cell.table import Table
+from multidrop.simulator.cell.spec import WorldSpec
+from multidrop.simulator.cell.table import Table
 
 KEYS = ("home", "limit_plus", "limit_minus", "stall_at", "load", "inputs", "analog", "locked")
 """Keys for every drive."""

@@ -7,10 +7,10 @@ from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import Any
 
-from dialects.files import escaped_toml
-from dialects.parameters import Reading, same
-from dialects.visible import visible
-from simulator.cell.identities import LONGEST
+from multidrop.dialects.files import escaped_toml
+from multidrop.dialects.parameters import Reading, same
+from multidrop.dialects.visible import visible
+from multidrop.simulator.cell.identities import LONGEST
 
 HEAD = "A machine as it was read. Open it with sim:FILE; `multidrop snapshot apply FILE URL` puts a drive onto a unit."
 

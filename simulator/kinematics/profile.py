@@ -22,7 +22,7 @@ from collections.abc import Callable, Iterator, Sequence
 from math import copysign, inf, nextafter, sqrt
 from typing import NamedTuple
 
-from simulator.kinematics.segments import LINEAR, Segment, Shape, ramp
+from multidrop.simulator.kinematics.segments import LINEAR, Segment, Shape, ramp
 
 __all__ = ["Profile", "Segment", "Shape", "halt", "meeting", "move", "slew"]
 

@@ -9,38 +9,38 @@ from __future__ import annotations
 from functools import lru_cache, partial
 from typing import NamedTuple
 
-from dialects.mcode.manual.error_texts import text as error_text
-from dialects.mcode.manual.grammar import LineError, parse, strip
-from simulator.cell.spec import DriveSpec
-from simulator.lexium import set_up
-from simulator.lexium.event_loop import EventLoop
-from simulator.lexium.language import io_variables, motion_variables
-from simulator.lexium.language.flow import Flow
-from simulator.lexium.language.input_functions import InputFunctions
-from simulator.lexium.language.instructions import Instructions
-from simulator.lexium.language.interpreter import Interpreter
-from simulator.lexium.language.motor_commands import MotorCommands
-from simulator.lexium.language.pausing import Pausing
-from simulator.lexium.language.printed_setups import PrintedSetups
-from simulator.lexium.language.prints import Prints
-from simulator.lexium.language.program_commands import ProgramCommands
-from simulator.lexium.language.program_mode import Names, ProgramMode
-from simulator.lexium.language.setups import Setups
-from simulator.lexium.language.thread import Thread
-from simulator.lexium.language.variable_access import VariableAccess
-from simulator.lexium.motion.inputs import Inputs
-from simulator.lexium.motion.motor import Motor
-from simulator.lexium.motion.outputs import Outputs
-from simulator.lexium.motion.rotor import Rotor
-from simulator.lexium.nvm import Nvm
-from simulator.lexium.power import Power
-from simulator.lexium.state.comm_settings import CommSettings
-from simulator.lexium.state.error_flag import ErrorFlag
-from simulator.lexium.state.errors import Fault
-from simulator.lexium.state.printer import CRLF, Printer
-from simulator.lexium.state.program_memory import Program
-from simulator.lexium.state.timeline import Timeline
-from simulator.world import World
+from multidrop.dialects.mcode.manual.error_texts import text as error_text
+from multidrop.dialects.mcode.manual.grammar import LineError, parse, strip
+from multidrop.simulator.cell.spec import DriveSpec
+from multidrop.simulator.lexium import set_up
+from multidrop.simulator.lexium.event_loop import EventLoop
+from multidrop.simulator.lexium.language import io_variables, motion_variables
+from multidrop.simulator.lexium.language.flow import Flow
+from multidrop.simulator.lexium.language.input_functions import InputFunctions
+from multidrop.simulator.lexium.language.instructions import Instructions
+from multidrop.simulator.lexium.language.interpreter import Interpreter
+from multidrop.simulator.lexium.language.motor_commands import MotorCommands
+from multidrop.simulator.lexium.language.pausing import Pausing
+from multidrop.simulator.lexium.language.printed_setups import PrintedSetups
+from multidrop.simulator.lexium.language.prints import Prints
+from multidrop.simulator.lexium.language.program_commands import ProgramCommands
+from multidrop.simulator.lexium.language.program_mode import Names, ProgramMode
+from multidrop.simulator.lexium.language.setups import Setups
+from multidrop.simulator.lexium.language.thread import Thread
+from multidrop.simulator.lexium.language.variable_access import VariableAccess
+from multidrop.simulator.lexium.motion.inputs import Inputs
+from multidrop.simulator.lexium.motion.motor import Motor
+from multidrop.simulator.lexium.motion.outputs import Outputs
+from multidrop.simulator.lexium.motion.rotor import Rotor
+from multidrop.simulator.lexium.nvm import Nvm
+from multidrop.simulator.lexium.power import Power
+from multidrop.simulator.lexium.state.comm_settings import CommSettings
+from multidrop.simulator.lexium.state.error_flag import ErrorFlag
+from multidrop.simulator.lexium.state.errors import Fault
+from multidrop.simulator.lexium.state.printer import CRLF, Printer
+from multidrop.simulator.lexium.state.program_memory import Program
+from multidrop.simulator.lexium.state.timeline import Timeline
+from multidrop.simulator.world import World
 
 SHORTEST_US = 1.0
 """No line takes less, so that a loop always ends at some time."""

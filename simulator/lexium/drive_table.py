@@ -5,15 +5,15 @@ from __future__ import annotations
 from difflib import get_close_matches
 from functools import partial
 
-from dialects.mcode.manual.grammar import is_name
-from dialects.mcode.manual.table import Mnemonic, lookup, words
-from simulator.cell.identities import read_identity, read_variables
-from simulator.cell.reader import common_keys
-from simulator.cell.settings import Check, read_settings
-from simulator.cell.spec import DriveSpec, Value
-from simulator.cell.table import Folder, Table, quoted, shown
-from simulator.cell.worlds import KEYS, read_world
-from simulator.lexium.state.models import MODELS
+from multidrop.dialects.mcode.manual.grammar import is_name
+from multidrop.dialects.mcode.manual.table import Mnemonic, lookup, words
+from multidrop.simulator.cell.identities import read_identity, read_variables
+from multidrop.simulator.cell.reader import common_keys
+from multidrop.simulator.cell.settings import Check, read_settings
+from multidrop.simulator.cell.spec import DriveSpec, Value
+from multidrop.simulator.cell.table import Folder, Table, quoted, shown
+from multidrop.simulator.cell.worlds import KEYS, read_world
+from multidrop.simulator.lexium.state.models import MODELS
 
 KEY_OF = {"DN": "name", "PY": "party"}
 """Mnemonics that have a key of their own in the table."""

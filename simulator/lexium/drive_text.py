@@ -6,20 +6,20 @@ import re
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 
-from dialects.mcode.manual.canonical import canonical
-from dialects.mcode.manual.device_name import UNNAMED
-from dialects.mcode.manual.grammar import LineError, parse
-from dialects.mcode.manual.line_size import size_of
-from dialects.mcode.manual.table import lookup
-from dialects.parameters import VARIABLES, Reading, Scalar, Value, same
-from dialects.snapshots import Snapshot
-from simulator.cell.spec import DriveSpec, WorldSpec
-from simulator.cell.writer import DriveText, Entry, plain, remark
-from simulator.family import Snapshots, StoredProgram
-from simulator.lexium.device import MCodeDevice
-from simulator.lexium.drive_table import KEY_OF
-from simulator.lexium.state.models import MODELS
-from simulator.world import World
+from multidrop.dialects.mcode.manual.canonical import canonical
+from multidrop.dialects.mcode.manual.device_name import UNNAMED
+from multidrop.dialects.mcode.manual.grammar import LineError, parse
+from multidrop.dialects.mcode.manual.line_size import size_of
+from multidrop.dialects.mcode.manual.table import lookup
+from multidrop.dialects.parameters import VARIABLES, Reading, Scalar, Value, same
+from multidrop.dialects.snapshots import Snapshot
+from multidrop.simulator.cell.spec import DriveSpec, WorldSpec
+from multidrop.simulator.cell.writer import DriveText, Entry, plain, remark
+from multidrop.simulator.family import Snapshots, StoredProgram
+from multidrop.simulator.lexium.device import MCodeDevice
+from multidrop.simulator.lexium.drive_table import KEY_OF
+from multidrop.simulator.lexium.state.models import MODELS
+from multidrop.simulator.world import World
 
 TRIPS = frozenset({"TA", "TC", "TI", "TM", "TP", "TR", "TT"})
 _LISTED = re.compile(r"(IS|OS|LS)(\d+)")

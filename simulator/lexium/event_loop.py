@@ -10,13 +10,13 @@ from __future__ import annotations
 from functools import partial
 from math import inf, nextafter
 
-from simulator.lexium.language.input_functions import InputFunctions
-from simulator.lexium.language.interpreter import Interpreter
-from simulator.lexium.motion.inputs import Inputs
-from simulator.lexium.motion.motor import Motor
-from simulator.lexium.power import Power
-from simulator.lexium.state.printer import Printer
-from simulator.lexium.state.timeline import Event, Timeline, nothing, when
+from multidrop.simulator.lexium.language.input_functions import InputFunctions
+from multidrop.simulator.lexium.language.interpreter import Interpreter
+from multidrop.simulator.lexium.motion.inputs import Inputs
+from multidrop.simulator.lexium.motion.motor import Motor
+from multidrop.simulator.lexium.power import Power
+from multidrop.simulator.lexium.state.printer import Printer
+from multidrop.simulator.lexium.state.timeline import Event, Timeline, nothing, when
 
 
 class EventLoop:

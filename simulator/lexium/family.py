@@ -4,17 +4,17 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from dialects.family import Motion
-from simulator.cell.spec import DriveSpec
-from simulator.family import Family, Place, Shadow, Unit
-from simulator.lexium import drive_table, drive_text
-from simulator.lexium.device import MCodeDevice
-from simulator.lexium.ports.mcode import MCodePort
-from simulator.lexium.ports.modbus import ModbusPort
-from simulator.lexium.ports.registers import Registers
-from simulator.lexium.power import BAUDS
-from simulator.lexium.state.models import MODELS
-from simulator.world import World
+from multidrop.dialects.family import Motion
+from multidrop.simulator.cell.spec import DriveSpec
+from multidrop.simulator.family import Family, Place, Shadow, Unit
+from multidrop.simulator.lexium import drive_table, drive_text
+from multidrop.simulator.lexium.device import MCodeDevice
+from multidrop.simulator.lexium.ports.mcode import MCodePort
+from multidrop.simulator.lexium.ports.modbus import ModbusPort
+from multidrop.simulator.lexium.ports.registers import Registers
+from multidrop.simulator.lexium.power import BAUDS
+from multidrop.simulator.lexium.state.models import MODELS
+from multidrop.simulator.world import World
 
 DEFAULT = 96
 """BD from the factory."""

@@ -4,16 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from dialects.mcode.manual.errors import ErrorNumber as E
-from simulator.lexium.motion.axis import MOVES
-from simulator.lexium.motion.inputs import Inputs
-from simulator.lexium.motion.limits import FRESH
-from simulator.lexium.motion.motor import Motor
-from simulator.lexium.motion.outputs import Outputs
-from simulator.lexium.state.errors import Fault
-from simulator.lexium.state.memory import KEPT_BY_FD, Memory, Store
-from simulator.lexium.state.program_memory import Program
-from simulator.lexium.state.timeline import Timeline
+from multidrop.dialects.mcode.manual.errors import ErrorNumber as E
+from multidrop.simulator.lexium.motion.axis import MOVES
+from multidrop.simulator.lexium.motion.inputs import Inputs
+from multidrop.simulator.lexium.motion.limits import FRESH
+from multidrop.simulator.lexium.motion.motor import Motor
+from multidrop.simulator.lexium.motion.outputs import Outputs
+from multidrop.simulator.lexium.state.errors import Fault
+from multidrop.simulator.lexium.state.memory import KEPT_BY_FD, Memory, Store
+from multidrop.simulator.lexium.state.program_memory import Program
+from multidrop.simulator.lexium.state.timeline import Timeline
 
 
 class Nvm:

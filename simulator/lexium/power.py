@@ -6,21 +6,21 @@ A serial drive begins at once. One with Ethernet is silent for `ETHERNET_BOOT` s
 
 from __future__ import annotations
 
-from dialects.mcode.manual.errors import ErrorNumber as E
-from dialects.mcode.manual.grammar import Name
-from simulator.lexium.language.interpreter import Interpreter
-from simulator.lexium.language.program_mode import ProgramMode
-from simulator.lexium.motion.inputs import Inputs
-from simulator.lexium.motion.motor import Motor
-from simulator.lexium.motion.outputs import Outputs
-from simulator.lexium.nvm import Nvm
-from simulator.lexium.state.comm_settings import CommSettings
-from simulator.lexium.state.error_flag import ErrorFlag
-from simulator.lexium.state.memory import Memory
-from simulator.lexium.state.printer import Printer
-from simulator.lexium.state.program_memory import Program
-from simulator.lexium.state.timeline import Timeline
-from simulator.world import World
+from multidrop.dialects.mcode.manual.errors import ErrorNumber as E
+from multidrop.dialects.mcode.manual.grammar import Name
+from multidrop.simulator.lexium.language.interpreter import Interpreter
+from multidrop.simulator.lexium.language.program_mode import ProgramMode
+from multidrop.simulator.lexium.motion.inputs import Inputs
+from multidrop.simulator.lexium.motion.motor import Motor
+from multidrop.simulator.lexium.motion.outputs import Outputs
+from multidrop.simulator.lexium.nvm import Nvm
+from multidrop.simulator.lexium.state.comm_settings import CommSettings
+from multidrop.simulator.lexium.state.error_flag import ErrorFlag
+from multidrop.simulator.lexium.state.memory import Memory
+from multidrop.simulator.lexium.state.printer import Printer
+from multidrop.simulator.lexium.state.program_memory import Program
+from multidrop.simulator.lexium.state.timeline import Timeline
+from multidrop.simulator.world import World
 
 ETHERNET_BOOT = 20.0
 """Seconds, of the device's own time."""

@@ -14,24 +14,24 @@ from functools import partial
 from math import inf
 from typing import Any, NamedTuple
 
-from dialects import Diagnostic
-from dialects.files import split_lines
-from dialects.mcode.manual import error_texts, program_file
-from dialects.mcode.manual.errors import ErrorNumber
-from dialects.mcode.manual.grammar import LineError, Name, Number, Statement, parse, words
-from dialects.mcode.manual.line_size import size_of
-from dialects.mcode.manual.program_file import ProgramLine
-from dialects.mcode.manual.remedies import remedy
-from dialects.numbers import whole
-from dialects.problems import Problem, errors
-from simulator.cell.spec import DriveSpec
-from simulator.lexium.device import MCodeDevice
-from simulator.lexium.state.errors import Failure, Fault
-from simulator.lexium.state.expressions import Read
-from simulator.lexium.state.models import MODELS
-from simulator.lexium.state.printer import CRLF
-from simulator.lexium.state.program_memory import SPACE
-from simulator.program_run import (
+from multidrop.dialects import Diagnostic
+from multidrop.dialects.files import split_lines
+from multidrop.dialects.mcode.manual import error_texts, program_file
+from multidrop.dialects.mcode.manual.errors import ErrorNumber
+from multidrop.dialects.mcode.manual.grammar import LineError, Name, Number, Statement, parse, words
+from multidrop.dialects.mcode.manual.line_size import size_of
+from multidrop.dialects.mcode.manual.program_file import ProgramLine
+from multidrop.dialects.mcode.manual.remedies import remedy
+from multidrop.dialects.numbers import whole
+from multidrop.dialects.problems import Problem, errors
+from multidrop.simulator.cell.spec import DriveSpec
+from multidrop.simulator.lexium.device import MCodeDevice
+from multidrop.simulator.lexium.state.errors import Failure, Fault
+from multidrop.simulator.lexium.state.expressions import Read
+from multidrop.simulator.lexium.state.models import MODELS
+from multidrop.simulator.lexium.state.printer import CRLF
+from multidrop.simulator.lexium.state.program_memory import SPACE
+from multidrop.simulator.program_run import (
     LONGEST,
     MOST_LINES,
     NO_DEBUGGING,
@@ -48,7 +48,7 @@ from simulator.program_run import (
     remark,
     split_break,
 )
-from simulator.world import World
+from multidrop.simulator.world import World
 
 # What a person follows in the run of an MCode program: which line of the file comes next, what variables hold.
 

@@ -7,10 +7,10 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from dialects import Diagnostic
-from dialects.files import split_lines
-from simulator.cell.spec import DriveSpec
-from simulator.lexium.state.memory import Memory
+from multidrop.dialects import Diagnostic
+from multidrop.dialects.files import split_lines
+from multidrop.simulator.cell.spec import DriveSpec
+from multidrop.simulator.lexium.state.memory import Memory
 
 WORDS = {"position": "P"}
 """Words by the key of a counter in `identity`; the other keys are words."""

@@ -10,15 +10,15 @@ from __future__ import annotations
 from collections.abc import Iterator
 from math import inf
 
-from simulator.cell.spec import WorldSpec
-from simulator.kinematics.profile import Profile
-from simulator.pmx.homing import Homing
-from simulator.pmx.pulses import Pulses
-from simulator.pmx.rotor import Rotor
-from simulator.pmx.settings import Refusal, Settings, wrapped
-from simulator.pmx.states import HOME, INDEX, MINUS, MINUS_ERROR, PLUS, PLUS_ERROR, Doing, Pace
-from simulator.pmx.stepnloop import Loop
-from simulator.world import World
+from multidrop.simulator.cell.spec import WorldSpec
+from multidrop.simulator.kinematics.profile import Profile
+from multidrop.simulator.pmx.homing import Homing
+from multidrop.simulator.pmx.pulses import Pulses
+from multidrop.simulator.pmx.rotor import Rotor
+from multidrop.simulator.pmx.settings import Refusal, Settings, wrapped
+from multidrop.simulator.pmx.states import HOME, INDEX, MINUS, MINUS_ERROR, PLUS, PLUS_ERROR, Doing, Pace
+from multidrop.simulator.pmx.stepnloop import Loop
+from multidrop.simulator.world import World
 
 POLARITY_DIRECTION, POLARITY_HOME, POLARITY_LIMIT, POLARITY_INDEX = 1 << 1, 1 << 5, 1 << 6, 1 << 7
 POLARITY_DECODING, POLARITY_ENABLE = 8, 1 << 12

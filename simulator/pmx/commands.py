@@ -11,10 +11,10 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from decimal import ROUND_HALF_UP, Decimal
 
-from simulator.pmx import motions
-from simulator.pmx.axis import Axis
-from simulator.pmx.controller import PmxController
-from simulator.pmx.settings import AXES, INT32, REGISTERS, SCALE, Refusal
+from multidrop.simulator.pmx import motions
+from multidrop.simulator.pmx.axis import Axis
+from multidrop.simulator.pmx.controller import PmxController
+from multidrop.simulator.pmx.settings import AXES, INT32, REGISTERS, SCALE, Refusal
 
 MODEL = "2ED"
 OK, MOVING, INVALID, INDEX = "OK", "?Moving", "?Invalid Answer", "?Index out of Range"

@@ -8,13 +8,13 @@ from __future__ import annotations
 
 from math import inf
 
-from simulator.cell.spec import WorldSpec
-from simulator.pmx import motions
-from simulator.pmx.axis import Axis
-from simulator.pmx.motions import Line, Stick
-from simulator.pmx.settings import AXES, Settings
-from simulator.pmx.states import JOYSTICK, TIMED_OUT, Doing
-from simulator.world import World
+from multidrop.simulator.cell.spec import WorldSpec
+from multidrop.simulator.pmx import motions
+from multidrop.simulator.pmx.axis import Axis
+from multidrop.simulator.pmx.motions import Line, Stick
+from multidrop.simulator.pmx.settings import AXES, Settings
+from multidrop.simulator.pmx.states import JOYSTICK, TIMED_OUT, Doing
+from multidrop.simulator.world import World
 
 BAUDS = {1: 9600, 2: 19200, 3: 38400, 4: 57600, 5: 115200}
 """By DB (table 6.1)."""

@@ -5,15 +5,15 @@ The `set` of a cell is what was stored before the first power-up, and speeds, wh
 
 from __future__ import annotations
 
-from dialects import Diagnostic
-from dialects.pmx.manual import program_file
-from simulator.cell.spec import DriveSpec, Identity, WorldSpec
-from simulator.pmx.axis import Axis
-from simulator.pmx.commands import CommandedController
-from simulator.pmx.controller import BAUDS, PmxController
-from simulator.pmx.program_commands import PROGRAMS, answer_program
-from simulator.pmx.programs import Programs
-from simulator.world import World
+from multidrop.dialects import Diagnostic
+from multidrop.dialects.pmx.manual import program_file
+from multidrop.simulator.cell.spec import DriveSpec, Identity, WorldSpec
+from multidrop.simulator.pmx.axis import Axis
+from multidrop.simulator.pmx.commands import CommandedController
+from multidrop.simulator.pmx.controller import BAUDS, PmxController
+from multidrop.simulator.pmx.program_commands import PROGRAMS, answer_program
+from multidrop.simulator.pmx.programs import Programs
+from multidrop.simulator.world import World
 
 
 class PmxDevice:

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from simulator.cell.identities import read_identity, read_variables
-from simulator.cell.reader import common_keys
-from simulator.cell.settings import read_settings
-from simulator.cell.spec import DriveSpec, Value
-from simulator.cell.table import Folder, Table, quoted
-from simulator.cell.worlds import ENCODER_KEYS, KEYS, read_worlds
-from simulator.pmx.settings import AXES, VARIABLES
+from multidrop.simulator.cell.identities import read_identity, read_variables
+from multidrop.simulator.cell.reader import common_keys
+from multidrop.simulator.cell.settings import read_settings
+from multidrop.simulator.cell.spec import DriveSpec, Value
+from multidrop.simulator.cell.table import Folder, Table, quoted
+from multidrop.simulator.cell.worlds import ENCODER_KEYS, KEYS, read_worlds
+from multidrop.simulator.pmx.settings import AXES, VARIABLES
 
 INPUTS, COUNTS = range(1, 9), 5000
 """Digital inputs, and the end of scale of the analog inputs in millivolts."""

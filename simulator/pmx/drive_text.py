@@ -2,19 +2,19 @@
 
 from __future__ import annotations
 
-from dialects.files import split_lines
-from dialects.parameters import VARIABLES, Value
-from dialects.pmx.manual import program_file
-from dialects.pmx.manual.script_compiler import ERASED
-from dialects.pmx.manual.script_decompiler import Undecodable
-from dialects.problems import errors
-from dialects.snapshots import Snapshot
-from simulator.cell.spec import DriveSpec
-from simulator.cell.writer import DriveText, Entry, plain, remark
-from simulator.family import Snapshots, StoredProgram
-from simulator.pmx.commands import MODEL
-from simulator.pmx.drive_table import NAMES
-from simulator.pmx.settings import AXES
+from multidrop.dialects.files import split_lines
+from multidrop.dialects.parameters import VARIABLES, Value
+from multidrop.dialects.pmx.manual import program_file
+from multidrop.dialects.pmx.manual.script_compiler import ERASED
+from multidrop.dialects.pmx.manual.script_decompiler import Undecodable
+from multidrop.dialects.problems import errors
+from multidrop.dialects.snapshots import Snapshot
+from multidrop.simulator.cell.spec import DriveSpec
+from multidrop.simulator.cell.writer import DriveText, Entry, plain, remark
+from multidrop.simulator.family import Snapshots, StoredProgram
+from multidrop.simulator.pmx.commands import MODEL
+from multidrop.simulator.pmx.drive_table import NAMES
+from multidrop.simulator.pmx.settings import AXES
 
 KEY_OF = ("DN",)
 """Words that have a key of their own."""

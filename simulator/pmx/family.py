@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from dialects.family import Motion
-from simulator.cell.spec import DriveSpec
-from simulator.family import Family, Place, Shadow, Unit
-from simulator.pmx import drive_table, drive_text
-from simulator.pmx.controller import BAUDS
-from simulator.pmx.device import PmxDevice
-from simulator.pmx.port import PmxPort
-from simulator.pmx.program_commands import PROGRAMS
+from multidrop.dialects.family import Motion
+from multidrop.simulator.cell.spec import DriveSpec
+from multidrop.simulator.family import Family, Place, Shadow, Unit
+from multidrop.simulator.pmx import drive_table, drive_text
+from multidrop.simulator.pmx.controller import BAUDS
+from multidrop.simulator.pmx.device import PmxDevice
+from multidrop.simulator.pmx.port import PmxPort
+from multidrop.simulator.pmx.program_commands import PROGRAMS
 
 AXES = "xy"
 

@@ -11,10 +11,10 @@ from enum import Enum
 from math import inf
 from typing import Protocol
 
-from simulator.kinematics.profile import Profile
-from simulator.pmx.pulses import Pulses
-from simulator.pmx.settings import Settings
-from simulator.pmx.states import Doing, Pace
+from multidrop.simulator.kinematics.profile import Profile
+from multidrop.simulator.pmx.pulses import Pulses
+from multidrop.simulator.pmx.settings import Settings
+from multidrop.simulator.pmx.states import Doing, Pace
 
 
 class Until(Enum):

@@ -8,9 +8,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 
-from dialects.pmx.manual.script_compiler import COMPARISON, MOVES, OPERANDS, OPERATION
-from dialects.pmx.manual.script_words import AXES, WORDS
-from simulator.pmx.vm import IDLE, MASK, Fault, Thread, signed
+from multidrop.dialects.pmx.manual.script_compiler import COMPARISON, MOVES, OPERANDS, OPERATION
+from multidrop.dialects.pmx.manual.script_words import AXES, WORDS
+from multidrop.simulator.pmx.vm import IDLE, MASK, Fault, Thread, signed
 
 
 def step(thread: Thread, now: float) -> None:

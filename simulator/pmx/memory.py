@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from dialects.pmx.manual.script_compiler import ERASED, LINES, split
+from multidrop.dialects.pmx.manual.script_compiler import ERASED, LINES, split
 
 LONGEST = 24
 """Characters of a line; ten is the longest that units have shown, our names take more."""

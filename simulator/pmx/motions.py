@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from math import copysign, hypot, inf
 
-from simulator.kinematics.profile import Profile, halt, slew
-from simulator.pmx import motions
-from simulator.pmx.axis import Axis
-from simulator.pmx.homing import Homing
-from simulator.pmx.pulses import planned
-from simulator.pmx.settings import AXES, WINDOWS, Refusal, Settings
-from simulator.pmx.states import Doing, Pace, own_pace, paced
+from multidrop.simulator.kinematics.profile import Profile, halt, slew
+from multidrop.simulator.pmx import motions
+from multidrop.simulator.pmx.axis import Axis
+from multidrop.simulator.pmx.homing import Homing
+from multidrop.simulator.pmx.pulses import planned
+from multidrop.simulator.pmx.settings import AXES, WINDOWS, Refusal, Settings
+from multidrop.simulator.pmx.states import Doing, Pace, own_pace, paced
 
 # Joystick control of one axis (manual 7.15): an analog input commands the speed, within soft limits.
 #

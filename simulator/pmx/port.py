@@ -15,7 +15,7 @@ from __future__ import annotations
 
 from typing import Protocol
 
-from simulator.wire.wire import Transmission
+from multidrop.simulator.wire.wire import Transmission
 
 CR, LF, AT = 0x0D, 0x0A, 0x40
 LINE_BUFFER = 64

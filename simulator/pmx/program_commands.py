@@ -6,10 +6,10 @@ import re
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from dialects.pmx.manual.table import PROBE, PROBED
-from simulator.pmx.commands import INDEX, INVALID, OK, number
-from simulator.pmx.programs import Programs
-from simulator.pmx.settings import VARIABLES, Refusal
+from multidrop.dialects.pmx.manual.table import PROBE, PROBED
+from multidrop.simulator.pmx.commands import INDEX, INVALID, OK, number
+from multidrop.simulator.pmx.programs import Programs
+from multidrop.simulator.pmx.settings import VARIABLES, Refusal
 
 LINES, PROGRAMS, SUBROUTINES = 1275, 2, 32
 FOR_PROGRAMS = "JOYENA="

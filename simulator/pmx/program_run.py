@@ -13,15 +13,15 @@ from functools import partial
 from math import inf
 from typing import Any
 
-from dialects import Diagnostic
-from dialects.files import SourceLine, split_lines
-from dialects.numbers import whole
-from dialects.pmx.manual import program_file, script_compiler
-from dialects.pmx.manual.script_words import PROGRAMS, VARIABLES
-from dialects.pmx.manual.table import lookup
-from simulator.cell.spec import DriveSpec
-from simulator.pmx.device import PmxDevice
-from simulator.program_run import (
+from multidrop.dialects import Diagnostic
+from multidrop.dialects.files import SourceLine, split_lines
+from multidrop.dialects.numbers import whole
+from multidrop.dialects.pmx.manual import program_file, script_compiler
+from multidrop.dialects.pmx.manual.script_words import PROGRAMS, VARIABLES
+from multidrop.dialects.pmx.manual.table import lookup
+from multidrop.simulator.cell.spec import DriveSpec
+from multidrop.simulator.pmx.device import PmxDevice
+from multidrop.simulator.program_run import (
     LONGEST,
     MOST_LINES,
     NO_DEBUGGING,

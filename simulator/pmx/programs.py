@@ -15,11 +15,11 @@ from collections import deque
 from collections.abc import Callable
 from typing import Protocol
 
-from dialects.pmx.manual.script_compiler import LINES
-from dialects.pmx.manual.script_words import AXES, PROGRAMS, VARIABLES
-from simulator.pmx import lines
-from simulator.pmx.memory import Memory
-from simulator.pmx.vm import CONTINUE, IDLE, PAUSE, RUNNING, START, STOP, Failure, Fault, Thread
+from multidrop.dialects.pmx.manual.script_compiler import LINES
+from multidrop.dialects.pmx.manual.script_words import AXES, PROGRAMS, VARIABLES
+from multidrop.simulator.pmx import lines
+from multidrop.simulator.pmx.memory import Memory
+from multidrop.simulator.pmx.vm import CONTINUE, IDLE, PAUSE, RUNNING, START, STOP, Failure, Fault, Thread
 
 KEPT = 32
 """The first variable that STORE keeps; those below are zero after power-up."""

@@ -8,10 +8,10 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from simulator.kinematics.profile import Profile, halt, move, slew
-from simulator.pmx.rotor import Rotor
-from simulator.pmx.settings import INT32, wrapped
-from simulator.pmx.states import ACCELERATING, CONSTANT, DECELERATING, Doing, Pace
+from multidrop.simulator.kinematics.profile import Profile, halt, move, slew
+from multidrop.simulator.pmx.rotor import Rotor
+from multidrop.simulator.pmx.settings import INT32, wrapped
+from multidrop.simulator.pmx.states import ACCELERATING, CONSTANT, DECELERATING, Doing, Pace
 
 
 def planned(t: float, here: float, place: float, pace: Pace) -> Profile:

@@ -8,9 +8,9 @@ from __future__ import annotations
 
 from math import ceil, floor, inf
 
-from simulator.cell.spec import WorldSpec
-from simulator.shaft import TOUCH, Shaft
-from simulator.world import World
+from multidrop.simulator.cell.spec import WorldSpec
+from multidrop.simulator.shaft import TOUCH, Shaft
+from multidrop.simulator.world import World
 
 TURN = 1600.0
 """Motor steps from one index mark to the next: a motor of 1.8 degrees at an eighth of a step (manual 5.1)."""

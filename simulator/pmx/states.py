@@ -5,9 +5,9 @@ from __future__ import annotations
 from enum import Enum
 from typing import NamedTuple
 
-from simulator.kinematics.profile import Shape
-from simulator.kinematics.segments import LINEAR, TRIANGLE
-from simulator.pmx.settings import Refusal, Settings, rate, window
+from multidrop.simulator.kinematics.profile import Shape
+from multidrop.simulator.kinematics.segments import LINEAR, TRIANGLE
+from multidrop.simulator.pmx.settings import Refusal, Settings, rate, window
 
 ACCELERATING, DECELERATING, CONSTANT = 1, 2, 4
 PLUS, MINUS, HOME = 16, 32, 64

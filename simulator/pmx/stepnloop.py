@@ -11,9 +11,9 @@ from __future__ import annotations
 from math import inf
 from typing import Protocol
 
-from simulator.pmx.pulses import Pulses
-from simulator.pmx.settings import SCALE, Settings
-from simulator.pmx.states import Doing, own_pace
+from multidrop.simulator.pmx.pulses import Pulses
+from multidrop.simulator.pmx.settings import SCALE, Settings
+from multidrop.simulator.pmx.states import Doing, own_pace
 
 OFF, IDLE, MOVING, CORRECTING, STOPPING, JOGGING, HOMING, Z_HOMING = 12, 0, 1, 2, 3, 5, 6, 7
 RANGE_ERROR, ATTEMPTS_ERROR, STALL_ERROR, LIMIT_ERROR, LIMIT_HOMING = 8, 9, 10, 11, 13

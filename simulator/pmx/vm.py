@@ -8,8 +8,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Protocol
 
-from dialects.pmx.manual.script_words import HANDLER, WORDS
-from simulator.pmx.memory import Memory
+from multidrop.dialects.pmx.manual.script_words import HANDLER, WORDS
+from multidrop.simulator.pmx.memory import Memory
 
 STOP, START, PAUSE, CONTINUE = 0, 1, 2, 3
 """Values of SR."""

@@ -15,14 +15,14 @@ from pathlib import Path
 from typing import TextIO
 from urllib.parse import urlsplit
 
-from dialects import Diagnostic
-from dialects.files import bounded, check_line
-from dialects.visible import visible
-from simulator import cells
-from simulator.floor import Floor
-from simulator.serving.endpoints import Served, serve_bus
-from simulator.serving.running import RunningFloor
-from transports.exposure import exposed
+from multidrop.dialects import Diagnostic
+from multidrop.dialects.files import bounded, check_line
+from multidrop.dialects.visible import visible
+from multidrop.simulator import cells
+from multidrop.simulator.floor import Floor
+from multidrop.simulator.serving.endpoints import Served, serve_bus
+from multidrop.simulator.serving.running import RunningFloor
+from multidrop.transports.exposure import exposed
 
 INPUT = "standard input"
 LONGEST = 64 * 1024

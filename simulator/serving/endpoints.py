@@ -14,10 +14,10 @@ from contextlib import AsyncExitStack
 from dataclasses import dataclass
 from typing import cast
 
-from dialects import Diagnostic
-from simulator.cell.spec import BusSpec, Endpoint
-from simulator.serving.input_queue import PIECE, InputQueue
-from simulator.serving.running import RunningFloor
+from multidrop.dialects import Diagnostic
+from multidrop.simulator.cell.spec import BusSpec, Endpoint
+from multidrop.simulator.serving.input_queue import PIECE, InputQueue
+from multidrop.simulator.serving.running import RunningFloor
 
 BACKLOG = 1 << 20
 """Bytes that a TCP client may leave unread before it is disconnected."""
@@ -59,7 +59,7 @@ async def _serve_pty(floor: RunningFloor, bus: str, endpoint: Endpoint, stack: A
     if sys.platform == "win32":
         raise Diagnostic("Windows has no pseudo-terminals", f'bus "{bus}"', "serve tcp://")
     else:
-        from simulator.serving.pty import PtyServer
+        from multidrop.simulator.serving.pty import PtyServer
 
         server = PtyServer(floor, bus, endpoint.path)
         stack.callback(server.close)

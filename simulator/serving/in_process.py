@@ -12,13 +12,13 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from dialects import Diagnostic
-from simulator import cells
-from simulator.cell.spec import BusSpec, Cell
-from simulator.families import FAMILIES, family_of
-from simulator.floor import Floor
-from simulator.serving.running import RunningFloor
-from transports import Lost, Received, Transport, TransportLost
+from multidrop.dialects import Diagnostic
+from multidrop.simulator import cells
+from multidrop.simulator.cell.spec import BusSpec, Cell
+from multidrop.simulator.families import FAMILIES, family_of
+from multidrop.simulator.floor import Floor
+from multidrop.simulator.serving.running import RunningFloor
+from multidrop.transports import Lost, Received, Transport, TransportLost
 
 DEFAULT = next(iter(FAMILIES))
 """The dialect for a bus without drives."""

@@ -12,7 +12,7 @@ import asyncio
 from collections import deque
 from typing import Protocol
 
-from simulator.serving.running import RunningFloor
+from multidrop.simulator.serving.running import RunningFloor
 
 HOLD = 4096
 """Bytes of one client that wait in the queue."""

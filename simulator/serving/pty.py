@@ -20,10 +20,10 @@ import termios
 import tty
 from pathlib import Path
 
-from dialects import Diagnostic
-from simulator.serving.input_queue import InputQueue
-from simulator.serving.running import RunningFloor
-from simulator.wire.baud import resample
+from multidrop.dialects import Diagnostic
+from multidrop.simulator.serving.input_queue import InputQueue
+from multidrop.simulator.serving.running import RunningFloor
+from multidrop.simulator.wire.baud import resample
 
 # The number of clients that have a pseudo-terminal open, counted without polling.
 #

@@ -10,9 +10,9 @@ import asyncio
 from collections.abc import Callable
 from typing import Protocol
 
-from simulator.family import Connection, Shadow
-from simulator.floor import Floor
-from simulator.wire.baud import BITS_A_BYTE
+from multidrop.simulator.family import Connection, Shadow
+from multidrop.simulator.floor import Floor
+from multidrop.simulator.wire.baud import BITS_A_BYTE
 
 SHORTEST_SLEEP = 0.001
 LATEST = 0.1

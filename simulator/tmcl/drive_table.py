@@ -8,14 +8,14 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 
-from dialects.tmcl.manual.parameters import AXIS, GLOBAL, Global, Parameter
-from simulator.cell.identities import read_identity
-from simulator.cell.reader import common_keys
-from simulator.cell.settings import read_settings
-from simulator.cell.spec import DriveSpec, Identity, Value
-from simulator.cell.table import Folder, Table, quoted
-from simulator.cell.worlds import read_world
-from simulator.tmcl.motor import STORED
+from multidrop.dialects.tmcl.manual.parameters import AXIS, GLOBAL, Global, Parameter
+from multidrop.simulator.cell.identities import read_identity
+from multidrop.simulator.cell.reader import common_keys
+from multidrop.simulator.cell.settings import read_settings
+from multidrop.simulator.cell.spec import DriveSpec, Identity, Value
+from multidrop.simulator.cell.table import Folder, Table, quoted
+from multidrop.simulator.cell.worlds import read_world
+from multidrop.simulator.tmcl.motor import STORED
 
 VERSION = re.compile(r"\d{4}V\d{3}", re.ASCII)
 GLOBAL_PREFIX = "G"

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dialects.parameters import Value
-from dialects.snapshots import Snapshot
-from dialects.tmcl.manual.parameters import Global
-from simulator.cell.spec import DriveSpec
-from simulator.cell.writer import DriveText, Entry, remark
-from simulator.family import Snapshots, StoredProgram
-from simulator.tmcl.drive_table import GLOBAL_PREFIX, stored
+from multidrop.dialects.parameters import Value
+from multidrop.dialects.snapshots import Snapshot
+from multidrop.dialects.tmcl.manual.parameters import Global
+from multidrop.simulator.cell.spec import DriveSpec
+from multidrop.simulator.cell.writer import DriveText, Entry, remark
+from multidrop.simulator.family import Snapshots, StoredProgram
+from multidrop.simulator.tmcl.drive_table import GLOBAL_PREFIX, stored
 
 ADDRESS = f"{GLOBAL_PREFIX}{int(Global.ADDRESS)}"
 """The parameter that has a key of its own."""

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from dialects.family import Motion
-from dialects.tmcl.manual.parameters import BAUDS, Axis
-from simulator.cell.spec import DriveSpec
-from simulator.family import Family, Place, Shadow, Unit
-from simulator.tmcl import drive_text
-from simulator.tmcl.drive_table import read_drive, split_settings
-from simulator.tmcl.module import VERSION, TmclModule
-from simulator.tmcl.port import TmclPort
-from simulator.world import World
+from multidrop.dialects.family import Motion
+from multidrop.dialects.tmcl.manual.parameters import BAUDS, Axis
+from multidrop.simulator.cell.spec import DriveSpec
+from multidrop.simulator.family import Family, Place, Shadow, Unit
+from multidrop.simulator.tmcl import drive_text
+from multidrop.simulator.tmcl.drive_table import read_drive, split_settings
+from multidrop.simulator.tmcl.module import VERSION, TmclModule
+from multidrop.simulator.tmcl.port import TmclPort
+from multidrop.simulator.world import World
 
 
 def build(spec: DriveSpec, place: Place) -> Unit:

@@ -12,13 +12,13 @@ from dataclasses import dataclass
 from math import inf
 from types import MappingProxyType
 
-from dialects.tmcl.manual.commands import FACTORY_CODE, Call, Command, Move, Search, Version
-from dialects.tmcl.manual.parameters import AXIS, BAUDS, GLOBAL, Axis, Global, Parameter
-from dialects.tmcl.manual.status import Status
-from simulator.tmcl.motor import STORED, Motor
-from simulator.tmcl.program import Program
-from simulator.tmcl.search import ReferenceSearch
-from simulator.world import World
+from multidrop.dialects.tmcl.manual.commands import FACTORY_CODE, Call, Command, Move, Search, Version
+from multidrop.dialects.tmcl.manual.parameters import AXIS, BAUDS, GLOBAL, Axis, Global, Parameter
+from multidrop.dialects.tmcl.manual.status import Status
+from multidrop.simulator.tmcl.motor import STORED, Motor
+from multidrop.simulator.tmcl.program import Program
+from multidrop.simulator.tmcl.search import ReferenceSearch
+from multidrop.simulator.world import World
 
 VERSION = "1241V115"
 BANK = 0

@@ -11,10 +11,10 @@ from collections.abc import Iterator
 from enum import Enum
 from math import inf
 
-from dialects.tmcl.manual.parameters import AXIS, Axis
-from simulator.kinematics.profile import halt, move, slew
-from simulator.shaft import Shaft
-from simulator.world import World
+from multidrop.dialects.tmcl.manual.parameters import AXIS, Axis
+from multidrop.simulator.kinematics.profile import halt, move, slew
+from multidrop.simulator.shaft import Shaft
+from multidrop.simulator.world import World
 
 FULL = 256
 """Microsteps of a full step, which is one motor step of the world."""

@@ -9,10 +9,10 @@ from __future__ import annotations
 from struct import Struct
 from typing import Protocol
 
-from dialects.tmcl.manual.commands import Call, Command
-from dialects.tmcl.manual.status import Status
-from simulator.tmcl.module import Answer
-from simulator.wire.wire import Transmission
+from multidrop.dialects.tmcl.manual.commands import Call, Command
+from multidrop.dialects.tmcl.manual.status import Status
+from multidrop.simulator.tmcl.module import Answer
+from multidrop.simulator.wire.wire import Transmission
 
 LENGTH = 9
 PAUSE = 0.5

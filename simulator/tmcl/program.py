@@ -11,8 +11,8 @@ from collections.abc import Callable
 from enum import IntEnum
 from math import inf
 
-from dialects.tmcl.manual.commands import Call, Command
-from simulator.tmcl.motor import Motor
+from multidrop.dialects.tmcl.manual.commands import Call, Command
+from multidrop.simulator.tmcl.motor import Motor
 
 LINE_TIME = 0.001
 TICK = 0.01

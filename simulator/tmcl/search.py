@@ -10,8 +10,8 @@ from __future__ import annotations
 from enum import Enum
 from itertools import pairwise
 
-from dialects.tmcl.manual.parameters import Axis
-from simulator.tmcl.motor import Motor, wrapped
+from multidrop.dialects.tmcl.manual.parameters import Axis
+from multidrop.simulator.tmcl.motor import Motor, wrapped
 
 HOME, RIGHT, LEFT = 0, 1, 2
 """Places in what `Shaft.switches` gives."""

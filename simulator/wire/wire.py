@@ -26,9 +26,9 @@ from math import inf
 from random import Random
 from typing import NamedTuple, Protocol
 
-from simulator.cell.spec import Faults
-from simulator.wire.baud import BITS_A_BYTE, resample
-from simulator.wire.collisions import Merger, Paced, Unpaced
+from multidrop.simulator.cell.spec import Faults
+from multidrop.simulator.wire.baud import BITS_A_BYTE, resample
+from multidrop.simulator.wire.collisions import Merger, Paced, Unpaced
 
 # The faults of a wire: what they do to bytes, drawn from one seeded source in the order of the bytes.
 

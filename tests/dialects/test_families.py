@@ -7,10 +7,10 @@ from pathlib import Path
 
 import pytest
 
-from dialects.families import DEFAULT, FAMILIES, TABLE, family_of, languages, program_languages
-from dialects.family import Hints
-from shell.connect import urls
-from shell.connect.url_forms import URL_FORMS
+from multidrop.dialects.families import DEFAULT, FAMILIES, TABLE, family_of, languages, program_languages
+from multidrop.dialects.family import Hints
+from multidrop.shell.connect import urls
+from multidrop.shell.connect.url_forms import URL_FORMS
 
 ROOT = Path(__file__).parents[2]
 ROOMS = ("drives", "shell", "tui", "macros", "multidrop")

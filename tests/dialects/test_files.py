@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from dialects import Diagnostic
-from dialects.files import (
+from multidrop.dialects import Diagnostic
+from multidrop.dialects.files import (
     DEEPEST,
     LARGEST,
     MOST_LINES,
@@ -20,18 +20,18 @@ from dialects.files import (
     text_of,
     toml_of,
 )
-from dialects.mcode.manual import program_file
-from dialects.pmx.manual import program_file as pmx_file
-from macros import MacroStore
-from macros.toml_format import parse_macro
-from macros.vendor import imported
-from shell.connect import settings
-from shell.edited_file import EditedFile
-from shell.log import files as log_files
-from shell.params import file as params_file
-from shell.scripts.reading import read_script
-from simulator import cells
-from simulator.serving.command import read_lines
+from multidrop.dialects.mcode.manual import program_file
+from multidrop.dialects.pmx.manual import program_file as pmx_file
+from multidrop.macros import MacroStore
+from multidrop.macros.toml_format import parse_macro
+from multidrop.macros.vendor import imported
+from multidrop.shell.connect import settings
+from multidrop.shell.edited_file import EditedFile
+from multidrop.shell.log import files as log_files
+from multidrop.shell.params import file as params_file
+from multidrop.shell.scripts.reading import read_script
+from multidrop.simulator import cells
+from multidrop.simulator.serving.command import read_lines
 from tests.support.cases import for_each
 
 ENDLESS = Path("/dev/zero")

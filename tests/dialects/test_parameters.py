@@ -2,18 +2,18 @@
 
 import pytest
 
-from dialects import Diagnostic
-from dialects.families import family_of
-from dialects.mcode.manual import parameters as mcode
-from dialects.modbus.family import MODBUS
-from dialects.modbus.host.codec import Modbus
-from dialects.modbus.host.state import ModbusState
-from dialects.modbus.manual.registers import REGISTERS
-from dialects.parameters import COMMUNICATION, Permission, Reading, Readings, same
-from dialects.pmx.manual import parameters as pmx
-from dialects.tmcl.manual import settings as tmcl
-from drives.procedure import ProcedureRunner
-from simulator.pmx.settings import REGISTERS as PMX_REGISTERS
+from multidrop.dialects import Diagnostic
+from multidrop.dialects.families import family_of
+from multidrop.dialects.mcode.manual import parameters as mcode
+from multidrop.dialects.modbus.family import MODBUS
+from multidrop.dialects.modbus.host.codec import Modbus
+from multidrop.dialects.modbus.host.state import ModbusState
+from multidrop.dialects.modbus.manual.registers import REGISTERS
+from multidrop.dialects.parameters import COMMUNICATION, Permission, Reading, Readings, same
+from multidrop.dialects.pmx.manual import parameters as pmx
+from multidrop.dialects.tmcl.manual import settings as tmcl
+from multidrop.drives.procedure import ProcedureRunner
+from multidrop.simulator.pmx.settings import REGISTERS as PMX_REGISTERS
 from tests.dialects.modbus.test_talk import Far
 
 

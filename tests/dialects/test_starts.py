@@ -4,12 +4,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dialects.families import FAMILIES
-from dialects.mcode.host.codec import MCode
-from dialects.mcode.manual.table import MDRIVE, MNEMONICS
-from dialects.modbus.host.codec import Modbus
-from dialects.pmx.host.codec import Pmx
-from dialects.pmx.manual.table import ROWS
+from multidrop.dialects.families import FAMILIES
+from multidrop.dialects.mcode.host.codec import MCode
+from multidrop.dialects.mcode.manual.table import MDRIVE, MNEMONICS
+from multidrop.dialects.modbus.host.codec import Modbus
+from multidrop.dialects.pmx.host.codec import Pmx
+from multidrop.dialects.pmx.manual.table import ROWS
 from tests.support.cases import for_each
 
 STARTS = {

@@ -9,9 +9,9 @@ from pathlib import Path
 
 import pytest
 
-from dialects.mcode.host.state import MCodeState
-from dialects.modbus.host.state import ModbusState
-from dialects.pmx.host.state import PmxState
+from multidrop.dialects.mcode.host.state import MCodeState
+from multidrop.dialects.modbus.host.state import ModbusState
+from multidrop.dialects.pmx.host.state import PmxState
 
 ROOT = Path(__file__).parents[2]
 ROOMS = ("dialects", "drives", "shell", "tui", "macros", "multidrop")

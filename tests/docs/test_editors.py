@@ -6,7 +6,7 @@ import json
 import re
 import tomllib
 
-from dialects.families import program_languages
+from multidrop.dialects.families import program_languages
 from tests.support.paths import ROOT
 
 PAGE = (ROOT / "docs" / "editors.md").read_text(encoding="utf-8")

@@ -11,10 +11,10 @@ from typing import Any
 
 import pytest
 
-from dialects.conditions import Conditions
-from shell.log.entries import Entry
-from shell.publishing import messages
-from shell.publishing.topics import Topics
+from multidrop.dialects.conditions import Conditions
+from multidrop.shell.log.entries import Entry
+from multidrop.shell.publishing import messages
+from multidrop.shell.publishing.topics import Topics
 from tests.support.paths import ROOT
 
 FOLDER = ROOT / "docs" / "recipes"

@@ -6,12 +6,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dialects import End, Kind, Priority, Request, StopPiece
-from dialects.mcode.host.codec import MCode
-from drives.doubt import LATE
-from drives.events import Unsolicited
-from drives.flight import LONGEST_LIST, NEVER_QUIET, Finished
-from drives.line import Line, Write
+from multidrop.dialects import End, Kind, Priority, Request, StopPiece
+from multidrop.dialects.mcode.host.codec import MCode
+from multidrop.drives.doubt import LATE
+from multidrop.drives.events import Unsolicited
+from multidrop.drives.flight import LONGEST_LIST, NEVER_QUIET, Finished
+from multidrop.drives.line import Line, Write
 from tests.support.examples import examples
 
 QUIETLY = MCode(em=1)

@@ -6,16 +6,16 @@ from typing import Any
 
 import pytest
 
-from dialects import End, Hints, Stopped
-from dialects.mcode.manual import program_file
-from drives.bus import Bus
-from drives.events import Changed, Ended, Lost, Notice, Sample, Traffic
-from simulator.cells import read
-from simulator.floor import Floor
-from simulator.serving.in_process import SimPipe
-from simulator.serving.running import RunningFloor
+from multidrop.dialects import End, Hints, Stopped
+from multidrop.dialects.mcode.manual import program_file
+from multidrop.drives.bus import Bus
+from multidrop.drives.events import Changed, Ended, Lost, Notice, Sample, Traffic
+from multidrop.simulator.cells import read
+from multidrop.simulator.floor import Floor
+from multidrop.simulator.serving.in_process import SimPipe
+from multidrop.simulator.serving.running import RunningFloor
+from multidrop.transports import TransportLost
 from tests.support.virtual import in_virtual_time
-from transports import TransportLost
 
 CELL = '[[bus]]\nname = "w"\nbaud = 9600\n' + "".join(
     f'[[bus.drive]]\npersonality = "LMDCM"\nname = "{name}"\nparty = true\nset = {{ EM = 1, CK = 1 }}\n'

@@ -4,16 +4,16 @@ import asyncio
 
 import pytest
 
-from dialects import DriveState, Priority, Procedure, Reply, Request, Stopped
-from dialects.mcode.host.codec import MCode
-from dialects.state import Owed
-from drives.conversations import Conversations
-from drives.events import Sent
-from drives.keeping import Keeper, NoKeeper
-from drives.line import Line
-from drives.link import Link
+from multidrop.dialects import DriveState, Priority, Procedure, Reply, Request, Stopped
+from multidrop.dialects.mcode.host.codec import MCode
+from multidrop.dialects.state import Owed
+from multidrop.drives.conversations import Conversations
+from multidrop.drives.events import Sent
+from multidrop.drives.keeping import Keeper, NoKeeper
+from multidrop.drives.line import Line
+from multidrop.drives.link import Link
+from multidrop.transports import TransportLost
 from tests.support.virtual import in_virtual_time
-from transports import TransportLost
 
 CODEC = MCode(em=1)
 REPLY_AFTER = 0.01

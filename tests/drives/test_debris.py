@@ -4,16 +4,16 @@ import asyncio
 
 import pytest
 
-from dialects import Hints, Request
-from dialects.codec import Kind
-from dialects.mcode.host.codec import MCode
-from drives.bus import Bus
-from drives.debris import LASTS, Debris
-from drives.events import Unsolicited
-from simulator.cells import read
-from simulator.floor import Floor
-from simulator.serving.in_process import SimPipe
-from simulator.serving.running import RunningFloor
+from multidrop.dialects import Hints, Request
+from multidrop.dialects.codec import Kind
+from multidrop.dialects.mcode.host.codec import MCode
+from multidrop.drives.bus import Bus
+from multidrop.drives.debris import LASTS, Debris
+from multidrop.drives.events import Unsolicited
+from multidrop.simulator.cells import read
+from multidrop.simulator.floor import Floor
+from multidrop.simulator.serving.in_process import SimPipe
+from multidrop.simulator.serving.running import RunningFloor
 from tests.support.cell_session import bus, party
 from tests.support.virtual import in_virtual_time
 

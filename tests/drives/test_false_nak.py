@@ -2,10 +2,10 @@
 
 import pytest
 
-from dialects import DriveError, NoAnswer
-from dialects.mcode.family import MCODE
-from drives.procedure import ProcedureRunner
-from simulator.cell.spec import Faults
+from multidrop.dialects import DriveError, NoAnswer
+from multidrop.dialects.mcode.family import MCODE
+from multidrop.drives.procedure import ProcedureRunner
+from multidrop.simulator.cell.spec import Faults
 from tests.support.mcode_drives import Desk
 
 SLOW = (0.0, 0.05, 0.3, 0.6, 0.9)

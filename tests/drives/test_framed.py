@@ -4,13 +4,13 @@ from dataclasses import dataclass, replace
 
 import pytest
 
-from dialects import Decoded, DriveState, End, Kind, NoAnswer, Reply, Request, StopPiece
-from dialects.mcode.host.codec import MCode
-from drives.events import Unsolicited
-from drives.flight import Finished
-from drives.inbox import TAIL
-from drives.line import QUIET, Line, Write
-from drives.procedure import ProcedureRunner
+from multidrop.dialects import Decoded, DriveState, End, Kind, NoAnswer, Reply, Request, StopPiece
+from multidrop.dialects.mcode.host.codec import MCode
+from multidrop.drives.events import Unsolicited
+from multidrop.drives.flight import Finished
+from multidrop.drives.inbox import TAIL
+from multidrop.drives.line import QUIET, Line, Write
+from multidrop.drives.procedure import ProcedureRunner
 
 
 @dataclass(frozen=True)
@@ -292,7 +292,7 @@ def test_a_stop_within_a_reply_forgets_no_half_of_it(came):
 
 
 def test_every_language_says_both():
-    from dialects.families import FAMILIES
+    from multidrop.dialects.families import FAMILIES
 
     told = {family: (each.codec.framed, each.codec.numbered) for family, each in FAMILIES.items()}
     assert told == {"mcode": (False, False), "pmx": (False, False), "modbus": (True, True), "tmcl": (True, False)}

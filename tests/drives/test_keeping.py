@@ -4,11 +4,11 @@ import asyncio
 
 import pytest
 
-from dialects import Hints, Stopped
-from dialects.mcode.manual import program_file
+from multidrop.dialects import Hints, Stopped
+from multidrop.dialects.mcode.manual import program_file
+from multidrop.transports import TransportLost
 from tests.drives.test_bus import LOOP, Desk, until
 from tests.support.virtual import in_virtual_time
-from transports import TransportLost
 
 
 class Kept:

@@ -8,16 +8,16 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dialects import End, Kind, NoAnswer, Request
-from dialects.mcode.family import MCODE
-from dialects.mcode.host.checksum import sealed
-from dialects.mcode.host.codec import MCode
-from dialects.mcode.host.state import MCodeState
-from dialects.pmx.host.codec import Pmx
-from drives.events import Unsolicited
-from drives.flight import Finished
-from drives.line import Line, Write
-from drives.procedure import ProcedureRunner
+from multidrop.dialects import End, Kind, NoAnswer, Request
+from multidrop.dialects.mcode.family import MCODE
+from multidrop.dialects.mcode.host.checksum import sealed
+from multidrop.dialects.mcode.host.codec import MCode
+from multidrop.dialects.mcode.host.state import MCodeState
+from multidrop.dialects.pmx.host.codec import Pmx
+from multidrop.drives.events import Unsolicited
+from multidrop.drives.flight import Finished
+from multidrop.drives.line import Line, Write
+from multidrop.drives.procedure import ProcedureRunner
 from tests.support.cases import for_each
 
 pytestmark = pytest.mark.slow

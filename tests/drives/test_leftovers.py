@@ -5,12 +5,12 @@ from dataclasses import replace
 
 import pytest
 
-from dialects import Owed
-from drives.events import Unsolicited
-from shell.connect.opening import open_buses
-from shell.connect.settings import Settings
-from shell.events import OnBus
-from shell.session import Session
+from multidrop.dialects import Owed
+from multidrop.drives.events import Unsolicited
+from multidrop.shell.connect.opening import open_buses
+from multidrop.shell.connect.settings import Settings
+from multidrop.shell.events import OnBus
+from multidrop.shell.session import Session
 from tests.support.cell_session import CellSession, bus, party
 
 pytestmark = pytest.mark.virtual

@@ -2,12 +2,12 @@
 
 import pytest
 
-from dialects import End, Kind, Priority, Request, StopPiece
-from dialects.mcode.host.checksum import sealed
-from dialects.mcode.host.codec import MCode
-from drives.events import Unsolicited
-from drives.flight import Finished
-from drives.line import QUIET, Line, Write
+from multidrop.dialects import End, Kind, Priority, Request, StopPiece
+from multidrop.dialects.mcode.host.checksum import sealed
+from multidrop.dialects.mcode.host.codec import MCode
+from multidrop.drives.events import Unsolicited
+from multidrop.drives.flight import Finished
+from multidrop.drives.line import QUIET, Line, Write
 
 ECHO = MCode(em=0)
 QUIETLY = MCode(em=1)

@@ -11,16 +11,16 @@ from pymodbus import ModbusDeviceIdentification
 from pymodbus.server import ModbusTcpServer
 from pymodbus.simulator import DataType, SimData, SimDevice
 
-from dialects import Hints, NoAnswer, Priority, Refused
-from dialects.families import family_of
-from dialects.modbus.host import framing
-from dialects.modbus.manual.registers import REGISTERS
-from drives.bus import Bus
-from drives.drive import still
-from drives.events import Notice, Traffic, Unsolicited
-from drives.halt import Fate
+from multidrop.dialects import Hints, NoAnswer, Priority, Refused
+from multidrop.dialects.families import family_of
+from multidrop.dialects.modbus.host import framing
+from multidrop.dialects.modbus.manual.registers import REGISTERS
+from multidrop.drives.bus import Bus
+from multidrop.drives.drive import still
+from multidrop.drives.events import Notice, Traffic, Unsolicited
+from multidrop.drives.halt import Fate
+from multidrop.transports.sockets import open_tcp
 from tests.support.until import PATIENCE
-from transports.sockets import open_tcp
 
 LAST = 0xB8
 logging.getLogger("pymodbus").addHandler(logging.NullHandler())

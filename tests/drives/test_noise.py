@@ -6,7 +6,7 @@ program's, and nothing is executed twice. Without a checksum a digit may be dama
 
 import pytest
 
-from simulator.cell.spec import Faults
+from multidrop.simulator.cell.spec import Faults
 from tests.support.noisy_wire import Crowd
 
 NOISE = {

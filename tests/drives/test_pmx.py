@@ -5,14 +5,14 @@ from random import Random
 
 import pytest
 
-from dialects import End, Hints, NoAnswer, Priority, Refused, StopPiece
-from dialects.pmx.host.codec import GAP, Pmx
-from drives.bus import Bus
-from drives.events import Unsolicited
-from drives.flight import Finished
-from drives.halt import Fate
-from drives.line import QUIET, Line, Write
-from drives.stop_forms import stop_forms
+from multidrop.dialects import End, Hints, NoAnswer, Priority, Refused, StopPiece
+from multidrop.dialects.pmx.host.codec import GAP, Pmx
+from multidrop.drives.bus import Bus
+from multidrop.drives.events import Unsolicited
+from multidrop.drives.flight import Finished
+from multidrop.drives.halt import Fate
+from multidrop.drives.line import QUIET, Line, Write
+from multidrop.drives.stop_forms import stop_forms
 from tests.support.virtual import in_virtual_time
 
 BYTE = 10 / 9600

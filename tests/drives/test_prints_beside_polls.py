@@ -5,14 +5,14 @@ import re
 
 import pytest
 
-from dialects import End, Priority
-from dialects.families import family_of
-from dialects.mcode.host.codec import MCode
-from dialects.mcode.host.state import MCodeState
-from drives.events import Sent, Traffic, Unsolicited
-from drives.procedure import ProcedureRunner
-from shell.events import OnBus
-from simulator.cell.spec import Faults
+from multidrop.dialects import End, Priority
+from multidrop.dialects.families import family_of
+from multidrop.dialects.mcode.host.codec import MCode
+from multidrop.dialects.mcode.host.state import MCodeState
+from multidrop.drives.events import Sent, Traffic, Unsolicited
+from multidrop.drives.procedure import ProcedureRunner
+from multidrop.shell.events import OnBus
+from multidrop.simulator.cell.spec import Faults
 from tests.support.cell_session import CellSession, bus, party
 
 LINES = 60

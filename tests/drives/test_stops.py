@@ -5,16 +5,28 @@ from typing import Any
 
 import pytest
 
-from dialects import DriveState, End, Hints, Kind, NoAnswer, Priority, Refused, Reply, Request, Stopped, StopPiece
-from dialects.mcode.manual import program_file
-from drives.bus import Bus
-from drives.drive import confirmed_motion
-from drives.events import Ended, Notice, Sample, Sent, Silent, Traffic, Unsolicited
-from drives.halt import Fate
-from simulator.cells import read
-from simulator.floor import Floor
-from simulator.serving.in_process import SimPipe
-from simulator.serving.running import RunningFloor
+from multidrop.dialects import (
+    DriveState,
+    End,
+    Hints,
+    Kind,
+    NoAnswer,
+    Priority,
+    Refused,
+    Reply,
+    Request,
+    Stopped,
+    StopPiece,
+)
+from multidrop.dialects.mcode.manual import program_file
+from multidrop.drives.bus import Bus
+from multidrop.drives.drive import confirmed_motion
+from multidrop.drives.events import Ended, Notice, Sample, Sent, Silent, Traffic, Unsolicited
+from multidrop.drives.halt import Fate
+from multidrop.simulator.cells import read
+from multidrop.simulator.floor import Floor
+from multidrop.simulator.serving.in_process import SimPipe
+from multidrop.simulator.serving.running import RunningFloor
 from tests.support.until import PATIENCE
 from tests.support.virtual import in_virtual_time
 
@@ -471,9 +483,9 @@ async def test_an_answer_that_was_under_way_when_a_stop_came_is_nobodys():
 
 
 def test_what_was_stopped_says_whether_it_was_sent():
-    from dialects.mcode.host.codec import MCode
-    from drives.flight import Finished
-    from drives.line import Line
+    from multidrop.dialects.mcode.host.codec import MCode
+    from multidrop.drives.flight import Finished
+    from multidrop.drives.line import Line
 
     line = Line(MCode(em=1))
     request = Request("", "MR 1", Kind.COMMAND, MCode(em=1), Priority.OPERATOR)

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from dialects.errors import Diagnostic
-from macros import MacroStore, drafts
+from multidrop.dialects.errors import Diagnostic
+from multidrop.macros import MacroStore, drafts
 
 TEXT = b"# mine\nname = 'm'\n[[step]]\nline = 'MR 1' # far\n"
 

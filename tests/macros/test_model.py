@@ -2,8 +2,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dialects.errors import Diagnostic
-from macros import Macro, Step, check, escape, fill, value_names
+from multidrop.dialects.errors import Diagnostic
+from multidrop.macros import Macro, Step, check, escape, fill, value_names
 
 
 @given(st.text())

@@ -6,8 +6,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dialects.errors import Diagnostic
-from macros import Macro, Parameter, Step, check, checked_values, filled, missing
+from multidrop.dialects.errors import Diagnostic
+from multidrop.macros import Macro, Parameter, Step, check, checked_values, filled, missing
 
 
 def macro(*lines: str, on_stop: tuple[str, ...] = ()) -> Macro:

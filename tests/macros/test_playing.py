@@ -1,7 +1,7 @@
 import pytest
 
-from dialects.errors import Diagnostic
-from macros import Macro, Recorder, Step
+from multidrop.dialects.errors import Diagnostic
+from multidrop.macros import Macro, Recorder, Step
 
 
 def recorded(*kept: tuple[str, float], start: float = 0.0) -> Macro:

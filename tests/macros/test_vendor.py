@@ -6,9 +6,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dialects.errors import Diagnostic
-from macros import Macro, Step
-from macros.vendor import REMARK, exported, imported
+from multidrop.dialects.errors import Diagnostic
+from multidrop.macros import Macro, Step
+from multidrop.macros.vendor import REMARK, exported, imported
 
 
 def steps(text: str) -> list[tuple[float, str]]:

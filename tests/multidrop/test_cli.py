@@ -7,7 +7,7 @@ import sys
 import pytest
 
 from multidrop import cli, command_table
-from simulator.families import PROGRAMS, TABLE
+from multidrop.simulator.families import PROGRAMS, TABLE
 from tests.support.paths import ROOT
 from tests.support.processes import environment
 from tests.support.until import PATIENCE
@@ -108,7 +108,7 @@ def test_the_help_names_each_personality_that_runs_programs(multidrop):
 def test_help_and_version_import_nothing_heavy():
     code = (
         "import sys\nfrom multidrop.__main__ import main\ncode = main(sys.argv[1:])\n"
-        "heavy = {'textual', 'prompt_toolkit', 'simulator.floor', 'rerun', 'serial', 'pymodbus', 'asyncio'}\n"
+        "heavy = {'textual', 'prompt_toolkit', 'multidrop.simulator.floor', 'rerun', 'serial', 'pymodbus', 'asyncio'}\n"
         "print(code, sorted(heavy & set(sys.modules)))"
     )
     for asked in ("--version", "--help"):

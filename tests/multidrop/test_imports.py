@@ -6,8 +6,8 @@ import sys
 
 import pytest
 
-from dialects.families import TABLE as FAMILIES
-from simulator.families import TABLE as SIMULATED
+from multidrop.dialects.families import TABLE as FAMILIES
+from multidrop.simulator.families import TABLE as SIMULATED
 from tests.support.paths import ROOT
 from tests.support.processes import environment
 from tests.support.until import PATIENCE
@@ -17,38 +17,67 @@ PLOTS = {"rerun", "numpy", "pyarrow"}
 EDITORS = {"pygls", "lsprotocol", "attrs", "cattrs"}
 HEAVY = SCREENS | PLOTS | EDITORS | {"pymodbus", "tomlkit", "importlib.metadata"}
 LOOP = {"asyncio", "socket", "ssl", "logging", "subprocess", "concurrent.futures"}
-HOSTS = {place.record.partition(":")[0] for place in FAMILIES.values()} | {"drives.bus", "shell.session"}
-SIMULATORS = {place.record.partition(":")[0] for place in SIMULATED.values()} | {"simulator.floor"}
+HOSTS = {place.record.partition(":")[0] for place in FAMILIES.values()} | {
+    "multidrop.drives.bus",
+    "multidrop.shell.session",
+}
+SIMULATORS = {place.record.partition(":")[0] for place in SIMULATED.values()} | {"multidrop.simulator.floor"}
 NO_LINE = HEAVY | LOOP | HOSTS | SIMULATORS | {"serial"}
-MCODE = {"dialects.mcode.family"}
-OTHERS = HOSTS - MCODE - {"drives.bus", "shell.session"}
-VERBS = {"shell.verbs.table", "shell.plots", "shell.transfers", "secrets", "hashlib", "difflib", "tempfile"}
-IDLE = "dialects.errors", "shutil", "dataclasses", "json", "pathlib"
+MCODE = {"multidrop.dialects.mcode.family"}
+OTHERS = HOSTS - MCODE - {"multidrop.drives.bus", "multidrop.shell.session"}
+VERBS = {
+    "multidrop.shell.verbs.table",
+    "multidrop.shell.plots",
+    "multidrop.shell.transfers",
+    "secrets",
+    "hashlib",
+    "difflib",
+    "tempfile",
+}
+IDLE = "multidrop.dialects.errors", "shutil", "dataclasses", "json", "pathlib"
 
 TABLE = {
-    ("--version",): NO_LINE | {*IDLE, "shell.output"},
+    ("--version",): NO_LINE | {*IDLE, "multidrop.shell.output"},
     ("--help",): NO_LINE | {"json", "pathlib"},
     ("send", "--help"): NO_LINE | {"json", "pathlib"},
     ("program", "check", "a.mxt"): NO_LINE
-    | {"json", "pathlib", "tomllib", "platformdirs", "dialects.pmx", "dialects.tmcl", "dialects.modbus"}
-    | {"dialects.mcode.host", "simulator.pmx", "simulator.tmcl", "simulator.lexium.ports", "simulator.wire.wire"},
-    ("program", "check", "a.prg"): NO_LINE | {"simulator.lexium", "dialects.mcode", "dialects.pmx.host"},
-    ("program", "test", "a.mxt"): NO_LINE | {"platformdirs", "dialects.pmx", "dialects.mcode.host", "simulator.pmx"},
+    | {
+        "json",
+        "pathlib",
+        "tomllib",
+        "platformdirs",
+        "multidrop.dialects.pmx",
+        "multidrop.dialects.tmcl",
+        "multidrop.dialects.modbus",
+    }
+    | {
+        "multidrop.dialects.mcode.host",
+        "multidrop.simulator.pmx",
+        "multidrop.simulator.tmcl",
+        "multidrop.simulator.lexium.ports",
+        "multidrop.simulator.wire.wire",
+    },
+    ("program", "check", "a.prg"): NO_LINE
+    | {"multidrop.simulator.lexium", "multidrop.dialects.mcode", "multidrop.dialects.pmx.host"},
+    ("program", "test", "a.mxt"): NO_LINE
+    | {"platformdirs", "multidrop.dialects.pmx", "multidrop.dialects.mcode.host", "multidrop.simulator.pmx"},
     ("lsp", "--help"): NO_LINE,
     ("program", "sweep", "a.mxt"): HEAVY
-    | {"socket", "ssl", "asyncio", "serial", "dialects.pmx", "simulator.pmx"}
+    | {"socket", "ssl", "asyncio", "serial", "multidrop.dialects.pmx", "multidrop.simulator.pmx"}
     | {"concurrent.futures", "distributed", "dask"}
     | HOSTS,
-    ("ports",): NO_LINE - {"serial"} | {"json", "platformdirs", "dialects.mcode"},
-    ("completion", "bash"): NO_LINE | {"platformdirs", "dialects.mcode"},
+    ("ports",): NO_LINE - {"serial"} | {"json", "platformdirs", "multidrop.dialects.mcode"},
+    ("completion", "bash"): NO_LINE | {"platformdirs", "multidrop.dialects.mcode"},
     ("macro", "list"): HEAVY | LOOP | HOSTS | SIMULATORS | {"serial"},
     ("send", "tcp://127.0.0.1:1", "PR P"): HEAVY | OTHERS | SIMULATORS | VERBS | {"serial"},
     ("send", "/dev/does-not-exist", "PR P"): HEAVY | OTHERS | SIMULATORS | VERBS | {"serial.tools.list_ports"},
-    ("send", "sim:a.toml", "PR P"): HEAVY | OTHERS | {"serial", "simulator.pmx", "simulator.tmcl"},
+    ("send", "sim:a.toml", "PR P"): HEAVY | OTHERS | {"serial", "multidrop.simulator.pmx", "multidrop.simulator.tmcl"},
     ("relay", "/dev/does-not-exist"): HEAVY | LOOP | HOSTS | SIMULATORS | VERBS | {"json", "platformdirs"},
     ("publish", "sim:", "--to", "http://broker"): HEAVY | SIMULATORS | VERBS | {"serial", "paho"},
-    ("share", "/dev/does-not-exist", "--rfc2217", "0"): HEAVY | OTHERS | SIMULATORS | {"shell.session"},
-    ("sim", "gone.toml"): HEAVY | HOSTS | {"serial", "simulator.pmx.family", "simulator.lexium.family"},
+    ("share", "/dev/does-not-exist", "--rfc2217", "0"): HEAVY | OTHERS | SIMULATORS | {"multidrop.shell.session"},
+    ("sim", "gone.toml"): HEAVY
+    | HOSTS
+    | {"serial", "multidrop.simulator.pmx.family", "multidrop.simulator.lexium.family"},
 }
 """For each command the modules that it must not import."""
 CHILD = """
@@ -83,6 +112,6 @@ def test_a_command_imports_nothing_that_it_does_not_need(command, tmp_path):
 
 def test_the_table_names_modules():
     ours = {name for names in TABLE.values() for name in names if (ROOT / name.partition(".")[0]).is_dir()}
-    assert "drives.bus" in ours
+    assert "multidrop.drives.bus" in ours
     for name in sorted(ours):
         importlib.import_module(name)

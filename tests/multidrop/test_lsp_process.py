@@ -16,9 +16,9 @@ from lsprotocol import types
 from pytest_lsp import client_capabilities
 from pytest_lsp.client import make_test_lsp_client
 
-from dialects import Diagnostic
 from multidrop.arguments.editors import add
 from multidrop.commands import lsp
+from multidrop.dialects import Diagnostic
 from multidrop.lsp.server import Server
 from multidrop.lsp.serving import serve_port
 from tests.support.lsp_session import Editor

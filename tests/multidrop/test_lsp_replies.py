@@ -7,11 +7,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 from lsprotocol import types
 
-from dialects.problems import Problem
+from multidrop.dialects.problems import Problem
 from multidrop.lsp import replies
 from multidrop.lsp.documents import Document
 from multidrop.lsp.positions import Positions
-from shell.program_text import ProgramGrammar, ProgramText
+from multidrop.shell.program_text import ProgramGrammar, ProgramText
 from tests.support.program_texts import TEXTS
 
 SIZES = {

@@ -15,25 +15,25 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dialects import Diagnostic, End
-from dialects.families import languages
-from dialects.family import Language
-from dialects.files import toml_of
-from dialects.mcode.host.codec import MCode
-from dialects.mcode.host.printed import INTEGER
-from dialects.mcode.host.state import MCodeState
-from dialects.numbers import whole
-from dialects.pmx.host.exchange import INTEGER as PMX_INTEGER
-from macros import parse_macro
 from multidrop.__main__ import main
-from shell.connect import settings, urls
-from shell.connect.settings import Settings
-from shell.events import FAILURES
-from shell.output import LONGEST, report, shortened
-from shell.plots.target import parse_target
-from shell.session import Session
-from simulator import cells
-from simulator.floor import Floor
+from multidrop.dialects import Diagnostic, End
+from multidrop.dialects.families import languages
+from multidrop.dialects.family import Language
+from multidrop.dialects.files import toml_of
+from multidrop.dialects.mcode.host.codec import MCode
+from multidrop.dialects.mcode.host.printed import INTEGER
+from multidrop.dialects.mcode.host.state import MCodeState
+from multidrop.dialects.numbers import whole
+from multidrop.dialects.pmx.host.exchange import INTEGER as PMX_INTEGER
+from multidrop.macros import parse_macro
+from multidrop.shell.connect import settings, urls
+from multidrop.shell.connect.settings import Settings
+from multidrop.shell.events import FAILURES
+from multidrop.shell.output import LONGEST, report, shortened
+from multidrop.shell.plots.target import parse_target
+from multidrop.shell.session import Session
+from multidrop.simulator import cells
+from multidrop.simulator.floor import Floor
 from tests.support.front_door import Command
 from tests.support.processes import environment
 from tests.support.until import PATIENCE

@@ -18,12 +18,6 @@ def test_what_is_not_public_is_an_attribute_error():
         multidrop.frob  # noqa: B018
 
 
-def test_nothing_hides_the_rooms_here_and_a_missing_one_is_told():
-    assert multidrop.hidden() == ""
-    assert "json" in multidrop.hidden(("json",)) and "rename" in multidrop.hidden(("json",))
-    assert "install" in multidrop.hidden(("no_such_room",))
-
-
 def test_the_version_says_which_extras_are_installed(monkeypatch):
     with open(ROOT / "pyproject.toml", "rb") as file:
         project = tomllib.load(file)["project"]

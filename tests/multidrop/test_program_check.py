@@ -8,9 +8,9 @@ from pathlib import Path
 
 import pytest
 
-from dialects.mcode.family import MCODE
-from dialects.mcode.manual.program_file import read
 from multidrop.__main__ import main
+from multidrop.dialects.mcode.family import MCODE
+from multidrop.dialects.mcode.manual.program_file import read
 from tests.conftest import Bench
 from tests.support.mcode_drives import Desk
 

@@ -9,8 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from dialects.pmx.manual.script_compiler import LINES
 from multidrop.__main__ import main
+from multidrop.dialects.pmx.manual.script_compiler import LINES
 from tests.support.pmx_programs import STEP_PER_EDGE, TEN_TIMES, plain
 from tests.support.processes import Running
 

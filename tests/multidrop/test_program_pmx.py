@@ -10,11 +10,11 @@ from typing import Any
 
 import pytest
 
-from dialects.pmx.manual import program_file
 from multidrop.__main__ import main
-from simulator.cell.spec import DriveSpec
-from simulator.cells import read
-from simulator.pmx.program_run import Failed, Output, ProgramRun, Summary
+from multidrop.dialects.pmx.manual import program_file
+from multidrop.simulator.cell.spec import DriveSpec
+from multidrop.simulator.cells import read
+from multidrop.simulator.pmx.program_run import Failed, Output, ProgramRun, Summary
 from tests.support import pmx_programs as shapes
 
 pytestmark = pytest.mark.slow

@@ -11,10 +11,10 @@ from xml.etree import ElementTree
 
 import pytest
 
-from dialects import Diagnostic
-from shell.front.junit import Case
-from shell.front.junit_file import JUnitFile
-from shell.sweeps import trial
+from multidrop.dialects import Diagnostic
+from multidrop.shell.front.junit import Case
+from multidrop.shell.front.junit_file import JUnitFile
+from multidrop.shell.sweeps import trial
 from tests.support.front_door import Command, Done
 from tests.support.front_door import multidrop as multidrop
 
@@ -233,6 +233,6 @@ def test_a_lost_report_is_said_beside_failed_cases(sweep, monkeypatch: pytest.Mo
 
 
 def test_lost_output_is_said_beside_failed_cases(sweep, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("shell.output.dropped", ["the output cannot be written: No space left on device"])
+    monkeypatch.setattr("multidrop.shell.output.dropped", ["the output cannot be written: No space left on device"])
     done = sweep(*FAILING)
     assert (done.returncode, done.stderr) == (1, "the output cannot be written: No space left on device\n")

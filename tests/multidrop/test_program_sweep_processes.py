@@ -15,8 +15,8 @@ from pathlib import Path
 
 import pytest
 
-from shell.front import answer as answers
-from shell.sweeps import cluster as cluster_of_cases
+from multidrop.shell.front import answer as answers
+from multidrop.shell.sweeps import cluster as cluster_of_cases
 from tests.support.front_door import Command
 from tests.support.front_door import multidrop as multidrop
 from tests.support.paths import ROOT

@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from multidrop.__main__ import main
-from simulator import program_run
+from multidrop.simulator import program_run
 
 LOOP = """VM=200000
 PG 1

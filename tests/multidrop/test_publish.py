@@ -15,18 +15,18 @@ from typing import Any
 
 import pytest
 
-from shell.connect.mqtt_settings import MqttSettings
-from shell.publishing import broker as broker_module
-from shell.publishing import publisher as publisher_module
-from shell.publishing.backlog import Message
-from shell.publishing.broker import Connection
-from shell.publishing.publisher import Publisher
-from shell.publishing.target import parse_target
-from shell.publishing.topics import Topics
+from multidrop.shell.connect.mqtt_settings import MqttSettings
+from multidrop.shell.publishing import broker as broker_module
+from multidrop.shell.publishing import publisher as publisher_module
+from multidrop.shell.publishing.backlog import Message
+from multidrop.shell.publishing.broker import Connection
+from multidrop.shell.publishing.publisher import Publisher
+from multidrop.shell.publishing.target import parse_target
+from multidrop.shell.publishing.topics import Topics
+from multidrop.transports import Unreachable
 from tests.support.mosquitto import PASSWORD, USER, Mosquitto, Subscriber, free_port, retained
 from tests.support.processes import Running
 from tests.support.until import PATIENCE, until
-from transports import Unreachable
 
 WILL = Message("t/status", "lost", True)
 

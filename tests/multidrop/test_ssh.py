@@ -17,16 +17,16 @@ import pytest
 
 import multidrop
 from multidrop.__main__ import main
-from shell.connect.settings import Settings
-from shell.session import Session
-from shell.signals import early_ends
+from multidrop.shell.connect.settings import Settings
+from multidrop.shell.session import Session
+from multidrop.shell.signals import early_ends
+from multidrop.transports import Limited, Transport, TransportLost, Unreachable
+from multidrop.transports.far_port import FarPort
+from multidrop.transports.serial_posix import lock_owner
+from multidrop.transports.ssh import open_ssh
+from multidrop.transports.ssh_session import reason
 from tests.support.ssh_server import fake_ssh, far_programs, script, ssh_server
 from tests.support.until import until
-from transports import Limited, Transport, TransportLost, Unreachable
-from transports.far_port import FarPort
-from transports.serial_posix import lock_owner
-from transports.ssh import open_ssh
-from transports.ssh_session import reason
 
 CELL = """
 [[bus]]

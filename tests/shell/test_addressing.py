@@ -2,7 +2,7 @@
 
 import pytest
 
-from shell.lines import parse, pinned
+from multidrop.shell.lines import parse, pinned
 
 
 @pytest.mark.parametrize(

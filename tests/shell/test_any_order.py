@@ -21,16 +21,16 @@ from hypothesis.stateful import (
     run_state_machine_as_test,
 )
 
-from dialects import Diagnostic, DriveError
-from macros import Macro
-from macros.model import Step
-from simulator.cell.spec import Faults
+from multidrop.dialects import Diagnostic, DriveError
+from multidrop.macros import Macro
+from multidrop.macros.model import Step
+from multidrop.simulator.cell.spec import Faults
+from multidrop.transports import TransportLost
 from soak.judge import Witness
 from soak.languages import MCodeLanguage
 from tests.support.cell_session import CellSession, bus, moves, party
 from tests.support.examples import examples
 from tests.support.virtual import VirtualLoop
-from transports import TransportLost
 
 pytestmark = pytest.mark.slow
 

@@ -4,10 +4,10 @@ import asyncio
 
 import pytest
 
-from dialects import Diagnostic, Stopped
-from shell.connect.settings import Settings
-from shell.front.answer import PAUSE, Answer, at_lines
-from shell.session import Session
+from multidrop.dialects import Diagnostic, Stopped
+from multidrop.shell.connect.settings import Settings
+from multidrop.shell.front.answer import PAUSE, Answer, at_lines
+from multidrop.shell.session import Session
 from tests.support.virtual import in_virtual_time
 
 WHAT = "CP erases the program"

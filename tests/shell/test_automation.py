@@ -4,15 +4,15 @@ import asyncio
 
 import pytest
 
-from dialects import DriveError, Refused, Stopped
-from macros import Macro, Step
-from shell.events import By
-from shell.front.stream import run_lines
-from shell.scripts import model
-from shell.scripts.executor import run_script
+from multidrop.dialects import DriveError, Refused, Stopped
+from multidrop.macros import Macro, Step
+from multidrop.shell.events import By
+from multidrop.shell.front.stream import run_lines
+from multidrop.shell.scripts import model
+from multidrop.shell.scripts.executor import run_script
+from multidrop.transports import TransportLost
 from tests.support.cell_session import ETHERNET, CellSession, bus, party, pmx
 from tests.support.virtual import in_virtual_time
-from transports import TransportLost
 
 pytestmark = pytest.mark.slow
 

@@ -8,14 +8,14 @@ from typing import cast as typed
 
 import pytest
 
-from dialects import Diagnostic
-from drives.bus import Bus
-from macros import Macro, Step
-from shell.asking import Field
-from shell.casting import settled
-from shell.connect.settings import Settings
-from shell.events import Notified
-from shell.session import Session
+from multidrop.dialects import Diagnostic
+from multidrop.drives.bus import Bus
+from multidrop.macros import Macro, Step
+from multidrop.shell.asking import Field
+from multidrop.shell.casting import settled
+from multidrop.shell.connect.settings import Settings
+from multidrop.shell.events import Notified
+from multidrop.shell.session import Session
 
 TURNS = Macro("turns", (Step(0.0, "MR {far:int=7,1..9}"), Step(0.0, "VM {fast:int}")))
 GANTRY = Macro("home", (Step(0.0, "@gantry:a HM 1"), Step(0.0, "/wait @gantry:a I1=1")), roles=("gantry",))

@@ -9,12 +9,12 @@ from pathlib import Path
 
 import pytest
 
-from dialects import Diagnostic, Inexpressible
-from macros import atomic
-from shell.checking import examine, rewrite
-from shell.connect.settings import Settings
-from shell.events import Notified, Output
-from shell.session import Session
+from multidrop.dialects import Diagnostic, Inexpressible
+from multidrop.macros import atomic
+from multidrop.shell.checking import examine, rewrite
+from multidrop.shell.connect.settings import Settings
+from multidrop.shell.events import Notified, Output
+from multidrop.shell.session import Session
 
 GOOD = "va q1=5\t' half a turn\r\nPG 1\r\n  lb ga      'start\r\n\tmr q1   ` go \r\n\tH\r\n e   \r\npg\r\n\r\ns"
 SPELLED = "VA Q1=5\t' half a turn\r\nPG 1\r\n  LB GA      'start\r\n\tMR Q1   ` go \r\n\tH\r\n E\r\nPG\r\n\r\nS"

@@ -6,8 +6,8 @@ import weakref
 
 import pytest
 
-from shell.front import collector
-from shell.front.collector import collected_at_rest
+from multidrop.shell.front import collector
+from multidrop.shell.front.collector import collected_at_rest
 from tests.support.virtual import in_virtual_time
 
 pytestmark = pytest.mark.slow

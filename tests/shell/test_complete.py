@@ -3,15 +3,15 @@ from types import SimpleNamespace
 
 import pytest
 
-from dialects.families import FAMILIES
 from multidrop import cli
-from shell.connect.url_forms import URL_FORMS
-from shell.connect.urls import KEYS
-from shell.front.complete import complete, hint
-from shell.verbs.offers import PLACEHOLDERS
-from shell.verbs.table import VERBS
-from shell.verbs.usage import forms, is_placeholder
-from simulator.sim_words import USAGES
+from multidrop.dialects.families import FAMILIES
+from multidrop.shell.connect.url_forms import URL_FORMS
+from multidrop.shell.connect.urls import KEYS
+from multidrop.shell.front.complete import complete, hint
+from multidrop.shell.verbs.offers import PLACEHOLDERS
+from multidrop.shell.verbs.table import VERBS
+from multidrop.shell.verbs.usage import forms, is_placeholder
+from multidrop.simulator.sim_words import USAGES
 from tests.support.cases import for_each
 
 BOTH = [("press", "a"), ("press", "b"), ("eth", "!")]

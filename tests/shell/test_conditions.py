@@ -8,10 +8,10 @@ from typing import Any
 
 import pytest
 
-from dialects.conditions import UNREAD, Conditions
-from dialects.families import FAMILIES
-from drives.events import Conditioned, Unsolicited
-from shell.events import OnBus
+from multidrop.dialects.conditions import UNREAD, Conditions
+from multidrop.dialects.families import FAMILIES
+from multidrop.drives.events import Conditioned, Unsolicited
+from multidrop.shell.events import OnBus
 from tests.support.cell_session import ETHERNET, CellSession, bus, party, pmx
 
 pytestmark = pytest.mark.virtual

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from dialects import Diagnostic, Inexpressible, Refused, Stopped
+from multidrop.dialects import Diagnostic, Inexpressible, Refused, Stopped
 from tests.support.debugged import ROUND, cell, ethernet, keys, run, serial, shown
 
 pytestmark = [pytest.mark.virtual, pytest.mark.slow]

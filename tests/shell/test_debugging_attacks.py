@@ -9,11 +9,11 @@ from typing import Any
 
 import pytest
 
-from dialects import DriveError, Inexpressible, NoAnswer, Refused, Stopped
-from dialects.mcode.host.debugging import traced
-from drives.halt import Fate
-from shell.events import FAILURES, By
-from simulator.cell.spec import Faults
+from multidrop.dialects import DriveError, Inexpressible, NoAnswer, Refused, Stopped
+from multidrop.dialects.mcode.host.debugging import traced
+from multidrop.drives.halt import Fate
+from multidrop.shell.events import FAILURES, By
+from multidrop.simulator.cell.spec import Faults
 from tests.support.cell_session import CellSession, bus
 from tests.support.debugged import cell, ethernet, keys, out, run, serial
 

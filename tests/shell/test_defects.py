@@ -8,10 +8,10 @@ from typing import Any
 
 import pytest
 
-from drives.bus import Bus
-from drives.drive import Drive
-from drives.events import Sample
-from shell.events import OnBus, StateChanged
+from multidrop.drives.bus import Bus
+from multidrop.drives.drive import Drive
+from multidrop.drives.events import Sample
+from multidrop.shell.events import OnBus, StateChanged
 from tests.support.cell_session import CellSession, bus, party
 from tests.support.until import until
 from tests.support.virtual import in_virtual_time

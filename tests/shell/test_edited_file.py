@@ -9,9 +9,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dialects import Diagnostic
-from shell.drafts import Draft, Drafts
-from shell.edited_file import ChangedMeanwhile, EditedFile, edited, real_text
+from multidrop.dialects import Diagnostic
+from multidrop.shell.drafts import Draft, Drafts
+from multidrop.shell.edited_file import ChangedMeanwhile, EditedFile, edited, real_text
 
 
 @pytest.mark.parametrize(

@@ -6,9 +6,9 @@ from pathlib import Path
 import pytest
 
 import shell
-from dialects.families import FAMILIES, TABLE
-from shell.connect.url_forms import URL_FORMS
-from shell.connect.urls import parse
+from multidrop.dialects.families import FAMILIES, TABLE
+from multidrop.shell.connect.url_forms import URL_FORMS
+from multidrop.shell.connect.urls import parse
 from tests.support.cases import for_each
 
 FILES = sorted(Path(shell.__file__).parent.rglob("*.py"))

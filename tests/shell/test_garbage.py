@@ -7,10 +7,10 @@ import random
 
 import pytest
 
-from dialects import DriveError, NoAnswer, Refused
-from shell.connect.settings import Settings
-from shell.events import Printed
-from shell.session import Session
+from multidrop.dialects import DriveError, NoAnswer, Refused
+from multidrop.shell.connect.settings import Settings
+from multidrop.shell.events import Printed
+from multidrop.shell.session import Session
 from tests.support.virtual import in_virtual_time
 
 CHATTER = 'PG 1\nLB SU\nPR "Logic 000"\nH 200\nBR SU\nE\nPG\n'

@@ -6,19 +6,19 @@ import asyncio
 
 import pytest
 
-from dialects import Diagnostic, Inexpressible
-from dialects.mcode.manual import program_checker, program_file
-from dialects.mcode.manual.grammar import LineError, check_groups
-from dialects.modbus.host.codec import Modbus
-from dialects.modbus.host.operations import perform
-from dialects.modbus.host.state import ModbusState
-from dialects.pmx.manual import program_file as pmx_file
-from dialects.pmx.manual.table import grouped
-from dialects.tmcl.manual import grammar as tmcl
-from macros import Macro, Step
-from shell.events import By
-from shell.scripts.executor import run_script
-from shell.scripts.reading import read_script
+from multidrop.dialects import Diagnostic, Inexpressible
+from multidrop.dialects.mcode.manual import program_checker, program_file
+from multidrop.dialects.mcode.manual.grammar import LineError, check_groups
+from multidrop.dialects.modbus.host.codec import Modbus
+from multidrop.dialects.modbus.host.operations import perform
+from multidrop.dialects.modbus.host.state import ModbusState
+from multidrop.dialects.pmx.manual import program_file as pmx_file
+from multidrop.dialects.pmx.manual.table import grouped
+from multidrop.dialects.tmcl.manual import grammar as tmcl
+from multidrop.macros import Macro, Step
+from multidrop.shell.events import By
+from multidrop.shell.scripts.executor import run_script
+from multidrop.shell.scripts.reading import read_script
 from tests.support.cases import for_each
 from tests.support.cell_session import CellSession, bus, party, pmx
 from tests.support.virtual import in_virtual_time

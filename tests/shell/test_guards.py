@@ -5,10 +5,10 @@ from contextlib import asynccontextmanager
 
 import pytest
 
-from dialects import Diagnostic, Stopped
-from macros import Macro, Step
-from shell.connect import settings
-from shell.events import By
+from multidrop.dialects import Diagnostic, Stopped
+from multidrop.macros import Macro, Step
+from multidrop.shell.connect import settings
+from multidrop.shell.events import By
 from tests.support.cell_session import CellSession, bus, party, pmx
 from tests.support.virtual import in_virtual_time
 

@@ -5,9 +5,9 @@ from pathlib import Path
 
 import pytest
 
-from dialects import Diagnostic
-from shell.events import Bytes
-from shell.printer import Printer
+from multidrop.dialects import Diagnostic
+from multidrop.shell.events import Bytes
+from multidrop.shell.printer import Printer
 from tests.support.cell_session import CellSession, bus
 from tests.support.virtual import in_virtual_time
 

@@ -6,8 +6,8 @@ import sys
 
 import pytest
 
-from shell.front import history
-from shell.front.history import History
+from multidrop.shell.front import history
+from multidrop.shell.front.history import History
 from tests.support.until import PATIENCE
 
 
@@ -93,7 +93,7 @@ def test_a_line_that_another_process_adds_while_the_file_is_cut_is_kept(tmp_path
 @pytest.mark.process
 def test_two_processes_lose_no_line(tmp_path):
     script = (
-        "import sys; from shell.front.history import History\n"
+        "import sys; from multidrop.shell.front.history import History\n"
         "kept = History(__import__('pathlib').Path(sys.argv[1]))\n"
         "for n in range(200): kept.append(f'{sys.argv[2]} {n}'); n % 20 or kept.lines()\n"
     )

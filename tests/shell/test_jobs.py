@@ -5,9 +5,9 @@ import sys
 
 import pytest
 
-from shell.events import Notified, Printed, Progressed
-from shell.jobs import running
-from shell.printer import Printer
+from multidrop.shell.events import Notified, Printed, Progressed
+from multidrop.shell.jobs import running
+from multidrop.shell.printer import Printer
 
 
 class Channel:

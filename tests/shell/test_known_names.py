@@ -6,13 +6,13 @@ from pathlib import Path
 from prompt_toolkit.completion import CompleteEvent
 from prompt_toolkit.document import Document
 
-from dialects import Priority
-from dialects.held import Held
-from dialects.mcode.host.names import offered
-from drives.events import Ended
-from shell.events import OnBus
-from shell.front.complete import complete, names_of
-from shell.front.prompt_parts import SessionCompleter
+from multidrop.dialects import Priority
+from multidrop.dialects.held import Held
+from multidrop.dialects.mcode.host.names import offered
+from multidrop.drives.events import Ended
+from multidrop.shell.events import OnBus
+from multidrop.shell.front.complete import complete, names_of
+from multidrop.shell.front.prompt_parts import SessionCompleter
 from tests.support.cases import for_each
 from tests.support.cell_session import CellSession, bus, party
 from tests.support.virtual import in_virtual_time

@@ -11,11 +11,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dialects.families import languages
-from shell.events import Output, Printed
-from shell.layout import laid_out
-from shell.printer import Printer
-from shell.verbs.table import VERBS
+from multidrop.dialects.families import languages
+from multidrop.shell.events import Output, Printed
+from multidrop.shell.layout import laid_out
+from multidrop.shell.printer import Printer
+from multidrop.shell.verbs.table import VERBS
 
 NOTE = "  note       beyond one comparison it is read from left to right: R1=1&MV as (R1=1)&MV, KF&12=12 as (KF&12)=12"
 

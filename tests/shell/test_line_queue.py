@@ -3,8 +3,8 @@
 import asyncio
 from typing import Any
 
-from dialects import Refused
-from shell.front.line_queue import BURST, SHOWN, LineQueue
+from multidrop.dialects import Refused
+from multidrop.shell.front.line_queue import BURST, SHOWN, LineQueue
 from tests.support.virtual import in_virtual_time
 
 

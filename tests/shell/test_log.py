@@ -10,14 +10,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dialects import Diagnostic, Priority
-from drives.events import Ended, Sent, Traffic, Unsolicited
-from shell.connect.log_settings import LogSettings
-from shell.connect.settings import Settings, parse
-from shell.events import By, Entered, Failed, Notified, OnBus, Output, Printed, StateChanged
-from shell.log import disk, files
-from shell.log.entries import KINDS, TRAFFIC, Entry, entry_of, line_of
-from shell.log.writer import SessionLog, begin
+from multidrop.dialects import Diagnostic, Priority
+from multidrop.drives.events import Ended, Sent, Traffic, Unsolicited
+from multidrop.shell.connect.log_settings import LogSettings
+from multidrop.shell.connect.settings import Settings, parse
+from multidrop.shell.events import By, Entered, Failed, Notified, OnBus, Output, Printed, StateChanged
+from multidrop.shell.log import disk, files
+from multidrop.shell.log.entries import KINDS, TRAFFIC, Entry, entry_of, line_of
+from multidrop.shell.log.writer import SessionLog, begin
 
 
 class FakeSession:

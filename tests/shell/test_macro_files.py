@@ -2,10 +2,10 @@
 
 import pytest
 
-from dialects import Diagnostic
-from shell.connect.settings import Settings
-from shell.events import By
-from shell.session import Session
+from multidrop.dialects import Diagnostic
+from multidrop.shell.connect.settings import Settings
+from multidrop.shell.events import By
+from multidrop.shell.session import Session
 
 pytestmark = pytest.mark.virtual
 OUTSIDE = [

@@ -7,11 +7,11 @@ from pathlib import Path
 
 import pytest
 
-from dialects import Diagnostic
 from multidrop.__main__ import main
-from shell.connect.settings import Settings
-from shell.events import Notified, Output
-from shell.session import Session
+from multidrop.dialects import Diagnostic
+from multidrop.shell.connect.settings import Settings
+from multidrop.shell.events import Notified, Output
+from multidrop.shell.session import Session
 
 HAND = "# by hand\nname = 'm' # mine\nkey = 'F3' # left\nnote = 'to and fro'\n\n# first\n[[step]]\nline = '/sleep 0'\n"
 

@@ -7,11 +7,11 @@ from pathlib import Path
 
 import pytest
 
-from dialects import Refused
-from shell.connect.settings import Settings
-from shell.events import Output
-from shell.front import complete
-from shell.session import Session
+from multidrop.dialects import Refused
+from multidrop.shell.connect.settings import Settings
+from multidrop.shell.events import Output
+from multidrop.shell.front import complete
+from multidrop.shell.session import Session
 
 pytestmark = pytest.mark.virtual
 

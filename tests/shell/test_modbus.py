@@ -7,15 +7,15 @@ from contextlib import AsyncExitStack
 
 import pytest
 
-from dialects import Diagnostic, DriveError, Inexpressible, Refused, Stopped
-from drives.events import Sample, Traffic, Unsolicited
-from shell.connect.settings import Settings
-from shell.events import FAILURES, By, Notified, OnBus, Output, Printed
-from shell.session import Session
-from simulator.cells import load
-from simulator.floor import Floor
-from simulator.serving.endpoints import serve_bus
-from simulator.serving.running import RunningFloor
+from multidrop.dialects import Diagnostic, DriveError, Inexpressible, Refused, Stopped
+from multidrop.drives.events import Sample, Traffic, Unsolicited
+from multidrop.shell.connect.settings import Settings
+from multidrop.shell.events import FAILURES, By, Notified, OnBus, Output, Printed
+from multidrop.shell.session import Session
+from multidrop.simulator.cells import load
+from multidrop.simulator.floor import Floor
+from multidrop.simulator.serving.endpoints import serve_bus
+from multidrop.simulator.serving.running import RunningFloor
 from tests.support.until import PATIENCE
 
 pytestmark = pytest.mark.slow

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from dialects import Diagnostic
-from shell import new_file
+from multidrop.dialects import Diagnostic
+from multidrop.shell import new_file
 
 
 def test_a_full_disk_leaves_no_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

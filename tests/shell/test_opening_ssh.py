@@ -10,17 +10,17 @@ from pathlib import Path
 
 import pytest
 
-from dialects import DriveError
-from drives.bus import Bus
-from shell.connect.opening import Opened
-from shell.connect.reopening import LOGIN, LoginAgain
-from shell.connect.settings import Settings
-from shell.connect.urls import Connection, parse
-from shell.events import Notified
-from shell.scanning import NothingFound, Scanning
-from shell.session import Session
-from transports import Received, Unreachable
-from transports.base import Lost
+from multidrop.dialects import DriveError
+from multidrop.drives.bus import Bus
+from multidrop.shell.connect.opening import Opened
+from multidrop.shell.connect.reopening import LOGIN, LoginAgain
+from multidrop.shell.connect.settings import Settings
+from multidrop.shell.connect.urls import Connection, parse
+from multidrop.shell.events import Notified
+from multidrop.shell.scanning import NothingFound, Scanning
+from multidrop.shell.session import Session
+from multidrop.transports import Received, Unreachable
+from multidrop.transports.base import Lost
 
 pytestmark = pytest.mark.virtual
 LIMITS = "on pc socat passes the bytes on: a stop waits there"

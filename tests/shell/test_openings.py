@@ -4,15 +4,15 @@ import asyncio
 
 import pytest
 
-from dialects import Diagnostic, Hints, NoAnswer
-from shell import stops
-from shell.connect.opening import Opened
-from shell.connect.settings import Settings
-from shell.session import Session
+from multidrop.dialects import Diagnostic, Hints, NoAnswer
+from multidrop.shell import stops
+from multidrop.shell.connect.opening import Opened
+from multidrop.shell.connect.settings import Settings
+from multidrop.shell.session import Session
+from multidrop.transports import Unreachable
 from tests.shell.test_session import FakeBus
 from tests.support.cell_session import CellSession, bus, party
 from tests.support.virtual import in_virtual_time
-from transports import Unreachable
 
 
 class Floor:

@@ -16,8 +16,8 @@ from datetime import datetime
 
 import pytest
 
-from shell import outlets, output
-from shell.outlets import Lane
+from multidrop.shell import outlets, output
+from multidrop.shell.outlets import Lane
 from tests.support.served_cell import until
 from tests.support.until import PATIENCE
 

@@ -8,12 +8,12 @@ import sys
 
 import pytest
 
-from dialects import Diagnostic, DriveError, Inexpressible, NoAnswer, Refused, Stopped
-from drives.events import Unsolicited
-from shell.events import Failed, Notified, OnBus, Output, Printed
-from shell.output import ReaderWatch, exit_code, report, write
-from shell.printer import Printer
-from transports import TransportLost, Unreachable
+from multidrop.dialects import Diagnostic, DriveError, Inexpressible, NoAnswer, Refused, Stopped
+from multidrop.drives.events import Unsolicited
+from multidrop.shell.events import Failed, Notified, OnBus, Output, Printed
+from multidrop.shell.output import ReaderWatch, exit_code, report, write
+from multidrop.shell.printer import Printer
+from multidrop.transports import TransportLost, Unreachable
 
 
 @pytest.mark.parametrize(
@@ -87,8 +87,8 @@ def test_a_character_that_the_output_does_not_know_is_written_out():
 
 
 def test_a_full_disk_is_told_at_the_end(monkeypatch):
-    monkeypatch.setattr("shell.output.dropped", [])
-    from shell import output
+    monkeypatch.setattr("multidrop.shell.output.dropped", [])
+    from multidrop.shell import output
 
     class Full(io.StringIO):
         def write(self, text):

@@ -7,9 +7,9 @@ from pathlib import Path
 
 import pytest
 
-from dialects import Diagnostic
-from dialects.mcode.manual import program_checker
-from shell.events import By
+from multidrop.dialects import Diagnostic
+from multidrop.dialects.mcode.manual import program_checker
+from multidrop.shell.events import By
 from tests.support.cases import for_each
 from tests.support.transfers import kept, load, shop_with
 from tests.support.virtual import in_virtual_time

@@ -7,15 +7,15 @@ from dataclasses import replace
 
 import pytest
 
-from dialects import Diagnostic, DriveError, NoAnswer, Refused, Stopped
-from drives.events import Traffic
-from shell.connect.settings import Settings
-from shell.events import Notified, OnBus, Output
-from shell.params import file as files
-from shell.params import restore
-from shell.params.readings import read
-from shell.session import Session
-from transports import TransportLost
+from multidrop.dialects import Diagnostic, DriveError, NoAnswer, Refused, Stopped
+from multidrop.drives.events import Traffic
+from multidrop.shell.connect.settings import Settings
+from multidrop.shell.events import Notified, OnBus, Output
+from multidrop.shell.params import file as files
+from multidrop.shell.params import restore
+from multidrop.shell.params.readings import read
+from multidrop.shell.session import Session
+from multidrop.transports import TransportLost
 
 pytestmark = [pytest.mark.virtual, pytest.mark.slow]
 

@@ -6,9 +6,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dialects import Diagnostic
-from dialects.parameters import SECTIONS, Reading, Readings
-from shell.params import file as files
+from multidrop.dialects import Diagnostic
+from multidrop.dialects.parameters import SECTIONS, Reading, Readings
+from multidrop.shell.params import file as files
 
 TEXTS = st.text(st.characters(codec="utf-8", exclude_categories=("Cc", "Cs")), max_size=8)
 SCALARS = st.integers(-(2**63), 2**63 - 1) | st.floats(allow_nan=False) | TEXTS

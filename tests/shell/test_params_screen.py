@@ -6,9 +6,9 @@ import asyncio
 
 import pytest
 
-from dialects import Diagnostic
-from drives.events import Conditioned
-from shell.events import Notified, OnBus, SettingsRead
+from multidrop.dialects import Diagnostic
+from multidrop.drives.events import Conditioned
+from multidrop.shell.events import Notified, OnBus, SettingsRead
 from tests.support.cell_session import ETHERNET, CellSession, bus, party, pmx
 
 pytestmark = pytest.mark.virtual

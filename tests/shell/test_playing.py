@@ -10,13 +10,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dialects import Diagnostic, DriveError
-from macros import Macro, MacroStore, Step
-from shell.events import Entered, Progressed
-from shell.scripts.executor import run_script
-from shell.scripts.macro_lines import stand_in
-from shell.scripts.reading import WrongScript, read_macro, read_script
-from shell.scripts.results import Ending, Result
+from multidrop.dialects import Diagnostic, DriveError
+from multidrop.macros import Macro, MacroStore, Step
+from multidrop.shell.events import Entered, Progressed
+from multidrop.shell.scripts.executor import run_script
+from multidrop.shell.scripts.macro_lines import stand_in
+from multidrop.shell.scripts.reading import WrongScript, read_macro, read_script
+from multidrop.shell.scripts.results import Ending, Result
 from tests.support.cell_session import CellSession, bus, party
 from tests.support.virtual import in_virtual_time
 

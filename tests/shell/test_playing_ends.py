@@ -7,16 +7,16 @@ from pathlib import Path
 
 import pytest
 
-from dialects import Diagnostic, DriveError, Refused, Stopped
-from drives.events import Traffic
-from shell.events import OnBus
-from shell.output import report
-from shell.scripts.executor import run_script
-from shell.scripts.reading import read_script
-from shell.scripts.results import Ending
+from multidrop.dialects import Diagnostic, DriveError, Refused, Stopped
+from multidrop.drives.events import Traffic
+from multidrop.shell.events import OnBus
+from multidrop.shell.output import report
+from multidrop.shell.scripts.executor import run_script
+from multidrop.shell.scripts.reading import read_script
+from multidrop.shell.scripts.results import Ending
+from multidrop.transports import TransportLost
 from tests.shell.test_playing import Shop
 from tests.support.virtual import in_virtual_time
-from transports import TransportLost
 
 
 def short(texts: list[str], shop: Shop) -> list[str]:

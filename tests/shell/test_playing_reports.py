@@ -7,11 +7,11 @@ from pathlib import Path
 
 import pytest
 
-from dialects import DriveError, Refused
-from shell.events import Notified
-from shell.front.report import Report
-from shell.scripts.executor import run_script
-from shell.scripts.reading import read_script
+from multidrop.dialects import DriveError, Refused
+from multidrop.shell.events import Notified
+from multidrop.shell.front.report import Report
+from multidrop.shell.scripts.executor import run_script
+from multidrop.shell.scripts.reading import read_script
 from tests.shell.test_playing import Shop
 from tests.support.virtual import in_virtual_time
 

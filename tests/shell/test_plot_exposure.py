@@ -2,12 +2,12 @@
 
 import pytest
 
-from shell.connect.settings import Settings
-from shell.events import Notified
-from shell.plots import feed
-from shell.plots.plot import Plot
-from shell.plots.target import parse_target
-from shell.workspace import Workspace
+from multidrop.shell.connect.settings import Settings
+from multidrop.shell.events import Notified
+from multidrop.shell.plots import feed
+from multidrop.shell.plots.plot import Plot
+from multidrop.shell.plots.target import parse_target
+from multidrop.shell.workspace import Workspace
 
 
 @pytest.mark.parametrize(

@@ -10,10 +10,10 @@ from typing import Any
 
 import pytest
 
-from drives.events import Sample, Valued
-from shell.plots.layout import LINES, drives_of
-from shell.plots.plot import Plot
-from shell.plots.target import PlotTarget, parse_target
+from multidrop.drives.events import Sample, Valued
+from multidrop.shell.plots.layout import LINES, drives_of
+from multidrop.shell.plots.plot import Plot
+from multidrop.shell.plots.target import PlotTarget, parse_target
 from tests.support.plot_file import contents
 
 PATHS = {

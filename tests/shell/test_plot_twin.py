@@ -10,16 +10,16 @@ from typing import Any
 
 import pytest
 
-from dialects import Diagnostic
-from drives.events import Sample
 from multidrop import read_rrd
-from shell.events import Predicted
-from shell.plots.feed import attach
-from shell.plots.layout import DIFFERS, LINES, PALE, RUNS, TWIN, drives_of, layout
-from shell.plots.plot import Plot
-from shell.plots.series import parse_series, read_first
-from shell.plots.target import PlotTarget
-from shell.roles import DIFFERENCE, Series
+from multidrop.dialects import Diagnostic
+from multidrop.drives.events import Sample
+from multidrop.shell.events import Predicted
+from multidrop.shell.plots.feed import attach
+from multidrop.shell.plots.layout import DIFFERS, LINES, PALE, RUNS, TWIN, drives_of, layout
+from multidrop.shell.plots.plot import Plot
+from multidrop.shell.plots.series import parse_series, read_first
+from multidrop.shell.plots.target import PlotTarget
+from multidrop.shell.roles import DIFFERENCE, Series
 from tests.support.cell_session import CellSession, bus, party
 from tests.support.plot_file import contents
 

@@ -8,13 +8,13 @@ from typing import Any
 
 import pytest
 
-from dialects import Diagnostic, Refused
-from drives.events import Sample, Valued
-from drives.readings import Value
-from shell.events import OnBus
-from shell.plots.feed import attach
-from shell.plots.series import parse_series
-from shell.roles import Series
+from multidrop.dialects import Diagnostic, Refused
+from multidrop.drives.events import Sample, Valued
+from multidrop.drives.readings import Value
+from multidrop.shell.events import OnBus
+from multidrop.shell.plots.feed import attach
+from multidrop.shell.plots.series import parse_series
+from multidrop.shell.roles import Series
 from tests.support.cell_session import ETHERNET, CellSession, bus, party, pmx
 
 pytestmark = pytest.mark.virtual

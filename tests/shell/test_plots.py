@@ -16,13 +16,13 @@ from typing import Any
 
 import pytest
 
-from dialects import Diagnostic
-from drives.events import Sample
-from shell.plots.plot import Plot
-from shell.plots.target import PlotTarget, parse_target
+from multidrop.dialects import Diagnostic
+from multidrop.drives.events import Sample
+from multidrop.shell.plots.plot import Plot
+from multidrop.shell.plots.target import PlotTarget, parse_target
+from multidrop.transports import Unreachable
 from tests.support.paths import ROOT
 from tests.support.until import PATIENCE
-from transports import Unreachable
 
 EPOCH = 1_800_000_000.0
 
@@ -193,10 +193,10 @@ async def test_an_empty_file_is_written_and_one_in_no_folder_is_told(rerun: Any,
 CHILD = """
 import asyncio, os, sys
 from datetime import UTC, datetime
-from drives.events import Sample
-from shell.plots import plot as plots, sink
-from shell.plots.plot import Plot
-from shell.plots.target import parse_target
+from multidrop.drives.events import Sample
+from multidrop.shell.plots import plot as plots, sink
+from multidrop.shell.plots.plot import Plot
+from multidrop.shell.plots.target import parse_target
 
 async def main(to, limit):
     if limit:

@@ -8,14 +8,14 @@ from typing import Any
 
 import pytest
 
-from dialects import Diagnostic
-from dialects.conditions import Conditions, Lamp
-from drives.events import Conditioned, Sample, Unsolicited, Valued
-from drives.readings import Value
-from shell.events import By, Entered, Failed, Notified, OnBus, Output, Printed, SessionEvent
-from shell.plots.feed import attach
-from shell.plots.target import parse_target
-from shell.roles import Series
+from multidrop.dialects import Diagnostic
+from multidrop.dialects.conditions import Conditions, Lamp
+from multidrop.drives.events import Conditioned, Sample, Unsolicited, Valued
+from multidrop.drives.readings import Value
+from multidrop.shell.events import By, Entered, Failed, Notified, OnBus, Output, Printed, SessionEvent
+from multidrop.shell.plots.feed import attach
+from multidrop.shell.plots.target import parse_target
+from multidrop.shell.roles import Series
 
 # What is typed
 

@@ -6,12 +6,12 @@ import asyncio
 
 import pytest
 
-from dialects import Diagnostic, Refused, Stopped
-from drives.events import Sample
-from shell.connect.settings import Settings
-from shell.events import By, Notified, OnBus, Output, Printed
-from shell.front.complete import complete, hint
-from shell.session import Session
+from multidrop.dialects import Diagnostic, Refused, Stopped
+from multidrop.drives.events import Sample
+from multidrop.shell.connect.settings import Settings
+from multidrop.shell.events import By, Notified, OnBus, Output, Printed
+from multidrop.shell.front.complete import complete, hint
+from multidrop.shell.session import Session
 from tests.support.until import PATIENCE
 
 pytestmark = pytest.mark.virtual
@@ -72,7 +72,7 @@ async def test_a_stop_stops_both_axes_of_every_controller(session):
 
 async def test_a_program_that_moves_is_stopped_for_good(session):
     lines = ["PRG 0", "WHILE 1=1", "X1000", "WAITX", "X0", "WAITX", "ENDWHILE", "END"]
-    from dialects.pmx.manual import program_file
+    from multidrop.dialects.pmx.manual import program_file
 
     drive = session.buses["stages"].drives["00"]
     await drive.download(program_file.read("\n".join(lines), "shuttle.prg"))

@@ -7,9 +7,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dialects.state import Remembered
-from shell.connect.port_memory import MOST, PortMemory
-from shell.connect.port_state import PortState
+from multidrop.dialects.state import Remembered
+from multidrop.shell.connect.port_memory import MOST, PortMemory
+from multidrop.shell.connect.port_state import PortState
 
 A = Remembered("a", "a", "LMDCM", "LMDCM 6.002, Hw: 3.2", "LMDCM571", "0401", True, 1, 2)
 B, ALONE = replace(A, address="b", name="b", serial="0402"), replace(A, address="", party=False)

@@ -9,12 +9,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dialects import Owed
-from dialects.mcode.host.codec import MCode
-from dialects.mcode.host.state import MCodeState
-from dialects.tmcl.host.codec import Tmcl
-from dialects.tmcl.host.state import TmclState
-from shell.connect.port_state import MOST, PortState
+from multidrop.dialects import Owed
+from multidrop.dialects.mcode.host.codec import MCode
+from multidrop.dialects.mcode.host.state import MCodeState
+from multidrop.dialects.tmcl.host.codec import Tmcl
+from multidrop.dialects.tmcl.host.state import TmclState
+from multidrop.shell.connect.port_state import MOST, PortState
 
 PORT = "/dev/serial/by-id/usb-FTDI/RS485: 1"
 OWED = Owed(1, "a", "LMDCM", "LMDCM 6.002", "LMDCM571", "0401")

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from shell.events import Phase, ProgramRead, ProgramSeen
+from multidrop.shell.events import Phase, ProgramRead, ProgramSeen
 from tests.support.cell_session import CellSession, bus, pmx
 from tests.support.debugged import LINES, ROUND, cell, ethernet, run
 

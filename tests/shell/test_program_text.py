@@ -10,19 +10,19 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dialects import Diagnostic
-from dialects.families import program_languages
-from dialects.files import split_lines
-from dialects.mcode.manual.canonical import canonical
-from dialects.mcode.manual.grammar import LineError, Statement, parse
-from dialects.mcode.manual.program_file import scan
-from dialects.pmx.manual.program_file import compiled
-from dialects.pmx.manual.program_file import read as read_script
-from dialects.program_editing import Block, replaced
-from shell.program_text import Edit, ProgramGrammar, ProgramText
-from simulator.cell.spec import DriveSpec, WorldSpec
-from simulator.lexium.device import MCodeDevice
-from simulator.world import World
+from multidrop.dialects import Diagnostic
+from multidrop.dialects.families import program_languages
+from multidrop.dialects.files import split_lines
+from multidrop.dialects.mcode.manual.canonical import canonical
+from multidrop.dialects.mcode.manual.grammar import LineError, Statement, parse
+from multidrop.dialects.mcode.manual.program_file import scan
+from multidrop.dialects.pmx.manual.program_file import compiled
+from multidrop.dialects.pmx.manual.program_file import read as read_script
+from multidrop.dialects.program_editing import Block, replaced
+from multidrop.shell.program_text import Edit, ProgramGrammar, ProgramText
+from multidrop.simulator.cell.spec import DriveSpec, WorldSpec
+from multidrop.simulator.lexium.device import MCodeDevice
+from multidrop.simulator.world import World
 from tests.support.program_texts import TEXTS
 from tests.support.sample_files import MCODE, PMX, product_of
 

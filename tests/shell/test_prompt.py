@@ -7,10 +7,10 @@ from prompt_toolkit.application import create_app_session
 from prompt_toolkit.input import create_pipe_input
 from prompt_toolkit.output import DummyOutput
 
-from shell.connect.settings import Settings
-from shell.events import Entered, Output, Progressed, StateChanged
-from shell.front.prompt import Prompt
-from shell.session import Session
+from multidrop.shell.connect.settings import Settings
+from multidrop.shell.events import Entered, Output, Progressed, StateChanged
+from multidrop.shell.front.prompt import Prompt
+from multidrop.shell.session import Session
 from tests.support.until import PATIENCE
 
 

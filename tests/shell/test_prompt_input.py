@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from prompt_toolkit.keys import Keys
 
-from shell.front.prompt_keys import BEGIN, END, KeyboardInput
+from multidrop.shell.front.prompt_keys import BEGIN, END, KeyboardInput
 
 PIECES = ["MR 5", "\r", BEGIN, END, "\x1b[A", "\x1b", "PR P\r", "é"]
 

@@ -6,7 +6,7 @@ import asyncio
 
 import pytest
 
-from shell.front.prompt_lines import BURST, CHUNK, LONG_PAUSE, MANY, MOST, PATIENCE, PAUSE, LinesAbove, Stream
+from multidrop.shell.front.prompt_lines import BURST, CHUNK, LONG_PAUSE, MANY, MOST, PATIENCE, PAUSE, LinesAbove, Stream
 from tests.support.virtual import in_virtual_time
 
 

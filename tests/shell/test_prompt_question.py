@@ -8,12 +8,12 @@ from prompt_toolkit.application import create_app_session
 from prompt_toolkit.input import create_pipe_input
 from prompt_toolkit.output import DummyOutput
 
-from dialects import Diagnostic, Stopped
-from shell.connect.settings import Settings
-from shell.events import Entered, Notified
-from shell.front.answer import PAUSE
-from shell.front.prompt import Prompt
-from shell.session import Session
+from multidrop.dialects import Diagnostic, Stopped
+from multidrop.shell.connect.settings import Settings
+from multidrop.shell.events import Entered, Notified
+from multidrop.shell.front.answer import PAUSE
+from multidrop.shell.front.prompt import Prompt
+from multidrop.shell.session import Session
 from tests.support.virtual import in_virtual_time
 
 LONG = PAUSE * 2

@@ -10,13 +10,13 @@ from pathlib import Path
 
 import pytest
 
-from drives.events import Unsolicited
-from shell.events import OnBus
-from shell.publishing.backlog import Backlog, Message
-from shell.publishing.feed import HEARTBEAT, Feed
-from shell.publishing.limits import BURST, LINES
-from shell.publishing.publisher import Publisher
-from shell.publishing.topics import Topics
+from multidrop.drives.events import Unsolicited
+from multidrop.shell.events import OnBus
+from multidrop.shell.publishing.backlog import Backlog, Message
+from multidrop.shell.publishing.feed import HEARTBEAT, Feed
+from multidrop.shell.publishing.limits import BURST, LINES
+from multidrop.shell.publishing.publisher import Publisher
+from multidrop.shell.publishing.topics import Topics
 from tests.support.cell_session import ETHERNET, CellSession, bus, party, pmx
 from tests.support.kept_broker import KeptBroker
 

@@ -7,13 +7,13 @@ from pathlib import Path
 
 import pytest
 
-from dialects import Diagnostic
-from shell.connect.settings import Settings
-from shell.events import Notified
-from shell.front.publishing import AGAIN, open_later, open_lines
-from shell.session import Session
+from multidrop.dialects import Diagnostic
+from multidrop.shell.connect.settings import Settings
+from multidrop.shell.events import Notified
+from multidrop.shell.front.publishing import AGAIN, open_later, open_lines
+from multidrop.shell.session import Session
+from multidrop.transports import TransportLost
 from tests.support.cell_session import bus, party
-from transports import TransportLost
 
 pytestmark = pytest.mark.virtual
 

@@ -12,18 +12,18 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dialects import Diagnostic
-from dialects.conditions import UNREAD, Conditions
-from drives.events import Conditioned, Sample
-from shell.connect import settings
-from shell.connect.mqtt_settings import MqttSettings
-from shell.log.entries import Entry
-from shell.publishing import messages
-from shell.publishing.backlog import Backlog, Message
-from shell.publishing.drive_feed import DriveFeed
-from shell.publishing.limits import BURST, LINES, UNCHANGED, Curve, LineLimit, Point, SampleLimit, parse_rate
-from shell.publishing.target import Target, parse_target
-from shell.publishing.topics import Topics, escape, unescape
+from multidrop.dialects import Diagnostic
+from multidrop.dialects.conditions import UNREAD, Conditions
+from multidrop.drives.events import Conditioned, Sample
+from multidrop.shell.connect import settings
+from multidrop.shell.connect.mqtt_settings import MqttSettings
+from multidrop.shell.log.entries import Entry
+from multidrop.shell.publishing import messages
+from multidrop.shell.publishing.backlog import Backlog, Message
+from multidrop.shell.publishing.drive_feed import DriveFeed
+from multidrop.shell.publishing.limits import BURST, LINES, UNCHANGED, Curve, LineLimit, Point, SampleLimit, parse_rate
+from multidrop.shell.publishing.target import Target, parse_target
+from multidrop.shell.publishing.topics import Topics, escape, unescape
 
 # Topics
 

@@ -9,11 +9,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from shell.publishing.backlog import Backlog, Message
-from shell.publishing.publisher import DRAIN, LONGEST, REMIND, Publisher
+from multidrop.shell.publishing.backlog import Backlog, Message
+from multidrop.shell.publishing.publisher import DRAIN, LONGEST, REMIND, Publisher
+from multidrop.transports import Unreachable
 from tests.support.kept_broker import KeptBroker
 from tests.support.virtual import in_virtual_time
-from transports import Unreachable
 
 pytestmark = pytest.mark.virtual
 ONLINE, BYE = Message("p/status", "online", True), Message("p/status", "bye", True)

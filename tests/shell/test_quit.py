@@ -7,8 +7,8 @@ import signal
 import pexpect
 import pytest
 
-from dialects import Stopped
-from drives.drive import confirmed_motion
+from multidrop.dialects import Stopped
+from multidrop.drives.drive import confirmed_motion
 from tests.support.cell_session import CellSession, bus, party, pmx
 from tests.support.processes import Running
 from tests.support.served_cell import until

@@ -9,15 +9,15 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dialects import Diagnostic, NoAnswer, Stopped
-from macros import Macro, Step
-from shell.connect.settings import Settings
-from shell.events import By, Bytes
-from shell.raw import Form, hex_of, parse_bytes, text_of
-from shell.session import Session
+from multidrop.dialects import Diagnostic, NoAnswer, Stopped
+from multidrop.macros import Macro, Step
+from multidrop.shell.connect.settings import Settings
+from multidrop.shell.events import By, Bytes
+from multidrop.shell.raw import Form, hex_of, parse_bytes, text_of
+from multidrop.shell.session import Session
+from multidrop.transports import TransportLost
 from tests.support.cell_session import CellSession, bus, moves, party, pmx
 from tests.support.virtual import in_virtual_time
-from transports import TransportLost
 
 ALONE = 'personality = "LMDCM"\nset = { EM = 0 }'
 

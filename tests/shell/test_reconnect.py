@@ -10,15 +10,15 @@ from typing import Any
 
 import pytest
 
-from dialects import Diagnostic
-from drives.events import Sample
-from macros import Macro, Step
-from shell.events import OnBus
+from multidrop.dialects import Diagnostic
+from multidrop.drives.events import Sample
+from multidrop.macros import Macro, Step
+from multidrop.shell.events import OnBus
+from multidrop.transports import TransportLost
 from tests.support.cell_session import ETHERNET, CellSession, bus, party, pmx
 from tests.support.mcode_drives import Witness
 from tests.support.until import until
 from tests.support.virtual import in_virtual_time
-from transports import TransportLost
 
 pytestmark = pytest.mark.slow
 

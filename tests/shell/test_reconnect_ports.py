@@ -15,15 +15,15 @@ from typing import Any
 
 import pytest
 
-from dialects import Diagnostic
-from shell.connect.reopening import Absent, SerialAgain
-from shell.connect.settings import Settings
-from shell.events import Notified, Printed
-from shell.session import Session
-from simulator.cells import load
-from simulator.floor import Floor
-from simulator.serving.endpoints import Served, serve_bus
-from simulator.serving.running import RunningFloor
+from multidrop.dialects import Diagnostic
+from multidrop.shell.connect.reopening import Absent, SerialAgain
+from multidrop.shell.connect.settings import Settings
+from multidrop.shell.events import Notified, Printed
+from multidrop.shell.session import Session
+from multidrop.simulator.cells import load
+from multidrop.simulator.floor import Floor
+from multidrop.simulator.serving.endpoints import Served, serve_bus
+from multidrop.simulator.serving.running import RunningFloor
 from tests.support.processes import Running
 from tests.support.until import until
 

@@ -8,11 +8,11 @@ from random import Random
 
 import pytest
 
-from dialects import DriveError
+from multidrop.dialects import DriveError
+from multidrop.transports import TransportLost
 from tests.support.cell_session import ETHERNET, CellSession, bus, party
 from tests.support.mcode_drives import Witness
 from tests.support.virtual import in_virtual_time
-from transports import TransportLost
 
 ORDINARY, ALL = 2, 60
 WAITS = (0.001, 0.01, 0.05, 0.3, 1.0, 3.0)

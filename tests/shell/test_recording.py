@@ -8,10 +8,10 @@ from pathlib import Path
 
 import pytest
 
-from dialects import Refused
-from shell.connect.settings import Settings
-from shell.events import Notified
-from shell.session import Session
+from multidrop.dialects import Refused
+from multidrop.shell.connect.settings import Settings
+from multidrop.shell.events import Notified
+from multidrop.shell.session import Session
 
 pytestmark = pytest.mark.virtual
 

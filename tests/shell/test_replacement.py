@@ -8,12 +8,12 @@ from pathlib import Path
 
 import pytest
 
-from dialects import Diagnostic, DriveError, Refused, Stopped
-from drives.events import Traffic
-from shell import replacement, snapshots
-from simulator import cells
+from multidrop.dialects import Diagnostic, DriveError, Refused, Stopped
+from multidrop.drives.events import Traffic
+from multidrop.shell import replacement, snapshots
+from multidrop.simulator import cells
+from multidrop.transports import TransportLost
 from tests.support.cell_session import CellSession, bus
-from transports import TransportLost
 
 pytestmark = [pytest.mark.virtual, pytest.mark.slow]
 

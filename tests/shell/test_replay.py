@@ -9,11 +9,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dialects import Diagnostic, DriveError, Stopped
-from shell.front.replay import replay
-from shell.log.entries import BEGIN, KINDS, Entry, line_of
-from shell.log.steps import compared, read
-from shell.log.writer import SessionLog
+from multidrop.dialects import Diagnostic, DriveError, Stopped
+from multidrop.shell.front.replay import replay
+from multidrop.shell.log.entries import BEGIN, KINDS, Entry, line_of
+from multidrop.shell.log.steps import compared, read
+from multidrop.shell.log.writer import SessionLog
 from tests.support.cell_session import CellSession, bus, party
 from tests.support.virtual import in_virtual_time
 

@@ -13,15 +13,15 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dialects import DriveError, Priority
-from dialects.families import FAMILIES
-from drives.drive import Drive
-from drives.procedure import ProcedureRunner
-from shell.front.replay import replay
-from shell.front.replay_report import ReplayReport
-from shell.log.steps import Exchange, read
-from shell.log.writer import SessionLog
-from shell.twins.after import Decoding
+from multidrop.dialects import DriveError, Priority
+from multidrop.dialects.families import FAMILIES
+from multidrop.drives.drive import Drive
+from multidrop.drives.procedure import ProcedureRunner
+from multidrop.shell.front.replay import replay
+from multidrop.shell.front.replay_report import ReplayReport
+from multidrop.shell.log.steps import Exchange, read
+from multidrop.shell.log.writer import SessionLog
+from multidrop.shell.twins.after import Decoding
 from tests.support.cell_session import ETHERNET, CellSession, bus, party, pmx
 from tests.support.twin_cell import encoder, run
 

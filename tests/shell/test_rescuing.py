@@ -5,10 +5,10 @@ from itertools import product
 
 import pytest
 
-from dialects import Diagnostic, Stopped
-from shell.connect.urls import parse
-from shell.rescuing import Rescue
-from shell.scanning import NothingFound, Scanning
+from multidrop.dialects import Diagnostic, Stopped
+from multidrop.shell.connect.urls import parse
+from multidrop.shell.rescuing import Rescue
+from multidrop.shell.scanning import NothingFound, Scanning
 from tests.support.cell_session import bus, pmx
 from tests.support.tuned_ports import Port
 from tests.support.virtual import in_virtual_time

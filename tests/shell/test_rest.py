@@ -9,13 +9,13 @@ from typing import Any
 
 import pytest
 
-from dialects import Motion, Priority
-from dialects.families import FAMILIES
-from drives.drive import Drive
-from drives.events import Sample
-from drives.halt import Fate
-from shell.events import OnBus
-from shell.motion import standings
+from multidrop.dialects import Motion, Priority
+from multidrop.dialects.families import FAMILIES
+from multidrop.drives.drive import Drive
+from multidrop.drives.events import Sample
+from multidrop.drives.halt import Fate
+from multidrop.shell.events import OnBus
+from multidrop.shell.motion import standings
 from tests.support.cell_session import CellSession, bus, party
 from tests.support.virtual import in_virtual_time
 

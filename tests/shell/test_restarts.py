@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from dialects import Diagnostic
-from dialects.families import FAMILIES
+from multidrop.dialects import Diagnostic
+from multidrop.dialects.families import FAMILIES
 from tests.support.cell_session import CellSession, bus, party, pmx
 
 pytestmark = pytest.mark.virtual

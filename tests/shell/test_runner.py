@@ -4,11 +4,11 @@ import select
 
 import pytest
 
-from dialects import Diagnostic
-from dialects.files import LARGEST
-from shell.front.stream import stream_lines
-from shell.lines import uncommented
-from shell.scripts.reading import read_script
+from multidrop.dialects import Diagnostic
+from multidrop.dialects.files import LARGEST
+from multidrop.shell.front.stream import stream_lines
+from multidrop.shell.lines import uncommented
+from multidrop.shell.scripts.reading import read_script
 from tests.support.until import PATIENCE
 
 

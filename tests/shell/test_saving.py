@@ -2,8 +2,8 @@
 
 import pytest
 
-from dialects import Diagnostic
-from shell.connect import saving, settings
+from multidrop.dialects import Diagnostic
+from multidrop.shell.connect import saving, settings
 
 OLD = "# the shop\n[connections.press]\nurl = 'serial:/dev/ttyS0'   # left\n"
 

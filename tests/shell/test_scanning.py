@@ -4,16 +4,16 @@ import asyncio
 
 import pytest
 
-from dialects import Diagnostic, Stopped
-from dialects.state import Remembered
-from shell.connect.port_state import PortState
-from shell.connect.urls import parse
-from shell.found import url_of
-from shell.scanning import NothingFound, Scanning
+from multidrop.dialects import Diagnostic, Stopped
+from multidrop.dialects.state import Remembered
+from multidrop.shell.connect.port_state import PortState
+from multidrop.shell.connect.urls import parse
+from multidrop.shell.found import url_of
+from multidrop.shell.scanning import NothingFound, Scanning
+from multidrop.transports import TransportLost
 from tests.support.cell_session import CellSession, bus, party, pmx
 from tests.support.tuned_ports import Port
 from tests.support.virtual import in_virtual_time
-from transports import TransportLost
 
 pytestmark = pytest.mark.slow
 

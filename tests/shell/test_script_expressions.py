@@ -7,9 +7,9 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from dialects import Diagnostic
-from shell.scripts.expression import Name, Word, evaluate, parse, parse_check, unknowns
-from shell.scripts.values import LARGEST, value_of, written
+from multidrop.dialects import Diagnostic
+from multidrop.shell.scripts.expression import Name, Word, evaluate, parse, parse_check, unknowns
+from multidrop.shell.scripts.values import LARGEST, value_of, written
 
 SIGNS = {
     "+": operator.add,

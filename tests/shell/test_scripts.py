@@ -6,13 +6,13 @@ from xml.etree import ElementTree
 
 import pytest
 
-from dialects import Diagnostic, DriveError, Stopped
-from macros import Macro, Step
-from shell.front.report import Report
-from shell.output import exit_code, report
-from shell.scripts.execution import CheckFailed
-from shell.scripts.executor import run_script
-from shell.scripts.reading import read_script
+from multidrop.dialects import Diagnostic, DriveError, Stopped
+from multidrop.macros import Macro, Step
+from multidrop.shell.front.report import Report
+from multidrop.shell.output import exit_code, report
+from multidrop.shell.scripts.execution import CheckFailed
+from multidrop.shell.scripts.executor import run_script
+from multidrop.shell.scripts.reading import read_script
 from tests.support.cell_session import CellSession, bus, party, pmx
 from tests.support.virtual import in_virtual_time
 

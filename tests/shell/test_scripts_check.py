@@ -5,9 +5,9 @@ import sys
 
 import pytest
 
-from dialects import Diagnostic
-from macros import Macro, MacroStore, Step
-from shell.scripts.reading import WrongScript, read_script
+from multidrop.dialects import Diagnostic
+from multidrop.macros import Macro, MacroStore, Step
+from multidrop.shell.scripts.reading import WrongScript, read_script
 
 
 @pytest.fixture

@@ -6,12 +6,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dialects import Diagnostic
 from multidrop.__main__ import main
-from shell.connect.urls import parse
-from shell.plots.target import parse_target as plot_target
-from shell.publishing.target import parse_target as broker
-from shell.secrets import HIDDEN, toml_without_secrets, without_secrets
+from multidrop.dialects import Diagnostic
+from multidrop.shell.connect.urls import parse
+from multidrop.shell.plots.target import parse_target as plot_target
+from multidrop.shell.publishing.target import parse_target as broker
+from multidrop.shell.secrets import HIDDEN, toml_without_secrets, without_secrets
 
 
 @pytest.mark.parametrize(

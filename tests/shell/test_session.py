@@ -5,19 +5,19 @@ from dataclasses import dataclass, field
 
 import pytest
 
-from dialects import Diagnostic, DriveError, Hints, Motion, NoAnswer, Refused, Stopped
-from dialects.families import DEFAULT, FAMILIES
-from dialects.mcode.host.codec import MCode
-from dialects.mcode.host.state import MCodeState
-from drives.events import Changed, Lost, Notice, Unsolicited
-from drives.halt import Halt
-from macros import Macro, Step
-from shell.connect.opening import Opened
-from shell.connect.settings import SavedConnection, Settings
-from shell.events import By, Entered, Failed, Notified, OnBus, Printed, StateChanged
-from shell.output import report
-from shell.session import Session
-from transports import TransportLost
+from multidrop.dialects import Diagnostic, DriveError, Hints, Motion, NoAnswer, Refused, Stopped
+from multidrop.dialects.families import DEFAULT, FAMILIES
+from multidrop.dialects.mcode.host.codec import MCode
+from multidrop.dialects.mcode.host.state import MCodeState
+from multidrop.drives.events import Changed, Lost, Notice, Unsolicited
+from multidrop.drives.halt import Halt
+from multidrop.macros import Macro, Step
+from multidrop.shell.connect.opening import Opened
+from multidrop.shell.connect.settings import SavedConnection, Settings
+from multidrop.shell.events import By, Entered, Failed, Notified, OnBus, Printed, StateChanged
+from multidrop.shell.output import report
+from multidrop.shell.session import Session
+from multidrop.transports import TransportLost
 
 
 @dataclass(eq=False)

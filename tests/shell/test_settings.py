@@ -3,8 +3,8 @@ from pathlib import Path
 
 import pytest
 
-from dialects import Diagnostic
-from shell.connect import settings
+from multidrop.dialects import Diagnostic
+from multidrop.shell.connect import settings
 
 
 @pytest.fixture

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import pytest
 
-from dialects.visible import visible
-from shell.sharing.exchange import SILENT
+from multidrop.dialects.visible import visible
+from multidrop.shell.sharing.exchange import SILENT
+from multidrop.transports import telnet
+from multidrop.transports.com_port import OPTION
 from tests.support.shared_exchange import ADA, BOB, EVE, Port
-from transports import telnet
-from transports.com_port import OPTION
 
 HELLO = telnet.option(telnet.WILL, OPTION)
 MST = bytes([1, 3, 0, 0, 0, 0, 0, 0, 4])

@@ -17,18 +17,18 @@ from unittest.mock import Mock
 import pytest
 import serial
 
-from shell.connect.opening import open_port
-from shell.connect.urls import parse
-from shell.sharing import server
-from shell.sharing.actions import Say
-from shell.sharing.client import Client, Input, Request
-from shell.sharing.exchange import NOT_REACHED, TURN
-from shell.sharing.server import SharedPort
-from shell.sharing.stop_bytes import stop_bytes
+from multidrop.shell.connect.opening import open_port
+from multidrop.shell.connect.urls import parse
+from multidrop.shell.sharing import server
+from multidrop.shell.sharing.actions import Say
+from multidrop.shell.sharing.client import Client, Input, Request
+from multidrop.shell.sharing.exchange import NOT_REACHED, TURN
+from multidrop.shell.sharing.server import SharedPort
+from multidrop.shell.sharing.stop_bytes import stop_bytes
+from multidrop.transports import TransportLost, Unreachable, telnet
+from multidrop.transports.com_port import OPTION, Setting, message
+from multidrop.transports.rfc2217 import open_rfc2217
 from tests.support.until import PATIENCE, until
-from transports import TransportLost, Unreachable, telnet
-from transports.com_port import OPTION, Setting, message
-from transports.rfc2217 import open_rfc2217
 
 pytestmark = [
     pytest.mark.skipif(sys.platform == "win32", reason="the port is a pseudo-terminal"),

@@ -5,11 +5,11 @@ from __future__ import annotations
 from hypothesis import given
 from hypothesis import strategies as st
 
-from shell.sharing.actions import Close, Send, Stop, Write
-from shell.sharing.exchange import SILENT, Exchange
-from shell.sharing.stop_bytes import stop_bytes
-from transports import telnet
-from transports.com_port import OPTION, Setting, message
+from multidrop.shell.sharing.actions import Close, Send, Stop, Write
+from multidrop.shell.sharing.exchange import SILENT, Exchange
+from multidrop.shell.sharing.stop_bytes import stop_bytes
+from multidrop.transports import telnet
+from multidrop.transports.com_port import OPTION, Setting, message
 
 PIECES = st.one_of(
     st.binary(max_size=12),

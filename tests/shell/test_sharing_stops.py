@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import pytest
 
-from dialects import Codec, Diagnostic
-from dialects.mcode.host.codec import MCode
-from dialects.pmx.host.codec import Pmx
-from dialects.tmcl.host.codec import Tmcl
-from shell.sharing.exchange import NEVER, NOT_REACHED, OWED
-from shell.sharing.stop_bytes import CERTAIN, NOTICED, stop_bytes
+from multidrop.dialects import Codec, Diagnostic
+from multidrop.dialects.mcode.host.codec import MCode
+from multidrop.dialects.pmx.host.codec import Pmx
+from multidrop.dialects.tmcl.host.codec import Tmcl
+from multidrop.shell.sharing.exchange import NEVER, NOT_REACHED, OWED
+from multidrop.shell.sharing.stop_bytes import CERTAIN, NOTICED, stop_bytes
+from multidrop.transports import telnet
+from multidrop.transports.com_port import OPTION, REPLY, Setting, message
 from tests.support.shared_exchange import ADA, BOB, Port
-from transports import telnet
-from transports.com_port import OPTION, REPLY, Setting, message
 
 CODECS: list[tuple[str, Codec]] = [
     *(("mcode", MCode(party=party, escape=escape)) for party in (False, True) for escape in (0, 1, 2, 3)),

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import pytest
 
-from shell.sharing.actions import Action, Close, Send, Set, Stop, Write
-from shell.sharing.exchange import TURN, WAITING
+from multidrop.shell.sharing.actions import Action, Close, Send, Set, Stop, Write
+from multidrop.shell.sharing.exchange import TURN, WAITING
+from multidrop.transports import telnet
+from multidrop.transports.com_port import OPTION, REPLY, Control, Setting, message
 from tests.support.shared_exchange import ADA, BOB, EVE, Port
-from transports import telnet
-from transports.com_port import OPTION, REPLY, Control, Setting, message
 
 HELLO = telnet.option(telnet.WILL, OPTION)
 MST = bytes([1, 3, 0, 0, 0, 0, 0, 0, 4])

@@ -4,13 +4,13 @@ import asyncio
 
 import pytest
 
-from dialects import DriveError, Inexpressible, NoAnswer, Refused, Stopped
-from drives.events import Traffic
-from shell.connect.settings import SavedConnection, Settings
-from shell.events import Failed, Notified, OnBus, Output, Printed
-from shell.session import Session
+from multidrop.dialects import DriveError, Inexpressible, NoAnswer, Refused, Stopped
+from multidrop.drives.events import Traffic
+from multidrop.shell.connect.settings import SavedConnection, Settings
+from multidrop.shell.events import Failed, Notified, OnBus, Output, Printed
+from multidrop.shell.session import Session
+from multidrop.transports import TransportLost
 from tests.support.until import PATIENCE
-from transports import TransportLost
 
 pytestmark = pytest.mark.virtual
 

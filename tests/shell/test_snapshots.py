@@ -7,14 +7,14 @@ from pathlib import Path
 
 import pytest
 
-from dialects import Diagnostic, DriveError, Stopped
-from shell import snapshots, transfers
-from shell.connect.settings import Settings
-from shell.events import Notified
-from shell.session import Session
-from simulator import cells
+from multidrop.dialects import Diagnostic, DriveError, Stopped
+from multidrop.shell import snapshots, transfers
+from multidrop.shell.connect.settings import Settings
+from multidrop.shell.events import Notified
+from multidrop.shell.session import Session
+from multidrop.simulator import cells
+from multidrop.transports import TransportLost
 from tests.support.cell_session import CellSession, bus, pmx
-from transports import TransportLost
 
 pytestmark = [pytest.mark.virtual, pytest.mark.slow]
 

@@ -7,13 +7,13 @@ from collections.abc import Iterator
 
 import pytest
 
-from dialects import Diagnostic
-from dialects.mcode.manual.table import words
-from shell import snapshots
-from simulator import cells
-from simulator.floor import Floor
-from simulator.lexium.drive_table import KEY_OF
-from simulator.lexium.state.models import MODELS
+from multidrop.dialects import Diagnostic
+from multidrop.dialects.mcode.manual.table import words
+from multidrop.shell import snapshots
+from multidrop.simulator import cells
+from multidrop.simulator.floor import Floor
+from multidrop.simulator.lexium.drive_table import KEY_OF
+from multidrop.simulator.lexium.state.models import MODELS
 from tests.shell.test_snapshots import taken
 from tests.support.cell_session import CellSession, bus
 

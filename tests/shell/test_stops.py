@@ -5,15 +5,15 @@ from dataclasses import replace
 
 import pytest
 
-from dialects import Motion, Stopped
-from drives.drive import Drive, confirmed_motion
-from drives.halt import Fate
-from shell import stops
-from shell.automation import outcome
-from shell.events import OnBus
+from multidrop.dialects import Motion, Stopped
+from multidrop.drives.drive import Drive, confirmed_motion
+from multidrop.drives.halt import Fate
+from multidrop.shell import stops
+from multidrop.shell.automation import outcome
+from multidrop.shell.events import OnBus
+from multidrop.transports import TransportLost
 from tests.support.cell_session import ETHERNET, CellSession, bus, party, pmx
 from tests.support.virtual import in_virtual_time
-from transports import TransportLost
 
 FLOOR = (bus("press", party("a"), party("b")), bus("eth", ETHERNET), bus("stages", pmx("00"), pmx("01")))
 ALL = ("@press:a SL 50000", "@press:b SL -50000", "@eth:! SL 30000", "@stages:00 JX+", "@stages:01 JY-")

@@ -7,11 +7,11 @@ from contextlib import contextmanager
 
 import pytest
 
-from dialects import Diagnostic
-from shell.sweeps import cluster
-from shell.sweeps.interruption import Interruption
-from shell.sweeps.trial import Case, Job, Result
-from transports import TransportLost
+from multidrop.dialects import Diagnostic
+from multidrop.shell.sweeps import cluster
+from multidrop.shell.sweeps.interruption import Interruption
+from multidrop.shell.sweeps.trial import Case, Job, Result
+from multidrop.transports import TransportLost
 
 comm = pytest.importorskip("distributed.comm", reason="the extra cluster is not installed")
 

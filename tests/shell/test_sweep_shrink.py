@@ -6,9 +6,9 @@ from collections.abc import Callable
 
 import pytest
 
-from shell.sweeps.shrink import MOST, shrunk
-from shell.sweeps.trial import HELD, REFUSED, Case, Result
-from shell.sweeps.values import parse
+from multidrop.shell.sweeps.shrink import MOST, shrunk
+from multidrop.shell.sweeps.trial import HELD, REFUSED, Case, Result
+from multidrop.shell.sweeps.values import parse
 
 LOAD, WALL, SPEED = parse("0..0.9:0.1"), parse("10000..90000:10000"), parse("1000..50000")
 OWN = [None, None, 20000]

@@ -7,9 +7,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dialects import Diagnostic
-from shell.sweeps.values import parse, simpler, spelled
-from shell.sweeps.variation import parse as parse_key
+from multidrop.dialects import Diagnostic
+from multidrop.shell.sweeps.values import parse, simpler, spelled
+from multidrop.shell.sweeps.variation import parse as parse_key
 
 
 def values(text: str, *, drawn: bool = False) -> list[object]:

@@ -10,9 +10,9 @@ from collections.abc import Callable, Sequence
 
 import pytest
 
-from shell.sweeps import pools, workers
-from shell.sweeps.interruption import Interruption
-from shell.sweeps.trial import DIED, Case, Job, Result
+from multidrop.shell.sweeps import pools, workers
+from multidrop.shell.sweeps.interruption import Interruption
+from multidrop.shell.sweeps.trial import DIED, Case, Job, Result
 
 pytestmark = pytest.mark.process
 

@@ -2,9 +2,9 @@
 
 import pytest
 
-from dialects import Diagnostic
-from shell.connect.settings import load
-from shell.session import Session
+from multidrop.dialects import Diagnostic
+from multidrop.shell.connect.settings import load
+from multidrop.shell.session import Session
 
 pytestmark = pytest.mark.virtual
 

@@ -7,15 +7,15 @@ import itertools
 
 import pytest
 
-from dialects import Diagnostic, DriveError, Inexpressible, NoAnswer, Refused, Stopped
-from dialects.families import TABLE
-from drives.events import Sample, Unsolicited
-from drives.stop_forms import stop_forms
-from shell.connect.settings import Settings
-from shell.connect.urls import parse as parse_url
-from shell.events import By, Notified, OnBus, Output, Printed
-from shell.front.complete import complete, hint
-from shell.session import Session
+from multidrop.dialects import Diagnostic, DriveError, Inexpressible, NoAnswer, Refused, Stopped
+from multidrop.dialects.families import TABLE
+from multidrop.drives.events import Sample, Unsolicited
+from multidrop.drives.stop_forms import stop_forms
+from multidrop.shell.connect.settings import Settings
+from multidrop.shell.connect.urls import parse as parse_url
+from multidrop.shell.events import By, Notified, OnBus, Output, Printed
+from multidrop.shell.front.complete import complete, hint
+from multidrop.shell.session import Session
 from tests.support.until import PATIENCE
 
 pytestmark = pytest.mark.virtual

@@ -4,10 +4,10 @@ from pathlib import Path
 
 import pytest
 
-from dialects import Diagnostic
-from shell.connect import settings
-from shell.events import Notified
-from shell.transcripts import EVERYTHING, Filter
+from multidrop.dialects import Diagnostic
+from multidrop.shell.connect import settings
+from multidrop.shell.events import Notified
+from multidrop.shell.transcripts import EVERYTHING, Filter
 from tests.support.cases import for_each
 from tests.support.cell_session import CellSession, bus, party
 from tests.support.virtual import in_virtual_time

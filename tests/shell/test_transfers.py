@@ -6,9 +6,9 @@ from pathlib import Path
 
 import pytest
 
-from dialects import Diagnostic
-from shell import backups
-from shell.events import Progressed
+from multidrop.dialects import Diagnostic
+from multidrop.shell import backups
+from multidrop.shell.events import Progressed
 from tests.support.cell_session import bus, pmx
 from tests.support.transfers import FILE, LISTED, LONG, SLOW, kept, load, shop_with
 from tests.support.virtual import in_virtual_time

@@ -9,13 +9,13 @@ from pathlib import Path
 
 import pytest
 
-from dialects import Diagnostic, Refused, Stopped
-from dialects.errors import Differs
+from multidrop.dialects import Diagnostic, Refused, Stopped
+from multidrop.dialects.errors import Differs
+from multidrop.transports import TransportLost
 from tests.support.cell_session import bus, pmx
 from tests.support.transfers import FILE, LONG, RUNNING, SLOW, kept, load, shop_with
 from tests.support.until import until
 from tests.support.virtual import in_virtual_time
-from transports import TransportLost
 
 pytestmark = pytest.mark.slow
 
@@ -28,7 +28,7 @@ def test_without_a_backup_nothing_is_sent(tmp_path: Path, monkeypatch: pytest.Mo
     @in_virtual_time
     async def body() -> None:
         async with shop_with(tmp_path) as shop:
-            monkeypatch.setattr("macros.atomic.os.fsync", fails)
+            monkeypatch.setattr("multidrop.macros.atomic.os.fsync", fails)
             with pytest.raises(Diagnostic, match="the backup cannot be written: .*; nothing was sent"):
                 await load(shop, tmp_path)
             assert b"PG" not in shop.written("line") and not kept(tmp_path)

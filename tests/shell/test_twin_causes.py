@@ -8,8 +8,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from shell.twins.causes import Known, Pair, causes
-from shell.twins.comparing import LASTING, LIMIT, Comparison, Verdict
+from multidrop.shell.twins.causes import Known, Pair, causes
+from multidrop.shell.twins.comparing import LASTING, LIMIT, Comparison, Verdict
 
 STEP = 0.1
 Motion = Callable[[float], tuple[float, float]]

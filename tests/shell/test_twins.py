@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from shell.events import Agreed, Diverged, Predicted
+from multidrop.shell.events import Agreed, Diverged, Predicted
 from tests.support.cell_session import CellSession, bus, party
 from tests.support.twin_cell import encoder, of, run
 

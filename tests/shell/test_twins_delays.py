@@ -8,8 +8,8 @@ from random import Random
 
 import pytest
 
-from shell.events import Diverged
-from simulator.serving.in_process import SimPipe
+from multidrop.shell.events import Diverged
+from multidrop.simulator.serving.in_process import SimPipe
 from tests.support.cell_session import CellSession, bus, party
 from tests.support.twin_cell import of, run
 

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from dialects import DriveError
+from multidrop.dialects import DriveError
 from tests.support.cell_session import CellSession, bus, party
 from tests.support.twin_cell import run
 

@@ -8,9 +8,9 @@ from pathlib import Path
 
 import pytest
 
-from dialects import Diagnostic, DriveError, NoAnswer, Refused
-from drives.events import Sent
-from shell.events import Diverged, OnBus, Predicted, TwinEnded
+from multidrop.dialects import Diagnostic, DriveError, NoAnswer, Refused
+from multidrop.drives.events import Sent
+from multidrop.shell.events import Diverged, OnBus, Predicted, TwinEnded
 from tests.support.cell_session import ETHERNET, CellSession, bus, party, pmx
 from tests.support.twin_cell import of, run
 

@@ -2,11 +2,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dialects import Diagnostic, Hints
-from shell.connect.opening import port_name
-from shell.connect.settings import SavedConnection
-from shell.connect.urls import KEYS, SCHEMES, parse
-from shell.found import port_of
+from multidrop.dialects import Diagnostic, Hints
+from multidrop.shell.connect.opening import port_name
+from multidrop.shell.connect.settings import SavedConnection
+from multidrop.shell.connect.urls import KEYS, SCHEMES, parse
+from multidrop.shell.found import port_of
 
 
 @pytest.mark.parametrize(

@@ -7,11 +7,11 @@ from pathlib import Path
 
 import pytest
 
-from dialects import Diagnostic, DriveError
-from shell.connect.settings import Settings
-from shell.lines import each_names_one_drive
-from shell.session import Session
-from shell.waits import condition
+from multidrop.dialects import Diagnostic, DriveError
+from multidrop.shell.connect.settings import Settings
+from multidrop.shell.lines import each_names_one_drive
+from multidrop.shell.session import Session
+from multidrop.shell.waits import condition
 
 pytestmark = pytest.mark.virtual
 

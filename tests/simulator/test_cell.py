@@ -6,9 +6,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dialects import Diagnostic
-from simulator import cells as cell
-from simulator.cell.spec import BusSpec, Cell, DriveSpec, Faults, WorldSpec
+from multidrop.dialects import Diagnostic
+from multidrop.simulator import cells as cell
+from multidrop.simulator.cell.spec import BusSpec, Cell, DriveSpec, Faults, WorldSpec
 from tests.support.cases import for_each
 
 SAMPLE = """

@@ -2,9 +2,9 @@
 
 import pytest
 
-from dialects import Diagnostic
-from simulator import cells as cell
-from simulator.floor import Floor
+from multidrop.dialects import Diagnostic
+from multidrop.simulator import cells as cell
+from multidrop.simulator.floor import Floor
 from tests.support.cases import for_each
 
 MCODE = """

@@ -3,8 +3,8 @@
 from hypothesis import given
 from hypothesis import strategies as st
 
-from simulator import cells
-from simulator.cell.writer import BusText, DriveText, Entry, plain, write
+from multidrop.simulator import cells
+from multidrop.simulator.cell.writer import BusText, DriveText, Entry, plain, write
 
 texts = st.text(st.characters(exclude_categories=["Cs"], exclude_characters="\r\n\x0b\x0c\x1c\x1d\x1e\x85\u2028\u2029"))
 

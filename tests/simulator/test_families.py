@@ -9,16 +9,16 @@ from struct import Struct
 
 import pytest
 
-from dialects import Diagnostic
-from simulator.cell.reader import Reader, common_keys
-from simulator.cell.spec import DriveSpec, WorldSpec
-from simulator.cell.table import Table
-from simulator.cell.worlds import KEYS, read_worlds
-from simulator.families import BY_PERSONALITY, FAMILIES, PROGRAMS, TABLE, family_of
-from simulator.family import Family, Place, Unit
-from simulator.lexium.state.models import MODELS
-from simulator.wire.wire import Transmission, Wire
-from simulator.world import World
+from multidrop.dialects import Diagnostic
+from multidrop.simulator.cell.reader import Reader, common_keys
+from multidrop.simulator.cell.spec import DriveSpec, WorldSpec
+from multidrop.simulator.cell.table import Table
+from multidrop.simulator.cell.worlds import KEYS, read_worlds
+from multidrop.simulator.families import BY_PERSONALITY, FAMILIES, PROGRAMS, TABLE, family_of
+from multidrop.simulator.family import Family, Place, Unit
+from multidrop.simulator.lexium.state.models import MODELS
+from multidrop.simulator.wire.wire import Transmission, Wire
+from multidrop.simulator.world import World
 
 FRAME = Struct(">BBBBiB")
 BYTE = 10 / 9600

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import pytest
 
-from dialects import Diagnostic
-from dialects.mcode.manual import program_file
-from simulator.cell.spec import DriveSpec, WorldSpec
-from simulator.lexium.program_run import LONGEST, Failed, Printed, ProgramRun, Summary
+from multidrop.dialects import Diagnostic
+from multidrop.dialects.mcode.manual import program_file
+from multidrop.simulator.cell.spec import DriveSpec, WorldSpec
+from multidrop.simulator.lexium.program_run import LONGEST, Failed, Printed, ProgramRun, Summary
 
 Event = Printed | Failed | Summary
 

@@ -8,9 +8,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from simulator.cell.spec import Faults
-from simulator.wire.baud import resample
-from simulator.wire.wire import Transmission, Wire
+from multidrop.simulator.cell.spec import Faults
+from multidrop.simulator.wire.baud import resample
+from multidrop.simulator.wire.wire import Transmission, Wire
 
 BYTE = 10 / 9600
 

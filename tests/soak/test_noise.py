@@ -2,11 +2,11 @@
 
 import pytest
 
-from dialects import NoAnswer, Refused
+from multidrop.dialects import NoAnswer, Refused
+from multidrop.transports import TransportLost
 from soak.judge import Judge, Ledger, Witness, Word, word
 from soak.noise import Job, jobs, judge
 from soak.noisy_line import Setup
-from transports import TransportLost
 
 pytestmark = pytest.mark.slow
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from drives.events import Traffic
-from shell.connect.settings import Settings
-from shell.events import Failed, Notified, OnBus, Output, Printed
-from shell.session import Session
+from multidrop.drives.events import Traffic
+from multidrop.shell.connect.settings import Settings
+from multidrop.shell.events import Failed, Notified, OnBus, Output, Printed
+from multidrop.shell.session import Session
 
 
 def bus(name: str, *drives: str, baud: int = 9600) -> str:

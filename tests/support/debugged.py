@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from shell.events import Notified, OnBus
+from multidrop.shell.events import Notified, OnBus
 from tests.support.cell_session import CellSession, bus
 
 PROGRAM = '''program_text = """

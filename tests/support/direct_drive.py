@@ -5,10 +5,10 @@ from __future__ import annotations
 import re
 from typing import Any
 
-from dialects import End, Kind, Procedure, Reply
-from dialects.mcode.host.codec import MCode
-from dialects.mcode.host.state import MCodeState
-from drives.procedure import ProcedureRunner
+from multidrop.dialects import End, Kind, Procedure, Reply
+from multidrop.dialects.mcode.host.codec import MCode
+from multidrop.dialects.mcode.host.state import MCodeState
+from multidrop.drives.procedure import ProcedureRunner
 from tests.support.lexium import drive
 
 

@@ -14,22 +14,22 @@ from typing import Any
 
 from textual.pilot import Pilot
 
-from dialects import Diagnostic, DriveError, DriveState, Stopped
-from dialects.conditions import UNREAD, Conditions, Lamp, Pace
-from dialects.families import FAMILIES
-from dialects.family import Family
-from drives.events import Conditioned, Sample, Silent, Unsolicited
-from drives.halt import Fate
-from drives.readings import Value
-from shell.asking import Fill
-from shell.events import By, Entered, Failed, Notified, OnBus, Printed, SessionEvent, StateChanged
-from shell.roles import RunningPlot, Series
-from shell.stops import Found, Tally
-from shell.transcripts import Transcripts
-from transports import TransportLost, Unreachable
-from tui.app import MultidropApp
-from tui.assist import Assist, StartEntry
-from tui.widgets.signs import Signs
+from multidrop.dialects import Diagnostic, DriveError, DriveState, Stopped
+from multidrop.dialects.conditions import UNREAD, Conditions, Lamp, Pace
+from multidrop.dialects.families import FAMILIES
+from multidrop.dialects.family import Family
+from multidrop.drives.events import Conditioned, Sample, Silent, Unsolicited
+from multidrop.drives.halt import Fate
+from multidrop.drives.readings import Value
+from multidrop.shell.asking import Fill
+from multidrop.shell.events import By, Entered, Failed, Notified, OnBus, Printed, SessionEvent, StateChanged
+from multidrop.shell.roles import RunningPlot, Series
+from multidrop.shell.stops import Found, Tally
+from multidrop.shell.transcripts import Transcripts
+from multidrop.transports import TransportLost, Unreachable
+from multidrop.tui.app import MultidropApp
+from multidrop.tui.assist import Assist, StartEntry
+from multidrop.tui.widgets.signs import Signs
 
 
 @dataclass

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from drives.events import Sample
-from shell.events import Diverged, OnBus, Predicted, SessionEvent
+from multidrop.drives.events import Sample
+from multidrop.shell.events import Diverged, OnBus, Predicted, SessionEvent
 from tests.support.fake_session import FakeSession, a_move
 
 CAUSES = ("stall", "load")

@@ -7,8 +7,8 @@ import json
 from collections.abc import Callable
 from typing import Any
 
-from shell.publishing.backlog import Message
-from transports import Unreachable
+from multidrop.shell.publishing.backlog import Message
+from multidrop.transports import Unreachable
 
 
 class KeptBroker:

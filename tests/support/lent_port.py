@@ -7,11 +7,11 @@ import socket
 import threading
 from collections.abc import Iterator
 
+from multidrop.transports import TransportLost
+from multidrop.transports.relay import serve
+from multidrop.transports.relay_frames import GREETING, SILENCE
+from multidrop.transports.serial_posix import SerialEndpoint
 from tests.support.until import PATIENCE
-from transports import TransportLost
-from transports.relay import serve
-from transports.relay_frames import GREETING, SILENCE
-from transports.serial_posix import SerialEndpoint
 
 
 class SocketConnection:

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
-from simulator.cell.spec import DriveSpec, WorldSpec
-from simulator.lexium.device import MCodeDevice
-from simulator.world import World
+from multidrop.simulator.cell.spec import DriveSpec, WorldSpec
+from multidrop.simulator.lexium.device import MCodeDevice
+from multidrop.simulator.world import World
 
 
 def drive(*lines: str, personality: str = "LMDCM", program: str = "", **world: Any) -> MCodeDevice:

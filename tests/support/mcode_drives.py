@@ -2,8 +2,8 @@
 
 from random import Random
 
-from dialects.mcode.host.codec import MCode
-from dialects.mcode.host.state import MCodeState
+from multidrop.dialects.mcode.host.codec import MCode
+from multidrop.dialects.mcode.host.state import MCodeState
 
 MODES = [(em, party, check) for em in range(4) for party in (False, True) for check in range(3)]
 

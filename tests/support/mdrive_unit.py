@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import Any
 
-from simulator.cell.spec import DriveSpec, WorldSpec
-from simulator.lexium.device import MCodeDevice
-from simulator.lexium.ports.mcode import MCodePort
-from simulator.world import World
+from multidrop.simulator.cell.spec import DriveSpec, WorldSpec
+from multidrop.simulator.lexium.device import MCodeDevice
+from multidrop.simulator.lexium.ports.mcode import MCodePort
+from multidrop.simulator.world import World
 
 
 class Unit:

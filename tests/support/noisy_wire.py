@@ -12,12 +12,12 @@ from dataclasses import dataclass, field
 from random import Random
 from typing import Any
 
-from dialects import DriveError, DriveState, End, Priority
-from dialects.families import family_of
-from dialects.mcode.host.codec import MCode
-from dialects.mcode.host.state import MCodeState
-from drives.procedure import ProcedureRunner
-from simulator.cell.spec import Faults
+from multidrop.dialects import DriveError, DriveState, End, Priority
+from multidrop.dialects.families import family_of
+from multidrop.dialects.mcode.host.codec import MCode
+from multidrop.dialects.mcode.host.state import MCodeState
+from multidrop.drives.procedure import ProcedureRunner
+from multidrop.simulator.cell.spec import Faults
 from tests.support.mcode_drives import Witness
 
 PROGRAM = ("PG 1", "LB G1", 'PR "tick ",R3', "IC R3", "H 170", "PR R3", "H 190", "BR G1", "E", "PG", "EX G1")

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from simulator.cells import read
-from simulator.floor import Floor
-from simulator.pmx.device import PmxDevice
+from multidrop.simulator.cells import read
+from multidrop.simulator.floor import Floor
+from multidrop.simulator.pmx.device import PmxDevice
 
 
 class Bench:

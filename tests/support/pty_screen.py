@@ -15,9 +15,9 @@ from textual import events
 from textual.driver import Driver
 from textual.geometry import Size
 
+from multidrop.tui.app import MultidropApp
+from multidrop.tui.terminal.driver import Terminal
 from tests.support.until import PATIENCE
-from tui.app import MultidropApp
-from tui.terminal.driver import Terminal
 
 
 class PtyScreen:

@@ -1,8 +1,8 @@
 """Running a program file on a simulated drive, for the sample programs' tests."""
 
-from simulator.cell.spec import DriveSpec, WorldSpec
-from simulator.lexium.device import MCodeDevice
-from simulator.world import World
+from multidrop.simulator.cell.spec import DriveSpec, WorldSpec
+from multidrop.simulator.lexium.device import MCodeDevice
+from multidrop.simulator.world import World
 
 REVOLUTION = 51200
 

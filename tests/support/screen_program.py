@@ -8,9 +8,9 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
+from multidrop.tui import launch  # noqa: E402
+from multidrop.tui.app import MultidropApp  # noqa: E402
 from tests.support.fake_session import FakeAssist, FakeSession, demo_session  # noqa: E402
-from tui import launch  # noqa: E402
-from tui.app import MultidropApp  # noqa: E402
 
 
 class Witness(FakeSession):

@@ -15,8 +15,8 @@ import time
 import pexpect
 import pytest
 
-from dialects.mcode.host.checksum import sealed
-from dialects.mcode.host.codec import MCode
+from multidrop.dialects.mcode.host.checksum import sealed
+from multidrop.dialects.mcode.host.codec import MCode
 from tests.support.processes import Running, environment
 from tests.support.until import PATIENCE
 

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from shell.sharing.actions import Action, Close, Purge, Say, Send, Set, Stop, Write
-from shell.sharing.exchange import Exchange
-from shell.sharing.stop_bytes import stop_bytes
+from multidrop.shell.sharing.actions import Action, Close, Purge, Say, Send, Set, Stop, Write
+from multidrop.shell.sharing.exchange import Exchange
+from multidrop.shell.sharing.stop_bytes import stop_bytes
 
 ADA, BOB, EVE = 1, 2, 3
 

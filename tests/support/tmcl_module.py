@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dialects.tmcl.host import framing
-from dialects.tmcl.manual import grammar
-from simulator.cell.spec import WorldSpec
-from simulator.tmcl.drive_table import split_settings
-from simulator.tmcl.module import TmclModule
-from simulator.tmcl.port import TmclPort
-from simulator.world import World
+from multidrop.dialects.tmcl.host import framing
+from multidrop.dialects.tmcl.manual import grammar
+from multidrop.simulator.cell.spec import WorldSpec
+from multidrop.simulator.tmcl.drive_table import split_settings
+from multidrop.simulator.tmcl.module import TmclModule
+from multidrop.simulator.tmcl.port import TmclPort
+from multidrop.simulator.world import World
 
 
 class Module:

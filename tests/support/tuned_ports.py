@@ -5,16 +5,16 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from dialects.families import FAMILIES
-from drives.bus import Bus
-from shell.connect.opening import Opened
-from shell.connect.settings import Settings
-from shell.events import Notified, Output, Progressed
-from shell.session import Session
-from simulator.cells import read
-from simulator.floor import Floor
-from simulator.serving.running import RunningFloor
-from simulator.wire.baud import resample
+from multidrop.dialects.families import FAMILIES
+from multidrop.drives.bus import Bus
+from multidrop.shell.connect.opening import Opened
+from multidrop.shell.connect.settings import Settings
+from multidrop.shell.events import Notified, Output, Progressed
+from multidrop.shell.session import Session
+from multidrop.simulator.cells import read
+from multidrop.simulator.floor import Floor
+from multidrop.simulator.serving.running import RunningFloor
+from multidrop.simulator.wire.baud import resample
 
 
 class TunedPipe:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from shell.events import OnBus
+from multidrop.shell.events import OnBus
 from tests.support.cell_session import CellSession, party
 
 

@@ -14,9 +14,9 @@ import time
 
 import pytest
 
+from multidrop.transports import Controllable
+from multidrop.transports.rfc2217 import PIECE
 from tests.support.pipes import KINDS, PATIENCE, STREAMS, rig
-from transports import Controllable
-from transports.rfc2217 import PIECE
 
 pytestmark = [
     pytest.mark.slow,

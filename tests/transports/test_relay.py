@@ -10,12 +10,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from multidrop.transports import relay
+from multidrop.transports.relay import Relay
+from multidrop.transports.relay_frames import CREDIT, GREETING, MOST, Frames, Garbled, Kind, Setting, frame
+from multidrop.transports.relay_pipe import RelayEndpoint
+from multidrop.transports.serial_posix import lock_owner
 from tests.support.lent_port import lent
-from transports import relay
-from transports.relay import Relay
-from transports.relay_frames import CREDIT, GREETING, MOST, Frames, Garbled, Kind, Setting, frame
-from transports.relay_pipe import RelayEndpoint
-from transports.serial_posix import lock_owner
 
 FRAMES = st.lists(st.tuples(st.sampled_from(Kind), st.binary(max_size=40)), max_size=20)
 HELD = 16

@@ -9,10 +9,10 @@ from contextlib import asynccontextmanager
 
 import pytest
 
+from multidrop.transports import TransportLost
+from multidrop.transports.relay_frames import BEAT, MISSED, Frames, Kind, frame
+from multidrop.transports.relay_pipe import RelayPipe
 from tests.support.lent_port import SocketConnection
-from transports import TransportLost
-from transports.relay_frames import BEAT, MISSED, Frames, Kind, frame
-from transports.relay_pipe import RelayPipe
 
 pytestmark = pytest.mark.virtual
 

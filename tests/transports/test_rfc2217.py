@@ -7,10 +7,10 @@ from collections.abc import Callable
 
 import pytest
 
+from multidrop.transports import Lost, Received, TransportLost, Unreachable, telnet
+from multidrop.transports.com_port import OPTION, REPLY, Control, Setting, message, parsed
+from multidrop.transports.rfc2217 import Rfc2217Pipe, negotiated
 from tests.support.virtual import in_virtual_time
-from transports import Lost, Received, TransportLost, Unreachable, telnet
-from transports.com_port import OPTION, REPLY, Control, Setting, message, parsed
-from transports.rfc2217 import Rfc2217Pipe, negotiated
 
 DTR = (Setting.CONTROL, Control.DTR_ON)
 RTS = (Setting.CONTROL, Control.RTS_ON)

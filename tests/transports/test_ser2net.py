@@ -13,10 +13,10 @@ from pathlib import Path
 
 import pytest
 
+from multidrop.transports import TransportLost, Unreachable
+from multidrop.transports.rfc2217 import Rfc2217Pipe, open_rfc2217
 from tests.support.tools import tool
 from tests.support.until import PATIENCE, until
-from transports import TransportLost, Unreachable
-from transports.rfc2217 import Rfc2217Pipe, open_rfc2217
 
 pytestmark = [
     pytest.mark.process,

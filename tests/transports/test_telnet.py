@@ -6,9 +6,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from transports import telnet
-from transports.com_port import Setting, message, parsed
-from transports.telnet import Data, Decoder, Event, Interrupt, Option, Subnegotiation
+from multidrop.transports import telnet
+from multidrop.transports.com_port import Setting, message, parsed
+from multidrop.transports.telnet import Data, Decoder, Event, Interrupt, Option, Subnegotiation
 
 PIECES = st.lists(
     st.one_of(

@@ -5,8 +5,14 @@ from textual import events
 from textual.pilot import Pilot
 from textual.worker import WorkerFailed
 
-from drives.events import Sample, Unsolicited
-from shell.events import By, Entered, OnBus, StateChanged
+from multidrop.drives.events import Sample, Unsolicited
+from multidrop.shell.events import By, Entered, OnBus, StateChanged
+from multidrop.transports import TransportLost
+from multidrop.tui.outbox import BURST
+from multidrop.tui.polling import LIVELY, OTHERS, PLOT, REST, STATUS
+from multidrop.tui.readout import State
+from multidrop.tui.screens.dialogs import Choose, Confirm, Offer, TooSmall, offers_like
+from multidrop.tui.screens.start import Start
 from tests.support.fake_session import (
     FakeBus,
     FakeDrive,
@@ -17,12 +23,6 @@ from tests.support.fake_session import (
     make_app,
     settle,
 )
-from transports import TransportLost
-from tui.outbox import BURST
-from tui.polling import LIVELY, OTHERS, PLOT, REST, STATUS
-from tui.readout import State
-from tui.screens.dialogs import Choose, Confirm, Offer, TooSmall, offers_like
-from tui.screens.start import Start
 
 pytestmark = pytest.mark.tui
 

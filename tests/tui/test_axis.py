@@ -8,19 +8,19 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dialects.conditions import UNREAD, Conditions, Lamp, Pace
-from drives.events import Sample
+from multidrop.dialects.conditions import UNREAD, Conditions, Lamp, Pace
+from multidrop.drives.events import Sample
+from multidrop.tui.panels.axis import drive_rows
+from multidrop.tui.panels.glance import Glance
+from multidrop.tui.panels.spark import spark
+from multidrop.tui.panels.status import kept, narrow_rows
+from multidrop.tui.panels.travel import LEARNT, LIMITS, SEEN, bar, phase, seconds_to_go, travel_of
+from multidrop.tui.panels.view import View
+from multidrop.tui.readout import Readout
+from multidrop.tui.screen_model import ScreenModel
+from multidrop.tui.widgets.lines import Row, width_of
+from multidrop.tui.widgets.signs import Signs, shown_as
 from tests.support.fake_session import demo_session
-from tui.panels.axis import drive_rows
-from tui.panels.glance import Glance
-from tui.panels.spark import spark
-from tui.panels.status import kept, narrow_rows
-from tui.panels.travel import LEARNT, LIMITS, SEEN, bar, phase, seconds_to_go, travel_of
-from tui.panels.view import View
-from tui.readout import Readout
-from tui.screen_model import ScreenModel
-from tui.widgets.lines import Row, width_of
-from tui.widgets.signs import Signs, shown_as
 
 PACE = Pace(1000, 100_000, 1e6, 1e6)
 LAMPS = (Lamp("1", "home", True), Lamp("2", "lim+", True), Lamp("1", "", None, output=True))

@@ -10,18 +10,18 @@ from pathlib import Path
 
 import pytest
 
-from drives.events import Traffic
-from shell.connect.settings import Settings
-from shell.events import Entered, OnBus, SessionEvent
-from shell.session import Session
-from simulator.lexium.device import MCodeDevice
+from multidrop.drives.events import Traffic
+from multidrop.shell.connect.settings import Settings
+from multidrop.shell.events import Entered, OnBus, SessionEvent
+from multidrop.shell.session import Session
+from multidrop.simulator.lexium.device import MCodeDevice
+from multidrop.tui.app import MultidropApp
+from multidrop.tui.assist import ShellAssist
+from multidrop.tui.screens.dialogs import Confirm, Search
+from multidrop.tui.screens.start import Start
 from tests.support.fake_session import FakeAssist, FakeSession, demo_session
 from tests.support.pty_screen import PtyScreen, on_a_pty
 from tests.support.until import PATIENCE
-from tui.app import MultidropApp
-from tui.assist import ShellAssist
-from tui.screens.dialogs import Confirm, Search
-from tui.screens.start import Start
 
 pytestmark = [pytest.mark.tui, pytest.mark.skipif(os.name != "posix", reason="pseudo-terminals")]
 STOP = b"\x18"

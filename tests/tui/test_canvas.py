@@ -15,7 +15,7 @@ from textual._compositor import ChopsUpdate, LayoutUpdate
 from textual.geometry import Region
 from textual.strip import Strip
 
-from tui.terminal.canvas import Canvas, Pens, pieces_of
+from multidrop.tui.terminal.canvas import Canvas, Pens, pieces_of
 
 WIDTH, HEIGHT = 30, 8
 STYLES = [

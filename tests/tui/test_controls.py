@@ -11,15 +11,15 @@ from hypothesis import strategies as st
 from textual import events
 from textual.pilot import Pilot
 
-from dialects.conditions import Conditions
-from dialects.controls import BY, NAMES, TO
-from dialects.families import FAMILIES
-from drives.events import Conditioned, Sample, Silent
-from shell.events import OnBus
+from multidrop.dialects.conditions import Conditions
+from multidrop.dialects.controls import BY, NAMES, TO
+from multidrop.dialects.families import FAMILIES
+from multidrop.drives.events import Conditioned, Sample, Silent
+from multidrop.shell.events import OnBus
+from multidrop.tui.jog import Jog
+from multidrop.tui.readout import Readout, State
+from multidrop.tui.screens.controls import ControlsPage
 from tests.support.fake_session import FakeSession, demo_session, make_app, settle
-from tui.jog import Jog
-from tui.readout import Readout, State
-from tui.screens.controls import ControlsPage
 
 at_screen = pytest.mark.tui
 

@@ -6,21 +6,21 @@ import sys
 import pytest
 from textual.css.stylesheet import Stylesheet
 
+from multidrop.tui.screens.table import PAGES
 from tests.support.fake_session import demo_session, make_app
 from tests.support.processes import environment
 from tests.support.until import PATIENCE
-from tui.screens.table import PAGES
 
 CHILD = """
 import asyncio, sys
-from tui.app import MultidropApp
-from tui.assist import ShellAssist
-from tui.launch import driver
-from shell.connect.settings import load
-from shell.front.collector import collected_at_rest
-from shell.log.writer import begin
-from shell.session import Session
-from tui.opening import Opener
+from multidrop.tui.app import MultidropApp
+from multidrop.tui.assist import ShellAssist
+from multidrop.tui.launch import driver
+from multidrop.shell.connect.settings import load
+from multidrop.shell.front.collector import collected_at_rest
+from multidrop.shell.log.writer import begin
+from multidrop.shell.session import Session
+from multidrop.tui.opening import Opener
 
 driver()
 displayed = []
@@ -53,10 +53,20 @@ async def main():
 asyncio.run(main())
 """
 LATER = {
-    *(f"tui.screens.{page.place.partition(':')[0]}" for page in PAGES),
-    *("tui.editor.widget", "shell.params.page", "shell.verbs.table", "shell.front.complete"),
-    *("dialects.mcode.family", "dialects.pmx.family", "dialects.tmcl.family", "dialects.modbus.family"),
-    *("simulator.floor", "simulator.lexium", "serial", "prompt_toolkit", "pymodbus", "tomlkit"),
+    *(f"multidrop.tui.screens.{page.place.partition(':')[0]}" for page in PAGES),
+    *(
+        "multidrop.tui.editor.widget",
+        "multidrop.shell.params.page",
+        "multidrop.shell.verbs.table",
+        "multidrop.shell.front.complete",
+    ),
+    *(
+        "multidrop.dialects.mcode.family",
+        "multidrop.dialects.pmx.family",
+        "multidrop.dialects.tmcl.family",
+        "multidrop.dialects.modbus.family",
+    ),
+    *("multidrop.simulator.floor", "multidrop.simulator.lexium", "serial", "prompt_toolkit", "pymodbus", "tomlkit"),
     *("rerun", "numpy", "pyarrow", "importlib.metadata"),
 }
 
@@ -69,7 +79,7 @@ def test_the_first_frame_imports_no_page_no_family_and_no_simulator_and_the_firs
     )
     modules, footer, *letter = done.stdout.splitlines() or [done.stderr, ""]
     imported = set(modules.split())
-    assert "tui.app" in imported, done.stderr
+    assert "multidrop.tui.app" in imported, done.stderr
     assert sorted(imported & LATER) == []
     assert "STOP ALL" in footer  # all was painted before anything was opened
     assert letter == [""], done.stderr

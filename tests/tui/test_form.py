@@ -11,10 +11,10 @@ import pytest
 from textual.pilot import Pilot
 from textual.widgets import Static
 
-from macros import Macro, Step
-from shell.casting import value_fields
+from multidrop.macros import Macro, Step
+from multidrop.shell.casting import value_fields
+from multidrop.tui.screens.form import Form
 from tests.support.fake_session import demo_session, make_app, settle
-from tui.screens.form import Form
 
 pytestmark = pytest.mark.tui
 MACRO = Macro("m", (Step(0.0, "MR {turns:int=10,1..100}"), Step(0.0, "{mode:choice(slow|fast)} {turns}")))
@@ -23,7 +23,7 @@ MACRO = Macro("m", (Step(0.0, "MR {turns:int=10,1..100}"), Step(0.0, "{mode:choi
 @pytest.fixture(autouse=True)
 def colours(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delenv("NO_COLOR", raising=False)
-    monkeypatch.setattr("tui.terminal.keyboard.PAUSE", 1e6)  # keys count once a test says so
+    monkeypatch.setattr("multidrop.tui.terminal.keyboard.PAUSE", 1e6)  # keys count once a test says so
 
 
 @asynccontextmanager

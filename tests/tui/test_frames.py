@@ -6,10 +6,10 @@ from typing import Any
 
 import pytest
 
-from shell.events import Printed
+from multidrop.shell.events import Printed
+from multidrop.tui.frames import FRAMES, Frames
+from multidrop.tui.presenter import FLOOD, FLOOD_PERIOD, Presenter
 from tests.support.fake_session import demo_session, make_app
-from tui.frames import FRAMES, Frames
-from tui.presenter import FLOOD, FLOOD_PERIOD, Presenter
 
 pytestmark = pytest.mark.tui
 

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from multidrop.tui.function_keys import FunctionKeys
 from tests.support.fake_session import FakeMacro, FakeMacros
-from tui.function_keys import FunctionKeys
 
 
 def read(*macros: FakeMacro) -> FunctionKeys:

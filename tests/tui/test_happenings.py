@@ -2,10 +2,10 @@
 
 from dataclasses import replace
 
-from dialects.conditions import UNREAD, Conditions, Lamp
-from drives.events import Conditioned, Sample, Silent
-from shell.events import By, Entered, Failed, OnBus
-from tui.screen_model import ScreenModel
+from multidrop.dialects.conditions import UNREAD, Conditions, Lamp
+from multidrop.drives.events import Conditioned, Sample, Silent
+from multidrop.shell.events import By, Entered, Failed, OnBus
+from multidrop.tui.screen_model import ScreenModel
 
 REST = Conditions(lamps=(Lamp("1", "home", False), Lamp("2", "lim+", False), Lamp("3", "", True)))
 LIMIT = replace(REST, lamps=(Lamp("1", "home", True), Lamp("2", "lim+", True), Lamp("3", "", False)))

@@ -5,15 +5,15 @@ from hypothesis import given
 from hypothesis import strategies as st
 from textual.binding import Binding
 
-from shell.connect.look import Look
+from multidrop.shell.connect.look import Look
+from multidrop.tui.app import MultidropApp, bindings
+from multidrop.tui.keymap import keymap, read_key
+from multidrop.tui.screens.all_drives import AllDrives
+from multidrop.tui.screens.dialogs import Search
+from multidrop.tui.screens.page import Page
+from multidrop.tui.screens.table import PAGES, PageEntry
+from multidrop.tui.widgets.signs import Signs
 from tests.support.fake_session import FakeAssist, demo_session, settle
-from tui.app import MultidropApp, bindings
-from tui.keymap import keymap, read_key
-from tui.screens.all_drives import AllDrives
-from tui.screens.dialogs import Search
-from tui.screens.page import Page
-from tui.screens.table import PAGES, PageEntry
-from tui.widgets.signs import Signs
 
 
 @pytest.mark.parametrize(

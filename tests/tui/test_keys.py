@@ -12,12 +12,12 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 from textual import constants
 
+from multidrop.tui.app import MultidropApp
+from multidrop.tui.widgets.entry import Draft
+from multidrop.tui.widgets.lines import width_of
 from tests.support.examples import examples
 from tests.support.fake_session import FakeAssist, demo_session
 from tests.support.pty_screen import PtyScreen, on_a_pty
-from tui.app import MultidropApp
-from tui.widgets.entry import Draft
-from tui.widgets.lines import width_of
 
 pytestmark = [pytest.mark.tui, pytest.mark.skipif(os.name != "posix", reason="pseudo-terminals")]
 HOME, UP, DOWN, LEFT = b"\x1b[H", b"\x1b[A", b"\x1b[B", b"\x1b[D"

@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 from textual import constants, events
 from textual.message import Message
 
+from multidrop.tui.terminal.keystream import MOST, STALLED, KeyStream, Kind, Piece, Splitter
 from tests.support.virtual import in_virtual_time
-from tui.terminal.keystream import MOST, STALLED, KeyStream, Kind, Piece, Splitter
 
 PASTE = b"\x1b[200~MR 1\rMR 2\r\x1b[201~"
 TYPED: dict[bytes, list[str]] = {

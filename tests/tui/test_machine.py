@@ -11,17 +11,17 @@ import pytest
 from textual import events
 from textual.message import Message
 
-from drives.events import Sample
-from shell.connect.settings import Settings
-from shell.events import Failed, OnBus, StateChanged
-from shell.session import Session
+from multidrop.drives.events import Sample
+from multidrop.shell.connect.settings import Settings
+from multidrop.shell.events import Failed, OnBus, StateChanged
+from multidrop.shell.session import Session
+from multidrop.tui.app import MultidropApp
+from multidrop.tui.assist import ShellAssist
+from multidrop.tui.screens.dialogs import Search
+from multidrop.tui.screens.start import Start
+from multidrop.tui.terminal.keyboard import PAUSE
 from tests.support.fake_session import FakeAssist, FakeBus, FakeDrive, FakeSession, demo_session
 from tests.support.pty_screen import PtyScreen, on_a_pty
-from tui.app import MultidropApp
-from tui.assist import ShellAssist
-from tui.screens.dialogs import Search
-from tui.screens.start import Start
-from tui.terminal.keyboard import PAUSE
 
 pytestmark = [pytest.mark.tui, pytest.mark.skipif(os.name != "posix", reason="pseudo-terminals")]
 NEXT_BUS, BUS_1, BUS_2 = b"\x1b[6;5~", b"\x1b1", b"\x1b2"

@@ -7,9 +7,9 @@ from pathlib import Path
 
 import pytest
 
+from multidrop.tui.screens.program import ProgramPage
 from tests.support.fake_session import demo_session, make_app, settle
 from tests.support.until import PATIENCE
-from tui.screens.program import ProgramPage
 
 pytestmark = pytest.mark.tui
 TEXT = "# mine\nname = 'm'\n[[step]]\nline = 'MR 1'\n"

@@ -10,14 +10,14 @@ from types import SimpleNamespace
 import pytest
 from textual.pilot import Pilot
 
-from drives.events import Traffic
-from shell.events import OnBus
+from multidrop.drives.events import Traffic
+from multidrop.shell.events import OnBus
+from multidrop.tui.frames import Frames
+from multidrop.tui.screens.macros import Listed, MacrosPage, macro_row, step_rows
+from multidrop.tui.screens.program import ProgramPage
+from multidrop.tui.screens.traffic import TrafficPage
 from tests.support.fake_session import FakeMacro, demo_session, make_app, settle
 from tests.support.until import PATIENCE
-from tui.frames import Frames
-from tui.screens.macros import Listed, MacrosPage, macro_row, step_rows
-from tui.screens.program import ProgramPage
-from tui.screens.traffic import TrafficPage
 
 pytestmark = pytest.mark.tui
 

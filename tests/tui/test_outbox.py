@@ -6,10 +6,10 @@ import asyncio
 from collections.abc import Callable, Coroutine
 from typing import Any
 
-from shell.events import By
+from multidrop.shell.events import By
+from multidrop.tui.outbox import BURST, Outbox
 from tests.support.fake_session import FakeSession, demo_session
 from tests.support.virtual import in_virtual_time
-from tui.outbox import BURST, Outbox
 
 LATER = BURST + 0.1
 

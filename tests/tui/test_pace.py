@@ -2,7 +2,7 @@
 
 import pytest
 
-from tui.terminal.pace import PATIENCE, TRIES, Pace
+from multidrop.tui.terminal.pace import PATIENCE, TRIES, Pace
 
 
 class Screen:

@@ -2,14 +2,14 @@
 
 import pytest
 
-from drives.events import Sample, Silent
-from shell.events import By, OnBus
+from multidrop.drives.events import Sample, Silent
+from multidrop.shell.events import By, OnBus
+from multidrop.tui.app import MultidropApp
+from multidrop.tui.panels.glance import Glance
+from multidrop.tui.readout import Readout
+from multidrop.tui.screens.all_drives import AllDrives, Place, drive_row
+from multidrop.tui.widgets.lines import width_of
 from tests.support.fake_session import a_move, demo_session, make_app, settle
-from tui.app import MultidropApp
-from tui.panels.glance import Glance
-from tui.readout import Readout
-from tui.screens.all_drives import AllDrives, Place, drive_row
-from tui.widgets.lines import width_of
 
 pytestmark = pytest.mark.tui
 

@@ -9,13 +9,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 from textual.pilot import Pilot
 
-from dialects import Diagnostic
-from dialects.families import FAMILIES
-from dialects.parameters import IO, VARIABLES, Reading, Readings
-from shell.events import SettingsRead
-from shell.params.page import edit, found_in, meanings_of, parsed, rows
+from multidrop.dialects import Diagnostic
+from multidrop.dialects.families import FAMILIES
+from multidrop.dialects.parameters import IO, VARIABLES, Reading, Readings
+from multidrop.shell.events import SettingsRead
+from multidrop.shell.params.page import edit, found_in, meanings_of, parsed, rows
+from multidrop.tui.screens.parameters import ParametersPage
 from tests.support.fake_session import FakeSession, demo_session, make_app, settle
-from tui.screens.parameters import ParametersPage
 
 at_screen = pytest.mark.tui
 FOUND = Readings(

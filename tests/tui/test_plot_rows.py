@@ -9,19 +9,19 @@ from hypothesis import given
 from hypothesis import strategies as st
 from textual.pilot import Pilot
 
-from drives.events import Lost, Sample, Valued
-from shell.events import By, OnBus
-from shell.roles import Series
+from multidrop.drives.events import Lost, Sample, Valued
+from multidrop.shell.events import By, OnBus
+from multidrop.shell.roles import Series
+from multidrop.transports import TransportLost
+from multidrop.tui.curves.ink import ASCII
+from multidrop.tui.panels.chart_rows import cursor_row
+from multidrop.tui.panels.glance import glances_of
+from multidrop.tui.panels.plot import plot_rows, plot_title
+from multidrop.tui.panels.view import View
+from multidrop.tui.screen_model import ScreenModel
+from multidrop.tui.screens.plot_page import PlotPage
+from multidrop.tui.widgets.lines import Row, width_of
 from tests.support.fake_session import FakeBus, FakeDrive, FakeSession, a_move, demo_session, make_app, settle
-from transports import TransportLost
-from tui.curves.ink import ASCII
-from tui.panels.chart_rows import cursor_row
-from tui.panels.glance import glances_of
-from tui.panels.plot import plot_rows, plot_title
-from tui.panels.view import View
-from tui.screen_model import ScreenModel
-from tui.screens.plot_page import PlotPage
-from tui.widgets.lines import Row, width_of
 
 
 def plain(*rows: Row) -> str:

@@ -6,11 +6,11 @@ from collections.abc import Callable
 import pytest
 from textual.pilot import Pilot
 
-from drives.events import Sample, Valued
-from shell.events import OnBus
-from shell.roles import Series
+from multidrop.drives.events import Sample, Valued
+from multidrop.shell.events import OnBus
+from multidrop.shell.roles import Series
+from multidrop.tui.widgets.signs import Signs
 from tests.support.fake_session import FakeSession, a_move, demo_session, make_app, settle
-from tui.widgets.signs import Signs
 
 pytestmark = pytest.mark.tui
 

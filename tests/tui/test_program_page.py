@@ -11,13 +11,13 @@ import pytest
 from textual import events
 from textual.pilot import Pilot
 
-from shell.drafts import Draft, Drafts
-from shell.events import Phase, ProgramRead, ProgramSeen
+from multidrop.shell.drafts import Draft, Drafts
+from multidrop.shell.events import Phase, ProgramRead, ProgramSeen
+from multidrop.tui.app import MultidropApp
+from multidrop.tui.screens.dialogs import Confirm, Search
+from multidrop.tui.screens.program import ProgramPage
 from tests.support.fake_session import FakeAssist, FakeSession, demo_session, settle
 from tests.support.until import PATIENCE
-from tui.app import MultidropApp
-from tui.screens.dialogs import Confirm, Search
-from tui.screens.program import ProgramPage
 
 pytestmark = pytest.mark.tui
 
@@ -54,7 +54,7 @@ async def page(folder: Path, *, file: str = "a.mxt", size: tuple[int, int] = (80
 @pytest.fixture(autouse=True)
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr("tui.screens.edit.PAUSE", 0.02)
+    monkeypatch.setattr("multidrop.tui.screens.edit.PAUSE", 0.02)
     (tmp_path / "a.mxt").write_text(TEXT)
     return tmp_path
 
@@ -152,7 +152,7 @@ async def test_a_copy_is_kept_while_a_text_is_not_saved(folder: Path) -> None:
 
 
 async def test_the_end_of_the_app_keeps_a_copy_of_the_last_keys(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("tui.screens.edit.PAUSE", 1000.0)
+    monkeypatch.setattr("multidrop.tui.screens.edit.PAUSE", 1000.0)
     async with page(folder) as pilot:
         typed(pilot, "ctrl+end", "' last")
         await until(pilot, lambda: shown(pilot).editor.text.endswith("' last"))

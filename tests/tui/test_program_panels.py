@@ -8,18 +8,18 @@ from typing import Any
 
 import pytest
 
-from dialects.conditions import Conditions
-from drives.events import Traffic
-from shell.events import Phase
+from multidrop.dialects.conditions import Conditions
+from multidrop.drives.events import Traffic
+from multidrop.shell.events import Phase
+from multidrop.tui.panels.glance import Glance
+from multidrop.tui.panels.log import log_rows, log_title, size_words
+from multidrop.tui.panels.program import listing_rows, program_rows, program_title, state_words
+from multidrop.tui.panels.traffic import piece_rows, traffic_rows
+from multidrop.tui.panels.view import View
+from multidrop.tui.readout import ProgramFacts, Readout
+from multidrop.tui.screen_model import ScreenModel
+from multidrop.tui.traffic import Piece
 from tests.support.fake_session import demo_session
-from tui.panels.glance import Glance
-from tui.panels.log import log_rows, log_title, size_words
-from tui.panels.program import listing_rows, program_rows, program_title, state_words
-from tui.panels.traffic import piece_rows, traffic_rows
-from tui.panels.view import View
-from tui.readout import ProgramFacts, Readout
-from tui.screen_model import ScreenModel
-from tui.traffic import Piece
 
 LINES = tuple((1 + 5 * number, f"MR {number}") for number in range(30))
 

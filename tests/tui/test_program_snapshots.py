@@ -9,11 +9,11 @@ from pathlib import Path
 import pytest
 from textual.pilot import Pilot
 
-from drives.events import Traffic
-from shell.events import OnBus, Phase, ProgramRead, ProgramSeen
+from multidrop.drives.events import Traffic
+from multidrop.shell.events import OnBus, Phase, ProgramRead, ProgramSeen
+from multidrop.tui.screens.program import ProgramPage
 from tests.support.fake_session import FakeSession, a_move, a_talk, demo_session, make_app, settle
 from tests.support.until import PATIENCE
-from tui.screens.program import ProgramPage
 
 pytestmark = pytest.mark.tui
 
@@ -41,7 +41,7 @@ Act = Callable[[Pilot[int], FakeSession], Awaitable[None]]
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delenv("NO_COLOR", raising=False)
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr("tui.screens.edit.PAUSE", 0.02)
+    monkeypatch.setattr("multidrop.tui.screens.edit.PAUSE", 0.02)
     (tmp_path / "shuttle.mxt").write_text(TEXT)
     (tmp_path / "wrong.mxt").write_text(TEXT.replace("MA 0", "MAX 0").replace("PR", "PRINT"))
 

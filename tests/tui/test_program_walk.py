@@ -10,13 +10,13 @@ import pytest
 from textual import events
 from textual.pilot import Pilot
 
-from shell.connect.settings import Settings
-from shell.session import Session
+from multidrop.shell.connect.settings import Settings
+from multidrop.shell.session import Session
+from multidrop.tui.app import MultidropApp
+from multidrop.tui.assist import ShellAssist
+from multidrop.tui.screens.dialogs import Confirm, Search
+from multidrop.tui.screens.program import ProgramPage
 from tests.support.until import PATIENCE
-from tui.app import MultidropApp
-from tui.assist import ShellAssist
-from tui.screens.dialogs import Confirm, Search
-from tui.screens.program import ProgramPage
 
 pytestmark = [pytest.mark.tui, pytest.mark.slow]
 
@@ -40,7 +40,7 @@ async def test_a_program_is_mended_downloaded_traced_and_stopped(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr("tui.screens.edit.PAUSE", 0.05)
+    monkeypatch.setattr("multidrop.tui.screens.edit.PAUSE", 0.05)
     (tmp_path / "long.mxt").write_text(TEXT)
     settings = Settings(folder=tmp_path / "config", state=tmp_path / "state")
     session = Session(settings)

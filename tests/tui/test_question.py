@@ -10,8 +10,8 @@ from typing import Any
 import pytest
 from textual.pilot import Pilot
 
+from multidrop.tui.screens.dialogs import GoOn
 from tests.support.fake_session import FakeSession, demo_session, make_app, settle
-from tui.screens.dialogs import GoOn
 
 pytestmark = pytest.mark.tui
 WHAT = "a: CP erases every program and every user variable"
@@ -20,7 +20,7 @@ WHAT = "a: CP erases every program and every user variable"
 @pytest.fixture(autouse=True)
 def colours(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delenv("NO_COLOR", raising=False)
-    monkeypatch.setattr("tui.terminal.keyboard.PAUSE", 1e6)  # keys count once a test says so
+    monkeypatch.setattr("multidrop.tui.terminal.keyboard.PAUSE", 1e6)  # keys count once a test says so
 
 
 @asynccontextmanager

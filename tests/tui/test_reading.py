@@ -6,16 +6,16 @@ from pathlib import Path
 import pytest
 from textual.pilot import Pilot
 
-from dialects import Diagnostic
-from drives.events import Unsolicited
-from shell.events import By, Entered, OnBus, Printed
-from shell.transcripts import Filter
+from multidrop.dialects import Diagnostic
+from multidrop.drives.events import Unsolicited
+from multidrop.shell.events import By, Entered, OnBus, Printed
+from multidrop.shell.transcripts import Filter
+from multidrop.tui.app import MultidropApp
+from multidrop.tui.outbox import BURST
+from multidrop.tui.screens.dialogs import LEAST, Confirm
+from multidrop.tui.terminal.keyboard import PAUSE
+from multidrop.tui.widgets.reader import MOST_COPIED
 from tests.support.fake_session import FakeSession, a_talk, demo_session, make_app, settle
-from tui.app import MultidropApp
-from tui.outbox import BURST
-from tui.screens.dialogs import LEAST, Confirm
-from tui.terminal.keyboard import PAUSE
-from tui.widgets.reader import MOST_COPIED
 
 pytestmark = pytest.mark.tui
 

@@ -8,11 +8,11 @@ from itertools import zip_longest
 import pyte
 import pytest
 
+from multidrop.tui.app import MultidropApp
+from multidrop.tui.widgets.signs import Signs
 from tests.support.fake_session import FakeAssist, demo_session
 from tests.support.pty_screen import PtyScreen, on_a_pty
 from tests.support.until import PATIENCE
-from tui.app import MultidropApp
-from tui.widgets.signs import Signs
 
 pytestmark = pytest.mark.tui
 

@@ -8,21 +8,21 @@ from hypothesis import given
 from hypothesis import strategies as st
 from rich.style import Style
 
-from drives.events import Sample
-from drives.halt import Fate
-from shell.events import OnBus, StateChanged
-from shell.stops import Found, Tally
+from multidrop.drives.events import Sample
+from multidrop.drives.halt import Fate
+from multidrop.shell.events import OnBus, StateChanged
+from multidrop.shell.stops import Found, Tally
+from multidrop.tui.panels.column import column_rows
+from multidrop.tui.panels.glance import Glance, firmware_of
+from multidrop.tui.panels.status import narrow_rows
+from multidrop.tui.panels.table import PANELS, Panel
+from multidrop.tui.panels.view import View
+from multidrop.tui.readout import Readout, State
+from multidrop.tui.screen_model import ScreenModel
+from multidrop.tui.widgets.banner import banner_row
+from multidrop.tui.widgets.footer import STOP, Footer, footer_row
+from multidrop.tui.widgets.lines import Lines, Row, width_of
 from tests.support.fake_session import FakeDrive, demo_session, make_app, settle
-from tui.panels.column import column_rows
-from tui.panels.glance import Glance, firmware_of
-from tui.panels.status import narrow_rows
-from tui.panels.table import PANELS, Panel
-from tui.panels.view import View
-from tui.readout import Readout, State
-from tui.screen_model import ScreenModel
-from tui.widgets.banner import banner_row
-from tui.widgets.footer import STOP, Footer, footer_row
-from tui.widgets.lines import Lines, Row, width_of
 
 KEYS = [("F1", "help"), *((f"F{n}", f"macro-number-{n}") for n in range(2, 13)), ("^Q", "quit")]
 states = st.sampled_from(list(State))

@@ -2,9 +2,9 @@
 
 import pytest
 
-from dialects.conditions import Conditions
-from drives.events import Conditioned, Sample, Silent, Traffic, Unsolicited
-from shell.events import (
+from multidrop.dialects.conditions import Conditions
+from multidrop.drives.events import Conditioned, Sample, Silent, Traffic, Unsolicited
+from multidrop.shell.events import (
     Agreed,
     By,
     Diverged,
@@ -18,9 +18,9 @@ from shell.events import (
     Progressed,
     TwinEnded,
 )
-from tui.panels.lamps import program_words
-from tui.readout import Readout, State
-from tui.screen_model import BusFacts, ScreenModel, bus_old, bus_state
+from multidrop.tui.panels.lamps import program_words
+from multidrop.tui.readout import Readout, State
+from multidrop.tui.screen_model import BusFacts, ScreenModel, bus_old, bus_state
 
 
 def sample(at: float, velocity: int, position: int = 0, address: str = "a", axis: str = "") -> OnBus:

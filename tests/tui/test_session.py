@@ -12,12 +12,12 @@ from textual import events
 from textual.keys import _character_to_key
 from textual.pilot import Pilot
 
-from dialects.mcode.host.checksum import sealed
-from shell.connect.settings import Settings
-from shell.session import Session
+from multidrop.dialects.mcode.host.checksum import sealed
+from multidrop.shell.connect.settings import Settings
+from multidrop.shell.session import Session
+from multidrop.tui.app import MultidropApp
+from multidrop.tui.assist import ShellAssist
 from tests.support.until import PATIENCE
-from tui.app import MultidropApp
-from tui.assist import ShellAssist
 
 pytestmark = pytest.mark.tui
 

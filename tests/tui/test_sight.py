@@ -5,12 +5,12 @@ from collections.abc import Iterable
 from hypothesis import given
 from hypothesis import strategies as st
 
-from shell.transcripts import EVERYTHING, Filter
+from multidrop.shell.transcripts import EVERYTHING, Filter
+from multidrop.tui.screen_model import Record
+from multidrop.tui.widgets.finding import Index, Shown
+from multidrop.tui.widgets.records import Records
+from multidrop.tui.widgets.sight import Picked, Search, Sight
 from tests.support.cases import for_each
-from tui.screen_model import Record
-from tui.widgets.finding import Index, Shown
-from tui.widgets.records import Records
-from tui.widgets.sight import Picked, Search, Sight
 
 TALK = [
     Record(1.0, "a", ">", "MR 5"),

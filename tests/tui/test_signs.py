@@ -5,9 +5,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from rich.cells import cell_len
 
+from multidrop.tui.widgets.signs import BRAILLE, TABLES, Signs, shown_as, signs_for
 from tests.support.fake_session import a_move, a_talk, demo_session, make_app, settle
 from tests.support.paths import ROOT
-from tui.widgets.signs import BRAILLE, TABLES, Signs, shown_as, signs_for
 
 
 @given(st.text(), st.sampled_from(Signs))

@@ -5,14 +5,14 @@ from collections.abc import Awaitable, Callable
 import pytest
 from textual.pilot import Pilot
 
-from dialects.conditions import Conditions
-from drives.events import Conditioned, Sample
-from drives.halt import Fate
-from shell.events import OnBus
+from multidrop.dialects.conditions import Conditions
+from multidrop.drives.events import Conditioned, Sample
+from multidrop.drives.halt import Fate
+from multidrop.shell.events import OnBus
+from multidrop.transports import TransportLost
+from multidrop.tui.app import MultidropApp
+from multidrop.tui.widgets.signs import Signs
 from tests.support.fake_session import FakeBus, FakeDrive, FakeSession, a_move, a_talk, demo_session, make_app, settle
-from transports import TransportLost
-from tui.app import MultidropApp
-from tui.widgets.signs import Signs
 
 pytestmark = pytest.mark.tui
 

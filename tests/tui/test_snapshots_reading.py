@@ -5,8 +5,8 @@ from collections.abc import Callable, Sequence
 import pytest
 from textual.pilot import Pilot
 
-from shell.events import Bytes, Printed
-from shell.transcripts import Filter
+from multidrop.shell.events import Bytes, Printed
+from multidrop.shell.transcripts import Filter
 from tests.support.fake_session import (
     FakeAssist,
     FakeCompletion,

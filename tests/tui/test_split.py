@@ -2,7 +2,7 @@
 
 import pytest
 
-from shell.events import By, Entered, Printed
+from multidrop.shell.events import By, Entered, Printed
 from tests.support.fake_session import a_talk, demo_session, make_app, settle
 
 pytestmark = pytest.mark.tui

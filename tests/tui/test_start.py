@@ -5,16 +5,16 @@ from pathlib import Path
 
 import pytest
 
-from dialects import Diagnostic
-from shell.connect import opened
+from multidrop.dialects import Diagnostic
+from multidrop.shell.connect import opened
+from multidrop.transports import Unreachable
+from multidrop.transports.holders import holder
+from multidrop.tui.app import MultidropApp
+from multidrop.tui.assist import StartEntry
+from multidrop.tui.screens.dialogs import Options
+from multidrop.tui.screens.start import Start
+from multidrop.tui.text import ago
 from tests.support.fake_session import FakeAssist, FakeBus, FakeDrive, FakeSession, settle
-from transports import Unreachable
-from transports.holders import holder
-from tui.app import MultidropApp
-from tui.assist import StartEntry
-from tui.screens.dialogs import Options
-from tui.screens.start import Start
-from tui.text import ago
 
 
 class Assist(FakeAssist):

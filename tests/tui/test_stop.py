@@ -7,21 +7,21 @@ import pytest
 from textual import events
 from textual.pilot import Pilot
 
-from drives.halt import Fate
-from shell import stops
-from shell.events import By
+from multidrop.drives.halt import Fate
+from multidrop.shell import stops
+from multidrop.shell.events import By
+from multidrop.tui.app import MultidropApp, is_stop
+from multidrop.tui.panels.glance import glances_of
+from multidrop.tui.panels.lamps import program_words
+from multidrop.tui.polling import LIVELY, STATUS
+from multidrop.tui.readout import State
+from multidrop.tui.screen_model import ScreenModel, bus_state
+from multidrop.tui.screens.dialogs import Ask, Choose, Confirm, Search, TooSmall
+from multidrop.tui.screens.start import Start
+from multidrop.tui.terminal.keystream import STOP
 from tests.support.cell_session import CellSession, bus, party
 from tests.support.fake_session import FakeSession, a_move, demo_session, make_app, settle
 from tests.support.virtual import in_virtual_time
-from tui.app import MultidropApp, is_stop
-from tui.panels.glance import glances_of
-from tui.panels.lamps import program_words
-from tui.polling import LIVELY, STATUS
-from tui.readout import State
-from tui.screen_model import ScreenModel, bus_state
-from tui.screens.dialogs import Ask, Choose, Confirm, Search, TooSmall
-from tui.screens.start import Start
-from tui.terminal.keystream import STOP
 
 SCREENS = {
     "main": ((), None),

@@ -6,10 +6,10 @@ import threading
 
 import pytest
 
+from multidrop.tui.app import MultidropApp
 from tests.support.fake_session import FakeAssist, demo_session
 from tests.support.pty_screen import on_a_pty
 from tests.support.until import PATIENCE
-from tui.app import MultidropApp
 
 pytestmark = pytest.mark.tui
 

@@ -134,7 +134,7 @@ def test_after_sigstop_and_sigcont_one_thread_reads_a_terminal_that_is_raw_again
 def test_escape_and_a_digit_is_alt_and_that_digit():
     from textual._xterm_parser import XTermParser
 
-    from tui.terminal.keystream import know_alt_digits
+    from multidrop.tui.terminal.keystream import know_alt_digits
 
     know_alt_digits()
     keys = [event.key for digit in "19" for event in XTermParser().feed(f"\x1b{digit}")]

@@ -5,7 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from rich.cells import cell_len
 
-from tui.text import LONGEST, age, at_words, digits, fit, short, shorter, visible
+from multidrop.tui.text import LONGEST, age, at_words, digits, fit, short, shorter, visible
 
 
 def test_control_characters_are_written_out() -> None:

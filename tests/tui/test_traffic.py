@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from dialects import End, Priority, Reply
-from dialects.mcode.host.codec import MCode
-from drives.events import Ended, Sample, Sent, Traffic, Transaction
-from tui.traffic import MOST, MOST_BYTES, TrafficStore
+from multidrop.dialects import End, Priority, Reply
+from multidrop.dialects.mcode.host.codec import MCode
+from multidrop.drives.events import Ended, Sample, Sent, Traffic, Transaction
+from multidrop.tui.traffic import MOST, MOST_BYTES, TrafficStore
 
 
 def exchange(store: TrafficStore, out: bytes, back: bytes, priority: Priority) -> None:

@@ -7,9 +7,9 @@ import pytest
 from textual.app import App, ComposeResult
 from textual.pilot import Pilot
 
-from tui.screen_model import KEPT, Record
-from tui.widgets.gutter import Clocks
-from tui.widgets.transcript import Transcript
+from multidrop.tui.screen_model import KEPT, Record
+from multidrop.tui.widgets.gutter import Clocks
+from multidrop.tui.widgets.transcript import Transcript
 
 pytestmark = pytest.mark.tui
 GUTTER = Clocks("clock", str).gutter

@@ -8,24 +8,24 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from drives.events import Conditioned, Sample
-from shell.events import Agreed, By, OnBus, Predicted, SessionEvent, TwinEnded
-from shell.roles import DIFFERENCE, Series
+from multidrop.drives.events import Conditioned, Sample
+from multidrop.shell.events import Agreed, By, OnBus, Predicted, SessionEvent, TwinEnded
+from multidrop.shell.roles import DIFFERENCE, Series
+from multidrop.tui.curves.ink import ASCII, BLOCK, BRAILLE, TWINS, Ink
+from multidrop.tui.panels.axis import drive_rows
+from multidrop.tui.panels.glance import glances_of
+from multidrop.tui.panels.plot import plot_rows, plot_title
+from multidrop.tui.panels.status import drives_rows, kept, narrow_rows
+from multidrop.tui.panels.view import View
+from multidrop.tui.polling import Polling
+from multidrop.tui.presenter import trouble_mark
+from multidrop.tui.readout import State
+from multidrop.tui.screen_model import ScreenModel, bus_state
+from multidrop.tui.screens.all_drives import drive_row, summary, worst_first
+from multidrop.tui.widgets.lines import Row, width_of
+from multidrop.tui.widgets.signs import Signs, shown_as
 from tests.support.fake_session import AT_LIMIT, FakeSession, demo_session, make_app, settle
 from tests.support.fake_twin import apart, beside
-from tui.curves.ink import ASCII, BLOCK, BRAILLE, TWINS, Ink
-from tui.panels.axis import drive_rows
-from tui.panels.glance import glances_of
-from tui.panels.plot import plot_rows, plot_title
-from tui.panels.status import drives_rows, kept, narrow_rows
-from tui.panels.view import View
-from tui.polling import Polling
-from tui.presenter import trouble_mark
-from tui.readout import State
-from tui.screen_model import ScreenModel, bus_state
-from tui.screens.all_drives import drive_row, summary, worst_first
-from tui.widgets.lines import Row, width_of
-from tui.widgets.signs import Signs, shown_as
 
 
 def view(session: FakeSession, *events: SessionEvent) -> View:

@@ -5,9 +5,9 @@ from collections.abc import Callable
 import pytest
 from textual.pilot import Pilot
 
+from multidrop.tui.widgets.signs import Signs
 from tests.support.fake_session import demo_session, make_app, settle
 from tests.support.fake_twin import a_stall
-from tui.widgets.signs import Signs
 
 pytestmark = pytest.mark.tui
 

@@ -6,12 +6,12 @@ from collections.abc import Sequence
 from math import floor
 from typing import NamedTuple
 
-from tui.curves.columns import Columns
-from tui.curves.ink import Ink
-from tui.curves.raster import Curve, Frame, Raster, Run
-from tui.curves.scale import Scale, magnified, steady
-from tui.curves.trace import Quantity, Traces
-from tui.curves.window import Window
+from multidrop.tui.curves.columns import Columns
+from multidrop.tui.curves.ink import Ink
+from multidrop.tui.curves.raster import Curve, Frame, Raster, Run
+from multidrop.tui.curves.scale import Scale, magnified, steady
+from multidrop.tui.curves.trace import Quantity, Traces
+from multidrop.tui.curves.window import Window
 
 KEPT = 3
 """Pictures of different heights that are kept."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 from math import floor, nan
 from typing import NamedTuple
 
-from tui.curves.trace import Trace
+from multidrop.tui.curves.trace import Trace
 
 GAP = 1.0
 """Seconds without a sample after which a line is interrupted, unless samples come more slowly."""

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from math import floor
 
-from tui.curves.chart import Chart
-from tui.curves.ink import BRAILLE, Ink
-from tui.curves.window import Window
+from multidrop.tui.curves.chart import Chart
+from multidrop.tui.curves.ink import BRAILLE, Ink
+from multidrop.tui.curves.window import Window
 
 SPANS = (2.0, 5.0, 10.0, 20.0, 60.0, 120.0, 300.0, 600.0)
 """Seconds that a plot shows."""

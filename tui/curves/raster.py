@@ -12,9 +12,9 @@ from itertools import groupby
 from math import isnan
 from typing import NamedTuple
 
-from tui.curves.columns import Column, Columns
-from tui.curves.ink import Ink
-from tui.curves.scale import Scale
+from multidrop.tui.curves.columns import Column, Columns
+from multidrop.tui.curves.ink import Ink
+from multidrop.tui.curves.scale import Scale
 
 EMPTY, CURSOR = -1, -2
 """Owners of a cell beside the numbers of the series."""

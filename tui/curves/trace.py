@@ -7,9 +7,9 @@ from bisect import bisect_left
 from collections.abc import Iterator
 from typing import NamedTuple
 
-from drives.events import Sample, Valued
-from shell.events import Predicted
-from shell.roles import DIFFERENCE
+from multidrop.drives.events import Sample, Valued
+from multidrop.shell.events import Predicted
+from multidrop.shell.roles import DIFFERENCE
 
 KEPT = 660.0
 """Seconds of samples that are kept: the longest span, and some more to look back."""

@@ -6,11 +6,11 @@ import re
 from collections.abc import Sequence
 from typing import Protocol
 
-from dialects import Diagnostic
-from dialects.problems import Problem, in_order
-from dialects.program_files import Entry, Part
-from macros import parse_macro
-from shell.program_text import ProgramGrammar
+from multidrop.dialects import Diagnostic
+from multidrop.dialects.problems import Problem, in_order
+from multidrop.dialects.program_files import Entry, Part
+from multidrop.macros import parse_macro
+from multidrop.shell.program_text import ProgramGrammar
 
 _LINE = re.compile(r":(\d+)(?::(\d+))?\Z")
 _TOML = re.compile(

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
 
-from dialects import Diagnostic
-from shell.drafts import Draft, Drafts
-from shell.edited_file import EditedFile, real_text
+from multidrop.dialects import Diagnostic
+from multidrop.shell.drafts import Draft, Drafts
+from multidrop.shell.edited_file import EditedFile, real_text
 
 
 @dataclass

@@ -13,8 +13,8 @@ from textual.binding import Binding, BindingType
 from textual.strip import Strip
 from textual.widgets import TextArea
 
-from shell.edited_file import STAND_INS, edited
-from tui.editor.grammar import Grammar
+from multidrop.shell.edited_file import STAND_INS, edited
+from multidrop.tui.editor.grammar import Grammar
 
 KINDS = ("word", "starts", "label", "text", "remark", "wrong", "current", "error", "warning", "break")
 _SHOWN = {ord(stand_in): "?" for stand_in in STAND_INS}

@@ -6,14 +6,14 @@ most, as a low screen cuts the last ones.
 
 from __future__ import annotations
 
-from tui.panels.glance import NOT_REFERENCED, Glance, firmware_of, name_of
-from tui.panels.lamps import error_span, facts_groups, flowing, lamp_groups
-from tui.panels.travel import LEARNT, LIMITS, SEEN, bar, phase, to_go_words, travel_of
-from tui.panels.twin import twin_rows
-from tui.panels.view import View
-from tui.readout import READ, Readout
-from tui.text import digits, fit
-from tui.widgets.lines import Row, Span, spread, width_of
+from multidrop.tui.panels.glance import NOT_REFERENCED, Glance, firmware_of, name_of
+from multidrop.tui.panels.lamps import error_span, facts_groups, flowing, lamp_groups
+from multidrop.tui.panels.travel import LEARNT, LIMITS, SEEN, bar, phase, to_go_words, travel_of
+from multidrop.tui.panels.twin import twin_rows
+from multidrop.tui.panels.view import View
+from multidrop.tui.readout import READ, Readout
+from multidrop.tui.text import digits, fit
+from multidrop.tui.widgets.lines import Row, Span, spread, width_of
 
 NUMBER = 12
 """Width of the longest position, -2147483648, and a space."""

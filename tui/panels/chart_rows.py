@@ -4,16 +4,16 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from tui.curves.chart import Chart, Extent
-from tui.curves.ink import TWINS
-from tui.curves.look import Look
-from tui.curves.raster import CURSOR, EMPTY, with_cursor
-from tui.curves.scale import Scale, row_of, ticks
-from tui.curves.window import Window
-from tui.panels.series import Group, Line, groups, role_of
-from tui.panels.view import View
-from tui.text import age, digits, fit, short
-from tui.widgets.lines import SERIES, Row, Span
+from multidrop.tui.curves.chart import Chart, Extent
+from multidrop.tui.curves.ink import TWINS
+from multidrop.tui.curves.look import Look
+from multidrop.tui.curves.raster import CURSOR, EMPTY, with_cursor
+from multidrop.tui.curves.scale import Scale, row_of, ticks
+from multidrop.tui.curves.window import Window
+from multidrop.tui.panels.series import Group, Line, groups, role_of
+from multidrop.tui.panels.view import View
+from multidrop.tui.text import age, digits, fit, short
+from multidrop.tui.widgets.lines import SERIES, Row, Span
 
 AXIS = 10
 """Width of the axis of values in cells: label, space, tick."""

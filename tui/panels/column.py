@@ -8,10 +8,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from tui.panels.table import Panel
-from tui.panels.view import View
-from tui.text import fit
-from tui.widgets.lines import Row, width_of
+from multidrop.tui.panels.table import Panel
+from multidrop.tui.panels.view import View
+from multidrop.tui.text import fit
+from multidrop.tui.widgets.lines import Row, width_of
 
 HEAD = 1
 """Rows of a title."""

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from tui.readout import READ, Readout, State
-from tui.screen_model import ScreenModel
-from tui.session_view import BusView, SessionView
-from tui.text import digits, fit
-from tui.widgets.lines import Span
+from multidrop.tui.readout import READ, Readout, State
+from multidrop.tui.screen_model import ScreenModel
+from multidrop.tui.session_view import BusView, SessionView
+from multidrop.tui.text import digits, fit
+from multidrop.tui.widgets.lines import Span
 
 STATE = 17
 """Width of a sign and its words: `■ stood 0.9 s ago`."""

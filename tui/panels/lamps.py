@@ -8,10 +8,10 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
-from dialects.conditions import UNREAD, Conditions, Lamp
-from tui.readout import Readout
-from tui.text import age
-from tui.widgets.lines import Row, Span, width_of
+from multidrop.dialects.conditions import UNREAD, Conditions, Lamp
+from multidrop.tui.readout import Readout
+from multidrop.tui.text import age
+from multidrop.tui.widgets.lines import Row, Span, width_of
 
 LIMITS = ("lim+", "lim-")
 MANY = 6

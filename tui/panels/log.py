@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from tui.panels.view import View
-from tui.text import fit, visible
-from tui.widgets.lines import Row
+from multidrop.tui.panels.view import View
+from multidrop.tui.text import fit, visible
+from multidrop.tui.widgets.lines import Row
 
 OFF = (" off", " /log on: a new file in the state folder", " /log FILE: one that you name")
 

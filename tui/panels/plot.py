@@ -8,15 +8,15 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from tui.curves.chart import Chart, Extent
-from tui.curves.ink import Ink
-from tui.curves.look import Look
-from tui.curves.window import Window
-from tui.panels.chart_rows import AXIS, Shown, chart_rows, columns_of, gutter, shown_number, time_row
-from tui.panels.series import PLOTTED, Group, Line, groups, role_of
-from tui.panels.view import View
-from tui.text import age, fit
-from tui.widgets.lines import Row, Span, width_of
+from multidrop.tui.curves.chart import Chart, Extent
+from multidrop.tui.curves.ink import Ink
+from multidrop.tui.curves.look import Look
+from multidrop.tui.curves.window import Window
+from multidrop.tui.panels.chart_rows import AXIS, Shown, chart_rows, columns_of, gutter, shown_number, time_row
+from multidrop.tui.panels.series import PLOTTED, Group, Line, groups, role_of
+from multidrop.tui.panels.view import View
+from multidrop.tui.text import age, fit
+from multidrop.tui.widgets.lines import Row, Span, width_of
 
 REST = 2.0
 """Steps by which the position of a drive at rest may change: an encoder between two counts."""

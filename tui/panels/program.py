@@ -5,12 +5,12 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from shell.events import Phase
-from tui.panels.glance import Glance
-from tui.panels.view import View
-from tui.readout import Readout
-from tui.text import age, fit
-from tui.widgets.lines import Row
+from multidrop.shell.events import Phase
+from multidrop.tui.panels.glance import Glance
+from multidrop.tui.panels.view import View
+from multidrop.tui.readout import Readout
+from multidrop.tui.text import age, fit
+from multidrop.tui.widgets.lines import Row
 
 SIGNS = {Phase.EXECUTES: "▶", Phase.BEFORE: "║", Phase.AFTER: "✓"}
 """The sign of the current line: it is executed; the program waits before it; it was executed, and the program waits."""

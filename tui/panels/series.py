@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from shell.roles import DIFFERENCE
-from tui.curves.ink import TWINS
-from tui.curves.trace import PREDICTED, Quantity
-from tui.panels.view import View
-from tui.polling import plotted
-from tui.widgets.lines import SERIES
+from multidrop.shell.roles import DIFFERENCE
+from multidrop.tui.curves.ink import TWINS
+from multidrop.tui.curves.trace import PREDICTED, Quantity
+from multidrop.tui.panels.view import View
+from multidrop.tui.polling import plotted
+from multidrop.tui.widgets.lines import SERIES
 
 PLOTTED = {"velocity": "/s", "position": ""}
 """The quantities of every drive, and the end of their units."""

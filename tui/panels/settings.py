@@ -4,15 +4,15 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from dialects import Diagnostic
-from dialects.parameters import VARIABLES, Readings, Value
-from shell.params.page import Row as Setting
-from shell.params.page import found_in, meanings_of, rows
-from tui.panels.glance import Glance, name_of
-from tui.panels.view import View
-from tui.session_view import DriveView
-from tui.text import age, fit
-from tui.widgets.lines import Row, Span, spread
+from multidrop.dialects import Diagnostic
+from multidrop.dialects.parameters import VARIABLES, Readings, Value
+from multidrop.shell.params.page import Row as Setting
+from multidrop.shell.params.page import found_in, meanings_of, rows
+from multidrop.tui.panels.glance import Glance, name_of
+from multidrop.tui.panels.view import View
+from multidrop.tui.session_view import DriveView
+from multidrop.tui.text import age, fit
+from multidrop.tui.widgets.lines import Row, Span, spread
 
 NAME, VALUE, UNIT = 8, 16, 10
 TOLD = ("range", "value", "values", "note")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from tui.panels.table import PANELS, Panel
+from multidrop.tui.panels.table import PANELS, Panel
 
 
 class Shown:

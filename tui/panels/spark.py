@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import math
 
-from tui.curves.columns import Columns
-from tui.curves.ink import BRAILLE
-from tui.curves.raster import Curve, Frame, Raster
-from tui.curves.scale import Scale
-from tui.curves.trace import Trace
-from tui.readout import SPAN, Readout
+from multidrop.tui.curves.columns import Columns
+from multidrop.tui.curves.ink import BRAILLE
+from multidrop.tui.curves.raster import Curve, Frame, Raster
+from multidrop.tui.curves.scale import Scale
+from multidrop.tui.curves.trace import Trace
+from multidrop.tui.readout import SPAN, Readout
 
 
 def spark(readout: Readout, now: float, width: int) -> str:

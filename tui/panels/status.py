@@ -7,16 +7,16 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from tui.panels.axis import NUMBER, poll_words
-from tui.panels.glance import NOT_REFERENCED, Glance
-from tui.panels.lamps import flowing, lamp_groups, program_words, trouble_of
-from tui.panels.spark import spark
-from tui.panels.travel import bar, to_go_words
-from tui.panels.twin import SIGN, alarm_words, difference_words, differs
-from tui.panels.view import View
-from tui.readout import READ, Readout, State
-from tui.text import age, digits, fit
-from tui.widgets.lines import Row, Span, spread, width_of
+from multidrop.tui.panels.axis import NUMBER, poll_words
+from multidrop.tui.panels.glance import NOT_REFERENCED, Glance
+from multidrop.tui.panels.lamps import flowing, lamp_groups, program_words, trouble_of
+from multidrop.tui.panels.spark import spark
+from multidrop.tui.panels.travel import bar, to_go_words
+from multidrop.tui.panels.twin import SIGN, alarm_words, difference_words, differs
+from multidrop.tui.panels.view import View
+from multidrop.tui.readout import READ, Readout, State
+from multidrop.tui.text import age, digits, fit
+from multidrop.tui.widgets.lines import Row, Span, spread, width_of
 
 NAME = 9
 STATE = 14

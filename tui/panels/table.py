@@ -8,14 +8,14 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import NamedTuple
 
-from tui.panels.axis import drive_rows, drive_title
-from tui.panels.log import log_rows, log_title
-from tui.panels.plot import plot_rows, plot_title
-from tui.panels.program import program_rows, program_title
-from tui.panels.status import drives_rows
-from tui.panels.traffic import traffic_rows, traffic_title
-from tui.panels.view import View
-from tui.widgets.lines import Row
+from multidrop.tui.panels.axis import drive_rows, drive_title
+from multidrop.tui.panels.log import log_rows, log_title
+from multidrop.tui.panels.plot import plot_rows, plot_title
+from multidrop.tui.panels.program import program_rows, program_title
+from multidrop.tui.panels.status import drives_rows
+from multidrop.tui.panels.traffic import traffic_rows, traffic_title
+from multidrop.tui.panels.view import View
+from multidrop.tui.widgets.lines import Row
 
 MOTION, CONDITIONS, PLOT = "motion", "conditions", "plot"
 """What a panel can want: position and velocity; lamps, errors and programs; samples as fast as the wire allows."""

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from datetime import datetime
 
-from shell.raw import text_of
-from tui.panels.view import View
-from tui.text import fit
-from tui.traffic import Piece
-from tui.widgets.lines import Row
+from multidrop.shell.raw import text_of
+from multidrop.tui.panels.view import View
+from multidrop.tui.text import fit
+from multidrop.tui.traffic import Piece
+from multidrop.tui.widgets.lines import Row
 
 OUT, IN = "↑", "↓"
 CLOCK = 12

@@ -9,8 +9,8 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from dialects.conditions import Pace
-from tui.readout import SWITCHES, Point, Readout
+from multidrop.dialects.conditions import Pace
+from multidrop.tui.readout import SWITCHES, Point, Readout
 
 LIMITS, LEARNT, SEEN = "limits", "switches", "seen"
 """Where a travel comes from: software limits, limit switches that were reached, the positions seen so far."""

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
-from tui.readout import Readout
-from tui.text import at_words, digits
-from tui.widgets.lines import Row, Span, spread
+from multidrop.tui.readout import Readout
+from multidrop.tui.text import at_words, digits
+from multidrop.tui.widgets.lines import Row, Span, spread
 
 SIGN = "≠"
 """The drive differs from its twin by more than the limit."""

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from tui.panels.glance import Glance
-from tui.screen_model import ScreenModel
-from tui.session_view import SessionView
+from multidrop.tui.panels.glance import Glance
+from multidrop.tui.screen_model import ScreenModel
+from multidrop.tui.session_view import SessionView
 
 
 @dataclass(frozen=True)

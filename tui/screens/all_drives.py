@@ -10,18 +10,18 @@ from typing import ClassVar, NamedTuple
 from textual.app import ComposeResult
 from textual.binding import Binding, BindingType
 
-from dialects.visible import visible
-from tui.panels.glance import NOT_REFERENCED, Glance, glances_of
-from tui.panels.lamps import program_words, trouble_of
-from tui.panels.spark import spark
-from tui.panels.status import STATE, short_words
-from tui.panels.twin import SIGN, alarm_words
-from tui.panels.view import View
-from tui.readout import State
-from tui.screens.dialogs import Field
-from tui.screens.page import Host, Page
-from tui.text import fit
-from tui.widgets.lines import Row, Span, spread, width_of
+from multidrop.dialects.visible import visible
+from multidrop.tui.panels.glance import NOT_REFERENCED, Glance, glances_of
+from multidrop.tui.panels.lamps import program_words, trouble_of
+from multidrop.tui.panels.spark import spark
+from multidrop.tui.panels.status import STATE, short_words
+from multidrop.tui.panels.twin import SIGN, alarm_words
+from multidrop.tui.panels.view import View
+from multidrop.tui.readout import State
+from multidrop.tui.screens.dialogs import Field
+from multidrop.tui.screens.page import Host, Page
+from multidrop.tui.text import fit
+from multidrop.tui.widgets.lines import Row, Span, spread, width_of
 
 URGENCY = (
     *(State.LOST, State.SILENT, State.MOVING, State.DWELL, State.STORING, State.UNKNOWN),

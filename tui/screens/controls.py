@@ -13,17 +13,29 @@ from typing import ClassVar, NamedTuple
 from textual.app import ComposeResult
 from textual.binding import Binding, BindingType
 
-from dialects.controls import BY, DISABLE, ENABLE, HIGH, HOME_MINUS, HOME_PLUS, LOW, STOP, TO, Control, Controls
-from tui.jog import Jog
-from tui.panels.axis import drive_rows, unit_of
-from tui.panels.glance import Glance, name_of
-from tui.panels.view import View
-from tui.readout import READ, Readout, State
-from tui.screens.dialogs import Field
-from tui.screens.page import Host, Page
-from tui.session_view import Place, selected_place
-from tui.text import fit
-from tui.widgets.lines import Row, Span, spread, width_of
+from multidrop.dialects.controls import (
+    BY,
+    DISABLE,
+    ENABLE,
+    HIGH,
+    HOME_MINUS,
+    HOME_PLUS,
+    LOW,
+    STOP,
+    TO,
+    Control,
+    Controls,
+)
+from multidrop.tui.jog import Jog
+from multidrop.tui.panels.axis import drive_rows, unit_of
+from multidrop.tui.panels.glance import Glance, name_of
+from multidrop.tui.panels.view import View
+from multidrop.tui.readout import READ, Readout, State
+from multidrop.tui.screens.dialogs import Field
+from multidrop.tui.screens.page import Host, Page
+from multidrop.tui.session_view import Place, selected_place
+from multidrop.tui.text import fit
+from multidrop.tui.widgets.lines import Row, Span, spread, width_of
 
 STEPS = tuple(10**n for n in range(8))
 """The sizes of a step that keys choose."""

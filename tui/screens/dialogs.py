@@ -20,9 +20,9 @@ from textual.screen import ModalScreen
 from textual.widgets import Input, OptionList, Static
 from textual.widgets.option_list import Option
 
-from dialects.visible import visible
-from tui.keymap import named_key
-from tui.widgets.footer import StopSign
+from multidrop.dialects.visible import visible
+from multidrop.tui.keymap import named_key
+from multidrop.tui.widgets.footer import StopSign
 
 T = TypeVar("T")
 

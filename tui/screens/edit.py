@@ -15,20 +15,20 @@ from textual.app import ComposeResult
 from textual.binding import Binding, BindingType
 from textual.containers import Horizontal, Vertical
 
-from dialects import Diagnostic
-from dialects.problems import Problem
-from dialects.program_files import Part
-from shell.edited_file import ChangedMeanwhile, real_text
-from tui.editor.grammar import Grammar, MacroGrammar, grammar_of
-from tui.editor.texts import OpenText
-from tui.editor.widget import Editor
-from tui.panels.view import View
-from tui.readout import ProgramFacts
-from tui.screens import program_choices as choices
-from tui.screens.dialogs import Confirm, Search
-from tui.screens.page import Host, Page
-from tui.screens.program_rows import Findings, heading_row, news_rows, problem_rows, rule
-from tui.session_view import SessionView
+from multidrop.dialects import Diagnostic
+from multidrop.dialects.problems import Problem
+from multidrop.dialects.program_files import Part
+from multidrop.shell.edited_file import ChangedMeanwhile, real_text
+from multidrop.tui.editor.grammar import Grammar, MacroGrammar, grammar_of
+from multidrop.tui.editor.texts import OpenText
+from multidrop.tui.editor.widget import Editor
+from multidrop.tui.panels.view import View
+from multidrop.tui.readout import ProgramFacts
+from multidrop.tui.screens import program_choices as choices
+from multidrop.tui.screens.dialogs import Confirm, Search
+from multidrop.tui.screens.page import Host, Page
+from multidrop.tui.screens.program_rows import Findings, heading_row, news_rows, problem_rows, rule
+from multidrop.tui.session_view import SessionView
 
 # The lines of a file and those in a drive: which line of the file has which address, where both hold one program.
 

@@ -10,9 +10,9 @@ from textual.binding import Binding, BindingType
 from textual.containers import Vertical, VerticalScroll
 from textual.widgets import Static
 
-from dialects.visible import visible
-from shell.asking import Field as Wanted
-from tui.screens.dialogs import Dialog, Field
+from multidrop.dialects.visible import visible
+from multidrop.shell.asking import Field as Wanted
+from multidrop.tui.screens.dialogs import Dialog, Field
 
 NEEDED = "a value is needed"
 

@@ -7,10 +7,10 @@ from typing import ClassVar
 
 from textual.screen import Screen
 
-from tui.widgets.compositor import FrontCompositor
-from tui.widgets.footer import Footer
-from tui.widgets.lines import Lines
-from tui.widgets.topline import TopLine
+from multidrop.tui.widgets.compositor import FrontCompositor
+from multidrop.tui.widgets.footer import Footer
+from multidrop.tui.widgets.lines import Lines
+from multidrop.tui.widgets.topline import TopLine
 
 
 class Framed(Screen[None]):

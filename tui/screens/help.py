@@ -6,11 +6,11 @@ from collections.abc import Iterable, Sequence
 
 from rich.text import Text
 
-from tui.keymap import Keymap
-from tui.screens.dialogs import Match
-from tui.screens.framed import Framed
-from tui.screens.page import Page
-from tui.text import at_words, visible
+from multidrop.tui.keymap import Keymap
+from multidrop.tui.screens.dialogs import Match
+from multidrop.tui.screens.framed import Framed
+from multidrop.tui.screens.page import Page
+from multidrop.tui.text import at_words, visible
 
 Entry = tuple[str, str]
 """A key, a line or a sign, and its meaning; a heading has an empty meaning."""

@@ -10,14 +10,14 @@ from typing import ClassVar, NamedTuple
 from textual.app import ComposeResult
 from textual.binding import Binding, BindingType
 
-from dialects import Diagnostic
-from tui.panels.view import View
-from tui.screens.dialogs import Ask, Confirm
-from tui.screens.page import Host, Page
-from tui.screens.program_rows import news_rows, rule
-from tui.session_view import MacrosView, MacroView, PlayingView
-from tui.text import fit, visible
-from tui.widgets.lines import Row, spread
+from multidrop.dialects import Diagnostic
+from multidrop.tui.panels.view import View
+from multidrop.tui.screens.dialogs import Ask, Confirm
+from multidrop.tui.screens.page import Host, Page
+from multidrop.tui.screens.program_rows import news_rows, rule
+from multidrop.tui.session_view import MacrosView, MacroView, PlayingView
+from multidrop.tui.text import fit, visible
+from multidrop.tui.widgets.lines import Row, spread
 
 NAME, KEY = 20, 8
 NEWS = 3

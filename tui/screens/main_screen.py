@@ -11,18 +11,18 @@ from textual.binding import Binding, BindingType
 from textual.containers import Horizontal, Vertical
 from textual.geometry import Size
 
-from tui.keymap import named_key
-from tui.panels.column import divided, fitting
-from tui.panels.shown import Shown
-from tui.panels.table import CONDITIONS, MOTION, PANELS, Panel
-from tui.screens.reading import Reading
-from tui.text import fit, shorter
-from tui.widgets.banner import Banner
-from tui.widgets.beside import Beside
-from tui.widgets.entry import Complete, Draft, Entry, Menu, Typed
-from tui.widgets.lines import Lines, Roles, Row, width_of
-from tui.widgets.topline import rule_row
-from tui.widgets.transcript import Transcript
+from multidrop.tui.keymap import named_key
+from multidrop.tui.panels.column import divided, fitting
+from multidrop.tui.panels.shown import Shown
+from multidrop.tui.panels.table import CONDITIONS, MOTION, PANELS, Panel
+from multidrop.tui.screens.reading import Reading
+from multidrop.tui.text import fit, shorter
+from multidrop.tui.widgets.banner import Banner
+from multidrop.tui.widgets.beside import Beside
+from multidrop.tui.widgets.entry import Complete, Draft, Entry, Menu, Typed
+from multidrop.tui.widgets.lines import Lines, Roles, Row, width_of
+from multidrop.tui.widgets.topline import rule_row
+from multidrop.tui.widgets.transcript import Transcript
 
 WIDE = (110, 24)
 """Smallest width and height with a column of panels."""

@@ -13,18 +13,18 @@ from textual.app import ComposeResult
 from textual.binding import Binding, BindingType
 from textual.containers import Vertical
 
-from tui.editor.texts import Texts
-from tui.frames import Frames
-from tui.function_keys import FunctionKeys
-from tui.keymap import named_key
-from tui.outbox import Outbox
-from tui.panels.view import View
-from tui.screen_model import Record, ScreenModel
-from tui.screens.framed import Framed
-from tui.session_view import SessionView
-from tui.terminal.keyboard import Keyboard
-from tui.widgets.banner import Banner
-from tui.widgets.lines import Lines
+from multidrop.tui.editor.texts import Texts
+from multidrop.tui.frames import Frames
+from multidrop.tui.function_keys import FunctionKeys
+from multidrop.tui.keymap import named_key
+from multidrop.tui.outbox import Outbox
+from multidrop.tui.panels.view import View
+from multidrop.tui.screen_model import Record, ScreenModel
+from multidrop.tui.screens.framed import Framed
+from multidrop.tui.session_view import SessionView
+from multidrop.tui.terminal.keyboard import Keyboard
+from multidrop.tui.widgets.banner import Banner
+from multidrop.tui.widgets.lines import Lines
 
 
 class Host(Protocol):

@@ -11,18 +11,18 @@ from typing import ClassVar, NamedTuple
 from textual.app import ComposeResult
 from textual.binding import Binding, BindingType
 
-from dialects import Diagnostic
-from dialects.parameters import VARIABLES, Readings
-from shell.params import file as files
-from shell.params.page import Edit, edit, parsed
-from tui.panels.glance import Glance
-from tui.panels.settings import SettingsTable
-from tui.panels.view import View
-from tui.screens.dialogs import Field
-from tui.screens.page import Host, Page
-from tui.session_view import Place, selected_place
-from tui.text import fit
-from tui.widgets.lines import Row, Span
+from multidrop.dialects import Diagnostic
+from multidrop.dialects.parameters import VARIABLES, Readings
+from multidrop.shell.params import file as files
+from multidrop.shell.params.page import Edit, edit, parsed
+from multidrop.tui.panels.glance import Glance
+from multidrop.tui.panels.settings import SettingsTable
+from multidrop.tui.panels.view import View
+from multidrop.tui.screens.dialogs import Field
+from multidrop.tui.screens.page import Host, Page
+from multidrop.tui.session_view import Place, selected_place
+from multidrop.tui.text import fit
+from multidrop.tui.widgets.lines import Row, Span
 
 SEARCH, FILE, DRIVE, EDIT = "search", "file", "drive", "value"
 READING = "reading; the footer shows how far"

@@ -7,15 +7,15 @@ from typing import ClassVar
 from textual.app import ComposeResult
 from textual.binding import Binding, BindingType
 
-from shell.roles import DIFFERENCE
-from tui.curves.look import Look
-from tui.panels.chart_rows import columns_of, cursor_row
-from tui.panels.plot import plot_rows, plot_title
-from tui.panels.series import PLOTTED
-from tui.panels.view import View
-from tui.polling import plotted
-from tui.screens.page import Host, Page
-from tui.widgets.lines import Row
+from multidrop.shell.roles import DIFFERENCE
+from multidrop.tui.curves.look import Look
+from multidrop.tui.panels.chart_rows import columns_of, cursor_row
+from multidrop.tui.panels.plot import plot_rows, plot_title
+from multidrop.tui.panels.series import PLOTTED
+from multidrop.tui.panels.view import View
+from multidrop.tui.polling import plotted
+from multidrop.tui.screens.page import Host, Page
+from multidrop.tui.widgets.lines import Row
 
 PORT = 9876
 """The port at which viewers of rerun connect by default."""

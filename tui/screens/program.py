@@ -12,19 +12,19 @@ from typing import ClassVar
 
 from textual.binding import Binding, BindingType
 
-from dialects.program_files import Entry
-from shell.checking import ending_of
-from shell.program_text import ProgramGrammar
-from tui.panels.column import column_rows
-from tui.panels.program import SIGNS, index_of, spot_of, state_words
-from tui.panels.table import panel
-from tui.panels.view import View
-from tui.readout import ProgramFacts
-from tui.screens import program_choices as choices
-from tui.screens.dialogs import Ask, Confirm, Offer, Search, offers_like
-from tui.screens.edit import EditPage
-from tui.screens.page import Host
-from tui.screens.program_rows import marks_of
+from multidrop.dialects.program_files import Entry
+from multidrop.shell.checking import ending_of
+from multidrop.shell.program_text import ProgramGrammar
+from multidrop.tui.panels.column import column_rows
+from multidrop.tui.panels.program import SIGNS, index_of, spot_of, state_words
+from multidrop.tui.panels.table import panel
+from multidrop.tui.panels.view import View
+from multidrop.tui.readout import ProgramFacts
+from multidrop.tui.screens import program_choices as choices
+from multidrop.tui.screens.dialogs import Ask, Confirm, Offer, Search, offers_like
+from multidrop.tui.screens.edit import EditPage
+from multidrop.tui.screens.page import Host
+from multidrop.tui.screens.program_rows import marks_of
 
 
 class ProgramPage(EditPage):

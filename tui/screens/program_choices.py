@@ -10,16 +10,16 @@ from typing import NamedTuple
 
 from rich.text import Text
 
-from dialects.families import program_languages
-from dialects.problems import errors
-from dialects.program_files import Entry
-from shell.lines import join_target
-from tui.editor.texts import OpenText
-from tui.readout import ProgramFacts
-from tui.screens.dialogs import Match
-from tui.screens.program_rows import Findings
-from tui.session_view import SessionView
-from tui.text import visible
+from multidrop.dialects.families import program_languages
+from multidrop.dialects.problems import errors
+from multidrop.dialects.program_files import Entry
+from multidrop.shell.lines import join_target
+from multidrop.tui.editor.texts import OpenText
+from multidrop.tui.readout import ProgramFacts
+from multidrop.tui.screens.dialogs import Match
+from multidrop.tui.screens.program_rows import Findings
+from multidrop.tui.session_view import SessionView
+from multidrop.tui.text import visible
 
 UPLOAD = "\0upload"
 """The choice to read what the drive holds into a new file."""

@@ -5,15 +5,15 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-from dialects.problems import Problem, errors
-from dialects.program_files import Entry
-from tui.editor.texts import OpenText
-from tui.editor.widget import Mark
-from tui.panels.glance import Glance, name_of
-from tui.screen_model import Record
-from tui.text import fit, visible
-from tui.widgets.gutter import MARKS
-from tui.widgets.lines import Row, Span, spread, width_of
+from multidrop.dialects.problems import Problem, errors
+from multidrop.dialects.program_files import Entry
+from multidrop.tui.editor.texts import OpenText
+from multidrop.tui.editor.widget import Mark
+from multidrop.tui.panels.glance import Glance, name_of
+from multidrop.tui.screen_model import Record
+from multidrop.tui.text import fit, visible
+from multidrop.tui.widgets.gutter import MARKS
+from multidrop.tui.widgets.lines import Row, Span, spread, width_of
 
 MOST_PROBLEMS = 4
 """Problems that are shown below the editor."""

@@ -9,14 +9,14 @@ from typing import TypeVar
 from rich.text import Text
 from textual.app import App
 
-from shell.asking import Field
-from tui.panels.glance import Glance
-from tui.screens.dialogs import Ask, Choose, Confirm, Dialog, GoOn, Match, Offer, Search, TooSmall
-from tui.screens.form import Form
-from tui.session_view import BusView, SessionView
-from tui.text import visible
-from tui.widgets.signs import Signs
-from tui.widgets.theme import THEMES
+from multidrop.shell.asking import Field
+from multidrop.tui.panels.glance import Glance
+from multidrop.tui.screens.dialogs import Ask, Choose, Confirm, Dialog, GoOn, Match, Offer, Search, TooSmall
+from multidrop.tui.screens.form import Form
+from multidrop.tui.session_view import BusView, SessionView
+from multidrop.tui.text import visible
+from multidrop.tui.widgets.signs import Signs
+from multidrop.tui.widgets.theme import THEMES
 
 T = TypeVar("T")
 Answers = list[tuple[str, str]]

@@ -7,10 +7,10 @@ from typing import ClassVar
 from textual import events
 from textual.binding import Binding, BindingType
 
-from tui.keymap import named_key
-from tui.screens.framed import Framed
-from tui.widgets.reader import Reader
-from tui.widgets.transcript import Transcript
+from multidrop.tui.keymap import named_key
+from multidrop.tui.screens.framed import Framed
+from multidrop.tui.widgets.reader import Reader
+from multidrop.tui.widgets.transcript import Transcript
 
 
 class Reading(Framed):

@@ -15,13 +15,13 @@ from textual.containers import Vertical
 from textual.widgets import Static
 from textual.widgets.option_list import Option
 
-from dialects import Diagnostic, DriveError
-from dialects.visible import visible
-from transports import TransportLost
-from tui.assist import StartEntry
-from tui.keymap import named_key
-from tui.screens.dialogs import Field, Options, Over
-from tui.widgets.banner import Banner
+from multidrop.dialects import Diagnostic, DriveError
+from multidrop.dialects.visible import visible
+from multidrop.transports import TransportLost
+from multidrop.tui.assist import StartEntry
+from multidrop.tui.keymap import named_key
+from multidrop.tui.screens.dialogs import Field, Options, Over
+from multidrop.tui.widgets.banner import Banner
 
 DEMO = StartEntry("demo", "the demo cell", "sim:", "simulated drives, no hardware needed")
 TOUR = StartEntry("demo", "the tour", "tour", "two minutes through it, on the demo cell")

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from dialects import Diagnostic
-from dialects.on_demand import imported
-from tui.screens.page import Page
+from multidrop.dialects import Diagnostic
+from multidrop.dialects.on_demand import imported
+from multidrop.tui.screens.page import Page
 
 
 class PageEntry(NamedTuple):
@@ -23,7 +23,7 @@ class PageEntry(NamedTuple):
 
     def page(self) -> type[Page]:
         """Import the class."""
-        found: type[Page] = imported(f"tui.screens.{self.place}")
+        found: type[Page] = imported(f"multidrop.tui.screens.{self.place}")
         return found
 
 

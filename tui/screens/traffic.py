@@ -8,12 +8,12 @@ from typing import ClassVar
 from textual.app import ComposeResult
 from textual.binding import Binding, BindingType
 
-from tui.panels.traffic import piece_rows
-from tui.panels.view import View
-from tui.screens.page import Host, Page
-from tui.text import visible
-from tui.traffic import TrafficStore
-from tui.widgets.lines import Row, spread
+from multidrop.tui.panels.traffic import piece_rows
+from multidrop.tui.panels.view import View
+from multidrop.tui.screens.page import Host, Page
+from multidrop.tui.text import visible
+from multidrop.tui.traffic import TrafficStore
+from multidrop.tui.widgets.lines import Row, spread
 
 NO_TRAFFIC = TrafficStore()
 

@@ -21,9 +21,9 @@ from typing import Any, Protocol, cast
 from textual import events
 from textual.message import Message
 
-from shell.front import raw_terminal
-from tui.terminal.keystream import STOP, KeyStream
-from tui.terminal.screenwriter import ScreenWriter
+from multidrop.shell.front import raw_terminal
+from multidrop.tui.terminal.keystream import STOP, KeyStream
+from multidrop.tui.terminal.screenwriter import ScreenWriter
 
 assert sys.platform != "win32"
 

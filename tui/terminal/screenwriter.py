@@ -19,9 +19,9 @@ from textual._compositor import ChopsUpdate, LayoutUpdate
 from textual.drivers.linux_driver import LinuxDriver
 from textual.geometry import Offset, Size
 
-from shell.outlets import Lane, Loss
-from tui.terminal.canvas import Canvas, pieces_of
-from tui.terminal.pace import Pace
+from multidrop.shell.outlets import Lane, Loss
+from multidrop.tui.terminal.canvas import Canvas, pieces_of
+from multidrop.tui.terminal.pace import Pace
 
 CURSOR_QUERY = "\x1b[6n"
 KEYBOARD_PROTOCOL = re.compile("\x1b\\[[<>][0-9]*u")

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from shell.stops import Tally, headline, words
-from tui.text import fit
-from tui.widgets.lines import Lines, Row
+from multidrop.shell.stops import Tally, headline, words
+from multidrop.tui.text import fit
+from multidrop.tui.widgets.lines import Lines, Row
 
 
 def banner_row(tally: Tally | None, lost: str, width: int) -> Row:

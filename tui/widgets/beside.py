@@ -7,11 +7,11 @@ from collections.abc import Callable, Iterable
 from textual.app import ComposeResult
 from textual.containers import Vertical
 
-from shell.transcripts import Filter
-from tui.screen_model import Record
-from tui.text import fit
-from tui.widgets.lines import Lines, Row
-from tui.widgets.transcript import Transcript
+from multidrop.shell.transcripts import Filter
+from multidrop.tui.screen_model import Record
+from multidrop.tui.text import fit
+from multidrop.tui.widgets.lines import Lines, Row
+from multidrop.tui.widgets.transcript import Transcript
 
 
 class Half(Transcript):

@@ -21,11 +21,11 @@ from textual.reactive import Reactive
 from textual.widgets import Input
 from textual.widgets.input import Selection
 
-from dialects import Diagnostic
-from dialects.files import lines_of
-from tui.assist import CompletionView
-from tui.text import fit
-from tui.widgets.lines import Lines, Row
+from multidrop.dialects import Diagnostic
+from multidrop.dialects.files import lines_of
+from multidrop.tui.assist import CompletionView
+from multidrop.tui.text import fit
+from multidrop.tui.widgets.lines import Lines, Row
 
 LISTED = 8
 """Number of completions in view."""

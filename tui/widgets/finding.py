@@ -10,10 +10,10 @@ from bisect import bisect_left, insort
 from collections.abc import Sequence
 from typing import Protocol
 
-from shell.lines import EVERYONE
-from shell.transcripts import Filter
-from tui.screen_model import Record
-from tui.widgets.records import Records
+from multidrop.shell.lines import EVERYONE
+from multidrop.shell.transcripts import Filter
+from multidrop.tui.screen_model import Record
+from multidrop.tui.widgets.records import Records
 
 SENT = frozenset(">»")
 TALK = frozenset({">", "", "x"})

@@ -6,9 +6,9 @@ from collections.abc import Sequence
 
 from textual import events
 
-from tui.keymap import read_key
-from tui.text import fit
-from tui.widgets.lines import Lines, Row, Span, width_of
+from multidrop.tui.keymap import read_key
+from multidrop.tui.text import fit
+from multidrop.tui.widgets.lines import Lines, Row, Span, width_of
 
 STOP = "^X STOP ALL"
 

@@ -7,10 +7,10 @@ from typing import NamedTuple
 
 from rich.cells import cell_len, chop_cells
 
-from shell.layout import laid_out
-from tui.screen_model import Record
-from tui.text import at_words, fit, visible
-from tui.widgets.lines import Row, Span
+from multidrop.shell.layout import laid_out
+from multidrop.tui.screen_model import Record
+from multidrop.tui.text import at_words, fit, visible
+from multidrop.tui.widgets.lines import Row, Span
 
 MARKS = {
     ">": ("›", "strong"),

@@ -17,9 +17,9 @@ from textual.geometry import Size
 from textual.reactive import Reactive
 from textual.widgets import Input
 
-from tui.widgets.lines import Lines, Row, spread, width_of
-from tui.widgets.sight import Picked, Search
-from tui.widgets.transcript import Transcript
+from multidrop.tui.widgets.lines import Lines, Row, spread, width_of
+from multidrop.tui.widgets.sight import Picked, Search
+from multidrop.tui.widgets.transcript import Transcript
 
 LONGEST = 200
 """Characters of a searched text."""

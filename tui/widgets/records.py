@@ -10,7 +10,7 @@ from collections import deque
 from collections.abc import Iterator, Sequence
 from itertools import islice
 
-from tui.screen_model import KEPT, Record
+from multidrop.tui.screen_model import KEPT, Record
 
 MOST_TEXT = 8_000_000
 """Characters of all kept records: fifty thousand long lines would take gigabytes."""

@@ -9,10 +9,10 @@ from __future__ import annotations
 from bisect import bisect_left, bisect_right
 from collections.abc import Sequence
 
-from shell.transcripts import EVERYTHING, Filter
-from tui.screen_model import Record
-from tui.widgets.finding import Holding, Index, Shown
-from tui.widgets.records import Records
+from multidrop.shell.transcripts import EVERYTHING, Filter
+from multidrop.tui.screen_model import Record
+from multidrop.tui.widgets.finding import Holding, Index, Shown
+from multidrop.tui.widgets.records import Records
 
 
 class Sight:

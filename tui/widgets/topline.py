@@ -12,9 +12,9 @@ from dataclasses import dataclass
 
 from textual import events
 
-from tui.readout import State
-from tui.text import fit
-from tui.widgets.lines import Lines, Row, Span, width_of
+from multidrop.tui.readout import State
+from multidrop.tui.text import fit
+from multidrop.tui.widgets.lines import Lines, Row, Span, width_of
 
 NAME = " multidrop  "
 TROUBLE = frozenset({State.LOST, State.SILENT, State.TROUBLE, State.DIFFERS})

@@ -10,13 +10,13 @@ from collections.abc import Callable, Iterable
 from textual import events
 from textual.geometry import Size
 
-from shell.transcripts import Filter
-from tui.screen_model import Record
-from tui.widgets import gutter
-from tui.widgets.gutter import SENT, Clocks
-from tui.widgets.lines import Lines, Row, Span, spread, width_of
-from tui.widgets.records import Records
-from tui.widgets.sight import Picked, Search, Sight
+from multidrop.shell.transcripts import Filter
+from multidrop.tui.screen_model import Record
+from multidrop.tui.widgets import gutter
+from multidrop.tui.widgets.gutter import SENT, Clocks
+from multidrop.tui.widgets.lines import Lines, Row, Span, spread, width_of
+from multidrop.tui.widgets.records import Records
+from multidrop.tui.widgets.sight import Picked, Search, Sight
 
 SAID = frozenset({"", ".", "!"})
 

@@ -9,15 +9,15 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from dialects.codec import End, Kind, Procedure, Request
-from dialects.errors import NoAnswer
-from dialects.mcode.host.exchange import read_error, synchronise
-from dialects.mcode.host.identity import find, find_in_text
-from dialects.mcode.host.resync import activate_party, look_in
-from dialects.mcode.host.signatures import question, value
-from dialects.mcode.host.state import MCodeState, Place
-from dialects.mcode.host.wording import described, who
-from dialects.state import Remembered
+from multidrop.dialects.codec import End, Kind, Procedure, Request
+from multidrop.dialects.errors import NoAnswer
+from multidrop.dialects.mcode.host.exchange import read_error, synchronise
+from multidrop.dialects.mcode.host.identity import find, find_in_text
+from multidrop.dialects.mcode.host.resync import activate_party, look_in
+from multidrop.dialects.mcode.host.signatures import question, value
+from multidrop.dialects.mcode.host.state import MCodeState, Place
+from multidrop.dialects.mcode.host.wording import described, who
+from multidrop.dialects.state import Remembered
 
 
 def attend(state: MCodeState, request: Request) -> Procedure[Request]:

@@ -5,12 +5,12 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 
-from dialects.codec import Kind
-from dialects.family import Referencing
-from dialects.mcode.manual.device_name import device_name
-from dialects.mcode.manual.grammar import Argument, LineError, Name, Number, Statement, Text, parse, tokens
-from dialects.mcode.manual.table import PRINTS_LINES, lookup
-from dialects.state import DriveState
+from multidrop.dialects.codec import Kind
+from multidrop.dialects.family import Referencing
+from multidrop.dialects.mcode.manual.device_name import device_name
+from multidrop.dialects.mcode.manual.grammar import Argument, LineError, Name, Number, Statement, Text, parse, tokens
+from multidrop.dialects.mcode.manual.table import PRINTS_LINES, lookup
+from multidrop.dialects.state import DriveState
 
 WORD = re.compile(r"\s*([A-Za-z_]+)\s*=?\s*(.*)", re.S)
 BLANK = re.compile(r'\s*PR[\s,"]*;?', re.I)

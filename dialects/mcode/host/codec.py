@@ -10,17 +10,17 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import ClassVar
 
-from dialects.codec import Decoded, End, Kind, Reply, Request, StopPiece
-from dialects.errors import Inexpressible
-from dialects.mcode.host import classify, printed
-from dialects.mcode.host.checksum import sealed
-from dialects.mcode.host.framing import SIGN_ON, UNPRINTED, pieces, printable, unasked
-from dialects.mcode.host.quiet_times import SHORT, SILENT, quiet_time
-from dialects.mcode.host.reply_lines import ENDLESS, ReplyLines, divided
-from dialects.mcode.host.reply_parser import ReplyParser
-from dialects.mcode.host.short_reply import only_strays, short_reply
-from dialects.mcode.manual.device_name import UNNAMED
-from dialects.mcode.manual.program_file import LONGEST, bare, unsendable
+from multidrop.dialects.codec import Decoded, End, Kind, Reply, Request, StopPiece
+from multidrop.dialects.errors import Inexpressible
+from multidrop.dialects.mcode.host import classify, printed
+from multidrop.dialects.mcode.host.checksum import sealed
+from multidrop.dialects.mcode.host.framing import SIGN_ON, UNPRINTED, pieces, printable, unasked
+from multidrop.dialects.mcode.host.quiet_times import SHORT, SILENT, quiet_time
+from multidrop.dialects.mcode.host.reply_lines import ENDLESS, ReplyLines, divided
+from multidrop.dialects.mcode.host.reply_parser import ReplyParser
+from multidrop.dialects.mcode.host.short_reply import only_strays, short_reply
+from multidrop.dialects.mcode.manual.device_name import UNNAMED
+from multidrop.dialects.mcode.manual.program_file import LONGEST, bare, unsendable
 
 ESCAPE, CONTROL_E = b"\x1b", b"\x05"
 GLOBAL = ("*", "^")

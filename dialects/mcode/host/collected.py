@@ -7,8 +7,8 @@ from __future__ import annotations
 
 import re
 
-from dialects.codec import Request
-from dialects.mcode.host.checksum import unsealed
+from multidrop.dialects.codec import Request
+from multidrop.dialects.mcode.host.checksum import unsealed
 
 PROMPTS = (">", "?")
 ACK = "\x06"

@@ -8,14 +8,14 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from dialects.codec import Procedure, Request
-from dialects.errors import DriveError, NoAnswer, Refused
-from dialects.mcode.host import classify
-from dialects.mcode.host.exchange import answered, refused
-from dialects.mcode.host.resync import activate_party, look_in, places_after
-from dialects.mcode.host.state import MCodeState, Place
-from dialects.mcode.host.wording import who
-from dialects.mcode.manual.device_name import UNNAMED
+from multidrop.dialects.codec import Procedure, Request
+from multidrop.dialects.errors import DriveError, NoAnswer, Refused
+from multidrop.dialects.mcode.host import classify
+from multidrop.dialects.mcode.host.exchange import answered, refused
+from multidrop.dialects.mcode.host.resync import activate_party, look_in, places_after
+from multidrop.dialects.mcode.host.state import MCodeState, Place
+from multidrop.dialects.mcode.host.wording import who
+from multidrop.dialects.mcode.manual.device_name import UNNAMED
 
 __all__ = ["activate_party", "set_wire"]
 

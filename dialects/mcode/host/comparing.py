@@ -6,11 +6,11 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from itertools import zip_longest
 
-from dialects.codec import Procedure
-from dialects.files import SourceLine
-from dialects.held import Difference, Held, Stored
-from dialects.mcode.host import classify
-from dialects.mcode.host.listing import (
+from multidrop.dialects.codec import Procedure
+from multidrop.dialects.files import SourceLine
+from multidrop.dialects.held import Difference, Held, Stored
+from multidrop.dialects.mcode.host import classify
+from multidrop.dialects.mcode.host.listing import (
     FileProgram,
     declared,
     immediate_lines,
@@ -19,12 +19,12 @@ from dialects.mcode.host.listing import (
     size,
     size_of_file,
 )
-from dialects.mcode.host.operations import immediate
-from dialects.mcode.host.replacing import clears_itself
-from dialects.mcode.host.state import MCodeState
-from dialects.mcode.manual.canonical import canonical
-from dialects.mcode.manual.grammar import Argument, Compare, LineError, Name, Number, Statement, Unary, parse
-from dialects.mcode.manual.table import lookup
+from multidrop.dialects.mcode.host.operations import immediate
+from multidrop.dialects.mcode.host.replacing import clears_itself
+from multidrop.dialects.mcode.host.state import MCodeState
+from multidrop.dialects.mcode.manual.canonical import canonical
+from multidrop.dialects.mcode.manual.grammar import Argument, Compare, LineError, Name, Number, Statement, Unary, parse
+from multidrop.dialects.mcode.manual.table import lookup
 
 HOLDING = ("variable", "flag")
 """The kinds of words that hold a value."""

@@ -12,19 +12,19 @@ from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
 
-from dialects.codec import End, Kind, Priority, Procedure, Reply, Request
-from dialects.conditions import Conditions, Facts, Part, Reader
-from dialects.errors import NoAnswer, Refused
-from dialects.mcode.host.attend import attend
-from dialects.mcode.host.exchange import note_error
-from dialects.mcode.host.parameters import BETWEEN, GLOBAL, asked, rows_of_list
-from dialects.mcode.host.signatures import question, value
-from dialects.mcode.host.state import MCodeState
-from dialects.mcode.host.wording import who
-from dialects.mcode.manual import parameters as manual
-from dialects.mcode.manual import points
-from dialects.mcode.manual.parameters import Form, Setting
-from dialects.mcode.manual.table import words
+from multidrop.dialects.codec import End, Kind, Priority, Procedure, Reply, Request
+from multidrop.dialects.conditions import Conditions, Facts, Part, Reader
+from multidrop.dialects.errors import NoAnswer, Refused
+from multidrop.dialects.mcode.host.attend import attend
+from multidrop.dialects.mcode.host.exchange import note_error
+from multidrop.dialects.mcode.host.parameters import BETWEEN, GLOBAL, asked, rows_of_list
+from multidrop.dialects.mcode.host.signatures import question, value
+from multidrop.dialects.mcode.host.state import MCodeState
+from multidrop.dialects.mcode.host.wording import who
+from multidrop.dialects.mcode.manual import parameters as manual
+from multidrop.dialects.mcode.manual import points
+from multidrop.dialects.mcode.manual.parameters import Form, Setting
+from multidrop.dialects.mcode.manual.table import words
 
 STATE = ("EF", "BY", "MV", "VC", "MP", "DE", "P", "IN", "I5", "AF")
 """What changes by itself, or by a program; the flags first, which need no separator."""

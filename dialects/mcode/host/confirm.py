@@ -10,15 +10,15 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from dialects.codec import Kind, Procedure, Request
-from dialects.errors import NoAnswer, Refused
-from dialects.mcode.host.exchange import answered
-from dialects.mcode.host.printed import INTEGER
-from dialects.mcode.host.signatures import question, value
-from dialects.mcode.host.state import MCodeState
-from dialects.mcode.host.wording import who
-from dialects.mcode.manual.grammar import LineError, Number, Unary, parse
-from dialects.mcode.manual.table import lookup
+from multidrop.dialects.codec import Kind, Procedure, Request
+from multidrop.dialects.errors import NoAnswer, Refused
+from multidrop.dialects.mcode.host.exchange import answered
+from multidrop.dialects.mcode.host.printed import INTEGER
+from multidrop.dialects.mcode.host.signatures import question, value
+from multidrop.dialects.mcode.host.state import MCodeState
+from multidrop.dialects.mcode.host.wording import who
+from multidrop.dialects.mcode.manual.grammar import LineError, Number, Unary, parse
+from multidrop.dialects.mcode.manual.table import lookup
 
 READ_BACK = {
     *("A", "D", "DB", "DE", "DT", "EE", "HC", "HT", "JE", "LK", "LM", "MS", "MT", "NE"),

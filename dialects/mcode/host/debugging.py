@@ -15,20 +15,20 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from dialects.codec import Decoded, End, Kind, Procedure, Reply, Request
-from dialects.debugging import Debugging, Look, Neighbours, Row, Stepped
-from dialects.errors import Diagnostic, Inexpressible, NoAnswer, Refused
-from dialects.held import Held
-from dialects.mcode.host.codec import MCode
-from dialects.mcode.host.exchange import answered
-from dialects.mcode.host.framing import printable
-from dialects.mcode.host.operations import flag, listing, perform
-from dialects.mcode.host.signatures import question, value
-from dialects.mcode.host.state import MCodeState
-from dialects.mcode.host.wording import who
-from dialects.mcode.manual.grammar import LineError, Name, Number, Statement, parse
-from dialects.mcode.manual.mnemonic import MDRIVE_PLUS
-from dialects.mcode.manual.table import lookup
+from multidrop.dialects.codec import Decoded, End, Kind, Procedure, Reply, Request
+from multidrop.dialects.debugging import Debugging, Look, Neighbours, Row, Stepped
+from multidrop.dialects.errors import Diagnostic, Inexpressible, NoAnswer, Refused
+from multidrop.dialects.held import Held
+from multidrop.dialects.mcode.host.codec import MCode
+from multidrop.dialects.mcode.host.exchange import answered
+from multidrop.dialects.mcode.host.framing import printable
+from multidrop.dialects.mcode.host.operations import flag, listing, perform
+from multidrop.dialects.mcode.host.signatures import question, value
+from multidrop.dialects.mcode.host.state import MCodeState
+from multidrop.dialects.mcode.host.wording import who
+from multidrop.dialects.mcode.manual.grammar import LineError, Name, Number, Statement, parse
+from multidrop.dialects.mcode.manual.mnemonic import MDRIVE_PLUS
+from multidrop.dialects.mcode.manual.table import lookup
 
 # The keys of single step: one byte each, outside of any line.
 #

@@ -13,21 +13,21 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
-from dialects.codec import End, Kind, Procedure, Reply, Request
-from dialects.errors import DriveError, Inexpressible, NoAnswer, Refused, Stopped
-from dialects.family import Progress
-from dialects.files import SourceLine
-from dialects.held import Held
-from dialects.mcode.host import classify
-from dialects.mcode.host.attend import attend
-from dialects.mcode.host.exchange import REPEATS, ends_in_program_mode, read_error
-from dialects.mcode.host.holding import read
-from dialects.mcode.host.leave_program import leave_program, take_out
-from dialects.mcode.host.operations import immediate
-from dialects.mcode.host.program_mode import echo_everything, put_back, restore_echo
-from dialects.mcode.host.replacing import concerns_programs, prepare
-from dialects.mcode.host.state import MCodeState
-from dialects.mcode.host.wording import described, who
+from multidrop.dialects.codec import End, Kind, Procedure, Reply, Request
+from multidrop.dialects.errors import DriveError, Inexpressible, NoAnswer, Refused, Stopped
+from multidrop.dialects.family import Progress
+from multidrop.dialects.files import SourceLine
+from multidrop.dialects.held import Held
+from multidrop.dialects.mcode.host import classify
+from multidrop.dialects.mcode.host.attend import attend
+from multidrop.dialects.mcode.host.exchange import REPEATS, ends_in_program_mode, read_error
+from multidrop.dialects.mcode.host.holding import read
+from multidrop.dialects.mcode.host.leave_program import leave_program, take_out
+from multidrop.dialects.mcode.host.operations import immediate
+from multidrop.dialects.mcode.host.program_mode import echo_everything, put_back, restore_echo
+from multidrop.dialects.mcode.host.replacing import concerns_programs, prepare
+from multidrop.dialects.mcode.host.state import MCodeState
+from multidrop.dialects.mcode.host.wording import described, who
 
 
 @dataclass

@@ -20,15 +20,15 @@ import re
 from dataclasses import replace
 from typing import NoReturn
 
-from dialects.codec import End, Kind, Priority, Procedure, Reply, Request
-from dialects.errors import NoAnswer, Refused
-from dialects.mcode.host import classify
-from dialects.mcode.host.framing import ACK
-from dialects.mcode.host.printed import INTEGER, NOTHING
-from dialects.mcode.host.signatures import fresh, question, value
-from dialects.mcode.host.state import MCodeState
-from dialects.mcode.host.wording import described, unknown, who
-from dialects.mcode.manual import errors
+from multidrop.dialects.codec import End, Kind, Priority, Procedure, Reply, Request
+from multidrop.dialects.errors import NoAnswer, Refused
+from multidrop.dialects.mcode.host import classify
+from multidrop.dialects.mcode.host.framing import ACK
+from multidrop.dialects.mcode.host.printed import INTEGER, NOTHING
+from multidrop.dialects.mcode.host.signatures import fresh, question, value
+from multidrop.dialects.mcode.host.state import MCodeState
+from multidrop.dialects.mcode.host.wording import described, unknown, who
+from multidrop.dialects.mcode.manual import errors
 
 REPEATS = 3
 

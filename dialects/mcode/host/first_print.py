@@ -11,17 +11,17 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from dialects.codec import Kind, Procedure, Request
-from dialects.errors import Inexpressible, NoAnswer
-from dialects.mcode.host import printed
-from dialects.mcode.host.attend import confirm_drive
-from dialects.mcode.host.codec import MCode
-from dialects.mcode.host.exchange import refused
-from dialects.mcode.host.framing import NAK
-from dialects.mcode.host.identity import pinged
-from dialects.mcode.host.resync import asked
-from dialects.mcode.host.state import MCodeState, Place
-from dialects.mcode.host.wording import unknown
+from multidrop.dialects.codec import Kind, Procedure, Request
+from multidrop.dialects.errors import Inexpressible, NoAnswer
+from multidrop.dialects.mcode.host import printed
+from multidrop.dialects.mcode.host.attend import confirm_drive
+from multidrop.dialects.mcode.host.codec import MCode
+from multidrop.dialects.mcode.host.exchange import refused
+from multidrop.dialects.mcode.host.framing import NAK
+from multidrop.dialects.mcode.host.identity import pinged
+from multidrop.dialects.mcode.host.resync import asked
+from multidrop.dialects.mcode.host.state import MCodeState, Place
+from multidrop.dialects.mcode.host.wording import unknown
 
 LONGEST_MARK = '"~a0000"'
 

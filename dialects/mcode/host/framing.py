@@ -6,7 +6,7 @@ import re
 from dataclasses import dataclass
 from os.path import commonprefix
 
-from dialects.mcode.host.checksum import stripped, unsealed
+from multidrop.dialects.mcode.host.checksum import stripped, unsealed
 
 ACK, NAK, CR, LF = b"\x06", b"\x15", b"\r", b"\n"
 ADDRESS_PROMPT = re.compile(rb"\d{1,9}  ")

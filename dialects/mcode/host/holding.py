@@ -9,16 +9,16 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import TypeVar
 
-from dialects.codec import Procedure
-from dialects.errors import Diagnostic, NoAnswer, Refused
-from dialects.family import Progress
-from dialects.files import SourceLine
-from dialects.held import Held
-from dialects.mcode.host.exchange import REPEATS
-from dialects.mcode.host.listing import declared, programs_of, stored
-from dialects.mcode.host.operations import flag, immediate, listing, perform
-from dialects.mcode.host.state import MCodeState
-from dialects.mcode.host.wording import who
+from multidrop.dialects.codec import Procedure
+from multidrop.dialects.errors import Diagnostic, NoAnswer, Refused
+from multidrop.dialects.family import Progress
+from multidrop.dialects.files import SourceLine
+from multidrop.dialects.held import Held
+from multidrop.dialects.mcode.host.exchange import REPEATS
+from multidrop.dialects.mcode.host.listing import declared, programs_of, stored
+from multidrop.dialects.mcode.host.operations import flag, immediate, listing, perform
+from multidrop.dialects.mcode.host.state import MCodeState
+from multidrop.dialects.mcode.host.wording import who
 
 T = TypeVar("T")
 

@@ -21,18 +21,18 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-from dialects.codec import Kind, Procedure, Reply, Request
-from dialects.errors import Inexpressible, NoAnswer
-from dialects.family import Hints
-from dialects.mcode.host.codec import NOBODY, MCode
-from dialects.mcode.host.identity import SETTLE, TEXT, end_text, find, find_in_text
-from dialects.mcode.host.program_mode import put_back_found
-from dialects.mcode.host.resync import BRIEF
-from dialects.mcode.host.state import MCodeState, Place, Unconfirmed
-from dialects.mcode.host.stopped import overflow, written
-from dialects.mcode.host.wording import who
-from dialects.mcode.manual.device_name import UNNAMED
-from dialects.state import Remembered
+from multidrop.dialects.codec import Kind, Procedure, Reply, Request
+from multidrop.dialects.errors import Inexpressible, NoAnswer
+from multidrop.dialects.family import Hints
+from multidrop.dialects.mcode.host.codec import NOBODY, MCode
+from multidrop.dialects.mcode.host.identity import SETTLE, TEXT, end_text, find, find_in_text
+from multidrop.dialects.mcode.host.program_mode import put_back_found
+from multidrop.dialects.mcode.host.resync import BRIEF
+from multidrop.dialects.mcode.host.state import MCodeState, Place, Unconfirmed
+from multidrop.dialects.mcode.host.stopped import overflow, written
+from multidrop.dialects.mcode.host.wording import who
+from multidrop.dialects.mcode.manual.device_name import UNNAMED
+from multidrop.dialects.state import Remembered
 
 SEARCH = "multidrop scan PORT tries every name and baud rate"
 

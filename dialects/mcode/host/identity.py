@@ -14,16 +14,16 @@ from __future__ import annotations
 import re
 from dataclasses import replace
 
-from dialects.codec import Kind, Procedure, Request
-from dialects.mcode.host.codec import NOBODY, MCode
-from dialects.mcode.host.collected import pongs
-from dialects.mcode.host.framing import NAK
-from dialects.mcode.host.leave_program import take_out
-from dialects.mcode.host.quiet_times import PONG
-from dialects.mcode.host.resync import BRIEF, PROGRAM_PROMPT, asked, look, take_over
-from dialects.mcode.host.signatures import as_printed
-from dialects.mcode.host.state import MCodeState, Place
-from dialects.mcode.host.wording import who
+from multidrop.dialects.codec import Kind, Procedure, Request
+from multidrop.dialects.mcode.host.codec import NOBODY, MCode
+from multidrop.dialects.mcode.host.collected import pongs
+from multidrop.dialects.mcode.host.framing import NAK
+from multidrop.dialects.mcode.host.leave_program import take_out
+from multidrop.dialects.mcode.host.quiet_times import PONG
+from multidrop.dialects.mcode.host.resync import BRIEF, PROGRAM_PROMPT, asked, look, take_over
+from multidrop.dialects.mcode.host.signatures import as_printed
+from multidrop.dialects.mcode.host.state import MCodeState, Place
+from multidrop.dialects.mcode.host.wording import who
 
 LEXIUM = r"LM[DM][A-Z0-9]* [ !#-=?-~]*"
 OLDER = r"\d+\.\d+[ !#-=?-~]*"

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from dialects.codec import End, Kind, Procedure
-from dialects.errors import NoAnswer
-from dialects.mcode.host.exchange import REPEATS, ends_in_program_mode, print_mark, read_error
-from dialects.mcode.host.state import MCodeState
-from dialects.mcode.host.wording import described, who
-from dialects.mcode.manual.errors import ErrorNumber
+from multidrop.dialects.codec import End, Kind, Procedure
+from multidrop.dialects.errors import NoAnswer
+from multidrop.dialects.mcode.host.exchange import REPEATS, ends_in_program_mode, print_mark, read_error
+from multidrop.dialects.mcode.host.state import MCodeState
+from multidrop.dialects.mcode.host.wording import described, who
+from multidrop.dialects.mcode.manual.errors import ErrorNumber
 
 NOT_PROGRAMMING = ErrorNumber.NOT_IN_PROGRAM_MODE
 """The error of PG alone outside of program mode (section 10)."""

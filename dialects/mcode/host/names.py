@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from dialects.codec import Procedure
-from dialects.errors import Refused
-from dialects.held import Held
-from dialects.mcode.host.listing import LABEL, Called, names_of
-from dialects.mcode.host.parameters import GLOBAL, listed
-from dialects.mcode.host.state import MCodeState
-from dialects.mcode.host.wording import who
-from dialects.mcode.manual import help, name_places
+from multidrop.dialects.codec import Procedure
+from multidrop.dialects.errors import Refused
+from multidrop.dialects.held import Held
+from multidrop.dialects.mcode.host.listing import LABEL, Called, names_of
+from multidrop.dialects.mcode.host.parameters import GLOBAL, listed
+from multidrop.dialects.mcode.host.state import MCodeState
+from multidrop.dialects.mcode.host.wording import who
+from multidrop.dialects.mcode.manual import help, name_places
 
 
 def read(state: MCodeState) -> Procedure[Held]:

@@ -6,24 +6,24 @@ import re
 from dataclasses import replace
 from functools import lru_cache
 
-from dialects.codec import End, Kind, Priority, Procedure, Reply, Request
-from dialects.errors import Inexpressible, NoAnswer, Refused
-from dialects.family import Motion
-from dialects.mcode.host import classify
-from dialects.mcode.host.attend import attend
-from dialects.mcode.host.codec import MCode
-from dialects.mcode.host.comm_settings import set_wire
-from dialects.mcode.host.confirm import confirm_effect, rest_before
-from dialects.mcode.host.exchange import answered, check_error_flag, mark, note_error, print_mark
-from dialects.mcode.host.first_print import first_print
-from dialects.mcode.host.printed import INTEGER
-from dialects.mcode.host.program_mode import enter_program, program_line, put_back
-from dialects.mcode.host.signatures import Sign, question, sign, signed, value
-from dialects.mcode.host.state import MCodeState
-from dialects.mcode.host.wording import who
-from dialects.mcode.manual import grammar
-from dialects.mcode.manual.mnemonic import EXPANDED
-from dialects.mcode.manual.status import EXPANDED_INPUTS, INPUTS, STATUS, in_words
+from multidrop.dialects.codec import End, Kind, Priority, Procedure, Reply, Request
+from multidrop.dialects.errors import Inexpressible, NoAnswer, Refused
+from multidrop.dialects.family import Motion
+from multidrop.dialects.mcode.host import classify
+from multidrop.dialects.mcode.host.attend import attend
+from multidrop.dialects.mcode.host.codec import MCode
+from multidrop.dialects.mcode.host.comm_settings import set_wire
+from multidrop.dialects.mcode.host.confirm import confirm_effect, rest_before
+from multidrop.dialects.mcode.host.exchange import answered, check_error_flag, mark, note_error, print_mark
+from multidrop.dialects.mcode.host.first_print import first_print
+from multidrop.dialects.mcode.host.printed import INTEGER
+from multidrop.dialects.mcode.host.program_mode import enter_program, program_line, put_back
+from multidrop.dialects.mcode.host.signatures import Sign, question, sign, signed, value
+from multidrop.dialects.mcode.host.state import MCodeState
+from multidrop.dialects.mcode.host.wording import who
+from multidrop.dialects.mcode.manual import grammar
+from multidrop.dialects.mcode.manual.mnemonic import EXPANDED
+from multidrop.dialects.mcode.manual.status import EXPANDED_INPUTS, INPUTS, STATUS, in_words
 
 GLOBAL = ("*", "^")
 

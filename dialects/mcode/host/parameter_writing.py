@@ -4,17 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping
 
-from dialects.codec import Procedure
-from dialects.errors import Refused
-from dialects.mcode.host.attend import attend
-from dialects.mcode.host.exchange import answered
-from dialects.mcode.host.operations import perform
-from dialects.mcode.host.parameters import read
-from dialects.mcode.host.signatures import question, value
-from dialects.mcode.host.state import MCodeState
-from dialects.mcode.host.wording import who
-from dialects.mcode.manual import parameter_plan
-from dialects.parameters import Change, Parameters, Permission, Plan, Readings, Value
+from multidrop.dialects.codec import Procedure
+from multidrop.dialects.errors import Refused
+from multidrop.dialects.mcode.host.attend import attend
+from multidrop.dialects.mcode.host.exchange import answered
+from multidrop.dialects.mcode.host.operations import perform
+from multidrop.dialects.mcode.host.parameters import read
+from multidrop.dialects.mcode.host.signatures import question, value
+from multidrop.dialects.mcode.host.state import MCodeState
+from multidrop.dialects.mcode.host.wording import who
+from multidrop.dialects.mcode.manual import parameter_plan
+from multidrop.dialects.parameters import Change, Parameters, Permission, Plan, Readings, Value
 
 
 def plan(state: MCodeState, present: Readings, wanted: Mapping[str, Value], allowed: Permission) -> Plan:

@@ -13,18 +13,18 @@ import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 
-from dialects.codec import End, Kind, Priority, Procedure, Reply
-from dialects.errors import NoAnswer, Refused
-from dialects.mcode.host.attend import attend
-from dialects.mcode.host.exchange import REPEATS, note_error, print_mark
-from dialects.mcode.host.signatures import question, sign, value
-from dialects.mcode.host.state import MCodeState
-from dialects.mcode.host.wording import who
-from dialects.mcode.manual import parameters as manual
-from dialects.mcode.manual.parameters import Form, Setting
-from dialects.mcode.manual.program_file import LONGEST
-from dialects.mcode.manual.table import words
-from dialects.parameters import VARIABLES, Progress, Reading, Readings, Value
+from multidrop.dialects.codec import End, Kind, Priority, Procedure, Reply
+from multidrop.dialects.errors import NoAnswer, Refused
+from multidrop.dialects.mcode.host.attend import attend
+from multidrop.dialects.mcode.host.exchange import REPEATS, note_error, print_mark
+from multidrop.dialects.mcode.host.signatures import question, sign, value
+from multidrop.dialects.mcode.host.state import MCodeState
+from multidrop.dialects.mcode.host.wording import who
+from multidrop.dialects.mcode.manual import parameters as manual
+from multidrop.dialects.mcode.manual.parameters import Form, Setting
+from multidrop.dialects.mcode.manual.program_file import LONGEST
+from multidrop.dialects.mcode.manual.table import words
+from multidrop.dialects.parameters import VARIABLES, Progress, Reading, Readings, Value
 
 GLOBAL = ("*", "^")
 ETHERNET = ("LMDOE", "LMDCE")

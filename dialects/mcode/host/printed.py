@@ -10,9 +10,9 @@ from __future__ import annotations
 import re
 from functools import lru_cache
 
-from dialects.mcode.manual.grammar import LineError, Name, Number, Statement, Text, parse
-from dialects.mcode.manual.mnemonic import Mnemonic
-from dialects.mcode.manual.table import lookup
+from multidrop.dialects.mcode.manual.grammar import LineError, Name, Number, Statement, Text, parse
+from multidrop.dialects.mcode.manual.mnemonic import Mnemonic
+from multidrop.dialects.mcode.manual.table import lookup
 
 NOTHING = r"(?!)"
 """Matches no line."""

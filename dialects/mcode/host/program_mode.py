@@ -11,17 +11,17 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-from dialects.codec import End, Kind, Procedure, Reply, Request
-from dialects.errors import DriveError, NoAnswer, Refused
-from dialects.mcode.host import classify
-from dialects.mcode.host.attend import attend, find_again
-from dialects.mcode.host.comm_settings import set_wire
-from dialects.mcode.host.exchange import answered, ends_in_program_mode
-from dialects.mcode.host.leave_program import take_out as take_out
-from dialects.mcode.host.signatures import question, value
-from dialects.mcode.host.state import MCodeState
-from dialects.mcode.host.wording import who
-from dialects.state import Owed
+from multidrop.dialects.codec import End, Kind, Procedure, Reply, Request
+from multidrop.dialects.errors import DriveError, NoAnswer, Refused
+from multidrop.dialects.mcode.host import classify
+from multidrop.dialects.mcode.host.attend import attend, find_again
+from multidrop.dialects.mcode.host.comm_settings import set_wire
+from multidrop.dialects.mcode.host.exchange import answered, ends_in_program_mode
+from multidrop.dialects.mcode.host.leave_program import take_out as take_out
+from multidrop.dialects.mcode.host.signatures import question, value
+from multidrop.dialects.mcode.host.state import MCodeState
+from multidrop.dialects.mcode.host.wording import who
+from multidrop.dialects.state import Owed
 
 
 def enter_program(state: MCodeState, request: Request) -> Procedure[tuple[str, ...]]:

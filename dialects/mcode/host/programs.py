@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from dialects.family import Programs
-from dialects.mcode.host import comparing, holding, listing, names, operations
-from dialects.mcode.host.download import download
-from dialects.mcode.host.state import MCodeState
-from dialects.mcode.host.upload import annotated, file_of, readable, refreshed, upload
-from dialects.mcode.manual import guards
+from multidrop.dialects.family import Programs
+from multidrop.dialects.mcode.host import comparing, holding, listing, names, operations
+from multidrop.dialects.mcode.host.download import download
+from multidrop.dialects.mcode.host.state import MCodeState
+from multidrop.dialects.mcode.host.upload import annotated, file_of, readable, refreshed, upload
+from multidrop.dialects.mcode.manual import guards
 
 PROGRAMS: Programs[MCodeState] = Programs(
     listing=operations.listing,

@@ -12,10 +12,10 @@ from __future__ import annotations
 import re
 from functools import lru_cache
 
-from dialects.codec import Kind, Request
-from dialects.mcode.host import classify
-from dialects.mcode.host.collected import ends_by_itself, is_pong
-from dialects.mcode.host.framing import ACK, NAK
+from multidrop.dialects.codec import Kind, Request
+from multidrop.dialects.mcode.host import classify
+from multidrop.dialects.mcode.host.collected import ends_by_itself, is_pong
+from multidrop.dialects.mcode.host.framing import ACK, NAK
 
 SHORT, PATIENT, FLASH = 0.02, 0.15, 3.0
 LIST_QUIET = 0.25

@@ -4,16 +4,16 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from dialects.codec import End, Priority, Procedure
-from dialects.errors import Diagnostic, NoAnswer, Refused
-from dialects.mcode.host.attend import attend
-from dialects.mcode.host.debugging import check_names, values
-from dialects.mcode.host.exchange import note_error
-from dialects.mcode.host.signatures import question, value
-from dialects.mcode.host.state import MCodeState
-from dialects.mcode.host.wording import who
-from dialects.mcode.manual.table import lookup
-from dialects.readings import Readings, number
+from multidrop.dialects.codec import End, Priority, Procedure
+from multidrop.dialects.errors import Diagnostic, NoAnswer, Refused
+from multidrop.dialects.mcode.host.attend import attend
+from multidrop.dialects.mcode.host.debugging import check_names, values
+from multidrop.dialects.mcode.host.exchange import note_error
+from multidrop.dialects.mcode.host.signatures import question, value
+from multidrop.dialects.mcode.host.state import MCodeState
+from multidrop.dialects.mcode.host.wording import who
+from multidrop.dialects.mcode.manual.table import lookup
+from multidrop.dialects.readings import Readings, number
 
 NUMBER = r"-?\d{1,10}(?:\.\d+)?"
 

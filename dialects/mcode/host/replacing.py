@@ -15,12 +15,12 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 
-from dialects.codec import Procedure
-from dialects.errors import Refused
-from dialects.files import SourceLine
-from dialects.held import LOCKED, Held
-from dialects.mcode.host import classify
-from dialects.mcode.host.listing import (
+from multidrop.dialects.codec import Procedure
+from multidrop.dialects.errors import Refused
+from multidrop.dialects.files import SourceLine
+from multidrop.dialects.held import LOCKED, Held
+from multidrop.dialects.mcode.host import classify
+from multidrop.dialects.mcode.host.listing import (
     GLOBAL,
     LABEL,
     LOCAL,
@@ -33,11 +33,11 @@ from dialects.mcode.host.listing import (
     programs_of,
     size,
 )
-from dialects.mcode.host.operations import immediate
-from dialects.mcode.host.state import MCodeState
-from dialects.mcode.host.wording import who
-from dialects.mcode.manual.program_checker import slips
-from dialects.mcode.manual.program_file import ProgramLine
+from multidrop.dialects.mcode.host.operations import immediate
+from multidrop.dialects.mcode.host.state import MCodeState
+from multidrop.dialects.mcode.host.wording import who
+from multidrop.dialects.mcode.manual.program_checker import slips
+from multidrop.dialects.mcode.manual.program_file import ProgramLine
 
 WHOLE = {"", "0", "1", "S"}
 """The parameters with which CP clears all programs."""

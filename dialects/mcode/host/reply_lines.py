@@ -5,10 +5,10 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 
-from dialects.codec import Decoded, End, Kind, Reply, Request
-from dialects.mcode.host import classify
-from dialects.mcode.host.checksum import checksum, stripped, unsealed
-from dialects.mcode.host.framing import SIGN_ON, UNPRINTED, Piece, printable
+from multidrop.dialects.codec import Decoded, End, Kind, Reply, Request
+from multidrop.dialects.mcode.host import classify
+from multidrop.dialects.mcode.host.checksum import checksum, stripped, unsealed
+from multidrop.dialects.mcode.host.framing import SIGN_ON, UNPRINTED, Piece, printable
 
 SIGNED = re.compile(r'["~]')
 """The sign of a signature: the quotation marks of a drive's name, or the host's own mark."""

@@ -25,10 +25,10 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from dialects.codec import Decoded, End, Kind, Request
-from dialects.mcode.host.checksum import unsealed
-from dialects.mcode.host.framing import ADDRESS_PROMPT, Piece, after_echo, pieces, printable
-from dialects.mcode.host.reply_lines import ENDLESS, ReplyLines
+from multidrop.dialects.codec import Decoded, End, Kind, Request
+from multidrop.dialects.mcode.host.checksum import unsealed
+from multidrop.dialects.mcode.host.framing import ADDRESS_PROMPT, Piece, after_echo, pieces, printable
+from multidrop.dialects.mcode.host.reply_lines import ENDLESS, ReplyLines
 
 PROMPTS = (b">", b"?")
 WAITED = 2

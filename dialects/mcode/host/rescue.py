@@ -12,12 +12,12 @@ every name. (MCode reference 5.1.21, 5.1.41, 5.1.45, 5.1.98, 5.1.105; facts of r
 
 from __future__ import annotations
 
-from dialects.codec import Kind, Procedure, Request
-from dialects.mcode.host.checksum import sealed
-from dialects.mcode.host.codec import NOBODY, MCode
-from dialects.mcode.host.resync import BRIEF
-from dialects.mcode.host.stopped import overflow, written
-from dialects.mcode.manual.device_name import NAMES
+from multidrop.dialects.codec import Kind, Procedure, Request
+from multidrop.dialects.mcode.host.checksum import sealed
+from multidrop.dialects.mcode.host.codec import NOBODY, MCode
+from multidrop.dialects.mcode.host.resync import BRIEF
+from multidrop.dialects.mcode.host.stopped import overflow, written
+from multidrop.dialects.mcode.manual.device_name import NAMES
 
 CLEARS = (
     "stops every drive and its program, makes half a line in a drive overflow (error 20) and sends PG, an error "

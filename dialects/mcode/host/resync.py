@@ -12,17 +12,17 @@ import re
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
-from dialects.codec import Kind, Priority, Procedure, Reply, Request
-from dialects.mcode.host.checksum import sealed
-from dialects.mcode.host.classify import Setting
-from dialects.mcode.host.codec import MCode
-from dialects.mcode.host.framing import NAK
-from dialects.mcode.host.leave_program import take_out
-from dialects.mcode.host.printed import NOTHING
-from dialects.mcode.host.quiet_times import SLOWEST
-from dialects.mcode.host.signatures import fresh
-from dialects.mcode.host.state import MCodeState, Place
-from dialects.mcode.manual.device_name import UNNAMED
+from multidrop.dialects.codec import Kind, Priority, Procedure, Reply, Request
+from multidrop.dialects.mcode.host.checksum import sealed
+from multidrop.dialects.mcode.host.classify import Setting
+from multidrop.dialects.mcode.host.codec import MCode
+from multidrop.dialects.mcode.host.framing import NAK
+from multidrop.dialects.mcode.host.leave_program import take_out
+from multidrop.dialects.mcode.host.printed import NOTHING
+from multidrop.dialects.mcode.host.quiet_times import SLOWEST
+from multidrop.dialects.mcode.host.signatures import fresh
+from multidrop.dialects.mcode.host.state import MCodeState, Place
+from multidrop.dialects.mcode.manual.device_name import UNNAMED
 
 PROGRAM_PROMPT = re.compile(rb"\n\d{1,9}  $|[\x06\x15]\d{1,9}  $")
 TRIES, SILENCES, NAKS, STORED = 4, 2, 2, 2

@@ -24,19 +24,19 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
-from dialects.codec import Kind, Procedure, Request
-from dialects.errors import NoAnswer
-from dialects.mcode.host import rescue
-from dialects.mcode.host.checksum import sealed
-from dialects.mcode.host.codec import MCode
-from dialects.mcode.host.collected import pongs
-from dialects.mcode.host.framing import NAK
-from dialects.mcode.host.identity import find
-from dialects.mcode.host.resync import BRIEF, PROGRAM_PROMPT
-from dialects.mcode.host.state import MCodeState, Place
-from dialects.mcode.host.stopped import overflow
-from dialects.mcode.manual.device_name import NAMES
-from dialects.scanning import Found, Outcome, Reach, Scan, Step
+from multidrop.dialects.codec import Kind, Procedure, Request
+from multidrop.dialects.errors import NoAnswer
+from multidrop.dialects.mcode.host import rescue
+from multidrop.dialects.mcode.host.checksum import sealed
+from multidrop.dialects.mcode.host.codec import MCode
+from multidrop.dialects.mcode.host.collected import pongs
+from multidrop.dialects.mcode.host.framing import NAK
+from multidrop.dialects.mcode.host.identity import find
+from multidrop.dialects.mcode.host.resync import BRIEF, PROGRAM_PROMPT
+from multidrop.dialects.mcode.host.state import MCodeState, Place
+from multidrop.dialects.mcode.host.stopped import overflow
+from multidrop.dialects.mcode.manual.device_name import NAMES
+from multidrop.dialects.scanning import Found, Outcome, Reach, Scan, Step
 
 QUESTION = b"PR VR"
 FOREIGN = b"?" + QUESTION

@@ -8,7 +8,7 @@ from __future__ import annotations
 import re
 from functools import lru_cache
 
-from dialects.codec import Decoded, Kind, Reply, Request
+from multidrop.dialects.codec import Decoded, Kind, Reply, Request
 
 ONE_LINE = re.compile(rb"(?:\r\n)?([ -~]+)\r\n")
 """The print of a drive with EM=1 or 2; EM=1 sends a CRLF before it while no program runs."""

@@ -13,10 +13,10 @@ import re
 from dataclasses import dataclass, replace
 from functools import lru_cache
 
-from dialects.codec import Reply, Request
-from dialects.errors import Inexpressible
-from dialects.mcode.host import printed
-from dialects.mcode.host.state import MCodeState
+from multidrop.dialects.codec import Reply, Request
+from multidrop.dialects.errors import Inexpressible
+from multidrop.dialects.mcode.host import printed
+from multidrop.dialects.mcode.host.state import MCodeState
 
 
 @dataclass(frozen=True)

@@ -9,20 +9,20 @@ import re
 from collections.abc import Mapping
 from dataclasses import replace
 
-from dialects.codec import Procedure
-from dialects.held import LOCKED
-from dialects.mcode.host import parameters
-from dialects.mcode.host.attend import attend
-from dialects.mcode.host.exchange import answered
-from dialects.mcode.host.signatures import question, value
-from dialects.mcode.host.state import MCodeState
-from dialects.mcode.manual.device_name import UNNAMED
-from dialects.mcode.manual.parameters import exact
-from dialects.mcode.manual.status import EXPANDED_INPUTS, INPUTS
-from dialects.mcode.manual.table import words
-from dialects.parameters import Progress, Readings
-from dialects.snapshots import Levels, Snapshot
-from dialects.state import DriveState
+from multidrop.dialects.codec import Procedure
+from multidrop.dialects.held import LOCKED
+from multidrop.dialects.mcode.host import parameters
+from multidrop.dialects.mcode.host.attend import attend
+from multidrop.dialects.mcode.host.exchange import answered
+from multidrop.dialects.mcode.host.signatures import question, value
+from multidrop.dialects.mcode.host.state import MCodeState
+from multidrop.dialects.mcode.manual.device_name import UNNAMED
+from multidrop.dialects.mcode.manual.parameters import exact
+from multidrop.dialects.mcode.manual.status import EXPANDED_INPUTS, INPUTS
+from multidrop.dialects.mcode.manual.table import words
+from multidrop.dialects.parameters import Progress, Readings
+from multidrop.dialects.snapshots import Levels, Snapshot
+from multidrop.dialects.state import DriveState
 
 BAUDS = {48: 4800, 96: 9600, 19: 19200, 38: 38400, 11: 115200}
 """By BD (5.1.9)."""

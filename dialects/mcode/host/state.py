@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
-from dialects.mcode.host.codec import MCode
-from dialects.state import DriveState, Remembered
+from multidrop.dialects.mcode.host.codec import MCode
+from multidrop.dialects.state import DriveState, Remembered
 
 Candidate = tuple[MCode, str]
 """A codec and an address at which a drive may answer."""

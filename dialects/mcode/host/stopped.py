@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from dialects.codec import Kind, Procedure, Request
-from dialects.mcode.host.codec import NOBODY, MCode
-from dialects.mcode.host.resync import BRIEF
-from dialects.mcode.manual.program_file import LONGEST
+from multidrop.dialects.codec import Kind, Procedure, Request
+from multidrop.dialects.mcode.host.codec import NOBODY, MCode
+from multidrop.dialects.mcode.host.resync import BRIEF
+from multidrop.dialects.mcode.manual.program_file import LONGEST
 
 
 def overflow(names: Sequence[str]) -> Procedure[None]:

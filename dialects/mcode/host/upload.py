@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
-from dialects.codec import Procedure
-from dialects.files import split_lines
-from dialects.held import Held
-from dialects.mcode.host.holding import read
-from dialects.mcode.host.listing import GLOBAL, declared, names_of, programs
-from dialects.mcode.host.state import MCodeState
-from dialects.mcode.host.wording import who
-from dialects.mcode.manual import program_file
+from multidrop.dialects.codec import Procedure
+from multidrop.dialects.files import split_lines
+from multidrop.dialects.held import Held
+from multidrop.dialects.mcode.host.holding import read
+from multidrop.dialects.mcode.host.listing import GLOBAL, declared, names_of, programs
+from multidrop.dialects.mcode.host.state import MCodeState
+from multidrop.dialects.mcode.host.wording import who
+from multidrop.dialects.mcode.manual import program_file
 
 
 def upload(state: MCodeState, raw: bool) -> Procedure[tuple[str, ...]]:

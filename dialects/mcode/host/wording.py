@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from dialects.codec import Request
-from dialects.mcode.manual import error_texts
-from dialects.state import DriveState
+from multidrop.dialects.codec import Request
+from multidrop.dialects.mcode.manual import error_texts
+from multidrop.dialects.state import DriveState
 
 
 def who(state: DriveState) -> str:

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Container
 
-from dialects.mcode.manual.grammar import (
+from multidrop.dialects.mcode.manual.grammar import (
     Argument,
     Binary,
     Compare,
@@ -23,7 +23,7 @@ from dialects.mcode.manual.grammar import (
     parse,
     tokens,
 )
-from dialects.mcode.manual.table import lookup
+from multidrop.dialects.mcode.manual.table import lookup
 
 
 def canonical(text: str, names: Container[str] = ()) -> str:

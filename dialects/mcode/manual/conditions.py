@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from dialects.mcode.manual.grammar import (
+from multidrop.dialects.mcode.manual.grammar import (
     FUNCTIONS,
     LOGIC,
     Argument,

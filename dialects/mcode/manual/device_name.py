@@ -9,7 +9,7 @@ from __future__ import annotations
 import re
 from string import ascii_lowercase, ascii_uppercase, digits
 
-from dialects.mcode.manual.grammar import Argument, Number, Text
+from multidrop.dialects.mcode.manual.grammar import Argument, Number, Text
 
 UNNAMED = "!"
 """The name of a drive without a name of its own."""

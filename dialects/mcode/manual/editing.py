@@ -4,15 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Container, Iterable, Iterator, Sequence
 
-from dialects.errors import Diagnostic
-from dialects.files import split_lines
-from dialects.mcode.manual import help, program_names
-from dialects.mcode.manual.grammar import statement_tokens
-from dialects.mcode.manual.line_parts import MOVES
-from dialects.mcode.manual.mnemonic import Mnemonic
-from dialects.mcode.manual.name_places import LABEL, LABELS_AT, NEW, PRINTED, STATEMENT, expected
-from dialects.mcode.manual.program_file import ProgramLine, remark_at, scan
-from dialects.program_editing import Block, Offer, Span, UserName, Word
+from multidrop.dialects.errors import Diagnostic
+from multidrop.dialects.files import split_lines
+from multidrop.dialects.mcode.manual import help, program_names
+from multidrop.dialects.mcode.manual.grammar import statement_tokens
+from multidrop.dialects.mcode.manual.line_parts import MOVES
+from multidrop.dialects.mcode.manual.mnemonic import Mnemonic
+from multidrop.dialects.mcode.manual.name_places import LABEL, LABELS_AT, NEW, PRINTED, STATEMENT, expected
+from multidrop.dialects.mcode.manual.program_file import ProgramLine, remark_at, scan
+from multidrop.dialects.program_editing import Block, Offer, Span, UserName, Word
 
 names = program_names.names
 remark = program_names.remark

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from types import MappingProxyType
 
-from dialects.mcode.manual.errors import ErrorNumber as E
+from multidrop.dialects.mcode.manual.errors import ErrorNumber as E
 
 _COMMON: dict[int, str] = {
     E.NONE: "no error",

@@ -19,8 +19,8 @@ from dataclasses import dataclass, field
 from math import inf
 from typing import NamedTuple
 
-from dialects.mcode.manual.errors import ErrorNumber
-from dialects.mcode.manual.table import MDRIVE, MNEMONICS, lookup
+from multidrop.dialects.mcode.manual.errors import ErrorNumber
+from multidrop.dialects.mcode.manual.table import MDRIVE, MNEMONICS, lookup
 
 FUNCTIONS = frozenset({"AB", "CS", "C_", "LO", "L_", "SI", "SQ", "S_", "TG", "T_"})
 """Words that precede their operand (manual 5.2.15 to 5.2.25)."""

@@ -11,10 +11,10 @@ from collections.abc import Callable, Mapping
 from types import MappingProxyType
 from typing import NamedTuple
 
-from dialects.guards import ADDRESSES, EVERYONE, Guard, to_all
-from dialects.mcode.manual.grammar import LineError, Number, Statement, parse
-from dialects.mcode.manual.program_file import bare
-from dialects.mcode.manual.table import lookup
+from multidrop.dialects.guards import ADDRESSES, EVERYONE, Guard, to_all
+from multidrop.dialects.mcode.manual.grammar import LineError, Number, Statement, parse
+from multidrop.dialects.mcode.manual.program_file import bare
+from multidrop.dialects.mcode.manual.table import lookup
 
 AT_ONCE: Mapping[str, str] = MappingProxyType(
     {

@@ -7,11 +7,11 @@ from __future__ import annotations
 
 import re
 
-from dialects.errors import Diagnostic
-from dialects.mcode.manual import error_texts
-from dialects.mcode.manual.conditions import condition_of, is_mixed, reading
-from dialects.mcode.manual.grammar import LineError, parse
-from dialects.mcode.manual.table import EVERY, LEXIUM, MDRIVE, MDRIVE_PLUS, MNEMONICS, Mnemonic, lookup, words
+from multidrop.dialects.errors import Diagnostic
+from multidrop.dialects.mcode.manual import error_texts
+from multidrop.dialects.mcode.manual.conditions import condition_of, is_mixed, reading
+from multidrop.dialects.mcode.manual.grammar import LineError, parse
+from multidrop.dialects.mcode.manual.table import EVERY, LEXIUM, MDRIVE, MDRIVE_PLUS, MNEMONICS, Mnemonic, lookup, words
 
 ACCESS = {
     "RW": "read and write",

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from dialects.mcode.manual.grammar import Token, tokens
-from dialects.mcode.manual.program_file import remark_at, scan
-from dialects.mcode.manual.table import lookup
-from dialects.mcode.manual.table_motion import MOTION
-from dialects.program_files import Entry, Part
+from multidrop.dialects.mcode.manual.grammar import Token, tokens
+from multidrop.dialects.mcode.manual.program_file import remark_at, scan
+from multidrop.dialects.mcode.manual.table import lookup
+from multidrop.dialects.mcode.manual.table_motion import MOTION
+from multidrop.dialects.program_files import Entry, Part
 
 _DECLARE = ("LB", "VA")
 MOVES = frozenset(row.name for row in MOTION if row.starts and row.kind == "instruction")

@@ -7,8 +7,8 @@ characters. The manual gives no sizes.
 
 from __future__ import annotations
 
-from dialects.mcode.manual.grammar import Argument, Binary, Compare, Name, Number, Statement, Text, Unary
-from dialects.mcode.manual.table import lookup
+from multidrop.dialects.mcode.manual.grammar import Argument, Binary, Compare, Name, Number, Statement, Text, Unary
+from multidrop.dialects.mcode.manual.table import lookup
 
 
 def size_of(statement: Statement, product: str = "") -> int:

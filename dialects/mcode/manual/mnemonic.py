@@ -10,7 +10,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TypedDict, Unpack
 
-from dialects.mcode.manual.errors import ErrorNumber
+from multidrop.dialects.mcode.manual.errors import ErrorNumber
 
 READ_ONLY, NOT_STEPPABLE = ErrorNumber.READ_ONLY, ErrorNumber.NOT_STEPPABLE
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from dialects.mcode.manual.grammar import tokens
-from dialects.mcode.manual.program_flow import PLACES
+from multidrop.dialects.mcode.manual.grammar import tokens
+from multidrop.dialects.mcode.manual.program_flow import PLACES
 
 STATEMENT, NEW, LABEL, PRINTED, VALUE = "statement", "new", "label", "printed", "value"
 """A head; a name that is not there yet; the label of a place; an item of PR; any other argument."""

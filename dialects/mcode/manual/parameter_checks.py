@@ -9,12 +9,12 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping
 from itertools import combinations
 
-from dialects.errors import Diagnostic
-from dialects.mcode.manual import parameters as manual
-from dialects.mcode.manual.mnemonic import CLOSED_LOOP, EXPANDED, MDRIVE_PLUS
-from dialects.mcode.manual.parameter_rules import CLOCKS, SHARED, TORQUE, writable
-from dialects.mcode.manual.parameters import COUNTED, TRIPS
-from dialects.parameters import Value, number, same
+from multidrop.dialects.errors import Diagnostic
+from multidrop.dialects.mcode.manual import parameters as manual
+from multidrop.dialects.mcode.manual.mnemonic import CLOSED_LOOP, EXPANDED, MDRIVE_PLUS
+from multidrop.dialects.mcode.manual.parameter_rules import CLOCKS, SHARED, TORQUE, writable
+from multidrop.dialects.mcode.manual.parameters import COUNTED, TRIPS
+from multidrop.dialects.parameters import Value, number, same
 
 IN_UNITS = COUNTED - {"MS"} | {"BL", "LS0", "LS1", "TP", "TR"}
 """Settings in the unit of motion: steps or encoder counts."""

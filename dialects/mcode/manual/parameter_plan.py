@@ -12,14 +12,14 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from math import ceil
 
-from dialects.mcode.manual import parameter_checks as checks
-from dialects.mcode.manual import parameter_rules as rules
-from dialects.mcode.manual import parameters as manual
-from dialects.mcode.manual.mnemonic import MDRIVE_PLUS
-from dialects.mcode.manual.parameter_checks import FINEST, PAIRS, PER_MICROSTEP
-from dialects.mcode.manual.parameter_rules import CLOCKS, SHARED, TORQUE
-from dialects.mcode.manual.parameters import COUNTED, WIRE
-from dialects.parameters import Change, Permission, Plan, Readings, Value, number, reference_lost, same
+from multidrop.dialects.mcode.manual import parameter_checks as checks
+from multidrop.dialects.mcode.manual import parameter_rules as rules
+from multidrop.dialects.mcode.manual import parameters as manual
+from multidrop.dialects.mcode.manual.mnemonic import MDRIVE_PLUS
+from multidrop.dialects.mcode.manual.parameter_checks import FINEST, PAIRS, PER_MICROSTEP
+from multidrop.dialects.mcode.manual.parameter_rules import CLOCKS, SHARED, TORQUE
+from multidrop.dialects.mcode.manual.parameters import COUNTED, WIRE
+from multidrop.dialects.parameters import Change, Permission, Plan, Readings, Value, number, reference_lost, same
 
 # The steps of a plan so far, and the settings that a drive has after them.
 

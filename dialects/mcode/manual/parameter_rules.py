@@ -10,12 +10,12 @@ import re
 from collections.abc import Collection, Mapping
 from math import isfinite
 
-from dialects.errors import Diagnostic
-from dialects.mcode.manual.grammar import is_name
-from dialects.mcode.manual.mnemonic import FLOAT_HIGH, INT_HIGH, INT_LOW, Mnemonic
-from dialects.mcode.manual.parameters import LISTS, TRIPS, UNIT, WIRE, exact
-from dialects.mcode.manual.table import lookup
-from dialects.parameters import COMMUNICATION, Scalar, Value, number
+from multidrop.dialects.errors import Diagnostic
+from multidrop.dialects.mcode.manual.grammar import is_name
+from multidrop.dialects.mcode.manual.mnemonic import FLOAT_HIGH, INT_HIGH, INT_LOW, Mnemonic
+from multidrop.dialects.mcode.manual.parameters import LISTS, TRIPS, UNIT, WIRE, exact
+from multidrop.dialects.mcode.manual.table import lookup
+from multidrop.dialects.parameters import COMMUNICATION, Scalar, Value, number
 
 TORQUE = 3
 """The hMT mode that turns the motor by itself."""

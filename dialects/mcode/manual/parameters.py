@@ -13,10 +13,10 @@ from dataclasses import dataclass
 from enum import Enum
 from functools import lru_cache
 
-from dialects.mcode.manual.mnemonic import CLOSED_LOOP, ENCODER, EVERY, LEXIUM, MDRIVE_ENCODER, Mnemonic
-from dialects.mcode.manual.table import words
-from dialects.mcode.manual.table_system import COMMUNICATION
-from dialects.parameters import IO, PARAMETERS, VARIABLES, Reading, Value
+from multidrop.dialects.mcode.manual.mnemonic import CLOSED_LOOP, ENCODER, EVERY, LEXIUM, MDRIVE_ENCODER, Mnemonic
+from multidrop.dialects.mcode.manual.table import words
+from multidrop.dialects.mcode.manual.table_system import COMMUNICATION
+from multidrop.dialects.parameters import IO, PARAMETERS, VARIABLES, Reading, Value
 
 WIRE = frozenset(row.name for row in COMMUNICATION)
 """Communication settings."""

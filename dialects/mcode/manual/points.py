@@ -9,11 +9,11 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 
-from dialects.conditions import UNREAD, Conditions, Facts, Lamp, Pace
-from dialects.mcode.manual.mnemonic import EXPANDED
-from dialects.mcode.manual.parameters import counting
-from dialects.mcode.manual.status import EXPANDED_INPUTS, INPUTS
-from dialects.parameters import number
+from multidrop.dialects.conditions import UNREAD, Conditions, Facts, Lamp, Pace
+from multidrop.dialects.mcode.manual.mnemonic import EXPANDED
+from multidrop.dialects.mcode.manual.parameters import counting
+from multidrop.dialects.mcode.manual.status import EXPANDED_INPUTS, INPUTS
+from multidrop.dialects.parameters import number
 
 FUNCTIONS: Mapping[int, str] = {
     0: "", 1: "home", 2: "lim+", 3: "lim-", 4: "go", 5: "stop", 6: "pause", 7: "jog+", 8: "jog-", 11: "reset",

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Container, Iterable, Iterator, Sequence
 
-from dialects.mcode.manual import (
+from multidrop.dialects.mcode.manual import (
     guards,
     line_parts,
     program_file,
@@ -13,15 +13,15 @@ from dialects.mcode.manual import (
     program_products,
     program_trips,
 )
-from dialects.mcode.manual.conditions import condition_of, is_mixed, reading
-from dialects.mcode.manual.grammar import NAME_FORM, LineError, Name, Statement, is_name, parse, words
-from dialects.mcode.manual.mnemonic import EVERY
-from dialects.mcode.manual.program_file import ProgramLine
-from dialects.mcode.manual.program_flow import Flow
-from dialects.mcode.manual.program_products import names_in, words_of
-from dialects.mcode.manual.remedies import form, out_of_range
-from dialects.mcode.manual.table import lookup
-from dialects.problems import Problem, errors, in_order
+from multidrop.dialects.mcode.manual.conditions import condition_of, is_mixed, reading
+from multidrop.dialects.mcode.manual.grammar import NAME_FORM, LineError, Name, Statement, is_name, parse, words
+from multidrop.dialects.mcode.manual.mnemonic import EVERY
+from multidrop.dialects.mcode.manual.program_file import ProgramLine
+from multidrop.dialects.mcode.manual.program_flow import Flow
+from multidrop.dialects.mcode.manual.program_products import names_in, words_of
+from multidrop.dialects.mcode.manual.remedies import form, out_of_range
+from multidrop.dialects.mcode.manual.table import lookup
+from multidrop.dialects.problems import Problem, errors, in_order
 
 TARGETS = {"BR": 0, "CL": 0, "OE": 0, "TA": 1}
 """Words with a target, and the position of the target among their arguments."""

@@ -16,12 +16,12 @@ from dataclasses import dataclass, field
 from math import inf
 from typing import TYPE_CHECKING
 
-from dialects.files import program_text_of, split_lines, wrong_characters
-from dialects.layout import respelled
-from dialects.mcode.manual.canonical import canonical
-from dialects.mcode.manual.grammar import LineError, check_groups, parse
-from dialects.mcode.manual.table import lookup
-from dialects.problems import Problem, refuse
+from multidrop.dialects.files import program_text_of, split_lines, wrong_characters
+from multidrop.dialects.layout import respelled
+from multidrop.dialects.mcode.manual.canonical import canonical
+from multidrop.dialects.mcode.manual.grammar import LineError, check_groups, parse
+from multidrop.dialects.mcode.manual.table import lookup
+from multidrop.dialects.problems import Problem, refuse
 
 if TYPE_CHECKING:
     from pathlib import Path

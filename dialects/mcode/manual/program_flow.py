@@ -9,8 +9,8 @@ from __future__ import annotations
 from collections.abc import Container, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
-from dialects.mcode.manual.grammar import Name, Number, Statement
-from dialects.mcode.manual.program_file import ProgramLine
+from multidrop.dialects.mcode.manual.grammar import Name, Number, Statement
+from multidrop.dialects.mcode.manual.program_file import ProgramLine
 
 PLACES = {"BR": 0, "CL": 0, "OE": 0, "TC": 0, "TM": 0, "TI": 1, "TP": 1, "TT": 1, "TR": 1, "TA": 1}
 """Words that go to a place or name one, and the position of that place among their arguments."""

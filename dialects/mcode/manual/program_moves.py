@@ -10,11 +10,11 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from dialects.mcode.manual.conditions import CONDITIONAL
-from dialects.mcode.manual.grammar import Number, words
-from dialects.mcode.manual.program_flow import Flow, Step
-from dialects.problems import Problem
-from dialects.walks import nearest
+from multidrop.dialects.mcode.manual.conditions import CONDITIONAL
+from multidrop.dialects.mcode.manual.grammar import Number, words
+from multidrop.dialects.mcode.manual.program_flow import Flow, Step
+from multidrop.dialects.problems import Problem
+from multidrop.dialects.walks import nearest
 
 MOVES = frozenset({"MA", "MR"})
 HOMINGS = frozenset({"HM", "HI", "HF"})

@@ -10,14 +10,14 @@ from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
 from functools import lru_cache
 from typing import NamedTuple
 
-from dialects.errors import Diagnostic
-from dialects.files import split_lines
-from dialects.mcode.manual.grammar import NAME_FORM, Token, divided, is_name, tokens
-from dialects.mcode.manual.mnemonic import EVERY
-from dialects.mcode.manual.program_file import LONGEST, ProgramLine, bare, remark_at
-from dialects.mcode.manual.program_products import AT_POWER_UP
-from dialects.mcode.manual.table import lookup
-from dialects.program_editing import Span, UserName, replaced
+from multidrop.dialects.errors import Diagnostic
+from multidrop.dialects.files import split_lines
+from multidrop.dialects.mcode.manual.grammar import NAME_FORM, Token, divided, is_name, tokens
+from multidrop.dialects.mcode.manual.mnemonic import EVERY
+from multidrop.dialects.mcode.manual.program_file import LONGEST, ProgramLine, bare, remark_at
+from multidrop.dialects.mcode.manual.program_products import AT_POWER_UP
+from multidrop.dialects.mcode.manual.table import lookup
+from multidrop.dialects.program_editing import Span, UserName, replaced
 
 
 class _Line(NamedTuple):

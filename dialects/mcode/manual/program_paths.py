@@ -9,9 +9,9 @@ from __future__ import annotations
 
 from collections.abc import Container, Iterator, Mapping
 
-from dialects.mcode.manual.program_flow import Flow, Step
-from dialects.problems import Problem
-from dialects.walks import walk, way_to
+from multidrop.dialects.mcode.manual.program_flow import Flow, Step
+from multidrop.dialects.problems import Problem
+from multidrop.dialects.walks import walk, way_to
 
 AT_POWER_UP = "SU"
 

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
-from dialects.mcode.manual.grammar import FUNCTIONS, Argument, Binary, Compare, Name, Statement, Unary
-from dialects.mcode.manual.mnemonic import EVERY
-from dialects.mcode.manual.program_file import ProgramLine
-from dialects.mcode.manual.table import lookup
-from dialects.problems import Problem
+from multidrop.dialects.mcode.manual.grammar import FUNCTIONS, Argument, Binary, Compare, Name, Statement, Unary
+from multidrop.dialects.mcode.manual.mnemonic import EVERY
+from multidrop.dialects.mcode.manual.program_file import ProgramLine
+from multidrop.dialects.mcode.manual.table import lookup
+from multidrop.dialects.problems import Problem
 
 AT_POWER_UP = "SU"
 """The one word that a label may have."""

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Container, Iterator, Mapping, Sequence
 
-from dialects.mcode.manual.grammar import Number, Statement
-from dialects.mcode.manual.program_file import ProgramLine
-from dialects.problems import Problem
+from multidrop.dialects.mcode.manual.grammar import Number, Statement
+from multidrop.dialects.mcode.manual.program_file import ProgramLine
+from multidrop.dialects.problems import Problem
 
 BITS: Mapping[str, int] = {"TI": 1, "TP": 2, "TC": 4, "TT": 8, "TR": 16, "TA": 32, "TM": 64}
 """The trips, each with the number by which TE enables it."""

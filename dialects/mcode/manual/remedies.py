@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from dialects.mcode.manual import error_texts
-from dialects.mcode.manual.errors import ErrorNumber
-from dialects.mcode.manual.grammar import LineError, Number, Statement, parse, tokens
-from dialects.mcode.manual.program_products import words_of
-from dialects.mcode.manual.table import lookup
+from multidrop.dialects.mcode.manual import error_texts
+from multidrop.dialects.mcode.manual.errors import ErrorNumber
+from multidrop.dialects.mcode.manual.grammar import LineError, Number, Statement, parse, tokens
+from multidrop.dialects.mcode.manual.program_products import words_of
+from multidrop.dialects.mcode.manual.table import lookup
 
 SPOKEN_OF_FORM = frozenset({ErrorNumber.OUT_OF_RANGE, ErrorNumber.ILLEGAL_DATA, ErrorNumber.NO_SEPARATOR})
 """Errors about what follows a word."""

@@ -8,13 +8,13 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from types import MappingProxyType
 
-from dialects.mcode.manual.mnemonic import ENCODER, EVERY, LEXIUM, MDRIVE_PLUS, Mnemonic
-from dialects.mcode.manual.table_io import IO
-from dialects.mcode.manual.table_math import MATH
-from dialects.mcode.manual.table_mdrive import WORDS
-from dialects.mcode.manual.table_motion import MOTION
-from dialects.mcode.manual.table_program import PROGRAM
-from dialects.mcode.manual.table_system import SYSTEM
+from multidrop.dialects.mcode.manual.mnemonic import ENCODER, EVERY, LEXIUM, MDRIVE_PLUS, Mnemonic
+from multidrop.dialects.mcode.manual.table_io import IO
+from multidrop.dialects.mcode.manual.table_math import MATH
+from multidrop.dialects.mcode.manual.table_mdrive import WORDS
+from multidrop.dialects.mcode.manual.table_motion import MOTION
+from multidrop.dialects.mcode.manual.table_program import PROGRAM
+from multidrop.dialects.mcode.manual.table_system import SYSTEM
 
 __all__ = [
     "ENCODER", "EVERY", "LEXIUM", "MDRIVE", "MDRIVE_PLUS", "MNEMONICS", "NO_STEP", "PRINTS_LINES",

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Unpack
 
-from dialects.mcode.manual.mnemonic import (
+from multidrop.dialects.mcode.manual.mnemonic import (
     CLOSED_LOOP,
     ENCODER,
     INT_HIGH,

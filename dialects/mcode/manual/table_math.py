@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dialects.mcode.manual.mnemonic import FLOAT_HIGH, INT_HIGH, INT_LOW, Mnemonic, flag, mode, number
+from multidrop.dialects.mcode.manual.mnemonic import FLOAT_HIGH, INT_HIGH, INT_LOW, Mnemonic, flag, mode, number
 
 
 def _operator(name: str, title: str, meaning: str, section: str, syntax: str) -> Mnemonic:

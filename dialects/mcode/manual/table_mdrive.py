@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any, Unpack
 
-from dialects.mcode.manual.mnemonic import (
+from multidrop.dialects.mcode.manual.mnemonic import (
     EXPANDED,
     MDRIVE_ENCODER,
     MDRIVE_PLUS,
@@ -25,11 +25,11 @@ from dialects.mcode.manual.mnemonic import (
     number,
     status,
 )
-from dialects.mcode.manual.table_io import IO
-from dialects.mcode.manual.table_math import MATH
-from dialects.mcode.manual.table_motion import MOTION
-from dialects.mcode.manual.table_program import PROGRAM
-from dialects.mcode.manual.table_system import SYSTEM
+from multidrop.dialects.mcode.manual.table_io import IO
+from multidrop.dialects.mcode.manual.table_math import MATH
+from multidrop.dialects.mcode.manual.table_motion import MOTION
+from multidrop.dialects.mcode.manual.table_program import PROGRAM
+from multidrop.dialects.mcode.manual.table_system import SYSTEM
 
 _LEXIUM: Mapping[str, Mnemonic] = {row.name: row for row in (*MOTION, *IO, *SYSTEM, *PROGRAM, *MATH)}
 FASTEST = 5000000

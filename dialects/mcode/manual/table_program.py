@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dialects.mcode.manual.mnemonic import NOT_STEPPABLE, Mnemonic, flag, status
+from multidrop.dialects.mcode.manual.mnemonic import NOT_STEPPABLE, Mnemonic, flag, status
 
 CONDITIONS = (
     "beyond one comparison it is read from left to right: R1=1&MV as (R1=1)&MV, KF&12=12 as (KF&12)=12, "

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dialects.mcode.manual.mnemonic import (
+from multidrop.dialects.mcode.manual.mnemonic import (
     CLOSED_LOOP,
     MODULE,
     NOT_STEPPABLE,

@@ -9,10 +9,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import ClassVar
 
-from dialects.codec import Decoded, End, Reply, Request, StopPiece
-from dialects.modbus.host import framing
-from dialects.modbus.host.messages import pdu_codec
-from dialects.modbus.manual.registers import REGISTERS
+from multidrop.dialects.codec import Decoded, End, Reply, Request, StopPiece
+from multidrop.dialects.modbus.host import framing
+from multidrop.dialects.modbus.host.messages import pdu_codec
+from multidrop.dialects.modbus.manual.registers import REGISTERS
 
 NUMBERS = 0xFFF0
 """Requests have numbers below this; the messages of a stop have numbers above it."""

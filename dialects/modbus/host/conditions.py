@@ -5,18 +5,18 @@ from __future__ import annotations
 from collections.abc import Sequence
 from functools import partial
 
-from dialects.codec import Priority, Procedure
-from dialects.conditions import Conditions, Facts, Part, Reader
-from dialects.mcode.host.parameters import rows_of_list
-from dialects.mcode.manual import parameters as manual
-from dialects.mcode.manual import points
-from dialects.mcode.manual.table import words
-from dialects.modbus.host import framing, mapping
-from dialects.modbus.host.exchange import request, sure
-from dialects.modbus.host.messages import pdu_codec
-from dialects.modbus.host.operations import OUTPUTS
-from dialects.modbus.host.state import ModbusState
-from dialects.modbus.manual.registers import REGISTERS
+from multidrop.dialects.codec import Priority, Procedure
+from multidrop.dialects.conditions import Conditions, Facts, Part, Reader
+from multidrop.dialects.mcode.host.parameters import rows_of_list
+from multidrop.dialects.mcode.manual import parameters as manual
+from multidrop.dialects.mcode.manual import points
+from multidrop.dialects.mcode.manual.table import words
+from multidrop.dialects.modbus.host import framing, mapping
+from multidrop.dialects.modbus.host.exchange import request, sure
+from multidrop.dialects.modbus.host.messages import pdu_codec
+from multidrop.dialects.modbus.host.operations import OUTPUTS
+from multidrop.dialects.modbus.host.state import ModbusState
+from multidrop.dialects.modbus.manual.registers import REGISTERS
 
 FLAGS = ("EF", "BY", "MV", "DE")
 SETTINGS = ("EE", "AS", "RC", "HC", "VI", "VM", "A", "D")

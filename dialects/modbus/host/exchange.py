@@ -8,13 +8,13 @@ read and reported first. The host never repeats a request.
 
 from __future__ import annotations
 
-from dialects.codec import End, Kind, Priority, Procedure, Reply, Request
-from dialects.errors import NoAnswer, Refused
-from dialects.mcode.host.wording import described, unknown, who
-from dialects.modbus.host import framing, mapping
-from dialects.modbus.host.messages import pdu_codec
-from dialects.modbus.host.state import ModbusState
-from dialects.modbus.manual.registers import AT, REGISTERS
+from multidrop.dialects.codec import End, Kind, Priority, Procedure, Reply, Request
+from multidrop.dialects.errors import NoAnswer, Refused
+from multidrop.dialects.mcode.host.wording import described, unknown, who
+from multidrop.dialects.modbus.host import framing, mapping
+from multidrop.dialects.modbus.host.messages import pdu_codec
+from multidrop.dialects.modbus.host.state import ModbusState
+from multidrop.dialects.modbus.manual.registers import AT, REGISTERS
 
 ILLEGAL_VALUE, FAILURE = 3, 4
 READS = frozenset(

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import re
 
-from dialects.codec import Procedure
-from dialects.errors import Refused
-from dialects.family import Hints
-from dialects.mcode.host.wording import who
-from dialects.modbus.host.codec import Modbus
-from dialects.modbus.host.exchange import flagged
-from dialects.modbus.host.operations import identification
-from dialects.modbus.host.state import ModbusState
+from multidrop.dialects.codec import Procedure
+from multidrop.dialects.errors import Refused
+from multidrop.dialects.family import Hints
+from multidrop.dialects.mcode.host.wording import who
+from multidrop.dialects.modbus.host.codec import Modbus
+from multidrop.dialects.modbus.host.exchange import flagged
+from multidrop.dialects.modbus.host.operations import identification
+from multidrop.dialects.modbus.host.state import ModbusState
 
 BASIC = 1
 """The first three objects of the identification, which are mandatory."""

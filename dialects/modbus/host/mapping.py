@@ -9,14 +9,14 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
-from dialects.errors import Inexpressible, Refused
-from dialects.mcode.manual import error_texts
-from dialects.mcode.manual.errors import ErrorNumber
-from dialects.mcode.manual.grammar import Argument, Name, Number, Statement
-from dialects.mcode.manual.table import lookup
-from dialects.modbus.host import framing
-from dialects.modbus.host.messages import pdu_codec
-from dialects.modbus.manual.registers import AT, INT32, REGISTERS, Register
+from multidrop.dialects.errors import Inexpressible, Refused
+from multidrop.dialects.mcode.manual import error_texts
+from multidrop.dialects.mcode.manual.errors import ErrorNumber
+from multidrop.dialects.mcode.manual.grammar import Argument, Name, Number, Statement
+from multidrop.dialects.mcode.manual.table import lookup
+from multidrop.dialects.modbus.host import framing
+from multidrop.dialects.modbus.host.messages import pdu_codec
+from multidrop.dialects.modbus.manual.registers import AT, INT32, REGISTERS, Register
 
 ALTERNATIVE = "MCode/TCP (tcp://HOST:503)"
 READ_ONLY, UNREADABLE = ErrorNumber.READ_ONLY, ErrorNumber.NOT_PRINTABLE

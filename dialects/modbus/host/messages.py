@@ -6,12 +6,12 @@ from functools import cache
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from dialects.modbus.host.pdu import PduCodec
+    from multidrop.dialects.modbus.host.pdu import PduCodec
 
 
 @cache
 def pdu_codec() -> PduCodec:
     """Return the codec of PDUs. The first call imports pymodbus (50 to 100 ms)."""
-    from dialects.modbus.host.pdu import PduCodec
+    from multidrop.dialects.modbus.host.pdu import PduCodec
 
     return PduCodec()

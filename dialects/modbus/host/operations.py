@@ -5,18 +5,18 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Sequence
 
-from dialects.codec import Priority, Procedure
-from dialects.errors import Inexpressible, NoAnswer, Refused
-from dialects.family import Motion
-from dialects.mcode.host.wording import who
-from dialects.mcode.manual import grammar
-from dialects.mcode.manual.status import STATUS, in_words
-from dialects.modbus.host import framing, mapping
-from dialects.modbus.host.exchange import answered, carried_out, flagged, request, sure
-from dialects.modbus.host.mapping import Reading
-from dialects.modbus.host.messages import pdu_codec
-from dialects.modbus.host.state import ModbusState
-from dialects.modbus.manual.registers import AT, REGISTERS, ROWS, Register
+from multidrop.dialects.codec import Priority, Procedure
+from multidrop.dialects.errors import Inexpressible, NoAnswer, Refused
+from multidrop.dialects.family import Motion
+from multidrop.dialects.mcode.host.wording import who
+from multidrop.dialects.mcode.manual import grammar
+from multidrop.dialects.mcode.manual.status import STATUS, in_words
+from multidrop.dialects.modbus.host import framing, mapping
+from multidrop.dialects.modbus.host.exchange import answered, carried_out, flagged, request, sure
+from multidrop.dialects.modbus.host.mapping import Reading
+from multidrop.dialects.modbus.host.messages import pdu_codec
+from multidrop.dialects.modbus.host.state import ModbusState
+from multidrop.dialects.modbus.manual.registers import AT, REGISTERS, ROWS, Register
 
 USER = frozenset(f"V{n}" for n in range(1, 9))
 OUTPUTS = 3

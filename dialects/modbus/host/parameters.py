@@ -9,21 +9,21 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 
-from dialects.codec import Procedure
-from dialects.errors import NoAnswer, Refused
-from dialects.mcode.host.parameters import rows_of_list
-from dialects.mcode.host.wording import who
-from dialects.mcode.manual import parameter_plan
-from dialects.mcode.manual import parameters as manual
-from dialects.mcode.manual.parameters import reading_of
-from dialects.mcode.manual.table import words
-from dialects.modbus.host import mapping
-from dialects.modbus.host.exchange import request, sure
-from dialects.modbus.host.messages import pdu_codec
-from dialects.modbus.host.operations import flag, perform
-from dialects.modbus.host.state import ModbusState
-from dialects.modbus.manual.registers import REGISTERS
-from dialects.parameters import Change, Parameters, Permission, Plan, Progress, Readings, Value, number, same
+from multidrop.dialects.codec import Procedure
+from multidrop.dialects.errors import NoAnswer, Refused
+from multidrop.dialects.mcode.host.parameters import rows_of_list
+from multidrop.dialects.mcode.host.wording import who
+from multidrop.dialects.mcode.manual import parameter_plan
+from multidrop.dialects.mcode.manual import parameters as manual
+from multidrop.dialects.mcode.manual.parameters import reading_of
+from multidrop.dialects.mcode.manual.table import words
+from multidrop.dialects.modbus.host import mapping
+from multidrop.dialects.modbus.host.exchange import request, sure
+from multidrop.dialects.modbus.host.messages import pdu_codec
+from multidrop.dialects.modbus.host.operations import flag, perform
+from multidrop.dialects.modbus.host.state import ModbusState
+from multidrop.dialects.modbus.manual.registers import REGISTERS
+from multidrop.dialects.parameters import Change, Parameters, Permission, Plan, Progress, Readings, Value, number, same
 
 OTHER_FORM = frozenset({"TS", "TA"})
 """Registers whose values are not those of the word."""

@@ -19,7 +19,7 @@ from pymodbus.pdu.bit_message import ReadCoilsRequest, ReadDiscreteInputsRequest
 from pymodbus.pdu.mei_message import ReadDeviceInformationRequest, ReadDeviceInformationResponse
 from pymodbus.pdu.register_message import ReadHoldingRegistersRequest, WriteMultipleRegistersRequest
 
-from dialects.modbus.host.framing import (
+from multidrop.dialects.modbus.host.framing import (
     READ_COILS,
     READ_INPUTS,
     READ_REGISTERS,

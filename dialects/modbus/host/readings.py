@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dialects.codec import Priority, Procedure
-from dialects.errors import Diagnostic, Inexpressible, NoAnswer, Refused
-from dialects.mcode.host.wording import who
-from dialects.modbus.host import framing, mapping
-from dialects.modbus.host.exchange import request, sure
-from dialects.modbus.host.state import ModbusState
-from dialects.readings import Readings, number
+from multidrop.dialects.codec import Priority, Procedure
+from multidrop.dialects.errors import Diagnostic, Inexpressible, NoAnswer, Refused
+from multidrop.dialects.mcode.host.wording import who
+from multidrop.dialects.modbus.host import framing, mapping
+from multidrop.dialects.modbus.host.exchange import request, sure
+from multidrop.dialects.modbus.host.state import ModbusState
+from multidrop.dialects.readings import Readings, number
 
 _NO_NUMBER = mapping.IDENTITY.keys() | mapping.SETUPS
 

@@ -4,15 +4,15 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from dialects.codec import Procedure
-from dialects.mcode.host import snapshot
-from dialects.mcode.manual.table import words
-from dialects.modbus.host import mapping, parameters
-from dialects.modbus.host.exchange import request, sure
-from dialects.modbus.host.operations import identification
-from dialects.modbus.host.state import ModbusState
-from dialects.parameters import Progress
-from dialects.snapshots import Snapshot
+from multidrop.dialects.codec import Procedure
+from multidrop.dialects.mcode.host import snapshot
+from multidrop.dialects.mcode.manual.table import words
+from multidrop.dialects.modbus.host import mapping, parameters
+from multidrop.dialects.modbus.host.exchange import request, sure
+from multidrop.dialects.modbus.host.operations import identification
+from multidrop.dialects.modbus.host.state import ModbusState
+from multidrop.dialects.parameters import Progress
+from multidrop.dialects.snapshots import Snapshot
 
 SERIAL = 5
 """The object of the identification."""

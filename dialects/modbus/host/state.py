@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from dialects.modbus.host.codec import Modbus
-from dialects.state import DriveState
+from multidrop.dialects.modbus.host.codec import Modbus
+from multidrop.dialects.state import DriveState
 
 
 @dataclass(eq=False)

@@ -10,9 +10,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import ClassVar
 
-from dialects.codec import Decoded, End, Kind, Reply, Request, StopPiece
-from dialects.errors import Inexpressible
-from dialects.pmx.manual.table import reads, starts_motion
+from multidrop.dialects.codec import Decoded, End, Kind, Reply, Request, StopPiece
+from multidrop.dialects.errors import Inexpressible
+from multidrop.dialects.pmx.manual.table import reads, starts_motion
 
 LONGEST = 62
 """Characters of a command with its number: the room in a USB packet of the same controller, with the end."""

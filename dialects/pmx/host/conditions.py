@@ -9,14 +9,14 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from functools import partial
 
-from dialects.codec import Priority, Procedure, Request
-from dialects.conditions import Conditions, Facts, Lamp, Pace, Part, Reader
-from dialects.parameters import number as whole
-from dialects.pmx.host.exchange import beyond_doubt, number
-from dialects.pmx.host.operations import PROGRAMS
-from dialects.pmx.host.state import PmxState
-from dialects.pmx.manual import status as words
-from dialects.pmx.manual.table import AXES
+from multidrop.dialects.codec import Priority, Procedure, Request
+from multidrop.dialects.conditions import Conditions, Facts, Lamp, Pace, Part, Reader
+from multidrop.dialects.parameters import number as whole
+from multidrop.dialects.pmx.host.exchange import beyond_doubt, number
+from multidrop.dialects.pmx.host.operations import PROGRAMS
+from multidrop.dialects.pmx.host.state import PmxState
+from multidrop.dialects.pmx.manual import status as words
+from multidrop.dialects.pmx.manual.table import AXES
 
 RUNNING, PAUSED = 1, 2
 """Values of SASTAT at which SPC counts."""

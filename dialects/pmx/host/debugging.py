@@ -9,18 +9,18 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from dialects.codec import Procedure
-from dialects.debugging import Debugging, Look, Neighbours, Row
-from dialects.errors import Diagnostic, Inexpressible, Refused
-from dialects.held import Held
-from dialects.pmx.host.download import listing
-from dialects.pmx.host.exchange import answered, number, who
-from dialects.pmx.host.operations import perform
-from dialects.pmx.host.state import PmxState
-from dialects.pmx.manual import program_file, script_checker
-from dialects.pmx.manual.program_file import RAW
-from dialects.pmx.manual.script_decompiler import Undecodable
-from dialects.pmx.manual.table import lookup
+from multidrop.dialects.codec import Procedure
+from multidrop.dialects.debugging import Debugging, Look, Neighbours, Row
+from multidrop.dialects.errors import Diagnostic, Inexpressible, Refused
+from multidrop.dialects.held import Held
+from multidrop.dialects.pmx.host.download import listing
+from multidrop.dialects.pmx.host.exchange import answered, number, who
+from multidrop.dialects.pmx.host.operations import perform
+from multidrop.dialects.pmx.host.state import PmxState
+from multidrop.dialects.pmx.manual import program_file, script_checker
+from multidrop.dialects.pmx.manual.program_file import RAW
+from multidrop.dialects.pmx.manual.script_decompiler import Undecodable
+from multidrop.dialects.pmx.manual.table import lookup
 
 RUNNING, PAUSED = 1, 2
 """Values of SASTAT."""

@@ -8,17 +8,17 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from dialects.codec import End, Procedure
-from dialects.errors import DriveError, NoAnswer, Refused, Stopped
-from dialects.family import Progress
-from dialects.files import SourceLine
-from dialects.held import Held
-from dialects.numbers import whole
-from dialects.pmx.host.exchange import answered, number, who
-from dialects.pmx.host.state import PmxState
-from dialects.pmx.manual import program_file
-from dialects.pmx.manual.script_compiler import EMPTY, ERASED, LINES
-from dialects.pmx.manual.table import PROBE, PROBED
+from multidrop.dialects.codec import End, Procedure
+from multidrop.dialects.errors import DriveError, NoAnswer, Refused, Stopped
+from multidrop.dialects.family import Progress
+from multidrop.dialects.files import SourceLine
+from multidrop.dialects.held import Held
+from multidrop.dialects.numbers import whole
+from multidrop.dialects.pmx.host.exchange import answered, number, who
+from multidrop.dialects.pmx.host.state import PmxState
+from multidrop.dialects.pmx.manual import program_file
+from multidrop.dialects.pmx.manual.script_compiler import EMPTY, ERASED, LINES
+from multidrop.dialects.pmx.manual.table import PROBE, PROBED
 
 BLANK = 16
 """Number of empty lines in a row that mark the end of the stored programs."""

@@ -12,12 +12,12 @@ from __future__ import annotations
 import re
 from dataclasses import replace
 
-from dialects.codec import End, Kind, Priority, Procedure, Reply, Request
-from dialects.errors import NoAnswer, Refused
-from dialects.pmx.host.state import PmxState
-from dialects.pmx.manual import errors
-from dialects.pmx.manual.help import suggestion
-from dialects.pmx.manual.table import lookup
+from multidrop.dialects.codec import End, Kind, Priority, Procedure, Reply, Request
+from multidrop.dialects.errors import NoAnswer, Refused
+from multidrop.dialects.pmx.host.state import PmxState
+from multidrop.dialects.pmx.manual import errors
+from multidrop.dialects.pmx.manual.help import suggestion
+from multidrop.dialects.pmx.manual.table import lookup
 
 MARK = "Q"
 """The first letter of a sync mark; no command begins with it."""

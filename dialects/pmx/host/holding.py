@@ -7,18 +7,18 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from dialects.codec import Procedure
-from dialects.errors import Diagnostic, Refused
-from dialects.family import Progress
-from dialects.files import SourceLine, split_lines
-from dialects.held import Difference, Held, Stored
-from dialects.pmx.host.download import BLANK, read_line
-from dialects.pmx.host.exchange import answered, number, who
-from dialects.pmx.host.operations import OK, PROGRAMS, moving
-from dialects.pmx.host.state import PmxState
-from dialects.pmx.manual import program_file
-from dialects.pmx.manual.script_compiler import EMPTY, LINES
-from dialects.pmx.manual.script_words import VARIABLES
+from multidrop.dialects.codec import Procedure
+from multidrop.dialects.errors import Diagnostic, Refused
+from multidrop.dialects.family import Progress
+from multidrop.dialects.files import SourceLine, split_lines
+from multidrop.dialects.held import Difference, Held, Stored
+from multidrop.dialects.pmx.host.download import BLANK, read_line
+from multidrop.dialects.pmx.host.exchange import answered, number, who
+from multidrop.dialects.pmx.host.operations import OK, PROGRAMS, moving
+from multidrop.dialects.pmx.host.state import PmxState
+from multidrop.dialects.pmx.manual import program_file
+from multidrop.dialects.pmx.manual.script_compiler import EMPTY, LINES
+from multidrop.dialects.pmx.manual.script_words import VARIABLES
 
 RUNS = (1, 2)
 """The states of a program that runs or waits to go on."""

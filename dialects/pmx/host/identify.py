@@ -5,13 +5,13 @@ from __future__ import annotations
 import re
 from dataclasses import replace
 
-from dialects.codec import End, Procedure
-from dialects.errors import Inexpressible, NoAnswer
-from dialects.family import Hints
-from dialects.pmx.host.codec import FACTORY, Pmx
-from dialects.pmx.host.exchange import who
-from dialects.pmx.host.operations import troubles
-from dialects.pmx.host.state import PmxState
+from multidrop.dialects.codec import End, Procedure
+from multidrop.dialects.errors import Inexpressible, NoAnswer
+from multidrop.dialects.family import Hints
+from multidrop.dialects.pmx.host.codec import FACTORY, Pmx
+from multidrop.dialects.pmx.host.exchange import who
+from multidrop.dialects.pmx.host.operations import troubles
+from multidrop.dialects.pmx.host.state import PmxState
 
 PRODUCT = re.compile(r"(?i)performax-(\S+)")
 NAME = re.compile(r"\d[A-Za-z]+(\d\d)")

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import re
 
-from dialects.codec import Priority, Procedure, Request
-from dialects.errors import Inexpressible, Refused
-from dialects.family import Motion, Referencing
-from dialects.pmx.host.exchange import answered, beyond_doubt, number, who
-from dialects.pmx.host.state import PmxState
-from dialects.pmx.manual import status as words
-from dialects.pmx.manual.table import AXES, grouped
+from multidrop.dialects.codec import Priority, Procedure, Request
+from multidrop.dialects.errors import Inexpressible, Refused
+from multidrop.dialects.family import Motion, Referencing
+from multidrop.dialects.pmx.host.exchange import answered, beyond_doubt, number, who
+from multidrop.dialects.pmx.host.state import PmxState
+from multidrop.dialects.pmx.manual import status as words
+from multidrop.dialects.pmx.manual.table import AXES, grouped
 
 OK = "OK"
 LATER = ("DN", "DB")

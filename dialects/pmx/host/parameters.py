@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping
 from dataclasses import replace
 
-from dialects.codec import Procedure
-from dialects.errors import Refused
-from dialects.parameters import Change, Parameters, Permission, Plan, Progress, Readings, Value
-from dialects.pmx.host.exchange import answered, who
-from dialects.pmx.host.operations import LATER, busy, moving, perform
-from dialects.pmx.host.state import PmxState
-from dialects.pmx.manual import parameters as manual
+from multidrop.dialects.codec import Procedure
+from multidrop.dialects.errors import Refused
+from multidrop.dialects.parameters import Change, Parameters, Permission, Plan, Progress, Readings, Value
+from multidrop.dialects.pmx.host.exchange import answered, who
+from multidrop.dialects.pmx.host.operations import LATER, busy, moving, perform
+from multidrop.dialects.pmx.host.state import PmxState
+from multidrop.dialects.pmx.manual import parameters as manual
 
 FORM = r"-?\d{1,19}"
 RATIO_FORM = r"\d{1,6}(?:\.\d+)?"

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from dialects.family import Programs
-from dialects.pmx.host import holding
-from dialects.pmx.host.download import download, listing
-from dialects.pmx.host.state import PmxState
-from dialects.pmx.host.upload import file_of, readable, upload
-from dialects.pmx.manual import program_file
+from multidrop.dialects.family import Programs
+from multidrop.dialects.pmx.host import holding
+from multidrop.dialects.pmx.host.download import download, listing
+from multidrop.dialects.pmx.host.state import PmxState
+from multidrop.dialects.pmx.host.upload import file_of, readable, upload
+from multidrop.dialects.pmx.manual import program_file
 
 PROGRAMS: Programs[PmxState] = Programs(
     listing=listing,

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from dialects.codec import Priority, Procedure
-from dialects.errors import Diagnostic, Refused
-from dialects.pmx.host.exchange import answered, who
-from dialects.pmx.host.state import PmxState
-from dialects.pmx.manual.table import lookup
-from dialects.readings import Readings, number
+from multidrop.dialects.codec import Priority, Procedure
+from multidrop.dialects.errors import Diagnostic, Refused
+from multidrop.dialects.pmx.host.exchange import answered, who
+from multidrop.dialects.pmx.host.state import PmxState
+from multidrop.dialects.pmx.manual.table import lookup
+from multidrop.dialects.readings import Readings, number
 
 
 def check(state: PmxState, word: str) -> str:

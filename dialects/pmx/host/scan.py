@@ -8,11 +8,11 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
-from dialects.codec import Kind, Procedure
-from dialects.pmx.host.codec import FACTORY, Pmx
-from dialects.pmx.host.identify import find
-from dialects.pmx.host.state import PmxState
-from dialects.scanning import WINDOW, Found, Outcome, Reach, Scan, Step
+from multidrop.dialects.codec import Kind, Procedure
+from multidrop.dialects.pmx.host.codec import FACTORY, Pmx
+from multidrop.dialects.pmx.host.identify import find
+from multidrop.dialects.pmx.host.state import PmxState
+from multidrop.dialects.scanning import WINDOW, Found, Outcome, Reach, Scan, Step
 
 NUMBERS = tuple(f"{number:02}" for number in range(100))
 NOTHING = "~~~"

@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-from dialects.codec import Procedure
-from dialects.parameters import Progress
-from dialects.pmx.host import parameters
-from dialects.pmx.host.download import listing
-from dialects.pmx.host.exchange import answered, number
-from dialects.pmx.host.operations import PROGRAMS
-from dialects.pmx.host.state import PmxState
-from dialects.pmx.manual import status as words
-from dialects.pmx.manual.program_file import RAW
-from dialects.pmx.manual.table import AXES
-from dialects.snapshots import Levels, Snapshot
+from multidrop.dialects.codec import Procedure
+from multidrop.dialects.parameters import Progress
+from multidrop.dialects.pmx.host import parameters
+from multidrop.dialects.pmx.host.download import listing
+from multidrop.dialects.pmx.host.exchange import answered, number
+from multidrop.dialects.pmx.host.operations import PROGRAMS
+from multidrop.dialects.pmx.host.state import PmxState
+from multidrop.dialects.pmx.manual import status as words
+from multidrop.dialects.pmx.manual.program_file import RAW
+from multidrop.dialects.pmx.manual.table import AXES
+from multidrop.dialects.snapshots import Levels, Snapshot
 
 BAUDS = {1: 9600, 2: 19200, 3: 38400, 4: 57600, 5: 115200}
 """By DB (table 6.1)."""

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from dialects.pmx.host.codec import Pmx
-from dialects.state import DriveState
+from multidrop.dialects.pmx.host.codec import Pmx
+from multidrop.dialects.state import DriveState
 
 
 @dataclass(eq=False)

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dialects.codec import Procedure
-from dialects.held import Held
-from dialects.pmx.host.exchange import who
-from dialects.pmx.host.holding import read
-from dialects.pmx.host.state import PmxState
-from dialects.pmx.manual import program_file
-from dialects.pmx.manual.script_decompiler import Undecodable
+from multidrop.dialects.codec import Procedure
+from multidrop.dialects.held import Held
+from multidrop.dialects.pmx.host.exchange import who
+from multidrop.dialects.pmx.host.holding import read
+from multidrop.dialects.pmx.host.state import PmxState
+from multidrop.dialects.pmx.manual import program_file
+from multidrop.dialects.pmx.manual.script_decompiler import Undecodable
 
 
 def readable(held: Held) -> tuple[str, ...]:

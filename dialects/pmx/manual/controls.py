@@ -6,9 +6,9 @@ sends ABS first.
 
 from __future__ import annotations
 
-from dialects.controls import BY, DISABLE, ENABLE, HOME_MINUS, HOME_PLUS, STOP, TO, Control, Controls
-from dialects.pmx.manual.table import AXES
-from dialects.state import DriveState
+from multidrop.dialects.controls import BY, DISABLE, ENABLE, HOME_MINUS, HOME_PLUS, STOP, TO, Control, Controls
+from multidrop.dialects.pmx.manual.table import AXES
+from multidrop.dialects.state import DriveState
 
 
 def controls(state: DriveState, axis: str) -> Controls:

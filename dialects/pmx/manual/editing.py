@@ -5,13 +5,13 @@ from __future__ import annotations
 import re
 from collections.abc import Container, Iterable, Sequence
 
-from dialects.files import split_lines
-from dialects.pmx.manual import line_parts, script_help, script_names
-from dialects.pmx.manual.line_parts import MOVE
-from dialects.pmx.manual.script_parser import Statement, parse
-from dialects.pmx.manual.script_words import AXES
-from dialects.pmx.manual.script_words import Word as Register
-from dialects.program_editing import Block, Offer, Span, UserName, Word
+from multidrop.dialects.files import split_lines
+from multidrop.dialects.pmx.manual import line_parts, script_help, script_names
+from multidrop.dialects.pmx.manual.line_parts import MOVE
+from multidrop.dialects.pmx.manual.script_parser import Statement, parse
+from multidrop.dialects.pmx.manual.script_words import AXES
+from multidrop.dialects.pmx.manual.script_words import Word as Register
+from multidrop.dialects.program_editing import Block, Offer, Span, UserName, Word
 
 names = script_names.names
 fixed = script_names.fixed

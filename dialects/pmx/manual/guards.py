@@ -9,8 +9,8 @@ import re
 from collections.abc import Mapping
 from types import MappingProxyType
 
-from dialects.guards import ADDRESSES, EVERYONE, Guard, to_all
-from dialects.pmx.manual.table import head, lookup, starts_motion
+from multidrop.dialects.guards import ADDRESSES, EVERYONE, Guard, to_all
+from multidrop.dialects.pmx.manual.table import head, lookup, starts_motion
 
 NAMES: Mapping[str, str] = MappingProxyType(
     {

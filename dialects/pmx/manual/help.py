@@ -5,9 +5,9 @@ from __future__ import annotations
 import difflib
 from dataclasses import replace
 
-from dialects.errors import Diagnostic
-from dialects.pmx.manual.errors import meaning
-from dialects.pmx.manual.table import COMMANDS, ELSEWHERE, ROWS, WORDS, Command, head, lookup
+from multidrop.dialects.errors import Diagnostic
+from multidrop.dialects.pmx.manual.errors import meaning
+from multidrop.dialects.pmx.manual.table import COMMANDS, ELSEWHERE, ROWS, WORDS, Command, head, lookup
 
 ACCESS = {"R": "read only", "W": "write only", "RW": "read and write"}
 EXAMPLES = {"X": ["X1000", "X1000Y2000"], "Y": ["Y1000"], "I": ["I1000:-1000"], "T": ["TX1000", "TY1000"]}

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import re
 
-from dialects.pmx.manual.script_words import AXES, BLOCKS, WORDS
-from dialects.program_editing import Word
-from dialects.program_files import Entry, Part
+from multidrop.dialects.pmx.manual.script_words import AXES, BLOCKS, WORDS
+from multidrop.dialects.program_editing import Word
+from multidrop.dialects.program_files import Entry, Part
 
 _WORD = re.compile(r"[A-Za-z]\w*[+-]?", re.ASCII)
 MOVE = re.compile(rf"([{AXES}](V?\d+)?)+", re.ASCII)

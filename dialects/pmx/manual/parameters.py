@@ -9,8 +9,8 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 
-from dialects.errors import Diagnostic
-from dialects.parameters import (
+from multidrop.dialects.errors import Diagnostic
+from multidrop.dialects.parameters import (
     COMMUNICATION,
     PARAMETERS,
     VARIABLES,
@@ -24,7 +24,7 @@ from dialects.parameters import (
     reference_lost,
     same,
 )
-from dialects.pmx.manual.table import AXES, COMMANDS
+from multidrop.dialects.pmx.manual.table import AXES, COMMANDS
 
 WIRE = ("DN", "DB")
 LOOP = ("SLR", "SLT", "SLE", "SLA")

@@ -11,12 +11,12 @@ from collections.abc import Container, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from dialects.files import SourceLine, program_text_of, split_lines, wrong_characters
-from dialects.layout import respelled
-from dialects.pmx.manual import line_parts, script_checker, script_decompiler
-from dialects.pmx.manual.script_compiler import EMPTY, ERASED, LINES, looks_compiled, split
-from dialects.pmx.manual.script_parser import parse
-from dialects.problems import Problem, refuse
+from multidrop.dialects.files import SourceLine, program_text_of, split_lines, wrong_characters
+from multidrop.dialects.layout import respelled
+from multidrop.dialects.pmx.manual import line_parts, script_checker, script_decompiler
+from multidrop.dialects.pmx.manual.script_compiler import EMPTY, ERASED, LINES, looks_compiled, split
+from multidrop.dialects.pmx.manual.script_parser import parse
+from multidrop.dialects.problems import Problem, refuse
 
 # The canonical spelling of a line of A-SCRIPT: no blanks but the one before a number or a condition.
 

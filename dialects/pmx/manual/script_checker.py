@@ -8,10 +8,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from dialects.pmx.manual import script_compiler, script_flow
-from dialects.pmx.manual.script_compiler import LINES
-from dialects.pmx.manual.script_parser import Statement, parse
-from dialects.problems import Problem, errors, in_order, refuse
+from multidrop.dialects.pmx.manual import script_compiler, script_flow
+from multidrop.dialects.pmx.manual.script_compiler import LINES
+from multidrop.dialects.pmx.manual.script_parser import Statement, parse
+from multidrop.dialects.problems import Problem, errors, in_order, refuse
 
 _OPENS = {"ENDIF": "IF", "ELSE": "IF", "ELSEIF": "IF", "ENDWHILE": "WHILE"}
 _ENDS = {"IF": "ENDIF", "WHILE": "ENDWHILE", "PRG": "END", "SUB": "ENDSUB"}

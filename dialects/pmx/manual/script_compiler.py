@@ -15,8 +15,17 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
-from dialects.pmx.manual.script_parser import Statement, Value
-from dialects.pmx.manual.script_words import AXES, COMPARISONS, HANDLER, INT32, OPERATORS, PROGRAMS, VARIABLES, WORDS
+from multidrop.dialects.pmx.manual.script_parser import Statement, Value
+from multidrop.dialects.pmx.manual.script_words import (
+    AXES,
+    COMPARISONS,
+    HANDLER,
+    INT32,
+    OPERATORS,
+    PROGRAMS,
+    VARIABLES,
+    WORDS,
+)
 
 LINES = 1275
 """The size of the controller's memory, in lines (7.19.1)."""

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from dialects.pmx.manual import script_checker
-from dialects.pmx.manual.script_compiler import COMPARISON, EMPTY, MOVES, OPERATION, compile_, split
-from dialects.pmx.manual.script_parser import parse
-from dialects.pmx.manual.script_words import AXES, WORDS
+from multidrop.dialects.pmx.manual import script_checker
+from multidrop.dialects.pmx.manual.script_compiler import COMPARISON, EMPTY, MOVES, OPERATION, compile_, split
+from multidrop.dialects.pmx.manual.script_parser import parse
+from multidrop.dialects.pmx.manual.script_words import AXES, WORDS
 
 _OPERATIONS = {code: op for op, code in OPERATION.items()}
 _COMPARISONS = {code: op for op, code in COMPARISON.items()}

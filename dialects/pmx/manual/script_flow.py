@@ -11,9 +11,9 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Sequence
 
-from dialects.pmx.manual.script_parser import Statement
-from dialects.problems import Problem
-from dialects.walks import nearest, walk
+from multidrop.dialects.pmx.manual.script_parser import Statement
+from multidrop.dialects.problems import Problem
+from multidrop.dialects.walks import nearest, walk
 
 FARTHEST = 500
 """Statements after a move that are looked at."""

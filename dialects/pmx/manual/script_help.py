@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from dialects.pmx.manual.script_words import AXES, INT32, PROGRAMS, SUBROUTINES, VARIABLES, WORDS, Word
-from dialects.pmx.manual.table import lookup
+from multidrop.dialects.pmx.manual.script_words import AXES, INT32, PROGRAMS, SUBROUTINES, VARIABLES, WORDS, Word
+from multidrop.dialects.pmx.manual.table import lookup
 
 KEYWORDS: Mapping[str, tuple[str, str]] = {
     "PRG": (f"PRG 0 to PRG {PROGRAMS - 1}", "begins a program; END ends it"),

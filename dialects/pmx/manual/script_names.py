@@ -6,13 +6,13 @@ import re
 from collections.abc import Iterator
 from dataclasses import replace
 
-from dialects.errors import Diagnostic
-from dialects.files import split_lines
-from dialects.pmx.manual.line_parts import words
-from dialects.pmx.manual.script_help import VARIABLE_NAMES
-from dialects.pmx.manual.script_parser import MOVE, TARGET, Statement, Value, parse
-from dialects.pmx.manual.script_words import HANDLER, KEPT_VARIABLES, SUBROUTINES, VARIABLES
-from dialects.program_editing import Span, UserName, replaced
+from multidrop.dialects.errors import Diagnostic
+from multidrop.dialects.files import split_lines
+from multidrop.dialects.pmx.manual.line_parts import words
+from multidrop.dialects.pmx.manual.script_help import VARIABLE_NAMES
+from multidrop.dialects.pmx.manual.script_parser import MOVE, TARGET, Statement, Value, parse
+from multidrop.dialects.pmx.manual.script_words import HANDLER, KEPT_VARIABLES, SUBROUTINES, VARIABLES
+from multidrop.dialects.program_editing import Span, UserName, replaced
 
 _NUMBERED = re.compile(r"\s*(PRG|SUB|GOSUB)\s*(\d{1,4})\s*", re.ASCII)
 _SETS = re.compile(r"\s*(V\d+)\s*=", re.ASCII)

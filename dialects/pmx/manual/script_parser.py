@@ -12,10 +12,10 @@ import difflib
 import re
 from dataclasses import dataclass, field
 
-from dialects.files import split_lines
-from dialects.pmx.manual.script_words import AXES, BLOCKS, COMPARISONS, INT32, PROGRAMS, SUBROUTINES, WORDS
-from dialects.pmx.manual.table import grouped
-from dialects.problems import Problem
+from multidrop.dialects.files import split_lines
+from multidrop.dialects.pmx.manual.script_words import AXES, BLOCKS, COMPARISONS, INT32, PROGRAMS, SUBROUTINES, WORDS
+from multidrop.dialects.pmx.manual.table import grouped
+from multidrop.dialects.problems import Problem
 
 _VALUE = r"-?\d+|[A-Za-z]\w*"
 _BLOCK = re.compile(r"(IF|ELSEIF|WHILE)(?![A-Za-z0-9])(.*)")

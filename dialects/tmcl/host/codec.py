@@ -13,12 +13,12 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import ClassVar
 
-from dialects.codec import Decoded, End, Kind, Reply, Request, StopPiece
-from dialects.errors import Inexpressible
-from dialects.tmcl.host import framing
-from dialects.tmcl.manual import grammar
-from dialects.tmcl.manual.commands import Call, Command, Search, Version
-from dialects.tmcl.manual.status import Status, accepted
+from multidrop.dialects.codec import Decoded, End, Kind, Reply, Request, StopPiece
+from multidrop.dialects.errors import Inexpressible
+from multidrop.dialects.tmcl.host import framing
+from multidrop.dialects.tmcl.manual import grammar
+from multidrop.dialects.tmcl.manual.commands import Call, Command, Search, Version
+from multidrop.dialects.tmcl.manual.status import Status, accepted
 
 FACTORY = "1"
 """The address of a new module."""

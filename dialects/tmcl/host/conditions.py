@@ -8,14 +8,14 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from functools import partial
 
-from dialects.codec import Priority, Procedure
-from dialects.conditions import Conditions, Facts, Lamp, Pace, Part, Reader
-from dialects.errors import Refused
-from dialects.tmcl.host.exchange import read
-from dialects.tmcl.host.motors import motors
-from dialects.tmcl.host.state import TmclState
-from dialects.tmcl.manual.commands import Call, Command
-from dialects.tmcl.manual.parameters import Axis
+from multidrop.dialects.codec import Priority, Procedure
+from multidrop.dialects.conditions import Conditions, Facts, Lamp, Pace, Part, Reader
+from multidrop.dialects.errors import Refused
+from multidrop.dialects.tmcl.host.exchange import read
+from multidrop.dialects.tmcl.host.motors import motors
+from multidrop.dialects.tmcl.host.state import TmclState
+from multidrop.dialects.tmcl.manual.commands import Call, Command
+from multidrop.dialects.tmcl.manual.parameters import Axis
 
 STATE = (Axis.TARGET_POSITION, Axis.POSITION_REACHED)
 SWITCHES = ((Axis.HOME_SWITCH, "home"), (Axis.RIGHT_SWITCH, "lim+"), (Axis.LEFT_SWITCH, "lim-"))

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from dialects.controls import BY, DISABLE, ENABLE, HOME_MINUS, HOME_PLUS, STOP, TO, Control, Controls
-from dialects.tmcl.host.state import TmclState
-from dialects.tmcl.manual.parameters import RELATIVE_FROM
+from multidrop.dialects.controls import BY, DISABLE, ENABLE, HOME_MINUS, HOME_PLUS, STOP, TO, Control, Controls
+from multidrop.dialects.tmcl.host.state import TmclState
+from multidrop.dialects.tmcl.manual.parameters import RELATIVE_FROM
 
 NO_ENABLE = "direct mode has no command for it"
 ONE_WAY = "axis parameter 193 chooses the direction of a reference search"

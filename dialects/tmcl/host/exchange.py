@@ -10,14 +10,14 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from dialects.codec import End, Priority, Procedure, Reply, Request
-from dialects.errors import NoAnswer, Refused, Stopped
-from dialects.tmcl.host import framing
-from dialects.tmcl.host.codec import late_reply_to
-from dialects.tmcl.host.state import TmclState
-from dialects.tmcl.manual.commands import Call, Command, Search, Version
-from dialects.tmcl.manual.parameters import Axis, Global
-from dialects.tmcl.manual.status import REFUSALS, Status
+from multidrop.dialects.codec import End, Priority, Procedure, Reply, Request
+from multidrop.dialects.errors import NoAnswer, Refused, Stopped
+from multidrop.dialects.tmcl.host import framing
+from multidrop.dialects.tmcl.host.codec import late_reply_to
+from multidrop.dialects.tmcl.host.state import TmclState
+from multidrop.dialects.tmcl.manual.commands import Call, Command, Search, Version
+from multidrop.dialects.tmcl.manual.parameters import Axis, Global
+from multidrop.dialects.tmcl.manual.status import REFUSALS, Status
 
 MARKS = (
     Call(Command.GGP, Global.HOST_ADDRESS),

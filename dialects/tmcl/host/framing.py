@@ -8,7 +8,7 @@ from __future__ import annotations
 from struct import Struct
 from typing import NamedTuple
 
-from dialects.tmcl.manual.commands import Call
+from multidrop.dialects.tmcl.manual.commands import Call
 
 LENGTH = 9
 _FIELDS = Struct(">BBBBi")

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from dialects.codec import End, Procedure
-from dialects.errors import Inexpressible, NoAnswer
-from dialects.family import Hints
-from dialects.tmcl.host.codec import FACTORY, MOST_MOTORS, Tmcl, number_of
-from dialects.tmcl.host.exchange import END, status_of, who
-from dialects.tmcl.host.motors import motors
-from dialects.tmcl.host.state import TmclState
-from dialects.tmcl.manual.commands import Call, Command, Version
-from dialects.tmcl.manual.status import Status
+from multidrop.dialects.codec import End, Procedure
+from multidrop.dialects.errors import Inexpressible, NoAnswer
+from multidrop.dialects.family import Hints
+from multidrop.dialects.tmcl.host.codec import FACTORY, MOST_MOTORS, Tmcl, number_of
+from multidrop.dialects.tmcl.host.exchange import END, status_of, who
+from multidrop.dialects.tmcl.host.motors import motors
+from multidrop.dialects.tmcl.host.state import TmclState
+from multidrop.dialects.tmcl.manual.commands import Call, Command, Version
+from multidrop.dialects.tmcl.manual.status import Status
 
 TRIES = 2
 """The first request may complete an unfinished message in a module."""

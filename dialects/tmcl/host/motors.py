@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dialects.codec import Priority, Procedure
-from dialects.errors import NoAnswer, Refused
-from dialects.tmcl.host.codec import MOST_MOTORS
-from dialects.tmcl.host.exchange import read
-from dialects.tmcl.host.state import TmclState
-from dialects.tmcl.manual.commands import Call, Command
-from dialects.tmcl.manual.parameters import Axis
+from multidrop.dialects.codec import Priority, Procedure
+from multidrop.dialects.errors import NoAnswer, Refused
+from multidrop.dialects.tmcl.host.codec import MOST_MOTORS
+from multidrop.dialects.tmcl.host.exchange import read
+from multidrop.dialects.tmcl.host.state import TmclState
+from multidrop.dialects.tmcl.manual.commands import Call, Command
+from multidrop.dialects.tmcl.manual.parameters import Axis
 
 
 def motors(state: TmclState, priority: Priority = Priority.OPERATOR) -> Procedure[int]:

@@ -4,16 +4,16 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from dialects.codec import Kind, Priority, Procedure, Request
-from dialects.errors import Inexpressible, NoAnswer, Refused
-from dialects.family import Motion, Referencing
-from dialects.tmcl.host.exchange import END, answered, read, refusal, status_of, synchronised, who
-from dialects.tmcl.host.motors import motors
-from dialects.tmcl.host.state import TmclState
-from dialects.tmcl.manual import grammar
-from dialects.tmcl.manual.commands import Call, Command, Running, Search
-from dialects.tmcl.manual.parameters import Axis, Global
-from dialects.tmcl.manual.status import Status
+from multidrop.dialects.codec import Kind, Priority, Procedure, Request
+from multidrop.dialects.errors import Inexpressible, NoAnswer, Refused
+from multidrop.dialects.family import Motion, Referencing
+from multidrop.dialects.tmcl.host.exchange import END, answered, read, refusal, status_of, synchronised, who
+from multidrop.dialects.tmcl.host.motors import motors
+from multidrop.dialects.tmcl.host.state import TmclState
+from multidrop.dialects.tmcl.manual import grammar
+from multidrop.dialects.tmcl.manual.commands import Call, Command, Running, Search
+from multidrop.dialects.tmcl.manual.parameters import Axis, Global
+from multidrop.dialects.tmcl.manual.status import Status
 
 LACKS = (Status.INVALID_COMMAND, Status.WRONG_TYPE, Status.INVALID_VALUE)
 """The statuses of a module that does not know a command or a parameter."""

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import re
 
-from dialects.codec import Priority, Procedure
-from dialects.errors import Diagnostic
-from dialects.readings import Readings
-from dialects.tmcl.host.exchange import read
-from dialects.tmcl.host.state import TmclState
-from dialects.tmcl.manual.commands import Call, Command
+from multidrop.dialects.codec import Priority, Procedure
+from multidrop.dialects.errors import Diagnostic
+from multidrop.dialects.readings import Readings
+from multidrop.dialects.tmcl.host.exchange import read
+from multidrop.dialects.tmcl.host.state import TmclState
+from multidrop.dialects.tmcl.manual.commands import Call, Command
 
 _WORD = re.compile(r"AP(\d{1,3})(?:/(\d))?", re.IGNORECASE | re.ASCII)
 

@@ -4,16 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping
 
-from dialects.codec import Procedure
-from dialects.errors import Refused
-from dialects.parameters import Change, Parameters, Permission, Plan, Progress, Reading, Readings, Value
-from dialects.tmcl.host.exchange import read as read_value
-from dialects.tmcl.host.exchange import who
-from dialects.tmcl.host.motors import motors
-from dialects.tmcl.host.operations import moving, perform
-from dialects.tmcl.host.state import TmclState
-from dialects.tmcl.manual import settings as manual
-from dialects.tmcl.manual.commands import Command
+from multidrop.dialects.codec import Procedure
+from multidrop.dialects.errors import Refused
+from multidrop.dialects.parameters import Change, Parameters, Permission, Plan, Progress, Reading, Readings, Value
+from multidrop.dialects.tmcl.host.exchange import read as read_value
+from multidrop.dialects.tmcl.host.exchange import who
+from multidrop.dialects.tmcl.host.motors import motors
+from multidrop.dialects.tmcl.host.operations import moving, perform
+from multidrop.dialects.tmcl.host.state import TmclState
+from multidrop.dialects.tmcl.manual import settings as manual
+from multidrop.dialects.tmcl.manual.commands import Command
 
 
 def read(state: TmclState, progress: Progress) -> Procedure[Readings]:

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from dialects.codec import Procedure
-from dialects.parameters import Progress
-from dialects.snapshots import Snapshot
-from dialects.tmcl.host import settings
-from dialects.tmcl.host.exchange import read
-from dialects.tmcl.host.motors import motors
-from dialects.tmcl.host.operations import moving
-from dialects.tmcl.host.state import TmclState
-from dialects.tmcl.manual.commands import Call, Command
-from dialects.tmcl.manual.parameters import BAUDS, Axis, Global
+from multidrop.dialects.codec import Procedure
+from multidrop.dialects.parameters import Progress
+from multidrop.dialects.snapshots import Snapshot
+from multidrop.dialects.tmcl.host import settings
+from multidrop.dialects.tmcl.host.exchange import read
+from multidrop.dialects.tmcl.host.motors import motors
+from multidrop.dialects.tmcl.host.operations import moving
+from multidrop.dialects.tmcl.host.state import TmclState
+from multidrop.dialects.tmcl.manual.commands import Call, Command
+from multidrop.dialects.tmcl.manual.parameters import BAUDS, Axis, Global
 
 
 def take(state: TmclState, progress: Progress) -> Procedure[Snapshot]:

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 
-from dialects.state import DriveState, Owed
-from dialects.tmcl.host.codec import STOPS, Tmcl
+from multidrop.dialects.state import DriveState, Owed
+from multidrop.dialects.tmcl.host.codec import STOPS, Tmcl
 
 
 @dataclass(eq=False)

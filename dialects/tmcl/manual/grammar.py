@@ -9,7 +9,7 @@ from __future__ import annotations
 import difflib
 import re
 
-from dialects.tmcl.manual.commands import BANK, INT32, MOTOR, MOTORS, TYPE, VALUE, WORDS, Call, Row
+from multidrop.dialects.tmcl.manual.commands import BANK, INT32, MOTOR, MOTORS, TYPE, VALUE, WORDS, Call, Row
 
 BYTE = range(256)
 RANGES = {TYPE: BYTE, MOTOR: MOTORS, BANK: BYTE, VALUE: INT32}

@@ -9,10 +9,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from types import MappingProxyType
 
-from dialects.guards import ADDRESSES, EVERYONE, Guard, to_all
-from dialects.tmcl.manual import grammar
-from dialects.tmcl.manual.commands import Call, Command
-from dialects.tmcl.manual.parameters import Global
+from multidrop.dialects.guards import ADDRESSES, EVERYONE, Guard, to_all
+from multidrop.dialects.tmcl.manual import grammar
+from multidrop.dialects.tmcl.manual.commands import Call, Command
+from multidrop.dialects.tmcl.manual.parameters import Global
 
 BOOTLOADER = 242
 """The command that starts the bootloader."""

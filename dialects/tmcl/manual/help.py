@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from dialects.errors import Diagnostic
-from dialects.tmcl.manual.commands import WORDS, Command, Row
-from dialects.tmcl.manual.parameters import AXIS, GLOBAL, RELATIVE_FROM, Parameter
-from dialects.tmcl.manual.status import REFUSALS
+from multidrop.dialects.errors import Diagnostic
+from multidrop.dialects.tmcl.manual.commands import WORDS, Command, Row
+from multidrop.dialects.tmcl.manual.parameters import AXIS, GLOBAL, RELATIVE_FROM, Parameter
+from multidrop.dialects.tmcl.manual.status import REFUSALS
 
 ON_AXIS = frozenset({Command.SAP, Command.GAP, Command.STAP, Command.RSAP})
 ON_MODULE = frozenset({Command.SGP, Command.GGP, Command.STGP, Command.RSGP})

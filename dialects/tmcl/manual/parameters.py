@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from enum import IntEnum
 from types import MappingProxyType
 
-from dialects.tmcl.manual.commands import INT32
+from multidrop.dialects.tmcl.manual.commands import INT32
 
 STEPS, SPEED, RATE = "microsteps", "microsteps/s", "microsteps/s2"
 FLAG = range(2)

@@ -8,10 +8,20 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 
-from dialects.errors import Diagnostic
-from dialects.parameters import COMMUNICATION, Change, Permission, Plan, Reading, Readings, Value, reference_lost, same
-from dialects.tmcl.manual.commands import STARTING_PARAMETERS, Call, Command
-from dialects.tmcl.manual.parameters import AXIS, GLOBAL, Axis, Global, Parameter
+from multidrop.dialects.errors import Diagnostic
+from multidrop.dialects.parameters import (
+    COMMUNICATION,
+    Change,
+    Permission,
+    Plan,
+    Reading,
+    Readings,
+    Value,
+    reference_lost,
+    same,
+)
+from multidrop.dialects.tmcl.manual.commands import STARTING_PARAMETERS, Call, Command
+from multidrop.dialects.tmcl.manual.parameters import AXIS, GLOBAL, Axis, Global, Parameter
 
 GLOBAL_PREFIX = "G"
 ADDRESS = f"{GLOBAL_PREFIX}{int(Global.ADDRESS)}"

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from dialects.mcode.manual.errors import ErrorNumber as E
-from dialects.mcode.manual.grammar import Argument, Name, Number, Statement
-from simulator.lexium.language.program_mode import Action
-from simulator.lexium.language.variable_access import VariableAccess
-from simulator.lexium.state.errors import Fault
-from simulator.lexium.state.expressions import whole
+from multidrop.dialects.mcode.manual.errors import ErrorNumber as E
+from multidrop.dialects.mcode.manual.grammar import Argument, Name, Number, Statement
+from multidrop.simulator.lexium.language.program_mode import Action
+from multidrop.simulator.lexium.language.variable_access import VariableAccess
+from multidrop.simulator.lexium.state.errors import Fault
+from multidrop.simulator.lexium.state.expressions import whole
 
 Compile = Callable[[Statement], Action]
 """Compiles the statement of one instruction. Raises Fault for a wrong form."""

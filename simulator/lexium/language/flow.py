@@ -7,22 +7,22 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 
-from dialects.mcode.manual.errors import ErrorNumber as E
-from dialects.mcode.manual.grammar import Argument, Compare, Name, Number, Statement, Text
-from dialects.mcode.manual.table import lookup
-from simulator.lexium.language.arguments import Compile, bare, is_place, only, pair
-from simulator.lexium.language.interpreter import Interpreter
-from simulator.lexium.language.pausing import Pausing
-from simulator.lexium.language.program_mode import Action, Names
-from simulator.lexium.language.variable_access import VariableAccess
-from simulator.lexium.motion.motor import Motor
-from simulator.lexium.state.errors import Fault
-from simulator.lexium.state.expressions import compile_condition, whole
-from simulator.lexium.state.memory import Memory
-from simulator.lexium.state.printer import Printer
-from simulator.lexium.state.program_memory import Program
-from simulator.lexium.state.ranges import within
-from simulator.lexium.state.timeline import Timeline
+from multidrop.dialects.mcode.manual.errors import ErrorNumber as E
+from multidrop.dialects.mcode.manual.grammar import Argument, Compare, Name, Number, Statement, Text
+from multidrop.dialects.mcode.manual.table import lookup
+from multidrop.simulator.lexium.language.arguments import Compile, bare, is_place, only, pair
+from multidrop.simulator.lexium.language.interpreter import Interpreter
+from multidrop.simulator.lexium.language.pausing import Pausing
+from multidrop.simulator.lexium.language.program_mode import Action, Names
+from multidrop.simulator.lexium.language.variable_access import VariableAccess
+from multidrop.simulator.lexium.motion.motor import Motor
+from multidrop.simulator.lexium.state.errors import Fault
+from multidrop.simulator.lexium.state.expressions import compile_condition, whole
+from multidrop.simulator.lexium.state.memory import Memory
+from multidrop.simulator.lexium.state.printer import Printer
+from multidrop.simulator.lexium.state.program_memory import Program
+from multidrop.simulator.lexium.state.ranges import within
+from multidrop.simulator.lexium.state.timeline import Timeline
 
 
 class Flow:

@@ -9,15 +9,15 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from dialects.mcode.manual.errors import ErrorNumber as E
-from dialects.mcode.manual.grammar import Number
-from simulator.lexium.language.interpreter import Interpreter
-from simulator.lexium.language.pausing import Pausing
-from simulator.lexium.motion.inputs import GO, JOG_MINUS, JOG_PLUS, PAUSE, RESET, SOFT_STOP, Inputs
-from simulator.lexium.motion.motor import Motor
-from simulator.lexium.state.error_flag import ErrorFlag
-from simulator.lexium.state.errors import Fault
-from simulator.lexium.state.timeline import Timeline
+from multidrop.dialects.mcode.manual.errors import ErrorNumber as E
+from multidrop.dialects.mcode.manual.grammar import Number
+from multidrop.simulator.lexium.language.interpreter import Interpreter
+from multidrop.simulator.lexium.language.pausing import Pausing
+from multidrop.simulator.lexium.motion.inputs import GO, JOG_MINUS, JOG_PLUS, PAUSE, RESET, SOFT_STOP, Inputs
+from multidrop.simulator.lexium.motion.motor import Motor
+from multidrop.simulator.lexium.state.error_flag import ErrorFlag
+from multidrop.simulator.lexium.state.errors import Fault
+from multidrop.simulator.lexium.state.timeline import Timeline
 
 JOGS = (JOG_PLUS, JOG_MINUS)
 GO_ADDRESS = Number(1)

@@ -11,21 +11,21 @@ from __future__ import annotations
 from collections.abc import Mapping
 from functools import partial
 
-from dialects.mcode.manual.errors import ErrorNumber as E
-from dialects.mcode.manual.grammar import Name, Statement
-from dialects.mcode.manual.table import Mnemonic
-from simulator.lexium.language.arguments import Compile, bare, is_place, only
-from simulator.lexium.language.flow import Flow
-from simulator.lexium.language.motor_commands import MotorCommands
-from simulator.lexium.language.prints import REGISTERS, Prints
-from simulator.lexium.language.program_commands import ProgramCommands
-from simulator.lexium.language.program_mode import Action, Storage
-from simulator.lexium.language.setups import Setups
-from simulator.lexium.language.variable_access import VariableAccess
-from simulator.lexium.state.errors import Fault
-from simulator.lexium.state.expressions import Read, whole, wrap
-from simulator.lexium.state.memory import Memory
-from simulator.lexium.state.program_memory import Program
+from multidrop.dialects.mcode.manual.errors import ErrorNumber as E
+from multidrop.dialects.mcode.manual.grammar import Name, Statement
+from multidrop.dialects.mcode.manual.table import Mnemonic
+from multidrop.simulator.lexium.language.arguments import Compile, bare, is_place, only
+from multidrop.simulator.lexium.language.flow import Flow
+from multidrop.simulator.lexium.language.motor_commands import MotorCommands
+from multidrop.simulator.lexium.language.prints import REGISTERS, Prints
+from multidrop.simulator.lexium.language.program_commands import ProgramCommands
+from multidrop.simulator.lexium.language.program_mode import Action, Storage
+from multidrop.simulator.lexium.language.setups import Setups
+from multidrop.simulator.lexium.language.variable_access import VariableAccess
+from multidrop.simulator.lexium.state.errors import Fault
+from multidrop.simulator.lexium.state.expressions import Read, whole, wrap
+from multidrop.simulator.lexium.state.memory import Memory
+from multidrop.simulator.lexium.state.program_memory import Program
 
 
 class Instructions:

@@ -13,16 +13,16 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Protocol
 
-from dialects.mcode.manual.errors import ErrorNumber as E
-from dialects.mcode.manual.grammar import Argument, Statement
-from simulator.lexium.language.program_mode import Action, LinkedProgram
-from simulator.lexium.language.thread import NORMAL, SILENT, STEPPED, TRACED, Frame, Thread
-from simulator.lexium.state.error_flag import ErrorFlag
-from simulator.lexium.state.errors import Fault
-from simulator.lexium.state.memory import Memory
-from simulator.lexium.state.printer import CRLF, Printer
-from simulator.lexium.state.program_memory import Program
-from simulator.lexium.state.timeline import Timeline
+from multidrop.dialects.mcode.manual.errors import ErrorNumber as E
+from multidrop.dialects.mcode.manual.grammar import Argument, Statement
+from multidrop.simulator.lexium.language.program_mode import Action, LinkedProgram
+from multidrop.simulator.lexium.language.thread import NORMAL, SILENT, STEPPED, TRACED, Frame, Thread
+from multidrop.simulator.lexium.state.error_flag import ErrorFlag
+from multidrop.simulator.lexium.state.errors import Fault
+from multidrop.simulator.lexium.state.memory import Memory
+from multidrop.simulator.lexium.state.printer import CRLF, Printer
+from multidrop.simulator.lexium.state.program_memory import Program
+from multidrop.simulator.lexium.state.timeline import Timeline
 
 
 class Observer(Protocol):

@@ -4,17 +4,17 @@ from __future__ import annotations
 
 from functools import partial
 
-from dialects.mcode.manual.errors import ErrorNumber as E
-from simulator.lexium.language.variable_access import Readers, Writers
-from simulator.lexium.motion.inputs import Inputs
-from simulator.lexium.motion.jog import Jog
-from simulator.lexium.motion.outputs import Outputs
-from simulator.lexium.motion.trips import BITS, Trips
-from simulator.lexium.state.errors import Fault
-from simulator.lexium.state.expressions import Value
-from simulator.lexium.state.memory import Memory
-from simulator.lexium.state.ranges import Ranges
-from simulator.lexium.state.timeline import Timeline
+from multidrop.dialects.mcode.manual.errors import ErrorNumber as E
+from multidrop.simulator.lexium.language.variable_access import Readers, Writers
+from multidrop.simulator.lexium.motion.inputs import Inputs
+from multidrop.simulator.lexium.motion.jog import Jog
+from multidrop.simulator.lexium.motion.outputs import Outputs
+from multidrop.simulator.lexium.motion.trips import BITS, Trips
+from multidrop.simulator.lexium.state.errors import Fault
+from multidrop.simulator.lexium.state.expressions import Value
+from multidrop.simulator.lexium.state.memory import Memory
+from multidrop.simulator.lexium.state.ranges import Ranges
+from multidrop.simulator.lexium.state.timeline import Timeline
 
 POINTS = (1, 2, 3, 4, 9, 10, 11, 12)
 """Inputs and outputs that bear a word each."""

@@ -6,14 +6,14 @@ from collections.abc import Mapping
 from functools import partial
 from math import inf
 
-from dialects.mcode.manual.errors import ErrorNumber as E
-from simulator.lexium.language.variable_access import Readers, Writers
-from simulator.lexium.motion.motor import Motor
-from simulator.lexium.state.errors import Fault
-from simulator.lexium.state.expressions import Value, whole
-from simulator.lexium.state.memory import BANKED, Memory
-from simulator.lexium.state.ranges import Ranges
-from simulator.lexium.state.timeline import Timeline
+from multidrop.dialects.mcode.manual.errors import ErrorNumber as E
+from multidrop.simulator.lexium.language.variable_access import Readers, Writers
+from multidrop.simulator.lexium.motion.motor import Motor
+from multidrop.simulator.lexium.state.errors import Fault
+from multidrop.simulator.lexium.state.expressions import Value, whole
+from multidrop.simulator.lexium.state.memory import BANKED, Memory
+from multidrop.simulator.lexium.state.ranges import Ranges
+from multidrop.simulator.lexium.state.timeline import Timeline
 
 LEAST_MS = 10
 """With hMT (manual 5.1.6)."""

@@ -9,16 +9,16 @@ from collections.abc import Mapping
 from functools import partial
 from math import inf
 
-from dialects.mcode.manual.errors import ErrorNumber as E
-from dialects.mcode.manual.grammar import Number, Statement
-from simulator.lexium.language.arguments import Compile, bare, numbers, only
-from simulator.lexium.language.program_mode import Action
-from simulator.lexium.language.variable_access import VariableAccess
-from simulator.lexium.motion.motor import Motor
-from simulator.lexium.state.errors import Fault
-from simulator.lexium.state.expressions import whole
-from simulator.lexium.state.memory import Memory
-from simulator.lexium.state.timeline import Timeline
+from multidrop.dialects.mcode.manual.errors import ErrorNumber as E
+from multidrop.dialects.mcode.manual.grammar import Number, Statement
+from multidrop.simulator.lexium.language.arguments import Compile, bare, numbers, only
+from multidrop.simulator.lexium.language.program_mode import Action
+from multidrop.simulator.lexium.language.variable_access import VariableAccess
+from multidrop.simulator.lexium.motion.motor import Motor
+from multidrop.simulator.lexium.state.errors import Fault
+from multidrop.simulator.lexium.state.expressions import whole
+from multidrop.simulator.lexium.state.memory import Memory
+from multidrop.simulator.lexium.state.timeline import Timeline
 
 
 class MotorCommands:

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from dialects.mcode.manual.errors import ErrorNumber as E
-from simulator.lexium.language.thread import Thread
-from simulator.lexium.motion.motor import Motor
-from simulator.lexium.state.errors import Fault
-from simulator.lexium.state.timeline import Timeline
+from multidrop.dialects.mcode.manual.errors import ErrorNumber as E
+from multidrop.simulator.lexium.language.thread import Thread
+from multidrop.simulator.lexium.motion.motor import Motor
+from multidrop.simulator.lexium.state.errors import Fault
+from multidrop.simulator.lexium.state.timeline import Timeline
 
 
 class Pausing:

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from dialects.mcode.manual.grammar import Name, Number
-from simulator.lexium.motion.inputs import Inputs
-from simulator.lexium.motion.limits import Limits
-from simulator.lexium.motion.outputs import Outputs
-from simulator.lexium.motion.trips import BITS, Trips
+from multidrop.dialects.mcode.manual.grammar import Name, Number
+from multidrop.simulator.lexium.motion.inputs import Inputs
+from multidrop.simulator.lexium.motion.limits import Limits
+from multidrop.simulator.lexium.motion.outputs import Outputs
+from multidrop.simulator.lexium.motion.trips import BITS, Trips
 
 PRINTED_INPUTS = (1, 2, 3, 4, 6)
 

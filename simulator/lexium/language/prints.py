@@ -9,21 +9,21 @@ import re
 from collections.abc import Callable, Iterator, Mapping
 from functools import partial
 
-from dialects.mcode.manual.errors import ErrorNumber as E
-from dialects.mcode.manual.grammar import Argument, Name, Number, Statement, Text
-from dialects.mcode.manual.table import MNEMONICS
-from simulator.lexium.language.printed_setups import PrintedSetups, fields
-from simulator.lexium.language.program_mode import Action
-from simulator.lexium.language.variable_access import VariableAccess
-from simulator.lexium.motion.motor import Motor
-from simulator.lexium.motion.trips import BITS
-from simulator.lexium.state.error_flag import ErrorFlag
-from simulator.lexium.state.errors import Fault
-from simulator.lexium.state.expressions import FLOATS, Value
-from simulator.lexium.state.memory import Memory, slot
-from simulator.lexium.state.printer import CRLF, Printer
-from simulator.lexium.state.program_memory import Program
-from simulator.lexium.state.timeline import Timeline
+from multidrop.dialects.mcode.manual.errors import ErrorNumber as E
+from multidrop.dialects.mcode.manual.grammar import Argument, Name, Number, Statement, Text
+from multidrop.dialects.mcode.manual.table import MNEMONICS
+from multidrop.simulator.lexium.language.printed_setups import PrintedSetups, fields
+from multidrop.simulator.lexium.language.program_mode import Action
+from multidrop.simulator.lexium.language.variable_access import VariableAccess
+from multidrop.simulator.lexium.motion.motor import Motor
+from multidrop.simulator.lexium.motion.trips import BITS
+from multidrop.simulator.lexium.state.error_flag import ErrorFlag
+from multidrop.simulator.lexium.state.errors import Fault
+from multidrop.simulator.lexium.state.expressions import FLOATS, Value
+from multidrop.simulator.lexium.state.memory import Memory, slot
+from multidrop.simulator.lexium.state.printer import CRLF, Printer
+from multidrop.simulator.lexium.state.program_memory import Program
+from multidrop.simulator.lexium.state.timeline import Timeline
 
 Item = Callable[[], str]
 Optional = Callable[[int], str]

@@ -7,19 +7,19 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from dialects.mcode.manual.errors import ErrorNumber as E
-from dialects.mcode.manual.grammar import Argument, Name, Number, Statement
-from simulator.lexium.language.arguments import Compile, is_place, pair
-from simulator.lexium.language.interpreter import Interpreter
-from simulator.lexium.language.program_mode import Action, ProgramMode, Storage
-from simulator.lexium.language.variable_access import VariableAccess
-from simulator.lexium.motion.motion_status import MotionStatus
-from simulator.lexium.state.errors import Fault
-from simulator.lexium.state.expressions import whole
-from simulator.lexium.state.memory import Memory
-from simulator.lexium.state.printer import CRLF, Printer
-from simulator.lexium.state.program_memory import FIRST, SPACE, Program
-from simulator.lexium.state.timeline import Timeline
+from multidrop.dialects.mcode.manual.errors import ErrorNumber as E
+from multidrop.dialects.mcode.manual.grammar import Argument, Name, Number, Statement
+from multidrop.simulator.lexium.language.arguments import Compile, is_place, pair
+from multidrop.simulator.lexium.language.interpreter import Interpreter
+from multidrop.simulator.lexium.language.program_mode import Action, ProgramMode, Storage
+from multidrop.simulator.lexium.language.variable_access import VariableAccess
+from multidrop.simulator.lexium.motion.motion_status import MotionStatus
+from multidrop.simulator.lexium.state.errors import Fault
+from multidrop.simulator.lexium.state.expressions import whole
+from multidrop.simulator.lexium.state.memory import Memory
+from multidrop.simulator.lexium.state.printer import CRLF, Printer
+from multidrop.simulator.lexium.state.program_memory import FIRST, SPACE, Program
+from multidrop.simulator.lexium.state.timeline import Timeline
 
 MOST_PASSES = 65535
 OPTIONS = (Number(0), Number(1))

@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Protocol
 
-from dialects.mcode.manual.errors import ErrorNumber as E
-from dialects.mcode.manual.grammar import Argument, Name, Statement, is_name
-from dialects.mcode.manual.table import lookup
-from simulator.lexium.state.errors import Fault
-from simulator.lexium.state.memory import TABLE_SIZE, Memory
-from simulator.lexium.state.program_memory import Program
+from multidrop.dialects.mcode.manual.errors import ErrorNumber as E
+from multidrop.dialects.mcode.manual.grammar import Argument, Name, Statement, is_name
+from multidrop.dialects.mcode.manual.table import lookup
+from multidrop.simulator.lexium.state.errors import Fault
+from multidrop.simulator.lexium.state.memory import TABLE_SIZE, Memory
+from multidrop.simulator.lexium.state.program_memory import Program
 
 # Program memory compiled to closures in a list; labels are no lines of it (they are marks and take no time).
 

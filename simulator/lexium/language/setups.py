@@ -8,24 +8,24 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from functools import partial
 
-from dialects.mcode.manual.device_name import device_name as device_name_of
-from dialects.mcode.manual.errors import ErrorNumber as E
-from dialects.mcode.manual.grammar import Argument, Number, Statement
-from dialects.mcode.manual.table import lookup
-from simulator.lexium.language.arguments import Compile, is_place, missing, numbers
-from simulator.lexium.language.input_functions import InputFunctions
-from simulator.lexium.language.program_mode import Action
-from simulator.lexium.language.variable_access import VariableAccess
-from simulator.lexium.motion.inputs import ANALOG, Inputs
-from simulator.lexium.motion.motor import Motor
-from simulator.lexium.motion.outputs import Outputs
-from simulator.lexium.motion.trips import BITS
-from simulator.lexium.state.errors import Fault
-from simulator.lexium.state.expressions import whole
-from simulator.lexium.state.memory import Memory
-from simulator.lexium.state.program_memory import Program
-from simulator.lexium.state.timeline import Timeline
-from simulator.lexium.state.trip import Trip
+from multidrop.dialects.mcode.manual.device_name import device_name as device_name_of
+from multidrop.dialects.mcode.manual.errors import ErrorNumber as E
+from multidrop.dialects.mcode.manual.grammar import Argument, Number, Statement
+from multidrop.dialects.mcode.manual.table import lookup
+from multidrop.simulator.lexium.language.arguments import Compile, is_place, missing, numbers
+from multidrop.simulator.lexium.language.input_functions import InputFunctions
+from multidrop.simulator.lexium.language.program_mode import Action
+from multidrop.simulator.lexium.language.variable_access import VariableAccess
+from multidrop.simulator.lexium.motion.inputs import ANALOG, Inputs
+from multidrop.simulator.lexium.motion.motor import Motor
+from multidrop.simulator.lexium.motion.outputs import Outputs
+from multidrop.simulator.lexium.motion.trips import BITS
+from multidrop.simulator.lexium.state.errors import Fault
+from multidrop.simulator.lexium.state.expressions import whole
+from multidrop.simulator.lexium.state.memory import Memory
+from multidrop.simulator.lexium.state.program_memory import Program
+from multidrop.simulator.lexium.state.timeline import Timeline
+from multidrop.simulator.lexium.state.trip import Trip
 
 FIRST_INPUT = 1
 MOST_REPEATS = 65000

@@ -11,9 +11,9 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from math import inf
 
-from dialects.mcode.manual.errors import ErrorNumber as E
-from simulator.lexium.state.errors import Fault
-from simulator.lexium.state.timeline import Timeline
+from multidrop.dialects.mcode.manual.errors import ErrorNumber as E
+from multidrop.simulator.lexium.state.errors import Fault
+from multidrop.simulator.lexium.state.timeline import Timeline
 
 STACK_DEPTH = 10
 """How deep subroutines may be nested (of the maker's older drives; the manual does not say)."""

@@ -11,15 +11,15 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from functools import partial
 
-from dialects.mcode.manual.errors import ErrorNumber as E
-from dialects.mcode.manual.grammar import Argument, Compare, Text
-from dialects.mcode.manual.table import Mnemonic
-from simulator.lexium.state.errors import Fault
-from simulator.lexium.state.expressions import PI, Read, Value, compile_value, compile_whole, whole
-from simulator.lexium.state.memory import Memory, slot
-from simulator.lexium.state.program_memory import Program
-from simulator.lexium.state.ranges import Ranges, within
-from simulator.lexium.state.timeline import Timeline
+from multidrop.dialects.mcode.manual.errors import ErrorNumber as E
+from multidrop.dialects.mcode.manual.grammar import Argument, Compare, Text
+from multidrop.dialects.mcode.manual.table import Mnemonic
+from multidrop.simulator.lexium.state.errors import Fault
+from multidrop.simulator.lexium.state.expressions import PI, Read, Value, compile_value, compile_whole, whole
+from multidrop.simulator.lexium.state.memory import Memory, slot
+from multidrop.simulator.lexium.state.program_memory import Program
+from multidrop.simulator.lexium.state.ranges import Ranges, within
+from multidrop.simulator.lexium.state.timeline import Timeline
 
 Write = Callable[[Value], None]
 Readers = Mapping[str, Read]

@@ -11,16 +11,16 @@ from collections.abc import Callable, Mapping
 from math import floor, inf
 from typing import Protocol, TypedDict
 
-from dialects.mcode.manual.errors import ErrorNumber as E
-from simulator.kinematics.profile import Profile, halt, move, slew
-from simulator.kinematics.segments import LINEAR, Shape
-from simulator.lexium.motion.bridges import Bridges
-from simulator.lexium.motion.counters import Counters
-from simulator.lexium.motion.rotor import Rotor
-from simulator.lexium.motion.units import Units
-from simulator.lexium.state.errors import Fault
-from simulator.lexium.state.expressions import Value
-from simulator.lexium.state.memory import Memory
+from multidrop.dialects.mcode.manual.errors import ErrorNumber as E
+from multidrop.simulator.kinematics.profile import Profile, halt, move, slew
+from multidrop.simulator.kinematics.segments import LINEAR, Shape
+from multidrop.simulator.lexium.motion.bridges import Bridges
+from multidrop.simulator.lexium.motion.counters import Counters
+from multidrop.simulator.lexium.motion.rotor import Rotor
+from multidrop.simulator.lexium.motion.units import Units
+from multidrop.simulator.lexium.state.errors import Fault
+from multidrop.simulator.lexium.state.expressions import Value
+from multidrop.simulator.lexium.state.memory import Memory
 
 # Ramps: how the velocity changes, from VI, A, D and the S-curves (manual 5.1.7, 5.1.9, 5.1.27, 5.1.30).
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from dialects.mcode.manual.errors import ErrorNumber as E
-from simulator.lexium.state.errors import Fault
-from simulator.lexium.state.expressions import Value
+from multidrop.dialects.mcode.manual.errors import ErrorNumber as E
+from multidrop.simulator.lexium.state.errors import Fault
+from multidrop.simulator.lexium.state.expressions import Value
 
 
 class Bridges:

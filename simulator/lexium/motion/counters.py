@@ -8,11 +8,11 @@ from __future__ import annotations
 
 from math import floor, inf
 
-from simulator.kinematics.profile import Profile
-from simulator.lexium.motion.rotor import Rotor
-from simulator.lexium.motion.units import Units
-from simulator.lexium.state.expressions import wrap
-from simulator.lexium.state.memory import Memory
+from multidrop.simulator.kinematics.profile import Profile
+from multidrop.simulator.lexium.motion.rotor import Rotor
+from multidrop.simulator.lexium.motion.units import Units
+from multidrop.simulator.lexium.state.expressions import wrap
+from multidrop.simulator.lexium.state.memory import Memory
 
 TURNOVER = 2**32
 """From one end of a counter to the same again."""

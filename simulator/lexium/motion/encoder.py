@@ -12,15 +12,15 @@ from __future__ import annotations
 from collections.abc import Callable
 from math import inf
 
-from dialects.mcode.manual.errors import ErrorNumber as E
-from simulator.lexium.motion.axis import CORRECTION, MOVES, Axis
-from simulator.lexium.motion.bridges import Bridges
-from simulator.lexium.motion.limits import Limits
-from simulator.lexium.motion.program_control import ProgramControl
-from simulator.lexium.motion.rotor import FOLLOWING
-from simulator.lexium.motion.units import Units
-from simulator.lexium.state.memory import Memory
-from simulator.lexium.state.timeline import Event, Timeline, when
+from multidrop.dialects.mcode.manual.errors import ErrorNumber as E
+from multidrop.simulator.lexium.motion.axis import CORRECTION, MOVES, Axis
+from multidrop.simulator.lexium.motion.bridges import Bridges
+from multidrop.simulator.lexium.motion.limits import Limits
+from multidrop.simulator.lexium.motion.program_control import ProgramControl
+from multidrop.simulator.lexium.motion.rotor import FOLLOWING
+from multidrop.simulator.lexium.motion.units import Units
+from multidrop.simulator.lexium.state.memory import Memory
+from multidrop.simulator.lexium.state.timeline import Event, Timeline, when
 
 TOUCH = 1e-3
 """Steps that are rounding."""

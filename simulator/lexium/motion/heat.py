@@ -13,14 +13,14 @@ from __future__ import annotations
 from collections.abc import Callable
 from math import exp, inf, log
 
-from dialects.mcode.manual.errors import ErrorNumber as E
-from simulator.lexium.motion.bridges import Bridges
-from simulator.lexium.motion.motion_status import MotionStatus
-from simulator.lexium.motion.program_control import ProgramControl
-from simulator.lexium.motion.torque import VARIABLE, Torque
-from simulator.lexium.state.memory import Memory
-from simulator.lexium.state.timeline import Event, nothing, when
-from simulator.world import World
+from multidrop.dialects.mcode.manual.errors import ErrorNumber as E
+from multidrop.simulator.lexium.motion.bridges import Bridges
+from multidrop.simulator.lexium.motion.motion_status import MotionStatus
+from multidrop.simulator.lexium.motion.program_control import ProgramControl
+from multidrop.simulator.lexium.motion.torque import VARIABLE, Torque
+from multidrop.simulator.lexium.state.memory import Memory
+from multidrop.simulator.lexium.state.timeline import Event, nothing, when
+from multidrop.simulator.world import World
 
 AMBIENT, RISE, TIME_CONSTANT = 35.0, 25.0, 300.0
 HOTTEST = 85.0

@@ -16,21 +16,21 @@ from __future__ import annotations
 from collections.abc import Callable
 from math import inf
 
-from dialects.mcode.manual.errors import ErrorNumber as E
-from simulator.kinematics.profile import meeting
-from simulator.lexium.motion.axis import MOVES, TORQUE, Axis
-from simulator.lexium.motion.bridges import Bridges
-from simulator.lexium.motion.motion_status import MotionStatus
-from simulator.lexium.motion.program_control import ProgramControl
-from simulator.lexium.motion.rotor import FOLLOWING, STANDING
-from simulator.lexium.motion.scale import Scale
-from simulator.lexium.motion.torque import FIXED, TORQUE_MODE, VARIABLE, Torque
-from simulator.lexium.motion.trips import Trips
-from simulator.lexium.motion.units import Units
-from simulator.lexium.motion.world_frame import TOUCH
-from simulator.lexium.state.errors import Fault
-from simulator.lexium.state.memory import Memory
-from simulator.lexium.state.timeline import Event, Timeline, nothing, when
+from multidrop.dialects.mcode.manual.errors import ErrorNumber as E
+from multidrop.simulator.kinematics.profile import meeting
+from multidrop.simulator.lexium.motion.axis import MOVES, TORQUE, Axis
+from multidrop.simulator.lexium.motion.bridges import Bridges
+from multidrop.simulator.lexium.motion.motion_status import MotionStatus
+from multidrop.simulator.lexium.motion.program_control import ProgramControl
+from multidrop.simulator.lexium.motion.rotor import FOLLOWING, STANDING
+from multidrop.simulator.lexium.motion.scale import Scale
+from multidrop.simulator.lexium.motion.torque import FIXED, TORQUE_MODE, VARIABLE, Torque
+from multidrop.simulator.lexium.motion.trips import Trips
+from multidrop.simulator.lexium.motion.units import Units
+from multidrop.simulator.lexium.motion.world_frame import TOUCH
+from multidrop.simulator.lexium.state.errors import Fault
+from multidrop.simulator.lexium.state.memory import Memory
+from multidrop.simulator.lexium.state.timeline import Event, Timeline, nothing, when
 
 CALIBRATION = 0.02
 """s."""

@@ -14,20 +14,20 @@ from __future__ import annotations
 from collections.abc import Callable
 from math import inf
 
-from dialects.mcode.manual.errors import ErrorNumber as E
-from simulator.kinematics.profile import slew
-from simulator.kinematics.segments import Shape
-from simulator.lexium.motion.axis import HOMING, TORQUE, Axis
-from simulator.lexium.motion.bridges import Bridges
-from simulator.lexium.motion.inputs import HOME, Inputs
-from simulator.lexium.motion.limits import DIRECTIONS, ERRORS, Limits
-from simulator.lexium.motion.motion_status import MotionStatus
-from simulator.lexium.motion.program_control import ProgramControl
-from simulator.lexium.motion.units import Units
-from simulator.lexium.motion.world_frame import TOUCH
-from simulator.lexium.state.errors import Fault
-from simulator.lexium.state.memory import Memory
-from simulator.lexium.state.timeline import Event, Timeline
+from multidrop.dialects.mcode.manual.errors import ErrorNumber as E
+from multidrop.simulator.kinematics.profile import slew
+from multidrop.simulator.kinematics.segments import Shape
+from multidrop.simulator.lexium.motion.axis import HOMING, TORQUE, Axis
+from multidrop.simulator.lexium.motion.bridges import Bridges
+from multidrop.simulator.lexium.motion.inputs import HOME, Inputs
+from multidrop.simulator.lexium.motion.limits import DIRECTIONS, ERRORS, Limits
+from multidrop.simulator.lexium.motion.motion_status import MotionStatus
+from multidrop.simulator.lexium.motion.program_control import ProgramControl
+from multidrop.simulator.lexium.motion.units import Units
+from multidrop.simulator.lexium.motion.world_frame import TOUCH
+from multidrop.simulator.lexium.state.errors import Fault
+from multidrop.simulator.lexium.state.memory import Memory
+from multidrop.simulator.lexium.state.timeline import Event, Timeline
 
 SEEK, BRAKE, TURN, APPROACH = "seek", "brake", "turn", "approach"
 TYPES = {1: (-1, 1), 2: (-1, -1), 3: (1, -1), 4: (1, 1)}

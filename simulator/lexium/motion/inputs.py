@@ -12,12 +12,12 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from math import inf
 
-from dialects.mcode.manual.errors import ErrorNumber as E
-from simulator.lexium.motion.rotor import Rotor
-from simulator.lexium.state.errors import Fault
-from simulator.lexium.state.memory import Memory
-from simulator.lexium.state.models import STEP_DIRECTION, UP_DOWN
-from simulator.world import World
+from multidrop.dialects.mcode.manual.errors import ErrorNumber as E
+from multidrop.simulator.lexium.motion.rotor import Rotor
+from multidrop.simulator.lexium.state.errors import Fault
+from multidrop.simulator.lexium.state.memory import Memory
+from multidrop.simulator.lexium.state.models import STEP_DIRECTION, UP_DOWN
+from multidrop.simulator.world import World
 
 GENERAL, HOME, PLUS, MINUS, GO, SOFT_STOP, PAUSE, JOG_PLUS, JOG_MINUS, RESET = 0, 1, 2, 3, 4, 5, 6, 7, 8, 11
 """Types of inputs; those of clocks and captures differ between products."""

@@ -6,14 +6,14 @@ cancel each other.
 
 from __future__ import annotations
 
-from dialects.mcode.manual.errors import JOG_IN_CLOCK_MODE
-from simulator.lexium.motion.axis import SLEW, Axis
-from simulator.lexium.motion.inputs import JOG_MINUS, JOG_PLUS, Inputs
-from simulator.lexium.motion.motion_status import MotionStatus
-from simulator.lexium.motion.program_control import ProgramControl
-from simulator.lexium.state.errors import Fault
-from simulator.lexium.state.memory import Memory
-from simulator.lexium.state.timeline import Timeline
+from multidrop.dialects.mcode.manual.errors import JOG_IN_CLOCK_MODE
+from multidrop.simulator.lexium.motion.axis import SLEW, Axis
+from multidrop.simulator.lexium.motion.inputs import JOG_MINUS, JOG_PLUS, Inputs
+from multidrop.simulator.lexium.motion.motion_status import MotionStatus
+from multidrop.simulator.lexium.motion.program_control import ProgramControl
+from multidrop.simulator.lexium.state.errors import Fault
+from multidrop.simulator.lexium.state.memory import Memory
+from multidrop.simulator.lexium.state.timeline import Timeline
 
 
 class Jog:

@@ -8,10 +8,10 @@ from __future__ import annotations
 
 from math import inf, nextafter
 
-from dialects.mcode.manual.errors import ErrorNumber as E
-from simulator.lexium.motion.counters import Counters
-from simulator.lexium.motion.inputs import MINUS, PLUS
-from simulator.lexium.motion.world_frame import TOUCH
+from multidrop.dialects.mcode.manual.errors import ErrorNumber as E
+from multidrop.simulator.lexium.motion.counters import Counters
+from multidrop.simulator.lexium.motion.inputs import MINUS, PLUS
+from multidrop.simulator.lexium.motion.world_frame import TOUCH
 
 DIRECTIONS = {PLUS: 1, MINUS: -1}
 """Types of the limit switches, and their directions."""

@@ -7,10 +7,10 @@ from __future__ import annotations
 
 from math import inf
 
-from simulator.lexium.motion.axis import CORRECTION, MOVES, TORQUE, Axis, Supervisor
-from simulator.lexium.motion.rotor import CATCHING
-from simulator.lexium.motion.units import Units
-from simulator.lexium.state.memory import Memory
+from multidrop.simulator.lexium.motion.axis import CORRECTION, MOVES, TORQUE, Axis, Supervisor
+from multidrop.simulator.lexium.motion.rotor import CATCHING
+from multidrop.simulator.lexium.motion.units import Units
+from multidrop.simulator.lexium.state.memory import Memory
 
 
 class MotionStatus:

@@ -9,29 +9,29 @@ from __future__ import annotations
 from collections.abc import Callable
 from math import inf
 
-from dialects.mcode.manual.errors import ErrorNumber as E
-from simulator.kinematics.profile import move
-from simulator.lexium.motion.axis import HOMING, Axis
-from simulator.lexium.motion.bridges import Bridges
-from simulator.lexium.motion.counters import Counters
-from simulator.lexium.motion.encoder import Encoder
-from simulator.lexium.motion.heat import Heat
-from simulator.lexium.motion.hmt import Hmt
-from simulator.lexium.motion.homing import Homing, LimitStop
-from simulator.lexium.motion.inputs import HOME, ClockInputs, Inputs
-from simulator.lexium.motion.jog import Jog
-from simulator.lexium.motion.limits import DIRECTIONS, Limits
-from simulator.lexium.motion.motion_status import MotionStatus
-from simulator.lexium.motion.program_control import ProgramControl
-from simulator.lexium.motion.rotor import Rotor
-from simulator.lexium.motion.scale import Scale
-from simulator.lexium.motion.torque import Torque
-from simulator.lexium.motion.trips import Trips
-from simulator.lexium.motion.units import Units
-from simulator.lexium.state.errors import Fault
-from simulator.lexium.state.memory import Memory
-from simulator.lexium.state.timeline import Event, Timeline, when
-from simulator.world import World
+from multidrop.dialects.mcode.manual.errors import ErrorNumber as E
+from multidrop.simulator.kinematics.profile import move
+from multidrop.simulator.lexium.motion.axis import HOMING, Axis
+from multidrop.simulator.lexium.motion.bridges import Bridges
+from multidrop.simulator.lexium.motion.counters import Counters
+from multidrop.simulator.lexium.motion.encoder import Encoder
+from multidrop.simulator.lexium.motion.heat import Heat
+from multidrop.simulator.lexium.motion.hmt import Hmt
+from multidrop.simulator.lexium.motion.homing import Homing, LimitStop
+from multidrop.simulator.lexium.motion.inputs import HOME, ClockInputs, Inputs
+from multidrop.simulator.lexium.motion.jog import Jog
+from multidrop.simulator.lexium.motion.limits import DIRECTIONS, Limits
+from multidrop.simulator.lexium.motion.motion_status import MotionStatus
+from multidrop.simulator.lexium.motion.program_control import ProgramControl
+from multidrop.simulator.lexium.motion.rotor import Rotor
+from multidrop.simulator.lexium.motion.scale import Scale
+from multidrop.simulator.lexium.motion.torque import Torque
+from multidrop.simulator.lexium.motion.trips import Trips
+from multidrop.simulator.lexium.motion.units import Units
+from multidrop.simulator.lexium.state.errors import Fault
+from multidrop.simulator.lexium.state.memory import Memory
+from multidrop.simulator.lexium.state.timeline import Event, Timeline, when
+from multidrop.simulator.world import World
 
 # The configuration test (SC): half a turn, to see what the encoder makes of it. Manual 5.1.115.
 

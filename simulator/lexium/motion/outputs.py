@@ -12,13 +12,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 
-from dialects.mcode.manual.errors import ErrorNumber as E
-from simulator.lexium.motion.hmt import HYBRID, LAG, LEAD, MOST
-from simulator.lexium.motion.motor import Motor
-from simulator.lexium.motion.torque import FIXED, VARIABLE
-from simulator.lexium.state.errors import Fault
-from simulator.lexium.state.memory import Memory
-from simulator.lexium.state.timeline import Timeline
+from multidrop.dialects.mcode.manual.errors import ErrorNumber as E
+from multidrop.simulator.lexium.motion.hmt import HYBRID, LAG, LEAD, MOST
+from multidrop.simulator.lexium.motion.motor import Motor
+from multidrop.simulator.lexium.motion.torque import FIXED, VARIABLE
+from multidrop.simulator.lexium.state.errors import Fault
+from multidrop.simulator.lexium.state.memory import Memory
+from multidrop.simulator.lexium.state.timeline import Timeline
 
 GENERAL, MOVING, ERROR, STALL, CHANGING, LOCKED_ROTOR, POSITIONING = 16, 17, 18, 19, 20, 21, 23
 HMT_ACTIVE, MAKING_UP, COUNT_A, COUNT_B, TRIP, ATTENTION, POINT_TRIP = 24, 25, 26, 27, 28, 29, 61

@@ -16,11 +16,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 from math import copysign, inf
 
-from simulator.kinematics.profile import Profile, halt, meeting, move, slew
-from simulator.lexium.motion.world_frame import TOUCH, WorldFrame
-from simulator.lexium.state.expressions import Value
-from simulator.lexium.state.timeline import Event, nothing, when
-from simulator.world import World
+from multidrop.simulator.kinematics.profile import Profile, halt, meeting, move, slew
+from multidrop.simulator.lexium.motion.world_frame import TOUCH, WorldFrame
+from multidrop.simulator.lexium.state.expressions import Value
+from multidrop.simulator.lexium.state.timeline import Event, nothing, when
+from multidrop.simulator.world import World
 
 FOLLOWING, STANDING, CATCHING = "following", "standing", "catching"
 WALL, HAND = "wall", "hand"

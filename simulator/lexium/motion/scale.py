@@ -7,10 +7,10 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from simulator.lexium.motion.axis import Axis
-from simulator.lexium.motion.counters import Counters
-from simulator.lexium.motion.units import Units
-from simulator.lexium.state.memory import Memory
+from multidrop.simulator.lexium.motion.axis import Axis
+from multidrop.simulator.lexium.motion.counters import Counters
+from multidrop.simulator.lexium.motion.units import Units
+from multidrop.simulator.lexium.state.memory import Memory
 
 
 class Scale:

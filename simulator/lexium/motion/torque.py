@@ -7,13 +7,13 @@ from __future__ import annotations
 
 from math import inf
 
-from simulator.kinematics.profile import halt
-from simulator.lexium.motion.axis import TORQUE, Axis
-from simulator.lexium.motion.bridges import Bridges
-from simulator.lexium.motion.limits import Limits
-from simulator.lexium.state.memory import Memory
-from simulator.lexium.state.timeline import Timeline
-from simulator.world import World
+from multidrop.simulator.kinematics.profile import halt
+from multidrop.simulator.lexium.motion.axis import TORQUE, Axis
+from multidrop.simulator.lexium.motion.bridges import Bridges
+from multidrop.simulator.lexium.motion.limits import Limits
+from multidrop.simulator.lexium.state.memory import Memory
+from multidrop.simulator.lexium.state.timeline import Timeline
+from multidrop.simulator.world import World
 
 FIXED, VARIABLE, TORQUE_MODE = 1, 2, 3
 """Values of AS."""

@@ -8,15 +8,15 @@ from __future__ import annotations
 from collections.abc import Mapping
 from math import inf
 
-from dialects.mcode.manual.errors import ErrorNumber as E
-from simulator.lexium.motion.counters import Counters
-from simulator.lexium.motion.inputs import Inputs
-from simulator.lexium.motion.program_control import ProgramControl
-from simulator.lexium.motion.units import Units
-from simulator.lexium.state.errors import Fault
-from simulator.lexium.state.memory import Memory
-from simulator.lexium.state.timeline import Timeline
-from simulator.lexium.state.trip import Trip
+from multidrop.dialects.mcode.manual.errors import ErrorNumber as E
+from multidrop.simulator.lexium.motion.counters import Counters
+from multidrop.simulator.lexium.motion.inputs import Inputs
+from multidrop.simulator.lexium.motion.program_control import ProgramControl
+from multidrop.simulator.lexium.motion.units import Units
+from multidrop.simulator.lexium.state.errors import Fault
+from multidrop.simulator.lexium.state.memory import Memory
+from multidrop.simulator.lexium.state.timeline import Timeline
+from multidrop.simulator.lexium.state.trip import Trip
 
 INPUT, POSITION, CAPTURE, TIME, RELATIVE, HMT, POWER = 1, 2, 4, 8, 16, 32, 64
 BITS: Mapping[str, int] = {

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from simulator.lexium.state.memory import Memory
+from multidrop.simulator.lexium.state.memory import Memory
 
 STATOR_BOUNDS = (1.1, 1.3, 1.5, 1.7)
 """Full steps between rotor and stator, by CB (manual 5.1.18)."""

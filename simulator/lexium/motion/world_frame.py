@@ -7,8 +7,8 @@ from __future__ import annotations
 
 from math import copysign, floor, inf
 
-from simulator.kinematics.profile import Profile
-from simulator.world import REVOLUTION, World
+from multidrop.simulator.kinematics.profile import Profile
+from multidrop.simulator.world import REVOLUTION, World
 
 TOUCH = 1e-6
 """Steps that are rounding."""

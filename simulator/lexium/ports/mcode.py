@@ -32,7 +32,7 @@ There is no clock: bytes and times come in, bytes with times go out. Times are s
 
 from __future__ import annotations
 
-from simulator.lexium.ports.received import (
+from multidrop.simulator.lexium.ports.received import (
     ADDRESSES,
     CR,
     CTRL_C,
@@ -48,10 +48,10 @@ from simulator.lexium.ports.received import (
     Line,
     Overheard,
 )
-from simulator.lexium.ports.replier import Device, Replier
-from simulator.lexium.ports.replies import Mode
-from simulator.lexium.ports.transmitter import Transmitter
-from simulator.wire.wire import Transmission
+from multidrop.simulator.lexium.ports.replier import Device, Replier
+from multidrop.simulator.lexium.ports.replies import Mode
+from multidrop.simulator.lexium.ports.transmitter import Transmitter
+from multidrop.simulator.wire.wire import Transmission
 
 STEP_KEYS = {0x20: " ", CR: "\r"}
 MOST_WAITING = 64

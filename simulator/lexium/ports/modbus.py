@@ -17,7 +17,14 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from struct import pack, unpack
 
-from simulator.lexium.ports.registers import ILLEGAL_ADDRESS, ILLEGAL_VALUE, MOST_REGISTERS, Drive, Refusal, Registers
+from multidrop.simulator.lexium.ports.registers import (
+    ILLEGAL_ADDRESS,
+    ILLEGAL_VALUE,
+    MOST_REGISTERS,
+    Drive,
+    Refusal,
+    Registers,
+)
 
 HEADER = 6
 """Bytes before those that the length counts."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 
-from simulator.lexium.ports.replies import Mode
+from multidrop.simulator.lexium.ports.replies import Mode
 
 CR, LF, ESC, CTRL_C, CTRL_E = 0x0D, 0x0A, 0x1B, 0x03, 0x05
 KEYS = frozenset({CR, LF, ESC, CTRL_C, CTRL_E})

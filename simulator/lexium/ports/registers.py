@@ -22,14 +22,14 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from typing import Protocol
 
-from dialects.mcode.manual.grammar import Name, Number
-from dialects.modbus.manual.registers import AT, REGISTERS, Register
-from simulator.lexium.motion.inputs import Inputs
-from simulator.lexium.motion.torque import Torque
-from simulator.lexium.motion.trips import HMT, RELATIVE, Trips
-from simulator.lexium.ports.replier import Answer
-from simulator.lexium.state.error_flag import ErrorFlag
-from simulator.lexium.state.program_memory import Program
+from multidrop.dialects.mcode.manual.grammar import Name, Number
+from multidrop.dialects.modbus.manual.registers import AT, REGISTERS, Register
+from multidrop.simulator.lexium.motion.inputs import Inputs
+from multidrop.simulator.lexium.motion.torque import Torque
+from multidrop.simulator.lexium.motion.trips import HMT, RELATIVE, Trips
+from multidrop.simulator.lexium.ports.replier import Answer
+from multidrop.simulator.lexium.state.error_flag import ErrorFlag
+from multidrop.simulator.lexium.state.program_memory import Program
 
 ILLEGAL_ADDRESS, ILLEGAL_VALUE, FAILURE = 2, 3, 4
 VALUE_ERRORS = frozenset({21, 22, 23, 76, 77})

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Protocol
 
-from dialects.mcode.manual.errors import ErrorNumber
-from simulator.lexium.ports.received import Line
-from simulator.lexium.ports.replies import CRLF, Mode, Outcome, Typed, compose, split
-from simulator.lexium.ports.transmitter import Transmitter
+from multidrop.dialects.mcode.manual.errors import ErrorNumber
+from multidrop.simulator.lexium.ports.received import Line
+from multidrop.simulator.lexium.ports.replies import CRLF, Mode, Outcome, Typed, compose, split
+from multidrop.simulator.lexium.ports.transmitter import Transmitter
 
 BUFFER_ERROR = ErrorNumber.UNKNOWN_VARIABLE
 BUFFER_FULL = ErrorNumber.TRANSMIT_BUFFER_FULL

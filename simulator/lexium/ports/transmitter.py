@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from simulator.lexium.ports.replies import PrintSeal
-from simulator.wire.baud import BITS_A_BYTE
-from simulator.wire.wire import Transmission
+from multidrop.simulator.lexium.ports.replies import PrintSeal
+from multidrop.simulator.wire.baud import BITS_A_BYTE
+from multidrop.simulator.wire.wire import Transmission
 
 TRANSMIT_BUFFER = 256
 """Bytes that wait to be sent when a program's next print is lost (the manual names the error, not the size)."""

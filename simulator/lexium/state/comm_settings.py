@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from simulator.lexium.state.memory import Memory
+from multidrop.simulator.lexium.state.memory import Memory
 
 
 class CommSettings:

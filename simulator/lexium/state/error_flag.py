@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, MutableMapping
 
-from simulator.lexium.state.errors import Failure
-from simulator.lexium.state.expressions import Value
-from simulator.lexium.state.timeline import Timeline
+from multidrop.simulator.lexium.state.errors import Failure
+from multidrop.simulator.lexium.state.expressions import Value
+from multidrop.simulator.lexium.state.timeline import Timeline
 
 
 class ErrorFlag:

@@ -12,10 +12,10 @@ import operator
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
-from dialects.mcode.manual.conditions import compares
-from dialects.mcode.manual.errors import ErrorNumber as E
-from dialects.mcode.manual.grammar import FUNCTIONS, Binary, Compare, Expression, Name, Number, Unary
-from simulator.lexium.state.errors import Fault
+from multidrop.dialects.mcode.manual.conditions import compares
+from multidrop.dialects.mcode.manual.errors import ErrorNumber as E
+from multidrop.dialects.mcode.manual.grammar import FUNCTIONS, Binary, Compare, Expression, Name, Number, Unary
+from multidrop.simulator.lexium.state.errors import Fault
 
 Value = int | float
 Read = Callable[[], Value]

@@ -6,11 +6,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import lru_cache
 
-from dialects.mcode.manual.table import Mnemonic, lookup, words
-from simulator.lexium.state.expressions import Value
-from simulator.lexium.state.models import MODELS
-from simulator.lexium.state.program_memory import Program
-from simulator.lexium.state.trip import Trip
+from multidrop.dialects.mcode.manual.table import Mnemonic, lookup, words
+from multidrop.simulator.lexium.state.expressions import Value
+from multidrop.simulator.lexium.state.models import MODELS
+from multidrop.simulator.lexium.state.program_memory import Program
+from multidrop.simulator.lexium.state.trip import Trip
 
 TABLE_SIZE = 192
 """Labels and user variables together (manual 3.3.1)."""

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from simulator.lexium.state.timeline import Timeline
+from multidrop.simulator.lexium.state.timeline import Timeline
 
 CRLF = "\r\n"
 BITS_A_BYTE, TRANSMIT_BUFFER = 10, 256

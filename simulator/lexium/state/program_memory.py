@@ -9,11 +9,11 @@ from bisect import bisect_left, insort
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
-from dialects.mcode.manual.errors import ErrorNumber as E
-from dialects.mcode.manual.grammar import Argument, Compare, Name, Number, Statement
-from dialects.mcode.manual.line_size import size_of
-from dialects.mcode.manual.table import lookup
-from simulator.lexium.state.errors import Fault
+from multidrop.dialects.mcode.manual.errors import ErrorNumber as E
+from multidrop.dialects.mcode.manual.grammar import Argument, Compare, Name, Number, Statement
+from multidrop.dialects.mcode.manual.line_size import size_of
+from multidrop.dialects.mcode.manual.table import lookup
+from multidrop.simulator.lexium.state.errors import Fault
 
 FIRST, SPACE = 1, 6384
 """The lowest address, and the size of program memory in bytes (that of the maker's older drives)."""

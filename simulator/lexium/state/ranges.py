@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from functools import lru_cache
 
-from dialects.mcode.manual.errors import ErrorNumber as E
-from dialects.mcode.manual.table import Mnemonic, lookup
-from simulator.lexium.state.errors import Fault
-from simulator.lexium.state.expressions import Value, whole
-from simulator.lexium.state.memory import Memory
+from multidrop.dialects.mcode.manual.errors import ErrorNumber as E
+from multidrop.dialects.mcode.manual.table import Mnemonic, lookup
+from multidrop.simulator.lexium.state.errors import Fault
+from multidrop.simulator.lexium.state.expressions import Value, whole
+from multidrop.simulator.lexium.state.memory import Memory
 
 
 @lru_cache(maxsize=4096)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from dialects.mcode.manual.grammar import Argument
+from multidrop.dialects.mcode.manual.grammar import Argument
 
 
 class Trip(NamedTuple):

@@ -2,11 +2,11 @@
 
 import pytest
 
-from dialects import End, Kind, NoAnswer, Reply
-from dialects.mcode.family import MCODE
-from dialects.mcode.host.checksum import sealed
-from dialects.mcode.host.codec import MCode
-from dialects.mcode.host.state import MCodeState
+from multidrop.dialects import End, Kind, NoAnswer, Reply
+from multidrop.dialects.mcode.family import MCODE
+from multidrop.dialects.mcode.host.checksum import sealed
+from multidrop.dialects.mcode.host.codec import MCode
+from multidrop.dialects.mcode.host.state import MCodeState
 from tests.support.cases import for_each
 from tests.support.mcode_drives import MODES, Desk
 

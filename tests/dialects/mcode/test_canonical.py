@@ -6,10 +6,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dialects.mcode.manual.canonical import canonical
-from dialects.mcode.manual.grammar import LineError, Statement, parse
-from dialects.mcode.manual.line_size import size_of
-from dialects.mcode.manual.table import MDRIVE, MNEMONICS
+from multidrop.dialects.mcode.manual.canonical import canonical
+from multidrop.dialects.mcode.manual.grammar import LineError, Statement, parse
+from multidrop.dialects.mcode.manual.line_size import size_of
+from multidrop.dialects.mcode.manual.table import MDRIVE, MNEMONICS
 from tests.support.cases import for_each
 
 NAMES = frozenset({"Q1", "K1", "GA", "AO"})

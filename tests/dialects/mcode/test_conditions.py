@@ -8,13 +8,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dialects.mcode.manual import help
-from dialects.mcode.manual.conditions import condition_of, is_mixed, reading
-from dialects.mcode.manual.grammar import parse
-from dialects.mcode.manual.program_checker import check
-from simulator.cell.spec import DriveSpec, WorldSpec
-from simulator.lexium.device import MCodeDevice
-from simulator.world import World
+from multidrop.dialects.mcode.manual import help
+from multidrop.dialects.mcode.manual.conditions import condition_of, is_mixed, reading
+from multidrop.dialects.mcode.manual.grammar import parse
+from multidrop.dialects.mcode.manual.program_checker import check
+from multidrop.simulator.cell.spec import DriveSpec, WorldSpec
+from multidrop.simulator.lexium.device import MCodeDevice
+from multidrop.simulator.world import World
 from tests.support.cases import for_each
 
 FORMS = [

@@ -2,8 +2,8 @@
 
 import pytest
 
-from dialects import NoAnswer, Refused
-from dialects.mcode.host.confirm import written
+from multidrop.dialects import NoAnswer, Refused
+from multidrop.dialects.mcode.host.confirm import written
 from tests.support.mcode_drives import Desk
 
 NOT_CONFIRMED = "its execution is not confirmed"

@@ -10,16 +10,16 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dialects.mcode.family import MCODE as FAMILY
-from dialects.mcode.host.codec import MCode
-from dialects.mcode.host.state import MCodeState
-from dialects.mcode.manual.canonical import canonical
-from dialects.mcode.manual.program_checker import check
-from dialects.mcode.manual.program_file import formatted, read, remark_at
-from shell.checking import examine
-from simulator.cell.spec import DriveSpec, WorldSpec
-from simulator.lexium.device import MCodeDevice
-from simulator.world import World
+from multidrop.dialects.mcode.family import MCODE as FAMILY
+from multidrop.dialects.mcode.host.codec import MCode
+from multidrop.dialects.mcode.host.state import MCodeState
+from multidrop.dialects.mcode.manual.canonical import canonical
+from multidrop.dialects.mcode.manual.program_checker import check
+from multidrop.dialects.mcode.manual.program_file import formatted, read, remark_at
+from multidrop.shell.checking import examine
+from multidrop.simulator.cell.spec import DriveSpec, WorldSpec
+from multidrop.simulator.lexium.device import MCodeDevice
+from multidrop.simulator.world import World
 from tests.conftest import Bench
 from tests.support.examples import examples
 from tests.support.sample_files import MCODE, product_of

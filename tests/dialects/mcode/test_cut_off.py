@@ -2,12 +2,12 @@
 
 import pytest
 
-from dialects import Hints, Owed
-from dialects.mcode.family import MCODE
-from dialects.mcode.host import identify
-from dialects.mcode.host.codec import MCode
-from dialects.mcode.manual import program_file
-from simulator.cell.spec import Faults
+from multidrop.dialects import Hints, Owed
+from multidrop.dialects.mcode.family import MCODE
+from multidrop.dialects.mcode.host import identify
+from multidrop.dialects.mcode.host.codec import MCode
+from multidrop.dialects.mcode.manual import program_file
+from multidrop.simulator.cell.spec import Faults
 from tests.support.cases import for_each
 from tests.support.mcode_drives import MODES, Witness
 

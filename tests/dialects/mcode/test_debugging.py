@@ -6,11 +6,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dialects.codec import Decoded, End
-from dialects.debugging import Row
-from dialects.mcode.host.codec import MCode
-from dialects.mcode.host.debugging import ENTER, SPACE, entry, hold, key, may_follow, traced
-from dialects.mcode.host.state import MCodeState
+from multidrop.dialects.codec import Decoded, End
+from multidrop.dialects.debugging import Row
+from multidrop.dialects.mcode.host.codec import MCode
+from multidrop.dialects.mcode.host.debugging import ENTER, SPACE, entry, hold, key, may_follow, traced
+from multidrop.dialects.mcode.host.state import MCodeState
 
 PROGRAM = [
     Row(1, "LB SU"),

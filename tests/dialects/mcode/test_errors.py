@@ -4,7 +4,7 @@ import csv
 
 import pytest
 
-from dialects.mcode.manual import error_texts
+from multidrop.dialects.mcode.manual import error_texts
 from tests.support.paths import FACTS
 
 TABLE_OF_FACTS = FACTS / "mcode-errors.csv"

@@ -6,10 +6,10 @@ from random import Random
 
 import pytest
 
-from dialects import DriveError, Hints, NoAnswer, Owed
-from dialects.mcode.host import identify
-from dialects.mcode.host.codec import MCode
-from simulator.cell.spec import Faults
+from multidrop.dialects import DriveError, Hints, NoAnswer, Owed
+from multidrop.dialects.mcode.host import identify
+from multidrop.dialects.mcode.host.codec import MCode
+from multidrop.simulator.cell.spec import Faults
 from tests.support.mcode_drives import MODES, Witness
 
 NAMED, STATED, ALONE = Hints(drives=("a",)), Hints(drives=("a",), party=True), Hints()

@@ -4,12 +4,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dialects import DriveError, End, Hints, NoAnswer, Priority, Refused
-from dialects.mcode.family import MCODE
-from dialects.mcode.host import identify
-from dialects.mcode.host.checksum import sealed
-from dialects.mcode.host.codec import MCode
-from dialects.mcode.host.state import MCodeState
+from multidrop.dialects import DriveError, End, Hints, NoAnswer, Priority, Refused
+from multidrop.dialects.mcode.family import MCODE
+from multidrop.dialects.mcode.host import identify
+from multidrop.dialects.mcode.host.checksum import sealed
+from multidrop.dialects.mcode.host.codec import MCode
+from multidrop.dialects.mcode.host.state import MCodeState
 from tests.support.mcode_drives import Witness
 
 MODES = [(em, party, check) for em in range(4) for party in (False, True) for check in (1, 2)]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from dialects.mcode.manual.program_checker import check
+from multidrop.dialects.mcode.manual.program_checker import check
 from tests.support.cases import for_each
 
 

@@ -3,10 +3,10 @@
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dialects.families import FAMILIES
-from dialects.mcode.host.codec import MCode
-from dialects.mcode.host.state import MCodeState
-from dialects.mcode.manual.guards import AT_ONCE, NAMES, SETTINGS
+from multidrop.dialects.families import FAMILIES
+from multidrop.dialects.mcode.host.codec import MCode
+from multidrop.dialects.mcode.host.state import MCodeState
+from multidrop.dialects.mcode.manual.guards import AT_ONCE, NAMES, SETTINGS
 
 FAMILY = FAMILIES["mcode"]
 PARTY, ALONE = MCodeState(MCode(party=True), "a"), MCodeState(MCode())

@@ -2,9 +2,9 @@
 
 import pytest
 
-from dialects.errors import Diagnostic
-from dialects.mcode.manual import help as mcode_help
-from dialects.mcode.manual.table import MNEMONICS
+from multidrop.dialects.errors import Diagnostic
+from multidrop.dialects.mcode.manual import help as mcode_help
+from multidrop.dialects.mcode.manual.table import MNEMONICS
 from tests.support.cases import for_each
 
 

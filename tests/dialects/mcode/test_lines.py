@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dialects.mcode.manual.grammar import (
+from multidrop.dialects.mcode.manual.grammar import (
     Binary,
     Compare,
     LineError,

@@ -4,11 +4,11 @@ from dataclasses import replace
 
 import pytest
 
-from dialects import End, NoAnswer
-from dialects.mcode.host.codec import MCode
-from dialects.mcode.host.signatures import fresh
-from dialects.mcode.host.state import MCodeState
-from simulator.cell.spec import Faults
+from multidrop.dialects import End, NoAnswer
+from multidrop.dialects.mcode.host.codec import MCode
+from multidrop.dialects.mcode.host.signatures import fresh
+from multidrop.dialects.mcode.host.state import MCodeState
+from multidrop.simulator.cell.spec import Faults
 from tests.support.mcode_drives import MODES, Desk
 
 LINES = ["LB G1", "R1=R1+1", "E", "LB G2", "RT"]

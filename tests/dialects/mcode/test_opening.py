@@ -5,11 +5,11 @@ from random import Random
 
 import pytest
 
-from dialects import Hints, Inexpressible, NoAnswer, Reply
-from dialects.mcode.host import identify, identity
-from dialects.mcode.host.codec import MCode
-from drives.line import Line
-from simulator.cell.spec import Faults
+from multidrop.dialects import Hints, Inexpressible, NoAnswer, Reply
+from multidrop.dialects.mcode.host import identify, identity
+from multidrop.dialects.mcode.host.codec import MCode
+from multidrop.drives.line import Line
+from multidrop.simulator.cell.spec import Faults
 from tests.support.mcode_drives import MODES, Witness
 
 SEVERAL = [(em, check) for em in range(4) for check in range(3)]

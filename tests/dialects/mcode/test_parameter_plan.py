@@ -4,9 +4,9 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from dialects import Diagnostic
-from dialects.mcode.family import MCODE
-from dialects.parameters import Permission, differing
+from multidrop.dialects import Diagnostic
+from multidrop.dialects.mcode.family import MCODE
+from multidrop.dialects.parameters import Permission, differing
 from tests.support.direct_drive import DirectDrive
 from tests.support.examples import examples
 from tests.support.random_settings import PROGRAM, lines

@@ -4,12 +4,12 @@ from types import SimpleNamespace
 
 import pytest
 
-from dialects.mcode.family import MCODE
-from dialects.mcode.manual import parameters as manual
-from dialects.mcode.manual.parameter_checks import types
-from dialects.parameters import IO, VARIABLES, Permission
-from simulator.cell.spec import Faults
-from simulator.lexium.state.models import MODELS
+from multidrop.dialects.mcode.family import MCODE
+from multidrop.dialects.mcode.manual import parameters as manual
+from multidrop.dialects.mcode.manual.parameter_checks import types
+from multidrop.dialects.parameters import IO, VARIABLES, Permission
+from multidrop.simulator.cell.spec import Faults
+from multidrop.simulator.lexium.state.models import MODELS
 from tests.support.direct_drive import DirectDrive
 from tests.support.mcode_drives import MODES, Desk
 

@@ -7,14 +7,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dialects import DriveState, NoAnswer
-from dialects.mcode.family import MCODE
-from dialects.mcode.host import printed
-from dialects.mcode.host.codec import MCode
-from dialects.mcode.host.signatures import sign, signed
-from dialects.mcode.host.state import MCodeState
-from dialects.mcode.manual.table import words
-from simulator.lexium.state.models import MODELS
+from multidrop.dialects import DriveState, NoAnswer
+from multidrop.dialects.mcode.family import MCODE
+from multidrop.dialects.mcode.host import printed
+from multidrop.dialects.mcode.host.codec import MCode
+from multidrop.dialects.mcode.host.signatures import sign, signed
+from multidrop.dialects.mcode.host.state import MCodeState
+from multidrop.dialects.mcode.manual.table import words
+from multidrop.simulator.lexium.state.models import MODELS
 from tests.support.mcode_drives import MODES, Desk
 
 FORMS = [
@@ -185,8 +185,8 @@ def test_one_that_is_deaf_to_its_name_is_not_believed(bench):
 
 @pytest.mark.parametrize(("em", "is_party", "check"), MODES)
 def test_opening_sees_whether_a_drive_prints_its_name(bench, em, is_party, check):
-    from dialects import Hints
-    from dialects.mcode.host import identify
+    from multidrop.dialects import Hints
+    from multidrop.dialects.mcode.host import identify
 
     desk = bench([{"name": "a" if is_party else "!", "party": is_party, "set": {"EM": em, "CK": check}}])
     hints = Hints(drives=("a",), party=True) if is_party else Hints()

@@ -2,10 +2,10 @@
 
 import pytest
 
-from dialects import DriveError, Inexpressible, Priority, Refused, Stopped, StopPiece
-from dialects.mcode.family import MCODE
-from dialects.mcode.host.codec import MCode
-from dialects.mcode.host.state import MCodeState
+from multidrop.dialects import DriveError, Inexpressible, Priority, Refused, Stopped, StopPiece
+from multidrop.dialects.mcode.family import MCODE
+from multidrop.dialects.mcode.host.codec import MCode
+from multidrop.dialects.mcode.host.state import MCodeState
 from tests.support.cases import for_each
 from tests.support.mcode_drives import MODES, Desk
 

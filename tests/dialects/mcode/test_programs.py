@@ -6,9 +6,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dialects.errors import Diagnostic
-from dialects.mcode.manual import program_file
-from dialects.mcode.manual.program_file import ProgramLine, read
+from multidrop.dialects.errors import Diagnostic
+from multidrop.dialects.mcode.manual import program_file
+from multidrop.dialects.mcode.manual.program_file import ProgramLine, read
 
 PRESS = """\
 '[VARIABLES]

@@ -4,15 +4,15 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dialects import NoAnswer, Refused
-from dialects.held import Held, Stored
-from dialects.mcode.family import MCODE
-from dialects.mcode.host import upload
-from dialects.mcode.host.codec import MCode
-from dialects.mcode.host.listing import GLOBAL, LABEL, LOCAL
-from dialects.mcode.host.replacing import plan
-from dialects.mcode.host.state import MCodeState
-from dialects.mcode.manual import program_file
+from multidrop.dialects import NoAnswer, Refused
+from multidrop.dialects.held import Held, Stored
+from multidrop.dialects.mcode.family import MCODE
+from multidrop.dialects.mcode.host import upload
+from multidrop.dialects.mcode.host.codec import MCode
+from multidrop.dialects.mcode.host.listing import GLOBAL, LABEL, LOCAL
+from multidrop.dialects.mcode.host.replacing import plan
+from multidrop.dialects.mcode.host.state import MCodeState
+from multidrop.dialects.mcode.manual import program_file
 
 MODES = [(em, party, check) for em in range(4) for party in (False, True) for check in (0, 1)]
 PROGRAM = """

@@ -2,8 +2,8 @@
 
 import pytest
 
-from dialects.mcode.host import rescue, scan
-from dialects.scanning import Reach
+from multidrop.dialects.mcode.host import rescue, scan
+from multidrop.dialects.scanning import Reach
 from tests.support.mcode_drives import MODES
 
 PRINTS = ("PG 1", "LB G1", 'PR "tick ",R3', "IC R3", "BR G1", "E", "PG", "EX G1")

@@ -4,9 +4,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dialects.mcode.host import scan
-from dialects.mcode.host.codec import MCode
-from dialects.scanning import Outcome, Reach
+from multidrop.dialects.mcode.host import scan
+from multidrop.dialects.mcode.host.codec import MCode
+from multidrop.dialects.scanning import Outcome, Reach
 from tests.support.examples import examples
 from tests.support.mcode_drives import MODES, Witness
 

@@ -5,12 +5,12 @@ The simulated drives are the witnesses: what was executed or refused is read fro
 
 import pytest
 
-from dialects import DriveError, End, NoAnswer, Refused, Reply
-from dialects.mcode.family import MCODE
-from dialects.mcode.host import classify
-from dialects.mcode.host.codec import MCode
-from dialects.mcode.host.state import MCodeState
-from simulator.cell.spec import Faults
+from multidrop.dialects import DriveError, End, NoAnswer, Refused, Reply
+from multidrop.dialects.mcode.family import MCODE
+from multidrop.dialects.mcode.host import classify
+from multidrop.dialects.mcode.host.codec import MCode
+from multidrop.dialects.mcode.host.state import MCodeState
+from multidrop.simulator.cell.spec import Faults
 from tests.support.mcode_drives import MODES, Desk
 
 pytestmark = pytest.mark.slow

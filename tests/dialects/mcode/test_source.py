@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from dialects.families import program_language_of, program_languages
-from dialects.mcode.manual.program_checker import check
+from multidrop.dialects.families import program_language_of, program_languages
+from multidrop.dialects.mcode.manual.program_checker import check
 
 GOOD = "VA Q1=5\nPG 1\nLB K1\n  MR Q1 ' on\n  H\n  CL K2,Q1=5\n  BR K1,I1=1\nE\nLB K2\nRT\nPG\nS\n"
 

@@ -5,7 +5,7 @@ import re
 
 import pytest
 
-from dialects.mcode.manual.table import (
+from multidrop.dialects.mcode.manual.table import (
     LEXIUM,
     MDRIVE,
     MDRIVE_PLUS,

@@ -2,13 +2,13 @@
 
 import pytest
 
-from dialects import DriveState, End, Kind, NoAnswer, Priority, Refused, Reply, Stopped
-from dialects.mcode.family import MCODE
-from dialects.mcode.host import identify
-from dialects.mcode.host.codec import MCode
-from dialects.mcode.host.exchange import answered
-from dialects.mcode.host.state import MCodeState
-from drives.procedure import ProcedureRunner
+from multidrop.dialects import DriveState, End, Kind, NoAnswer, Priority, Refused, Reply, Stopped
+from multidrop.dialects.mcode.family import MCODE
+from multidrop.dialects.mcode.host import identify
+from multidrop.dialects.mcode.host.codec import MCode
+from multidrop.dialects.mcode.host.exchange import answered
+from multidrop.dialects.mcode.host.state import MCodeState
+from multidrop.drives.procedure import ProcedureRunner
 
 MODES = [(em, party, check) for em in range(4) for party in (False, True) for check in range(3)]
 
@@ -352,7 +352,7 @@ def test_a_stop_thrown_into_a_conversation_ends_it():
 
 @pytest.mark.parametrize(("em", "party", "check"), MODES)
 def test_how_a_drive_is_set_is_found_out_and_nothing_moves(bench, em, party, check):
-    from dialects import Hints
+    from multidrop.dialects import Hints
 
     desk = bench([{"name": "a" if party else "!", "party": party, "set": {"EM": em, "CK": check, "ES": 1}}])
     hints = Hints(drives=("a",), party=True) if party else Hints()
@@ -365,7 +365,7 @@ def test_how_a_drive_is_set_is_found_out_and_nothing_moves(bench, em, party, che
 
 
 def test_several_names_imply_party_mode_and_a_missing_drive_is_told(bench):
-    from dialects import Hints
+    from multidrop.dialects import Hints
 
     desk = bench([{"name": n, "party": True, "set": {"EM": 1, "CK": 1}} for n in "ab"], baud=9600)
     a, b, c = desk.run(identify.identify(Hints(drives=("a", "b", "c"))))
@@ -375,7 +375,7 @@ def test_several_names_imply_party_mode_and_a_missing_drive_is_told(bench):
 
 
 def test_an_ethernet_drive_is_not_asked_what_it_would_refuse(bench):
-    from dialects import Hints
+    from multidrop.dialects import Hints
 
     desk = bench([{"personality": "LMDCE"}])
     [state] = desk.run(identify.identify(Hints()))
@@ -386,7 +386,7 @@ def test_an_ethernet_drive_is_not_asked_what_it_would_refuse(bench):
 
 @pytest.mark.parametrize(("em", "party", "check"), [m for m in MODES if m[0] in (0, 1)])
 def test_a_drive_left_in_program_mode_is_taken_out_and_that_is_said(bench, em, party, check):
-    from dialects import Hints
+    from multidrop.dialects import Hints
 
     desk = bench([{"name": "a" if party else "!", "party": party, "set": {"EM": em, "CK": check}}])
     next(iter(desk.devices.values())).execute("PG 1", 0.0)
@@ -397,7 +397,7 @@ def test_a_drive_left_in_program_mode_is_taken_out_and_that_is_said(bench, em, p
 
 
 def test_nobody_there_is_told(bench):
-    from dialects import Hints
+    from multidrop.dialects import Hints
 
     desk = bench([{"name": "a", "party": True}])
     with pytest.raises(NoAnswer, match="none of the drives x, y replies"):
@@ -405,7 +405,7 @@ def test_nobody_there_is_told(bench):
 
 
 def test_a_standing_error_is_found_without_clearing_it(bench):
-    from dialects import Hints
+    from multidrop.dialects import Hints
 
     desk = bench([{}])
     desk.devices["!"].fail(86, 0.0)

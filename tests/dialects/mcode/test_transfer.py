@@ -2,13 +2,13 @@
 
 import pytest
 
-from dialects import DriveError, End, Inexpressible, NoAnswer, Refused, Reply, Stopped, StopPiece
-from dialects.held import Held
-from dialects.mcode.family import MCODE
-from dialects.mcode.host.codec import MCode
-from dialects.mcode.host.state import MCodeState
-from dialects.mcode.manual import program_file
-from drives.procedure import ProcedureRunner
+from multidrop.dialects import DriveError, End, Inexpressible, NoAnswer, Refused, Reply, Stopped, StopPiece
+from multidrop.dialects.held import Held
+from multidrop.dialects.mcode.family import MCODE
+from multidrop.dialects.mcode.host.codec import MCode
+from multidrop.dialects.mcode.host.state import MCodeState
+from multidrop.dialects.mcode.manual import program_file
+from multidrop.drives.procedure import ProcedureRunner
 
 pytestmark = pytest.mark.slow
 
@@ -229,7 +229,7 @@ def test_on_a_bad_line_a_download_is_right_or_says_that_it_is_not(bench, seed):
     from random import Random
 
     desk, state = desk_and_known(bench, 1, True, 1, baud=9600)
-    from simulator.cell.spec import Faults
+    from multidrop.simulator.cell.spec import Faults
 
     desk.devices["a"].execute("CE=0", desk.now)  # a flipped bit makes ^C of a C, and a reset forgets what is not saved
     desk.wire._faults, desk.wire._rng = Faults(flip=4e-3), Random(seed)

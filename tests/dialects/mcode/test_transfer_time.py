@@ -2,14 +2,14 @@
 
 import pytest
 
-from dialects import Kind
-from dialects.held import Held
-from dialects.mcode.family import MCODE
-from dialects.mcode.host import codec as codecs
-from dialects.mcode.host.codec import MCode
-from dialects.mcode.host.quiet_times import EXECUTED, EXECUTING, LIST_QUIET, PATIENT, SHORT
-from dialects.mcode.host.state import MCodeState
-from dialects.mcode.manual import program_file
+from multidrop.dialects import Kind
+from multidrop.dialects.held import Held
+from multidrop.dialects.mcode.family import MCODE
+from multidrop.dialects.mcode.host import codec as codecs
+from multidrop.dialects.mcode.host.codec import MCode
+from multidrop.dialects.mcode.host.quiet_times import EXECUTED, EXECUTING, LIST_QUIET, PATIENT, SHORT
+from multidrop.dialects.mcode.host.state import MCodeState
+from multidrop.dialects.mcode.manual import program_file
 
 PROGRAM = "VA Q1=3\n" + "VM=400000\n" * 9 + "PG 1\nLB G1\nR1=R1+12\nMR 51200\nH\n" + "R1=R1+12\n" * 46 + "E\nPG\n"
 

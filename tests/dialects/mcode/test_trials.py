@@ -4,9 +4,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dialects import DriveError, Priority
-from dialects.mcode.family import MCODE
-from simulator.cell.spec import Faults
+from multidrop.dialects import DriveError, Priority
+from multidrop.dialects.mcode.family import MCODE
+from multidrop.simulator.cell.spec import Faults
 from tests.conftest import Bench
 from tests.support.examples import examples
 from tests.support.mcode_drives import Desk

@@ -3,7 +3,7 @@
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dialects.mcode.host.framing import pieces, printable, unasked
+from multidrop.dialects.mcode.host.framing import pieces, printable, unasked
 
 BYTES = st.text(alphabet="ab>?\r\n\x06\x15\xe9 ", max_size=40).map(lambda text: text.encode("latin-1"))
 

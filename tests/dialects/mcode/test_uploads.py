@@ -4,12 +4,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dialects.held import Difference, Held, Stored
-from dialects.mcode.family import MCODE
-from dialects.mcode.host import listing as listings
-from dialects.mcode.host.codec import MCode
-from dialects.mcode.host.state import MCodeState
-from dialects.mcode.manual import program_file
+from multidrop.dialects.held import Difference, Held, Stored
+from multidrop.dialects.mcode.family import MCODE
+from multidrop.dialects.mcode.host import listing as listings
+from multidrop.dialects.mcode.host.codec import MCode
+from multidrop.dialects.mcode.host.state import MCodeState
+from multidrop.dialects.mcode.manual import program_file
 from tests.conftest import Bench
 from tests.support.examples import examples
 

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from typing import Any
 
-from dialects import Kind, Procedure
-from dialects.modbus.family import MODBUS
-from dialects.modbus.host.codec import Modbus
-from dialects.modbus.host.state import ModbusState
-from drives.procedure import ProcedureRunner
-from simulator.lexium.family import _connect  # the port of an Ethernet drive
+from multidrop.dialects import Kind, Procedure
+from multidrop.dialects.modbus.family import MODBUS
+from multidrop.dialects.modbus.host.codec import Modbus
+from multidrop.dialects.modbus.host.state import ModbusState
+from multidrop.drives.procedure import ProcedureRunner
+from multidrop.simulator.lexium.family import _connect  # the port of an Ethernet drive
 from tests.support.lexium import drive
 
 

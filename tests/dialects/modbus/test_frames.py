@@ -6,12 +6,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dialects import End, Kind, Request
-from dialects.modbus.host import framing, mapping
-from dialects.modbus.host.codec import Modbus
-from dialects.modbus.host.messages import pdu_codec
-from dialects.modbus.host.state import ModbusState
-from dialects.modbus.manual.registers import REGISTERS
+from multidrop.dialects import End, Kind, Request
+from multidrop.dialects.modbus.host import framing, mapping
+from multidrop.dialects.modbus.host.codec import Modbus
+from multidrop.dialects.modbus.host.messages import pdu_codec
+from multidrop.dialects.modbus.host.state import ModbusState
+from multidrop.dialects.modbus.manual.registers import REGISTERS
 from tests.support.cases import for_each
 
 DRIVE = Modbus()

@@ -23,13 +23,13 @@ from pymodbus.pdu import DecodePDU, ExceptionResponse
 from pymodbus.pdu.mei_message import ReadDeviceInformationRequest
 from pymodbus.pdu.register_message import ReadHoldingRegistersRequest, WriteMultipleRegistersRequest
 
-from dialects import End, Kind, Request
-from dialects.modbus.host import framing, mapping
-from dialects.modbus.host.codec import Modbus
-from dialects.modbus.host.framing import NotModbus
-from dialects.modbus.host.messages import pdu_codec
-from dialects.modbus.host.state import ModbusState
-from dialects.modbus.manual.registers import REGISTERS
+from multidrop.dialects import End, Kind, Request
+from multidrop.dialects.modbus.host import framing, mapping
+from multidrop.dialects.modbus.host.codec import Modbus
+from multidrop.dialects.modbus.host.framing import NotModbus
+from multidrop.dialects.modbus.host.messages import pdu_codec
+from multidrop.dialects.modbus.host.state import ModbusState
+from multidrop.dialects.modbus.manual.registers import REGISTERS
 from tests.support.paths import ROOT
 from tests.support.until import PATIENCE
 
@@ -226,7 +226,7 @@ def test_it_is_silent_even_where_the_root_logs_everything() -> None:
     done = python(
         "import logging\n"
         "logging.basicConfig(level=logging.DEBUG)\n"
-        "from dialects.modbus.host.messages import pdu_codec\n"
+        "from multidrop.dialects.modbus.host.messages import pdu_codec\n"
         "made = pdu_codec()\n"
         "print(made._decoder.decode(bytes.fromhex('8001')), made._decoder.decode(b'\\x03\\x09\\x00'))\n"
         "made._framer.handleFrame(bytes.fromhex('00070001000301830201'), 1, 7)\n"

@@ -4,11 +4,11 @@ import csv
 
 import pytest
 
-from dialects.families import FAMILIES
-from dialects.mcode.manual.table import lookup
-from dialects.modbus.host.codec import Modbus
-from dialects.modbus.host.state import ModbusState
-from dialects.modbus.manual.registers import AT, REGISTERS, ROWS
+from multidrop.dialects.families import FAMILIES
+from multidrop.dialects.mcode.manual.table import lookup
+from multidrop.dialects.modbus.host.codec import Modbus
+from multidrop.dialects.modbus.host.state import ModbusState
+from multidrop.dialects.modbus.manual.registers import AT, REGISTERS, ROWS
 from tests.support.paths import FACTS
 
 TABLE_OF_FACTS = FACTS / "modbus-registers.csv"

@@ -2,14 +2,14 @@
 
 import pytest
 
-from dialects import End, Hints, Inexpressible, Kind, NoAnswer, Priority, Refused, Reply
-from dialects.modbus.family import MODBUS
-from dialects.modbus.host import framing, mapping
-from dialects.modbus.host.codec import Modbus
-from dialects.modbus.host.identify import identify
-from dialects.modbus.host.state import ModbusState
-from dialects.modbus.manual.registers import REGISTERS
-from drives.procedure import ProcedureRunner
+from multidrop.dialects import End, Hints, Inexpressible, Kind, NoAnswer, Priority, Refused, Reply
+from multidrop.dialects.modbus.family import MODBUS
+from multidrop.dialects.modbus.host import framing, mapping
+from multidrop.dialects.modbus.host.codec import Modbus
+from multidrop.dialects.modbus.host.identify import identify
+from multidrop.dialects.modbus.host.state import ModbusState
+from multidrop.dialects.modbus.manual.registers import REGISTERS
+from multidrop.drives.procedure import ProcedureRunner
 from tests.support.cases import for_each
 
 OBJECTS = {0: "SEM USA", 1: "LMDCE571", 2: "6.0.0.2", 3: "www", 4: "Lexium", 5: "0401", 6: "LMDCE 6.002, Hw: 3.2"}

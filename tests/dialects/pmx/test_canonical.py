@@ -5,9 +5,9 @@ from __future__ import annotations
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dialects.pmx.manual.program_file import canonical
-from dialects.pmx.manual.script_compiler import compile_
-from dialects.pmx.manual.script_parser import parse
+from multidrop.dialects.pmx.manual.program_file import canonical
+from multidrop.dialects.pmx.manual.script_compiler import compile_
+from multidrop.dialects.pmx.manual.script_parser import parse
 from tests.support.cases import for_each
 from tests.support.pmx_programs import EVERYTHING, EXAMPLES
 

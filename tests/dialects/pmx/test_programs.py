@@ -6,12 +6,12 @@ from pathlib import Path
 
 import pytest
 
-from dialects import Diagnostic, NoAnswer, Refused
-from dialects.codec import End, Reply
-from dialects.pmx.host import download, holding, upload
-from dialects.pmx.host.codec import Pmx
-from dialects.pmx.host.state import PmxState
-from dialects.pmx.manual import program_file, script_decompiler
+from multidrop.dialects import Diagnostic, NoAnswer, Refused
+from multidrop.dialects.codec import End, Reply
+from multidrop.dialects.pmx.host import download, holding, upload
+from multidrop.dialects.pmx.host.codec import Pmx
+from multidrop.dialects.pmx.host.state import PmxState
+from multidrop.dialects.pmx.manual import program_file, script_decompiler
 from tests.support.pmx_programs import EXAMPLES, TEN_TIMES, plain
 
 

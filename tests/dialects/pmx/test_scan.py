@@ -1,7 +1,7 @@
 """The search for PMX controllers at one baud rate."""
 
-from dialects.pmx.host import scan
-from dialects.scanning import Reach
+from multidrop.dialects.pmx.host import scan
+from multidrop.dialects.scanning import Reach
 
 
 def searched(bench, *numbers, baud=9600, before=b"", **faults):

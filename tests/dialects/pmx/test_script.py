@@ -9,11 +9,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dialects import Diagnostic
-from dialects.pmx.manual import script_checker, script_decompiler
-from dialects.pmx.manual.script_parser import parse
-from dialects.pmx.manual.script_words import BLOCKS, WORDS
-from dialects.problems import errors
+from multidrop.dialects import Diagnostic
+from multidrop.dialects.pmx.manual import script_checker, script_decompiler
+from multidrop.dialects.pmx.manual.script_parser import parse
+from multidrop.dialects.pmx.manual.script_words import BLOCKS, WORDS
+from multidrop.dialects.problems import errors
 from tests.support.cases import for_each
 from tests.support.examples import examples
 from tests.support.paths import FACTS

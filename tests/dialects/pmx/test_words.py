@@ -6,13 +6,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dialects import Diagnostic, End, Hints, Inexpressible, NoAnswer, Priority, Refused
-from dialects.pmx.family import PMX
-from dialects.pmx.host.codec import Pmx
-from dialects.pmx.host.identify import identify
-from dialects.pmx.host.state import PmxState
-from dialects.pmx.manual import errors, help, status, table
-from drives.procedure import ProcedureRunner
+from multidrop.dialects import Diagnostic, End, Hints, Inexpressible, NoAnswer, Priority, Refused
+from multidrop.dialects.pmx.family import PMX
+from multidrop.dialects.pmx.host.codec import Pmx
+from multidrop.dialects.pmx.host.identify import identify
+from multidrop.dialects.pmx.host.state import PmxState
+from multidrop.dialects.pmx.manual import errors, help, status, table
+from multidrop.drives.procedure import ProcedureRunner
 from tests.support.paths import FACTS
 
 ANSWERS = {"ID": "Performax-2ED-SA", "VER": "V128BL", "DN": "2ED00"}

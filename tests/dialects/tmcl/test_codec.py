@@ -4,10 +4,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dialects.codec import End
-from dialects.errors import Inexpressible
-from dialects.tmcl.host.codec import STOP_BYTES, Tmcl
-from dialects.tmcl.manual.grammar import parse
+from multidrop.dialects.codec import End
+from multidrop.dialects.errors import Inexpressible
+from multidrop.dialects.tmcl.host.codec import STOP_BYTES, Tmcl
+from multidrop.dialects.tmcl.manual.grammar import parse
 
 FRAMES = [
     ("ROR 0, 1000", "01 01 00 00 00 00 03 E8 ED"),

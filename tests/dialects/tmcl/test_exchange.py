@@ -6,17 +6,17 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from dialects.codec import Priority
-from dialects.controls import BY
-from dialects.errors import Inexpressible, NoAnswer, Refused, Stopped
-from dialects.family import Hints
-from dialects.tmcl.family import TMCL
-from dialects.tmcl.host.codec import Tmcl
-from dialects.tmcl.manual.commands import Call, Command
-from dialects.tmcl.manual.parameters import AXIS, Axis
-from dialects.tmcl.manual.status import Status
-from drives.line import Line
-from simulator.tmcl.module import Refused as Lacking
+from multidrop.dialects.codec import Priority
+from multidrop.dialects.controls import BY
+from multidrop.dialects.errors import Inexpressible, NoAnswer, Refused, Stopped
+from multidrop.dialects.family import Hints
+from multidrop.dialects.tmcl.family import TMCL
+from multidrop.dialects.tmcl.host.codec import Tmcl
+from multidrop.dialects.tmcl.manual.commands import Call, Command
+from multidrop.dialects.tmcl.manual.parameters import AXIS, Axis
+from multidrop.dialects.tmcl.manual.status import Status
+from multidrop.drives.line import Line
+from multidrop.simulator.tmcl.module import Refused as Lacking
 from tests.conftest import Bench
 from tests.support.cases import for_each
 
@@ -422,7 +422,9 @@ def test_the_host_says_from_where_a_relative_move_counts(option, counted):
 
 def test_a_module_without_parameter_127_counts_from_a_place_that_is_not_known(monkeypatch):
     shop = Shop()
-    monkeypatch.setattr("simulator.tmcl.module.AXIS", {n: row for n, row in AXIS.items() if n != Axis.RELATIVE_FROM})
+    monkeypatch.setattr(
+        "multidrop.simulator.tmcl.module.AXIS", {n: row for n, row in AXIS.items() if n != Axis.RELATIVE_FROM}
+    )
     (state,) = shop.open()
     assert state.motors == 1
     assert "not known" in TMCL.controls(state, "")[BY].about

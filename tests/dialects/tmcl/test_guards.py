@@ -2,9 +2,9 @@
 
 import pytest
 
-from dialects.families import FAMILIES
-from dialects.tmcl.host.codec import Tmcl
-from dialects.tmcl.host.state import TmclState
+from multidrop.dialects.families import FAMILIES
+from multidrop.dialects.tmcl.host.codec import Tmcl
+from multidrop.dialects.tmcl.host.state import TmclState
 
 FAMILY = FAMILIES["tmcl"]
 ONE, EVERY = TmclState(Tmcl(), "1"), TmclState(Tmcl(), "*")

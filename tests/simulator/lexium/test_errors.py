@@ -2,12 +2,12 @@
 
 import pytest
 
-from dialects.mcode.manual.error_texts import TEXTS
-from dialects.mcode.manual.table import MNEMONICS
-from simulator.cell.spec import DriveSpec, WorldSpec
-from simulator.lexium.device import MCodeDevice
-from simulator.lexium.ports.mcode import MCodePort
-from simulator.world import World
+from multidrop.dialects.mcode.manual.error_texts import TEXTS
+from multidrop.dialects.mcode.manual.table import MNEMONICS
+from multidrop.simulator.cell.spec import DriveSpec, WorldSpec
+from multidrop.simulator.lexium.device import MCodeDevice
+from multidrop.simulator.lexium.ports.mcode import MCodePort
+from multidrop.simulator.world import World
 from tests.support.cases import for_each
 from tests.support.lexium import drive, say
 

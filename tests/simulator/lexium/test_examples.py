@@ -2,7 +2,7 @@
 
 import pytest
 
-from simulator.lexium.ports.mcode import MCodePort
+from multidrop.simulator.lexium.ports.mcode import MCodePort
 from tests.support.lexium import drive
 
 

@@ -2,10 +2,10 @@
 
 import pytest
 
-from dialects import Diagnostic
-from simulator import cells
-from simulator.cell.spec import WorldSpec
-from simulator.world import World
+from multidrop.dialects import Diagnostic
+from multidrop.simulator import cells
+from multidrop.simulator.cell.spec import WorldSpec
+from multidrop.simulator.world import World
 from tests.support.lexium import at, drive, say
 
 HOME = "IS=1,1,0"

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import pytest
 
-from dialects import Diagnostic
-from simulator.cells import read
-from simulator.floor import Floor
+from multidrop.dialects import Diagnostic
+from multidrop.simulator.cells import read
+from multidrop.simulator.floor import Floor
 from tests.support.mdrive_unit import Unit
 
 # Motion.

@@ -6,8 +6,8 @@ from random import Random
 
 import pytest
 
-from dialects.mcode.manual.error_texts import TEXTS
-from dialects.mcode.manual.table import MDRIVE, MNEMONICS
+from multidrop.dialects.mcode.manual.error_texts import TEXTS
+from multidrop.dialects.mcode.manual.table import MDRIVE, MNEMONICS
 from tests.support.lexium import drive
 
 pytestmark = pytest.mark.slow

@@ -11,8 +11,8 @@ import re
 
 import pytest
 
-from dialects.mcode.manual.error_texts import TEXTS
-from dialects.mcode.manual.table import MDRIVE
+from multidrop.dialects.mcode.manual.error_texts import TEXTS
+from multidrop.dialects.mcode.manual.table import MDRIVE
 from tests.support.cases import for_each
 from tests.support.mdrive_unit import Unit
 from tests.support.paths import FACTS

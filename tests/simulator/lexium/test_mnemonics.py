@@ -2,10 +2,10 @@
 
 import pytest
 
-from dialects.mcode.manual.table import MNEMONICS
-from simulator.cell.spec import DriveSpec, WorldSpec
-from simulator.lexium.device import MCodeDevice
-from simulator.world import World
+from multidrop.dialects.mcode.manual.table import MNEMONICS
+from multidrop.simulator.cell.spec import DriveSpec, WorldSpec
+from multidrop.simulator.lexium.device import MCodeDevice
+from multidrop.simulator.world import World
 
 pytestmark = pytest.mark.slow
 

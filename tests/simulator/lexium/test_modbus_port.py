@@ -10,10 +10,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from simulator.cells import read
-from simulator.floor import Floor
-from simulator.lexium.device import MCodeDevice
-from simulator.lexium.ports.modbus import ModbusPort
+from multidrop.simulator.cells import read
+from multidrop.simulator.floor import Floor
+from multidrop.simulator.lexium.device import MCodeDevice
+from multidrop.simulator.lexium.ports.modbus import ModbusPort
 from tests.support.cases import for_each
 from tests.support.examples import examples
 

@@ -8,9 +8,9 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from dialects.modbus.manual.registers import AT, REGISTERS, ROWS, Register
-from simulator.cells import read
-from simulator.floor import Floor
+from multidrop.dialects.modbus.manual.registers import AT, REGISTERS, ROWS, Register
+from multidrop.simulator.cells import read
+from multidrop.simulator.floor import Floor
 from tests.support.cases import for_each
 from tests.support.examples import examples
 

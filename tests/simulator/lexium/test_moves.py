@@ -2,7 +2,7 @@
 
 import pytest
 
-from simulator.cell.spec import WorldSpec
+from multidrop.simulator.cell.spec import WorldSpec
 from tests.support.lexium import output, say, switched_on
 
 # Programs after the manual's samples.

@@ -2,14 +2,14 @@
 
 import pytest
 
-from simulator.cell.spec import DriveSpec, WorldSpec
-from simulator.cells import read
-from simulator.floor import Floor
-from simulator.lexium.device import MCodeDevice
-from simulator.lexium.ports.mcode import MCodePort
-from simulator.lexium.power import ETHERNET_BOOT
-from simulator.wire.wire import Wire
-from simulator.world import World
+from multidrop.simulator.cell.spec import DriveSpec, WorldSpec
+from multidrop.simulator.cells import read
+from multidrop.simulator.floor import Floor
+from multidrop.simulator.lexium.device import MCodeDevice
+from multidrop.simulator.lexium.ports.mcode import MCodePort
+from multidrop.simulator.lexium.power import ETHERNET_BOOT
+from multidrop.simulator.wire.wire import Wire
+from multidrop.simulator.world import World
 
 
 def device(name, program="", **settings):

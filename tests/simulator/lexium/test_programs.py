@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from simulator.cell.spec import WorldSpec
+from multidrop.simulator.cell.spec import WorldSpec
 from tests.support.examples import examples
 from tests.support.lexium import output, say, switched_on
 

@@ -2,7 +2,7 @@
 
 import pytest
 
-from simulator.lexium.device import MCodeDevice
+from multidrop.simulator.lexium.device import MCodeDevice
 from tests.support.lexium import at, drive, say
 
 

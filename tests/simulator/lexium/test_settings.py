@@ -2,9 +2,9 @@
 
 import pytest
 
-from simulator.cells import read
-from simulator.floor import Floor
-from simulator.lexium.device import MCodeDevice
+from multidrop.simulator.cells import read
+from multidrop.simulator.floor import Floor
+from multidrop.simulator.lexium.device import MCodeDevice
 from tests.support.lexium import at, drive, say
 
 

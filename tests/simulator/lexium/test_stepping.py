@@ -1,8 +1,8 @@
 """Programs watched: trace, single step, break points, Enter and Esc; what a new start clears."""
 
-from simulator.cell.spec import DriveSpec, WorldSpec
-from simulator.lexium.device import MCodeDevice
-from simulator.world import World
+from multidrop.simulator.cell.spec import DriveSpec, WorldSpec
+from multidrop.simulator.lexium.device import MCodeDevice
+from multidrop.simulator.world import World
 
 LOOP = "PG 1\nLB G1\nR1=0\nLB G2\nIC R1\nBR G2,R1<5\nPR R1\nE\nPG\n"
 

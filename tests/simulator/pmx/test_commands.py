@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from simulator.pmx.settings import REGISTERS
+from multidrop.simulator.pmx.settings import REGISTERS
 from tests.support.paths import FACTS
 from tests.support.pmx_controller import Bench
 
@@ -225,7 +225,7 @@ def test_lines_are_stored_and_given_back() -> None:
 
 
 def test_a_wrong_setting_in_a_cell_is_named() -> None:
-    from dialects import Diagnostic
+    from multidrop.dialects import Diagnostic
 
     with pytest.raises(Diagnostic, match=r"set SLRX = 0 is refused: \?Invalid Answer"):
         Bench("set = { SLRX = 0 }")
@@ -251,8 +251,8 @@ def test_a_number_sign_begins_the_line_again_and_a_long_line_is_no_command() -> 
 
 
 def test_two_on_a_line_answer_to_their_own_numbers_only() -> None:
-    from simulator.cells import read
-    from simulator.floor import Floor
+    from multidrop.simulator.cells import read
+    from multidrop.simulator.floor import Floor
 
     drive = '[[bus.drive]]\npersonality = "PMX"\nname = '
     wire = Floor(read(f'[[bus]]\nname = "b"\n{drive}"00"\n{drive}"17"\n')).wires["b"]
@@ -261,8 +261,8 @@ def test_two_on_a_line_answer_to_their_own_numbers_only() -> None:
 
 
 def test_another_baud_rate_acts_after_store_and_power() -> None:
-    from simulator.cells import read
-    from simulator.floor import Floor
+    from multidrop.simulator.cells import read
+    from multidrop.simulator.floor import Floor
 
     floor = Floor(read('[[bus]]\nname = "b"\nbaud = 19200\n[[bus.drive]]\npersonality = "PMX"\n'))
     wire = floor.wires["b"]

@@ -6,12 +6,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dialects.pmx.manual import program_file, script_checker, script_decompiler
-from dialects.pmx.manual.script_compiler import LINES, OPERATION, looks_compiled, split
-from dialects.pmx.manual.script_words import WORDS
-from simulator.cell.spec import DriveSpec
-from simulator.pmx.device import PmxDevice
-from simulator.pmx.programs import Programs
+from multidrop.dialects.pmx.manual import program_file, script_checker, script_decompiler
+from multidrop.dialects.pmx.manual.script_compiler import LINES, OPERATION, looks_compiled, split
+from multidrop.dialects.pmx.manual.script_words import WORDS
+from multidrop.simulator.cell.spec import DriveSpec
+from multidrop.simulator.pmx.device import PmxDevice
+from multidrop.simulator.pmx.programs import Programs
 
 IDLE, RUNNING, ERROR = 0, 1, 4
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import pytest
 
-from dialects.pmx.manual.script_checker import read
-from dialects.pmx.manual.script_compiler import LINES
-from simulator.pmx.programs import Programs
+from multidrop.dialects.pmx.manual.script_checker import read
+from multidrop.dialects.pmx.manual.script_compiler import LINES
+from multidrop.simulator.pmx.programs import Programs
 from tests.support.pmx_programs import STEP_PER_EDGE, TEN_TIMES, TWO, WATCHDOG
 
 SPEED = 10_000.0

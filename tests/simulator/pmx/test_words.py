@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from dialects.pmx.manual.script_words import WORDS, Word
-from simulator.cell.spec import DriveSpec
-from simulator.pmx.device import PmxDevice
+from multidrop.dialects.pmx.manual.script_words import WORDS, Word
+from multidrop.simulator.cell.spec import DriveSpec
+from multidrop.simulator.pmx.device import PmxDevice
 from tests.support.cases import for_each
 
 MOVING_ONLY = ("SSPDX", "SSPDY")

@@ -17,14 +17,14 @@ from pathlib import Path
 
 import pytest
 
-from dialects.mcode.manual.error_texts import text as error_text
-from simulator.cell.spec import Faults
-from simulator.cells import load, read
-from simulator.floor import Floor
-from simulator.serving import input_queue
-from simulator.serving.endpoints import BACKLOG, serve_bus
-from simulator.serving.running import RunningFloor
-from simulator.wire.wire import Wire
+from multidrop.dialects.mcode.manual.error_texts import text as error_text
+from multidrop.simulator.cell.spec import Faults
+from multidrop.simulator.cells import load, read
+from multidrop.simulator.floor import Floor
+from multidrop.simulator.serving import input_queue
+from multidrop.simulator.serving.endpoints import BACKLOG, serve_bus
+from multidrop.simulator.serving.running import RunningFloor
+from multidrop.simulator.wire.wire import Wire
 from tests.support.until import PATIENCE
 
 pytestmark = pytest.mark.slow

@@ -16,10 +16,10 @@ import pytest
 from pymodbus.client import AsyncModbusTcpClient
 from pyModbusTCP.client import ModbusClient
 
-from simulator.cells import demo, load
-from simulator.floor import Floor
-from simulator.serving.endpoints import serve_bus
-from simulator.serving.running import RunningFloor
+from multidrop.simulator.cells import demo, load
+from multidrop.simulator.floor import Floor
+from multidrop.simulator.serving.endpoints import serve_bus
+from multidrop.simulator.serving.running import RunningFloor
 from tests.support.processes import Running
 from tests.support.until import PATIENCE
 

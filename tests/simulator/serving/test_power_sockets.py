@@ -11,12 +11,12 @@ from typing import Any
 
 import pytest
 
-from simulator.cells import load, read
-from simulator.floor import Floor
-from simulator.lexium.power import ETHERNET_BOOT
-from simulator.serving.endpoints import serve_bus
-from simulator.serving.in_process import connect
-from simulator.serving.running import RunningFloor
+from multidrop.simulator.cells import load, read
+from multidrop.simulator.floor import Floor
+from multidrop.simulator.lexium.power import ETHERNET_BOOT
+from multidrop.simulator.serving.endpoints import serve_bus
+from multidrop.simulator.serving.in_process import connect
+from multidrop.simulator.serving.running import RunningFloor
 from tests.support.until import PATIENCE
 
 CELL = """

@@ -6,9 +6,9 @@ import asyncio
 
 import pytest
 
-from simulator.cells import read
-from simulator.floor import Floor
-from simulator.serving.running import LATEST, RunningFloor
+from multidrop.simulator.cells import read
+from multidrop.simulator.floor import Floor
+from multidrop.simulator.serving.running import LATEST, RunningFloor
 from tests.support.virtual import in_virtual_time
 
 CELL = '[[bus]]\nname = "w"\nbaud = 1200\n[[bus.drive]]\npersonality = "LMDCM"\n'

@@ -19,16 +19,16 @@ from pathlib import Path
 
 import pytest
 
-from dialects import Diagnostic
-from simulator.cells import load
-from simulator.floor import Floor
-from simulator.serving.command import reachable
-from simulator.serving.endpoints import Served, serve_bus
-from simulator.serving.in_process import connect
-from simulator.serving.running import RunningFloor
+from multidrop.dialects import Diagnostic
+from multidrop.simulator.cells import load
+from multidrop.simulator.floor import Floor
+from multidrop.simulator.serving.command import reachable
+from multidrop.simulator.serving.endpoints import Served, serve_bus
+from multidrop.simulator.serving.in_process import connect
+from multidrop.simulator.serving.running import RunningFloor
+from multidrop.transports import TransportLost
 from tests.support.paths import ROOT
 from tests.support.until import PATIENCE
-from transports import TransportLost
 
 CELL = """
 [[bus]]
@@ -406,7 +406,7 @@ async def test_a_bus_that_is_not_there_is_named(tmp_path: Path) -> None:
 
 PROGRAM = """
 import asyncio, sys
-from simulator.serving.command import serve
+from multidrop.simulator.serving.command import serve
 asyncio.run(serve(sys.argv[1], json=True, speed=float(sys.argv[2]), stdin=sys.stdin, stdout=sys.stdout))
 """
 

@@ -2,8 +2,8 @@
 
 import pytest
 
-from dialects import Diagnostic
-from simulator.cells import read
+from multidrop.dialects import Diagnostic
+from multidrop.simulator.cells import read
 
 CELL = '[[bus]]\nname = "slide"\n[[bus.drive]]\npersonality = "TMCM"\n'
 

@@ -2,7 +2,7 @@
 
 import pytest
 
-from dialects.tmcl.host import framing
+from multidrop.dialects.tmcl.host import framing
 from tests.support.tmcl_module import Module
 
 

@@ -4,8 +4,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dialects.tmcl.host import framing
-from dialects.tmcl.manual.commands import Call, Command
+from multidrop.dialects.tmcl.host import framing
+from multidrop.dialects.tmcl.manual.commands import Call, Command
 from tests.support.tmcl_module import Module
 
 WORKED = [
