@@ -68,7 +68,9 @@ def test_it_installs_without_a_compiler_and_runs_in_an_empty_home(built, which, 
     assert "no such file" in run(multidrop, "report", env=env)
     for name in ("shell", "drives", "transports", "macros", "tests"):  # a person's own files beside his program
         (tmp_path / f"{name}.py").write_text("raise SystemExit('imported')\n")
-    (tmp_path / "own.py").write_text("import multidrop\nwith multidrop.connect('sim:#press') as s: print(s.drive().send('PR VR'))\n")
+    (tmp_path / "own.py").write_text(
+        "import multidrop\nwith multidrop.connect('sim:#press') as s: print(s.drive().send('PR VR'))\n"
+    )
     assert "LMDCM" in run(tmp_path / "venv/bin/python", tmp_path / "own.py", env=env)
     assert all((tmp_path / "venv" / name).exists() for name in DATA)
 
@@ -84,8 +86,7 @@ def test_a_checkout_runs_and_its_editable_install_too(links, tmp_path):
     run(sys.executable, "-m", "venv", "--system-site-packages", tmp_path / "venv")
     python = tmp_path / "venv/bin/python"
     packages = os.pathsep.join(path for path in sys.path if path.endswith("site-packages"))
-    command = ["-m", "pip", "install", "--no-deps", "--no-build-isolation", "--no-index", "-e", tree]
-    run(python, *command, env=env | {"PYTHONPATH": packages})
+    run(python, "-m", "pip", "install", "--no-deps", "-e", tree, env=env)
     said = subprocess.run(
         [str(python), "-m", "multidrop", "send", "sim:#press", "PR VR"],
         env=env | {"PYTHONPATH": packages},
