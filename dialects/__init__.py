@@ -23,7 +23,7 @@ _MODULES = {
     "files": ("SourceLine",),
     "state": ("DriveState", "Owed"),
 }
-_PLACES = {name: f"dialects.{module}:{name}" for module, names in _MODULES.items() for name in names}
+_PLACES = {name: f"multidrop.dialects.{module}:{name}" for module, names in _MODULES.items() for name in names}
 __all__ = [
     "Codec",
     "Decoded",
