@@ -21,11 +21,11 @@ read = _READER.read
 
 def demo() -> Cell:
     """Read the cell that comes with the program."""
-    return read(_demo_text(), "demo cell", resources.files("simulator"))
+    return read(_demo_text(), "demo cell", resources.files("multidrop.simulator"))
 
 
 def _demo_text() -> str:
-    return resources.files("simulator").joinpath("demo.toml").read_text(encoding="utf-8")
+    return resources.files("multidrop.simulator").joinpath("demo.toml").read_text(encoding="utf-8")
 
 
 class Placed(NamedTuple):

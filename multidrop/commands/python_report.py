@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import os
 import sys
 import traceback
 from collections.abc import Callable, Coroutine, Iterator
@@ -22,8 +21,6 @@ from multidrop.shell.front.report import Report
 from multidrop.shell.scripts.model import ScriptLine
 from multidrop.shell.scripts.results import Result
 
-HOME = os.path.dirname(os.path.dirname(os.path.realpath(multidrop.__file__)))
-OURS = tuple(os.path.join(HOME, room, "") for room in ("multidrop", *multidrop.ROOMS))
 T = TypeVar("T")
 
 
@@ -122,17 +119,20 @@ def traceback_of(end: BaseException) -> list[str]:
     """The traceback without the frames of multidrop."""
     found = traceback.TracebackException.from_exception(end)
     each: traceback.TracebackException | None = found
+    ours = _ours()
     while each is not None:
         frames: list[traceback.FrameSummary] = list(each.stack)
-        inside = dropwhile(_is_ours, frames)
-        kept: list[traceback.FrameSummary] = list(takewhile(lambda frame: not _is_ours(frame), inside))
+        inside = dropwhile(lambda frame: frame.filename in ours, frames)
+        kept: list[traceback.FrameSummary] = list(takewhile(lambda frame: frame.filename not in ours, inside))
         each.stack = traceback.StackSummary.from_list(kept)
         each = each.__cause__ or each.__context__
     return "".join(found.format()).rstrip().splitlines()
 
 
-def _is_ours(frame: traceback.FrameSummary) -> bool:
-    return os.path.realpath(frame.filename).startswith(OURS)
+def _ours() -> set[str]:
+    """The files of multidrop that run."""
+    loaded = [module for name, module in sys.modules.items() if name.partition(".")[0] == multidrop.__name__]
+    return {getattr(module, "__file__", None) or "" for module in loaded}
 
 
 @contextlib.contextmanager

@@ -16,11 +16,10 @@ from functools import partial
 from pathlib import Path
 from types import CodeType, ModuleType
 
-import multidrop
 from multidrop import script
 from multidrop.api.blocking import Session
 from multidrop.commands.failure import fail
-from multidrop.commands.python_report import HOME, ReportedSession, place, replaced, result_of, traceback_of
+from multidrop.commands.python_report import ReportedSession, place, replaced, result_of, traceback_of
 from multidrop.dialects import Diagnostic, Stopped
 from multidrop.dialects.files import bytes_of
 from multidrop.shell.events import FAILURES
@@ -36,7 +35,6 @@ def run(chosen: argparse.Namespace, report: Report) -> int:
     file = chosen.script
     try:
         code = _compiled(file)
-        _check_names(Path(file))
     except Diagnostic as problem:
         report.wrong((problem,))
         return fail(problem)
@@ -51,14 +49,6 @@ def _compiled(file: str) -> CodeType:
         raise Diagnostic(f"{problem.msg}", f"{file}:{problem.lineno or 1}") from None
     except ValueError as problem:  # a NUL
         raise Diagnostic(f"is not Python: {problem}", file) from None
-
-
-def _check_names(file: Path) -> None:
-    """Raise Diagnostic for a module beside the program that has the name of one of ours."""
-    folder = file.resolve().parent
-    for room in multidrop.ROOMS if str(folder) != HOME else ():
-        if (folder / f"{room}.py").exists() or (folder / room / "__init__.py").exists():
-            raise Diagnostic(f"{room} is the name of a part of multidrop", str(folder), "rename that module")
 
 
 class _Execution:

@@ -266,7 +266,7 @@ def test_a_script_that_is_stopped_in_a_download_leaves_a_drive_that_listens(shop
     child.close()
     assert child.exitstatus == (4 if how == "the stop key" else 130)
     assert "SL" not in tap.written().decode("latin-1")
-    tap, url = tapped("slow", "party=1")
+    tap, url = tapped("slow", f"party=1&timeout={PATIENCE}")
     assert shop.done("send", url, "PR EM", "PR P", "PR BY") == (0, "1\n0\n0\n", "")
     assert b"PG" not in tap.written()
 

@@ -78,14 +78,17 @@ def test_an_uncaught_exception_shows_the_frames_of_the_program_only(run: Any) ->
 def test_what_is_wrong_beforehand_opens_nothing(run: Any, tmp_path: Path) -> None:
     done = run("x = (", "--on", "tcp://127.0.0.1:1")
     assert (done.returncode, done.stderr) == (2, "job.py:3: '(' was never closed\n")
-    (tmp_path / "drives.py").write_text("")
-    done = run("", "--on", "tcp://127.0.0.1:1")
-    assert done.returncode == 2 and "drives is the name of a part of multidrop; rename that module" in done.stderr
-    (tmp_path / "drives.py").unlink()
     done = run("print('never')", "--on", "tcp://127.0.0.1:1")
     assert (done.returncode, done.stdout) == (3, "") and "nothing listens there" in done.stderr
     done = run("", "--set", "a=1")
     assert done.returncode == 2 and "nothing to open" in done.stderr
+
+
+def test_files_of_a_person_beside_the_program_break_nothing(run: Any, tmp_path: Path) -> None:
+    for name in ("drives", "macros", "shell", "tests", "transports"):
+        (tmp_path / f"{name}.py").write_text(f"OWN = '{name}'")
+    done = run("import drives, shell\nprint(drives.OWN, shell.OWN, a.position)", "--on", "sim:cell.toml")
+    assert (done.returncode, done.stdout) == (0, "drives shell 0\n")
 
 
 def test_reports_of_what_was_sent_and_where(run: Any, tmp_path: Path) -> None:
