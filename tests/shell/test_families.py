@@ -5,13 +5,13 @@ from pathlib import Path
 
 import pytest
 
-import shell
 from multidrop.dialects.families import FAMILIES, TABLE
 from multidrop.shell.connect.url_forms import URL_FORMS
 from multidrop.shell.connect.urls import parse
 from tests.support.cases import for_each
+from tests.support.paths import ROOT
 
-FILES = sorted(Path(shell.__file__).parent.rglob("*.py"))
+FILES = sorted((ROOT / "shell").rglob("*.py"))
 
 
 def texts(file: Path) -> list[str]:
