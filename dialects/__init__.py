@@ -10,14 +10,25 @@ from typing import TYPE_CHECKING, Any
 from multidrop.dialects.on_demand import imported
 
 if TYPE_CHECKING:
-    from multidrop.dialects.codec import Codec, Decoded, End, Kind, Priority, Procedure, Reply, Request, StopPiece
+    from multidrop.dialects.codec import (
+        Codec,
+        Command,
+        Decoded,
+        End,
+        Kind,
+        Priority,
+        Procedure,
+        Reply,
+        Request,
+        StopPiece,
+    )
     from multidrop.dialects.errors import Diagnostic, DriveError, Inexpressible, NoAnswer, Refused, Stopped
     from multidrop.dialects.family import Family, Hints, Motion, Progress
     from multidrop.dialects.files import SourceLine
     from multidrop.dialects.state import DriveState, Owed
 
 _MODULES = {
-    "codec": ("Codec", "Decoded", "End", "Kind", "Priority", "Procedure", "Reply", "Request", "StopPiece"),
+    "codec": ("Codec", "Command", "Decoded", "End", "Kind", "Priority", "Procedure", "Reply", "Request", "StopPiece"),
     "errors": ("Diagnostic", "DriveError", "Inexpressible", "NoAnswer", "Refused", "Stopped"),
     "family": ("Family", "Hints", "Motion", "Progress"),
     "files": ("SourceLine",),
@@ -26,6 +37,7 @@ _MODULES = {
 _PLACES = {name: f"multidrop.dialects.{module}:{name}" for module, names in _MODULES.items() for name in names}
 __all__ = [
     "Codec",
+    "Command",
     "Decoded",
     "Diagnostic",
     "DriveError",

@@ -11,10 +11,10 @@ its result and raises what a person must read. A line, a bus or a test can run i
 from __future__ import annotations
 
 import re
-from collections.abc import Generator, Sequence
+from collections.abc import Callable, Generator, Sequence
 from dataclasses import dataclass, field, replace
 from enum import Enum, IntEnum
-from typing import NamedTuple, Protocol, TypeVar
+from typing import Any, NamedTuple, Protocol, TypeVar
 
 
 class Kind(Enum):
@@ -46,6 +46,30 @@ class End(Enum):
     DAMAGED = "damaged"
     TIMEOUT = "no reply"
     STOPPED = "stopped"
+
+
+T = TypeVar("T")
+
+
+class Command(str):
+    """A line typed for a drive. Each grammar reads it once: the result goes with the text to the conversation.
+
+    What depends on the drive (guard, start of a motion, target) is asked of the family when the line's turn comes.
+    """
+
+    __slots__ = ("_read",)
+    _read: dict[Callable[[str], Any], Any]
+
+    def read_by(self, grammar: Callable[[str], T]) -> T:
+        """Return what this function reads in the line; it is called once."""
+        try:
+            known = self._read
+        except AttributeError:
+            known = self._read = {}
+        if grammar not in known:
+            known[grammar] = grammar(self)
+        found: T = known[grammar]
+        return found
 
 
 @dataclass(frozen=True)
@@ -129,9 +153,6 @@ class Decoded:
     used: int
     strays: tuple[str, ...] = ()
     """Lines in between that are not part of the reply: a running program's prints."""
-
-
-T = TypeVar("T")
 
 
 def _with(frozen: T, **changes: object) -> T:

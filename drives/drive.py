@@ -9,6 +9,7 @@ from typing import Any, Protocol, TypeVar
 
 from multidrop.dialects import (
     Codec,
+    Command,
     DriveError,
     DriveState,
     Family,
@@ -208,7 +209,8 @@ class Drive:
     # What is sent
 
     async def send(self, text: str) -> tuple[str, ...]:
-        """Send a line in the drive's own language; return what it printed."""
+        """Send a line in the drive's own language (a `Command` if it was parsed before); return what it printed."""
+        text = text if isinstance(text, Command) else Command(text)
         if not self.starts(text):
             return await self._send(text)
         before = {each: each.commanded_at for each in self._meant}

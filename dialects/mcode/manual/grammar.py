@@ -19,6 +19,7 @@ from dataclasses import dataclass, field
 from math import inf
 from typing import NamedTuple
 
+from multidrop.dialects.codec import Command
 from multidrop.dialects.mcode.manual.errors import ErrorNumber
 from multidrop.dialects.mcode.manual.table import MDRIVE, MNEMONICS, lookup
 
@@ -157,6 +158,10 @@ def is_name(word: str) -> bool:
 
 def tokens(line: str) -> list[Token]:
     """Return all tokens of a line, remark included, without spaces. Never fails."""
+    return list(line.read_by(_tokens) if isinstance(line, Command) else _tokens(line))
+
+
+def _tokens(line: str) -> list[Token]:
     found = []
     for match in _TOKEN.finditer(line):
         kind = match.lastgroup or "bad"
@@ -175,7 +180,8 @@ def strip(line: str) -> str:
     for token in tokens(line):
         if token.kind == "remark":
             return line[: token.start].strip()
-    return line.strip()
+    bare = line.strip()
+    return line if bare == line else bare
 
 
 def statement_tokens(line: str, names: Container[str] = ()) -> list[Token]:
@@ -188,12 +194,22 @@ def parse(line: str, names: Container[str] = ()) -> Statement | None:
 
     Raises LineError.
     """
+    found = line.read_by(_read) if isinstance(line, Command) and not names else _read(line, names)
+    if isinstance(found, LineError):
+        raise found
+    return found
+
+
+def _read(line: str, names: Container[str] = ()) -> Statement | LineError | None:
     found = statement_tokens(line, names)
     if not found:
         return None
     if len(found) > MOST_TOKENS:
-        raise LineError(ErrorNumber.ILLEGAL_DATA, found[MOST_TOKENS].start, "the line is too long")
-    return _Parser(found, len(line), names).statement()
+        return LineError(ErrorNumber.ILLEGAL_DATA, found[MOST_TOKENS].start, "the line is too long")
+    try:
+        return _Parser(found, len(line), names).statement()
+    except LineError as error:
+        return error
 
 
 def check_groups(line: str, names: Container[str] = ()) -> None:

@@ -98,7 +98,8 @@ def scan(text: str) -> tuple[list[ProgramLine], list[Problem]]:
 def bare(line: str) -> str:
     """Return a line without its remark, indent and trailing blanks; tabs between words become blanks."""
     parts = line[: remark_at(line)].split('"')
-    return '"'.join(part if at % 2 else part.replace("\t", " ") for at, part in enumerate(parts)).strip(" ")
+    found = '"'.join(part if at % 2 else part.replace("\t", " ") for at, part in enumerate(parts)).strip(" ")
+    return line if found == line else found
 
 
 def remark_at(line: str) -> int:

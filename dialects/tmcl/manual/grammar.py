@@ -9,6 +9,7 @@ from __future__ import annotations
 import difflib
 import re
 
+from multidrop.dialects.codec import Command
 from multidrop.dialects.tmcl.manual.commands import BANK, INT32, MOTOR, MOTORS, TYPE, VALUE, WORDS, Call, Row
 
 BYTE = range(256)
@@ -24,6 +25,20 @@ class LineError(ValueError):
 
 def parse(text: str) -> Call:
     """The command in a line. Raises LineError."""
+    found = text.read_by(_read) if isinstance(text, Command) else _read(text)
+    if isinstance(found, LineError):
+        raise found
+    return found
+
+
+def _read(text: str) -> Call | LineError:
+    try:
+        return _parsed(text)
+    except LineError as error:
+        return error
+
+
+def _parsed(text: str) -> Call:
     word, _, rest = text.strip().partition(" ")
     fields = [field.strip() for field in rest.split(",")] if rest.strip() else []
     if word.isascii() and word.isdigit():

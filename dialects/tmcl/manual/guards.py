@@ -48,7 +48,7 @@ def find(text: str, address: str) -> Guard | None:
     """Find the guard of a line for a module; None: the line needs no agreement, as an invalid one."""
     line = text.strip()
     try:
-        call = grammar.parse(line)
+        call = grammar.parse(text)
     except grammar.LineError:
         return None
     if name := _name(call):
@@ -59,7 +59,7 @@ def find(text: str, address: str) -> Guard | None:
 def only_ends(text: str) -> bool:
     """Whether a line is a command of motion that can only end it: a velocity of 0."""
     try:
-        return _is_rest(grammar.parse(text.strip()))
+        return _is_rest(grammar.parse(text))
     except grammar.LineError:
         return False
 
