@@ -23,7 +23,7 @@ from report import Row, compared, main
 from sim_process import served
 
 from multidrop.dialects.mcode.host.checksum import sealed
-from multidrop.dialects.mcode.manual.device_name import NAMES
+from multidrop.dialects.mcode.manual.statements import NAMES
 from multidrop.shell.connect.opening import open_buses
 from multidrop.shell.connect.settings import Settings
 from multidrop.shell.connect.urls import parse

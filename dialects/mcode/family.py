@@ -52,6 +52,6 @@ MCODE = Family(
     remember=remember,
     scan_at="multidrop.dialects.mcode.host.scan:SCAN",
     conditions_at="multidrop.dialects.mcode.host.conditions:READER",
-    controls_at="multidrop.dialects.mcode.manual.controls:controls",
+    controls_at="multidrop.dialects.mcode.manual.sentences:controls",
     stop_bytes=STOP_BYTES,
 )

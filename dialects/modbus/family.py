@@ -62,5 +62,5 @@ MODBUS = Family(
     guards=Guards(guards.NAMES, guarded, guards.word_of, guards.only_ends),
     prepare=pdu_codec,
     conditions_at="multidrop.dialects.modbus.host.conditions:READER",
-    controls_at="multidrop.dialects.mcode.manual.controls:controls",
+    controls_at="multidrop.dialects.mcode.manual.sentences:controls",
 )

@@ -9,7 +9,7 @@ from __future__ import annotations
 from functools import lru_cache, partial
 from typing import NamedTuple
 
-from multidrop.dialects.mcode.manual.error_texts import text as error_text
+from multidrop.dialects.mcode.manual.errors import text as error_text
 from multidrop.dialects.mcode.manual.grammar import LineError, parse, strip
 from multidrop.simulator.cell.spec import DriveSpec
 from multidrop.simulator.lexium import set_up

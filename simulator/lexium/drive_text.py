@@ -6,10 +6,8 @@ import re
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 
-from multidrop.dialects.mcode.manual.canonical import canonical
-from multidrop.dialects.mcode.manual.device_name import UNNAMED
 from multidrop.dialects.mcode.manual.grammar import LineError, parse
-from multidrop.dialects.mcode.manual.line_size import size_of
+from multidrop.dialects.mcode.manual.statements import UNNAMED, canonical, size_of
 from multidrop.dialects.mcode.manual.table import lookup
 from multidrop.dialects.parameters import VARIABLES, Reading, Scalar, Value, same
 from multidrop.dialects.snapshots import Snapshot

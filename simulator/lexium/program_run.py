@@ -16,12 +16,13 @@ from typing import Any, NamedTuple
 
 from multidrop.dialects import Diagnostic
 from multidrop.dialects.files import split_lines
-from multidrop.dialects.mcode.manual import error_texts, program_file
+from multidrop.dialects.mcode.manual import program_file
 from multidrop.dialects.mcode.manual.errors import ErrorNumber
+from multidrop.dialects.mcode.manual.errors import text as text_of_error
 from multidrop.dialects.mcode.manual.grammar import LineError, Name, Number, Statement, parse, words
-from multidrop.dialects.mcode.manual.line_size import size_of
+from multidrop.dialects.mcode.manual.help import remedy
 from multidrop.dialects.mcode.manual.program_file import ProgramLine
-from multidrop.dialects.mcode.manual.remedies import remedy
+from multidrop.dialects.mcode.manual.statements import size_of
 from multidrop.dialects.numbers import whole
 from multidrop.dialects.problems import Problem, errors
 from multidrop.simulator.cell.spec import DriveSpec
@@ -209,7 +210,7 @@ class Failed:
     @property
     def meaning(self) -> str:
         """The error's code and its meaning."""
-        return f"error {self.code}, {error_texts.text(self.code, self.personality)}"
+        return f"error {self.code}, {text_of_error(self.code, self.personality)}"
 
 
 @dataclass(frozen=True)

@@ -13,9 +13,9 @@ from hypothesis import strategies as st
 from multidrop.dialects import Diagnostic
 from multidrop.dialects.families import program_languages
 from multidrop.dialects.files import split_lines
-from multidrop.dialects.mcode.manual.canonical import canonical
 from multidrop.dialects.mcode.manual.grammar import LineError, Statement, parse
 from multidrop.dialects.mcode.manual.program_file import scan
+from multidrop.dialects.mcode.manual.statements import canonical
 from multidrop.dialects.pmx.manual.program_file import compiled
 from multidrop.dialects.pmx.manual.program_file import read as read_script
 from multidrop.dialects.program_editing import Block, replaced

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from random import Random
 
-from multidrop.dialects.mcode.manual import parameter_checks as checks
+from multidrop.dialects.mcode.manual import parameter_plan as checks
 from multidrop.dialects.mcode.manual import parameters as manual
 from multidrop.dialects.mcode.manual.parameters import Setting
 

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 from multidrop.dialects.codec import Kind
 from multidrop.dialects.family import Referencing
-from multidrop.dialects.mcode.manual.device_name import device_name
 from multidrop.dialects.mcode.manual.grammar import Argument, LineError, Name, Number, Statement, Text, parse, tokens
+from multidrop.dialects.mcode.manual.statements import device_name
 from multidrop.dialects.mcode.manual.table import PRINTS_LINES, lookup
 from multidrop.dialects.state import DriveState
 

@@ -19,8 +19,8 @@ from multidrop.dialects.mcode.host.quiet_times import SHORT, SILENT, quiet_time
 from multidrop.dialects.mcode.host.reply_lines import ENDLESS, ReplyLines, divided
 from multidrop.dialects.mcode.host.reply_parser import ReplyParser
 from multidrop.dialects.mcode.host.short_reply import only_strays, short_reply
-from multidrop.dialects.mcode.manual.device_name import UNNAMED
 from multidrop.dialects.mcode.manual.program_file import LONGEST, bare, unsendable
+from multidrop.dialects.mcode.manual.statements import UNNAMED
 
 ESCAPE, CONTROL_E = b"\x1b", b"\x05"
 GLOBAL = ("*", "^")

@@ -15,7 +15,7 @@ from multidrop.dialects.mcode.host.exchange import answered, refused
 from multidrop.dialects.mcode.host.resync import activate_party, look_in, places_after
 from multidrop.dialects.mcode.host.state import MCodeState, Place
 from multidrop.dialects.mcode.host.wording import who
-from multidrop.dialects.mcode.manual.device_name import UNNAMED
+from multidrop.dialects.mcode.manual.statements import UNNAMED
 
 __all__ = ["activate_party", "set_wire"]
 

@@ -22,8 +22,8 @@ from multidrop.dialects.mcode.host.listing import (
 from multidrop.dialects.mcode.host.operations import immediate
 from multidrop.dialects.mcode.host.replacing import clears_itself
 from multidrop.dialects.mcode.host.state import MCodeState
-from multidrop.dialects.mcode.manual.canonical import canonical
 from multidrop.dialects.mcode.manual.grammar import Argument, Compare, LineError, Name, Number, Statement, Unary, parse
+from multidrop.dialects.mcode.manual.statements import canonical
 from multidrop.dialects.mcode.manual.table import lookup
 
 HOLDING = ("variable", "flag")

@@ -31,7 +31,7 @@ from multidrop.dialects.mcode.host.resync import BRIEF
 from multidrop.dialects.mcode.host.state import MCodeState, Place, Unconfirmed
 from multidrop.dialects.mcode.host.stopped import overflow, written
 from multidrop.dialects.mcode.host.wording import who
-from multidrop.dialects.mcode.manual.device_name import UNNAMED
+from multidrop.dialects.mcode.manual.statements import UNNAMED
 from multidrop.dialects.state import Remembered
 
 SEARCH = "multidrop scan PORT tries every name and baud rate"

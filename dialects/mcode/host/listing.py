@@ -17,7 +17,7 @@ from multidrop.dialects.files import SourceLine
 from multidrop.dialects.held import Held, Stored
 from multidrop.dialects.mcode.host import classify
 from multidrop.dialects.mcode.manual.grammar import Compare, LineError, Name, Statement, parse
-from multidrop.dialects.mcode.manual.line_size import size_of
+from multidrop.dialects.mcode.manual.statements import size_of
 
 GAP = 64
 """Bytes between the addresses of two lines, more than one line takes: another program begins."""

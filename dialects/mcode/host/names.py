@@ -9,7 +9,7 @@ from multidrop.dialects.mcode.host.listing import LABEL, Called, names_of
 from multidrop.dialects.mcode.host.parameters import GLOBAL, listed
 from multidrop.dialects.mcode.host.state import MCodeState
 from multidrop.dialects.mcode.host.wording import who
-from multidrop.dialects.mcode.manual import help, name_places
+from multidrop.dialects.mcode.manual import editing, help
 
 
 def read(state: MCodeState) -> Procedure[Held]:
@@ -31,7 +31,7 @@ def offered(held: Held, line: str) -> list[tuple[str, str]]:
     names = names_of(held)
     return [
         (name, _meaning(called))
-        for labels in name_places.LABELS_AT[name_places.expected(head)]
+        for labels in editing.LABELS_AT[editing.expected(head)]
         for name, called in names.items()
         if (called.kind == LABEL) is labels and name.startswith(word.upper())
     ]

@@ -23,7 +23,7 @@ from multidrop.dialects.mcode.host.state import MCodeState
 from multidrop.dialects.mcode.host.wording import who
 from multidrop.dialects.mcode.manual import grammar
 from multidrop.dialects.mcode.manual.mnemonic import EXPANDED
-from multidrop.dialects.mcode.manual.status import EXPANDED_INPUTS, INPUTS, STATUS, in_words
+from multidrop.dialects.mcode.manual.points import EXPANDED_INPUTS, INPUTS, STATUS, in_words
 
 GLOBAL = ("*", "^")
 

@@ -17,7 +17,7 @@ from multidrop.dialects.mcode.host.checksum import sealed
 from multidrop.dialects.mcode.host.codec import NOBODY, MCode
 from multidrop.dialects.mcode.host.resync import BRIEF
 from multidrop.dialects.mcode.host.stopped import overflow, written
-from multidrop.dialects.mcode.manual.device_name import NAMES
+from multidrop.dialects.mcode.manual.statements import NAMES
 
 CLEARS = (
     "stops every drive and its program, makes half a line in a drive overflow (error 20) and sends PG, an error "

@@ -22,7 +22,7 @@ from multidrop.dialects.mcode.host.printed import NOTHING
 from multidrop.dialects.mcode.host.quiet_times import SLOWEST
 from multidrop.dialects.mcode.host.signatures import fresh
 from multidrop.dialects.mcode.host.state import MCodeState, Place
-from multidrop.dialects.mcode.manual.device_name import UNNAMED
+from multidrop.dialects.mcode.manual.statements import UNNAMED
 
 PROGRAM_PROMPT = re.compile(rb"\n\d{1,9}  $|[\x06\x15]\d{1,9}  $")
 TRIES, SILENCES, NAKS, STORED = 4, 2, 2, 2

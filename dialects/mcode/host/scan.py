@@ -35,7 +35,7 @@ from multidrop.dialects.mcode.host.identity import find
 from multidrop.dialects.mcode.host.resync import BRIEF, PROGRAM_PROMPT
 from multidrop.dialects.mcode.host.state import MCodeState, Place
 from multidrop.dialects.mcode.host.stopped import overflow
-from multidrop.dialects.mcode.manual.device_name import NAMES
+from multidrop.dialects.mcode.manual.statements import NAMES
 from multidrop.dialects.scanning import Found, Outcome, Reach, Scan, Step
 
 QUESTION = b"PR VR"

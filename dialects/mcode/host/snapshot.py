@@ -16,9 +16,9 @@ from multidrop.dialects.mcode.host.attend import attend
 from multidrop.dialects.mcode.host.exchange import answered
 from multidrop.dialects.mcode.host.signatures import question, value
 from multidrop.dialects.mcode.host.state import MCodeState
-from multidrop.dialects.mcode.manual.device_name import UNNAMED
 from multidrop.dialects.mcode.manual.parameters import exact
-from multidrop.dialects.mcode.manual.status import EXPANDED_INPUTS, INPUTS
+from multidrop.dialects.mcode.manual.points import EXPANDED_INPUTS, INPUTS
+from multidrop.dialects.mcode.manual.statements import UNNAMED
 from multidrop.dialects.mcode.manual.table import words
 from multidrop.dialects.parameters import Progress, Readings
 from multidrop.dialects.snapshots import Levels, Snapshot

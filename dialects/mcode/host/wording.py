@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from multidrop.dialects.codec import Request
-from multidrop.dialects.mcode.manual import error_texts
+from multidrop.dialects.mcode.manual import errors
 from multidrop.dialects.state import DriveState
 
 
@@ -19,5 +19,5 @@ def unknown(state: DriveState, request: Request) -> str:
 
 def described(code: int, state: DriveState) -> str:
     """Number, meaning and remedy of an error."""
-    advice = error_texts.hint(code, state.product)
-    return f"error {code}: {error_texts.text(code, state.product)}" + (f" ({advice})" if advice else "")
+    advice = errors.hint(code, state.product)
+    return f"error {code}: {errors.text(code, state.product)}" + (f" ({advice})" if advice else "")

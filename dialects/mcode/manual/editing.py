@@ -2,22 +2,170 @@
 
 from __future__ import annotations
 
-from collections.abc import Container, Iterable, Iterator, Sequence
+from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
+from functools import lru_cache
+from typing import NamedTuple
 
 from multidrop.dialects.errors import Diagnostic
 from multidrop.dialects.files import split_lines
-from multidrop.dialects.mcode.manual import help, program_names
-from multidrop.dialects.mcode.manual.grammar import statement_tokens
-from multidrop.dialects.mcode.manual.line_parts import MOVES
-from multidrop.dialects.mcode.manual.mnemonic import Mnemonic
-from multidrop.dialects.mcode.manual.name_places import LABEL, LABELS_AT, NEW, PRINTED, STATEMENT, expected
-from multidrop.dialects.mcode.manual.program_file import ProgramLine, remark_at, scan
-from multidrop.dialects.program_editing import Block, Offer, Span, UserName, Word
+from multidrop.dialects.mcode.manual import help
+from multidrop.dialects.mcode.manual.grammar import NAME_FORM, Token, divided, is_name, statement_tokens, tokens
+from multidrop.dialects.mcode.manual.mnemonic import EVERY, Mnemonic
+from multidrop.dialects.mcode.manual.program_file import LONGEST, MOVES, ProgramLine, bare, remark_at, scan
+from multidrop.dialects.mcode.manual.program_flow import AT_POWER_UP, PLACES
+from multidrop.dialects.mcode.manual.table import lookup
+from multidrop.dialects.program_editing import Block, Offer, Span, UserName, Word, replaced
 
-names = program_names.names
-remark = program_names.remark
-fixed = program_names.fixed
-renamed = program_names.renamed
+STATEMENT, NEW, LABEL, PRINTED, VALUE = "statement", "new", "label", "printed", "value"
+"""A head; a name that is not there yet; the label of a place; an item of PR; any other argument."""
+LABELS_AT: Mapping[str, tuple[bool, ...]] = {
+    STATEMENT: (False,),
+    NEW: (),
+    LABEL: (True,),
+    PRINTED: (False, True),
+    VALUE: (False,),
+}
+"""The kinds of names at each place, in order: True for labels, False for variables."""
+_TARGETS: Mapping[str, int] = {**PLACES, "EX": 0}
+"""Words that take a label, and the number of commas before it."""
+
+
+def expected(before: str) -> str:
+    """Return what may follow `before`: a begun line without its last word."""
+    found = tokens(before)
+    if not found or found[-1].kind == "remark":
+        return STATEMENT
+    head, commas = found[0].text.upper(), sum(each.kind == "comma" for each in found)
+    if head in ("LB", "VA"):
+        return VALUE if head == "VA" and len(found) > 2 else NEW
+    if commas == _TARGETS.get(head) and found[-1].text in (found[0].text, "=", ","):
+        return LABEL
+    return PRINTED if head == "PR" else VALUE
+
+
+# The labels and variables of an MCode program file: where each is, and the check of another name for one.
+#
+# A rename keeps the program: every line has the tokens that it had, but for that name. A drive may divide a line
+# differently once a name exists or is gone: `H5` is `H 5` unless H5 is a variable. So the check compares all lines.
+
+
+class _Line(NamedTuple):
+    """A line of a file: its text without remark, the column of that from 0, the name that it declares, its tokens."""
+
+    text: str
+    column: int
+    declares: str
+    tokens: list[Token]
+
+
+@lru_cache(maxsize=16384)
+def _read(source: str) -> _Line:
+    """Read a line; it is kept, as an editor asks for all lines again after every key."""
+    text = bare(source)
+    column = len(source) - len(source.lstrip(" \t"))
+    return _Line(text, column, ProgramLine(0, text, "").declares, tokens(text))
+
+
+def names(text: str) -> list[UserName]:
+    """Return the labels and variables of a file."""
+    sources = split_lines(text)
+    lines = [_read(source) for source in sources]
+    words = _declared_names(lines)
+    labels = {line.declares for line in lines if line.text[:2].upper() == "LB"}
+    places: dict[str, list[Span]] = {}
+    declared: dict[str, list[Span]] = {}
+    for at, line in enumerate(lines):
+        for number, token in _uses(line, words):
+            word, start = token.text.upper(), line.column + token.start
+            place = Span(at, start, start + len(token.text))
+            places.setdefault(word, []).append(place)
+            if number <= 2 and word == line.declares:  # LB G1, LB=G1
+                declared.setdefault(word, []).append(place)
+
+    def named(word: str) -> UserName:
+        kind, there = "label" if word in labels else "variable", declared.get(word, [])
+        return UserName(word, kind, tuple(there), tuple(places[word]), remark(sources[there[0].line]) if there else "")
+
+    return [named(word) for word in places]
+
+
+def _declared_names(lines: Iterable[_Line]) -> frozenset[str]:
+    return frozenset(line.declares for line in lines if line.declares)
+
+
+def remark(line: str) -> str:
+    """Return the text of the remark of a line; empty if it has none."""
+    return line[remark_at(line) + 1 :].strip()
+
+
+def _uses(line: _Line, words: Container[str]) -> Iterator[tuple[int, Token]]:
+    """Yield the tokens of a line that are one of the words, each with its number; the letter after DN is none."""
+    found = divided(line.tokens, words)
+    names_device = bool(found) and found[0].text.upper() == "DN"
+    for number, token in enumerate(found):
+        if token.kind == "word" and token.text.upper() in words and not (names_device and number):
+            yield number, token
+
+
+def fixed(name: UserName) -> str:
+    """Return why a name cannot be another one; empty if it can."""
+    if name.word == AT_POWER_UP:
+        return f"{AT_POWER_UP} is the label of the program that runs at power-up: by another name it would not run"
+    return ""
+
+
+def renamed(text: str, name: UserName, new: str, product: str) -> str:
+    """Return the new name as given. Raises Diagnostic for one that is not a name, is in use, or changes the program."""
+    if reason := fixed(name):
+        raise Diagnostic(reason)
+    word = new.upper()
+    if not is_name(new):
+        raise Diagnostic(f"{new!r} is not a name", "", NAME_FORM)
+    if word == name.word:
+        return new
+    if lookup(word) is not None:
+        raise Diagnostic(_taken(word, product), "", "choose another name")
+    sources = split_lines(text)
+    for number, source in enumerate(sources, 1):
+        if any(_uses(_read(source), (word,))):
+            raise Diagnostic(f"{word} is in use already, in line {number}", "", "choose another name")
+    _compare(sources, replaced(sources, name.places, new), name.word, word)
+    return new
+
+
+def _taken(word: str, product: str) -> str:
+    """Name the owner of a word in use: the drive, or the program."""
+    row = lookup(word, product)
+    if row is not None:
+        return f"{word} is a word of the drive: {row.title}"
+    return f"{word} is a word of {', '.join(sorted(each for each in EVERY if lookup(word, each)))}"
+
+
+def _compare(before: Sequence[str], after: Sequence[str], old: str, new: str) -> None:
+    """Raise Diagnostic for a line that a rename makes too long, or that the drive would divide differently."""
+    lines = [_read(source) for source in before]
+    words = _declared_names(lines)
+    others = words - {old} | {new}
+    for number, (line, other) in enumerate(zip(lines, map(_read, after), strict=True), 1):
+        if len(other.text) > LONGEST >= len(line.text):
+            what = f"line {number} would have {len(other.text)} characters; a drive takes {LONGEST}"
+            raise Diagnostic(what, "", "choose a shorter name, or split the line")
+        if _tokens(line, words, {old: new}) != _tokens(other, others, {}):
+            raise Diagnostic(f"line {number} would mean something else with {new}", "", "choose another name")
+
+
+def _tokens(line: _Line, words: frozenset[str], new: Mapping[str, str]) -> list[str]:
+    """Return the tokens of a line, its names in capitals and renamed."""
+    found = [token.text for token in divided(line.tokens, words)]
+    for number, token in _uses(line, words):
+        upper = token.text.upper()
+        found[number] = new.get(upper, upper)
+    return found
+
+
+# MCode program files in an editor: the `EditingLanguage` of the language.
+
+
 _ACCESS = {"RW", "RO", "RC"}
 """Of words that PR prints."""
 

@@ -8,9 +8,10 @@ from __future__ import annotations
 import re
 
 from multidrop.dialects.errors import Diagnostic
-from multidrop.dialects.mcode.manual import error_texts
-from multidrop.dialects.mcode.manual.conditions import condition_of, is_mixed, reading
-from multidrop.dialects.mcode.manual.grammar import LineError, parse
+from multidrop.dialects.mcode.manual import errors
+from multidrop.dialects.mcode.manual.errors import ErrorNumber
+from multidrop.dialects.mcode.manual.grammar import LineError, Number, Statement, parse, tokens
+from multidrop.dialects.mcode.manual.statements import condition_of, condition_reading, is_mixed, words_of
 from multidrop.dialects.mcode.manual.table import EVERY, LEXIUM, MDRIVE, MDRIVE_PLUS, MNEMONICS, Mnemonic, lookup, words
 
 ACCESS = {
@@ -63,17 +64,17 @@ def describe_error(code: int, product: str = "") -> list[str]:
     Raises Diagnostic for a number without a meaning.
     """
     found: dict[str, list[str]] = {}
-    for family in [product] if product else error_texts.TEXTS:
-        found.setdefault(error_texts.text(code, family), []).append(family)
+    for family in [product] if product else errors.TEXTS:
+        found.setdefault(errors.text(code, family), []).append(family)
     lines = []
     for text, families in found.items():
         where = f" ({', '.join(families)})" if len(found) > 1 else ""
-        if text != error_texts.UNKNOWN:
+        if text != errors.UNKNOWN:
             lines.append(f"error {code}{where}: {text}")
     if not lines:
         what = f"no error {code} on {product}" if product else f"no error {code}"
-        raise Diagnostic(what, "", f"they are 0 to {max(map(max, error_texts.TEXTS.values()))}, with gaps")
-    advice = error_texts.hint(code, product)
+        raise Diagnostic(what, "", f"they are 0 to {max(map(max, errors.TEXTS.values()))}, with gaps")
+    advice = errors.hint(code, product)
     return [*lines, f"  do         {advice}"] if advice else lines
 
 
@@ -123,7 +124,7 @@ def _reading(text: str) -> str:
     except LineError:
         return ""
     condition = condition_of(statement) if statement is not None else None
-    return f"read as {reading(condition)}" if condition is not None and is_mixed(condition) else ""
+    return f"read as {condition_reading(condition)}" if condition is not None and is_mixed(condition) else ""
 
 
 def _row(word: str, product: str) -> Mnemonic | None:
@@ -208,3 +209,53 @@ def _here(row: Mnemonic, product: str) -> str:
     if product not in EVERY or product in row.products:
         return ""
     return f"not in an {product}: error 37" if product in row.reserved_on else f"a free name in an {product}"
+
+
+# What to do about a line that a drive refuses: the word's range, its form or its products, else the error's remedy.
+
+
+SPOKEN_OF_FORM = frozenset({ErrorNumber.OUT_OF_RANGE, ErrorNumber.ILLEGAL_DATA, ErrorNumber.NO_SEPARATOR})
+"""Errors about what follows a word."""
+
+
+def remedy(code: int, text: str, product: str) -> str:
+    """Return what to do about a line that a product refuses with this error; empty where that is not known."""
+    try:
+        statement = parse(text)
+    except LineError:
+        statement = None
+    row = lookup(statement.word, product) if statement is not None else None
+    if statement is None or row is None:
+        return errors.hint(code, product)
+    if code == ErrorNumber.NOT_AVAILABLE:
+        return _others(statement, product) or errors.hint(code, product)
+    if code == ErrorNumber.OUT_OF_RANGE and (valid := out_of_range(statement, product)):
+        return valid
+    return form_of(row.name, product) if code in SPOKEN_OF_FORM else errors.hint(code, product)
+
+
+def _others(statement: Statement, product: str) -> str:
+    """The products for which the first word is that this product lacks; empty where it lacks none."""
+    for word in words_of(statement):
+        row = lookup(word, product)
+        if row is not None and row.products and product not in row.products:
+            return f"{row.name} is for {', '.join(sorted(row.products))}"
+    return ""
+
+
+def form_of(text: str, product: str) -> str:
+    """Return the form of the statements with the word at the head of a line; empty where there is no such word."""
+    head = next(iter(tokens(text)), None)
+    row = lookup(head.text, product) if head is not None and head.kind == "word" else None
+    return f"the form is {row.syntax}" if row is not None and row.syntax else ""
+
+
+def out_of_range(statement: Statement, product: str) -> str:
+    """The numbers that a statement's word takes, if its one argument is a number and none of them; else empty."""
+    row = lookup(statement.word, product)
+    numbers = [each.value for each in statement.arguments if isinstance(each, Number)]
+    if row is None or len(numbers) != 1 or len(statement.arguments) != 1:
+        return ""
+    if row.accepts(numbers[0]) or row.accepts(numbers[0], encoder=True):
+        return ""
+    return f"{row.name} takes {', '.join(map(str, row.values)) if row.values else f'{row.low} to {row.high}'}"

@@ -8,17 +8,30 @@ has the words of its table only, and those of firmware 6 only from that firmware
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from enum import Enum
 from functools import lru_cache
+from math import isfinite
 
-from multidrop.dialects.mcode.manual.mnemonic import CLOSED_LOOP, ENCODER, EVERY, LEXIUM, MDRIVE_ENCODER, Mnemonic
-from multidrop.dialects.mcode.manual.table import words
-from multidrop.dialects.mcode.manual.table_system import COMMUNICATION
-from multidrop.dialects.parameters import IO, PARAMETERS, VARIABLES, Reading, Value
+from multidrop.dialects.errors import Diagnostic
+from multidrop.dialects.mcode.manual.grammar import is_name
+from multidrop.dialects.mcode.manual.mnemonic import (
+    CLOSED_LOOP,
+    ENCODER,
+    EVERY,
+    FLOAT_HIGH,
+    INT_HIGH,
+    INT_LOW,
+    LEXIUM,
+    MDRIVE_ENCODER,
+    Mnemonic,
+)
+from multidrop.dialects.mcode.manual.table import lookup, words
+from multidrop.dialects.mcode.manual.table_system import COMMUNICATION_WORDS
+from multidrop.dialects.parameters import COMMUNICATION, IO, PARAMETERS, VARIABLES, Reading, Scalar, Value, number
 
-WIRE = frozenset(row.name for row in COMMUNICATION)
+WIRE = frozenset(row.name for row in COMMUNICATION_WORDS)
 """Communication settings."""
 STATES = frozenset({"C1", "C2", "ER", "IF", "P", "ST", "TE"})
 """Words that can be written and are no settings."""
@@ -168,3 +181,184 @@ def form_of(row: Mnemonic) -> Form:
         return Form.FRACTION
     small = isinstance(row.high, int) and row.low >= 0 and row.high <= 9
     return Form.DIGIT if small else Form.WHOLE
+
+
+# The rules for writing one setting of an MCode drive: the line, its range, and what needs a person's word.
+#
+# A plain restore leaves alone what can move the motor or start a program by itself, what belongs to the motor unit,
+# and what sets up communication. `risk` gives the reason. (MCode reference, section 5; rulings in docs/rulings.md.)
+
+
+TORQUE = 3
+"""The hMT mode that turns the motor by itself."""
+GO, JOG_PLUS, JOG_MINUS, RESET = 4, 7, 8, 11
+"""Types of inputs that start a program, turn the motor, or restart the drive."""
+CLOCKS = frozenset({13, 14, 15, 33, 34, 35, 49, 50, 51})
+"""Types of points that are a clock; both points of a pair have one."""
+SHARED = frozenset({0, 16}) | CLOCKS
+"""Types that several points may have."""
+FIELDS = {"PF": 4, "PW": 4}
+PAIRED = frozenset({"S5", "S7", "S8", "S13"})
+"""Points of an MDrivePlus whose set-up has two fields; others have three."""
+PRINT_FORMAT = (16, 16, 1, 1)
+"""The highest fields of PF."""
+MOST_REPEATS = 65000
+SWITCHES = {
+    "JE": "inputs of the jog types turn the motor then",
+    "FL": "the motor follows the clock inputs then",
+    "CM": "the motor follows the clock then",
+    "PM": "the drive then moves back to its position by itself",
+}
+"""Flags that can move the motor when they are set."""
+LONGEST_NUMBER = 40
+_SETUP = re.compile(r"(IS|OS|LS)(\d)")
+_POINT = re.compile(r"S\d+")
+
+
+def row_of(name: str, product: str) -> Mnemonic | None:
+    """The row of a setting's word; `IS1` is a setting of IS. None for a user's variable."""
+    found = _SETUP.fullmatch(name)
+    return lookup(found[1] if found else name, product if exact(product) else "")
+
+
+def line(name: str, value: Value, new: bool = False) -> str:
+    """The line that gives a setting a value; `new`: a user's variable that the drive lacks."""
+    found = _SETUP.fullmatch(name)
+    if found is not None:
+        return f"{found[1]}={found[2]},{_fields(value)}"
+    if name == "DN":
+        return f'DN="{value}"'
+    return f"{'VA ' if new else ''}{name}={_fields(value)}"
+
+
+def _fields(value: Value) -> str:
+    return ",".join(map(_scalar, value if isinstance(value, tuple) else (value,)))
+
+
+def _scalar(value: Scalar) -> str:
+    if not isinstance(value, float):
+        return str(value)
+    text = repr(value)
+    return f"{value:.17f}".rstrip("0") if "e" in text and abs(value) < 1 else text
+
+
+def checked(name: str, value: Value, product: str, counts: bool, labels: Collection[str]) -> Value:
+    """Return the value as the drive takes it. Raises Diagnostic for a value out of range."""
+    row = row_of(name, product)
+    if isinstance(value, float) and value.is_integer() and not (row is not None and isinstance(row.default, float)):
+        value = int(value)
+    if row is None:
+        return _user(name, value, labels)
+    if exact(product) and product not in row.products:
+        raise Diagnostic(f"{name}: an {product} lacks it")
+    if name in TRIPS:
+        return _trip(name, value, row)
+    if (count := _fields_of(name)) is not None:
+        return _setup(name, value, count)
+    if row.access != "RW" or row.kind not in ("variable", "flag"):
+        raise Diagnostic(f"{name}: is not a setting ({row.title})")
+    if name == "DN":
+        if not (isinstance(value, str) and len(value) == 1 and value.isascii() and value.isalnum()):
+            raise Diagnostic(f"DN = {value}: takes one letter or digit")
+    elif not (isinstance(value, (int, float)) and row.accepts(value, counts)):
+        raise _out_of_range(name, value, row, counts)
+    return value
+
+
+def _user(name: str, value: Value, labels: Collection[str]) -> Value:
+    if not is_name(name):
+        raise Diagnostic(f"{name}: is neither a word of the drive nor a name for a variable")
+    if name in labels:
+        raise Diagnostic(f"{name}: is a label of the program in the drive, so no variable can have that name")
+    if not (isinstance(value, int) and INT_LOW <= value <= INT_HIGH):
+        raise Diagnostic(f"{name} = {value}: a variable takes a whole number from {INT_LOW} to {INT_HIGH}")
+    return value
+
+
+def _fields_of(name: str) -> int | None:
+    """The number of fields of a set-up; None for a setting of one value."""
+    if _SETUP.fullmatch(name):
+        return 2
+    if name in FIELDS:
+        return FIELDS[name]
+    return (2 if name in PAIRED else 3) if _POINT.fullmatch(name) else None
+
+
+def _setup(name: str, value: Value, count: int) -> Value:
+    if not (isinstance(value, tuple) and len(value) == count and all(isinstance(each, int) for each in value)):
+        raise Diagnostic(f"{name} = {value}: takes {count} whole numbers, as in {name} = {[0] * count}")
+    for each, most in zip(value, PRINT_FORMAT if name == "PF" else (), strict=False):
+        if not 0 <= number(each) <= most:
+            raise Diagnostic(f"{name} = {list(value)}: valid: up to {list(PRINT_FORMAT)}")
+    return value
+
+
+def _trip(name: str, value: Value, row: Mnemonic) -> Value:
+    """A trip: a target alone, or a number, a target, and for TR the repeats."""
+    fields = value if isinstance(value, tuple) else (value,)
+    alone, most = name in ("TC", "TM"), 3 if name == "TR" else 2
+    target = fields[0 if alone else 1 : 1 if alone else 2]
+    valid = len(fields) == 1 if alone else 2 <= len(fields) <= most or value == 0
+    valid = valid and all(isinstance(each, int) or (each in target and isinstance(each, str)) for each in fields)
+    first = fields[0]
+    if valid and not alone and value != 0:
+        valid = isinstance(first, int) and row.accepts(first) and not (name == "TR" and first == 0)
+    if not valid or any(not 0 <= number(each) <= MOST_REPEATS for each in fields[2:]):
+        raise Diagnostic(f"{name} = {value}: takes {row.syntax.partition(', PR')[0]}")
+    return value
+
+
+def _out_of_range(name: str, value: Value, row: Mnemonic, counts: bool) -> Diagnostic:
+    low, high = row.bounds(counts)
+    valid = ", ".join(map(str, row.values)) if row.values else f"{low} to {high}"
+    return Diagnostic(f"{name} = {value}: valid: {valid}" + (" (with EE=1)" if counts and row.low_encoder else ""))
+
+
+def writable(value: Value) -> bool:
+    """Whether a drive's line can hold a number of this size."""
+    exact = value if isinstance(value, float) else 0.0
+    return isfinite(exact) and abs(exact) <= FLOAT_HIGH and len(_scalar(exact)) <= LONGEST_NUMBER
+
+
+def risk(name: str, value: Value, now: Mapping[str, Value | None]) -> str:
+    """The reason for which a setting is only written when a person names it; empty: there is none.
+
+    `now` has the drive's present values.
+    """
+    torque = now.get("AS") == TORQUE
+    if name in WIRE:
+        return COMMUNICATION
+    if name in UNIT:
+        return "it belongs to the motor unit"
+    if name == "LK":
+        return "only CP or FD opens a lock again" if value else "it opens the program"
+    if name == "DE":
+        return "it switches the motor's current"
+    if name == "AS":
+        return "it can turn the motor"
+    if name in SWITCHES and value:
+        return SWITCHES[name]
+    if name in ("TD", "TQ", "TS") and torque:
+        return "in torque mode (AS=3) it turns the motor"
+    if name == "MU" and now.get("AS"):
+        return "the drive may make up lost steps at once"
+    if name == "EE" and now.get("PM"):
+        return SWITCHES["PM"]
+    return _risk_of_setup(name, value, now)
+
+
+def _risk_of_setup(name: str, value: Value, now: Mapping[str, Value | None]) -> str:
+    if name in TRIPS and isinstance(value, tuple) and isinstance(value[1], int) and value[1]:
+        return "it calls an address, which may hold another program's line"
+    point = name.startswith(tuple(LISTS)) or _POINT.fullmatch(name) is not None
+    if not point or name.startswith(("LS", "OS")) or not isinstance(value, tuple):
+        return ""
+    kind = value[0]
+    if kind == GO:
+        return "the input starts a program"
+    if kind == RESET:
+        return "the input restarts the drive"
+    if kind in (JOG_PLUS, JOG_MINUS) and now.get("JE"):
+        return SWITCHES["JE"]
+    follows = now.get("FL") or now.get("CM")
+    return "the motor follows the clock inputs" if kind in CLOCKS and follows else ""

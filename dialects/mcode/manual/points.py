@@ -1,19 +1,39 @@
-"""Inputs, outputs and flags of an MCode drive as lamps, and its conditions from what was read.
-
-An input's lamp follows IN and IS: IN has the raw levels, IS the level that counts as active. No serial drive prints its
-outputs. So the lamp of an output is known only where its type follows a flag that is read. (MCode reference 3.4.3,
-5.1.2, 5.1.62, 5.1.64, 5.1.78, 5.1.93.)
-"""
+"""A drive's state in words, from the values of P, V, MV, BY, EF and IN."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 
 from multidrop.dialects.conditions import UNREAD, Conditions, Facts, Lamp, Pace
 from multidrop.dialects.mcode.manual.mnemonic import EXPANDED
 from multidrop.dialects.mcode.manual.parameters import counting
-from multidrop.dialects.mcode.manual.status import EXPANDED_INPUTS, INPUTS
 from multidrop.dialects.parameters import number
+
+INPUTS = (1, 2, 3, 4)
+EXPANDED_INPUTS = (*INPUTS, 9, 10, 11, 12)
+"""The inputs of IN, lowest bit first."""
+STATUS = ("P", "V", "MV", "BY", "EF", "IN")
+"""The words to read for a status, in the order of `in_words`."""
+
+
+def in_words(
+    position: int, velocity: int, moving: int, busy: int, error: int, inputs: int, *, points: Sequence[int] = INPUTS
+) -> tuple[str, ...]:
+    """Describe P, V, MV, BY, EF and IN, one line for each matter; `points` are the inputs of IN, lowest bit first."""
+    return (
+        f"moving: V={velocity}, P={position}" if moving or velocity else f"at rest: P={position}",
+        "program: running" if busy else "program: none runs",
+        "error: set (EF=1); PR ER shows and clears it" if error else "error: none",
+        "inputs: " + ", ".join(f"{n} {'high' if inputs >> i & 1 else 'low'}" for i, n in enumerate(points)),
+    )
+
+
+# Inputs, outputs and flags of an MCode drive as lamps, and its conditions from what was read.
+#
+# An input's lamp follows IN and IS: IN has the raw levels, IS the level that counts as active. No serial drive prints
+# its outputs. So the lamp of an output is known only where its type follows a flag that is read. (MCode reference
+# 3.4.3, 5.1.2, 5.1.62, 5.1.64, 5.1.78, 5.1.93.)
+
 
 FUNCTIONS: Mapping[int, str] = {
     0: "", 1: "home", 2: "lim+", 3: "lim-", 4: "go", 5: "stop", 6: "pause", 7: "jog+", 8: "jog-", 11: "reset",

@@ -2,34 +2,141 @@
 
 from __future__ import annotations
 
-from collections.abc import Container, Iterable, Iterator, Sequence
+from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
 
-from multidrop.dialects.mcode.manual import (
-    guards,
-    line_parts,
-    program_file,
-    program_moves,
-    program_paths,
-    program_products,
-    program_trips,
+from multidrop.dialects.mcode.manual import guards, program_file, program_flow
+from multidrop.dialects.mcode.manual.grammar import (
+    NAME_FORM,
+    LineError,
+    Name,
+    Number,
+    Statement,
+    is_name,
+    parse,
+    words,
 )
-from multidrop.dialects.mcode.manual.conditions import condition_of, is_mixed, reading
-from multidrop.dialects.mcode.manual.grammar import NAME_FORM, LineError, Name, Statement, is_name, parse, words
+from multidrop.dialects.mcode.manual.help import form_of, out_of_range
 from multidrop.dialects.mcode.manual.mnemonic import EVERY
 from multidrop.dialects.mcode.manual.program_file import ProgramLine
-from multidrop.dialects.mcode.manual.program_flow import Flow
-from multidrop.dialects.mcode.manual.program_products import names_in, words_of
-from multidrop.dialects.mcode.manual.remedies import form, out_of_range
+from multidrop.dialects.mcode.manual.program_flow import AT_POWER_UP, Flow
+from multidrop.dialects.mcode.manual.statements import condition_of, condition_reading, is_mixed, names_in, words_of
 from multidrop.dialects.mcode.manual.table import lookup
 from multidrop.dialects.problems import Problem, errors, in_order
+
+# The products that have all words of a program, and a warning of a program for other ones.
+
+
+Read = Sequence[tuple[ProgramLine, Statement]]
+"""The lines of a file that can be parsed, each with its statement."""
+LISTED = 4
+"""Words that a message names."""
+
+
+def check_products(read: Read, names: frozenset[str], product: str) -> Iterator[Problem]:
+    """Report that a program is for other products than this one, if it is for any. `names` are the user's."""
+    used = dict[str, ProgramLine]()
+    for line, statement in read:
+        for word in words_of(statement):
+            if lookup(word) is not None:
+                used.setdefault(word, line)
+    own, drives = [word for word in used if word in names], [word for word in used if word not in names]
+    missing = [word for word in drives if _lacks(product, word)]
+    taken = [word for word in own if _takes(product, word)]
+    kin = sorted(EVERY, key=lambda each: (each[:2] != product[:2], each))
+    fit = [each for each in kin if not any(_lacks(each, word) for word in drives)]
+    fit = [each for each in fit if not any(_takes(each, word) for word in own)]
+    if not fit or not (missing or taken):
+        return
+    reasons = [f"no {product} has {_some(missing)}"] if missing else []
+    reasons += [f"{product} has {_some(taken)} as its own"] if taken else []
+    line = used[(missing or taken)[0]]
+    what = f"this is a program for {_choice(fit)}: {', and '.join(reasons)}"
+    yield Problem(line.number, line.column, what, f"check it with --personality {fit[0]}", warning=True)
+
+
+def _lacks(product: str, word: str) -> bool:
+    """Whether a product does not execute a word."""
+    row = lookup(word, product)
+    return row is None or product not in row.products
+
+
+def _takes(product: str, name: str) -> bool:
+    """Whether a product has a word of its own where a user has a name."""
+    return name != AT_POWER_UP and lookup(name, product) is not None
+
+
+def _some(words: Sequence[str]) -> str:
+    return ", ".join(words[:LISTED]) + (" and others" if len(words) > LISTED else "")
+
+
+def _choice(products: Sequence[str]) -> str:
+    *others, last = products
+    return f"{', '.join(others)} or {last}" if others else last
+
+
+# Warnings of trips that are set up and never enabled, and the reverse (MCode reference 5.1.125 to 5.1.132).
+
+
+BITS: Mapping[str, int] = {"TI": 1, "TP": 2, "TC": 4, "TT": 8, "TR": 16, "TA": 32, "TM": 64}
+"""The trips, each with the number by which TE enables it."""
+_Read = Sequence[tuple[ProgramLine, Statement]]
+"""The lines of a file without an error, each with its statement."""
+
+
+def check_trips(read: _Read, mentioned: Container[str]) -> Iterator[Problem]:
+    """Report trips without TE, and TE without trips. `mentioned` are words that lines with an error have."""
+    first = {statement.word: (line, statement) for line, statement in reversed(read) if statement.arguments}
+    enabled = _enabled(read)
+    if enabled is not None and "TE" not in mentioned:
+        for word, bit in BITS.items():
+            if word in first and not enabled & bit:
+                line, statement = first[word]
+                what = f"{word} is set up, but TE never enables it"
+                hint = f"TE={bit} enables it, after each trip again"
+                yield Problem(line.number, line.column + statement.column, what, hint, warning=True)
+    missing = {word: bit for word, bit in BITS.items() if word not in first and word not in mentioned}
+    yield from _undefined(read, missing)
+
+
+def _bits(statement: Statement) -> int | None:
+    """The number that a line gives TE; None for a number that the text does not show."""
+    value = statement.arguments[0]
+    return value.value if isinstance(value, Number) and isinstance(value.value, int) else None
+
+
+def _enabled(read: _Read) -> int | None:
+    """All trips that some line enables; None if the text does not show it."""
+    found = 0
+    for _, statement in read:
+        if statement.word == "TE" and statement.arguments:
+            bits = _bits(statement)
+            if bits is None:
+                return None
+            found |= bits
+    return found
+
+
+def _undefined(read: _Read, missing: Mapping[str, int]) -> Iterator[Problem]:
+    """Report the first TE for each set of trips that nothing sets up."""
+    reported = set[str]()
+    for line, statement in read:
+        bits = _bits(statement) if statement.word == "TE" and statement.arguments else None
+        words = [word for word, bit in missing.items() if (bits or 0) & bit and word not in reported]
+        if words:
+            reported.update(words)
+            what = f"TE enables {', '.join(words)}, which nothing in this file sets up"
+            yield Problem(
+                line.number, line.column + statement.column, what, "a drive refuses it: error 27", warning=True
+            )
+
 
 TARGETS = {"BR": 0, "CL": 0, "OE": 0, "TA": 1}
 """Words with a target, and the position of the target among their arguments."""
 load = program_file.load
 read = program_file.read
 formatted = program_file.formatted
-parts = line_parts.parts
-entries = line_parts.entries
+parts = program_file.parts
+entries = program_file.entries
 """With `load`, `read`, `check` and `measure` this module is a `FileLanguage`."""
 
 
@@ -54,16 +161,16 @@ def _forgotten(lines: Sequence[ProgramLine], reader: _Reader, wrong: Container[i
     read = [(line, correct[line.number]) for line in lines if line.number in correct]
     doubtful = frozenset[str]().union(*(words(line.text) for line in lines if line.number in wrong))
     flow = Flow(lines, correct, reader.names)
-    yield from program_paths.check(flow, doubtful)
-    yield from program_moves.check(flow)
+    yield from program_flow.check_paths(flow, doubtful)
+    yield from program_flow.check_moves(flow)
     words_of_drives = [each for each in read if each[1].word not in reader.names]
-    yield from program_trips.check(words_of_drives, doubtful)
+    yield from check_trips(words_of_drives, doubtful)
     yield from _unused(read, doubtful)
     yield from _at_once(words_of_drives, reader.product)
     if reader.product in EVERY:
         yield from _out_of_range(words_of_drives, reader.product)
         parsed = [(line, reader.statements[line.number]) for line in lines if line.number in reader.statements]
-        yield from program_products.check(parsed, reader.names, reader.product)
+        yield from check_products(parsed, reader.names, reader.product)
 
 
 def _at_once(read: Sequence[tuple[ProgramLine, Statement]], product: str) -> Iterator[Problem]:
@@ -122,7 +229,7 @@ class _Reader:
         try:
             statement = parse(line.text, self.names)
         except LineError as wrong:
-            hint = form(line.text, self.product)
+            hint = form_of(line.text, self.product)
             yield Problem(line.number, line.column + wrong.column, wrong.why, hint)
             return
         if statement is None:
@@ -175,5 +282,5 @@ def _condition(line: ProgramLine, statement: Statement) -> Iterator[Problem]:
     first = next(names_in(condition), None)
     column = first.column if first else statement.column
     hint = "the manual allows one comparison; split it into two lines to be sure"
-    what = f"more than one comparison is read as {reading(condition)}"
+    what = f"more than one comparison is read as {condition_reading(condition)}"
     yield Problem(line.number, line.column + column, what, hint, warning=True)

@@ -18,10 +18,12 @@ from typing import TYPE_CHECKING
 
 from multidrop.dialects.files import program_text_of, split_lines, wrong_characters
 from multidrop.dialects.layout import respelled
-from multidrop.dialects.mcode.manual.canonical import canonical
-from multidrop.dialects.mcode.manual.grammar import LineError, check_groups, parse
+from multidrop.dialects.mcode.manual.grammar import LineError, Token, check_groups, parse, tokens
+from multidrop.dialects.mcode.manual.statements import canonical
 from multidrop.dialects.mcode.manual.table import lookup
+from multidrop.dialects.mcode.manual.table_motion import MOTION
 from multidrop.dialects.problems import Problem, refuse
+from multidrop.dialects.program_files import Entry, Part
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -209,3 +211,46 @@ def _is_setting(text: str, names: frozenset[str]) -> bool:
 def _holds_value(word: str, names: frozenset[str]) -> bool:
     row = lookup(word)
     return word in names or (row is not None and row.kind in ("variable", "flag"))
+
+
+# The parts of a line of an MCode program for an editor, and the places at which a program can begin.
+
+
+_DECLARE = ("LB", "VA")
+MOVES = frozenset(row.name for row in MOTION if row.starts and row.kind == "instruction")
+
+
+def parts(line: str) -> list[Part]:
+    """Return the parts of a line that differ from plain text. Never fails."""
+    end = remark_at(line)
+    found = list(_statement_parts(tokens(line[:end])))
+    return [*found, Part(end, len(line), "remark")] if end < len(line) else found
+
+
+def _statement_parts(found: list[Token]) -> Iterator[Part]:
+    declares = bool(found) and found[0].text.upper() in _DECLARE
+    for number, token in enumerate(found):
+        if kind := _kind(token, number, declares):
+            yield Part(token.start, token.stop, kind)
+
+
+def _kind(token: Token, number: int, declares: bool) -> str:
+    if token.kind == "text" or token.kind == "bad":
+        return "wrong" if token.kind == "bad" or token.unclosed else "text"
+    if token.kind != "word":
+        return ""
+    if declares and number == 1:
+        return "label"
+    row = lookup(token.text.upper())
+    if row is None:
+        return ""
+    return "starts" if number == 0 and row.name in MOVES else "word"
+
+
+def entries(text: str) -> list[Entry]:
+    """Return the labels of the programs in a file, in order."""
+    return [
+        Entry(line.declares, line.number, f"EX {line.declares}")
+        for line in scan(text)[0]
+        if line.section == "program" and line.declares and line.text[:2].upper() == "LB"
+    ]

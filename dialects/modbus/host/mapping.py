@@ -10,7 +10,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 from multidrop.dialects.errors import Inexpressible, Refused
-from multidrop.dialects.mcode.manual import error_texts
+from multidrop.dialects.mcode.manual import errors
 from multidrop.dialects.mcode.manual.errors import ErrorNumber
 from multidrop.dialects.mcode.manual.grammar import Argument, Name, Number, Statement
 from multidrop.dialects.mcode.manual.table import lookup
@@ -61,7 +61,7 @@ def command(statement: Statement) -> bytes:
     if register is None:
         raise unavailable(word)
     if not register.writable:
-        raise Refused(f"{word} cannot be written: error {READ_ONLY}: {error_texts.text(READ_ONLY)}", READ_ONLY)
+        raise Refused(f"{word} cannot be written: error {READ_ONLY}: {errors.text(READ_ONLY)}", READ_ONLY)
     return write(register, _value(word, arguments))
 
 
@@ -156,11 +156,11 @@ def reading(word: str) -> Reading:
     row = lookup(word)
     register = REGISTERS.get(word)
     if word == "E" or word in CONTROLS or (register is not None and not register.readable):
-        raise Refused(f"{word} cannot be printed: error {UNREADABLE}: {error_texts.text(UNREADABLE)}", UNREADABLE)
+        raise Refused(f"{word} cannot be printed: error {UNREADABLE}: {errors.text(UNREADABLE)}", UNREADABLE)
     if register is None:
         raise unavailable(word)
     if row is not None and row.access == "-":
-        raise Refused(f"{word} cannot be printed: error {UNREADABLE}: {error_texts.text(UNREADABLE)}", UNREADABLE)
+        raise Refused(f"{word} cannot be printed: error {UNREADABLE}: {errors.text(UNREADABLE)}", UNREADABLE)
     return Reading(read(register), lambda answer: str(value_of(register, pdu_codec().registers(answer))))
 
 

@@ -10,7 +10,7 @@ from multidrop.dialects.errors import Inexpressible, NoAnswer, Refused
 from multidrop.dialects.family import Motion
 from multidrop.dialects.mcode.host.wording import who
 from multidrop.dialects.mcode.manual import grammar
-from multidrop.dialects.mcode.manual.status import STATUS, in_words
+from multidrop.dialects.mcode.manual.points import STATUS, in_words
 from multidrop.dialects.modbus.host import framing, mapping
 from multidrop.dialects.modbus.host.exchange import answered, carried_out, flagged, request, sure
 from multidrop.dialects.modbus.host.mapping import Reading

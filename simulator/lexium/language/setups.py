@@ -8,9 +8,9 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from functools import partial
 
-from multidrop.dialects.mcode.manual.device_name import device_name as device_name_of
 from multidrop.dialects.mcode.manual.errors import ErrorNumber as E
 from multidrop.dialects.mcode.manual.grammar import Argument, Number, Statement
+from multidrop.dialects.mcode.manual.statements import device_name as device_name_of
 from multidrop.dialects.mcode.manual.table import lookup
 from multidrop.simulator.lexium.language.arguments import Compile, is_place, missing, numbers
 from multidrop.simulator.lexium.language.input_functions import InputFunctions

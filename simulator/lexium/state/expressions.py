@@ -12,9 +12,9 @@ import operator
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
-from multidrop.dialects.mcode.manual.conditions import compares
 from multidrop.dialects.mcode.manual.errors import ErrorNumber as E
 from multidrop.dialects.mcode.manual.grammar import FUNCTIONS, Binary, Compare, Expression, Name, Number, Unary
+from multidrop.dialects.mcode.manual.statements import compares
 from multidrop.simulator.lexium.state.errors import Fault
 
 Value = int | float

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 from multidrop.dialects.mcode.manual.errors import ErrorNumber as E
 from multidrop.dialects.mcode.manual.grammar import Argument, Compare, Name, Number, Statement
-from multidrop.dialects.mcode.manual.line_size import size_of
+from multidrop.dialects.mcode.manual.statements import size_of
 from multidrop.dialects.mcode.manual.table import lookup
 from multidrop.simulator.lexium.state.errors import Fault
 

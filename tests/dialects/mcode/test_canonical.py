@@ -6,9 +6,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from multidrop.dialects.mcode.manual.canonical import canonical
 from multidrop.dialects.mcode.manual.grammar import LineError, Statement, parse
-from multidrop.dialects.mcode.manual.line_size import size_of
+from multidrop.dialects.mcode.manual.statements import canonical, size_of
 from multidrop.dialects.mcode.manual.table import MDRIVE, MNEMONICS
 from tests.support.cases import for_each
 

@@ -9,9 +9,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from multidrop.dialects.mcode.manual import help
-from multidrop.dialects.mcode.manual.conditions import condition_of, is_mixed, reading
 from multidrop.dialects.mcode.manual.grammar import parse
 from multidrop.dialects.mcode.manual.program_checker import check
+from multidrop.dialects.mcode.manual.statements import condition_of, condition_reading, is_mixed
 from multidrop.simulator.cell.spec import DriveSpec, WorldSpec
 from multidrop.simulator.lexium.device import MCodeDevice
 from multidrop.simulator.world import World
@@ -39,7 +39,7 @@ def mixed(form: str) -> str | None:
     assert statement is not None
     condition = condition_of(statement)
     assert condition is not None
-    return reading(condition) if is_mixed(condition) else None
+    return condition_reading(condition) if is_mixed(condition) else None
 
 
 @pytest.mark.parametrize(("form", "read"), FORMS)
@@ -185,7 +185,7 @@ def test_the_bracketed_reading_comes_to_the_same_as_the_flat_form(form: str, giv
     condition = condition_of(statement) if statement else None
     assert condition is not None
     try:
-        expected = Brackets(reading(condition), values).operation() != 0
+        expected = Brackets(condition_reading(condition), values).operation() != 0
     except ZeroDivisionError:
         return
     assert holds(form, values) is expected

@@ -13,9 +13,9 @@ from hypothesis import strategies as st
 from multidrop.dialects.mcode.family import MCODE as FAMILY
 from multidrop.dialects.mcode.host.codec import MCode
 from multidrop.dialects.mcode.host.state import MCodeState
-from multidrop.dialects.mcode.manual.canonical import canonical
 from multidrop.dialects.mcode.manual.program_checker import check
 from multidrop.dialects.mcode.manual.program_file import formatted, read, remark_at
+from multidrop.dialects.mcode.manual.statements import canonical
 from multidrop.shell.checking import examine
 from multidrop.simulator.cell.spec import DriveSpec, WorldSpec
 from multidrop.simulator.lexium.device import MCodeDevice

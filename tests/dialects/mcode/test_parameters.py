@@ -6,7 +6,7 @@ import pytest
 
 from multidrop.dialects.mcode.family import MCODE
 from multidrop.dialects.mcode.manual import parameters as manual
-from multidrop.dialects.mcode.manual.parameter_checks import types
+from multidrop.dialects.mcode.manual.parameter_plan import types
 from multidrop.dialects.parameters import IO, VARIABLES, Permission
 from multidrop.simulator.cell.spec import Faults
 from multidrop.simulator.lexium.state.models import MODELS

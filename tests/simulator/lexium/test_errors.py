@@ -2,7 +2,7 @@
 
 import pytest
 
-from multidrop.dialects.mcode.manual.error_texts import TEXTS
+from multidrop.dialects.mcode.manual.errors import TEXTS
 from multidrop.dialects.mcode.manual.table import MNEMONICS
 from multidrop.simulator.cell.spec import DriveSpec, WorldSpec
 from multidrop.simulator.lexium.device import MCodeDevice

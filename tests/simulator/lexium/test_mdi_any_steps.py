@@ -6,7 +6,7 @@ from random import Random
 
 import pytest
 
-from multidrop.dialects.mcode.manual.error_texts import TEXTS
+from multidrop.dialects.mcode.manual.errors import TEXTS
 from multidrop.dialects.mcode.manual.table import MDRIVE, MNEMONICS
 from tests.support.lexium import drive
 

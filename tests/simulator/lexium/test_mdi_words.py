@@ -11,7 +11,7 @@ import re
 
 import pytest
 
-from multidrop.dialects.mcode.manual.error_texts import TEXTS
+from multidrop.dialects.mcode.manual.errors import TEXTS
 from multidrop.dialects.mcode.manual.table import MDRIVE
 from tests.support.cases import for_each
 from tests.support.mdrive_unit import Unit

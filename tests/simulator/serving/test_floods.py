@@ -17,7 +17,7 @@ from pathlib import Path
 
 import pytest
 
-from multidrop.dialects.mcode.manual.error_texts import text as error_text
+from multidrop.dialects.mcode.manual.errors import text as error_text
 from multidrop.simulator.cell.spec import Faults
 from multidrop.simulator.cells import load, read
 from multidrop.simulator.floor import Floor
