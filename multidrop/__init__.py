@@ -68,7 +68,7 @@ _PLACES = {
     "multidrop.api.simulated": ("SimulatedCell", "simulate"),
     "multidrop.api.stopping": ("StopReport",),
     "multidrop.api.telemetry": ("AsyncTelemetry",),
-    "transports": ("TransportLost", "Unreachable"),
+    "multidrop.transports": ("TransportLost", "Unreachable"),
 }
 _PUBLIC = {name: module for module, names in _PLACES.items() for name in names}
 __all__ = [

@@ -19,7 +19,7 @@ from multidrop.dialects import Diagnostic
 from multidrop.drives.apart import apart
 from multidrop.drives.halt import Halt
 from multidrop.drives.keeping import GLOBAL
-from multidrop.shell import stops
+from multidrop.shell import stop_report
 
 if TYPE_CHECKING:
     from multidrop.drives.bus import Bus
@@ -255,9 +255,9 @@ def outcome(workspace: Workspace, halts: list[Halt]) -> list[str]:
     sent = [halt for halt in halts if halt.data]
     lines = []
     if sent:
-        tally = stops.of_halts(sent, workspace.wall(sent[0].at), len(workspace.buses) > 1)
+        tally = stop_report.of_halts(sent, workspace.wall(sent[0].at), len(workspace.buses) > 1)
         names = [halt.link.name if halt.whole else ", ".join(map(workspace.display_name, halt.drives)) for halt in sent]
-        lines.append(f"{'stopped' if tally.stand else 'stop sent to'} {', '.join(names)}: {stops.words(tally)}")
+        lines.append(f"{'stopped' if tally.stand else 'stop sent to'} {', '.join(names)}: {stop_report.words(tally)}")
     if others := [workspace.display_name(drive) for halt in sent for drive in halt.others]:
         lines.append(f"stopped as well, because the stop of their line has no name: {', '.join(others)}")
-    return lines + stops.unreached(halts, workspace.now())
+    return lines + stop_report.unreached(halts, workspace.now())

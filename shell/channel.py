@@ -3,11 +3,79 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Callable
+from collections.abc import Awaitable, Callable, Coroutine, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
 from datetime import datetime, timedelta
+from typing import TYPE_CHECKING, Any, TypeVar
 
+from multidrop.dialects import Diagnostic, Procedure, Stopped
 from multidrop.drives.apart import apart
-from multidrop.shell.events import Notified, Output, SessionEvent, StateChanged
+from multidrop.shell.events import By, Notified, Output, Progressed, SessionEvent, StateChanged
+
+if TYPE_CHECKING:
+    from multidrop.drives.drive import Drive
+
+
+T = TypeVar("T")
+
+
+class Tasks:
+    """Runs work so that a stop or an interruption can end it. `changed` is called at each begin and end."""
+
+    def __init__(self, changed: Callable[[], None]) -> None:
+        self._changed = changed
+        self._running: set[asyncio.Task[Any]] = set()
+        self._stopped: set[asyncio.Task[Any]] = set()
+
+    @property
+    def busy(self) -> bool:
+        """Whether any work runs."""
+        return bool(self._running)
+
+    async def run(self, work: Coroutine[Any, Any, T]) -> T:
+        """Await the work. Raises Stopped if a stop ended it."""
+        task = asyncio.get_running_loop().create_task(work)
+        self._running.add(task)
+        self._changed()
+        try:
+            return await task
+        except asyncio.CancelledError:
+            if task in self._stopped:
+                raise Stopped("stopped before it was done") from None
+            raise
+        finally:
+            self._running.discard(task)
+            self._stopped.discard(task)
+            self._changed()
+
+    def stop(self) -> None:
+        """Cancel all work except the caller's; each `run` raises Stopped."""
+        for task in self._others():
+            self._stopped.add(task)
+            task.cancel()
+
+    async def stopped(self, limit: float) -> None:
+        """Wait for the work that a stop has ended: it reads where drives stand, or leaves program mode."""
+        if self._stopped:
+            await asyncio.wait(self._stopped, timeout=limit)
+
+    def cancel(self) -> None:
+        """Cancel all work except the caller's."""
+        for task in self._others():
+            task.cancel()
+
+    def _others(self) -> set[asyncio.Task[Any]]:
+        return self._running - {_current()}
+
+
+def _current() -> asyncio.Task[Any] | None:
+    """The running task; None in a signal handler or a callback."""
+    try:
+        return asyncio.current_task()
+    except RuntimeError:
+        return None
+
 
 Callback = Callable[[SessionEvent], None]
 
@@ -55,3 +123,160 @@ class Channel:
     def wall(self, at: float) -> datetime:
         """Convert a session time to the time of day in the local zone."""
         return datetime.now().astimezone() - timedelta(seconds=self.now() - at)
+
+
+Ask = Callable[[str], Awaitable[bool]]
+"""Puts one question to a person, and returns whether the answer is yes. A stop cancels it."""
+
+
+@dataclass(frozen=True)
+class Field:
+    """A value that a person is asked for. `default` None: an answer is needed."""
+
+    name: str
+    valid: str
+    default: str | None
+    take: Callable[[str], object]
+    """Raises Diagnostic for an invalid answer."""
+    choices: tuple[str, ...] = ()
+    """The only valid answers, if there are so few."""
+
+    def problem(self, text: str) -> str:
+        """Describe what is wrong with an answer in one line; empty: nothing."""
+        try:
+            self.take(text)
+        except Diagnostic as problem:
+            return str(problem)
+        return ""
+
+
+Fill = Callable[[str, Sequence[Field]], Awaitable[Mapping[str, str] | None]]
+"""Puts a form to a person; returns the answers by name, None where the person gives up. A stop cancels it."""
+
+
+class Asking(Channel):
+    """A channel with questions, one at a time."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.agreed = False
+        """Every question is answered with yes beforehand (`--yes`)."""
+        self.ask: Ask | None = None
+        """The front end's way to ask; None: it has no person to ask."""
+        self.fill: Fill | None = None
+        """The front end's way to ask for values; None: it has no person to ask."""
+        self.way = "--yes"
+        """The way to agree to every question beforehand."""
+        self.beforehand = ""
+        """How to agree to the questions of this front end beforehand, for the message after a no."""
+        self.questions = Tasks(self.changed)
+        """The open questions. A stop ends them."""
+        self._turn = asyncio.Lock()
+
+    async def confirm(self, what: str, where: str = "", so_far: str = "nothing was sent", by: By = By.OPERATOR) -> None:
+        """Return once a person has agreed to `what`, one line that says what will happen. A script cannot ask.
+
+        Raises Diagnostic after any other answer and without a person to ask, Stopped after a stop. `so_far`: what a
+        caller that has sent something says instead.
+        """
+        if self.agreed:
+            return
+        if by is not By.OPERATOR:
+            hint = f"{self.way} agrees beforehand, or type the line"
+            raise Diagnostic(f"{what}; a {by.value} cannot ask, {so_far}", where, hint)
+        if self.ask is None:
+            raise Diagnostic(f"{what}; {so_far}", where, f"{self.way} agrees to it")
+        question = f"{where}: {what}" if where else what
+        try:
+            agreed = await self.questions.run(self._answer(self.ask, question))
+        except Stopped:
+            raise Stopped(f"{where}: not done, as a stop came before the answer".removeprefix(": ")) from None
+        if not agreed:
+            raise Diagnostic("the answer was no, so it was not done", where, self.beforehand)
+        self.notify(f"{question}: the answer was yes")
+
+    async def agrees(self, what: str) -> bool:
+        """Ask a person about a change that can be left. False without a person; `--yes` does not answer it."""
+        if self.ask is None:
+            return False
+        try:
+            return await self.questions.run(self._answer(self.ask, what))
+        except Stopped:
+            return False
+
+    async def fill_in(self, title: str, fields: Sequence[Field]) -> Mapping[str, str]:
+        """Ask a person for values. Raises Diagnostic without answers or a person, Stopped after a stop."""
+        if self.fill is None:
+            raise Diagnostic("values are needed, and no person can be asked", title, "give them as NAME=VALUE")
+        try:
+            answers = await self.questions.run(self._filled(self.fill, title, fields))
+        except Stopped:
+            raise Stopped(f"{title}: not done, as a stop came before the answer") from None
+        if answers is None:
+            raise Diagnostic("no values were given; nothing was sent", title)
+        return answers
+
+    async def _filled(self, fill: Fill, title: str, fields: Sequence[Field]) -> Mapping[str, str] | None:
+        async with self._turn:
+            return await fill(title, fields)
+
+    async def _answer(self, ask: Ask, question: str) -> bool:
+        async with self._turn:
+            return await ask(question)
+
+
+PERIOD = 0.1
+"""The shortest time between two reports of a job, s."""
+EARLIEST = 0.5
+"""The time after which the pace of a job says how long it will take, s."""
+
+
+class Job:
+    """A long job. Call it with the number of steps done and the number in all, as often as they change."""
+
+    def __init__(self, channel: Channel, what: str) -> None:
+        self._channel = channel
+        self._what = what
+        self._began = channel.now()
+        self._first = self._total = 0
+        """The first count of steps, and the steps in all: the pace is measured from there."""
+        self._shown_at = float("-inf")
+
+    def __call__(self, done: int, total: int) -> None:
+        """Report progress; most reports are not published."""
+        now = self._channel.now()
+        if total != self._total or done < self._first:
+            self._began, self._first, self._total = now, done, total
+        if done < total and now - self._shown_at >= PERIOD:
+            self._shown_at = now
+            self._channel.publish(Progressed(now, self._what, done, total, self._left(done, now)))
+
+    def _left(self, done: int, now: float) -> float | None:
+        """The time that the rest takes at the pace so far; None before there is a pace."""
+        took, steps = now - self._began, done - self._first
+        return took / steps * (self._total - done) if steps and took >= EARLIEST else None
+
+    def end(self) -> None:
+        """Publish the end, if anything was published."""
+        if self._shown_at > float("-inf"):
+            total = self._total
+            self._channel.publish(Progressed(self._channel.now(), self._what, total, total, 0.0))
+
+
+@contextmanager
+def running(channel: Channel, what: str) -> Iterator[Job]:
+    """Publish the progress of a job; `what` names it with its drive (`a: download`). It ends with the block."""
+    job = Job(channel, what)
+    try:
+        yield job
+    finally:
+        job.end()
+
+
+async def transferring(drive: Drive, procedure: Procedure[T]) -> T:
+    """Run a conversation of many requests; polls of the drive wait."""
+    drive.transferring = True
+    try:
+        return await drive.run(procedure)
+    finally:
+        drive.transferring = False

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from multidrop.dialects import Diagnostic, SourceLine
 from multidrop.dialects.held import Held
 from multidrop.shell import new_file, sources
-from multidrop.shell.jobs import running, transferring
+from multidrop.shell.channel import running, transferring
 from multidrop.shell.lines import EVERYONE
 from multidrop.shell.observed import Listing, Sight
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from multidrop.dialects import DriveError
 from multidrop.drives.drive import confirmed_motion
-from multidrop.shell.stops import UNCONFIRMED, last_seen
+from multidrop.shell.stop_report import UNCONFIRMED, last_seen
 from multidrop.transports import TransportLost
 
 if TYPE_CHECKING:

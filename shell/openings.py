@@ -7,24 +7,55 @@ import contextlib
 from collections.abc import Callable, Coroutine, Iterator, Sequence
 from dataclasses import replace
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from multidrop.dialects import Diagnostic, DriveError
 from multidrop.shell import unfinished
 from multidrop.shell.connect.opening import port_name
-from multidrop.shell.connect.side_by_side import side_by_side
 from multidrop.shell.connect.urls import Connection, parse
 from multidrop.shell.lines import EVERYONE, split_target
-from multidrop.shell.naming import described, free, named
 from multidrop.shell.raw import RawLine
 from multidrop.shell.workspace import BeingOpened
 from multidrop.transports import TransportLost
 
 if TYPE_CHECKING:
     from multidrop.drives.bus import Bus
+    from multidrop.drives.drive import Drive
     from multidrop.drives.halt import Halt
     from multidrop.shell.connect.opening import Opened, Opener
     from multidrop.shell.workspace import Workspace
+
+
+def free(name: str, taken: set[str]) -> str:
+    """The name, with a number appended if it is taken."""
+    if name not in taken:
+        return name
+    return next(each for number in range(2, 1000) if (each := f"{name}-{number}") not in taken)
+
+
+def named(base: str, name: str | None, taken: set[str], before: set[str]) -> str:
+    """The requested name; several buses of one cell append their own. Raises Diagnostic for a taken name."""
+    if name is None:
+        return base
+    if name in before:
+        raise Diagnostic(f"bus {name} is already open", hint="use another name, or /close it first")
+    return name if taken == before else f"{name}-{base}"
+
+
+def model(drive: Drive) -> str:
+    """The product and version that a drive reports."""
+    included = drive.version.startswith(drive.product)
+    return drive.version if included else f"{drive.product} {drive.version}".strip()
+
+
+def described(bus: Bus) -> str:
+    """A bus and its drives in one line: `press: a b c LMDCM 6.002, Hw: 3.2; d LMDCM 5.0`."""
+    alike: dict[str, list[str]] = {}
+    for drive in bus.drives.values():
+        alike.setdefault(model(drive), []).append(drive.address)
+    drives = "; ".join(" ".join(filter(None, [*addresses, each])) for each, addresses in alike.items())
+    return f"{bus.name}: {drives or 'no drive has replied'}"
+
 
 Failed = Callable[[int, BaseException], None]
 """Takes the number of a URL, from 0, and the failure to open it."""
@@ -268,3 +299,36 @@ def _stop_found(bus: Bus, halt: Halt) -> None:
     """Stop by name the drives that were found since a stop, as some need it, and confirm it; but none started since."""
     standing = [drive for drive in bus.all_drives if not halt.started_since(drive)]
     bus.halted(bus.halt(None if len(standing) == len(bus.all_drives) else standing))
+
+
+T = TypeVar("T")
+
+
+async def side_by_side(
+    works: Sequence[Coroutine[Any, Any, T]],
+    ready: Callable[[T], None],
+    failed: Callable[[int, BaseException], None] | None = None,
+) -> None:
+    """Await all work at once; call `ready` with each result, in the order of the work.
+
+    A failure goes to `failed`, and the rest goes on; without `failed` the rest is cancelled and the failure raised.
+    A cancellation of the caller cancels all work. Nothing is left running on return.
+    """
+    tasks = [asyncio.ensure_future(work) for work in works]
+    pending, passed = set(tasks), 0
+    try:
+        while pending:
+            done, pending = await asyncio.wait(pending, return_when=asyncio.FIRST_COMPLETED)
+            for number, task in enumerate(tasks):
+                if task in done and (failure := task.exception()) is not None:
+                    if failed is None:
+                        raise failure
+                    failed(number, failure)
+            while passed < len(tasks) and tasks[passed].done():
+                if tasks[passed].exception() is None:
+                    ready(tasks[passed].result())
+                passed += 1
+    finally:
+        for task in tasks:
+            task.cancel()
+        await asyncio.gather(*tasks, return_exceptions=True)

@@ -17,7 +17,8 @@ from typing import TYPE_CHECKING
 from multidrop.dialects import Diagnostic, DriveError, Inexpressible, Refused
 from multidrop.dialects.held import LOCKED
 from multidrop.dialects.parameters import Permission, Plan, Readings, differing
-from multidrop.shell import jobs, snapshots, transfers
+from multidrop.shell import snapshots, transfers
+from multidrop.shell.channel import running, transferring
 from multidrop.shell.params.file import shown
 from multidrop.shell.params.readings import parameters, read
 from multidrop.simulator import cells
@@ -152,7 +153,7 @@ class _Replacement:
 
     async def _check_ready(self) -> None:
         """Raise Refused where the drive is at work."""
-        if reason := await jobs.transferring(self._drive, self._parameters.ready(self._drive.state)):
+        if reason := await transferring(self._drive, self._parameters.ready(self._drive.state)):
             raise Refused(f"{reason} (nothing was sent)")
 
     def _show(self, now: Snapshot, here: DriveSpec) -> list[str]:
@@ -257,17 +258,17 @@ class _Replacement:
         drive, workspace = self._drive, self._workspace
         workspace.addressed.add((drive.link.name, drive.address))
         steps = self._plan(await read(workspace, drive, "apply"), communication)
-        with jobs.running(workspace, f"{self._name}: apply") as progress:
+        with running(workspace, f"{self._name}: apply") as progress:
             for number, each in enumerate(steps, 1):
                 if each.name in self._wanted.named and drive.starts(each.text):
                     self._commands.starting(drive)
-                await jobs.transferring(drive, self._parameters.write(drive.state, each))
+                await transferring(drive, self._parameters.write(drive.state, each))
                 self._done.append(each.text)
                 progress(number, len(steps))
         return len(steps)
 
     async def _save(self, what: str) -> None:
-        await jobs.transferring(self._drive, self._parameters.save(self._drive.state))
+        await transferring(self._drive, self._parameters.save(self._drive.state))
         self._done.append(f"{what} saved ({self._parameters.saving})")
 
     def _verify(self, here: DriveSpec) -> None:

@@ -16,7 +16,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from multidrop.dialects import Diagnostic, DriveState, Procedure
 from multidrop.dialects.families import DEFAULT, FAMILIES
 from multidrop.dialects.scanning import WINDOW, Reach, Scan
-from multidrop.shell import jobs, stops
+from multidrop.shell import stop_report
+from multidrop.shell.channel import Job, running
 from multidrop.shell.connect.opening import BAUDED, port_name
 from multidrop.shell.connect.port_state import memory_of
 from multidrop.shell.connect.urls import Connection
@@ -76,7 +77,7 @@ class Stage(NamedTuple):
 class Steps:
     """Counts the steps of one stage among those of all."""
 
-    def __init__(self, job: jobs.Job, done: int, total: int) -> None:
+    def __init__(self, job: Job, done: int, total: int) -> None:
         self._job, self.done, self._total = job, done, total
 
     def __call__(self) -> None:
@@ -167,7 +168,7 @@ class Scanning:
         """
         before, self._done = len(self.found), 0
         self._agreed_to |= dict.fromkeys(stages)
-        with jobs.running(self._workspace, f"{self._connection.short}: scan") as job:
+        with running(self._workspace, f"{self._connection.short}: scan") as job:
             for stage in stages:
                 await self._stage(stage, job, stages, hasty)
                 if len(self.found) > before and not everything:
@@ -206,8 +207,8 @@ class Scanning:
         if self._stopped:
             left_out = [each for each in self.stages(()) if each not in {**self._stopped, **self._agreed_to}]
             why = f"; not with {listed(left_out)}: no search there was agreed to" if left_out else ""
-            tally = stops.of_halts(self._read, self._workspace.wall(self._workspace.stopped_at), False)
-            read = f"; {stops.words(tally)}" if tally.found else ""
+            tally = stop_report.of_halts(self._read, self._workspace.wall(self._workspace.stopped_at), False)
+            read = f"; {stop_report.words(tally)}" if tally.found else ""
             self._warn(self.port, [f"the stop was sent with {listed(self._stopped)}{why}{read}. {UNLISTED}"])
 
     async def _stop_at(self, stage: Stage, confirm: bool) -> None:
@@ -290,7 +291,7 @@ class Scanning:
 
     # One stage
 
-    async def _stage(self, stage: Stage, job: jobs.Job, all_: Sequence[Stage], hasty: bool) -> None:
+    async def _stage(self, stage: Stage, job: Job, all_: Sequence[Stage], hasty: bool) -> None:
         """Open the port for a stage, search, and close it."""
         total = sum(each.scan.places(self._reach()) for each in all_)
         begun = self._done
@@ -378,7 +379,7 @@ async def extend(workspace: Workspace, bus: Bus) -> list[str]:
         done += 1
         job(done, total)
 
-    with jobs.running(workspace, f"{bus.name}: scan") as job:
+    with running(workspace, f"{bus.name}: scan") as job:
         outcome = await bus.search(scan.search(reach, found.append, step))
     for each in outcome.remarks:
         workspace.notify(f"{bus.name}: {each}", bus=bus.name, warning=True)

@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     from multidrop.shell.connect.opening import Opener
     from multidrop.shell.openings import Failed as OpeningFailed
     from multidrop.shell.raw import RawLine
-    from multidrop.shell.scripts.results import Watcher
+    from multidrop.shell.scripts.model import Watcher
 
 _published: ContextVar[list[BaseException] | None] = ContextVar("published", default=None)
 """The failures published so far in this task's outermost `run`."""

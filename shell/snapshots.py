@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING
 
 from multidrop.dialects import Diagnostic, DriveError, Inexpressible, Stopped
 from multidrop.dialects.held import Held, Stored
-from multidrop.shell import jobs, listings, new_file
+from multidrop.shell import listings, new_file
+from multidrop.shell.channel import running, transferring
 from multidrop.simulator import cells
 from multidrop.simulator.cell.writer import BusText, DriveText, write
 from multidrop.simulator.families import FAMILIES, snapshots_of
@@ -44,8 +45,8 @@ async def read(workspace: Workspace, drive: Drive) -> Snapshot:
     take = drive.family.snapshot
     if take is None:
         raise Inexpressible(f"{workspace.display_name(drive)}: the host takes no snapshot of a drive of its family")
-    with jobs.running(workspace, f"{workspace.display_name(drive)}: snapshot") as progress:
-        found = await jobs.transferring(drive, take(drive.state, progress))
+    with running(workspace, f"{workspace.display_name(drive)}: snapshot") as progress:
+        found = await transferring(drive, take(drive.state, progress))
     program = Held(tuple(Stored(at, text) for at, text in found.program))
     return replace(found, remarked=tuple(listings.remarked(workspace, drive, program))) if program.lines else found
 

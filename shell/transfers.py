@@ -22,8 +22,8 @@ from multidrop.dialects.held import LOCKED, Difference, Held
 from multidrop.dialects.problems import errors, refuse
 from multidrop.drives.drive import still
 from multidrop.shell import backups, sources
+from multidrop.shell.channel import running, transferring
 from multidrop.shell.events import By, Printed
-from multidrop.shell.jobs import running, transferring
 from multidrop.shell.listings import check_one, read
 from multidrop.shell.unfinished import marked
 

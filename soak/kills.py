@@ -25,7 +25,7 @@ from multidrop.dialects import Diagnostic
 from multidrop.macros import MacroStore
 from multidrop.shell.connect.settings import Settings
 from multidrop.shell.events import Notified
-from multidrop.shell.front.history import History
+from multidrop.shell.front.typed_lines import History
 from multidrop.shell.log.entries import entry_of
 from multidrop.shell.session import Session
 from multidrop.simulator import cells

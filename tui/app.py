@@ -26,7 +26,7 @@ from textual.message import Message
 from textual.screen import Screen
 
 from multidrop.drives.events import Unsolicited
-from multidrop.shell.connect.look import DEFAULT, Look
+from multidrop.shell.connect.settings_tables import DEFAULT_LOOK, Look
 from multidrop.shell.events import Failed, OnBus, Printed, SessionEvent, StateChanged
 from multidrop.tui.actions import Actions
 from multidrop.tui.assist import Assist
@@ -96,7 +96,7 @@ class MultidropApp(Actions):
         urls: Sequence[str],
         assist: Assist | None = None,
         driver: type[Driver] | None = None,
-        look: Look = DEFAULT,
+        look: Look = DEFAULT_LOOK,
     ) -> None:
         # With NO_COLOR, only this makes Textual take colours away altogether; else it makes greys of them.
         super().__init__(driver_class=driver, ansi_color=True if "NO_COLOR" in os.environ else None)

@@ -102,7 +102,7 @@ class ShellAssist(Assist):
     """The help that the prompt gives, too."""
 
     def __init__(self, session: Session, settings: Settings) -> None:
-        from multidrop.shell.front.history import History
+        from multidrop.shell.front.typed_lines import History
 
         self._session, self._settings = session, settings
         self._history = History(settings.history)
@@ -139,7 +139,7 @@ class ShellAssist(Assist):
 
     def lately(self) -> Sequence[StartEntry]:
         """URLs opened lately, the newest first; saved connections are listed themselves."""
-        from multidrop.shell.connect.opened import lately
+        from multidrop.shell.connect.port_state import lately
 
         now, saved = time.time(), self._settings.connections
         found = [each for each in lately(self._settings.state) if each.url not in saved]
@@ -147,7 +147,7 @@ class ShellAssist(Assist):
 
     async def opened(self, url: str) -> None:
         """Keep a URL that was opened."""
-        from multidrop.shell.connect.opened import note
+        from multidrop.shell.connect.port_state import note
 
         await asyncio.to_thread(note, self._settings.state, url)
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
-from multidrop.shell.asking import Field
+from multidrop.shell.channel import Field
 from multidrop.tui.actions import Actions
 from multidrop.tui.presenter import Presenter
 from multidrop.tui.terminal.keyboard import Keyboard

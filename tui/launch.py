@@ -62,7 +62,7 @@ async def _leave(session: Session) -> None:
 
     A terminal that is not read delays neither the stop nor the end.
     """
-    from multidrop.shell import stops
+    from multidrop.shell import stop_report
     from multidrop.shell.automation import outcome, settled
     from multidrop.shell.output import finish, nonblocking, write
     from multidrop.shell.verbs.recording import keep_unended
@@ -77,7 +77,7 @@ async def _leave(session: Session) -> None:
         for line in filter(None, (*outcome(session, halts), keep_unended(session))):
             write(sys.stderr, line)
         if session.latched:
-            write(sys.stderr, f"stop: {stops.words(session.tally())}")
+            write(sys.stderr, f"stop: {stop_report.words(session.tally())}")
         await finish(streams, lambda: True)
 
 

@@ -12,10 +12,10 @@ from multidrop.dialects.controls import Controls
 from multidrop.dialects.family import Language
 from multidrop.dialects.parameters import Parameters
 from multidrop.drives.readings import Value
-from multidrop.shell.asking import Fill
+from multidrop.shell.channel import Fill
 from multidrop.shell.events import By, SessionEvent
 from multidrop.shell.roles import RunningPlot, Series
-from multidrop.shell.stops import Tally
+from multidrop.shell.stop_report import Tally
 from multidrop.shell.transcripts import Transcripts
 
 

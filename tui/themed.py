@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from textual.app import App
 from textual.filter import LineFilter
 
-from multidrop.shell.connect.look import Look
+from multidrop.shell.connect.settings_tables import Look
 from multidrop.tui.curves.ink import INKS
 from multidrop.tui.widgets.signs import SignFilter, Signs, signs_for
 from multidrop.tui.widgets.theme import DEFAULTS, THEMES, theme_for

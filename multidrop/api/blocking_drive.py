@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from multidrop.dialects import Motion
     from multidrop.dialects.parameters import Readings
     from multidrop.shell.params.readings import Difference
-    from multidrop.shell.scripts.values import Value
+    from multidrop.shell.scripts.expression import Value
 
 Lines = list[str]
 

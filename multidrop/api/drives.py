@@ -13,12 +13,11 @@ from multidrop.api.programs import AsyncPrograms
 from multidrop.api.stopping import Stopping
 from multidrop.dialects import Diagnostic, Motion, Refused
 from multidrop.drives.drive import still
-from multidrop.shell import stops, waits
+from multidrop.shell import stop_report, waits
 from multidrop.shell.events import By
 from multidrop.shell.lines import join_target
-from multidrop.shell.scripts.asking import ask
-from multidrop.shell.scripts.expression import Word
-from multidrop.shell.scripts.values import Value, written
+from multidrop.shell.scripts.execution import ask
+from multidrop.shell.scripts.expression import Value, Word, written
 
 if TYPE_CHECKING:
     from multidrop.api.telemetry import AsyncTelemetry
@@ -171,7 +170,7 @@ class AsyncDrive:
         shell = self._owner.shell
         halt = shell.bus(self.drive.link.name).stop([self.drive])
         several = len(shell.buses) > 1
-        return Stopping(shell, lambda: stops.of_halts([halt], shell.wall(halt.at), several))
+        return Stopping(shell, lambda: stop_report.of_halts([halt], shell.wall(halt.at), several))
 
     def telemetry(self, rate: float = 50.0) -> AsyncTelemetry:
         """Read position and velocity `rate` times a second at most, as an iterator of samples."""

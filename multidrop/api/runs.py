@@ -10,7 +10,7 @@ from multidrop.api.pictures import table
 
 if TYPE_CHECKING:
     from multidrop.api.owner import Owner
-    from multidrop.shell.scripts.results import Result
+    from multidrop.shell.scripts.model import Result
 
 
 @dataclass(frozen=True)

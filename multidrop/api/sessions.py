@@ -18,7 +18,7 @@ from multidrop.api.runs import Run, run_file
 from multidrop.api.stopping import Stopping
 from multidrop.api.telemetry import RATE, AsyncTelemetry
 from multidrop.dialects import Diagnostic
-from multidrop.shell import stops
+from multidrop.shell import stop_report
 from multidrop.shell.automation import settled
 from multidrop.shell.connect.settings import load
 from multidrop.shell.events import By, Notified, SessionEvent
@@ -114,7 +114,7 @@ class AsyncSession:
             await calls.end()
             await settled(shell)  # a stop that is under way is repeated and confirmed
             if shell.latched:
-                self._notice(f"stop: {stops.words(shell.tally())}", True)
+                self._notice(f"stop: {stop_report.words(shell.tally())}", True)
         finally:
             for each in self._telemetry:
                 each.close()

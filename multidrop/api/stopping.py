@@ -6,7 +6,7 @@ from collections.abc import Callable, Generator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from multidrop.shell import stops
+from multidrop.shell import stop_report
 from multidrop.shell.automation import settled
 
 if TYPE_CHECKING:
@@ -29,7 +29,7 @@ class StopReport:
 class Stopping:
     """A stop that is written. Await it for its report; it works without that, too."""
 
-    def __init__(self, shell: Shell, tally: Callable[[], stops.Tally]) -> None:
+    def __init__(self, shell: Shell, tally: Callable[[], stop_report.Tally]) -> None:
         self._shell, self._tally = shell, tally
 
     def __await__(self) -> Generator[Any, None, StopReport]:
@@ -39,4 +39,4 @@ class Stopping:
     async def _report(self) -> StopReport:
         await settled(self._shell)
         tally = self._tally()
-        return StopReport(tally.stand, stops.words(tally))
+        return StopReport(tally.stand, stop_report.words(tally))

@@ -24,7 +24,7 @@ def shell(chosen: argparse.Namespace) -> int:
             from multidrop.shell.front.prompt import run
         return run(chosen.urls, reconnect=not chosen.no_reconnect, agreed=chosen.yes, raw=chosen.raw, twin=chosen.twin)
     from multidrop.shell.front import batch
-    from multidrop.shell.front.stream import run_stream
+    from multidrop.shell.front.terminal_input import run_stream
 
     async def lines(session: Session) -> None:
         if chosen.twin:
@@ -39,7 +39,7 @@ def send(chosen: argparse.Namespace) -> int:
     """Run lines and print the replies."""
     with importing():
         from multidrop.shell.front import batch
-        from multidrop.shell.front.stream import run_lines
+        from multidrop.shell.front.terminal_input import run_lines
         from multidrop.shell.lines import each_names_one_drive, targets
 
     lazy = each_names_one_drive(chosen.lines)

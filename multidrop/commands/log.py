@@ -71,9 +71,8 @@ def replay(chosen: argparse.Namespace) -> int:
     except Diagnostic as problem:
         return fail(problem)
     from multidrop.shell.front import batch
+    from multidrop.shell.front.replay import ReplayReport, VirtualLoop
     from multidrop.shell.front.replay import replay as run
-    from multidrop.shell.front.replay_report import ReplayReport
-    from multidrop.shell.front.virtual import VirtualLoop
 
     async def body(session: Session) -> None:
         await run(session, found, fast=chosen.fast, positions=bool(chosen.against), report=ReplayReport(chosen.json))

@@ -74,12 +74,12 @@ def _asked(macro: Macro, values: Mapping[str, str]) -> dict[str, str]:
     """Ask at the terminal for the values, if one is missing that must be given."""
     if not missing(macro, values):
         return {}
-    from multidrop.shell.casting import value_fields
-    from multidrop.shell.front import form
+    from multidrop.shell.front import terminal_input
+    from multidrop.shell.macro_arguments import value_fields
 
-    if not form.can_ask():
+    if not terminal_input.can_ask():
         return {}
-    return form.at_terminal(f"macro {macro.name}", value_fields(macro, values)) or {}
+    return terminal_input.at_terminal(f"macro {macro.name}", value_fields(macro, values)) or {}
 
 
 def _play(chosen: argparse.Namespace, macro: Macro, values: Mapping[str, str], report: Report) -> int:

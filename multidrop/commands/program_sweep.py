@@ -13,7 +13,7 @@ from functools import partial
 from multidrop.commands.failure import fail
 from multidrop.commands.sweep_report import Report
 from multidrop.dialects import Diagnostic
-from multidrop.shell.connect import saving, settings
+from multidrop.shell.connect import settings
 from multidrop.shell.output import INTERRUPTED, write
 from multidrop.shell.sweeps import plan as planning
 from multidrop.shell.sweeps import workers
@@ -70,7 +70,7 @@ def _agree(address: str, yes: bool, what: str, interruption: Interruption) -> No
         return
     import asyncio
 
-    from multidrop.shell.front.answer import ask_outside_a_session
+    from multidrop.shell.front.terminal_input import ask_outside_a_session
 
     where = f"--cluster {address}"
     with interruption.open():
@@ -79,5 +79,5 @@ def _agree(address: str, yes: bool, what: str, interruption: Interruption) -> No
         raise Diagnostic(f"{what}; nothing was connected", where, "--yes agrees to it")
     if not answer:
         raise Diagnostic("the answer was no, so nothing was connected", where)
-    path = saving.keep("sweep", "clusters", [*known, address])
+    path = settings.keep("sweep", "clusters", [*known, address])
     write(sys.stderr, f"{path}: sweep.clusters has {address} from now on")

@@ -18,8 +18,7 @@ from multidrop.api.sessions import Notice
 from multidrop.dialects import Stopped
 from multidrop.shell.events import FAILURES, Entered, Output, Printed, SessionEvent
 from multidrop.shell.front.report import Report
-from multidrop.shell.scripts.model import ScriptLine
-from multidrop.shell.scripts.results import Result
+from multidrop.shell.scripts.model import Result, ScriptLine
 
 T = TypeVar("T")
 

@@ -23,10 +23,10 @@ from multidrop.commands.python_report import ReportedSession, place, replaced, r
 from multidrop.dialects import Diagnostic, Stopped
 from multidrop.dialects.files import bytes_of
 from multidrop.shell.events import FAILURES
-from multidrop.shell.front.interrupts import on_stop_key
+from multidrop.shell.front.keyboard import on_stop_key
 from multidrop.shell.front.report import Report
 from multidrop.shell.output import INTERRUPTED, exit_code, lost_reader, why_interrupted, work_done, write
-from multidrop.shell.scripts.results import Result
+from multidrop.shell.scripts.model import Result
 from multidrop.shell.signals import SIGNALS, early_ends
 
 

@@ -10,7 +10,7 @@ from functools import partial
 
 from multidrop.commands.failure import fail
 from multidrop.dialects import Diagnostic
-from multidrop.shell.connect import saving
+from multidrop.shell.connect import settings
 from multidrop.shell.connect.opening import open_buses
 from multidrop.shell.connect.urls import parse
 from multidrop.shell.found import FoundDrive, url_of
@@ -23,7 +23,7 @@ def run(chosen: argparse.Namespace) -> int:
     """Print each drive that replies."""
     try:
         if chosen.save:
-            saving.check_new(chosen.save)
+            settings.check_new(chosen.save)
     except Diagnostic as problem:
         return fail(problem)
     return batch.run([], partial(_scan, chosen), agreed=chosen.yes, unsolicited=False)
@@ -52,7 +52,7 @@ def conclude(chosen: argparse.Namespace, session: Session, found: list[FoundDriv
     same = [each for each in found if _form(each) == _form(found[0])]
     url = url_of(same)
     if chosen.save:
-        path = saving.save(chosen.save, url)
+        path = settings.save(chosen.save, url)
         session.notify(f"{path}: connection {chosen.save} is saved: {url}", outcome=True)
     elif not chosen.json:
         session.notify(f"open with: multidrop shell {shlex.quote(url)}", outcome=True)

@@ -11,7 +11,7 @@ from datetime import datetime
 from multidrop.commands.failure import fail
 from multidrop.dialects import Diagnostic
 from multidrop.shell.front.junit import Case as JUnitCase
-from multidrop.shell.front.junit_file import JUnitFile
+from multidrop.shell.front.junit import JUnitFile
 from multidrop.shell.output import INTERRUPTED, write
 from multidrop.shell.status_line import StatusLine
 from multidrop.shell.sweeps.failures import Failures, command, grouped, rows

@@ -15,7 +15,7 @@ from multidrop.dialects.families import DEFAULT, FAMILIES
 from multidrop.drives.bus import Bus
 from multidrop.shell.connect import settings
 from multidrop.shell.connect.port_state import PortState
-from multidrop.shell.connect.reopening import HostAgain, LoginAgain, Reopen, SerialAgain, simulated, timed
+from multidrop.shell.connect.reconnect import HostAgain, LoginAgain, Reopen, SerialAgain, simulated, timed
 from multidrop.shell.connect.urls import Connection
 from multidrop.transports import Limited
 from multidrop.transports.far_port import FarPort

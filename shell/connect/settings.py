@@ -4,17 +4,17 @@
     url = "serial:/dev/ttyUSB0?drives=a,b"
     names = { a = "gantry", b = "clamp" }
 
-    [guards]                    # which lines need a yes (`shell.connect.guards`)
+    [guards]                    # which lines need a yes (`settings_tables`)
     off = ["BD"]
     also = ["S"]
 
-    [log]                       # the session log (`shell.connect.log_settings`)
+    [log]                       # the session log (`settings_tables`)
     always = true
 
-    [mqtt]                      # the login for a broker (`shell.connect.mqtt_settings`)
+    [mqtt]                      # the login for a broker (`settings_tables`)
     username = "shop-7"
 
-    [screen]                    # colours and signs, and [keys] (`shell.connect.look`)
+    [screen]                    # colours and signs, and [keys] (`settings_tables`)
     theme = "multidrop-light"
 
 `MULTIDROP_CONFIG_DIR` moves the configuration and the macros; `MULTIDROP_STATE_DIR` moves the history.
@@ -30,13 +30,20 @@ from pathlib import Path
 from typing import Any
 
 from multidrop.dialects import Diagnostic
-from multidrop.dialects.files import split_lines, toml_of, utf8_of
+from multidrop.dialects.files import split_lines, toml_of, utf8_of, why
 from multidrop.dialects.visible import visible
-from multidrop.shell.connect import guards, log_settings, look, mqtt_settings
-from multidrop.shell.connect.guards import Guarding
-from multidrop.shell.connect.log_settings import LogSettings
-from multidrop.shell.connect.look import Look
-from multidrop.shell.connect.mqtt_settings import MqttSettings
+from multidrop.macros.atomic import write_atomically
+from multidrop.shell.connect.settings_tables import (
+    DEFAULT_LOOK,
+    Guarding,
+    LogSettings,
+    Look,
+    MqttSettings,
+    read_guards,
+    read_log,
+    read_look,
+    read_mqtt,
+)
 
 # The line of a key in a TOML file, for messages: the parser that reads the values does not report it.
 
@@ -82,7 +89,7 @@ class Settings:
     state: Path = field(default_factory=lambda: state_folder())
     guards: Guarding = Guarding()
     log: LogSettings = LogSettings()
-    look: Look = look.DEFAULT
+    look: Look = DEFAULT_LOOK
     mqtt: MqttSettings = MqttSettings()
     allowed: tuple[Path, ...] = ()
     """Where paths of cell files may lead, too, in `simulator.allow`."""
@@ -168,10 +175,10 @@ def _read(document: Mapping[str, Any], where: str) -> Settings:
     connections = {name: _connection(name, table, where) for name, table in tables.items()}
     return Settings(
         connections,
-        guards=guards.read(document.get("guards", {}), where),
-        log=log_settings.read(document.get("log", {}), where),
-        look=look.read(document.get("screen", {}), document.get("keys", {}), where),
-        mqtt=mqtt_settings.read(document.get("mqtt", {}), where),
+        guards=read_guards(document.get("guards", {}), where),
+        log=read_log(document.get("log", {}), where),
+        look=read_look(document.get("screen", {}), document.get("keys", {}), where),
+        mqtt=read_mqtt(document.get("mqtt", {}), where),
         allowed=tuple(
             Path(where).parent / os.path.expanduser(each) for each in _texts(document, "simulator", "allow", where)
         ),
@@ -215,3 +222,67 @@ def _only(table: Mapping[str, Any], known: set[str], where: str, prefix: str) ->
     for key in table:
         if key not in known:
             raise Diagnostic(f"no key {prefix}{key}", where, f"valid: {', '.join(sorted(known))}")
+
+
+def check_new(name: str) -> None:
+    """Check that a connection can be saved under a name. Raises Diagnostic."""
+    _with_connection(name, "sim:")
+
+
+def save(name: str, url: str) -> Path:
+    """Add a connection; return the file, which is replaced as a whole. Raises Diagnostic."""
+    return _write(_with_connection(name, url))
+
+
+def keep(table: str, key: str, value: str | list[str]) -> Path:
+    """Set one value of a table; return the file, which is replaced as a whole. Raises Diagnostic."""
+    import tomlkit
+
+    document = _document()
+    if table not in document:
+        document[table] = tomlkit.table()
+    document[table][key] = value
+    return _write(_checked(document))
+
+
+def _write(text: str) -> Path:
+    path = config_file().resolve()
+    try:
+        write_atomically(path, text.encode())
+    except OSError as problem:
+        raise Diagnostic(f"cannot be written: {why(problem)}", str(path)) from None
+    return path
+
+
+def _document() -> Any:
+    """The file as it is, with its remarks and its layout. Raises Diagnostic."""
+    import tomlkit
+
+    path = config_file()
+    text = utf8_of(path) if path.exists() else ""
+    toml_of(text, str(path))  # tomlkit takes its time over what is wrong, and names no line
+    return tomlkit.parse(text)
+
+
+def _checked(document: Any) -> str:
+    """The text of a changed file, which is read again to make sure. Raises Diagnostic."""
+    import tomlkit
+
+    text = tomlkit.dumps(document)
+    parse(text, str(config_file()))
+    return text
+
+
+def _with_connection(name: str, url: str) -> str:
+    """Return the text of the file with a new connection. Raises Diagnostic."""
+    import tomlkit
+
+    if name in load().connections:
+        raise Diagnostic(f"a connection {name} exists already", str(config_file()), "give another name")
+    document = _document()
+    if "connections" not in document:
+        document["connections"] = tomlkit.table(is_super_table=True)
+    table = tomlkit.table()
+    table["url"] = url
+    document["connections"][name] = table
+    return _checked(document)

@@ -12,12 +12,12 @@ from collections.abc import Awaitable, Callable, Sequence
 from contextlib import nullcontext
 from functools import partial
 
-from multidrop.shell import stops
+from multidrop.shell import stop_report
 from multidrop.shell.automation import outcome, settled
 from multidrop.shell.connect import settings
 from multidrop.shell.events import FAILURES
-from multidrop.shell.front.answer import asker
-from multidrop.shell.front.interrupts import on_signals, on_stop_key
+from multidrop.shell.front.keyboard import on_signals, on_stop_key
+from multidrop.shell.front.terminal_input import asker
 from multidrop.shell.log.writer import begin as begin_log
 from multidrop.shell.output import (
     INTERRUPTED,
@@ -141,7 +141,7 @@ class _Host:
         if self.interrupted:
             code, lines = self._code, self._interruption()
         elif self._session.latched and (tally := self._session.tally()).found:  # a search has closed its port by now
-            lines.insert(0, f"stop: {stops.words(tally)}")
+            lines.insert(0, f"stop: {stop_report.words(tally)}")
         for each in lines:
             if each:
                 self._printer.notify(each)

@@ -32,15 +32,13 @@ from multidrop.shell.automation import outcome, settled
 from multidrop.shell.connect import settings
 from multidrop.shell.events import FAILURES, Progressed, SessionEvent, StateChanged
 from multidrop.shell.front.collector import collected_at_rest
-from multidrop.shell.front.form import filled
-from multidrop.shell.front.history import History
-from multidrop.shell.front.interrupts import on_signals
-from multidrop.shell.front.keyboard import Keyboard, terminal
-from multidrop.shell.front.line_queue import LineQueue, shown
+from multidrop.shell.front.keyboard import Keyboard, on_signals, terminal
 from multidrop.shell.front.prompt_keys import KeyboardInput
 from multidrop.shell.front.prompt_lines import LinesAbove
 from multidrop.shell.front.prompt_parts import SessionCompleter, SharedHistory, Toolbar
 from multidrop.shell.front.prompt_question import PromptQuestion
+from multidrop.shell.front.terminal_input import filled
+from multidrop.shell.front.typed_lines import History, LineQueue, shown
 from multidrop.shell.log.writer import begin as begin_log
 from multidrop.shell.output import INTERRUPTED, exit_code, finish, nonblocking, report, write
 from multidrop.shell.printer import Printer

@@ -10,12 +10,11 @@ from prompt_toolkit.completion import CompleteEvent, Completer, Completion
 from prompt_toolkit.document import Document
 from prompt_toolkit.history import History as PromptHistory
 
-from multidrop.shell import stops
+from multidrop.shell import stop_report
 from multidrop.shell.events import Progressed
 from multidrop.shell.front import complete
-from multidrop.shell.front.history import History
-from multidrop.shell.front.line_queue import LineQueue
-from multidrop.shell.naming import model
+from multidrop.shell.front.typed_lines import History, LineQueue
+from multidrop.shell.openings import model
 from multidrop.shell.session import Session
 from multidrop.shell.workspace import Workspace
 
@@ -40,7 +39,7 @@ class Toolbar:
         parts = [
             STOP,
             f"✗ {session.selected_bus} lost" if session.selected_bus in session.reconnections.trying else "",
-            stops.headline(session.tally(), room) if session.latched else "",
+            stop_report.headline(session.tally(), room) if session.latched else "",
             " ".join(f"▶ {each.short}" for each in session.playing),
             f"recording {session.recording}" if session.recording else "",
             f"log {session.log.path.name}" if session.log else "",

@@ -15,7 +15,7 @@ from prompt_toolkit.key_binding import KeyBindings
 from prompt_toolkit.key_binding.bindings.cpr import load_cpr_bindings
 from prompt_toolkit.keys import Keys
 
-from multidrop.shell.front.answer import GO_ON, Answer
+from multidrop.shell.front.terminal_input import GO_ON, Answer
 
 KEYS = {"y": "y", "Y": "y", "n": "n", "N": "n", "enter": "n", "c-j": "n", "escape": "n", "c-d": "n"}
 """The answer of each key, by its name in prompt_toolkit. Ctrl+C is the prompt's own: it may be a stop."""

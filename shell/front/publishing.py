@@ -23,7 +23,7 @@ from multidrop.shell.secrets import url_without_secrets
 
 if TYPE_CHECKING:
     from multidrop.drives.bus import Bus
-    from multidrop.shell.connect.mqtt_settings import MqttSettings
+    from multidrop.shell.connect.settings_tables import MqttSettings
     from multidrop.shell.session import Session
     from multidrop.shell.workspace import Workspace
     from multidrop.transports import TransportLost

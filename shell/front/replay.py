@@ -9,25 +9,118 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-from collections.abc import AsyncIterator, Mapping, Sequence
+import json
+import selectors
+import sys
+from collections.abc import AsyncIterator, Callable, Mapping, Sequence
+from concurrent.futures import Executor, ThreadPoolExecutor, wait
 from datetime import datetime
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from multidrop.dialects import Diagnostic, DriveError, Stopped
 from multidrop.shell import waits
 from multidrop.shell.automation import outcome, settled
 from multidrop.shell.events import By, Printed, SessionEvent
-from multidrop.shell.front.replay_report import ReplayReport
 from multidrop.shell.lines import EVERYONE, join_target
 from multidrop.shell.log.steps import WORLD, Step, Steps, compared, errors_differ
-from multidrop.shell.naming import model
+from multidrop.shell.openings import model
+from multidrop.shell.output import write
 from multidrop.shell.workspace import LATCHED
 
 if TYPE_CHECKING:
     from multidrop.drives.bus import Bus
     from multidrop.drives.drive import Drive
+    from multidrop.shell.channel import Channel
     from multidrop.shell.session import Session
-    from multidrop.shell.twins.after import Positions, Reading
+    from multidrop.shell.twins.after import Divergence, Positions, Reading
+
+
+class ReplayReport:
+    """Writes what differs to standard output as it is found. `as_json`: as objects, and the summary too."""
+
+    def __init__(self, as_json: bool = False) -> None:
+        self._json = as_json
+
+    def differs(self, step: Step, text: str, difference: str) -> None:
+        """Report another answer."""
+        place = {"bus": step.bus, "drive": step.drive, "line": step.text}
+        self._put(text, {"where": step.where, **place, "differs": difference})
+
+    def diverged(self, found: Divergence) -> None:
+        """Report the first divergence of an axis."""
+        fact = {
+            "drive": found.drive,
+            "time": found.at.isoformat(timespec="microseconds"),
+            "difference": found.difference,
+            "limit": found.limit,
+            "causes": found.causes,
+        }
+        self._put(found.text, {"diverged": fact})
+
+    def summary(
+        self, channel: Channel, lines: int, differences: int, uncompared: int, positions: Positions | None
+    ) -> None:
+        """Report the counts, and the largest difference of each axis."""
+        moved = f"; {uncompared} in motion printed another number" if uncompared else ""
+        channel.notify(f"{lines} lines replayed, {differences} differ{moved}", outcome=True)
+        fact: dict[str, object] = {"lines": lines, "differ": differences}
+        if positions is not None:
+            largest, compared = positions.largest, positions.compared
+            for name, number in compared.items():
+                noun = "position" if number == 1 else "positions"
+                text = f"{name}: {number} {noun} compared, largest difference {largest[name]} steps"
+                channel.notify(text, outcome=True)
+            fact |= {"compared": sum(compared.values()), "diverged": len(positions.diverged), "largest": largest}
+        if self._json:
+            write(sys.stdout, json.dumps({"summary": fact}))
+
+    @staticmethod
+    def words(lines: int, differences: int, positions: Positions | None) -> str:
+        """The differences in words; empty: none."""
+        said = [f"{differences} of {lines} lines gave another answer than in the log"] if differences else []
+        if positions is not None and positions.diverged:
+            axes = f"{len(positions.diverged)} of {len(positions.compared)} axes"
+            said.append(f"{axes} were not where the log has them")
+        return "; ".join(said)
+
+    def _put(self, text: str, fact: dict[str, object]) -> None:
+        write(sys.stdout, json.dumps(fact) if self._json else text)
+
+
+class _Impatient(selectors.DefaultSelector):
+    """Takes what is ready, and counts how long it would have waited."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.skipped = 0.0
+
+    def select(self, timeout: float | None = None) -> list[Any]:
+        ready = super().select(0)
+        if ready or timeout is None:
+            return ready or super().select(timeout)
+        self.skipped += max(0.0, timeout)
+        return ready
+
+
+class VirtualLoop(asyncio.SelectorEventLoop):
+    """Runs an hour of timers in no time. A call in a thread takes none either."""
+
+    def __init__(self) -> None:
+        self._impatient = _Impatient()
+        super().__init__(self._impatient)
+
+    def time(self) -> float:
+        """Virtual seconds, from 0."""
+        return self._impatient.skipped
+
+    def run_in_executor(  # type: ignore[override]
+        self, executor: Executor | None, func: Callable[..., Any], *arguments: Any
+    ) -> Any:
+        """Wait for a thread's end here, so that time does not run on meanwhile."""
+        with ThreadPoolExecutor(1) as threads:
+            done = threads.submit(func, *arguments)
+            wait([done])
+        return asyncio.wrap_future(done, loop=self)
 
 
 async def replay(

@@ -11,11 +11,10 @@ from datetime import datetime
 
 from multidrop.dialects import Diagnostic
 from multidrop.shell.events import FAILURES
-from multidrop.shell.front.junit import Case
-from multidrop.shell.front.junit_file import JUnitFile
+from multidrop.shell.front.junit import Case, JUnitFile
 from multidrop.shell.output import report as described
 from multidrop.shell.output import write
-from multidrop.shell.scripts.results import Ending, Result
+from multidrop.shell.scripts.model import Ending, Result
 from multidrop.shell.session import Session
 
 

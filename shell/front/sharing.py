@@ -14,7 +14,7 @@ from multidrop.shell.connect.listening import listening
 from multidrop.shell.connect.opening import open_port
 from multidrop.shell.connect.urls import parse
 from multidrop.shell.events import FAILURES
-from multidrop.shell.front.interrupts import on_signals, on_stop_key
+from multidrop.shell.front.keyboard import on_signals, on_stop_key
 from multidrop.shell.output import exit_code, finish, nonblocking, report, write
 from multidrop.shell.sharing.actions import Say
 from multidrop.shell.sharing.server import SharedPort

@@ -26,7 +26,7 @@ from multidrop.shell.events import (
 from multidrop.shell.log import files
 from multidrop.shell.log.disk import Disk
 from multidrop.shell.log.entries import BEGIN, KINDS, TRAFFIC, Entry, line_of
-from multidrop.shell.naming import model
+from multidrop.shell.openings import model
 
 if TYPE_CHECKING:
     from multidrop.dialects import Request

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from multidrop.dialects import Diagnostic, Inexpressible
 from multidrop.dialects.parameters import VARIABLES, Parameters, Readings, Value, same
-from multidrop.shell import jobs
+from multidrop.shell.channel import running, transferring
 from multidrop.shell.events import SettingsRead
 from multidrop.shell.params.file import SettingsFile
 
@@ -33,8 +33,8 @@ def parameters(drive: Drive) -> Parameters[Any]:
 
 async def read(workspace: Workspace, drive: Drive, what: str) -> Readings:
     """Read every setting of a drive. Raises DriveError; nothing is changed."""
-    with jobs.running(workspace, f"{workspace.display_name(drive)}: {what}") as progress:
-        found = await jobs.transferring(drive, parameters(drive).read(drive.state, progress))
+    with running(workspace, f"{workspace.display_name(drive)}: {what}") as progress:
+        found = await transferring(drive, parameters(drive).read(drive.state, progress))
     workspace.publish(SettingsRead(workspace.now(), drive.link.name, drive.address, found))
     return found
 

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 
 from multidrop.dialects import Diagnostic, DriveError, NoAnswer, Refused
 from multidrop.dialects.parameters import COMMUNICATION, IO, PARAMETERS, Change, Permission, Plan, Readings, Value, same
-from multidrop.shell import jobs
+from multidrop.shell.channel import running, transferring
 from multidrop.shell.params.file import SettingsFile, shown
 from multidrop.shell.params.readings import listed, parameters, read
 
@@ -152,7 +152,7 @@ def _show(workspace: Workspace, who: str, plan: Plan, wanted: Wanted) -> None:
 
 async def _check_ready(workspace: Workspace, drive: Drive) -> None:
     """Raise Refused where the drive is at work."""
-    if reason := await jobs.transferring(drive, parameters(drive).ready(drive.state)):
+    if reason := await transferring(drive, parameters(drive).ready(drive.state)):
         raise Refused(f"{reason} (nothing was sent)")
 
 
@@ -179,11 +179,11 @@ async def _write(
     Only a step that a person has named can start motion: an early end then stops the drive, and with it its line.
     """
     workspace.addressed.add((drive.link.name, drive.address))
-    with jobs.running(workspace, f"{workspace.display_name(drive)}: restore") as progress:
+    with running(workspace, f"{workspace.display_name(drive)}: restore") as progress:
         for change in plan:
             if change.name in options.named and drive.starts(change.text):
                 commands.starting(drive)
-            await jobs.transferring(drive, parameters(drive).write(drive.state, change))
+            await transferring(drive, parameters(drive).write(drive.state, change))
             written.append(change)
             progress(len(written), len(plan))
 
@@ -226,7 +226,7 @@ async def _finish(workspace: Workspace, drive: Drive, plan: Plan, goal: Mapping[
     result = f"{who}: {len(written)} setting{'s' * (len(written) != 1)} restored and read back{aside}"
     saving = parameters(drive).saving
     if options.save:
-        await jobs.transferring(drive, parameters(drive).save(drive.state))
+        await transferring(drive, parameters(drive).save(drive.state))
         workspace.notify(f"{result}; saved ({saving})", outcome=True)
     else:
         workspace.notify(f"{result}; not saved, so lost at power-off: --save keeps it ({saving})", warning=True)

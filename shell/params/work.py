@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING
 
 from multidrop.dialects import Diagnostic, DriveError, Stopped
 from multidrop.dialects.parameters import Readings
-from multidrop.shell import jobs, new_file
+from multidrop.shell import new_file
+from multidrop.shell.channel import transferring
 from multidrop.shell.lines import split_target
 from multidrop.shell.params import file as files
 from multidrop.shell.params import readings
@@ -128,7 +129,7 @@ async def save(workspace: Workspace, target: str) -> None:
     async def keep(drive: Drive) -> None:
         family, who = readings.parameters(drive), workspace.display_name(drive)
         await workspace.confirm(f"'{family.saving}' keeps all present settings over power-off", who)
-        await jobs.transferring(drive, family.save(drive.state))
+        await transferring(drive, family.save(drive.state))
         workspace.notify(f"{who}: its settings are saved")
 
     await each(workspace, targets(workspace, target), keep)

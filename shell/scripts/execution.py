@@ -13,22 +13,169 @@ from dataclasses import dataclass, replace
 from typing import TypeVar
 
 from multidrop.dialects import Diagnostic, DriveError, Stopped
+from multidrop.drives.drive import Drive
 from multidrop.macros import checked_values, fill
 from multidrop.shell import waits
-from multidrop.shell.events import FAILURES, By, Failed
-from multidrop.shell.playing import Playing, cast
+from multidrop.shell.channel import PERIOD, Channel
+from multidrop.shell.events import FAILURES, By, Failed, Progressed
+from multidrop.shell.lines import join_target, pinned, split_target
+from multidrop.shell.playing import Playing, cast, played_by
 from multidrop.shell.roles import Commands
 from multidrop.shell.scripts import words
-from multidrop.shell.scripts.asking import drive_of, known
-from multidrop.shell.scripts.expression import Expression, Name, Word, evaluate, unknowns
+from multidrop.shell.scripts.expression import (
+    Expression,
+    Name,
+    Value,
+    Word,
+    evaluate,
+    number,
+    quoted,
+    unknowns,
+    value_of,
+    written,
+)
 from multidrop.shell.scripts.hearing import Hearing
-from multidrop.shell.scripts.model import CallFile, CallMacro, If, MacroScript, Node, Repeat, ScriptLine
-from multidrop.shell.scripts.place import Place
+from multidrop.shell.scripts.model import (
+    CallFile,
+    CallMacro,
+    Executed,
+    If,
+    MacroScript,
+    Node,
+    Repeat,
+    Result,
+    ScriptLine,
+)
 from multidrop.shell.scripts.planning import bind
-from multidrop.shell.scripts.progress import StepProgress
-from multidrop.shell.scripts.results import Executed, Result
-from multidrop.shell.scripts.values import Value, number, quoted, written
 from multidrop.shell.workspace import LATCHED, Workspace
+
+
+class StepProgress:
+    """Shows the step that is under way. The last one of a fast row is shown too: it may last."""
+
+    def __init__(self, channel: Channel, playing: Playing) -> None:
+        self._channel = channel
+        self._playing = playing
+        self._text = ""
+        self._shown_at = float("-inf")
+        self._timer: asyncio.TimerHandle | None = None
+
+    def begins(self, step: int, line: str) -> None:
+        """Take the beginning of a step."""
+        self._playing.step = step
+        self._text = f"{self._playing.name}, {self._playing.at}: {line}"
+        late = self._shown_at + PERIOD - self._channel.now()
+        if late <= 0:
+            self.show()
+        elif self._timer is None:
+            self._timer = asyncio.get_running_loop().call_later(late, self.show)
+
+    def show(self) -> None:
+        """Publish it now."""
+        self._cancel()
+        if self._text:
+            self._shown_at = self._channel.now()
+            self._channel.publish(Progressed(self._shown_at, self._text, 0, 1))
+
+    def end(self) -> None:
+        """Publish the end, if anything was published."""
+        self._cancel()
+        if self._shown_at > float("-inf"):
+            self._channel.publish(Progressed(self._channel.now(), self._text, 1, 1, 0.0))
+
+    def _cancel(self) -> None:
+        if self._timer is not None:
+            self._timer.cancel()
+            self._timer = None
+
+
+class Place:
+    """The selection of one macro, which no other selection changes."""
+
+    def __init__(self, workspace: Workspace, caller: Place | None = None) -> None:
+        """Take the selection of the macro that calls this one, else the present one."""
+        self._workspace = workspace
+        self._at: tuple[str, str] = workspace.place if caller is None else caller._at
+
+    def pinned(self, line: str) -> str:
+        """The line, with an address where another drive is selected now."""
+        if self._workspace.place == self._at:
+            return line
+        words = line.split()
+        if words[:1] == ["/use"] and len(words) == 2 and self._is_address(words[1]):
+            return f"/use {join_target(self._at[0], words[1])}"
+        return pinned(line, *self._at)
+
+    def _is_address(self, word: str) -> bool:
+        """Whether a word is the address of a drive on the macro's bus, and neither a bus nor a role."""
+        return ":" not in word and played_by(word) not in self._workspace.buses
+
+    def target(self, target: str) -> str:
+        """The target of a question, with what the macro's selection adds."""
+        bus, address = split_target(target)
+        if bus or self._workspace.place == self._at:
+            return target
+        return join_target(self._at[0], address or self._at[1])
+
+    def passed(self, line: str) -> None:
+        """Take the selection over after a `/use` of the macro."""
+        if line.split()[:1] == ["/use"]:
+            self._at = self._workspace.place
+
+
+async def known(
+    workspace: Workspace,
+    commands: Commands,
+    tree: Expression,
+    values: Mapping[str, str],
+    by: By,
+    place: Place | None = None,
+) -> dict[Name | Word, Value]:
+    """Find the value of each name and word of an expression; each word is read once.
+
+    Raises Diagnostic for a word that is not a question, DriveError where a drive refuses or prints no single value.
+    """
+    found: dict[Name | Word, Value] = {}
+    for each in unknowns(tree):
+        if each not in found:
+            found[each] = (
+                value_of(values[each.name])
+                if isinstance(each, Name)
+                else await ask(workspace, commands, each, by, place)
+            )
+    return found
+
+
+def drive_of(workspace: Workspace, word: Word, place: Place | None = None) -> Drive:
+    """Find the drive that a word asks. Raises Diagnostic or NoAnswer."""
+    bus, address = split_target(place.target(word.target) if place is not None else word.target)
+    return workspace.drive(bus, address or None)
+
+
+async def ask(workspace: Workspace, commands: Commands, word: Word, by: By, place: Place | None = None) -> Value:
+    """Read the value of a word. Raises Diagnostic, DriveError or TransportLost."""
+    drive = drive_of(workspace, word, place)
+    line = _question(workspace, drive, word)
+    await commands.guard(drive, line, by)
+    printed = await drive.send(line)
+    if len(printed) != 1:
+        raise DriveError(f"{workspace.display_name(drive)}: {line} printed {len(printed)} lines; a value is one")
+    return value_of(printed[0])
+
+
+def _question(workspace: Workspace, drive: Drive, word: Word) -> str:
+    name = workspace.display_name(drive)
+    if drive.link.name in workspace.raw:
+        raise Diagnostic("is in raw mode, where no drive is asked", drive.link.name, "/raw off ends it")
+    if drive.programming:
+        raise DriveError(f"{name} is in program mode and would store the question; PG ends it")
+    line = word.text if word.line else drive.family.question(word.text)
+    if line is None:
+        raise Diagnostic(f"{word.text} has no value to read", name, "[LINE] asks with a line that prints one value")
+    if drive.starts(line):
+        raise Diagnostic(f"{word.shown} can start motion, and a question only reads; nothing was sent", name)
+    return line
+
 
 # The pace of a macro: as recorded, or as fast as its lines are done.
 

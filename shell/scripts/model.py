@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from datetime import datetime
+from typing import Any, Protocol
 
 from multidrop.macros import Macro
+from multidrop.shell.motion import Standing
+from multidrop.shell.secrets import without_secrets
 
 
 @dataclass(frozen=True)
@@ -116,3 +120,86 @@ def lines_of(body: Sequence[Node]) -> Iterator[ScriptLine]:
             yield from lines_of(node.script.body)
         elif isinstance(node, CallMacro):
             yield from lines_of((*node.played.body, *node.played.on_stop))
+
+
+@dataclass(frozen=True)
+class Result:
+    """What one line did. `sent` is the line with its values; `bus` and `drive` are empty for a verb."""
+
+    line: ScriptLine
+    sent: str
+    time: datetime
+    seconds: float
+    printed: tuple[str, ...] = ()
+    bus: str = ""
+    drive: str = ""
+    error: str = ""
+    """Empty: the line succeeded."""
+    failed_check: bool = False
+    """The line is a check, and the check failed."""
+    round: int = 0
+    """The round of the macro, from 1; 0 for a line of a script."""
+
+    @property
+    def where(self) -> str:
+        """The place of the line, with the round where that is not the first."""
+        return self.line.where + (f", round {self.round}" if self.round > 1 else "")
+
+    @property
+    def reported(self) -> str:
+        """The line for a report: a verb's URL without its secrets."""
+        return without_secrets(self.sent) if self.sent.startswith("/") else self.sent
+
+    @property
+    def ok(self) -> bool:
+        """Whether the line succeeded."""
+        return not self.error
+
+    @property
+    def check(self) -> bool:
+        """Whether the line checks something."""
+        return bool(self.line.where) and self.line.word in ("/assert", "/expect")
+
+    def fact(self) -> dict[str, Any]:
+        """The result as an object for programs; what is empty is left out."""
+        place: dict[str, Any] = {"file": self.line.file} if self.line.file else {}
+        if self.line.macro:
+            step = {"step": self.line.step, "round": self.round} if self.line.step else {"on_stop": True}
+            place |= {"macro": self.line.macro, **step}
+        where = {key: value for key, value in (("bus", self.bus), ("drive", self.drive)) if value}
+        time = {"time": self.time.isoformat(timespec="milliseconds")}
+        error = {"error": self.error} if self.error else {}
+        fields = {"line": self.line.number, "sent": self.reported, "printed": list(self.printed), "ok": self.ok}
+        return place | fields | where | time | error
+
+
+Executed = Callable[[Result], None]
+"""Takes the result of each line as it ends."""
+
+
+@dataclass(frozen=True)
+class Ending:
+    """The end of a macro."""
+
+    macro: str
+    rounds: int
+    """The rounds that were done."""
+    at: str = ""
+    """The place where it ended early; empty: it played to its end."""
+    standings: tuple[Standing, ...] = ()
+    """Where its drives stand after an early end."""
+
+    def fact(self) -> dict[str, Any]:
+        """The end as an object for programs."""
+        early = {"at": self.at, "drives": {each.name: each.fact for each in self.standings}} if self.at else {}
+        return {"macro": self.macro, "rounds": self.rounds} | early
+
+
+class Watcher(Protocol):
+    """Takes the results of a run."""
+
+    def executed(self, result: Result) -> None:
+        """Take the result of a line."""
+
+    def ended(self, ending: Ending) -> None:
+        """Take the end of a macro."""

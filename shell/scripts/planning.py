@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING
 
 from multidrop.dialects import Diagnostic, Inexpressible, NoAnswer
 from multidrop.macros import Macro, fill, value_names
-from multidrop.shell import casting
 from multidrop.shell.automation import Claim, only_ends
 from multidrop.shell.lines import DriveLine, parse
+from multidrop.shell.macro_arguments import check_bus, only_bus, unbound
 from multidrop.shell.playing import cast, played_by
 from multidrop.shell.roles import NO_ROLES
-from multidrop.shell.scripts.macro_lines import UNKNOWN
 from multidrop.shell.scripts.model import CallFile, CallMacro, If, MacroScript, Node, Repeat, Script, ScriptLine
+from multidrop.shell.scripts.reading import UNKNOWN
 from multidrop.shell.scripts.words import macro_call
 from multidrop.shell.workspace import Workspace
 
@@ -44,10 +44,10 @@ def bind(workspace: Workspace, macro: Macro, given: Mapping[str, str]) -> dict[s
     bound = {}
     for role in macro.roles:
         ambient = played_by(role)
-        bus = given.get(role) or (ambient if ambient in workspace.buses else casting.only_bus(workspace, macro, role))
+        bus = given.get(role) or (ambient if ambient in workspace.buses else only_bus(workspace, macro, role))
         if not bus:
-            raise casting.unbound(workspace, macro, role)
-        casting.check_bus(workspace, macro, role, bus)
+            raise unbound(workspace, macro, role)
+        check_bus(workspace, macro, role, bus)
         bound[role] = bus
     return bound
 

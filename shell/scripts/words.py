@@ -10,8 +10,7 @@ from typing import TypeVar
 from multidrop.dialects import Diagnostic
 from multidrop.dialects.families import FAMILIES
 from multidrop.shell import waits
-from multidrop.shell.scripts.expression import Comparison, Expression, Name, parse, parse_check, unknowns
-from multidrop.shell.scripts.values import Value, quoted
+from multidrop.shell.scripts.expression import Comparison, Expression, Name, Value, parse, parse_check, quoted, unknowns
 from multidrop.shell.verbs.macros import PLAY, PlayCall, play_call
 from multidrop.shell.verbs.registry import split
 from multidrop.shell.verbs.script_words import SCRIPT_WORDS

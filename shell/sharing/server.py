@@ -10,8 +10,7 @@ from typing import Any, cast
 
 from multidrop.dialects import StopPiece
 from multidrop.shell.connect.opening import OpenedPort
-from multidrop.shell.connect.reconnect import FIRST, GLANCE, LONGEST
-from multidrop.shell.connect.reopening import Absent
+from multidrop.shell.connect.reconnect import FIRST, GLANCE, LONGEST, Absent
 from multidrop.shell.sharing.actions import Action, Close, Purge, Say, Send, Set, Stop, Write
 from multidrop.shell.sharing.exchange import NEVER, NOT_REACHED, Exchange
 from multidrop.shell.sharing.stop_bytes import StopBytes

@@ -11,16 +11,21 @@ from dataclasses import dataclass
 
 from multidrop.dialects import Diagnostic
 from multidrop.shell.scripts.expression import (
+    EQUAL,
     Comparison,
     Expression,
     Known,
     Name,
+    Value,
     Word,
+    compared,
     evaluate,
+    number,
     parse_check,
+    quoted,
     unknowns,
+    value_of,
 )
-from multidrop.shell.scripts.values import EQUAL, Value, compared, number, quoted, value_of
 from multidrop.shell.sweeps.outcome import BY_ITSELF, ENDS, Outcome
 
 NAMES = Outcome._fields

@@ -8,7 +8,7 @@ from multidrop.dialects import Diagnostic, Inexpressible
 from multidrop.shell import scanning
 from multidrop.shell.connect.url_forms import table
 from multidrop.shell.lines import split_target
-from multidrop.shell.naming import model
+from multidrop.shell.openings import model
 from multidrop.shell.verbs.registry import Call, verb
 
 if TYPE_CHECKING:

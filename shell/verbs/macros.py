@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from multidrop.dialects import Diagnostic, Stopped
 from multidrop.dialects.numbers import whole
 from multidrop.macros import Macro
-from multidrop.shell import casting
 from multidrop.shell.events import By
+from multidrop.shell.macro_arguments import settled
 from multidrop.shell.playing import FOREVER
 from multidrop.shell.verbs.registry import Call, as_typed, verb
 from multidrop.shell.workspace import LATCHED
@@ -95,7 +95,7 @@ async def play(call: Call) -> None:
     if call.by is By.OPERATOR and any(each.name == chosen.macro for each in workspace.playing):
         raise Diagnostic(f"macro {chosen.macro} is playing", "/play", f"/play stop {chosen.macro} ends it")
     macro = workspace.macros.load(chosen.macro)
-    values, roles = await casting.settled(workspace, macro, chosen.given)
+    values, roles = await settled(workspace, macro, chosen.given)
     await call.commands.play(macro, values, times=chosen.times, fast=chosen.fast, roles=roles)
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from multidrop.dialects import Diagnostic, Stopped
-from multidrop.shell import stops
+from multidrop.shell import stop_report
 from multidrop.shell.events import By
 from multidrop.shell.log import files
 from multidrop.shell.log.writer import SessionLog
@@ -27,7 +27,7 @@ async def resume(call: Call) -> None:
     call.words(0, 0)
     if call.by is not By.OPERATOR:
         raise Stopped("/resume works only when a person types it")
-    state = f"; {stops.words(call.workspace.tally())}" if call.workspace.latched else ""
+    state = f"; {stop_report.words(call.workspace.tally())}" if call.workspace.latched else ""
     call.workspace.resume()
     call.workspace.notify(f"macros and scripts may run again{state}")
     if dropped := call.workspace.dropped:

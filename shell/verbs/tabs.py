@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from multidrop.shell import tabs
-from multidrop.shell.connect import saving
+from multidrop.shell.connect import settings
 from multidrop.shell.verbs.registry import Call, verb
 
 
@@ -34,5 +34,5 @@ async def keep(call: Call) -> None:
     """
     name, *bus = call.words(1, 2)
     url = call.commands.url_of(call.workspace.bus(bus[0] if bus else ""))
-    path = saving.save(name, url)
+    path = settings.save(name, url)
     call.workspace.notify(f"{path}: connection {name} is saved: {url}", outcome=True)

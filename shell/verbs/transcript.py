@@ -6,7 +6,7 @@ import asyncio
 from typing import TYPE_CHECKING
 
 from multidrop.dialects import Diagnostic
-from multidrop.shell.connect import saving
+from multidrop.shell.connect import settings
 from multidrop.shell.events import By
 from multidrop.shell.transcripts import EVERYTHING, TIMES, Filter, Transcripts
 from multidrop.shell.verbs.registry import Call, verb
@@ -47,7 +47,7 @@ async def times(call: Call) -> None:
 async def _kept(form: str) -> str:
     """Keep the form in the configuration; return why that failed."""
     try:
-        await asyncio.to_thread(saving.keep, "screen", "times", form)
+        await asyncio.to_thread(settings.keep, "screen", "times", form)
     except Diagnostic as problem:
         return f"; not kept for the next start ({problem})"
     return ""

@@ -12,8 +12,7 @@ from xml.etree import ElementTree
 import pytest
 
 from multidrop.dialects import Diagnostic
-from multidrop.shell.front.junit import Case
-from multidrop.shell.front.junit_file import JUnitFile
+from multidrop.shell.front.junit import Case, JUnitFile
 from multidrop.shell.sweeps import trial
 from tests.support.front_door import Command, Done
 from tests.support.front_door import multidrop as multidrop

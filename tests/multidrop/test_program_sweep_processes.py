@@ -15,7 +15,7 @@ from pathlib import Path
 
 import pytest
 
-from multidrop.shell.front import answer as answers
+from multidrop.shell.front import terminal_input
 from multidrop.shell.sweeps import cluster as cluster_of_cases
 from tests.support.front_door import Command
 from tests.support.front_door import multidrop as multidrop
@@ -137,7 +137,7 @@ def test_an_address_is_asked_for_once_at_a_terminal_and_a_yes_is_kept(
         questions.append(question)
         return answer
 
-    monkeypatch.setattr(answers, "ask_outside_a_session", ask)
+    monkeypatch.setattr(terminal_input, "ask_outside_a_session", ask)
     monkeypatch.setattr(cluster_of_cases, "PATIENCE", 0.2)
     with socket.create_server(("127.0.0.1", 0)) as scheduler:
         scheduler.setblocking(False)

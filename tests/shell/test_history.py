@@ -6,8 +6,8 @@ import sys
 
 import pytest
 
-from multidrop.shell.front import history
-from multidrop.shell.front.history import History
+from multidrop.shell.front import typed_lines
+from multidrop.shell.front.typed_lines import History
 from tests.support.until import PATIENCE
 
 
@@ -27,7 +27,7 @@ def test_a_history_that_cannot_be_kept_costs_no_line(tmp_path):
 
 
 def test_a_long_history_is_cut(tmp_path, monkeypatch):
-    monkeypatch.setattr(history, "KEPT", 3)
+    monkeypatch.setattr(typed_lines, "KEPT", 3)
     kept = History(tmp_path / "history")
     for number in range(7):
         kept.append(f"MR {number}")
@@ -41,7 +41,7 @@ def filled(path, lines=7):
 
 
 def test_a_file_that_is_cut_keeps_its_mode(tmp_path, monkeypatch):
-    monkeypatch.setattr(history, "KEPT", 3)
+    monkeypatch.setattr(typed_lines, "KEPT", 3)
     kept = filled(tmp_path / "history")
     for mode in (0o600, 0o640, 0o400):
         kept.path.chmod(0o600)
@@ -52,7 +52,7 @@ def test_a_file_that_is_cut_keeps_its_mode(tmp_path, monkeypatch):
 
 
 def test_a_file_made_anew_is_for_its_user_only(tmp_path, monkeypatch):
-    monkeypatch.setattr(history, "KEPT", 3)
+    monkeypatch.setattr(typed_lines, "KEPT", 3)
     kept = History(tmp_path / "history")
     for number in range(9):
         kept.append(f"MR {number}")
@@ -62,7 +62,7 @@ def test_a_file_made_anew_is_for_its_user_only(tmp_path, monkeypatch):
 
 
 def test_a_link_stays_a_link_and_the_file_behind_it_is_cut(tmp_path, monkeypatch):
-    monkeypatch.setattr(history, "KEPT", 3)
+    monkeypatch.setattr(typed_lines, "KEPT", 3)
     (tmp_path / "state").mkdir()
     filled(tmp_path / "elsewhere")
     (link := tmp_path / "state" / "history").symlink_to(tmp_path / "elsewhere")
@@ -75,16 +75,16 @@ def test_a_link_stays_a_link_and_the_file_behind_it_is_cut(tmp_path, monkeypatch
 
 
 def test_a_line_that_another_process_adds_while_the_file_is_cut_is_kept(tmp_path, monkeypatch):
-    monkeypatch.setattr(history, "KEPT", 3)
+    monkeypatch.setattr(typed_lines, "KEPT", 3)
     ours, theirs = filled(tmp_path / "history"), History(tmp_path / "history")
-    write = history.write_atomically
+    write = typed_lines.write_atomically
 
     def slow(path, data, mode):
         theirs.append("PR P")  # it cannot have the lock, and writes to the file that goes
         write(path, data, mode)
 
     with monkeypatch.context() as patch:
-        patch.setattr(history, "write_atomically", slow)
+        patch.setattr(typed_lines, "write_atomically", slow)
         ours.lines()
     theirs.append("PR V")
     assert ours.lines() == ["MR 6", "PR P", "PR V"]
@@ -93,7 +93,7 @@ def test_a_line_that_another_process_adds_while_the_file_is_cut_is_kept(tmp_path
 @pytest.mark.process
 def test_two_processes_lose_no_line(tmp_path):
     script = (
-        "import sys; from multidrop.shell.front.history import History\n"
+        "import sys; from multidrop.shell.front.typed_lines import History\n"
         "kept = History(__import__('pathlib').Path(sys.argv[1]))\n"
         "for n in range(200): kept.append(f'{sys.argv[2]} {n}'); n % 20 or kept.lines()\n"
     )
@@ -121,7 +121,7 @@ def test_a_full_disk_costs_one_line_and_not_the_next(tmp_path):
 
 
 def test_a_full_disk_leaves_a_long_history_as_it_was(tmp_path, monkeypatch):
-    monkeypatch.setattr(history, "KEPT", 3)
+    monkeypatch.setattr(typed_lines, "KEPT", 3)
     kept = filled(tmp_path / "history")
 
     def full(descriptor):

@@ -5,8 +5,8 @@ import sys
 
 import pytest
 
+from multidrop.shell.channel import running
 from multidrop.shell.events import Notified, Printed, Progressed
-from multidrop.shell.jobs import running
 from multidrop.shell.printer import Printer
 
 

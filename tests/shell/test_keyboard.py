@@ -10,9 +10,9 @@ import threading
 
 import pytest
 
-from multidrop.shell.front.answer import PAUSE, at_keyboard
 from multidrop.shell.front.keyboard import Keyboard
 from multidrop.shell.front.raw_terminal import _waiting as waiting
+from multidrop.shell.front.terminal_input import PAUSE, at_keyboard
 from tests.support.until import PATIENCE
 
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="pseudo-terminals")

@@ -4,7 +4,7 @@ import asyncio
 from typing import Any
 
 from multidrop.dialects import Refused
-from multidrop.shell.front.line_queue import BURST, SHOWN, LineQueue
+from multidrop.shell.front.typed_lines import BURST, SHOWN, LineQueue
 from tests.support.virtual import in_virtual_time
 
 

@@ -13,7 +13,7 @@ import pytest
 from multidrop.dialects import DriveError
 from multidrop.drives.bus import Bus
 from multidrop.shell.connect.opening import Opened
-from multidrop.shell.connect.reopening import LOGIN, LoginAgain
+from multidrop.shell.connect.reconnect import LOGIN, LoginAgain
 from multidrop.shell.connect.settings import Settings
 from multidrop.shell.connect.urls import Connection, parse
 from multidrop.shell.events import Notified

@@ -5,7 +5,7 @@ import asyncio
 import pytest
 
 from multidrop.dialects import Diagnostic, Hints, NoAnswer
-from multidrop.shell import stops
+from multidrop.shell import stop_report
 from multidrop.shell.connect.opening import Opened
 from multidrop.shell.connect.settings import Settings
 from multidrop.shell.session import Session
@@ -145,7 +145,7 @@ async def test_a_stop_before_a_line_is_open_is_not_said_to_reach_it_and_is_the_f
     assert cell.warned() == [
         f"{cell.url}: stop not sent (still being opened): the stop is the first to be sent if it opens - use the E-stop"
     ]
-    assert cell.session.tally().urgent and "(still being opened)" in stops.words(cell.session.tally())
+    assert cell.session.tally().urgent and "(still being opened)" in stop_report.words(cell.session.tally())
     await opening
     assert cell.written("press").startswith(b"\x1b")
     assert "press: the stop that came while it was being opened was sent first" in cell.told()
@@ -160,7 +160,7 @@ async def test_a_stop_before_an_opening_is_not_for_it(tmp_path):
     floor.session.stop()
     opening = asyncio.create_task(floor.session.open("/late"))
     await asyncio.sleep(1.0)
-    assert stops.words(floor.session.tally()) == "no drive is open"
+    assert stop_report.words(floor.session.tally()) == "no drive is open"
     await opening
     assert floor.buses["late"].stops == 0
     with pytest.raises(Unreachable):

@@ -14,9 +14,8 @@ from multidrop.dialects import Diagnostic, DriveError
 from multidrop.macros import Macro, MacroStore, Step
 from multidrop.shell.events import Entered, Progressed
 from multidrop.shell.scripts.executor import run_script
-from multidrop.shell.scripts.macro_lines import stand_in
-from multidrop.shell.scripts.reading import WrongScript, read_macro, read_script
-from multidrop.shell.scripts.results import Ending, Result
+from multidrop.shell.scripts.model import Ending, Result
+from multidrop.shell.scripts.reading import WrongScript, read_macro, read_script, stand_in
 from tests.support.cell_session import CellSession, bus, party
 from tests.support.virtual import in_virtual_time
 

@@ -12,8 +12,8 @@ from multidrop.drives.events import Traffic
 from multidrop.shell.events import OnBus
 from multidrop.shell.output import report
 from multidrop.shell.scripts.executor import run_script
+from multidrop.shell.scripts.model import Ending
 from multidrop.shell.scripts.reading import read_script
-from multidrop.shell.scripts.results import Ending
 from multidrop.transports import TransportLost
 from tests.shell.test_playing import Shop
 from tests.support.virtual import in_virtual_time

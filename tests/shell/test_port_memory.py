@@ -8,8 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from multidrop.dialects.state import Remembered
-from multidrop.shell.connect.port_memory import MOST, PortMemory
-from multidrop.shell.connect.port_state import PortState
+from multidrop.shell.connect.port_state import MOST_REPLIED, PortMemory, PortState
 
 A = Remembered("a", "a", "LMDCM", "LMDCM 6.002, Hw: 3.2", "LMDCM571", "0401", True, 1, 2)
 B, ALONE = replace(A, address="b", name="b", serial="0402"), replace(A, address="", party=False)
@@ -41,7 +40,7 @@ def test_the_file_is_written_only_where_something_is_new(tmp_path):
 
 def test_the_oldest_of_too_many_are_dropped(tmp_path):
     memory = PortMemory(tmp_path / "port.drives")
-    names = [chr(number) for number in range(33, 33 + MOST + 5)]
+    names = [chr(number) for number in range(33, 33 + MOST_REPLIED + 5)]
     memory.update({name: replace(A, address=name) for name in names})
     assert [each.address for each in memory.drives] == names[5:]
 

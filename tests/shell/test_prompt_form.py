@@ -16,12 +16,11 @@ from prompt_toolkit.output import DummyOutput
 
 from multidrop.dialects import Diagnostic, Stopped
 from multidrop.macros import Macro, Step
-from multidrop.shell.casting import value_fields
 from multidrop.shell.connect.settings import Settings
 from multidrop.shell.events import Entered, Notified
-from multidrop.shell.front.answer import PAUSE
-from multidrop.shell.front.form import at_terminal
 from multidrop.shell.front.prompt import Prompt
+from multidrop.shell.front.terminal_input import PAUSE, at_terminal
+from multidrop.shell.macro_arguments import value_fields
 from multidrop.shell.session import Session
 from tests.support.virtual import in_virtual_time
 

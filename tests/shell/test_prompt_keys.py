@@ -9,7 +9,7 @@ import time
 import pexpect
 import pytest
 
-from multidrop.shell.front.answer import PAUSE
+from multidrop.shell.front.terminal_input import PAUSE
 from tests.support.cases import for_each
 from tests.support.processes import Tap
 from tests.support.served_cell import SIGNALS, ends, until

@@ -11,8 +11,8 @@ from prompt_toolkit.output import DummyOutput
 from multidrop.dialects import Diagnostic, Stopped
 from multidrop.shell.connect.settings import Settings
 from multidrop.shell.events import Entered, Notified
-from multidrop.shell.front.answer import PAUSE
 from multidrop.shell.front.prompt import Prompt
+from multidrop.shell.front.terminal_input import PAUSE
 from multidrop.shell.session import Session
 from tests.support.virtual import in_virtual_time
 

@@ -16,7 +16,7 @@ from typing import Any
 import pytest
 
 from multidrop.dialects import Diagnostic
-from multidrop.shell.connect.reopening import Absent, SerialAgain
+from multidrop.shell.connect.reconnect import Absent, SerialAgain
 from multidrop.shell.connect.settings import Settings
 from multidrop.shell.events import Notified, Printed
 from multidrop.shell.session import Session

@@ -17,8 +17,7 @@ from multidrop.dialects import DriveError, Priority
 from multidrop.dialects.families import FAMILIES
 from multidrop.drives.drive import Drive
 from multidrop.drives.procedure import ProcedureRunner
-from multidrop.shell.front.replay import replay
-from multidrop.shell.front.replay_report import ReplayReport
+from multidrop.shell.front.replay import ReplayReport, replay
 from multidrop.shell.log.steps import Exchange, read
 from multidrop.shell.log.writer import SessionLog
 from multidrop.shell.twins.after import Decoding

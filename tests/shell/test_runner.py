@@ -6,7 +6,7 @@ import pytest
 
 from multidrop.dialects import Diagnostic
 from multidrop.dialects.files import LARGEST
-from multidrop.shell.front.stream import stream_lines
+from multidrop.shell.front.terminal_input import stream_lines
 from multidrop.shell.lines import uncommented
 from multidrop.shell.scripts.reading import read_script
 from tests.support.until import PATIENCE

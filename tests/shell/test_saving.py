@@ -3,7 +3,7 @@
 import pytest
 
 from multidrop.dialects import Diagnostic
-from multidrop.shell.connect import saving, settings
+from multidrop.shell.connect import settings
 
 OLD = "# the shop\n[connections.press]\nurl = 'serial:/dev/ttyS0'   # left\n"
 
@@ -16,7 +16,7 @@ def file(tmp_path, monkeypatch):
 
 def test_a_connection_is_added_and_remarks_stay(file):
     file.write_text(OLD)
-    assert saving.save("clamp", "serial:/dev/ttyUSB0?baud=9600") == file
+    assert settings.save("clamp", "serial:/dev/ttyUSB0?baud=9600") == file
     assert file.read_text().startswith(OLD)
     assert {name: each.url for name, each in settings.load().connections.items()} == {
         "press": "serial:/dev/ttyS0",
@@ -26,7 +26,7 @@ def test_a_connection_is_added_and_remarks_stay(file):
 
 
 def test_a_new_file_is_made(file):
-    saving.save("clamp", "sim:")
+    settings.save("clamp", "sim:")
     assert settings.load().connections["clamp"].url == "sim:"
 
 
@@ -34,13 +34,13 @@ def test_a_new_file_is_made(file):
 def test_a_name_that_exists_or_is_none_is_refused_and_nothing_changes(file, name, why):
     file.write_text(OLD)
     with pytest.raises(Diagnostic, match=why):
-        saving.check_new(name)
+        settings.check_new(name)
     with pytest.raises(Diagnostic, match=why):
-        saving.save(name, "sim:")
+        settings.save(name, "sim:")
     assert file.read_text() == OLD
 
 
 def test_a_folder_that_cannot_be_written_is_named(file):
     file.mkdir()
     with pytest.raises(Diagnostic, match="multidrop.toml"):
-        saving.save("clamp", "sim:")
+        settings.save("clamp", "sim:")

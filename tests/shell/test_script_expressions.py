@@ -8,8 +8,17 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 from multidrop.dialects import Diagnostic
-from multidrop.shell.scripts.expression import Name, Word, evaluate, parse, parse_check, unknowns
-from multidrop.shell.scripts.values import LARGEST, value_of, written
+from multidrop.shell.scripts.expression import (
+    LARGEST,
+    Name,
+    Word,
+    evaluate,
+    parse,
+    parse_check,
+    unknowns,
+    value_of,
+    written,
+)
 
 SIGNS = {
     "+": operator.add,

@@ -21,10 +21,10 @@ from multidrop.dialects.family import Family
 from multidrop.drives.events import Conditioned, Sample, Silent, Unsolicited
 from multidrop.drives.halt import Fate
 from multidrop.drives.readings import Value
-from multidrop.shell.asking import Fill
+from multidrop.shell.channel import Fill
 from multidrop.shell.events import By, Entered, Failed, Notified, OnBus, Printed, SessionEvent, StateChanged
 from multidrop.shell.roles import RunningPlot, Series
-from multidrop.shell.stops import Found, Tally
+from multidrop.shell.stop_report import Found, Tally
 from multidrop.shell.transcripts import Transcripts
 from multidrop.transports import TransportLost, Unreachable
 from multidrop.tui.app import MultidropApp

@@ -12,7 +12,7 @@ from textual.pilot import Pilot
 from textual.widgets import Static
 
 from multidrop.macros import Macro, Step
-from multidrop.shell.casting import value_fields
+from multidrop.shell.macro_arguments import value_fields
 from multidrop.tui.screens.form import Form
 from tests.support.fake_session import demo_session, make_app, settle
 

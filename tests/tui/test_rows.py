@@ -11,7 +11,7 @@ from rich.style import Style
 from multidrop.drives.events import Sample
 from multidrop.drives.halt import Fate
 from multidrop.shell.events import OnBus, StateChanged
-from multidrop.shell.stops import Found, Tally
+from multidrop.shell.stop_report import Found, Tally
 from multidrop.tui.panels.column import column_rows
 from multidrop.tui.panels.glance import Glance, firmware_of
 from multidrop.tui.panels.status import narrow_rows

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from multidrop.dialects import Diagnostic
-from multidrop.shell.connect import opened
+from multidrop.shell.connect import port_state
 from multidrop.transports import Unreachable
 from multidrop.transports.holders import holder
 from multidrop.tui.app import MultidropApp
@@ -127,15 +127,15 @@ async def test_the_url_of_a_port_can_be_edited() -> None:
 
 
 def test_what_was_opened_last_is_kept_newest_first(tmp_path: Path) -> None:
-    assert opened.lately(tmp_path / "none") == []
-    for url in ("a", "b", "a", *map(str, range(opened.MOST))):
-        opened.note(tmp_path, url)
-    assert [each.url for each in opened.lately(tmp_path)][:2] == ["11", "10"]
-    assert len(opened.lately(tmp_path)) == opened.MOST
+    assert port_state.lately(tmp_path / "none") == []
+    for url in ("a", "b", "a", *map(str, range(port_state.MOST_OPENED))):
+        port_state.note(tmp_path, url)
+    assert [each.url for each in port_state.lately(tmp_path)][:2] == ["11", "10"]
+    assert len(port_state.lately(tmp_path)) == port_state.MOST_OPENED
     (tmp_path / "opened.json").write_text("[")
-    assert opened.lately(tmp_path) == []
-    opened.note(tmp_path, "b")
-    assert [each.url for each in opened.lately(tmp_path)] == ["b"]
+    assert port_state.lately(tmp_path) == []
+    port_state.note(tmp_path, "b")
+    assert [each.url for each in port_state.lately(tmp_path)] == ["b"]
 
 
 def test_the_holder_of_a_port_is_found_by_its_lock_file_or_its_open_file(tmp_path: Path) -> None:

@@ -8,7 +8,7 @@ from textual import events
 from textual.pilot import Pilot
 
 from multidrop.drives.halt import Fate
-from multidrop.shell import stops
+from multidrop.shell import stop_report
 from multidrop.shell.events import By
 from multidrop.tui.app import MultidropApp, is_stop
 from multidrop.tui.panels.glance import glances_of
@@ -161,7 +161,7 @@ async def test_rows_and_tabs_never_say_the_contrary_of_the_banner_on_a_line_of_t
 
         def agree(_event: object) -> None:
             tally = session.tally()
-            said.add(stops.headline(tally).split(" ")[1])
+            said.add(stop_report.headline(tally).split(" ")[1])
             for glance, found in zip(glances_of(session, model, line), tally.found, strict=True):
                 row = f"{glance.sign(session.now())[0]} {program_words(glance.readout, session.now())}"
                 if found.fate is Fate.STANDING:

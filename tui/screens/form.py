@@ -11,7 +11,7 @@ from textual.containers import Vertical, VerticalScroll
 from textual.widgets import Static
 
 from multidrop.dialects.visible import visible
-from multidrop.shell.asking import Field as Wanted
+from multidrop.shell.channel import Field as Wanted
 from multidrop.tui.screens.dialogs import Dialog, Field
 
 NEEDED = "a value is needed"

@@ -9,7 +9,7 @@ from typing import TypeVar
 from rich.text import Text
 from textual.app import App
 
-from multidrop.shell.asking import Field
+from multidrop.shell.channel import Field
 from multidrop.tui.panels.glance import Glance
 from multidrop.tui.screens.dialogs import Ask, Choose, Confirm, Dialog, GoOn, Match, Offer, Search, TooSmall
 from multidrop.tui.screens.form import Form

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from multidrop.shell.stops import Tally, headline, words
+from multidrop.shell.stop_report import Tally, headline, words
 from multidrop.tui.text import fit
 from multidrop.tui.widgets.lines import Lines, Row
 

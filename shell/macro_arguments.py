@@ -8,7 +8,7 @@ from functools import partial
 from multidrop.dialects import Diagnostic
 from multidrop.macros import Macro, Parameter, checked_values, missing
 from multidrop.macros.parameters import written
-from multidrop.shell.asking import Field
+from multidrop.shell.channel import Field
 from multidrop.shell.workspace import Workspace
 
 

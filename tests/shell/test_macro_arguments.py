@@ -11,10 +11,10 @@ import pytest
 from multidrop.dialects import Diagnostic
 from multidrop.drives.bus import Bus
 from multidrop.macros import Macro, Step
-from multidrop.shell.asking import Field
-from multidrop.shell.casting import settled
+from multidrop.shell.channel import Field
 from multidrop.shell.connect.settings import Settings
 from multidrop.shell.events import Notified
+from multidrop.shell.macro_arguments import settled
 from multidrop.shell.session import Session
 
 TURNS = Macro("turns", (Step(0.0, "MR {far:int=7,1..9}"), Step(0.0, "VM {fast:int}")))
