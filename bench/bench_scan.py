@@ -22,7 +22,7 @@ import serial
 from report import Row, compared, main
 from sim_process import served
 
-from multidrop.dialects.mcode.host.checksum import sealed
+from multidrop.dialects.mcode.host.framing import sealed
 from multidrop.dialects.mcode.manual.statements import NAMES
 from multidrop.shell.connect.opening import open_buses
 from multidrop.shell.connect.settings import Settings

@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 
 from multidrop.dialects import End, Kind, NoAnswer, Request
 from multidrop.dialects.mcode.family import MCODE
-from multidrop.dialects.mcode.host.checksum import sealed
 from multidrop.dialects.mcode.host.codec import MCode
+from multidrop.dialects.mcode.host.framing import sealed
 from multidrop.dialects.mcode.host.state import MCodeState
 from multidrop.dialects.pmx.host.codec import Pmx
 from multidrop.drives.events import Unsolicited

@@ -3,8 +3,8 @@
 import pytest
 
 from multidrop.dialects import End, Kind, Priority, Request, StopPiece
-from multidrop.dialects.mcode.host.checksum import sealed
 from multidrop.dialects.mcode.host.codec import MCode
+from multidrop.dialects.mcode.host.framing import sealed
 from multidrop.drives.events import Unsolicited
 from multidrop.drives.flight import Finished
 from multidrop.drives.line import QUIET, Line, Write

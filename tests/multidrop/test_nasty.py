@@ -20,8 +20,8 @@ from multidrop.dialects import Diagnostic, End
 from multidrop.dialects.families import languages
 from multidrop.dialects.family import Language
 from multidrop.dialects.files import toml_of
+from multidrop.dialects.mcode.host.classify import INTEGER
 from multidrop.dialects.mcode.host.codec import MCode
-from multidrop.dialects.mcode.host.printed import INTEGER
 from multidrop.dialects.mcode.host.state import MCodeState
 from multidrop.dialects.numbers import whole
 from multidrop.dialects.pmx.host.exchange import INTEGER as PMX_INTEGER

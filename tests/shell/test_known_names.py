@@ -8,7 +8,7 @@ from prompt_toolkit.document import Document
 
 from multidrop.dialects import Priority
 from multidrop.dialects.held import Held
-from multidrop.dialects.mcode.host.names import offered
+from multidrop.dialects.mcode.host.program_readout import offered
 from multidrop.drives.events import Ended
 from multidrop.shell.events import OnBus
 from multidrop.shell.front.complete import complete, names_of

@@ -15,8 +15,8 @@ import time
 import pexpect
 import pytest
 
-from multidrop.dialects.mcode.host.checksum import sealed
 from multidrop.dialects.mcode.host.codec import MCode
+from multidrop.dialects.mcode.host.framing import sealed
 from tests.support.processes import Running, environment
 from tests.support.until import PATIENCE
 

@@ -20,12 +20,10 @@ from multidrop.dialects.debugging import Debugging, Look, Neighbours, Row, Stepp
 from multidrop.dialects.errors import Diagnostic, Inexpressible, NoAnswer, Refused
 from multidrop.dialects.held import Held
 from multidrop.dialects.mcode.host.codec import MCode
-from multidrop.dialects.mcode.host.exchange import answered
+from multidrop.dialects.mcode.host.exchange import answered, question, value
 from multidrop.dialects.mcode.host.framing import printable
 from multidrop.dialects.mcode.host.operations import flag, listing, perform
-from multidrop.dialects.mcode.host.signatures import question, value
-from multidrop.dialects.mcode.host.state import MCodeState
-from multidrop.dialects.mcode.host.wording import who
+from multidrop.dialects.mcode.host.state import MCodeState, who
 from multidrop.dialects.mcode.manual.grammar import LineError, Name, Number, Statement, parse
 from multidrop.dialects.mcode.manual.mnemonic import MDRIVE_PLUS
 from multidrop.dialects.mcode.manual.table import lookup

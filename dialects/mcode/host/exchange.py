@@ -1,34 +1,110 @@
-"""One request to an MCode drive, and proof of its outcome.
-
-Theory of operation. Only EM=0 shows a refusal by itself (`?`); with a checksum NAK does. Otherwise the host sends `PR
-EF` after a command that prints nothing, and `PR ER` if EF is 1. Reading ER clears it. So the host reads and reports an
-earlier error first, or the next command would be blamed for it. After a NAK, ER identifies a damaged frame (0: safe to
-repeat) from a refusal. The host never repeats anything else. After a missing reply it prints a sync mark: everything
-before the mark is late and is discarded.
-
-Some units reply NAK to every command while an error is set, and execute the command. So the host clears the flag before
-a command. Where the flag may have been set since, a NAK does not tell whether the command was executed. A running
-program may set the flag at any time.
-
-Values are signed (`signatures`): a running program prints numbers too, and another drive's reply may be late. (MCode
-reference 5.1.37, 5.1.39, 5.1.40, 7.1; facts of real units.)
-"""
+"""One request to an MCode drive, and proof of its outcome: signed prints, errors, the end of program mode."""
 
 from __future__ import annotations
 
 import re
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from functools import lru_cache
 from typing import NoReturn
 
 from multidrop.dialects.codec import End, Kind, Priority, Procedure, Reply, Request
-from multidrop.dialects.errors import NoAnswer, Refused
+from multidrop.dialects.errors import Inexpressible, NoAnswer, Refused
 from multidrop.dialects.mcode.host import classify
+from multidrop.dialects.mcode.host.classify import INTEGER, NOTHING
 from multidrop.dialects.mcode.host.framing import ACK
-from multidrop.dialects.mcode.host.printed import INTEGER, NOTHING
-from multidrop.dialects.mcode.host.signatures import fresh, question, value
-from multidrop.dialects.mcode.host.state import MCodeState
-from multidrop.dialects.mcode.host.wording import described, unknown, who
+from multidrop.dialects.mcode.host.state import MCodeState, described, unknown, who
 from multidrop.dialects.mcode.manual import errors
+from multidrop.dialects.mcode.manual.errors import ErrorNumber
+
+# Signed prints: the host's questions, a person's prints, sync marks.
+#
+# Theory of operation. A reply carries neither its request's number nor a name. So the host appends an item to the
+# values: the drive's own name (`PR P,DN`) if the drive prints it, otherwise a text with that name (`PR P,"~a"`). The
+# first is better. A flipped bit may turn one drive's name into another's: that drive prints any text that it receives,
+# but its own name. A sync mark also has a fresh number; everything before it is late. (MCode reference 5.1.33,
+# 5.1.102; decision 0014.)
+
+
+@dataclass(frozen=True)
+class Sign:
+    """The item of PR that signs a print, and its printed form."""
+
+    item: str
+    shown: str
+
+
+def sign(state: MCodeState) -> Sign:
+    """Return the signature of a drive."""
+    return _sign(state.address, state.signs and state.codec.party)
+
+
+@lru_cache(maxsize=256)
+def _sign(address: str, by_name: bool) -> Sign:
+    if by_name:
+        return Sign("DN", as_printed(address))
+    text = _tag(address)
+    return Sign(f'"{text}"', text)
+
+
+def fresh(state: MCodeState, address: str, party: bool) -> Sign:
+    """Return a sync mark: the signature of a drive at this address, with a fresh number."""
+    number = state.next_sync_mark() % 10000
+    if state.signs and party:
+        return Sign(f'"~{number}",DN', f"~{number}{as_printed(address)}")
+    text = f"{_tag(address)}{number}"
+    return Sign(f'"{text}"', text)
+
+
+def as_printed(name: str) -> str:
+    """Return a name as PR DN prints it."""
+    return f'"{name}"'
+
+
+def _tag(address: str) -> str:
+    return f"~{address}" if address.isalnum() else "~"
+
+
+def question(state: MCodeState, items: str, answer: str) -> Request:
+    """Print values for the host's own use; `answer` is a regular expression for them."""
+    own = sign(state)
+    asked = state.codec.request(state.address, f"PR {items},{own.item}")
+    return replace(asked, expect=f"({answer}){re.escape(own.shown)}", signed=True)
+
+
+def value(state: MCodeState, reply: Reply) -> str:
+    """Return the values of such a reply."""
+    return reply.text.removesuffix(sign(state).shown)
+
+
+def signed(state: MCodeState, request: Request) -> Request:
+    """Sign a person's print; unchanged where it has no value, or no room."""
+    own = sign(state)
+    text = classify.with_item(request.text, own.item)
+    if text is None:
+        return request
+    try:
+        longer = state.codec.request(state.address, text)
+    except Inexpressible:
+        return request
+    expect = f"{classify.print_form(request.text)}{re.escape(own.shown)}"
+    return replace(longer, text=request.text, spoken=text, expect=expect, signed=True)
+
+
+# One request to an MCode drive, and proof of its outcome.
+#
+# Theory of operation. Only EM=0 shows a refusal by itself (`?`); with a checksum NAK does. Otherwise the host sends
+# `PR EF` after a command that prints nothing, and `PR ER` if EF is 1. Reading ER clears it. So the host reads and
+# reports an earlier error first, or the next command would be blamed for it. After a NAK, ER identifies a damaged
+# frame (0: safe to repeat) from a refusal. The host never repeats anything else. After a missing reply it prints a
+# sync mark: everything before the mark is late and is discarded.
+#
+# Some units reply NAK to every command while an error is set, and execute the command. So the host clears the flag
+# before a command. Where the flag may have been set since, a NAK does not tell whether the command was executed. A
+# running program may set the flag at any time.
+#
+# Values are signed (`signatures`): a running program prints numbers too, and another drive's reply may be late. (MCode
+# reference 5.1.37, 5.1.39, 5.1.40, 7.1; facts of real units.)
+
 
 REPEATS = 3
 
@@ -235,3 +311,42 @@ def print_mark(state: MCodeState, priority: Priority, rows: str | None = None) -
 def ends_in_program_mode(reply: Reply) -> bool:
     """Whether the prompt is an address: the drive stores what it receives."""
     return reply.prompt[:1].isdigit()
+
+
+# Leaving program mode, whatever the state of the drive and of the wire (MCode reference 5.1.98).
+
+
+NOT_PROGRAMMING = ErrorNumber.NOT_IN_PROGRAM_MODE
+"""The error of PG alone outside of program mode (section 10)."""
+
+
+def leave_program(state: MCodeState) -> Procedure[int]:
+    """Send PG until a prompt, an error or a printed mark shows the end of program mode; one PG too many does no harm.
+
+    Returns the error that this found and cleared, 0 for none.
+    """
+    for _ in range(2 * REPEATS):
+        request = replace(state.codec.request(state.address, "PG"), kind=Kind.PROGRAM)
+        reply = yield request
+        code: int | None = 0
+        if ends_in_program_mode(reply):
+            continue
+        if reply.end in (End.DONE, End.SILENT):
+            state.left_program_mode()
+        elif reply.end in (End.REFUSED, End.NAK):
+            code = yield from read_error(state)  # None: stored, so still in program mode; 0: damaged frame
+            if code:
+                state.left_program_mode()
+        else:
+            if (yield from print_mark(state, request.priority)) is not None:
+                state.left_program_mode()
+        if not state.programming:
+            return code if code and code != NOT_PROGRAMMING else 0
+    raise NoAnswer(f"{who(state)} could not be taken out of program mode: type PG, then open it again")
+
+
+def take_out(state: MCodeState, remark: str) -> Procedure[None]:
+    """Leave program mode and report it, with the error that was set."""
+    code = yield from leave_program(state)
+    error = f"; {described(code, state)}, now cleared" if code else ""
+    state.note(f"{who(state)}: {remark}{error}")

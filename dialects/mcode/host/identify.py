@@ -25,12 +25,10 @@ from multidrop.dialects.codec import Kind, Procedure, Reply, Request
 from multidrop.dialects.errors import Inexpressible, NoAnswer
 from multidrop.dialects.family import Hints
 from multidrop.dialects.mcode.host.codec import NOBODY, MCode
-from multidrop.dialects.mcode.host.identity import SETTLE, TEXT, end_text, find, find_in_text
+from multidrop.dialects.mcode.host.identity import SETTLE, TEXT, end_text, find, find_in_text, overflow, write_stop
 from multidrop.dialects.mcode.host.program_mode import put_back_found
 from multidrop.dialects.mcode.host.resync import BRIEF
-from multidrop.dialects.mcode.host.state import MCodeState, Place, Unconfirmed
-from multidrop.dialects.mcode.host.stopped import overflow, written
-from multidrop.dialects.mcode.host.wording import who
+from multidrop.dialects.mcode.host.state import MCodeState, Place, Unconfirmed, who
 from multidrop.dialects.mcode.manual.statements import UNNAMED
 from multidrop.dialects.state import Remembered
 
@@ -53,7 +51,7 @@ def identify(hints: Hints) -> Procedure[list[MCodeState]]:
     yield from overflow(hints.drives or (UNNAMED,))
     found = yield from _look_around(hints)
     for state in found:  # their stops are known now, and an error's subroutine may have started since
-        yield from written(state.codec.stop([state.address or state.name], sure=not state.settings_unknown))
+        yield from write_stop(state.codec.stop([state.address or state.name], sure=not state.settings_unknown))
     return found
 
 

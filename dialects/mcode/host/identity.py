@@ -12,18 +12,37 @@ reference 5.1.33, 5.1.39, 5.1.98, 5.1.105, 5.1.119, 5.1.141; facts of real units
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from dataclasses import replace
 
 from multidrop.dialects.codec import Kind, Procedure, Request
 from multidrop.dialects.mcode.host.codec import NOBODY, MCode
-from multidrop.dialects.mcode.host.collected import pongs
+from multidrop.dialects.mcode.host.exchange import as_printed, take_out
 from multidrop.dialects.mcode.host.framing import NAK
-from multidrop.dialects.mcode.host.leave_program import take_out
-from multidrop.dialects.mcode.host.quiet_times import PONG
+from multidrop.dialects.mcode.host.quiet_end import PONG, pongs
 from multidrop.dialects.mcode.host.resync import BRIEF, PROGRAM_PROMPT, asked, look, take_over
-from multidrop.dialects.mcode.host.signatures import as_printed
-from multidrop.dialects.mcode.host.state import MCodeState, Place
-from multidrop.dialects.mcode.host.wording import who
+from multidrop.dialects.mcode.host.state import MCodeState, Place, who
+from multidrop.dialects.mcode.manual.program_file import LONGEST
+
+# Half a line in the drives' buffers, from an interrupted use of the port: it is made to overflow between stops.
+
+
+def overflow(names: Sequence[str]) -> Procedure[None]:
+    """Stop the drives, overflow every drive's buffer so that the half line is refused, and stop them twice more.
+
+    A CR ends the line outside of party mode. A LF executes it in party mode, where the CR only separates.
+    """
+    form = MCode(party=True)
+    stop = form.stop(names, sure=False)
+    spoiled = form.stop(names, sure=False, half_sent=True) + NOBODY.encode() * (LONGEST + 1) + b"\r\n" + stop
+    yield from write_stop(spoiled)
+    yield from write_stop(stop)  # a subroutine of OE may have started late
+
+
+def write_stop(data: bytes) -> Procedure[None]:
+    """Write a stop past the codec."""
+    yield Request(NOBODY, "stop", Kind.QUIET, MCode(party=True), settle=0.2, timeout=BRIEF, body=data)
+
 
 LEXIUM = r"LM[DM][A-Z0-9]* [ !#-=?-~]*"
 OLDER = r"\d+\.\d+[ !#-=?-~]*"

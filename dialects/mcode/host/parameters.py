@@ -10,23 +10,33 @@ pieces, since every refusal runs a resident OE subroutine. (MCode reference 5.1.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 from multidrop.dialects.codec import End, Kind, Priority, Procedure, Reply
 from multidrop.dialects.errors import NoAnswer, Refused
-from multidrop.dialects.mcode.host.attend import attend
-from multidrop.dialects.mcode.host.exchange import REPEATS, note_error, print_mark
-from multidrop.dialects.mcode.host.signatures import question, sign, value
-from multidrop.dialects.mcode.host.state import MCodeState
-from multidrop.dialects.mcode.host.wording import who
+from multidrop.dialects.mcode.host.before_request import before_request
+from multidrop.dialects.mcode.host.codec import EVERY_DRIVE
+from multidrop.dialects.mcode.host.exchange import REPEATS, answered, note_error, print_mark, question, sign, value
+from multidrop.dialects.mcode.host.operations import perform
+from multidrop.dialects.mcode.host.state import MCodeState, who
+from multidrop.dialects.mcode.manual import parameter_plan
 from multidrop.dialects.mcode.manual import parameters as manual
 from multidrop.dialects.mcode.manual.parameters import Form, Setting
 from multidrop.dialects.mcode.manual.program_file import LONGEST
 from multidrop.dialects.mcode.manual.table import words
-from multidrop.dialects.parameters import VARIABLES, Progress, Reading, Readings, Value
+from multidrop.dialects.parameters import (
+    VARIABLES,
+    Change,
+    Parameters,
+    Permission,
+    Plan,
+    Progress,
+    Reading,
+    Readings,
+    Value,
+)
 
-GLOBAL = ("*", "^")
 ETHERNET = ("LMDOE", "LMDCE")
 """The products without a name."""
 BETWEEN = ":"
@@ -46,7 +56,7 @@ class Found:
 
 def read(state: MCodeState, progress: Progress) -> Procedure[Readings]:
     """Read every setting that the drive prints. Raises Refused where it would store the questions, or NoAnswer."""
-    if state.address in GLOBAL:
+    if state.address in EVERY_DRIVE:
         raise Refused(f"'{state.address}' is every drive; name one")
     if state.programming:
         raise Refused(f"{who(state)} is in program mode and would store it: PG ends that")
@@ -128,7 +138,7 @@ def _print(state: MCodeState, items: str, forms: Sequence[str]) -> Procedure[lis
     """Print values; None where the drive refuses to, or prints what is not understood. Raises NoAnswer."""
     answer = "".join(f"(?:{form})" for form in forms)
     for _ in range(1 + REPEATS):
-        yield from attend(state, question(state, items, answer))
+        yield from before_request(state, question(state, items, answer))
         reply = yield question(state, items, answer)
         if reply.end is End.DONE:
             note_error(state, reply)
@@ -178,7 +188,7 @@ def _numbered(state: MCodeState, word: str, numbers: Sequence[int]) -> Procedure
     """
     if numbers[-1] != manual.LISTS[word][-1]:
         return (yield from listed(state, f"PR {word}"))
-    yield from attend(state, question(state, "EF", "[01]"))
+    yield from before_request(state, question(state, "EF", "[01]"))
     asked = state.codec.request(state.address, f"PR {word}")
     last = rf" *{word} *= *{numbers[-1]} *(?:, *-?\d+ *)+"
     reply = yield replace(asked, kind=Kind.PRINT, expect=last, gather=True, rows=rf" *{word} *=.*")
@@ -191,7 +201,7 @@ def _numbered(state: MCodeState, word: str, numbers: Sequence[int]) -> Procedure
 def listed(state: MCodeState, text: str) -> Procedure[tuple[str, ...]]:
     """Print a list (`PR UV`, `L`) to its end. Raises NoAnswer where it may be incomplete."""
     for _ in range(1 + REPEATS):
-        yield from attend(state, question(state, "EF", "[01]"))
+        yield from before_request(state, question(state, "EF", "[01]"))
         reply = yield state.codec.request(state.address, text)
         lines = reply.lines
         if state.codec.em != 0 or reply.end is not End.DONE:
@@ -249,3 +259,57 @@ def _natural(name: str) -> tuple[str, int]:
 
 def _number(text: str) -> int | float:
     return float(text) if "." in text else int(text)
+
+
+# Writing settings of an MCode drive: the moment for it, one step, and S.
+
+
+def plan(state: MCodeState, present: Readings, wanted: Mapping[str, Value], allowed: Permission) -> Plan:
+    """Order the steps to the wanted values. Raises Diagnostic for values that the drive refuses."""
+    return parameter_plan.plan(state.product, present, wanted, allowed)
+
+
+def conflict(plan: Plan, others: Collection[str]) -> str:
+    """Return the reason for which a name or party mode would disturb other drives of the line; empty: none."""
+    final = {change.name: change.after for change in plan}
+    if final.get("DN") in others:
+        return f"another drive of the line is named {final['DN']}"
+    return (
+        "other drives share the line, and PY=0 would make this one reply to all of it"
+        if (others and final.get("PY") == 0)
+        else ""
+    )
+
+
+def ready(state: MCodeState) -> Procedure[str]:
+    """Return the reason for which settings must not change now; empty: there is none."""
+    if state.programming:
+        return f"{who(state)} is in program mode and would store the settings: PG ends that"
+    yield from before_request(state, question(state, "MV", "[01]"))
+    reply = yield from answered(state, question(state, "MV,BY,TE", r"[01][01]\d{1,3}"))
+    said = value(state, reply)
+    if said[:1] == "1":
+        return f"{who(state)} moves: stop it first"
+    if said[1:2] == "1":
+        return f"{who(state)} runs a program: E ends it"
+    if said[2:] not in ("", "0"):
+        return f"{who(state)} has armed trips (TE={said[2:]}): TE=0 disarms them"
+    return ""
+
+
+def write(state: MCodeState, change: Change) -> Procedure[None]:
+    """Send one step, and make sure of it."""
+    yield from perform(state, change.text)
+
+
+def save(state: MCodeState) -> Procedure[None]:
+    """Send S."""
+    if state.programming:
+        raise Refused(f"{who(state)} is in program mode and would store S: PG ends that")
+    yield from perform(state, "S")
+
+
+_LATER = frozenset({"BD"})
+PARAMETERS = Parameters(
+    read=read, plan=plan, ready=ready, write=write, save=save, language="MCode", conflict=conflict, later=_LATER
+)

@@ -14,19 +14,17 @@ from dataclasses import replace
 from multidrop.dialects.codec import End, Kind, Procedure, Reply, Request
 from multidrop.dialects.errors import DriveError, NoAnswer, Refused
 from multidrop.dialects.mcode.host import classify
-from multidrop.dialects.mcode.host.attend import attend, find_again
-from multidrop.dialects.mcode.host.comm_settings import set_wire
-from multidrop.dialects.mcode.host.exchange import answered, ends_in_program_mode
-from multidrop.dialects.mcode.host.leave_program import take_out as take_out
-from multidrop.dialects.mcode.host.signatures import question, value
-from multidrop.dialects.mcode.host.state import MCodeState
-from multidrop.dialects.mcode.host.wording import who
+from multidrop.dialects.mcode.host.before_request import before_request, find_again
+from multidrop.dialects.mcode.host.exchange import answered, ends_in_program_mode, question, value
+from multidrop.dialects.mcode.host.exchange import take_out as take_out
+from multidrop.dialects.mcode.host.resync import set_wire
+from multidrop.dialects.mcode.host.state import MCodeState, who
 from multidrop.dialects.state import Owed
 
 
 def enter_program(state: MCodeState, request: Request) -> Procedure[tuple[str, ...]]:
     """Send PG n in EM=0, the only mode that shows whether the drive entered program mode."""
-    request = yield from attend(state, request)
+    request = yield from before_request(state, request)
     try:
         if state.codec.em != 0:
             yield from echo_everything(state)
@@ -83,7 +81,7 @@ def restore_echo(state: MCodeState) -> Procedure[None]:
     if state.restore is None:
         return
     mode = state.restore.em
-    asked = yield from attend(state, state.codec.request(state.address, f"EM={mode}"))
+    asked = yield from before_request(state, state.codec.request(state.address, f"EM={mode}"))
     if state.codec.em != mode:
         yield from set_wire(state, asked)
     state.owes_nothing()

@@ -1,33 +1,221 @@
-"""Programs in MCode drives: the conversations and the files of the family's record."""
+"""Programs in MCode drives: the family's record, and a file compared with what a drive holds."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from itertools import zip_longest
+
+from multidrop.dialects.codec import Procedure
 from multidrop.dialects.family import Programs
-from multidrop.dialects.mcode.host import comparing, holding, listing, names, operations
-from multidrop.dialects.mcode.host.download import download
+from multidrop.dialects.files import SourceLine
+from multidrop.dialects.held import Difference, Held, Stored
+from multidrop.dialects.mcode.host import classify, operations, program_readout
+from multidrop.dialects.mcode.host.download import clears_itself, download
+from multidrop.dialects.mcode.host.operations import immediate
+from multidrop.dialects.mcode.host.program_readout import (
+    FileProgram,
+    annotated,
+    declared,
+    file_of,
+    immediate_lines,
+    names_of,
+    programs_of,
+    readable,
+    refreshed,
+    size,
+    size_of_file,
+    upload,
+)
 from multidrop.dialects.mcode.host.state import MCodeState
-from multidrop.dialects.mcode.host.upload import annotated, file_of, readable, refreshed, upload
 from multidrop.dialects.mcode.manual import guards
+from multidrop.dialects.mcode.manual.grammar import Argument, Compare, LineError, Name, Number, Statement, Unary, parse
+from multidrop.dialects.mcode.manual.statements import canonical
+from multidrop.dialects.mcode.manual.table import lookup
+
+# A program file and what a drive holds, compared line by line in canonical spelling.
+
+
+HOLDING = ("variable", "flag")
+"""The kinds of words that hold a value."""
+STEADY = {"S", "CP", "PG"}
+"""Words of a file that leave nothing to compare beside the programs."""
+
+
+def differences(
+    state: MCodeState, lines: Sequence[SourceLine], held: Held, before: Held | None = None
+) -> tuple[Difference, ...]:
+    """Return where the programs of a file differ from those that a drive holds; other programs do not count.
+
+    `before`: what the drive held before the file was sent. A line of that after a program is another program's.
+    """
+    names = names_of(held)
+    found = programs_of(lines)
+    starts = {start for each in found if (start := each.start(names)) is not None}
+    known = {*names, *(each[1] for line in lines if (each := declared(line.text)) is not None)}
+    made: list[Difference] = []
+    for program in found:
+        start = program.start(names)
+        own = program if start is None else _not_replaced(program, start, starts, state.product)
+        made += _compared(own.lines, _there(own, start, starts, held, state.product), known)
+    old = set(before.lines) if before is not None else set()
+    return tuple(each for each in made if each.number or (each.at, each.there) not in old)
+
+
+def _not_replaced(program: FileProgram, start: int, starts: set[int], product: str) -> FileProgram:
+    """Return the lines of a program before the first one that begins inside it and changes a part of it."""
+    others = starts - {start}
+    inside: list[SourceLine] = []
+    for line in program.lines:
+        end = start + size(line.text, product)
+        if any(start <= other < end for other in others):
+            break
+        inside.append(line)
+        start = end
+    return replace(program, lines=tuple(inside))
+
+
+def _there(program: FileProgram, start: int | None, starts: set[int], held: Held, product: str) -> Sequence[Stored]:
+    """Return the lines in the drive from an address on: those of the program, and what an earlier one left after them.
+
+    A line after the program belongs to it if no gap is between them, unless the program is a part of another one.
+    """
+    lines = held.lines
+    first = next((n for n, line in enumerate(lines) if line.at == start), len(lines))
+    last = first
+    part = 0 < first < len(lines) and _follows(lines[first - 1], lines[first], product)
+    while last < len(lines) and (last == first or lines[last].at not in starts):
+        if last - first >= len(program.lines) and (part or not _follows(lines[last - 1], lines[last], product)):
+            break
+        last += 1
+    return lines[first:last]
+
+
+def _follows(before: Stored, line: Stored, product: str) -> bool:
+    return before.at + size(before.text, product) == line.at
+
+
+def _compared(here: Sequence[SourceLine], there: Sequence[Stored], names: set[str]) -> Iterator[Difference]:
+    own = [canonical(line.text, names) for line in here]
+    theirs = [canonical(line.text, names) for line in there]
+    if own == theirs:
+        return
+    from difflib import SequenceMatcher  # send never needs it
+
+    for kind, a, b, c, d in SequenceMatcher(None, own, theirs, autojunk=False).get_opcodes():
+        if kind == "equal":
+            continue
+        for source, stored in zip_longest(here[a:b], there[c:d]):
+            number, text = (source.number, source.text) if source else (0, "")
+            at, listed = (stored.at, stored.text) if stored else (None, "")
+            yield Difference(number, text, at, listed)
+
+
+def to_send(state: MCodeState, lines: Sequence[SourceLine], held: Held) -> Procedure[str]:
+    """Return why a file must be sent; empty where the drive holds its programs, variables and settings already."""
+    if differing := differences(state, lines, held):
+        return _place(differing[0].number)
+    if clears_itself(lines) and size_of_file(lines) != len(held.lines):
+        return "the drive holds other programs, which the file clears"
+    for line in immediate_lines(lines):
+        if why := (yield from _unlike(state, line, held)):
+            return why
+    return ""
+
+
+def _place(number: int) -> str:
+    return f"line {number} differs" if number else "the drive holds more lines"
+
+
+def _unlike(state: MCodeState, line: SourceLine, held: Held) -> Procedure[str]:
+    """Return why a line outside of programs must be sent; empty where the drive has its value."""
+    names = names_of(held)
+    statement = _statement(line.text, set(names))
+    if statement is None or statement.word in STEADY:
+        return ""
+    named = declared(line.text)
+    name = named[1] if named is not None else statement.word
+    values = [_initial(statement)] if named is not None else (yield from _values(state, statement))
+    if name in names:
+        present = [_as_number(names[name].value)]
+    elif named is not None or (row := lookup(name, state.product)) is None:
+        return _place(line.number)
+    else:
+        present = (yield from _read_setting(state, name, values)) if row.kind in HOLDING and values else []
+    if None in values or not present:
+        return f"line {line.number}: '{line.text}' cannot be compared"
+    return "" if present == values else _place(line.number)
+
+
+def _values(state: MCodeState, statement: Statement) -> Procedure[list[float | None]]:
+    """Return the values that a setting gets; of another word (`D=A`) its present value."""
+    match statement.arguments:
+        case (Name(word),) if (row := lookup(word, state.product)) is not None and row.kind in HOLDING:
+            return (yield from _read_setting(state, word, []))
+    return [_literal(each) for each in statement.arguments]
+
+
+def _statement(text: str, names: set[str]) -> Statement | None:
+    try:
+        return parse(text, names)
+    except LineError:
+        return Statement(classify.word_of(text)[0], ())
+
+
+def _initial(statement: Statement) -> float | None:
+    """Return the value that a VA gives."""
+    first = statement.arguments[0]
+    return _literal(first.right) if isinstance(first, Compare) else 0.0
+
+
+def _literal(argument: Argument | None) -> float | None:
+    """Return a number as written; None for anything else."""
+    match argument:
+        case Number(value):
+            return float(value)
+        case Unary("-", Number(value)):
+            return -float(value)
+    return None
+
+
+def _read_setting(state: MCodeState, name: str, values: Sequence[float | None]) -> Procedure[list[float | None]]:
+    """Read the present values of a setting; of a setting with several rows the row that begins alike."""
+    printed = yield from immediate(state, state.codec.request(state.address, f"PR {name}"))
+    rows = [[_as_number(each) for each in line.rpartition("=")[2].split(",")] for line in printed if line.strip()]
+    if len(rows) == 1:
+        return rows[0]
+    return next((row for row in rows if row[:1] == list(values[:1])), [])
+
+
+def _as_number(text: str) -> float | None:
+    try:
+        return float(text)
+    except ValueError:
+        return None
+
+
+# Programs in MCode drives: the conversations and the files of the family's record.
+
 
 PROGRAMS: Programs[MCodeState] = Programs(
     listing=operations.listing,
     readable=readable,
     upload=upload,
-    read=holding.read,
+    read=program_readout.read,
     file=file_of,
-    executed=listing.immediate_lines,
-    size=listing.size_of_file,
-    end=holding.end,
+    executed=program_readout.immediate_lines,
+    size=program_readout.size_of_file,
+    end=program_readout.end_program,
     download=download,
-    differences=comparing.differences,
-    to_send=comparing.to_send,
-    start=holding.start,
+    differences=differences,
+    to_send=to_send,
+    start=program_readout.start_line,
     refreshed=refreshed,
     annotated=annotated,
     acts=guards.acts,
     save="S",
     remark="'",
     clearing="CP",
-    names=names.read,
-    offered=names.offered,
+    names=program_readout.read_names,
+    offered=program_readout.offered,
 )

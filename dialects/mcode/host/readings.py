@@ -1,19 +1,149 @@
-"""Values of MCode drives for plots: one signed print each, and never a word whose reading clears it."""
+"""The values of an MCode drive that the host reads for a person: its conditions, values for plots, a snapshot."""
 
 from __future__ import annotations
 
+import re
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 
-from multidrop.dialects.codec import End, Priority, Procedure
+from multidrop.dialects.codec import End, Kind, Priority, Procedure, Reply, Request
+from multidrop.dialects.conditions import Conditions, Facts, Part, Reader
 from multidrop.dialects.errors import Diagnostic, NoAnswer, Refused
-from multidrop.dialects.mcode.host.attend import attend
+from multidrop.dialects.held import LOCKED
+from multidrop.dialects.mcode.host import parameters
+from multidrop.dialects.mcode.host.before_request import before_request
+from multidrop.dialects.mcode.host.codec import EVERY_DRIVE
 from multidrop.dialects.mcode.host.debugging import check_names, values
-from multidrop.dialects.mcode.host.exchange import note_error
-from multidrop.dialects.mcode.host.signatures import question, value
-from multidrop.dialects.mcode.host.state import MCodeState
-from multidrop.dialects.mcode.host.wording import who
-from multidrop.dialects.mcode.manual.table import lookup
-from multidrop.dialects.readings import Readings, number
+from multidrop.dialects.mcode.host.exchange import answered, note_error, question, value
+from multidrop.dialects.mcode.host.parameters import BETWEEN, asked, rows_of_list
+from multidrop.dialects.mcode.host.state import MCodeState, who
+from multidrop.dialects.mcode.manual import parameters as manual
+from multidrop.dialects.mcode.manual import points
+from multidrop.dialects.mcode.manual.mnemonic import EXPANDED
+from multidrop.dialects.mcode.manual.parameters import Form, Setting, exact
+from multidrop.dialects.mcode.manual.points import EXPANDED_INPUTS, INPUTS
+from multidrop.dialects.mcode.manual.statements import UNNAMED
+from multidrop.dialects.mcode.manual.table import lookup, words
+from multidrop.dialects.parameters import Progress, Readings
+from multidrop.dialects.readings import Readings as Polled
+from multidrop.dialects.readings import number
+from multidrop.dialects.snapshots import Levels, Snapshot
+from multidrop.dialects.state import DriveState
+
+# The conditions of an MCode drive: one print for its state; settings and set-ups once, and after each line.
+#
+# Theory of operation. The state is one signed PR of flags and values. ER is never read, since that clears it. Nothing
+# is asked with EM=3, whose prints wait in a queue. A set-up prints a list, whose last line ends it. The target is
+# known where the host sent the move: MA, or MR from a position that was read at rest.
+
+
+STATE = ("EF", "BY", "MV", "VC", "MP", "DE", "P", "IN", "I5", "AF")
+"""What changes by itself, or by a program; the flags first, which need no separator."""
+SETTINGS = ("EE", "AS", "RC", "HC", "VI", "VM", "A", "D")
+POINTS = ("S1", "S2", "S3", "S4")
+"""The set-ups of an MDrivePlus."""
+SETTLED = "IS1"
+"""Among the facts once the set-ups were read."""
+UNSURE = frozenset({"EE", "AS", "AF", "I5"})
+"""Words that not every Lexium has."""
+
+
+def parts(state: MCodeState, facts: Facts) -> Sequence[Part[MCodeState]]:
+    """The parts of a drive: its state, its settings, and its set-ups, which have another form on an MDrivePlus."""
+    if state.codec.em == 3 or state.address in EVERY_DRIVE or state.programming:
+        return ()
+    found = [Part("state", _state), Part("settings", partial(_values, names=SETTINGS), slow=True)]
+    if facts.get("BY") and SETTLED in facts:
+        return found  # a list has no signature, and a program prints lines, too
+    if not (lists := manual.lists(state.product, state.version)):
+        return [*found, Part("points", partial(_values, names=POINTS), slow=True)]
+    return found + [Part(word, partial(_list, word=word, numbers=rows), slow=True) for word, rows in lists.items()]
+
+
+def _state(state: MCodeState) -> Procedure[Facts]:
+    facts = yield from _values(state, STATE)
+    state.program_read(error=bool(facts["EF"]), running=bool(facts["BY"]))
+    position = facts["P"]
+    at_rest = isinstance(position, int) and not facts["MV"] and not facts["BY"]
+    state.seen_at_rest(position if at_rest and isinstance(position, int) else None)
+    return facts
+
+
+def _has(state: MCodeState, names: Sequence[str]) -> list[str]:
+    """The words that the product has; of an unknown product, those that every Lexium has."""
+    table = words(state.product)
+    known = manual.exact(state.product)
+    return [name for name in names if (state.product in table[name].products if known else name not in UNSURE)]
+
+
+def _values(state: MCodeState, names: Sequence[str]) -> Procedure[Facts]:
+    """Print values in one line. Raises Refused or NoAnswer, and reads no error."""
+    table = words(state.product)
+    batch = [
+        Setting(table[name], manual.form_of(table[name])) for name in _has(state, [n for n in names if n in table])
+    ]
+    items, forms = asked(batch)
+    answer = "".join(f"(?:{form})" for form in forms)
+    yield from _attended(state, question(state, items, answer))
+    reply = yield replace(question(state, items, answer), priority=Priority.POLL)
+    _check_printed(state, reply)
+    found = re.fullmatch("".join(f"({form})" for form in forms), value(state, reply))
+    assert found is not None
+    texts = [each.removeprefix(BETWEEN) for each in found.groups()]
+    return {each.name: _fact(each, text) for each, text in zip(batch, texts, strict=True)}
+
+
+def _fact(setting: Setting, text: str) -> int | tuple[int, ...]:
+    if setting.form is Form.FIELDS:
+        return tuple(int(each) for each in text.split(","))
+    return int(text)
+
+
+def _list(state: MCodeState, word: str, numbers: Sequence[int]) -> Procedure[Facts]:
+    """Print set-ups, up to the last number."""
+    yield from _attended(state, question(state, "EF", "[01]"))
+    last = rf" *{word} *= *{numbers[-1]} *(?:, *-?\d+ *)+"
+    row = rf" *{word} *=.*"
+    wanted = replace(
+        state.codec.request(state.address, f"PR {word}"), kind=Kind.PRINT, expect=last, gather=True, rows=row
+    )
+    reply = yield replace(wanted, priority=Priority.POLL)
+    _check_printed(state, reply)
+    rows = rows_of_list(word, numbers, reply.lines)
+    if reply.doubtful or len(rows) < len(numbers):
+        state.reply_lost()
+        raise NoAnswer(f"{who(state)}: the list of {word} may be incomplete, or another drive's")
+    return rows
+
+
+def _attended(state: MCodeState, wanted: Request) -> Procedure[None]:
+    """Clear what earlier requests left, at the priority of polls."""
+    yield from before_request(state, replace(wanted, priority=Priority.POLL))
+
+
+def _check_printed(state: MCodeState, reply: Reply) -> None:
+    """Raise Refused or NoAnswer unless the drive printed."""
+    note_error(state, reply)
+    if reply.end is End.REFUSED and not reply.doubtful:
+        raise Refused(f"{who(state)} refuses to print its conditions")
+    if reply.end is not End.DONE:
+        if reply.end is not End.NAK:
+            state.reply_lost()
+        raise NoAnswer(f"{who(state)} does not reply ({reply.end.value})")
+
+
+def fold(state: MCodeState, facts: Facts) -> tuple[Conditions, ...]:
+    """The conditions of its only axis."""
+    modes = f"EM{state.codec.em} CK{state.codec.checksum}"
+    return (replace(points.conditions(state.product, facts, state.heading), modes=modes),)
+
+
+READER = Reader(parts=parts, fold=fold)
+
+
+# Values of MCode drives for plots: one signed print each, and never a word whose reading clears it.
+
 
 NUMBER = r"-?\d{1,10}(?:\.\d+)?"
 
@@ -42,7 +172,7 @@ def first(state: MCodeState, word: str) -> Procedure[float]:
 def again(state: MCodeState, word: str, priority: Priority) -> Procedure[float]:
     """Read a value. The error flag is noted and not cleared."""
     _not_in_program(state)
-    yield from attend(state, replace(question(state, word, NUMBER), priority=priority))
+    yield from before_request(state, replace(question(state, word, NUMBER), priority=priority))
     reply = yield replace(question(state, word, NUMBER), priority=priority)
     note_error(state, reply)
     if reply.end is End.REFUSED:
@@ -64,4 +194,103 @@ def own(state: MCodeState, word: str) -> bool:
     return lookup(word.upper(), state.product) is not None
 
 
-READINGS = Readings(check=check, first=first, again=again, own=own)
+READINGS = Polled(check=check, first=first, again=again, own=own)
+
+
+# Reading everything of an MCode drive: settings, program, counters and inputs. Nothing moves, and nothing is cleared.
+#
+# A locked program is not asked for, as the refusal would run a resident OE subroutine (MCode reference 5.1.75).
+
+
+BAUDS = {48: 4800, 96: 9600, 19: 19200, 38: 38400, 11: 115200}
+"""By BD (5.1.9)."""
+SNAPSHOT_WORDS = ("P", "C1", "C2", "V", "BY", "IN", "I5")
+"""The words of the state, as far as the product has them."""
+OUTPUT_TYPES = range(16, 30)
+"""Types of a point that is not an input (MDrivePlus: S<n>)."""
+_LISTED = re.compile(r"(\d+)\s+(\S.*)")
+
+
+def take(state: MCodeState, progress: Progress) -> Procedure[Snapshot]:
+    """Read a drive. Raises Refused where it would store the questions, or NoAnswer."""
+    readings = yield from parameters.read(state, progress)
+    now = yield from _now(state)
+    program, remarks = yield from _program(state, readings, running=bool(now["BY"]))
+    found = snapshot_of(state, readings, now)
+    return replace(
+        found,
+        name=state.name or UNNAMED,
+        party=state.codec.party,
+        baud=BAUDS.get(_whole(readings, "BD"), 0),
+        program=program,
+        remarks=(*remarks, *found.remarks),
+    )
+
+
+def snapshot_of(state: DriveState, readings: Readings, now: Mapping[str, int]) -> Snapshot:
+    """Make the record of a drive from its settings and its state of the moment, by word."""
+    remarks = []
+    if now["V"]:
+        remarks.append(f"moving at V={now['V']} while it was read: its position is one of that moment")
+    if now["BY"]:
+        remarks.append("a program ran while it was read")
+    levels = _levels(state.product, readings)
+    return Snapshot(
+        kind="mcode",
+        product=state.product,
+        part=state.part,
+        version=state.version,
+        serial=state.serial,
+        name=UNNAMED,
+        readings=readings,
+        counters=_counters(readings, now),
+        inputs=levels.of(now["IN"]),
+        levels=levels,
+        active=bool(now["V"] or now["BY"]),
+        analog=(now["I5"],) if "I5" in now else (),
+        remarks=tuple(remarks),
+    )
+
+
+def _now(state: MCodeState) -> Procedure[dict[str, int]]:
+    """Read counters, motion and inputs in one print, so that they belong together."""
+    known, whole = words(state.product), exact(state.product)
+    asked = [word for word in SNAPSHOT_WORDS if word in known and (state.product in known[word].products or not whole)]
+    items, pattern = '," ",'.join(asked), " ".join(r"-?\d{1,10}" for _ in asked)
+    yield from before_request(state, question(state, items, pattern))
+    reply = yield from answered(state, question(state, items, pattern))
+    return dict(zip(asked, map(int, value(state, reply).split()), strict=True))
+
+
+def _program(
+    state: MCodeState, readings: Readings, running: bool
+) -> Procedure[tuple[tuple[tuple[int, str], ...], list[str]]]:
+    """Read the listing; one that a running program's prints may have come into is read twice."""
+    if _whole(readings, "LK"):
+        return (), [f"not read: {LOCKED}"]
+    first = yield from parameters.listed(state, "L")
+    if running and first != (yield from parameters.listed(state, "L")):
+        return (), ["its program was not read: it runs, and its prints came between the lines"]
+    found = [_LISTED.fullmatch(line.strip()) for line in first]
+    lost = [line for line, row in zip(first, found, strict=True) if row is None]
+    doubts = [f"its listing has a line that is not a program line: {line!r}" for line in lost]
+    return tuple((int(row[1]), row[2]) for row in found if row is not None), doubts
+
+
+def _counters(readings: Readings, now: Mapping[str, int]) -> Mapping[str, tuple[int, ...]]:
+    """P, and the counter that P is not."""
+    counts = _whole(readings, "EE") and not _whole(readings, "AS")
+    other = "C1" if counts else "C2"
+    return {"position": (now["P"],)} | ({other: (now[other],)} if other in now else {})
+
+
+def _levels(product: str, readings: Readings) -> Levels:
+    points = EXPANDED_INPUTS if product in EXPANDED else INPUTS
+    types = {name: held for name, held in readings.values.items() if isinstance(held, tuple)}
+    outputs = {n for n in points if types.get(f"S{n}", (0,))[0] in OUTPUT_TYPES}
+    return Levels("IN", tuple((n, bit) for bit, n in enumerate(points) if n not in outputs))
+
+
+def _whole(readings: Readings, name: str) -> int:
+    found = readings.values.get(name, 0)
+    return found if isinstance(found, int) else 0

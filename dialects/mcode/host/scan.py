@@ -1,22 +1,4 @@
-"""The search for MCode drives at one baud rate: one drive without a name, then every name, whatever their settings.
-
-Theory of operation. Nothing that is sent moves a drive or is an error in one. A drive outside of party mode collects
-all that it receives until a CR, and 64 characters are an error to it. So it is looked for first, and where one replies
-no name is tried. That question is `PR VR`, which no product refuses. But drives in party mode receive it too, and one
-that is named P would take it for its own `R VR`. So the question is sent in three parts, with a line feed after the P
-and after the R. Outside of party mode a line feed is part of no line. In party mode the parts are a ping of P, a ping
-of R, and a line for the name " ", which no drive has.
-
-A ping (a name and a line feed) is not stored in program mode and shows almost every drive. With EM=2 a drive replies to
-a print only, so what is silent is asked to print its name, at last with a checksum. A checksum is an error where none
-is wanted, and a drive that wants none has replied by then. A reply may come late, while the next names are tried. So
-once anything comes, the names before are asked again, with more time. What replied is then identified as at an opening
-(`identity.find`).
-
-One case remains: half a line of another program's, such as `aMR ` without its number. The P of the question completes
-it. Half a line of our own overflows first. (MCode reference 5.1.21, 5.1.33, 5.1.39, 5.1.98, 5.1.105, 7.1; facts of real
-units.)
-"""
+"""The search for MCode drives at one baud rate, and what frees a drive that does not reply."""
 
 from __future__ import annotations
 
@@ -26,17 +8,79 @@ from dataclasses import dataclass, field
 
 from multidrop.dialects.codec import Kind, Procedure, Request
 from multidrop.dialects.errors import NoAnswer
-from multidrop.dialects.mcode.host import rescue
-from multidrop.dialects.mcode.host.checksum import sealed
-from multidrop.dialects.mcode.host.codec import MCode
-from multidrop.dialects.mcode.host.collected import pongs
-from multidrop.dialects.mcode.host.framing import NAK
-from multidrop.dialects.mcode.host.identity import find
+from multidrop.dialects.mcode.host.codec import NOBODY, MCode
+from multidrop.dialects.mcode.host.framing import NAK, sealed
+from multidrop.dialects.mcode.host.identity import find, overflow, write_stop
+from multidrop.dialects.mcode.host.quiet_end import pongs
 from multidrop.dialects.mcode.host.resync import BRIEF, PROGRAM_PROMPT
 from multidrop.dialects.mcode.host.state import MCodeState, Place
-from multidrop.dialects.mcode.host.stopped import overflow
 from multidrop.dialects.mcode.manual.statements import NAMES
 from multidrop.dialects.scanning import Found, Outcome, Reach, Scan, Step
+
+# What frees an MCode drive that does not reply, whatever it is set to; nothing here knows the drive.
+#
+# Theory of operation. A drive is silent because a program floods the line or waits for a key (single step), because
+# its buffer holds half a line, or because it is in program mode with EM=2. The stop in every form ends programs. A
+# full buffer of tildes makes half a line overflow. PG ends program mode; outside of it PG is an error, so a stop
+# follows. Outside of party mode the line is `PG` and a CR, and a line feed after each letter keeps drives named P and
+# G from harm (see `scan`). In party mode `*` reaches every name. Each goes out without a checksum and with one.
+#
+# FD erases. It is the last resort, in the order that works on real units: outside of party mode, with a checksum, then
+# to every name. (MCode reference 5.1.21, 5.1.41, 5.1.45, 5.1.98, 5.1.105; facts of real units.)
+
+
+CLEARS = (
+    "stops every drive and its program, makes half a line in a drive overflow (error 20) and sends PG, an error "
+    "outside of program mode; an OE subroutine that an error starts is stopped. It erases nothing"
+)
+APART = 0.02
+"""Quiet time after each part, s: a drive may reply to it."""
+RESTARTING = 1.0
+"""The time that a drive takes for FD, s."""
+PG, EVERYONE = b"PG", b"*PG"
+RESETS = (b"\rFD\r", sealed(b"FD") + b"\r", sealed(b"CK=0") + b"\r", b"\n*FD\n", b"\n" + sealed(b"*FD") + b"\n")
+
+
+def clear() -> Procedure[None]:
+    """Stop all programs, overflow half lines, leave program mode, and stop what errors started."""
+    yield from overflow(NAMES)
+    for line in (PG, sealed(PG)):
+        for part in (line[:1] + b"\n", line[1:2] + b"\n", line[2:] + b"\r"):
+            yield from _sent(part, APART)
+    for line in (EVERYONE, sealed(EVERYONE)):
+        yield from _sent(line + b"\n", APART)
+    yield from write_stop(MCode(party=True).stop(NAMES, sure=False))
+
+
+def erase() -> Procedure[None]:
+    """Set every drive on the line to factory defaults: program, variables and parameters are lost."""
+    for line in RESETS:
+        yield from _sent(line, RESTARTING)
+
+
+def _sent(line: bytes, quiet: float) -> Procedure[None]:
+    yield Request(NOBODY, "rescue", Kind.QUIET, MCode(party=True), settle=quiet, timeout=max(quiet, BRIEF), body=line)
+
+
+# The search for MCode drives at one baud rate: one drive without a name, then every name, whatever their settings.
+#
+# Theory of operation. Nothing that is sent moves a drive or is an error in one. A drive outside of party mode collects
+# all that it receives until a CR, and 64 characters are an error to it. So it is looked for first, and where one
+# replies no name is tried. That question is `PR VR`, which no product refuses. But drives in party mode receive it
+# too, and one that is named P would take it for its own `R VR`. So the question is sent in three parts, with a line
+# feed after the P and after the R. Outside of party mode a line feed is part of no line. In party mode the parts are a
+# ping of P, a ping of R, and a line for the name " ", which no drive has.
+#
+# A ping (a name and a line feed) is not stored in program mode and shows almost every drive. With EM=2 a drive replies
+# to a print only, so what is silent is asked to print its name, at last with a checksum. A checksum is an error where
+# none is wanted, and a drive that wants none has replied by then. A reply may come late, while the next names are
+# tried. So once anything comes, the names before are asked again, with more time. What replied is then identified as
+# at an opening (`identity.find`).
+#
+# One case remains: half a line of another program's, such as `aMR ` without its number. The P of the question
+# completes it. Half a line of our own overflows first. (MCode reference 5.1.21, 5.1.33, 5.1.39, 5.1.98, 5.1.105, 7.1;
+# facts of real units.)
+
 
 QUESTION = b"PR VR"
 FOREIGN = b"?" + QUESTION
@@ -304,6 +348,4 @@ def _identified(own: _Search, place: Place) -> Procedure[MCodeState | None]:
     return None
 
 
-SCAN = Scan(
-    "MCode", (4800, 9600, 19200, 38400, 115200), _places, search, rescue.clear, rescue.CLEARS, rescue.erase, NAMES
-)
+SCAN = Scan("MCode", (4800, 9600, 19200, 38400, 115200), _places, search, clear, CLEARS, erase, NAMES)

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from multidrop.dialects.codec import End, Kind, Priority, Procedure, Reply, Request
 from multidrop.dialects.errors import NoAnswer, Refused
-from multidrop.dialects.mcode.host.wording import described, unknown, who
+from multidrop.dialects.mcode.host.state import described, unknown, who
 from multidrop.dialects.modbus.host import framing, mapping
 from multidrop.dialects.modbus.host.messages import pdu_codec
 from multidrop.dialects.modbus.host.state import ModbusState

@@ -7,7 +7,7 @@ import re
 from multidrop.dialects.codec import Procedure
 from multidrop.dialects.errors import Refused
 from multidrop.dialects.family import Hints
-from multidrop.dialects.mcode.host.wording import who
+from multidrop.dialects.mcode.host.state import who
 from multidrop.dialects.modbus.host.codec import Modbus
 from multidrop.dialects.modbus.host.exchange import flagged
 from multidrop.dialects.modbus.host.operations import identification

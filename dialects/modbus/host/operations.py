@@ -8,7 +8,7 @@ from collections.abc import Iterator, Sequence
 from multidrop.dialects.codec import Priority, Procedure
 from multidrop.dialects.errors import Inexpressible, NoAnswer, Refused
 from multidrop.dialects.family import Motion
-from multidrop.dialects.mcode.host.wording import who
+from multidrop.dialects.mcode.host.state import who
 from multidrop.dialects.mcode.manual import grammar
 from multidrop.dialects.mcode.manual.points import STATUS, in_words
 from multidrop.dialects.modbus.host import framing, mapping

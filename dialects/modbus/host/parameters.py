@@ -12,7 +12,7 @@ from collections.abc import Mapping
 from multidrop.dialects.codec import Procedure
 from multidrop.dialects.errors import NoAnswer, Refused
 from multidrop.dialects.mcode.host.parameters import rows_of_list
-from multidrop.dialects.mcode.host.wording import who
+from multidrop.dialects.mcode.host.state import who
 from multidrop.dialects.mcode.manual import parameter_plan
 from multidrop.dialects.mcode.manual import parameters as manual
 from multidrop.dialects.mcode.manual.parameters import reading_of

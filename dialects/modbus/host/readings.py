@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from multidrop.dialects.codec import Priority, Procedure
 from multidrop.dialects.errors import Diagnostic, Inexpressible, NoAnswer, Refused
-from multidrop.dialects.mcode.host.wording import who
+from multidrop.dialects.mcode.host.state import who
 from multidrop.dialects.modbus.host import framing, mapping
 from multidrop.dialects.modbus.host.exchange import request, sure
 from multidrop.dialects.modbus.host.state import ModbusState

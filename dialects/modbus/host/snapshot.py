@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from multidrop.dialects.codec import Procedure
-from multidrop.dialects.mcode.host import snapshot
+from multidrop.dialects.mcode.host.readings import SNAPSHOT_WORDS, snapshot_of
 from multidrop.dialects.mcode.manual.table import words
 from multidrop.dialects.modbus.host import mapping, parameters
 from multidrop.dialects.modbus.host.exchange import request, sure
@@ -27,12 +27,12 @@ def take(state: ModbusState, progress: Progress) -> Procedure[Snapshot]:
     if not state.serial:
         state.serial_read((yield from identification(state)).get(SERIAL, ""))
     known, now = words(state.product), {}
-    for word in snapshot.ASKED:
+    for word in SNAPSHOT_WORDS:
         if word in known and state.product in known[word].products:
             now[word] = yield from _value(state, word)
     if "I5" in now:
         now["I5"] *= DIVIDED
-    return snapshot.made(state, replace(readings, unread=(*readings.unread, NO_PROGRAM)), now)
+    return snapshot_of(state, replace(readings, unread=(*readings.unread, NO_PROGRAM)), now)
 
 
 def _value(state: ModbusState, word: str) -> Procedure[int]:

@@ -7,8 +7,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from multidrop.dialects import Decoded, End, Inexpressible, Kind, Reply
-from multidrop.dialects.mcode.host.checksum import checksum, sealed, unsealed
 from multidrop.dialects.mcode.host.codec import MCode
+from multidrop.dialects.mcode.host.framing import checksum, sealed, unsealed
 from tests.support.cases import for_each
 
 S = {text: sealed(text) for text in (b"0", b"aPR P", b"PR P", b"aMR 1", b"MR 1", b"12", b"Logic 000", b"PR ES")}

@@ -4,8 +4,8 @@ import pytest
 
 from multidrop.dialects import End, Kind, NoAnswer, Reply
 from multidrop.dialects.mcode.family import MCODE
-from multidrop.dialects.mcode.host.checksum import sealed
 from multidrop.dialects.mcode.host.codec import MCode
+from multidrop.dialects.mcode.host.framing import sealed
 from multidrop.dialects.mcode.host.state import MCodeState
 from tests.support.cases import for_each
 from tests.support.mcode_drives import MODES, Desk

@@ -3,7 +3,7 @@
 import pytest
 
 from multidrop.dialects import NoAnswer, Refused
-from multidrop.dialects.mcode.host.confirm import written
+from multidrop.dialects.mcode.host.operations import written
 from tests.support.mcode_drives import Desk
 
 NOT_CONFIRMED = "its execution is not confirmed"

@@ -7,8 +7,8 @@ from hypothesis import strategies as st
 from multidrop.dialects import DriveError, End, Hints, NoAnswer, Priority, Refused
 from multidrop.dialects.mcode.family import MCODE
 from multidrop.dialects.mcode.host import identify
-from multidrop.dialects.mcode.host.checksum import sealed
 from multidrop.dialects.mcode.host.codec import MCode
+from multidrop.dialects.mcode.host.framing import sealed
 from multidrop.dialects.mcode.host.state import MCodeState
 from tests.support.mcode_drives import Witness
 

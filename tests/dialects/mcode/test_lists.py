@@ -6,7 +6,7 @@ import pytest
 
 from multidrop.dialects import End, NoAnswer
 from multidrop.dialects.mcode.host.codec import MCode
-from multidrop.dialects.mcode.host.signatures import fresh
+from multidrop.dialects.mcode.host.exchange import fresh
 from multidrop.dialects.mcode.host.state import MCodeState
 from multidrop.simulator.cell.spec import Faults
 from tests.support.mcode_drives import MODES, Desk

@@ -9,9 +9,9 @@ from hypothesis import strategies as st
 
 from multidrop.dialects import DriveState, NoAnswer
 from multidrop.dialects.mcode.family import MCODE
-from multidrop.dialects.mcode.host import printed
+from multidrop.dialects.mcode.host import classify
 from multidrop.dialects.mcode.host.codec import MCode
-from multidrop.dialects.mcode.host.signatures import sign, signed
+from multidrop.dialects.mcode.host.exchange import sign, signed
 from multidrop.dialects.mcode.host.state import MCodeState
 from multidrop.dialects.mcode.manual.table import words
 from multidrop.simulator.lexium.state.models import MODELS
@@ -42,7 +42,7 @@ FORMS = [
 
 @pytest.mark.parametrize(("text", "answers", "others"), FORMS)
 def test_the_form_of_an_answer_comes_from_the_text_of_its_print(text, answers, others):
-    form = printed.form(text)
+    form = classify.print_form(text)
     assert form is not None
     for line in answers:
         assert re.fullmatch(form, line), line
@@ -52,7 +52,7 @@ def test_the_form_of_an_answer_comes_from_the_text_of_its_print(text, answers, o
 
 @pytest.mark.parametrize("text", ["MR 5", "PR AL", "L", 'PR "x', "PR ,P", 'PR "a\\n",P', "PR", "", "PR P+1"])
 def test_where_it_is_not_known_or_has_several_lines_there_is_none(text):
-    assert printed.form(text) is None and printed.signed(text, "DN") is None
+    assert classify.print_form(text) is None and classify.with_item(text, "DN") is None
 
 
 @pytest.mark.parametrize("product", MODELS)
@@ -63,7 +63,7 @@ def test_every_word_prints_what_its_form_says(bench, product):
     seen = 0
     for word in (*words(product), "Q1"):
         answer = device.execute(f"PR {word}", 0.0)
-        if answer.refused or len(answer.lines) != 1 or (form := printed.form(f"PR {word}")) is None:
+        if answer.refused or len(answer.lines) != 1 or (form := classify.print_form(f"PR {word}")) is None:
             continue
         seen += 1
         assert re.fullmatch(form, answer.lines[0]), (word, answer.lines)
@@ -84,7 +84,7 @@ ITEMS = st.lists(
 @given(ITEMS, st.sampled_from([",", " ", " , "]), st.booleans())
 def test_the_form_of_any_print_is_an_expression_that_is_matched_fast(items, between, quiet):
     text = "PR " + between.join(items) + ";" * quiet
-    form = printed.form(text)
+    form = classify.print_form(text)
     assert form is None or re.compile(form)
     if form is None:
         return
@@ -92,16 +92,16 @@ def test_the_form_of_any_print_is_an_expression_that_is_matched_fast(items, betw
     for line in ("1" * 4000, "-1" * 2000, " " * 4000 + "x", "1 " * 2000):
         re.fullmatch(form, line + "\x00")
     assert time.process_time() - begun < 1.0
-    again = printed.signed(text, "DN")
+    again = classify.with_item(text, "DN")
     assert again is None or (";" in again) is (";" in text)
 
 
 @given(st.text(max_size=40))
 def test_nothing_that_can_be_typed_breaks_it(text):
     for each in (text, f"PR {text}", f'PR "{text}",P'):
-        form = printed.form(each)
+        form = classify.print_form(each)
         assert form is None or re.compile(form)
-        printed.signed(each, "DN")
+        classify.with_item(each, "DN")
 
 
 # --- signs

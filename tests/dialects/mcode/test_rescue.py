@@ -2,7 +2,7 @@
 
 import pytest
 
-from multidrop.dialects.mcode.host import rescue, scan
+from multidrop.dialects.mcode.host import scan
 from multidrop.dialects.scanning import Reach
 from tests.support.mcode_drives import MODES
 
@@ -30,7 +30,7 @@ def freed(bench, table, before, half):
     found = []
     desk.run(scan.search(Reach(hasty=True), found.append, lambda: None))
     if not found:
-        desk.run(rescue.clear())
+        desk.run(scan.clear())
         desk.run(scan.search(Reach(), found.append, lambda: None))
     return desk, device, [(each.address, each.codec.em, each.codec.party, each.codec.checksum) for each in found]
 
@@ -65,6 +65,6 @@ def test_a_program_that_floods_the_line_hides_no_drive(bench, em, party, check):
 @pytest.mark.parametrize(("em", "party", "check"), MODES)
 def test_factory_defaults_reach_a_drive_in_every_mode(bench, em, party, check):
     desk = bench([{"name": "k", "party": party, "set": {"EM": em, "CK": check}}], baud=9600)
-    desk.run(rescue.erase())
+    desk.run(scan.erase())
     [device] = [placed.device for placed in desk.floor.drives]
     assert (device.echo_mode, device.party, device.checksum, device.name) == (0, False, 0, "!")

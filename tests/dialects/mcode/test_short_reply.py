@@ -9,9 +9,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from multidrop.dialects import Kind
-from multidrop.dialects.mcode.host.codec import MCode
+from multidrop.dialects.mcode.host.codec import MCode, only_strays, short_reply
 from multidrop.dialects.mcode.host.reply_parser import ReplyParser
-from multidrop.dialects.mcode.host.short_reply import only_strays, short_reply
 
 PIECES = st.sampled_from(
     [

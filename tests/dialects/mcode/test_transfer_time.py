@@ -7,7 +7,7 @@ from multidrop.dialects.held import Held
 from multidrop.dialects.mcode.family import MCODE
 from multidrop.dialects.mcode.host import codec as codecs
 from multidrop.dialects.mcode.host.codec import MCode
-from multidrop.dialects.mcode.host.quiet_times import EXECUTED, EXECUTING, LIST_QUIET, PATIENT, SHORT
+from multidrop.dialects.mcode.host.quiet_end import EXECUTED, EXECUTING, LIST_QUIET, PATIENT, SHORT
 from multidrop.dialects.mcode.host.state import MCodeState
 from multidrop.dialects.mcode.manual import program_file
 

@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 
 from multidrop.dialects.held import Difference, Held, Stored
 from multidrop.dialects.mcode.family import MCODE
-from multidrop.dialects.mcode.host import listing as listings
+from multidrop.dialects.mcode.host import program_readout as listings
 from multidrop.dialects.mcode.host.codec import MCode
 from multidrop.dialects.mcode.host.state import MCodeState
 from multidrop.dialects.mcode.manual import program_file

@@ -1,11 +1,4 @@
-"""The quiet time after which a reply without an end of its own is taken as it is.
-
-Theory of operation. A prompt, an ACK or an expected line ends most replies. Lists, settings and collections have no
-such end, and in some modes silence is the reply. The time is long where a late reply could be taken for another
-request's. It is short where the next request proves what came: a mark follows every list, and a print of the settings
-follows `EM=`. A sign that more is unlikely then only decides how soon the next request goes out. (MCode reference
-5.1.39, 7.1; facts of real units.)
-"""
+"""The end of a reply that has no end of its own: a collected reply's form, or a quiet time."""
 
 from __future__ import annotations
 
@@ -14,8 +7,50 @@ from functools import lru_cache
 
 from multidrop.dialects.codec import Kind, Request
 from multidrop.dialects.mcode.host import classify
-from multidrop.dialects.mcode.host.collected import ends_by_itself, is_pong
-from multidrop.dialects.mcode.host.framing import ACK, NAK
+from multidrop.dialects.mcode.host.framing import ACK, NAK, unsealed
+
+_PROMPTS = (">", "?")
+_ACK = "\x06"
+
+
+def is_pong(request: Request, buffer: bytes) -> bool:
+    """Whether this is the whole reply to a ping, from a drive that wants a checksum or none."""
+    if request.body or request.text or not request.address:
+        return False
+    return any(buffer in pongs(request.address, each) for each in (False, True))
+
+
+def pongs(address: str, checksum: bool) -> tuple[bytes, ...]:
+    """The whole replies to a ping in EM=1 and EM=0."""
+    name, sign = address.encode("latin-1"), b"\x15" if checksum else b"\r\n"
+    return sign, name + sign + b">", name + sign + b"?"
+
+
+def ends_by_itself(request: Request, buffer: bytes, checksum: bool) -> bool:
+    """Whether nothing more can follow a signed print. `checksum`: the request bears one.
+
+    EM=0 repeats the request and ends in a prompt; EM=3 only repeats it, so this cannot distinguish the two.
+    """
+    if not (request.signed and request.expect) or buffer[-1:] not in (b"\n", b">", b"?"):
+        return False
+    text = buffer.decode("latin-1")
+    found = list(re.finditer(rf"(?:{request.expect})(.?)\r?\n", text))
+    if not found:
+        return False
+    before, after = text[: found[-1].start()], text[found[-1].end() :]
+    if checksum and not (_ACK in before and unsealed(found[-1][0].rstrip("\r\n").encode("latin-1")) is not None):
+        return False  # an ACK may follow the print
+    return after in _PROMPTS if "PR " in before else not after
+
+
+# The quiet time after which a reply without an end of its own is taken as it is.
+#
+# Theory of operation. A prompt, an ACK or an expected line ends most replies. Lists, settings and collections have no
+# such end, and in some modes silence is the reply. The time is long where a late reply could be taken for another
+# request's. It is short where the next request proves what came: a mark follows every list, and a print of the
+# settings follows `EM=`. A sign that more is unlikely then only decides how soon the next request goes out. (MCode
+# reference 5.1.39, 7.1; facts of real units.)
+
 
 SHORT, PATIENT, FLASH = 0.02, 0.15, 3.0
 LIST_QUIET = 0.25
