@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Generic, NamedTuple, TypeVar
 
 from multidrop.dialects.codec import Procedure
-from multidrop.dialects.held import Held
+from multidrop.dialects.program_files import Held
 from multidrop.dialects.state import DriveState
 
 S = TypeVar("S", bound=DriveState)

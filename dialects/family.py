@@ -8,23 +8,39 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Generic, Protocol, TypeVar
+from typing import TYPE_CHECKING, Any, Generic, NamedTuple, Protocol, TypeVar
 
 from multidrop.dialects.codec import Codec, Priority, Procedure
 from multidrop.dialects.files import SourceLine
-from multidrop.dialects.guards import Guard
 from multidrop.dialects.on_demand import imported_if
 from multidrop.dialects.state import DriveState, Owed, Remembered
 
 if TYPE_CHECKING:
-    from multidrop.dialects.conditions import Reader
-    from multidrop.dialects.controls import Controls
     from multidrop.dialects.debugging import Debugging
-    from multidrop.dialects.held import Difference, Held
+
+    pass
     from multidrop.dialects.parameters import Parameters
-    from multidrop.dialects.readings import Readings
+    from multidrop.dialects.program_files import Difference, Held
     from multidrop.dialects.scanning import Scan
-    from multidrop.dialects.snapshots import TakeSnapshot
+    from multidrop.dialects.values import Controls, PolledValues, Reader, TakeSnapshot
+
+
+EVERYONE = "*"
+"""The name of the guard on lines that can start motion of every drive on a line."""
+ADDRESSES = ("*", "^")
+"""The addresses that mean every drive of a line."""
+
+
+class Guard(NamedTuple):
+    """One guarded line: the name of its guard in the configuration, and what the line does, for a person."""
+
+    name: str
+    what: str
+
+
+def to_all(line: str) -> Guard:
+    """Guard a line that can start motion of every drive."""
+    return Guard(EVERYONE, f"'{line}' can start every drive of the line")
 
 
 @dataclass(frozen=True)
@@ -269,7 +285,7 @@ class Family(Generic[S]):
     conditions_at: str = ""
     """The place of its `Reader` of conditions."""
     readings_at: str = ""
-    """The place of its `Readings`."""
+    """The place of its `PolledValues`."""
     controls_at: str = ""
     """The place of the function that gives the `Controls` of an axis."""
     registers: Registers[S] | None = None
@@ -325,9 +341,9 @@ class Family(Generic[S]):
         return found
 
     @property
-    def readings(self) -> Readings[S] | None:
+    def readings(self) -> PolledValues[S] | None:
         """Values of its drives that may be polled; None: there are none."""
-        found: Readings[S] | None = imported_if(self.readings_at)
+        found: PolledValues[S] | None = imported_if(self.readings_at)
         return found
 
     def controls(self, state: S, axis: str) -> Controls:

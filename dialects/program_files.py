@@ -1,18 +1,105 @@
-"""Program files of a family: what is known by a file's name, and the language, imported at its first use."""
+"""Programs of a family: files by their names, their language, problems and canonical spelling; what a drive holds.
+
+The language is imported at its first use. In canonical spelling indents, remarks and their columns stay.
+"""
 
 from __future__ import annotations
 
 import importlib
-from collections.abc import Sequence
+import re
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple, Protocol, cast
 
+from multidrop.dialects.errors import Diagnostic, Refused
 from multidrop.dialects.files import SourceLine
-from multidrop.dialects.problems import Problem
 
 if TYPE_CHECKING:
     from pathlib import Path
 
     from multidrop.dialects.program_editing import EditingLanguage
+
+
+class Problem(NamedTuple):
+    """A problem: line and column from 1, description, remedy. A program with mere warnings runs."""
+
+    line: int
+    column: int
+    what: str
+    hint: str = ""
+    warning: bool = False
+
+    def where(self, name: str) -> str:
+        """Return `file:line:column`."""
+        return f"{name}:{self.line}:{self.column}"
+
+    def line_for(self, name: str) -> str:
+        """Return the one line that a person reads of it."""
+        hint = f"; {self.hint}" if self.hint else ""
+        return f"{self.where(name)}: {'warning: ' if self.warning else ''}{self.what}{hint}"
+
+
+def in_order(problems: Iterable[Problem]) -> list[Problem]:
+    """The problems by their places in the file; errors precede warnings of one place."""
+    return sorted(problems, key=lambda each: (each.line, each.column, each.warning))
+
+
+def errors(problems: Sequence[Problem]) -> list[Problem]:
+    """The problems that are not warnings."""
+    return [each for each in problems if not each.warning]
+
+
+def refuse(problems: Sequence[Problem], name: str) -> None:
+    """Raise a Diagnostic for the first error, if any; it gives the number of the others."""
+    wrong = in_order(errors(problems))
+    if not wrong:
+        return
+    more = f" ({len(wrong) - 1} more: multidrop program check)" if len(wrong) > 1 else ""
+    raise Diagnostic(wrong[0].what + more, wrong[0].where(name), wrong[0].hint)
+
+
+LOCKED = "its program is locked (LK=1); LK=0 opens a lock that was not saved; CP opens any, and erases the program"
+
+
+class Stored(NamedTuple):
+    """A line in a drive: its address, or its number in memory, and its text as the drive lists it."""
+
+    at: int
+    text: str
+
+
+@dataclass(frozen=True)
+class Held:
+    """Everything that a drive holds of programs."""
+
+    lines: tuple[Stored, ...] = ()
+    names: tuple[str, ...] = ()
+    """Variables with their values, and labels with their places, as the drive prints them."""
+    locked: bool = False
+    """The drive lists no program: it is locked."""
+
+    def check_listed(self, who: str) -> None:
+        """Raise Refused where the drive is locked; `who` names it for a person."""
+        if self.locked:
+            raise Refused(f"{who}: no listing: {LOCKED}")
+
+    def check_program(self, who: str) -> None:
+        """Raise Refused where the drive is locked or holds no program."""
+        self.check_listed(who)
+        if not self.lines:
+            raise Refused(f"{who} holds no program")
+
+
+class Difference(NamedTuple):
+    """A line that is not the same in a file and in a drive.
+
+    `number`: of the file's line; 0: the file has none. `at`: the place in the drive; None: the drive has none.
+    """
+
+    number: int
+    here: str
+    at: int | None
+    there: str
 
 
 class Part(NamedTuple):
@@ -82,3 +169,51 @@ class ProgramFiles(NamedTuple):
     def editing(self) -> EditingLanguage:
         """Names, help and completion of a text under editing."""
         return cast("EditingLanguage", importlib.import_module(self.editing_module))
+
+
+BLANKS = " \t"
+TAB = 8
+"""Columns from one tab stop to the next."""
+
+
+_END_OF_FILE = "\x1a"
+
+
+def respelled(text: str, remark_at: Callable[[str], int], spell: Callable[[str], str]) -> str:
+    """Return a text with its statements in canonical spelling. `remark_at` finds where the remark of a line begins."""
+    body = text.rstrip(_END_OF_FILE)
+    parts = re.split("(\r?\n)" if "\n" in body else "(\r)", body)  # as `split_lines` divides it
+    parts[::2] = [_respelled_line(part, remark_at(part), spell) for part in parts[::2]]
+    return "".join(parts) + text[len(body) :]
+
+
+def _respelled_line(line: str, end: int, spell: Callable[[str], str]) -> str:
+    """Return a line with its statement in canonical spelling; its remark begins at `end`.
+
+    A remark keeps its column where the new statement leaves room. Blanks at the end of a line without a remark go.
+    """
+    code = line[:end].rstrip(BLANKS)
+    statement = code.lstrip(BLANKS)
+    if not statement:
+        return line
+    indent, gap, remark = code[: len(code) - len(statement)], line[len(code) : end], line[end:]
+    spelled = spell(statement)
+    if not remark:
+        return indent + spelled
+    if spelled == statement or not gap:
+        return indent + spelled + gap + remark
+    return _filled(indent + spelled, _width(line[:end]), gap) + remark
+
+
+def _filled(code: str, column: int, gap: str) -> str:
+    """Fill up to a column with what the gap consists of, with one such character at least."""
+    if gap.strip("\t"):
+        return code + " " * max(column - _width(code), 1)
+    code += "\t"
+    while _width(code) < column:
+        code += "\t"
+    return code
+
+
+def _width(text: str) -> int:
+    return len(text.expandtabs(TAB))

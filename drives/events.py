@@ -8,7 +8,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from multidrop.dialects import Reply, Request
-from multidrop.dialects.conditions import Conditions
+from multidrop.dialects.values import Conditions
 from multidrop.transports import TransportLost
 
 

@@ -69,7 +69,7 @@ class Telemetry:
         return self._watching.watch(addresses, period)
 
     def read(self, values: Sequence[Value], period: float = USUAL) -> Subscription[Value]:
-        """Read values by their words, which `dialects.readings` has checked, each every `period` s beside the polls."""
+        """Read values by their words, which `dialects.values` has checked, each every `period` s beside the polls."""
         return self._readings.subscribe(values, period)
 
     def subscribe(self, addresses: Sequence[str], period: float = MODEST) -> Subscription[str]:

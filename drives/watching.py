@@ -16,8 +16,8 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from multidrop.dialects import DriveError, NoAnswer, Refused
-from multidrop.dialects.conditions import Part, Reader
 from multidrop.dialects.parameters import Value
+from multidrop.dialects.values import Part, Reader
 from multidrop.drives.apart import apart
 from multidrop.drives.drive import Drive, Running
 from multidrop.drives.events import Conditioned

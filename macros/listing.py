@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from multidrop.dialects.errors import Diagnostic
-from multidrop.dialects.visible import visible
+from multidrop.dialects.text import visible
 from multidrop.macros.store import MacroStore
 
 

@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 
 from multidrop.dialects.errors import Diagnostic
-from multidrop.dialects.visible import visible
+from multidrop.dialects.text import visible
 
 Value = int | float | str
 LARGEST = 10**15

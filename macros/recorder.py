@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field
 
 from multidrop.dialects.errors import Diagnostic
-from multidrop.dialects.visible import visible
+from multidrop.dialects.text import visible
 from multidrop.macros.braces import escape
 from multidrop.macros.model import Macro, Step, check_name
 from multidrop.macros.pauses import Observed, Offer, offers

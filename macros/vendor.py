@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 
 from multidrop.dialects.errors import Diagnostic
 from multidrop.dialects.files import lines_of
-from multidrop.dialects.visible import visible
+from multidrop.dialects.text import visible
 from multidrop.macros.braces import escape, fill
 from multidrop.macros.model import KEYS, Macro, Step
 

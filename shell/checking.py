@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from multidrop.dialects import Diagnostic
 from multidrop.dialects.families import program_language_of, program_languages
 from multidrop.dialects.files import encoded_program_of, split_lines, why
-from multidrop.dialects.problems import Problem, errors, in_order
+from multidrop.dialects.program_files import Problem, errors, in_order
 from multidrop.simulator.cell.spec import DriveSpec
 from multidrop.simulator.families import PROGRAMS, TABLE
 

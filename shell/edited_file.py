@@ -12,7 +12,7 @@ from pathlib import Path
 
 from multidrop.dialects import Diagnostic
 from multidrop.dialects.files import bytes_of, decoded, why
-from multidrop.dialects.visible import ACTING
+from multidrop.dialects.text import ACTING
 
 LARGEST = 512 * 1024
 """Bytes; many times what a drive holds, and as much as an editor takes with ease."""

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from multidrop.dialects import Diagnostic, SourceLine
-from multidrop.dialects.held import Held
+from multidrop.dialects.program_files import Held
 from multidrop.shell import new_file, sources
 from multidrop.shell.channel import running, transferring
 from multidrop.shell.lines import EVERYONE

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from multidrop.dialects.debugging import Row
 from multidrop.dialects.family import Programs
-from multidrop.dialects.held import Held, Stored
+from multidrop.dialects.program_files import Held, Stored
 from multidrop.shell import sources
 from multidrop.shell.channel import Channel
 from multidrop.shell.events import Phase, ProgramRead, ProgramSeen

@@ -20,7 +20,7 @@ from collections.abc import Callable
 from typing import TextIO
 
 from multidrop.dialects import Diagnostic, DriveError, Stopped
-from multidrop.dialects.visible import visible
+from multidrop.dialects.text import visible
 from multidrop.shell import outlets
 from multidrop.transports import TransportLost
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 from typing import TextIO
 
-from multidrop.dialects.visible import visible
+from multidrop.dialects.text import visible
 from multidrop.drives.events import Unsolicited
 from multidrop.shell.events import Bytes, Failed, Notified, OnBus, Output, Printed, Progressed, SessionEvent
 from multidrop.shell.layout import laid_out

@@ -15,8 +15,8 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from multidrop.dialects import Diagnostic, DriveError, Inexpressible, Refused
-from multidrop.dialects.held import LOCKED
 from multidrop.dialects.parameters import Permission, Plan, Readings, differing
+from multidrop.dialects.program_files import LOCKED
 from multidrop.shell import snapshots, transfers
 from multidrop.shell.channel import running, transferring
 from multidrop.shell.params.file import shown
@@ -26,7 +26,7 @@ from multidrop.simulator.cell.writer import BusText, write
 from multidrop.simulator.families import family_of, snapshots_of
 
 if TYPE_CHECKING:
-    from multidrop.dialects.snapshots import Snapshot
+    from multidrop.dialects.values import Snapshot
     from multidrop.drives.drive import Drive
     from multidrop.shell.roles import Commands
     from multidrop.shell.workspace import Workspace

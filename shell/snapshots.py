@@ -6,7 +6,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from multidrop.dialects import Diagnostic, DriveError, Inexpressible, Stopped
-from multidrop.dialects.held import Held, Stored
+from multidrop.dialects.program_files import Held, Stored
 from multidrop.shell import listings, new_file
 from multidrop.shell.channel import running, transferring
 from multidrop.simulator import cells
@@ -15,7 +15,7 @@ from multidrop.simulator.families import FAMILIES, snapshots_of
 from multidrop.simulator.floor import Floor
 
 if TYPE_CHECKING:
-    from multidrop.dialects.snapshots import Snapshot
+    from multidrop.dialects.values import Snapshot
     from multidrop.drives.bus import Bus
     from multidrop.drives.drive import Drive
     from multidrop.shell.workspace import Workspace

@@ -12,7 +12,7 @@ import json
 from pathlib import Path
 from typing import NamedTuple
 
-from multidrop.dialects.held import Held
+from multidrop.dialects.program_files import Held
 from multidrop.macros.atomic import write_atomically
 
 FOLDER = "sources"

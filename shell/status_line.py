@@ -6,7 +6,7 @@ import contextlib
 import sys
 from shutil import get_terminal_size
 
-from multidrop.dialects.visible import visible
+from multidrop.dialects.text import visible
 from multidrop.shell.outlets import Outlet
 
 

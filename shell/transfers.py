@@ -18,8 +18,7 @@ from multidrop.dialects import Diagnostic, DriveError, Refused, SourceLine
 from multidrop.dialects.errors import Differs
 from multidrop.dialects.families import program_languages
 from multidrop.dialects.files import program_text_of
-from multidrop.dialects.held import LOCKED, Difference, Held
-from multidrop.dialects.problems import errors, refuse
+from multidrop.dialects.program_files import LOCKED, Difference, Held, errors, refuse
 from multidrop.drives.drive import still
 from multidrop.shell import backups, sources
 from multidrop.shell.channel import running, transferring

@@ -34,7 +34,7 @@ from multidrop.shell.playing import Playing, played_by
 from multidrop.transports import TransportLost
 
 if TYPE_CHECKING:
-    from multidrop.dialects.held import Held
+    from multidrop.dialects.program_files import Held
     from multidrop.drives.bus import Bus
     from multidrop.drives.drive import Drive
     from multidrop.drives.halt import Halt

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from random import Random
 
 from multidrop.dialects import Diagnostic
-from multidrop.dialects.numbers import whole
+from multidrop.dialects.text import whole
 from multidrop.simulator.cell.spec import BusSpec, Cell, DriveSpec
 from multidrop.simulator.families import BY_PERSONALITY, family_of
 from multidrop.simulator.family import Connection, Device, Place, Unit

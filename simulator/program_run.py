@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple, Protocol
 
-from multidrop.dialects.problems import Problem
+from multidrop.dialects.program_files import Problem
 from multidrop.simulator.cell.spec import DriveSpec
 
 LONGEST = 3600.0

@@ -6,8 +6,7 @@ from dataclasses import dataclass
 from random import Random
 from typing import Any, Protocol
 
-from multidrop.dialects.tmcl.manual.commands import Call
-from multidrop.dialects.tmcl.manual.status import Status
+from multidrop.dialects.tmcl.manual.commands import Call, Status
 
 VALUES = (60_000_000, 100_000_000)
 TICKS = 50_000_000

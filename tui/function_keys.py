@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from multidrop.dialects import Diagnostic
-from multidrop.dialects.visible import visible
+from multidrop.dialects.text import visible
 from multidrop.macros.model import FIRST_PAGE, KEYS, describe_clash, page_order
 from multidrop.tui.session_view import MacrosView, MacroView
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from typing import NamedTuple, Protocol
 
-from multidrop.dialects.conditions import UNREAD, Conditions
+from multidrop.dialects.values import UNREAD, Conditions
 from multidrop.drives.events import Conditioned, Sample, Silent
 from multidrop.tui.text import digits
 

@@ -14,7 +14,7 @@ from dataclasses import dataclass, field
 from textual.binding import Binding, BindingType
 from textual.keys import Keys
 
-from multidrop.dialects.visible import visible
+from multidrop.dialects.text import visible
 from multidrop.tui.text import key_words
 
 FIXED = {"escape", "enter", "tab", "space", "up", "down", "left", "right", "backspace", "delete"}

@@ -8,9 +8,9 @@ from datetime import datetime
 from pathlib import Path
 from typing import Any, NamedTuple, Protocol
 
-from multidrop.dialects.controls import Controls
 from multidrop.dialects.family import Language
 from multidrop.dialects.parameters import Parameters
+from multidrop.dialects.values import Controls
 from multidrop.drives.readings import Value
 from multidrop.shell.channel import Fill
 from multidrop.shell.events import By, SessionEvent

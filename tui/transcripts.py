@@ -7,7 +7,7 @@ from collections.abc import Awaitable, Callable, Sequence
 from datetime import datetime, timedelta
 
 from multidrop.dialects import Diagnostic
-from multidrop.dialects.visible import visible
+from multidrop.dialects.text import visible
 from multidrop.shell import new_file
 from multidrop.shell.transcripts import Filter
 from multidrop.tui.outbox import Outbox

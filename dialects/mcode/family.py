@@ -5,8 +5,7 @@ from __future__ import annotations
 from functools import partial
 
 from multidrop.dialects.codec import Procedure
-from multidrop.dialects.family import Family, Guards, Sentences
-from multidrop.dialects.guards import Guard
+from multidrop.dialects.family import Family, Guard, Guards, Sentences
 from multidrop.dialects.mcode.host import classify, operations
 from multidrop.dialects.mcode.host.codec import STOP_BYTES, MCode
 from multidrop.dialects.mcode.host.identify import identify, remember

@@ -5,16 +5,13 @@ from __future__ import annotations
 from functools import partial
 
 from multidrop.dialects.codec import Procedure
-from multidrop.dialects.family import Family, Guards, Registers, Sentences
-from multidrop.dialects.guards import Guard
+from multidrop.dialects.family import Family, Guard, Guards, Registers, Sentences
 from multidrop.dialects.mcode.host.classify import referencing
 from multidrop.dialects.mcode.manual import guards, help, sentences
 from multidrop.dialects.modbus.host import operations
-from multidrop.dialects.modbus.host.codec import Modbus
-from multidrop.dialects.modbus.host.identify import identify
+from multidrop.dialects.modbus.host.codec import Modbus, ModbusState, pdu_codec
 from multidrop.dialects.modbus.host.mapping import ALTERNATIVE, lines_of
-from multidrop.dialects.modbus.host.messages import pdu_codec
-from multidrop.dialects.modbus.host.state import ModbusState
+from multidrop.dialects.modbus.host.operations import identify
 from multidrop.dialects.modbus.manual.registers import REGISTERS
 
 
@@ -48,9 +45,9 @@ MODBUS = Family(
     question="PR {}".format,
     sentences=Sentences(sentences.move, sentences.move_to, sentences.assign),
     no_programs=f"programs are neither listed nor written over Modbus; {ALTERNATIVE} does both with the same drive",
-    parameters_at="multidrop.dialects.modbus.host.parameters:PARAMETERS",
-    snapshot_at="multidrop.dialects.modbus.host.snapshot:take",
-    readings_at="multidrop.dialects.modbus.host.readings:READINGS",
+    parameters_at="multidrop.dialects.modbus.host.values:PARAMETERS",
+    snapshot_at="multidrop.dialects.modbus.host.values:take",
+    readings_at="multidrop.dialects.modbus.host.values:READINGS",
     registers=Registers(
         read=operations.read_registers,
         write=operations.write_registers,
@@ -61,6 +58,6 @@ MODBUS = Family(
     ),
     guards=Guards(guards.NAMES, guarded, guards.word_of, guards.only_ends),
     prepare=pdu_codec,
-    conditions_at="multidrop.dialects.modbus.host.conditions:READER",
+    conditions_at="multidrop.dialects.modbus.host.values:READER",
     controls_at="multidrop.dialects.mcode.manual.sentences:controls",
 )

@@ -1,14 +1,78 @@
-"""The record of the PMX family: Performax controllers on a serial line or through a gateway."""
+"""The record of the PMX family: Performax controllers on a serial line or through a gateway.
+
+Guarded commands are in the PMX-2ED-SA manual 6.2.2, 6.3, 7.20; a stop is never guarded. A move follows its mode, which
+stays set.
+"""
 
 from __future__ import annotations
 
-from multidrop.dialects.family import Family, Guards, Sentences
+import re
+from collections.abc import Mapping
+from types import MappingProxyType
+
+from multidrop.dialects.family import ADDRESSES, EVERYONE, Family, Guard, Guards, Sentences, to_all
 from multidrop.dialects.pmx.host import operations
-from multidrop.dialects.pmx.host.codec import STOP_BYTES, Pmx
+from multidrop.dialects.pmx.host.codec import STOP_BYTES, Pmx, PmxState
 from multidrop.dialects.pmx.host.identify import identify
-from multidrop.dialects.pmx.host.state import PmxState
-from multidrop.dialects.pmx.manual import guards, help, sentences
-from multidrop.dialects.pmx.manual.table import reads
+from multidrop.dialects.pmx.manual import help
+from multidrop.dialects.pmx.manual.table import head, lookup, reads, starts_motion
+
+FIRST = "X"
+"""The first axis."""
+
+
+def move(axis: str, steps: int) -> tuple[str, ...]:
+    """Move an axis by a distance."""
+    return "INC", f"{axis.upper() or FIRST}{steps}"
+
+
+def move_to(axis: str, position: int) -> tuple[str, ...]:
+    """Move an axis to a position."""
+    return "ABS", f"{axis.upper() or FIRST}{position}"
+
+
+def assign(word: str, value: str) -> str:
+    """Give a word a value."""
+    return f"{word}={value}"
+
+
+GUARDS: Mapping[str, str] = MappingProxyType(
+    {
+        "STORE": "writes the present settings over the kept ones, device name and baud rate included",
+        "DN": "changes the number by which the controller is addressed, after STORE and a power cycle",
+        "DB": "changes the baud rate, after STORE and a power cycle",
+        EVERYONE: "can start every drive of the line",
+    }
+)
+"""Every guard, and what its commands do."""
+QUIET: Mapping[str, frozenset[str]] = MappingProxyType(
+    {"SR": frozenset({"0", "2"}), "EO": frozenset({"0"}), "SL": frozenset({"0"})}
+)
+"""Values that stop a program, a motor or its correction: no address makes them a guarded command."""
+_NUMBER = re.compile(r"\A\s*@\d{2}", re.ASCII)
+
+
+def guarded(text: str, address: str) -> Guard | None:
+    """Find the guard of a command for a controller; None: the command needs no agreement."""
+    line = text.strip()
+    word, value = word_of(line), line.partition("=")[2].strip()
+    if word == "STORE" or (word in GUARDS and value):
+        return Guard(word, f"'{line}' {GUARDS[word]}")
+    quiet = value in QUIET.get(word, ())
+    return to_all(line) if address in ADDRESSES and starts_motion(line) and not quiet else None
+
+
+def only_ends(text: str) -> bool:
+    """Whether a command of motion can only end it: that ends a program (SR)."""
+    return word_of(text.strip()) == "SR" and text.partition("=")[2].strip() in QUIET["SR"]
+
+
+def word_of(text: str) -> str:
+    """The name of a command without its axis or number, and without a device number before it, in capitals."""
+    command = _NUMBER.sub("", text)
+    row = lookup(command)
+    return row.name if row is not None else head(command)
+
 
 PMX = Family(
     name=Pmx.family,
@@ -26,15 +90,15 @@ PMX = Family(
     language=help,
     rests_in_place=False,
     question=lambda word: word if reads(word) else None,
-    sentences=Sentences(sentences.move, sentences.move_to, sentences.assign),
-    programs_at="multidrop.dialects.pmx.host.programs:PROGRAMS",
+    sentences=Sentences(move, move_to, assign),
+    programs_at="multidrop.dialects.pmx.host.programs:PROGRAM_FILES",
     parameters_at="multidrop.dialects.pmx.host.parameters:PARAMETERS",
-    snapshot_at="multidrop.dialects.pmx.host.snapshot:take",
-    readings_at="multidrop.dialects.pmx.host.readings:READINGS",
-    guards=Guards(guards.NAMES, lambda state, text: guards.find(text, state.address), guards.word_of, guards.only_ends),
-    scan_at="multidrop.dialects.pmx.host.scan:SCAN",
+    snapshot_at="multidrop.dialects.pmx.host.values:take",
+    readings_at="multidrop.dialects.pmx.host.values:READINGS",
+    guards=Guards(GUARDS, lambda state, text: guarded(text, state.address), word_of, only_ends),
+    scan_at="multidrop.dialects.pmx.host.identify:SCAN",
     debugging_at="multidrop.dialects.pmx.host.debugging:DEBUGGING",
-    conditions_at="multidrop.dialects.pmx.host.conditions:READER",
-    controls_at="multidrop.dialects.pmx.manual.controls:controls",
+    conditions_at="multidrop.dialects.pmx.host.values:READER",
+    controls_at="multidrop.dialects.pmx.host.values:controls",
     stop_bytes=STOP_BYTES,
 )

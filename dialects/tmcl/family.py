@@ -1,16 +1,103 @@
 """The record of the TMCL family: Trinamic modules in direct mode, on RS-485, USB or through a TCP converter.
 
-It has no URL scheme: its frames contain bytes that other drives obey, so nothing tries it on an unknown line.
+It has no URL scheme: its frames contain bytes that other drives obey, so nothing tries it on an unknown line. A guarded
+line wears the EEPROM out, forgets what is stored, starts programs later, or changes how the module is reached. A stop
+is never guarded. Values have numbers, not words: SAP and SGP set them, so no line assigns one.
 """
 
 from __future__ import annotations
 
-from multidrop.dialects.family import Family, Guards, Sentences
-from multidrop.dialects.tmcl.host import framing, operations
-from multidrop.dialects.tmcl.host.codec import STOP_BYTES, Tmcl
-from multidrop.dialects.tmcl.host.identify import identify
-from multidrop.dialects.tmcl.host.state import TmclState
-from multidrop.dialects.tmcl.manual import guards, help, sentences
+from collections.abc import Mapping
+from types import MappingProxyType
+
+from multidrop.dialects.family import ADDRESSES, EVERYONE, Family, Guard, Guards, Sentences, to_all
+from multidrop.dialects.tmcl.host import codec, operations
+from multidrop.dialects.tmcl.host.codec import STOP_BYTES, Tmcl, TmclState
+from multidrop.dialects.tmcl.host.operations import identify
+from multidrop.dialects.tmcl.manual import commands, help
+from multidrop.dialects.tmcl.manual.commands import Call, Command
+from multidrop.dialects.tmcl.manual.parameters import Global
+
+FIRST = "0"
+"""The first motor."""
+
+
+def move(axis: str, steps: int) -> tuple[str, ...]:
+    """Move a motor by a distance."""
+    return (f"MVP REL, {axis or FIRST}, {steps}",)
+
+
+def move_to(axis: str, position: int) -> tuple[str, ...]:
+    """Move a motor to a position."""
+    return (f"MVP ABS, {axis or FIRST}, {position}",)
+
+
+BOOTLOADER = 242
+"""The command that starts the bootloader."""
+_EEPROM = "writes to the EEPROM, which wears out"
+GUARDS: Mapping[str, str] = MappingProxyType(
+    {
+        "STAP": _EEPROM,
+        "STGP": _EEPROM,
+        "FACTORY": "restores the factory settings, and gives no reply",
+        "BOOTLOADER": "starts the bootloader; the module then obeys no command, a stop included",
+        "DOWNLOAD": "erases the program from that line on; the module then stores every command until 133",
+        "AUTOSTART": "has the module start its program at each power-up",
+        "BAUD": "changes the baud rate from the next message on",
+        "ADDRESS": "changes the address of the module from the next message on",
+        EVERYONE: "can start every drive of the line",
+    }
+)
+"""Every guard, and what its lines do."""
+_COMMANDS: Mapping[int, str] = MappingProxyType(
+    {
+        Command.STAP: "STAP",
+        Command.STGP: "STGP",
+        Command.DOWNLOAD: "DOWNLOAD",
+        Command.FACTORY: "FACTORY",
+        BOOTLOADER: "BOOTLOADER",
+    }
+)
+_PARAMETERS: Mapping[int, str] = MappingProxyType({Global.BAUD: "BAUD", Global.ADDRESS: "ADDRESS"})
+"""Guards on setting a global parameter, or restoring it from EEPROM."""
+
+
+def guarded(text: str, address: str) -> Guard | None:
+    """Find the guard of a line for a module; None: the line needs no agreement, as an invalid one."""
+    line = text.strip()
+    try:
+        call = commands.parse(text)
+    except commands.LineError:
+        return None
+    if name := _guard_name(call):
+        return Guard(name, f"'{line}' {GUARDS[name]}")
+    return to_all(line) if address in ADDRESSES and call.moves and not _is_rest(call) else None
+
+
+def only_ends(text: str) -> bool:
+    """Whether a line is a command of motion that can only end it: a velocity of 0."""
+    try:
+        return _is_rest(commands.parse(text))
+    except commands.LineError:
+        return False
+
+
+def _is_rest(call: Call) -> bool:
+    return call.command in (Command.ROR, Command.ROL) and call.value == 0
+
+
+def word_of(text: str) -> str:
+    """The word at the head of a line, in capitals; the number of a command without a word."""
+    return text.strip().partition(" ")[0].upper()
+
+
+def _guard_name(call: Call) -> str:
+    if call.command == Command.SGP and call.type == Global.AUTOSTART and call.value:
+        return "AUTOSTART"
+    if call.command in (Command.SGP, Command.RSGP):
+        return _PARAMETERS.get(call.type, "")
+    return _COMMANDS.get(call.command, "")
+
 
 TMCL = Family(
     name=Tmcl.family,
@@ -28,15 +115,15 @@ TMCL = Family(
     language=help,
     rests_in_place=True,
     question=lambda word: None,
-    sentences=Sentences(sentences.move, sentences.move_to, lambda word, value: None),
-    guards=Guards(guards.NAMES, lambda state, text: guards.find(text, state.address), guards.word_of, guards.only_ends),
-    parameters_at="multidrop.dialects.tmcl.host.settings:PARAMETERS",
-    snapshot_at="multidrop.dialects.tmcl.host.snapshot:take",
-    readings_at="multidrop.dialects.tmcl.host.readings:READINGS",
+    sentences=Sentences(move, move_to, lambda word, value: None),
+    guards=Guards(GUARDS, lambda state, text: guarded(text, state.address), word_of, only_ends),
+    parameters_at="multidrop.dialects.tmcl.host.values:PARAMETERS",
+    snapshot_at="multidrop.dialects.tmcl.host.values:take",
+    readings_at="multidrop.dialects.tmcl.host.values:READINGS",
     no_programs="the host loads no programs into TMCL modules; 132 and 133 begin and end a download by hand",
     repairs=True,
-    conditions_at="multidrop.dialects.tmcl.host.conditions:READER",
-    controls_at="multidrop.dialects.tmcl.host.controls:controls",
+    conditions_at="multidrop.dialects.tmcl.host.values:READER",
+    controls_at="multidrop.dialects.tmcl.host.values:controls",
     stop_bytes=STOP_BYTES,
-    message_moves=framing.moves,
+    message_moves=codec.moves,
 )

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 
 from multidrop.arguments import parts
-from multidrop.dialects.numbers import whole
+from multidrop.dialects.text import whole
 
 HOST = "127.0.0.1"
 

@@ -124,7 +124,7 @@ def baud(text: str) -> int:
 
 def number(text: str, low: int, high: int, other: str = "") -> int:
     """Read a whole number; `other`: the words that are valid in place of one."""
-    from multidrop.dialects.numbers import whole
+    from multidrop.dialects.text import whole
 
     found = whole(text, low, high)
     if found is None:

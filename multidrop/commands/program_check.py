@@ -8,7 +8,7 @@ from collections.abc import Mapping
 
 from multidrop.commands.failure import fail
 from multidrop.dialects import Diagnostic
-from multidrop.dialects.problems import errors
+from multidrop.dialects.program_files import errors
 from multidrop.shell.checking import Checked, examine, rewrite
 from multidrop.shell.output import shortened, write
 

@@ -11,7 +11,7 @@ from multidrop.commands.failure import fail
 from multidrop.dialects import Diagnostic
 from multidrop.dialects.families import program_language_of, program_languages
 from multidrop.dialects.files import program_text_of
-from multidrop.dialects.problems import errors
+from multidrop.dialects.program_files import errors
 from multidrop.shell import listings, transfers
 from multidrop.shell.front import batch
 from multidrop.shell.new_file import STANDARD_OUTPUT

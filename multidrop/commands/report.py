@@ -15,7 +15,7 @@ from pathlib import Path
 from multidrop.commands.failure import fail
 from multidrop.dialects import Diagnostic
 from multidrop.dialects.files import bounded, opened, split_lines, why
-from multidrop.dialects.visible import visible
+from multidrop.dialects.text import visible
 from multidrop.macros import MacroStore
 from multidrop.shell.connect import settings
 from multidrop.shell.new_file import STANDARD_OUTPUT

@@ -9,7 +9,7 @@ from math import inf
 from typing import NamedTuple, TypeVar
 
 from multidrop.dialects.families import program_languages
-from multidrop.dialects.problems import Problem
+from multidrop.dialects.program_files import Problem
 from multidrop.shell.program_text import ProgramGrammar, ProgramText
 from multidrop.shell.threads import in_thread
 

@@ -7,8 +7,8 @@ from collections.abc import Iterable, Sequence
 
 from lsprotocol import types
 
-from multidrop.dialects.problems import Problem
 from multidrop.dialects.program_editing import Block, Offer, Span
+from multidrop.dialects.program_files import Problem
 from multidrop.lsp.documents import Document
 from multidrop.lsp.positions import Positions
 from multidrop.shell.program_text import Coloured, Edit, Fold

@@ -16,7 +16,7 @@ from pygls.lsp.server import LanguageServer
 
 import multidrop
 from multidrop.dialects import Diagnostic
-from multidrop.dialects.problems import Problem
+from multidrop.dialects.program_files import Problem
 from multidrop.lsp import replies
 from multidrop.lsp.documents import DELAY, Document, Documents
 from multidrop.lsp.positions import Positions

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from multidrop.dialects import Diagnostic
-from multidrop.dialects.numbers import whole
+from multidrop.dialects.text import whole
 from multidrop.shell.secrets import url_without_secrets
 
 HOST = "127.0.0.1"

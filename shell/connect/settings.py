@@ -31,7 +31,7 @@ from typing import Any
 
 from multidrop.dialects import Diagnostic
 from multidrop.dialects.files import split_lines, toml_of, utf8_of, why
-from multidrop.dialects.visible import visible
+from multidrop.dialects.text import visible
 from multidrop.macros.atomic import write_atomically
 from multidrop.shell.connect.settings_tables import (
     DEFAULT_LOOK,

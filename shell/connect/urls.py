@@ -14,7 +14,7 @@ from urllib.parse import unquote
 
 from multidrop.dialects import Diagnostic, Hints
 from multidrop.dialects.families import TABLE
-from multidrop.dialects.numbers import whole
+from multidrop.dialects.text import whole
 from multidrop.shell.connect.url_forms import URL_FORMS, sentence
 from multidrop.shell.secrets import holds_password, url_without_secrets, without_secrets
 from multidrop.transports.far_port import WAYS, wrong_path

@@ -12,7 +12,7 @@ from xml.etree import ElementTree
 
 from multidrop.dialects import Diagnostic
 from multidrop.dialects.files import LARGEST_PROGRAM, bytes_of, why
-from multidrop.dialects.visible import visible
+from multidrop.dialects.text import visible
 from multidrop.macros.atomic import write_atomically
 from multidrop.shell import new_file
 

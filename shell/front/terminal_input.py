@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 from multidrop.dialects import Diagnostic
 from multidrop.dialects.files import LARGEST, check_line, split_lines
-from multidrop.dialects.visible import visible
+from multidrop.dialects.text import visible
 from multidrop.shell.channel import Ask, Field
 from multidrop.shell.front.keyboard import Keyboard, on_stop_key
 from multidrop.shell.lines import uncommented

@@ -16,7 +16,7 @@ from pathlib import Path
 
 from multidrop.dialects import Diagnostic
 from multidrop.dialects.files import lines_of
-from multidrop.dialects.visible import visible
+from multidrop.dialects.text import visible
 from multidrop.macros.atomic import write_atomically
 from multidrop.shell.events import FAILURES
 from multidrop.shell.lines import VerbLine, parse

@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
 from pathlib import Path
 
-from multidrop.dialects.visible import visible
+from multidrop.dialects.text import visible
 from multidrop.shell.lines import join_target
 from multidrop.shell.log import files
 from multidrop.shell.log.entries import KINDS, TRAFFIC, Entry

@@ -12,7 +12,7 @@ from datetime import datetime
 from pathlib import Path
 
 from multidrop.dialects import Diagnostic
-from multidrop.dialects.visible import visible
+from multidrop.dialects.text import visible
 from multidrop.shell.lines import WAITS
 from multidrop.shell.log.entries import BEGIN, TRAFFIC, Entry
 from multidrop.shell.log.files import Line

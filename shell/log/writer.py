@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from multidrop.dialects import Diagnostic, Priority
 from multidrop.dialects.files import why
-from multidrop.dialects.visible import visible
+from multidrop.dialects.text import visible
 from multidrop.drives.events import BusEvent, Ended, Sent, Traffic, Unsolicited
 from multidrop.shell.events import (
     Entered,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from multidrop.dialects.conditions import UNREAD, Conditions
+from multidrop.dialects.values import UNREAD, Conditions
 
 ON = {True: "on", False: "off", None: ""}
 

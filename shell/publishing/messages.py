@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from datetime import datetime
 
-from multidrop.dialects.conditions import UNREAD, Conditions
+from multidrop.dialects.values import UNREAD, Conditions
 from multidrop.shell.log.entries import Entry, line_of
 from multidrop.shell.output import shortened
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from urllib.parse import unquote, urlsplit
 
 from multidrop.dialects import Diagnostic
-from multidrop.dialects.visible import visible
+from multidrop.dialects.text import visible
 from multidrop.shell.publishing.topics import MOST
 
 PORTS = {"mqtt": 1883, "mqtts": 8883}

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from urllib.parse import unquote
 
-from multidrop.dialects.visible import visible
+from multidrop.dialects.text import visible
 
 RESERVED = "+#/%"
 """The wildcards and the separator of MQTT, and the sign of an escape."""

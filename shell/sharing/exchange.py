@@ -10,7 +10,7 @@ port is back.
 
 from __future__ import annotations
 
-from multidrop.dialects.visible import visible
+from multidrop.dialects.text import visible
 from multidrop.shell.sharing.actions import Action, Close, Purge, Say, Send, Set, Stop, Write
 from multidrop.shell.sharing.client import Client, Input, Request
 from multidrop.shell.sharing.half_line import ENDS, HalfLine

@@ -12,7 +12,7 @@ from typing import NamedTuple
 from multidrop.dialects import DriveError, Priority, Request
 from multidrop.dialects.codec import Reply
 from multidrop.dialects.family import Motion
-from multidrop.dialects.numbers import whole
+from multidrop.dialects.text import whole
 from multidrop.drives.drive import Drive
 from multidrop.drives.events import Sample
 from multidrop.drives.procedure import ProcedureRunner

@@ -7,8 +7,8 @@ from math import copysign, inf
 from typing import Generic, Protocol, TypeVar
 
 from multidrop.dialects import End, Priority
-from multidrop.dialects.conditions import Conditions
 from multidrop.dialects.family import Motion
+from multidrop.dialects.values import Conditions
 from multidrop.drives.conclusions import Concluded
 from multidrop.drives.conversations import ASKING
 from multidrop.drives.drive import Drive

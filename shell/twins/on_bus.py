@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from multidrop.dialects.snapshots import Snapshot
+from multidrop.dialects.values import Snapshot
 from multidrop.drives.bus import Bus
 from multidrop.drives.conclusions import Concluded
 from multidrop.drives.drive import Drive

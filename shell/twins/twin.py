@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from multidrop.dialects import Inexpressible
 from multidrop.dialects.family import Motion
-from multidrop.dialects.snapshots import Levels, Snapshot
+from multidrop.dialects.values import Levels, Snapshot
 from multidrop.simulator import cells
 from multidrop.simulator.cell.writer import BusText, write
 from multidrop.simulator.families import FAMILIES, family_of, snapshots_of

@@ -6,7 +6,7 @@ import asyncio
 
 from multidrop.dialects import Diagnostic, Inexpressible
 from multidrop.dialects.families import program_language_of
-from multidrop.dialects.problems import errors
+from multidrop.dialects.program_files import errors
 from multidrop.shell.checking import examine
 from multidrop.shell.verbs.registry import Call, as_typed, verb
 from multidrop.simulator.families import PROGRAMS, TABLE

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 from multidrop.dialects import Diagnostic, Stopped
-from multidrop.dialects.numbers import whole
+from multidrop.dialects.text import whole
 from multidrop.macros import Macro
 from multidrop.shell.events import By
 from multidrop.shell.macro_arguments import settled

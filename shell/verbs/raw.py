@@ -7,7 +7,7 @@ from collections.abc import Callable, Coroutine
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from multidrop.dialects import Diagnostic
-from multidrop.dialects.numbers import whole
+from multidrop.dialects.text import whole
 from multidrop.shell.raw import TERMINATORS, Form, RawLine, Watched, parse_bytes
 from multidrop.shell.verbs.registry import Call, verb
 

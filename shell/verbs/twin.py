@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from multidrop.dialects import Diagnostic
-from multidrop.dialects.numbers import whole
+from multidrop.dialects.text import whole
 from multidrop.shell.roles import RunningTwins
 from multidrop.shell.verbs.registry import Call, as_typed, verb
 

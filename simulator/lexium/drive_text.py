@@ -10,7 +10,7 @@ from multidrop.dialects.mcode.manual.grammar import LineError, parse
 from multidrop.dialects.mcode.manual.statements import UNNAMED, canonical, size_of
 from multidrop.dialects.mcode.manual.table import lookup
 from multidrop.dialects.parameters import VARIABLES, Reading, Scalar, Value, same
-from multidrop.dialects.snapshots import Snapshot
+from multidrop.dialects.values import Snapshot
 from multidrop.simulator.cell.spec import DriveSpec, WorldSpec
 from multidrop.simulator.cell.writer import DriveText, Entry, plain, remark
 from multidrop.simulator.family import Snapshots, StoredProgram

@@ -23,8 +23,8 @@ from multidrop.dialects.mcode.manual.grammar import LineError, Name, Number, Sta
 from multidrop.dialects.mcode.manual.help import remedy
 from multidrop.dialects.mcode.manual.program_file import ProgramLine
 from multidrop.dialects.mcode.manual.statements import size_of
-from multidrop.dialects.numbers import whole
-from multidrop.dialects.problems import Problem, errors
+from multidrop.dialects.program_files import Problem, errors
+from multidrop.dialects.text import whole
 from multidrop.simulator.cell.spec import DriveSpec
 from multidrop.simulator.lexium.device import MCodeDevice
 from multidrop.simulator.lexium.state.errors import Failure, Fault

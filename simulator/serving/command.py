@@ -17,7 +17,7 @@ from urllib.parse import urlsplit
 
 from multidrop.dialects import Diagnostic
 from multidrop.dialects.files import bounded, check_line
-from multidrop.dialects.visible import visible
+from multidrop.dialects.text import visible
 from multidrop.simulator import cells
 from multidrop.simulator.floor import Floor
 from multidrop.simulator.serving.endpoints import Served, serve_bus

@@ -9,8 +9,7 @@ from __future__ import annotations
 from struct import Struct
 from typing import Protocol
 
-from multidrop.dialects.tmcl.manual.commands import Call, Command
-from multidrop.dialects.tmcl.manual.status import Status
+from multidrop.dialects.tmcl.manual.commands import Call, Command, Status
 from multidrop.simulator.tmcl.module import Answer
 from multidrop.simulator.wire.wire import Transmission
 

@@ -6,12 +6,11 @@ from multidrop.dialects import Diagnostic
 from multidrop.dialects.families import family_of
 from multidrop.dialects.mcode.manual import parameters as mcode
 from multidrop.dialects.modbus.family import MODBUS
-from multidrop.dialects.modbus.host.codec import Modbus
-from multidrop.dialects.modbus.host.state import ModbusState
+from multidrop.dialects.modbus.host.codec import Modbus, ModbusState
 from multidrop.dialects.modbus.manual.registers import REGISTERS
 from multidrop.dialects.parameters import COMMUNICATION, Permission, Reading, Readings, same
-from multidrop.dialects.pmx.manual import parameters as pmx
-from multidrop.dialects.tmcl.manual import settings as tmcl
+from multidrop.dialects.pmx.host import parameters
+from multidrop.dialects.tmcl.host import values
 from multidrop.drives.procedure import ProcedureRunner
 from multidrop.simulator.pmx.settings import REGISTERS as PMX_REGISTERS
 from tests.dialects.modbus.test_talk import Far
@@ -38,10 +37,10 @@ def test_values_are_compared_as_numbers(one, other, alike):
 
 def test_a_plan_of_a_controller_keeps_the_low_speed_below_the_high_one():
     now = held(LSPD=2000, HSPD=5000)
-    assert steps(pmx.plan(now, {"LSPD": 100, "HSPD": 1000}, Permission())) == ["LSPD=100", "HSPD=1000"]
-    assert steps(pmx.plan(now, {"LSPD": 9000, "HSPD": 9900}, Permission())) == ["HSPD=9900", "LSPD=9000"]
+    assert steps(parameters._plan(now, {"LSPD": 100, "HSPD": 1000}, Permission())) == ["LSPD=100", "HSPD=1000"]
+    assert steps(parameters._plan(now, {"LSPD": 9000, "HSPD": 9900}, Permission())) == ["HSPD=9900", "LSPD=9000"]
     mixed = {"ACC": 300, "DN": "2ED07", "SLRX": 2.5, "HSPDX": 40}
-    made = pmx.plan(held(ACC=1, DN="2ED00", SLRX=1.0, HSPDX=0), mixed, Permission())
+    made = parameters._plan(held(ACC=1, DN="2ED00", SLRX=1.0, HSPDX=0), mixed, Permission())
     assert steps(made) == ["HSPDX=40", "ACC=300", "SLRX=2.500"] and made.withheld == (("DN", COMMUNICATION),)
 
 
@@ -50,8 +49,8 @@ def test_a_plan_of_a_controller_keeps_the_low_speed_below_the_high_one():
 )
 def test_what_a_controller_only_gets_by_name(name, value, now):
     present = held(**{name: 0, **now})
-    assert [each[0] for each in pmx.plan(present, {name: value}, Permission()).withheld] == [name]
-    assert steps(pmx.plan(present, {name: value}, Permission(frozenset({name})))) == [f"{name}={value}"]
+    assert [each[0] for each in parameters._plan(present, {name: value}, Permission()).withheld] == [name]
+    assert steps(parameters._plan(present, {name: value}, Permission(frozenset({name})))) == [f"{name}={value}"]
 
 
 @pytest.mark.parametrize(
@@ -59,7 +58,7 @@ def test_what_a_controller_only_gets_by_name(name, value, now):
 )
 def test_a_wrong_value_for_a_controller(wanted):
     with pytest.raises(Diagnostic):
-        pmx.plan(held(), wanted, Permission())
+        parameters._plan(held(), wanted, Permission())
 
 
 def test_every_register_of_a_controller_is_a_setting_with_its_range():
@@ -67,15 +66,15 @@ def test_every_register_of_a_controller_is_a_setting_with_its_range():
         if name == "JO":
             continue
         scale = 1000 if name.startswith("SLR") else 1
-        assert name in pmx.names()
+        assert name in parameters.setting_names()
         for value in (register.low, register.high):
-            pmx.plan(held(), {name: value / scale}, Permission(frozenset({name})))
+            parameters._plan(held(), {name: value / scale}, Permission(frozenset({name})))
 
 
 def test_a_plan_of_a_module():
-    now = Readings(tuple(tmcl.reading(name, 0 if name in ("4", "12") else 1) for name in tmcl.names(2)))
+    now = Readings(tuple(values.reading(name, 0 if name in ("4", "12") else 1) for name in values.setting_names(2)))
     wanted = {"12": 1, "13": 0, "5": 7, "5_1": 8, "4": 9, "G65": 3, "G77": 0, "140": 6}
-    made = tmcl.plan(2, now, wanted, Permission())
+    made = values._plan(2, now, wanted, Permission())
     assert steps(made) == ["SAP 5, 0, 7", "SAP 13, 0, 0", "SAP 140, 0, 6", "SAP 5, 1, 8", "SGP 77, 0, 0"]
     assert dict(made.withheld) == {
         "12": "a move that the limit switch holds back may go on",
@@ -84,7 +83,7 @@ def test_a_plan_of_a_module():
     }
     for wrong in ({"1": 5}, {"140": 9}, {"5_2": 5}, {"X": 1}, {"6": 1.5}):
         with pytest.raises(Diagnostic):
-            tmcl.plan(2, now, wrong, Permission(frozenset(wrong)))
+            values._plan(2, now, wrong, Permission(frozenset(wrong)))
 
 
 def talk(far, procedure):

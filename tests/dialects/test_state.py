@@ -10,12 +10,14 @@ from pathlib import Path
 import pytest
 
 from multidrop.dialects.mcode.host.state import MCodeState
-from multidrop.dialects.modbus.host.state import ModbusState
-from multidrop.dialects.pmx.host.state import PmxState
+from multidrop.dialects.modbus.host.codec import ModbusState
+from multidrop.dialects.pmx.host.codec import PmxState
 
 ROOT = Path(__file__).parents[2]
 ROOMS = ("dialects", "drives", "shell", "tui", "macros", "multidrop")
-STATE_FILES = {"dialects/state.py", *(f"dialects/{family}/host/state.py" for family in ("mcode", "modbus", "pmx"))}
+STATE_FILES = {"dialects/state.py", "dialects/mcode/host/state.py"} | {
+    f"dialects/{family}/host/codec.py" for family in ("modbus", "pmx", "tmcl")
+}
 FIELDS = {each.name for cls in (MCodeState, ModbusState, PmxState) for each in fields(cls)}
 COMMON = {"name", "address", "restore", "running", "error", "notes", "remarks", "version", "codec"}
 """Fields whose names other classes have too: only an assignment to something called a state counts."""

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from multidrop.dialects.visible import visible
+from multidrop.dialects.text import visible
 
 
 @pytest.mark.parametrize(

@@ -11,7 +11,7 @@ from typing import Any
 
 import pytest
 
-from multidrop.dialects.conditions import Conditions
+from multidrop.dialects.values import Conditions
 from multidrop.shell.log.entries import Entry
 from multidrop.shell.publishing import messages
 from multidrop.shell.publishing.topics import Topics

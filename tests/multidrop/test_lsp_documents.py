@@ -8,7 +8,7 @@ from typing import TypeVar
 
 import pytest
 
-from multidrop.dialects.problems import Problem
+from multidrop.dialects.program_files import Problem
 from multidrop.lsp.documents import DELAY, Document, Documents
 
 T = TypeVar("T")

@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from lsprotocol import types
 
-from multidrop.dialects.problems import Problem
+from multidrop.dialects.program_files import Problem
 from multidrop.lsp import replies
 from multidrop.lsp.documents import Document
 from multidrop.lsp.positions import Positions

@@ -8,8 +8,8 @@ from typing import Any
 
 import pytest
 
-from multidrop.dialects.conditions import UNREAD, Conditions
 from multidrop.dialects.families import FAMILIES
+from multidrop.dialects.values import UNREAD, Conditions
 from multidrop.drives.events import Conditioned, Unsolicited
 from multidrop.shell.events import OnBus
 from tests.support.cell_session import ETHERNET, CellSession, bus, party, pmx

@@ -9,12 +9,11 @@ import pytest
 from multidrop.dialects import Diagnostic, Inexpressible
 from multidrop.dialects.mcode.manual import program_checker, program_file
 from multidrop.dialects.mcode.manual.grammar import LineError, check_groups
-from multidrop.dialects.modbus.host.codec import Modbus
+from multidrop.dialects.modbus.host.codec import Modbus, ModbusState
 from multidrop.dialects.modbus.host.operations import perform
-from multidrop.dialects.modbus.host.state import ModbusState
 from multidrop.dialects.pmx.manual import program_file as pmx_file
 from multidrop.dialects.pmx.manual.table import grouped
-from multidrop.dialects.tmcl.manual import grammar as tmcl
+from multidrop.dialects.tmcl.manual import commands
 from multidrop.macros import Macro, Step
 from multidrop.shell.events import By
 from multidrop.shell.scripts.executor import run_script
@@ -62,7 +61,7 @@ def test_a_field_of_a_word_may_have_three_digits(line: str) -> None:
 
 @for_each("line", TMCL)
 def test_every_line_of_tmcl_has_its_fields(line: str) -> None:
-    assert tmcl.parse(line)
+    assert commands.parse(line)
 
 
 def test_no_command_of_the_controller_separates_numbers() -> None:

@@ -7,8 +7,8 @@ from prompt_toolkit.completion import CompleteEvent
 from prompt_toolkit.document import Document
 
 from multidrop.dialects import Priority
-from multidrop.dialects.held import Held
 from multidrop.dialects.mcode.host.program_readout import offered
+from multidrop.dialects.program_files import Held
 from multidrop.drives.events import Ended
 from multidrop.shell.events import OnBus
 from multidrop.shell.front.complete import complete, names_of

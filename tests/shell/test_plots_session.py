@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from multidrop.dialects import Diagnostic
-from multidrop.dialects.conditions import Conditions, Lamp
+from multidrop.dialects.values import Conditions, Lamp
 from multidrop.drives.events import Conditioned, Sample, Unsolicited, Valued
 from multidrop.drives.readings import Value
 from multidrop.shell.events import By, Entered, Failed, Notified, OnBus, Output, Printed, SessionEvent

@@ -12,8 +12,7 @@ from hypothesis import strategies as st
 from multidrop.dialects import Owed
 from multidrop.dialects.mcode.host.codec import MCode
 from multidrop.dialects.mcode.host.state import MCodeState
-from multidrop.dialects.tmcl.host.codec import Tmcl
-from multidrop.dialects.tmcl.host.state import TmclState
+from multidrop.dialects.tmcl.host.codec import Tmcl, TmclState
 from multidrop.shell.connect.port_state import MOST, PortState
 
 PORT = "/dev/serial/by-id/usb-FTDI/RS485: 1"

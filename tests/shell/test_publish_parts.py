@@ -13,7 +13,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from multidrop.dialects import Diagnostic
-from multidrop.dialects.conditions import UNREAD, Conditions
+from multidrop.dialects.values import UNREAD, Conditions
 from multidrop.drives.events import Conditioned, Sample
 from multidrop.shell.connect import settings
 from multidrop.shell.connect.settings_tables import MqttSettings

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from multidrop.dialects.visible import visible
+from multidrop.dialects.text import visible
 from multidrop.shell.sharing.exchange import SILENT
 from multidrop.transports import telnet
 from multidrop.transports.com_port import OPTION

@@ -15,9 +15,9 @@ from typing import Any
 from textual.pilot import Pilot
 
 from multidrop.dialects import Diagnostic, DriveError, DriveState, Stopped
-from multidrop.dialects.conditions import UNREAD, Conditions, Lamp, Pace
 from multidrop.dialects.families import FAMILIES
 from multidrop.dialects.family import Family
+from multidrop.dialects.values import UNREAD, Conditions, Lamp, Pace
 from multidrop.drives.events import Conditioned, Sample, Silent, Unsolicited
 from multidrop.drives.halt import Fate
 from multidrop.drives.readings import Value

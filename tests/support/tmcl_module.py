@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from multidrop.dialects.tmcl.host import framing
-from multidrop.dialects.tmcl.manual import grammar
+from multidrop.dialects.tmcl.host import codec
+from multidrop.dialects.tmcl.manual import commands
 from multidrop.simulator.cell.spec import WorldSpec
 from multidrop.simulator.tmcl.drive_table import split_settings
 from multidrop.simulator.tmcl.module import TmclModule
@@ -30,11 +30,11 @@ class Module:
         """What the port has sent up to now."""
         return b"".join(each.data for each in self.port.sent(self.now))
 
-    def reply(self, text: str, address: int = 1) -> framing.Frame:
+    def reply(self, text: str, address: int = 1) -> codec.Frame:
         """The reply to a command in TMCL's notation."""
-        frame = self.send(framing.request(address, grammar.parse(text)))
-        assert len(frame) == framing.LENGTH, frame
-        found = framing.reply(frame)
+        frame = self.send(codec.frame_of(address, commands.parse(text)))
+        assert len(frame) == codec.LENGTH, frame
+        found = codec.parse_reply(frame)
         assert found is not None
         return found
 

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from multidrop.dialects.conditions import UNREAD, Conditions, Lamp, Pace
+from multidrop.dialects.values import UNREAD, Conditions, Lamp, Pace
 from multidrop.drives.events import Sample
 from multidrop.tui.panels.axis import drive_rows
 from multidrop.tui.panels.glance import Glance

@@ -2,7 +2,7 @@
 
 from dataclasses import replace
 
-from multidrop.dialects.conditions import UNREAD, Conditions, Lamp
+from multidrop.dialects.values import UNREAD, Conditions, Lamp
 from multidrop.drives.events import Conditioned, Sample, Silent
 from multidrop.shell.events import By, Entered, Failed, OnBus
 from multidrop.tui.screen_model import ScreenModel

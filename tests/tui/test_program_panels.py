@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from multidrop.dialects.conditions import Conditions
+from multidrop.dialects.values import Conditions
 from multidrop.drives.events import Traffic
 from multidrop.shell.events import Phase
 from multidrop.tui.panels.glance import Glance

@@ -2,7 +2,7 @@
 
 import pytest
 
-from multidrop.dialects.conditions import Conditions
+from multidrop.dialects.values import Conditions
 from multidrop.drives.events import Conditioned, Sample, Silent, Traffic, Unsolicited
 from multidrop.shell.events import (
     Agreed,

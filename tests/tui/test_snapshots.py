@@ -5,7 +5,7 @@ from collections.abc import Awaitable, Callable
 import pytest
 from textual.pilot import Pilot
 
-from multidrop.dialects.conditions import Conditions
+from multidrop.dialects.values import Conditions
 from multidrop.drives.events import Conditioned, Sample
 from multidrop.drives.halt import Fate
 from multidrop.shell.events import OnBus

@@ -7,8 +7,7 @@ from collections.abc import Sequence
 from typing import Protocol
 
 from multidrop.dialects import Diagnostic
-from multidrop.dialects.problems import Problem, in_order
-from multidrop.dialects.program_files import Entry, Part
+from multidrop.dialects.program_files import Entry, Part, Problem, in_order
 from multidrop.macros import parse_macro
 from multidrop.shell.program_text import ProgramGrammar
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
-from multidrop.dialects.conditions import UNREAD, Conditions, Lamp
+from multidrop.dialects.values import UNREAD, Conditions, Lamp
 from multidrop.tui.readout import Readout
 from multidrop.tui.text import age
 from multidrop.tui.widgets.lines import Row, Span, width_of

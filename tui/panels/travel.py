@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from multidrop.dialects.conditions import Pace
+from multidrop.dialects.values import Pace
 from multidrop.tui.readout import SWITCHES, Point, Readout
 
 LIMITS, LEARNT, SEEN = "limits", "switches", "seen"

@@ -10,7 +10,7 @@ from typing import ClassVar, NamedTuple
 from textual.app import ComposeResult
 from textual.binding import Binding, BindingType
 
-from multidrop.dialects.visible import visible
+from multidrop.dialects.text import visible
 from multidrop.tui.panels.glance import NOT_REFERENCED, Glance, glances_of
 from multidrop.tui.panels.lamps import program_words, trouble_of
 from multidrop.tui.panels.spark import spark

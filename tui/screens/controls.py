@@ -13,19 +13,7 @@ from typing import ClassVar, NamedTuple
 from textual.app import ComposeResult
 from textual.binding import Binding, BindingType
 
-from multidrop.dialects.controls import (
-    BY,
-    DISABLE,
-    ENABLE,
-    HIGH,
-    HOME_MINUS,
-    HOME_PLUS,
-    LOW,
-    STOP,
-    TO,
-    Control,
-    Controls,
-)
+from multidrop.dialects.values import BY, DISABLE, ENABLE, HIGH, HOME_MINUS, HOME_PLUS, LOW, STOP, TO, Control, Controls
 from multidrop.tui.jog import Jog
 from multidrop.tui.panels.axis import drive_rows, unit_of
 from multidrop.tui.panels.glance import Glance, name_of

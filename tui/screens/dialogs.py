@@ -20,7 +20,7 @@ from textual.screen import ModalScreen
 from textual.widgets import Input, OptionList, Static
 from textual.widgets.option_list import Option
 
-from multidrop.dialects.visible import visible
+from multidrop.dialects.text import visible
 from multidrop.tui.keymap import named_key
 from multidrop.tui.widgets.footer import StopSign
 

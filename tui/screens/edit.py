@@ -16,8 +16,7 @@ from textual.binding import Binding, BindingType
 from textual.containers import Horizontal, Vertical
 
 from multidrop.dialects import Diagnostic
-from multidrop.dialects.problems import Problem
-from multidrop.dialects.program_files import Part
+from multidrop.dialects.program_files import Part, Problem
 from multidrop.shell.edited_file import ChangedMeanwhile, real_text
 from multidrop.tui.editor.grammar import Grammar, MacroGrammar, grammar_of
 from multidrop.tui.editor.texts import OpenText

@@ -10,7 +10,7 @@ from textual.binding import Binding, BindingType
 from textual.containers import Vertical, VerticalScroll
 from textual.widgets import Static
 
-from multidrop.dialects.visible import visible
+from multidrop.dialects.text import visible
 from multidrop.shell.channel import Field as Wanted
 from multidrop.tui.screens.dialogs import Dialog, Field
 

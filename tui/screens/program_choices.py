@@ -11,8 +11,7 @@ from typing import NamedTuple
 from rich.text import Text
 
 from multidrop.dialects.families import program_languages
-from multidrop.dialects.problems import errors
-from multidrop.dialects.program_files import Entry
+from multidrop.dialects.program_files import Entry, errors
 from multidrop.shell.lines import join_target
 from multidrop.tui.editor.texts import OpenText
 from multidrop.tui.readout import ProgramFacts

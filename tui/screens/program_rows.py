@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-from multidrop.dialects.problems import Problem, errors
-from multidrop.dialects.program_files import Entry
+from multidrop.dialects.program_files import Entry, Problem, errors
 from multidrop.tui.editor.texts import OpenText
 from multidrop.tui.editor.widget import Mark
 from multidrop.tui.panels.glance import Glance, name_of

@@ -16,7 +16,7 @@ from textual.widgets import Static
 from textual.widgets.option_list import Option
 
 from multidrop.dialects import Diagnostic, DriveError
-from multidrop.dialects.visible import visible
+from multidrop.dialects.text import visible
 from multidrop.transports import TransportLost
 from multidrop.tui.assist import StartEntry
 from multidrop.tui.keymap import named_key

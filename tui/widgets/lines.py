@@ -15,7 +15,7 @@ from textual.geometry import Region, Size
 from textual.strip import Strip
 from textual.widget import Widget
 
-from multidrop.dialects.visible import visible
+from multidrop.dialects.text import visible
 
 Span = tuple[str, str]
 """A text and its role."""

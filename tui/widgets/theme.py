@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from textual.theme import BUILTIN_THEMES, Theme
 
-from multidrop.dialects.visible import visible
+from multidrop.dialects.text import visible
 
 DARK = Theme(
     name="multidrop-dark",

@@ -18,7 +18,6 @@ from dataclasses import dataclass, replace
 from multidrop.dialects.codec import Decoded, End, Kind, Procedure, Reply, Request
 from multidrop.dialects.debugging import Debugging, Look, Neighbours, Row, Stepped
 from multidrop.dialects.errors import Diagnostic, Inexpressible, NoAnswer, Refused
-from multidrop.dialects.held import Held
 from multidrop.dialects.mcode.host.codec import MCode
 from multidrop.dialects.mcode.host.exchange import answered, question, value
 from multidrop.dialects.mcode.host.framing import printable
@@ -27,6 +26,7 @@ from multidrop.dialects.mcode.host.state import MCodeState, who
 from multidrop.dialects.mcode.manual.grammar import LineError, Name, Number, Statement, parse
 from multidrop.dialects.mcode.manual.mnemonic import MDRIVE_PLUS
 from multidrop.dialects.mcode.manual.table import lookup
+from multidrop.dialects.program_files import Held
 
 # The keys of single step: one byte each, outside of any line.
 #

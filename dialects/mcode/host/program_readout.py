@@ -12,7 +12,6 @@ from multidrop.dialects.codec import Procedure
 from multidrop.dialects.errors import Diagnostic, NoAnswer, Refused
 from multidrop.dialects.family import Progress
 from multidrop.dialects.files import SourceLine, split_lines
-from multidrop.dialects.held import Held, Stored
 from multidrop.dialects.mcode.host import classify
 from multidrop.dialects.mcode.host.codec import EVERY_DRIVE
 from multidrop.dialects.mcode.host.exchange import REPEATS
@@ -22,6 +21,7 @@ from multidrop.dialects.mcode.host.state import MCodeState, who
 from multidrop.dialects.mcode.manual import editing, help, program_file
 from multidrop.dialects.mcode.manual.grammar import Compare, LineError, Name, Statement, parse
 from multidrop.dialects.mcode.manual.statements import size_of
+from multidrop.dialects.program_files import Held, Stored
 
 # The programs of a file and of a listing.
 #

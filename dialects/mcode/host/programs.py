@@ -9,7 +9,6 @@ from itertools import zip_longest
 from multidrop.dialects.codec import Procedure
 from multidrop.dialects.family import Programs
 from multidrop.dialects.files import SourceLine
-from multidrop.dialects.held import Difference, Held, Stored
 from multidrop.dialects.mcode.host import classify, operations, program_readout
 from multidrop.dialects.mcode.host.download import clears_itself, download
 from multidrop.dialects.mcode.host.operations import immediate
@@ -32,6 +31,7 @@ from multidrop.dialects.mcode.manual import guards
 from multidrop.dialects.mcode.manual.grammar import Argument, Compare, LineError, Name, Number, Statement, Unary, parse
 from multidrop.dialects.mcode.manual.statements import canonical
 from multidrop.dialects.mcode.manual.table import lookup
+from multidrop.dialects.program_files import Difference, Held, Stored
 
 # A program file and what a drive holds, compared line by line in canonical spelling.
 

@@ -8,9 +8,7 @@ from dataclasses import replace
 from functools import partial
 
 from multidrop.dialects.codec import End, Kind, Priority, Procedure, Reply, Request
-from multidrop.dialects.conditions import Conditions, Facts, Part, Reader
 from multidrop.dialects.errors import Diagnostic, NoAnswer, Refused
-from multidrop.dialects.held import LOCKED
 from multidrop.dialects.mcode.host import parameters
 from multidrop.dialects.mcode.host.before_request import before_request
 from multidrop.dialects.mcode.host.codec import EVERY_DRIVE
@@ -26,10 +24,10 @@ from multidrop.dialects.mcode.manual.points import EXPANDED_INPUTS, INPUTS
 from multidrop.dialects.mcode.manual.statements import UNNAMED
 from multidrop.dialects.mcode.manual.table import lookup, words
 from multidrop.dialects.parameters import Progress, Readings
-from multidrop.dialects.readings import Readings as Polled
-from multidrop.dialects.readings import number
-from multidrop.dialects.snapshots import Levels, Snapshot
+from multidrop.dialects.program_files import LOCKED
 from multidrop.dialects.state import DriveState
+from multidrop.dialects.values import Conditions, Facts, Levels, Part, Reader, Snapshot, printed_number
+from multidrop.dialects.values import PolledValues as Polled
 
 # The conditions of an MCode drive: one print for its state; settings and set-ups once, and after each line.
 #
@@ -101,7 +99,7 @@ def _fact(setting: Setting, text: str) -> int | tuple[int, ...]:
 
 
 def _list(state: MCodeState, word: str, numbers: Sequence[int]) -> Procedure[Facts]:
-    """Print set-ups, up to the last number."""
+    """Print set-ups, up to the last printed_number."""
     yield from _attended(state, question(state, "EF", "[01]"))
     last = rf" *{word} *= *{numbers[-1]} *(?:, *-?\d+ *)+"
     row = rf" *{word} *=.*"
@@ -164,7 +162,7 @@ def first(state: MCodeState, word: str) -> Procedure[float]:
     if word not in found:
         raise Refused(f"{who(state)} has no variable {word}")
     try:
-        return number(who(state), word, found[word])
+        return printed_number(who(state), word, found[word])
     except ValueError as wrong:
         raise Refused(str(wrong)) from None
 

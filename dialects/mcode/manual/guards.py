@@ -11,7 +11,7 @@ from collections.abc import Callable, Mapping
 from types import MappingProxyType
 from typing import NamedTuple
 
-from multidrop.dialects.guards import ADDRESSES, EVERYONE, Guard, to_all
+from multidrop.dialects.family import ADDRESSES, EVERYONE, Guard, to_all
 from multidrop.dialects.mcode.manual.grammar import LineError, Number, Statement, parse
 from multidrop.dialects.mcode.manual.program_file import bare
 from multidrop.dialects.mcode.manual.table import lookup

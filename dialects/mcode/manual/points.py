@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 
-from multidrop.dialects.conditions import UNREAD, Conditions, Facts, Lamp, Pace
 from multidrop.dialects.mcode.manual.mnemonic import EXPANDED
 from multidrop.dialects.mcode.manual.parameters import counting
 from multidrop.dialects.parameters import number
+from multidrop.dialects.values import UNREAD, Conditions, Facts, Lamp, Pace
 
 INPUTS = (1, 2, 3, 4)
 EXPANDED_INPUTS = (*INPUTS, 9, 10, 11, 12)

@@ -21,7 +21,7 @@ from multidrop.dialects.mcode.manual.program_file import ProgramLine
 from multidrop.dialects.mcode.manual.program_flow import AT_POWER_UP, Flow
 from multidrop.dialects.mcode.manual.statements import condition_of, condition_reading, is_mixed, names_in, words_of
 from multidrop.dialects.mcode.manual.table import lookup
-from multidrop.dialects.problems import Problem, errors, in_order
+from multidrop.dialects.program_files import Problem, errors, in_order
 
 # The products that have all words of a program, and a warning of a program for other ones.
 

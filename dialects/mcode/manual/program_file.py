@@ -17,13 +17,11 @@ from math import inf
 from typing import TYPE_CHECKING
 
 from multidrop.dialects.files import program_text_of, split_lines, wrong_characters
-from multidrop.dialects.layout import respelled
 from multidrop.dialects.mcode.manual.grammar import LineError, Token, check_groups, parse, tokens
 from multidrop.dialects.mcode.manual.statements import canonical
 from multidrop.dialects.mcode.manual.table import lookup
 from multidrop.dialects.mcode.manual.table_motion import MOTION
-from multidrop.dialects.problems import Problem, refuse
-from multidrop.dialects.program_files import Entry, Part
+from multidrop.dialects.program_files import Entry, Part, Problem, refuse, respelled
 
 if TYPE_CHECKING:
     from pathlib import Path

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from multidrop.dialects.controls import BY, DISABLE, ENABLE, HOME_MINUS, HOME_PLUS, STOP, TO, Control, Controls
 from multidrop.dialects.state import DriveState
+from multidrop.dialects.values import BY, DISABLE, ENABLE, HOME_MINUS, HOME_PLUS, STOP, TO, Control, Controls
 
 
 def move(axis: str, steps: int) -> tuple[str, ...]:

@@ -1,4 +1,4 @@
-"""The codec of Modbus/TCP: messages out, replies in by their number, and the stop.
+"""The codec of Modbus/TCP: messages out, replies in by their number, and the stop; the host's knowledge of one drive.
 
 Source: Modbus/TCP manual 3.2, 4; MODBUS Messaging on TCP/IP 1.0b.
 """
@@ -7,16 +7,28 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import ClassVar
+from functools import cache
+from typing import TYPE_CHECKING, ClassVar
 
 from multidrop.dialects.codec import Decoded, End, Reply, Request, StopPiece
 from multidrop.dialects.modbus.host import framing
-from multidrop.dialects.modbus.host.messages import pdu_codec
 from multidrop.dialects.modbus.manual.registers import REGISTERS
+from multidrop.dialects.state import DriveState
+
+if TYPE_CHECKING:
+    from multidrop.dialects.modbus.host.pdu import PduCodec
 
 NUMBERS = 0xFFF0
 """Requests have numbers below this; the messages of a stop have numbers above it."""
 END_NUMBER, SLEW_NUMBER = 0xFFFE, 0xFFFF
+
+
+@cache
+def pdu_codec() -> PduCodec:
+    """Return the codec of PDUs. The first call imports pymodbus (50 to 100 ms)."""
+    from multidrop.dialects.modbus.host.pdu import PduCodec
+
+    return PduCodec()
 
 
 @dataclass(frozen=True)
@@ -141,3 +153,10 @@ def _whole(buffer: bytes) -> tuple[int, bool]:
 def _foreign(buffer: bytes) -> str:
     more = "..." if len(buffer) > 16 else ""
     return f"heard {buffer[:16].hex(' ')}{more}, which is not Modbus/TCP"
+
+
+@dataclass(eq=False)
+class ModbusState(DriveState):
+    """One Ethernet drive over Modbus."""
+
+    codec: Modbus

@@ -12,8 +12,7 @@ from multidrop.dialects.codec import End, Kind, Priority, Procedure, Reply, Requ
 from multidrop.dialects.errors import NoAnswer, Refused
 from multidrop.dialects.mcode.host.state import described, unknown, who
 from multidrop.dialects.modbus.host import framing, mapping
-from multidrop.dialects.modbus.host.messages import pdu_codec
-from multidrop.dialects.modbus.host.state import ModbusState
+from multidrop.dialects.modbus.host.codec import ModbusState, pdu_codec
 from multidrop.dialects.modbus.manual.registers import AT, REGISTERS
 
 ILLEGAL_VALUE, FAILURE = 3, 4

@@ -15,7 +15,7 @@ from multidrop.dialects.mcode.manual.errors import ErrorNumber
 from multidrop.dialects.mcode.manual.grammar import Argument, Name, Number, Statement
 from multidrop.dialects.mcode.manual.table import lookup
 from multidrop.dialects.modbus.host import framing
-from multidrop.dialects.modbus.host.messages import pdu_codec
+from multidrop.dialects.modbus.host.codec import pdu_codec
 from multidrop.dialects.modbus.manual.registers import AT, INT32, REGISTERS, Register
 
 ALTERNATIVE = "MCode/TCP (tcp://HOST:503)"

@@ -1,4 +1,7 @@
-"""Conversations with an Ethernet drive over Modbus: typed lines, motion, flags, raw registers."""
+"""Conversations with an Ethernet drive over Modbus: identification, typed lines, motion, registers and outputs.
+
+Identification only reads: nothing moves, no error is cleared.
+"""
 
 from __future__ import annotations
 
@@ -7,15 +10,19 @@ from collections.abc import Iterator, Sequence
 
 from multidrop.dialects.codec import Priority, Procedure
 from multidrop.dialects.errors import Inexpressible, NoAnswer, Refused
+<<<<<<< HEAD
 from multidrop.dialects.family import Motion
 from multidrop.dialects.mcode.host.state import who
+=======
+from multidrop.dialects.family import Hints, Motion
+from multidrop.dialects.mcode.host.wording import who
+>>>>>>> 9c377cb5 (Coarser dialects: one file for what a family reads, one exchange for replies without numbers)
 from multidrop.dialects.mcode.manual import grammar
 from multidrop.dialects.mcode.manual.points import STATUS, in_words
 from multidrop.dialects.modbus.host import framing, mapping
+from multidrop.dialects.modbus.host.codec import Modbus, ModbusState, pdu_codec
 from multidrop.dialects.modbus.host.exchange import answered, carried_out, flagged, request, sure
 from multidrop.dialects.modbus.host.mapping import Reading
-from multidrop.dialects.modbus.host.messages import pdu_codec
-from multidrop.dialects.modbus.host.state import ModbusState
 from multidrop.dialects.modbus.manual.registers import AT, REGISTERS, ROWS, Register
 
 USER = frozenset(f"V{n}" for n in range(1, 9))
@@ -225,3 +232,36 @@ def device(state: ModbusState) -> Procedure[tuple[str, ...]]:
     found = yield from identification(state)
     names = dict(enumerate(mapping.OBJECTS))
     return tuple(f"{names.get(number, f'object {number}')}: {text}" for number, text in sorted(found.items()))
+
+
+BASIC = 1
+"""The first three objects of the identification, which are mandatory."""
+PRODUCT = re.compile(r"LMD[A-Z]E")
+PART, VERSION = 1, 6
+
+
+def identify(hints: Hints) -> Procedure[list[ModbusState]]:
+    """Identify the drive at the other end. Raises NoAnswer where none replies."""
+    state = ModbusState(Modbus())
+    found = yield from _objects(state)
+    text = " ".join(found.get(number, "") for number in (VERSION, PART))
+    product = PRODUCT.search(text)
+    part = found.get(PART, "")
+    state.identified(product.group() if product else part, found.get(VERSION, ""), part)
+    if not product:
+        state.note(f"{who(state)} does not say that it is an LMDOE or LMDCE: its registers may mean other things")
+    if (yield from flagged(state)):
+        state.note(f"{who(state)}: its error flag is set (EF=1); PR ER shows and clears the error")
+    return [state]
+
+
+def _objects(state: ModbusState) -> Procedure[dict[int, str]]:
+    """Read the identification as far as the drive supports it."""
+    try:
+        return (yield from identification(state))
+    except Refused:
+        pass
+    try:
+        return (yield from identification(state, BASIC))
+    except Refused:
+        return {}

@@ -13,6 +13,7 @@ from typing import ClassVar
 from multidrop.dialects.codec import Decoded, End, Kind, Reply, Request, StopPiece
 from multidrop.dialects.errors import Inexpressible
 from multidrop.dialects.pmx.manual.table import reads, starts_motion
+from multidrop.dialects.state import DriveState
 
 LONGEST = 62
 """Characters of a command with its number: the room in a USB packet of the same controller, with the end."""
@@ -187,3 +188,10 @@ def _reply(text: str) -> Reply:
     if text.startswith("?"):
         return Reply((text,), End.REFUSED)
     return Reply((text,), acknowledged=True)
+
+
+@dataclass(eq=False)
+class PmxState(DriveState):
+    """One PMX controller."""
+
+    codec: Pmx

@@ -12,15 +12,14 @@ from typing import Any
 from multidrop.dialects.codec import Procedure
 from multidrop.dialects.debugging import Debugging, Look, Neighbours, Row
 from multidrop.dialects.errors import Diagnostic, Inexpressible, Refused
-from multidrop.dialects.held import Held
-from multidrop.dialects.pmx.host.download import listing
+from multidrop.dialects.pmx.host.codec import PmxState
 from multidrop.dialects.pmx.host.exchange import answered, number, who
 from multidrop.dialects.pmx.host.operations import perform
-from multidrop.dialects.pmx.host.state import PmxState
+from multidrop.dialects.pmx.host.programs import listing
 from multidrop.dialects.pmx.manual import program_file, script_checker
-from multidrop.dialects.pmx.manual.program_file import RAW
-from multidrop.dialects.pmx.manual.script_decompiler import Undecodable
+from multidrop.dialects.pmx.manual.program_file import RAW, Undecodable
 from multidrop.dialects.pmx.manual.table import lookup
+from multidrop.dialects.program_files import Held
 
 RUNNING, PAUSED = 1, 2
 """Values of SASTAT."""

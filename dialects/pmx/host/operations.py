@@ -7,8 +7,8 @@ import re
 from multidrop.dialects.codec import Priority, Procedure, Request
 from multidrop.dialects.errors import Inexpressible, Refused
 from multidrop.dialects.family import Motion, Referencing
+from multidrop.dialects.pmx.host.codec import PmxState
 from multidrop.dialects.pmx.host.exchange import answered, beyond_doubt, number, who
-from multidrop.dialects.pmx.host.state import PmxState
 from multidrop.dialects.pmx.manual import status as words
 from multidrop.dialects.pmx.manual.table import AXES, grouped
 
@@ -47,7 +47,7 @@ def motion(known: PmxState, priority: Priority) -> Procedure[tuple[Motion, ...]]
         speed = 0
         if state & words.MOVING or priority is not Priority.POLL:
             speed = yield from number(known, f"PS{axis}", priority, doubts)
-        found.append(Motion(position, speed, axis.lower(), words.remarkable(state)))
+        found.append(Motion(position, speed, axis.lower(), words.trouble_words(state)))
     if doubts:
         yield from beyond_doubt(known, doubts[0])
     return tuple(found)
@@ -88,9 +88,9 @@ def status(known: PmxState) -> Procedure[tuple[str, ...]]:
     for axis in AXES:
         state = yield from number(known, f"MST{axis}")
         loop = yield from number(known, f"SLS{axis}")
-        lines.append(f"{axis}: {', '.join(words.words(state))}; StepNLoop {words.loop(loop)}")
+        lines.append(f"{axis}: {', '.join(words.status_words(state))}; StepNLoop {words.loop_words(loop)}")
     for program in PROGRAMS:
-        lines.append(f"program {program}: {words.program((yield from number(known, f'SASTAT{program}')))}")
+        lines.append(f"program {program}: {words.program_words((yield from number(known, f'SASTAT{program}')))}")
     for word, what in POINTS:
         bits = yield from number(known, word)
         on = ", ".join(str(n + 1) for n in range(bits.bit_length()) if bits >> n & 1)
@@ -107,6 +107,6 @@ def troubles(known: PmxState) -> Procedure[None]:
         except Refused:
             continue
         if state & words.LIMIT_ERROR:
-            known.note(f"{who(known)}: {axis} has a {words.remarkable(state)}; CLR{axis} clears it")
+            known.note(f"{who(known)}: {axis} has a {words.trouble_words(state)}; CLR{axis} clears it")
         if loop in words.LOOP_ERRORS:
-            known.note(f"{who(known)}: StepNLoop of {axis} is in {words.loop(loop)}; CLR{axis} clears it")
+            known.note(f"{who(known)}: StepNLoop of {axis} is in {words.loop_words(loop)}; CLR{axis} clears it")

@@ -1,17 +1,158 @@
-"""Settings of a controller: one short request for each, since it prints one value a command (PMX-2ED-SA manual 9)."""
+"""The settings of a controller: what is read, what may be written, and in which order (PMX-2ED-SA manual 7, 9, A).
+
+A controller prints one value a command, so each setting is one short request. Positions, outputs, motor drivers and the
+joystick's switch are states of the moment and no settings. A low speed above the high speed is refused, and the times
+of ACC and DEC depend on both: speeds go first.
+"""
 
 from __future__ import annotations
 
+import re
 from collections.abc import Collection, Mapping
 from dataclasses import replace
 
 from multidrop.dialects.codec import Procedure
-from multidrop.dialects.errors import Refused
-from multidrop.dialects.parameters import Change, Parameters, Permission, Plan, Progress, Readings, Value
+from multidrop.dialects.errors import Diagnostic, Refused
+from multidrop.dialects.parameters import (
+    COMMUNICATION,
+    VARIABLES,
+    Change,
+    Parameters,
+    Permission,
+    Plan,
+    Progress,
+    Reading,
+    Readings,
+    Value,
+    number,
+    reference_lost,
+    same,
+)
+from multidrop.dialects.parameters import PARAMETERS as SETTINGS
+from multidrop.dialects.pmx.host.codec import PmxState
 from multidrop.dialects.pmx.host.exchange import answered, who
 from multidrop.dialects.pmx.host.operations import LATER, busy, moving, perform
-from multidrop.dialects.pmx.host.state import PmxState
-from multidrop.dialects.pmx.manual import parameters as manual
+from multidrop.dialects.pmx.manual.table import AXES, COMMANDS
+
+WIRE = ("DN", "DB")
+LOOP = ("SLR", "SLT", "SLE", "SLA")
+"""StepNLoop: while it is on, a change can make it correct the position by a move."""
+JOYSTICK = ("JV", "JL")
+"""Speeds, dead zones and limits of the joystick, whose switch cannot be read."""
+STATES = frozenset({"P", "E", "EO", "DO", "SA"})
+UNREAD = (("JO", "the controller does not report whether the joystick is on"),)
+SPEEDS = ("LSPD", "HSPD")
+FASTEST = 6_000_000
+LARGEST = 2**31 - 1
+RANGES: Mapping[str, tuple[int, int]] = {
+    "LSPD": (0, FASTEST), "HSPD": (0, FASTEST), "SCV": (0, 1), "EDEC": (0, 1), "IERR": (0, 1), "RZ": (0, 1),
+    "SL": (0, 1), "SSPDM": (0, 9), "EOBOOT": (0, 3), "DOBOOT": (0, 255), "SLOAD": (0, 3), "DB": (1, 5),
+}  # fmt: skip
+"""Ranges of whole numbers; others are whole numbers of 32 bits."""
+SIGNED = ("V", "JL")
+RATIO = "SLR"
+_AXIS = re.compile(rf"([A-Z]+?)([{''.join(AXES)}])\Z")
+
+
+def setting_names() -> tuple[str, ...]:
+    """The settings in the order in which they are written."""
+    rows = [row for row in COMMANDS.values() if row.access == "RW" and row.name not in STATES]
+    found = [word for row in rows for word in row.words()]
+    return tuple(sorted(found, key=lambda name: (base(name) not in SPEEDS, base(name) in (*LOOP, "SL"))))
+
+
+def base(name: str) -> str:
+    """The command of a setting, without axis or number."""
+    if name in COMMANDS:
+        return name
+    found = _AXIS.match(name)
+    return found[1] if found is not None and found[1] in COMMANDS else name.rstrip("0123456789")
+
+
+def axis(name: str) -> str:
+    """The axis of a setting; empty for one of the whole controller."""
+    found = _AXIS.match(name)
+    return found[2] if found is not None and name not in COMMANDS and found[1] in COMMANDS else ""
+
+
+def reading(name: str, value: Value) -> Reading:
+    """Put section and unit to a value."""
+    row, section = COMMANDS[base(name)], VARIABLES if base(name) == "V" else SETTINGS
+    unit = "ms" if row.name in ("ACC", "DEC", "TOC") else "pulses/s" if row.name in SPEEDS else ""
+    return Reading(name, value, section, unit, 0 if section == VARIABLES else None, name in WIRE)
+
+
+def _plan(present: Readings, wanted: Mapping[str, Value], allowed: Permission) -> Plan:
+    """Order the steps to the wanted values. Raises Diagnostic for a value that the controller refuses."""
+    now = present.values
+    changed = {name.upper(): value for name, value in wanted.items() if not same(value, now.get(name.upper()))}
+    withheld = {name: reason for name in changed if (reason := _risk(name, changed[name], now, allowed))}
+    goal = {name: value for name, value in changed.items() if name not in withheld}
+    for name, value in goal.items():
+        _check(name, value)
+    order = sorted(goal, key=_place)
+    for low in [name for name in order if base(name) == "LSPD"]:
+        order = _speeds_in_order(order, low, now, goal)
+    steps = [Change(name, now.get(name), goal[name], f"{name}={_text(name, goal[name])}") for name in order]
+    scale = [name for name in goal if base(name) in ("POL", "SLR", "SL")]
+    return Plan(tuple(steps), tuple(withheld.items()), remarks=reference_lost(steps, scale))
+
+
+def _place(name: str) -> int:
+    every = setting_names()
+    return every.index(name) if name in every else len(every)
+
+
+def _speeds_in_order(order: list[str], low: str, now: Mapping[str, Value], goal: Mapping[str, Value]) -> list[str]:
+    """The order in which the low speed is never above the high one: the high one first, unless it falls too far."""
+    high = low.replace("LSPD", "HSPD")
+    rest = [name for name in order if name not in (low, high)]
+    falls = high in goal and number(goal[high]) < number(now.get(low))
+    pair = [name for name in ((low, high) if falls else (high, low)) if name in goal]
+    return [*pair, *rest]
+
+
+def _risk(name: str, value: Value, now: Mapping[str, Value], allowed: Permission) -> str:
+    """The reason for which a setting waits for a person's word; empty: there is none."""
+    word, on = base(name), now.get(f"SL{axis(name)}")
+    if name in allowed.named or (name in WIRE and allowed.communication):
+        return ""
+    if name in WIRE:
+        return COMMUNICATION
+    if word == "SL" and value:
+        return "StepNLoop corrects the position by moves"
+    if word in JOYSTICK:
+        return "the joystick may be on, and then it can turn the motor"
+    if word in LOOP and on:
+        return "StepNLoop is on and may correct the position by a move"
+    return "programs run after power-up" if name == "SLOAD" and value else ""
+
+
+def _check(name: str, value: Value) -> None:
+    """Raise Diagnostic for an unknown setting, or a value out of range."""
+    if name not in setting_names():
+        raise Diagnostic(f"{name}: is not a setting of the controller")
+    if name == "DN":
+        if not re.fullmatch(r"2ED\d\d", str(value)):
+            raise Diagnostic(f"DN = {value}: valid: 2ED00 to 2ED99")
+        return
+    if isinstance(value, (str, tuple)):
+        raise Diagnostic(f"{name} = {value}: takes a number")
+    if base(name) == RATIO:
+        low, high = 0.001, 999.999
+    else:
+        low, high = RANGES.get(base(name), (-LARGEST - 1 if base(name) in SIGNED else 0, LARGEST))
+        if not float(value).is_integer():
+            raise Diagnostic(f"{name} = {value}: takes a whole number")
+    if not low <= value <= high:
+        raise Diagnostic(f"{name} = {value}: valid: {low} to {high}")
+
+
+def _text(name: str, value: Value) -> str:
+    return (
+        f"{number(value):.3f}" if base(name) == RATIO else str(value if isinstance(value, str) else int(number(value)))
+    )
+
 
 FORM = r"-?\d{1,19}"
 RATIO_FORM = r"\d{1,6}(?:\.\d+)?"
@@ -20,12 +161,12 @@ NAME_FORM = r"[0-9A-Za-z]{1,8}"
 
 def read(state: PmxState, progress: Progress) -> Procedure[Readings]:
     """Read every setting; a refused word is listed. Raises NoAnswer. Nothing is changed."""
-    names = manual.names()
-    found, unread = [], [*manual.UNREAD]
+    names = setting_names()
+    found, unread = [], [*UNREAD]
     for done, name in enumerate(names):
         progress(done, len(names))
         try:
-            found.append(manual.reading(name, (yield from _value(state, name))))
+            found.append(reading(name, (yield from _value(state, name))))
         except Refused as refusal:
             unread.append((name, str(refusal)))
     progress(len(names), len(names))
@@ -33,17 +174,17 @@ def read(state: PmxState, progress: Progress) -> Procedure[Readings]:
 
 
 def _value(state: PmxState, name: str) -> Procedure[Value]:
-    form = {"DN": NAME_FORM}.get(name, RATIO_FORM if manual.base(name) == manual.RATIO else FORM)
+    form = {"DN": NAME_FORM}.get(name, RATIO_FORM if base(name) == RATIO else FORM)
     asked = replace(state.codec.request(state.address, name), expect=form)
     text = (yield from answered(state, asked)).text
     if name == "DN":
         return text
-    return float(text) if manual.base(name) == manual.RATIO else int(text)
+    return float(text) if base(name) == RATIO else int(text)
 
 
 def plan(state: PmxState, present: Readings, wanted: Mapping[str, Value], allowed: Permission) -> Plan:
     """Order the steps to the wanted values. Raises Diagnostic."""
-    return manual.plan(present, wanted, allowed)
+    return _plan(present, wanted, allowed)
 
 
 def conflict(plan: Plan, others: Collection[str]) -> str:

@@ -1,21 +1,140 @@
-"""A-SCRIPT files in an editor: the `EditingLanguage` of the language."""
+"""A-SCRIPT files in an editor: the `EditingLanguage` of the language.
+
+The names of a file are variables (V0 to V63), subroutines and programs.
+"""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Container, Iterable, Sequence
+from collections.abc import Container, Iterable, Iterator, Sequence
+from dataclasses import replace
 
+from multidrop.dialects.errors import Diagnostic
 from multidrop.dialects.files import split_lines
-from multidrop.dialects.pmx.manual import line_parts, script_help, script_names
-from multidrop.dialects.pmx.manual.line_parts import MOVE
-from multidrop.dialects.pmx.manual.script_parser import Statement, parse
-from multidrop.dialects.pmx.manual.script_words import AXES
-from multidrop.dialects.pmx.manual.script_words import Word as Register
-from multidrop.dialects.program_editing import Block, Offer, Span, UserName, Word
+from multidrop.dialects.pmx.manual import script_words
+from multidrop.dialects.pmx.manual.script_parser import MOVE, TARGET, Statement, Value, parse
+from multidrop.dialects.pmx.manual.script_words import (
+    AXES,
+    HANDLER,
+    KEPT_VARIABLES,
+    SUBROUTINES,
+    VARIABLE_NAMES,
+    VARIABLES,
+    Register,
+)
+from multidrop.dialects.program_editing import Block, Offer, Span, UserName, Word, replaced
 
-names = script_names.names
-fixed = script_names.fixed
-renamed = script_names.renamed
+_NUMBERED = re.compile(r"\s*(PRG|SUB|GOSUB)\s*(\d{1,4})\s*", re.ASCII)
+_SETS = re.compile(r"\s*(V\d+)\s*=", re.ASCII)
+_NUMBER = re.compile(r"(?:SUB)?\s*(\d{1,4})\s*", re.ASCII)
+_NAME_KINDS = {"PRG": ("PRG", "program"), "SUB": ("SUB", "subroutine"), "GOSUB": ("SUB", "subroutine")}
+
+
+def names(text: str) -> list[UserName]:
+    """Return the names of a file. A variable has no declaration: the first line that sets it counts as one."""
+    lines = split_lines(text)
+    kinds: dict[str, str] = {}
+    places: dict[str, list[Span]] = {}
+    declared: dict[str, Span] = {}
+    for number, line in enumerate(lines):
+        code = line.partition(";")[0]
+        for word, kind, start, stop in _found(code):
+            place = Span(number, start, stop)
+            kinds[word] = kind
+            places.setdefault(word, []).append(place)
+            if _declares(code, kind, start):
+                declared.setdefault(word, place)
+
+    def named(word: str) -> UserName:
+        first = (declared[word],) if word in declared else ()
+        remark = lines[first[0].line].partition(";")[2].strip() if first else ""
+        return UserName(word, kinds[word], first, tuple(places[word]), remark)
+
+    return [named(word) for word in places]
+
+
+def _found(code: str) -> Iterator[tuple[str, str, int, int]]:
+    """Yield the names of a line: word, kind, and columns."""
+    if numbered := _NUMBERED.fullmatch(code):
+        head, kind = _NAME_KINDS[numbered[1]]
+        yield f"{head} {int(numbered[2])}", kind, *numbered.span(2)
+        return
+    indent = len(code) - len(code.lstrip())
+    if MOVE.fullmatch(code.strip()):
+        found = [(each[2], indent + each.start(2)) for each in TARGET.finditer(code.strip())]
+    else:
+        found = [(word.text, word.start) for word in script_words.words(code)]
+    yield from ((text, "variable", start, start + len(text)) for text, start in found if text in VARIABLE_NAMES)
+
+
+def _declares(code: str, kind: str, start: int) -> bool:
+    if kind == "variable":
+        found = _SETS.match(code)
+        return found is not None and found.start(1) == start
+    return "GOSUB" not in code
+
+
+def fixed(name: UserName) -> str:
+    """Return why a name cannot be another one; empty if it can."""
+    if name.kind == "program":
+        return f"the host starts {name.word} by its number (SR{name.word[4:]}=1)"
+    if name.word == f"SUB {HANDLER}":
+        return f"{name.word} is the subroutine that runs after an error, by its number"
+    return ""
+
+
+def renamed(text: str, name: UserName, new: str, product: str) -> str:  # noqa: ARG001
+    """Return the variable, or the number of the subroutine. Raises Diagnostic where that is none, or is in use."""
+    if reason := fixed(name):
+        raise Diagnostic(reason)
+    word = _variable(name, new) if name.kind == "variable" else _subroutine(new)
+    taken = next((each for each in names(text) if each.word == word and each.word != name.word), None)
+    if taken is not None:
+        raise Diagnostic(f"{word} is in use already, in line {taken.places[0].line + 1}", "", "choose another number")
+    _compare(text, name, word)
+    return word.removeprefix("SUB ")
+
+
+def _compare(text: str, name: UserName, word: str) -> None:
+    """Raise Diagnostic unless a rename changes that word alone in the statements of the text."""
+    after = replaced(split_lines(text), name.places, word.removeprefix("SUB "))
+    wanted = [_renamed(each, name.word, word) for each in parse(text)[0]]
+    for one, other in zip(wanted, parse("\n".join(after))[0], strict=True):
+        if one != other:
+            raise Diagnostic(f"line {other.line} would mean something else with {word}", "", "choose another number")
+
+
+def _renamed(statement: Statement, old: str, new: str) -> Statement:
+    """Return a statement with another variable, or another number of a subroutine."""
+    if old.startswith("SUB "):
+        numbered = statement.word in ("SUB", "GOSUB") and statement.values == (Value(old[4:]),)
+        return replace(statement, values=(Value(new[4:]),)) if numbered else statement
+    values = tuple(Value(new) if each.text == old else each for each in statement.values)
+    return replace(statement, values=values, word=new if statement.word == old else statement.word)
+
+
+def _variable(name: UserName, new: str) -> str:
+    word = new.strip()
+    if word not in VARIABLE_NAMES:
+        raise Diagnostic(f"{new!r} is not a variable", "", f"variables are V0 to V{VARIABLES - 1}")
+    old_kept, new_kept = (int(each[1:]) in KEPT_VARIABLES for each in (name.word, word))
+    if old_kept != new_kept:
+        kept, other = (name.word, word) if old_kept else (word, name.word)
+        first = KEPT_VARIABLES.start
+        hint = f"V0 to V{first - 1} are 0 at each start, V{first} to V{VARIABLES - 1} are kept"
+        raise Diagnostic(f"STORE keeps {kept} and does not keep {other}", "", hint)
+    return word
+
+
+def _subroutine(new: str) -> str:
+    found = _NUMBER.fullmatch(new.strip())
+    if found is None or int(found[1]) >= SUBROUTINES:
+        raise Diagnostic(f"{new!r} is not a subroutine", "", f"subroutines are 0 to {SUBROUTINES - 1}")
+    if int(found[1]) == HANDLER:
+        raise Diagnostic(f"SUB {HANDLER} is the subroutine that runs after an error", "", "choose another number")
+    return f"SUB {int(found[1])}"
+
+
 _LAST = re.compile(r"[A-Za-z]\w*[+-]?\Z", re.ASCII)
 _CALL = re.compile(r"\s*GOSUB\s*(\d*)\Z", re.ASCII)
 _NEW = re.compile(r"\s*(PRG|SUB)\s*\d*\Z", re.ASCII)
@@ -26,8 +145,8 @@ _KINDS = {"PRG": "program", "SUB": "subroutine", "IF": "block", "WHILE": "block"
 def words(line: str, names: Container[str]) -> list[Word]:  # noqa: ARG001
     """Return the words of a line; each axis of a move is one."""
     found = []
-    for word in line_parts.words(line):
-        if MOVE.fullmatch(word.text):
+    for word in script_words.words(line):
+        if script_words.MOVE.fullmatch(word.text):
             found += [
                 Word(word.start + at, word.start + at + 1, axis) for at, axis in enumerate(word.text) if axis in AXES
             ]
@@ -38,7 +157,7 @@ def words(line: str, names: Container[str]) -> list[Word]:  # noqa: ARG001
 
 def describe(word: str, product: str) -> list[str]:  # noqa: ARG001
     """Return the help on a word; empty where there is none."""
-    return script_help.describe(word)
+    return script_words.describe(word)
 
 
 def typing(before: str) -> str:
@@ -62,8 +181,8 @@ def offers(before: str, names: Iterable[UserName], product: str) -> list[Offer]:
     first = not before[: len(before) - len(word)].strip()
     own = [Offer(each.word, each.about, each.kind) for each in names if each.kind == "variable"]
     known = [
-        Offer(text, script_help.meaning(text), "starts" if line_parts.kind_of(text, first) == "starts" else "word")
-        for text, register in script_help.offered()
+        Offer(text, script_words.meaning(text), "starts" if script_words.kind_of(text, first) == "starts" else "word")
+        for text, register in script_words.offered()
         if _fits(register, first)
     ]
     return [each for each in (*own, *known) if each.text.startswith(word)]

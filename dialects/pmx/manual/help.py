@@ -6,7 +6,7 @@ import difflib
 from dataclasses import replace
 
 from multidrop.dialects.errors import Diagnostic
-from multidrop.dialects.pmx.manual.errors import meaning
+from multidrop.dialects.pmx.manual.status import meaning
 from multidrop.dialects.pmx.manual.table import COMMANDS, ELSEWHERE, ROWS, WORDS, Command, head, lookup
 
 ACCESS = {"R": "read only", "W": "write only", "RW": "read and write"}

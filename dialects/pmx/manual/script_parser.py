@@ -15,7 +15,7 @@ from dataclasses import dataclass, field
 from multidrop.dialects.files import split_lines
 from multidrop.dialects.pmx.manual.script_words import AXES, BLOCKS, COMPARISONS, INT32, PROGRAMS, SUBROUTINES, WORDS
 from multidrop.dialects.pmx.manual.table import grouped
-from multidrop.dialects.problems import Problem
+from multidrop.dialects.program_files import Problem
 
 _VALUE = r"-?\d+|[A-Za-z]\w*"
 _BLOCK = re.compile(r"(IF|ELSEIF|WHILE)(?![A-Za-z0-9])(.*)")

@@ -1,24 +1,65 @@
-"""TMCL as a dialect: nine bytes out, nine bytes in, and how to stop.
+"""TMCL as a dialect: nine bytes out, nine bytes in, the stop, and the host's knowledge of one module.
 
-Theory of operation. A reply repeats the address of its module and its command, not its type or motor. The codec passes
-over whole frames with another address or command as late; `exchange` finds out whether a reply with the right ones is
-late. A wrong checksum, in a reply or reported by a module, means that the count of nine may be lost: the request then
-ends after a second of silence, in which host and modules drop an unfinished message. A stop is repeated after it too.
+Theory of operation. A frame is nine bytes: four of one byte, a value of four, a checksum. A reply repeats the address
+of its module and its command, not its type or motor. The codec passes over whole frames with another address or command
+as late; `exchange` finds out whether a reply with the right ones is late. A wrong checksum, in a reply or reported by a
+module, means that the count of nine may be lost: the request then ends after a second of silence, in which host and
+modules drop an unfinished message. A stop is repeated after it too.
 """
 
 from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
-from typing import ClassVar
+from dataclasses import dataclass, field, replace
+from struct import Struct
+from typing import ClassVar, NamedTuple
 
 from multidrop.dialects.codec import Decoded, End, Kind, Reply, Request, StopPiece
 from multidrop.dialects.errors import Inexpressible
-from multidrop.dialects.tmcl.host import framing
-from multidrop.dialects.tmcl.manual import grammar
-from multidrop.dialects.tmcl.manual.commands import Call, Command, Search, Version
-from multidrop.dialects.tmcl.manual.status import Status, accepted
+from multidrop.dialects.state import DriveState, Owed
+from multidrop.dialects.tmcl.manual import commands
+from multidrop.dialects.tmcl.manual.commands import Call, Command, Search, Status, Version, accepted
+
+LENGTH = 9
+_FIELDS = Struct(">BBBBi")
+
+
+class Frame(NamedTuple):
+    """A parse_reply: addresses of host and module, status, the command that it repeats, and a value."""
+
+    host: int
+    module: int
+    status: int
+    command: int
+    value: int
+
+
+def frame_of(address: int, call: Call) -> bytes:
+    """The frame of a command."""
+    return _sealed(_FIELDS.pack(address, call.command, call.type, call.motor, call.value))
+
+
+def parse_reply(frame: bytes) -> Frame | None:
+    """The fields of a parse_reply; None where its checksum is wrong."""
+    return Frame(*_FIELDS.unpack(frame[:-1])) if _sealed(frame[:-1]) == frame else None
+
+
+def call_of(frame: bytes) -> tuple[int, Call]:
+    """The address and the command in the frame of a frame_of."""
+    address, command, kind, motor, value = _FIELDS.unpack(frame[:-1])
+    return address, Call(command, kind, motor, value)
+
+
+def moves(frames: bytes) -> bool:
+    """Whether requests can start a motion or a program; a part of one may belong to any."""
+    pieces = [frames[at : at + LENGTH] for at in range(0, len(frames), LENGTH)]
+    return any(len(each) < LENGTH or call_of(each)[1].moves for each in pieces)
+
+
+def _sealed(body: bytes) -> bytes:
+    return body + bytes([sum(body) % 256])
+
 
 FACTORY = "1"
 """The address of a new module."""
@@ -57,7 +98,7 @@ class Tmcl:
     def request(self, address: str, text: str, call: Call) -> Request:
         """The request for a command; `text` is what it means to a person. Raises Inexpressible."""
         kind = Kind.QUIET if call.command == Command.FACTORY else Kind.PRINT if call.prints else Kind.COMMAND
-        return Request(address, text, kind, self, body=framing.request(number_of(address), call))
+        return Request(address, text, kind, self, body=frame_of(number_of(address), call))
 
     def encode(self, request: Request) -> bytes:
         """The frame, as it is."""
@@ -70,13 +111,13 @@ class Tmcl:
         return None if doubtful else found
 
     def _reply_in(self, request: Request, buffer: bytes) -> Decoded | None:
-        address, call = framing.call_of(request.body)
+        address, call = call_of(request.body)
         strays: list[str] = []
-        for at in range(0, len(buffer) - framing.LENGTH + 1, framing.LENGTH):
-            frame, end = buffer[at : at + framing.LENGTH], at + framing.LENGTH
+        for at in range(0, len(buffer) - LENGTH + 1, LENGTH):
+            frame, end = buffer[at : at + LENGTH], at + LENGTH
             if _is_version(call, frame):
                 return Decoded(Reply((frame[1:].decode("ascii"),), acknowledged=True, body=frame), end, tuple(strays))
-            fields = framing.reply(frame)
+            fields = parse_reply(frame)
             if fields is None:
                 return None
             if (fields.module, fields.command) != (address, call.command) or fields.status == Status.TARGET_REACHED:
@@ -104,7 +145,7 @@ class Tmcl:
 
     def parse_unsolicited(self, buffer: bytes) -> tuple[tuple[str, ...], int]:
         """Late replies and reached targets, a line each; replies to a stop give none."""
-        used = len(buffer) - len(buffer) % framing.LENGTH
+        used = len(buffer) - len(buffer) % LENGTH
         return tuple(_unsolicited(buffer[:used])), used
 
     def stop(self, addresses: Sequence[str], sure: bool = True, half_sent: bool = False) -> bytes:
@@ -123,13 +164,13 @@ class Tmcl:
 
     def _first(self, addresses: Sequence[str]) -> list[bytes]:
         call = Call(Command.END_DOWNLOAD if self.storing else Command.MST)
-        return [framing.request(int(name), call) for name in _modules(addresses)]
+        return [frame_of(int(name), call) for name in _modules(addresses)]
 
     def _stops(self, addresses: Sequence[str]) -> list[bytes]:
         """The end of each program; MST for the first motor of each module, then for the second; so for the searches."""
         counted, modules = dict(self.motors), _modules(addresses)
-        return [framing.request(int(name), Call(Command.STOP_PROGRAM)) for name in modules] + [
-            framing.request(int(name), Call(command, kind, motor))
+        return [frame_of(int(name), Call(Command.STOP_PROGRAM)) for name in modules] + [
+            frame_of(int(name), Call(command, kind, motor))
             for command, kind in ((Command.MST, 0), (Command.RFS, Search.STOP))
             for motor in range(MOST_MOTORS)
             for name in modules
@@ -143,8 +184,8 @@ class Tmcl:
     def starts_motion(self, text: str) -> bool:
         """Look the line up in the table of commands; an invalid line may start anything."""
         try:
-            return grammar.parse(text).moves
-        except grammar.LineError:
+            return commands.parse(text).moves
+        except commands.LineError:
             return True
 
     def damaged(self, line: str) -> bool:
@@ -157,7 +198,7 @@ class Tmcl:
 
     def answers(self, request: Request, line: str) -> bool:
         """Whether the line is a reply of this module to a command that only reads."""
-        _, call = framing.call_of(request.body)
+        _, call = call_of(request.body)
         return request.kind is Kind.PRINT and line.startswith(
             f"module {request.address}: {late_reply_to(call.command)}:"
         )
@@ -192,7 +233,7 @@ def is_address(text: str) -> bool:
     return text in ADDRESSES
 
 
-def _found(request: Request, fields: framing.Frame, frame: bytes, end: int, strays: list[str]) -> Decoded:
+def _found(request: Request, fields: Frame, frame: bytes, end: int, strays: list[str]) -> Decoded:
     """The reply that a frame is."""
     if request.gather:  # a refusal proves as much as a value
         return Decoded(Reply((*strays, str(fields.value)), acknowledged=True, body=frame), end, tuple(strays))
@@ -209,9 +250,9 @@ def _is_version(call: Call, frame: bytes) -> bool:
 
 
 def _unsolicited(frames: bytes) -> Iterator[str]:
-    for at in range(0, len(frames), framing.LENGTH):
-        frame = frames[at : at + framing.LENGTH]
-        fields = framing.reply(frame)
+    for at in range(0, len(frames), LENGTH):
+        frame = frames[at : at + LENGTH]
+        fields = parse_reply(frame)
         if fields is None:
             yield f"heard {frame.hex(' ')}"
         elif fields.command not in STOPS:
@@ -220,7 +261,7 @@ def _unsolicited(frames: bytes) -> Iterator[str]:
             yield f"module {fields.module}: in download mode: the stop was stored as a line of its program"
 
 
-def _described(fields: framing.Frame) -> str:
+def _described(fields: Frame) -> str:
     """A frame that answers nothing, for a person."""
     if fields.command == Command.NOTIFY and fields.status == Status.TARGET_REACHED:
         motors = [str(n) for n in range(8) if fields.value >> n & 1]
@@ -232,3 +273,65 @@ def late_reply_to(command: int) -> str:
     """How a line that no request expects names the command of its frame."""
     name = Command(command).name if command in tuple(Command) else f"command {command}"
     return f"late reply to {name}"
+
+
+@dataclass(eq=False)
+class TmclState(DriveState):
+    """One module."""
+
+    codec: Tmcl
+    lost_commands: set[int] = field(default_factory=set)
+    """Commands whose replies did not come, and may come late."""
+
+    motors: int = 0
+    """Number of its motors; 0: not counted."""
+    relative: dict[int, int] = field(default_factory=dict)
+    """Axis parameter 127 of each motor: from where MVP REL counts; a motor without an entry: not known."""
+
+    def reply_lost(self, command: int) -> None:
+        """The reply to a command did not come."""
+        self.lost_commands.add(command)
+        self.reply_outstanding()
+
+    def proved(self) -> None:
+        """The reply to a mark came: all earlier replies are over."""
+        self.lost_commands.clear()
+        self.synchronised()
+
+    def motors_counted(self, motors: int) -> None:
+        """Record how many motors the module has."""
+        self.motors = motors
+
+    def relative_read(self, motor: int, value: int) -> None:
+        """Record axis parameter 127 of a motor."""
+        self.relative[motor] = value
+
+    def relative_forgotten(self) -> None:
+        """Axis parameter 127 may have changed."""
+        self.relative.clear()
+
+    def readdressed(self, address: int) -> None:
+        """The module has another address from now on: requests and stops go there."""
+        self.address = self.name = str(address)
+
+    def found_storing(self) -> None:
+        """The module is in download mode, or may be: it stores every command but the end of that mode."""
+        self.programming, self.codec = True, replace(self.codec, storing=True)
+        self.owes(Owed(0, self.name, self.product, self.version, self.part, self.serial))
+
+    def executes(self) -> None:
+        """The module executes commands again."""
+        self.programming, self.codec = False, replace(self.codec, storing=False)
+
+    def stopped(self) -> None:
+        """A stop ends download mode; its replies may be late."""
+        self.executes()
+        self.lost_commands |= STOPS
+        self.reply_outstanding()
+
+    def line_counted(self, codec: Tmcl) -> None:
+        """Record the codec that all modules of the line share: it has the motors of each."""
+        self.codec = codec
+
+    def settings_may_have_changed(self) -> None:
+        """Do nothing: no setting changes its replies or its stop, so it is stopped together with the others."""

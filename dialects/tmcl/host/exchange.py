@@ -1,9 +1,7 @@
-"""One request of a procedure, and proof that its reply belongs to no other request.
+"""One request of a procedure, and proof that its reply belongs to no other request; the motors of a module.
 
-Theory of operation. A reply repeats the command and not what it was for, so a late reply can pass for the next one's.
-After a reply that did not come, or that may be another's, the host sends a mark: a reading command whose number no
-lost reply bears. A module replies in order, so whatever comes before the reply to the mark is late. Nothing is sent
-twice.
+A reply repeats the command and not what it was for. So the sync mark is a reading command whose number no lost reply
+bears.
 """
 
 from __future__ import annotations
@@ -12,12 +10,10 @@ from dataclasses import replace
 
 from multidrop.dialects.codec import End, Priority, Procedure, Reply, Request
 from multidrop.dialects.errors import NoAnswer, Refused, Stopped
-from multidrop.dialects.tmcl.host import framing
-from multidrop.dialects.tmcl.host.codec import late_reply_to
-from multidrop.dialects.tmcl.host.state import TmclState
-from multidrop.dialects.tmcl.manual.commands import Call, Command, Search, Version
+from multidrop.dialects.exchange import Exchange
+from multidrop.dialects.tmcl.host.codec import LENGTH, MOST_MOTORS, TmclState, call_of, late_reply_to, parse_reply
+from multidrop.dialects.tmcl.manual.commands import REFUSALS, Call, Command, Search, Status, Version
 from multidrop.dialects.tmcl.manual.parameters import Axis, Global
-from multidrop.dialects.tmcl.manual.status import REFUSALS, Status
 
 MARKS = (
     Call(Command.GGP, Global.HOST_ADDRESS),
@@ -32,7 +28,6 @@ END = "133 0, 0, 0"
 
 
 def who(state: TmclState) -> str:
-    """The name of a module in a message."""
     return f"module {state.address}"
 
 
@@ -43,22 +38,7 @@ def answered(state: TmclState, request: Request) -> Procedure[Reply]:
     yield from synchronised(state, request)
     if state.programming:
         raise Refused(f"{who(state)} is in download mode; '{request.text}' was not sent", int(Status.STORED))
-    reply = yield from _replied(state, request)
-    if reply.end in (End.TIMEOUT, End.DAMAGED):
-        state.reply_lost(_command(request))
-        raise NoAnswer(_unanswered(state, request, reply))
-    if reply.doubtful:
-        yield from _beyond_doubt(state, request)
-    if reply.end is End.REFUSED:
-        raise refusal(state, request, reply)
-    state.settings_confirmed()
-    return reply
-
-
-def synchronised(state: TmclState, request: Request) -> Procedure[None]:
-    """Make sure that no reply is outstanding before a request. Raises NoAnswer."""
-    if state.reply_pending and not (yield from _mark(state, request.priority)):
-        raise NoAnswer(f"{who(state)} does not reply: '{request.text}' was not sent")
+    return (yield from _EXCHANGE.answered(state, request))
 
 
 def _replied(state: TmclState, request: Request) -> Procedure[Reply]:
@@ -73,13 +53,13 @@ def _replied(state: TmclState, request: Request) -> Procedure[Reply]:
             state.owes_nothing()
         return reply
     except (Stopped, GeneratorExit):
-        state.reply_lost(_command(request))
+        _lost(state, request)
         raise
 
 
 def status_of(reply: Reply) -> int | None:
     """The status in the frame of a reply; None: it is not one."""
-    fields = framing.reply(reply.body) if len(reply.body) == framing.LENGTH else None
+    fields = parse_reply(reply.body) if len(reply.body) == LENGTH else None
     return fields.status if fields is not None else None
 
 
@@ -93,48 +73,53 @@ def read(state: TmclState, call: Call, priority: Priority = Priority.OPERATOR) -
 def refusal(state: TmclState, request: Request, reply: Reply) -> Refused:
     """The exception for a refusal: its status, meaning and remedy."""
     code = int(reply.text)
-    meaning = REFUSALS.get(code)
-    text = f"{meaning.text} ({meaning.advice})" if meaning else "unknown status"
+    meaning, advice = REFUSALS.get(code, ("", ""))
+    text = f"{meaning} ({advice})" if meaning else "unknown status"
     return Refused(f"{who(state)} refused '{request.text}': status {code}, {text}", code)
 
 
-def _command(request: Request) -> int:
-    return framing.call_of(request.body)[1].command
+def _lost(state: TmclState, request: Request) -> None:
+    state.reply_lost(call_of(request.body)[1].command)
 
 
-def _unanswered(state: TmclState, request: Request, reply: Reply) -> str:
-    if reply.end is End.DAMAGED:
-        return (
-            f"{who(state)}: the reply to '{request.text}' is damaged ({reply.detail}); it may have been executed and "
-            "was not sent again"
-        )
-    return f"{who(state)} does not reply: it is not known whether '{request.text}' was executed; it was sent once"
-
-
-def _mark(state: TmclState, priority: Priority) -> Procedure[bool]:
-    """Send a mark; whether its reply came."""
-    return (yield from _late_before_mark(state, priority)) is not None
-
-
-def _beyond_doubt(state: TmclState, request: Request) -> Procedure[None]:
-    """Make sure that a reply was the one to this request. Raises NoAnswer where it may be another's."""
-    name = f"{who(state)}: {late_reply_to(_command(request))}"
-    late = yield from _late_before_mark(state, request.priority, _command(request))
-    if late is None or any(name in line for line in late):
-        raise NoAnswer(
-            f"{who(state)}: a late reply came, perhaps to '{request.text}': it is not known whether that was "
-            "executed; it was sent once"
-        )
-
-
-def _late_before_mark(state: TmclState, priority: Priority, besides: int = 0) -> Procedure[tuple[str, ...] | None]:
-    """Lines that came before the reply to a mark; None where that did not come, or may be another's."""
-    taken = state.lost_commands | {besides}
+def _mark(state: TmclState, request: Request, sent: bool) -> Procedure[tuple[str, ...] | None]:
+    """Send a mark; its reply may be another's where all commands of marks have lost replies."""
+    own = call_of(request.body)[1].command
+    taken = state.lost_commands | ({own} if sent else set())
     call = next((each for each in MARKS if each.command not in taken), MARKS[0])
-    asked = replace(state.codec.request(state.address, str(call), call), priority=priority)
+    asked = replace(state.codec.request(state.address, str(call), call), priority=request.priority)
     reply = yield from _replied(state, replace(asked, expect=ANY_VALUE, gather=True))
     if reply.end is not End.DONE or (call.command in taken and reply.doubtful):
         state.reply_lost(call.command)
         return None
     state.proved()
-    return reply.lines[:-1]
+    name = f"{who(state)}: {late_reply_to(own)}"
+    return tuple(line for line in reply.lines[:-1] if not sent or name in line)
+
+
+_EXCHANGE = Exchange(who, _mark, _lost, refusal, _replied)
+synchronised = _EXCHANGE.synchronised
+
+
+def motors(state: TmclState, priority: Priority = Priority.OPERATOR) -> Procedure[int]:
+    """The number of motors; where it is not known, read motors until the module refuses one. Raises NoAnswer.
+
+    It is read together with parameter 127 of each motor; a module that refuses that for one lacks it.
+    """
+    if state.motors:
+        return state.motors
+    count = 1
+    try:
+        while count < MOST_MOTORS:
+            yield from read(state, Call(Command.GAP, Axis.ACTUAL_POSITION, count), priority)
+            count += 1
+    except Refused:
+        pass
+    state.motors_counted(count)
+    try:
+        for motor in range(count):
+            call = Call(Command.GAP, Axis.RELATIVE_FROM, motor)
+            state.relative_read(motor, (yield from read(state, call, priority)))
+    except (Refused, NoAnswer):
+        pass
+    return count

@@ -1,15 +1,20 @@
-"""The commands of TMCL's direct mode, and how a person writes each (TMCL firmware manuals, "TMCL commands").
+"""TMCL's direct mode: commands, how a person writes each, and the status byte of a reply.
 
-`fields` are written after the word, in this order. A word's type is fixed unless `type` is one of its fields;
-`types` are the names that a type may be written with.
+A line in TMCL's own notation, `MVP ABS, 0, 51200`, is a word, then its fields with commas between them. A command
+without a word is called by its number, then type, motor and value: `138 0, 0, 1`. Numbers are decimal. Words and types
+may be written in small letters. (TMCL firmware manuals, "TMCL commands", "Reply format".)
 """
 
 from __future__ import annotations
 
+import difflib
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import IntEnum
 from types import MappingProxyType
+
+from multidrop.dialects.codec import Command as TypedCommand
 
 
 class Command(IntEnum):
@@ -175,7 +180,7 @@ class Call:
     @property
     def moves(self) -> bool:
         """Whether it can start motion; a command without a word may."""
-        return _moves(self)
+        return _starts(self)
 
 
 STARTING_PARAMETERS = frozenset({0, 1, 2, 4})
@@ -199,7 +204,7 @@ NEVER_MOVE = frozenset(
 """Commands without a word that start neither a motion nor a program; 129 and 130 do."""
 
 
-def _moves(call: Call) -> bool:
+def _starts(call: Call) -> bool:
     if call.command in NEVER_MOVE:
         return False
     if call.command in (Command.SAP, Command.RSAP):
@@ -207,3 +212,114 @@ def _moves(call: Call) -> bool:
     if call.command == Command.RFS:
         return call.type == Search.START
     return call.row is None or call.row.moves
+
+
+BYTE = range(256)
+RANGES = {TYPE: BYTE, MOTOR: MOTORS, BANK: BYTE, VALUE: INT32}
+NUMBER = re.compile(r"[+-]?\d{1,11}", re.ASCII)
+BY_NUMBER = (TYPE, MOTOR, VALUE)
+"""Fields after the number of a command."""
+
+
+class LineError(ValueError):
+    """An invalid TMCL line; the text says why and what is valid."""
+
+
+def parse(text: str) -> Call:
+    """The command in a line. Raises LineError."""
+    found = text.read_by(_read) if isinstance(text, TypedCommand) else _read(text)
+    if isinstance(found, LineError):
+        raise found
+    return found
+
+
+def _read(text: str) -> Call | LineError:
+    try:
+        return _parsed(text)
+    except LineError as error:
+        return error
+
+
+def _parsed(text: str) -> Call:
+    word, _, rest = text.strip().partition(" ")
+    fields = [field.strip() for field in rest.split(",")] if rest.strip() else []
+    if word.isascii() and word.isdigit():
+        return _by_number(word, fields)
+    row = WORDS.get(word.upper())
+    if row is None:
+        raise LineError(f"no command {word!r}{_suggestion(word)}")
+    if len(fields) != len(row.fields):
+        raise LineError(f"{row.word} takes {_count(len(row.fields))}: {row.syntax}")
+    values = {name: _value(row, name, field) for name, field in zip(row.fields, fields, strict=True)}
+    return Call(row.command, values.get(TYPE, 0), values.get(MOTOR, values.get(BANK, 0)), values.get(VALUE, 0))
+
+
+def _by_number(word: str, fields: list[str]) -> Call:
+    if int(word) not in BYTE:
+        raise LineError(f"no command {word}; valid: 0 to 255")
+    if len(fields) != len(BY_NUMBER):
+        raise LineError(f"a command by its number takes {_count(len(BY_NUMBER))}: {word} {', '.join(BY_NUMBER)}")
+    kind, motor, value = (_number(name, field) for name, field in zip(BY_NUMBER, fields, strict=True))
+    return Call(int(word), kind, motor, value)
+
+
+def _value(row: Row, name: str, field: str) -> int:
+    if name == TYPE and field.upper() in row.types:
+        return row.types[field.upper()]
+    if name == TYPE and row.types and not NUMBER.fullmatch(field):
+        raise LineError(f"{row.word} has no type {field!r}; valid: {', '.join(row.types)}")
+    return _number(name, field)
+
+
+def _number(name: str, field: str) -> int:
+    valid = RANGES[name]
+    if not NUMBER.fullmatch(field) or int(field) not in valid:
+        raise LineError(f"{name} cannot be {field!r}; valid: {valid[0]} to {valid[-1]}")
+    return int(field)
+
+
+def _count(fields: int) -> str:
+    return "1 field" if fields == 1 else f"{fields} fields"
+
+
+def _suggestion(word: str) -> str:
+    near = difflib.get_close_matches(word.upper(), list(WORDS), 3, 0.6)
+    return f"; did you mean {' or '.join(near)}?" if near else f"; valid: {', '.join(WORDS)}"
+
+
+class Status(IntEnum):
+    """Byte 2 of a reply. Below 100 the command was refused and changed nothing; 101 is as good as a refusal."""
+
+    WRONG_CHECKSUM = 1
+    INVALID_COMMAND = 2
+    WRONG_TYPE = 3
+    INVALID_VALUE = 4
+    EEPROM_LOCKED = 5
+    NOT_AVAILABLE = 6
+    MAXIMUM_EXCEEDED = 9
+    DONE = 100
+    STORED = 101
+    TARGET_REACHED = 128
+
+
+def accepted(status: int) -> bool:
+    """Whether the module has executed the command."""
+    return status >= Status.DONE and status != Status.STORED
+
+
+REFUSALS: Mapping[int, tuple[str, str]] = MappingProxyType(
+    {
+        Status.WRONG_CHECKSUM: ("wrong checksum", "the line is disturbed: check wiring and baud"),
+        Status.INVALID_COMMAND: ("invalid command", "this module has no such command"),
+        Status.WRONG_TYPE: ("wrong type", "this module has no such parameter or type"),
+        Status.INVALID_VALUE: ("invalid value", "check the range of the value, and the motor's number"),
+        Status.EEPROM_LOCKED: ("the EEPROM is locked", "unlock it with the vendor's tool"),
+        Status.NOT_AVAILABLE: ("command not available", "this module has it not in this state or equipment"),
+        Status.MAXIMUM_EXCEEDED: ("maximum exceeded", "too many of them; check the value"),
+        Status.STORED: (
+            "stored as a program line, not executed",
+            "the module is in download mode; 133 0, 0, 0 or a stop ends that",
+        ),
+    }
+)
+"""Meaning of a refusing status and what to do, for a person."""

@@ -5,9 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from multidrop.dialects.errors import Diagnostic
-from multidrop.dialects.tmcl.manual.commands import WORDS, Command, Row
+from multidrop.dialects.tmcl.manual.commands import REFUSALS, WORDS, Command, Row
 from multidrop.dialects.tmcl.manual.parameters import AXIS, GLOBAL, RELATIVE_FROM, Parameter
-from multidrop.dialects.tmcl.manual.status import REFUSALS
 
 ON_AXIS = frozenset({Command.SAP, Command.GAP, Command.STAP, Command.RSAP})
 ON_MODULE = frozenset({Command.SGP, Command.GGP, Command.STGP, Command.RSGP})
@@ -43,7 +42,7 @@ def describe_error(code: int, product: str = "") -> list[str]:
     if refusal is None:
         codes = ", ".join(str(int(each)) for each in REFUSALS)
         raise Diagnostic(f"no status {code} in TMCL", "", f"refusals are {codes}")
-    return [f"status {code}: {refusal.text}", f"  do         {refusal.advice}"]
+    return [f"status {code}: {refusal[0]}", f"  do         {refusal[1]}"]
 
 
 def complete(prefix: str, product: str = "") -> list[tuple[str, str]]:

@@ -5,7 +5,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from multidrop.dialects import NoAnswer, Refused
-from multidrop.dialects.held import Held, Stored
 from multidrop.dialects.mcode.family import MCODE
 from multidrop.dialects.mcode.host import program_readout
 from multidrop.dialects.mcode.host.codec import MCode
@@ -13,6 +12,7 @@ from multidrop.dialects.mcode.host.download import plan
 from multidrop.dialects.mcode.host.program_readout import GLOBAL, LABEL, LOCAL
 from multidrop.dialects.mcode.host.state import MCodeState
 from multidrop.dialects.mcode.manual import program_file
+from multidrop.dialects.program_files import Held, Stored
 
 MODES = [(em, party, check) for em in range(4) for party in (False, True) for check in (0, 1)]
 PROGRAM = """

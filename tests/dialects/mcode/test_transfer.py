@@ -3,11 +3,11 @@
 import pytest
 
 from multidrop.dialects import DriveError, End, Inexpressible, NoAnswer, Refused, Reply, Stopped, StopPiece
-from multidrop.dialects.held import Held
 from multidrop.dialects.mcode.family import MCODE
 from multidrop.dialects.mcode.host.codec import MCode
 from multidrop.dialects.mcode.host.state import MCodeState
 from multidrop.dialects.mcode.manual import program_file
+from multidrop.dialects.program_files import Held
 from multidrop.drives.procedure import ProcedureRunner
 
 pytestmark = pytest.mark.slow

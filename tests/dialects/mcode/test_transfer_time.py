@@ -3,13 +3,13 @@
 import pytest
 
 from multidrop.dialects import Kind
-from multidrop.dialects.held import Held
 from multidrop.dialects.mcode.family import MCODE
 from multidrop.dialects.mcode.host import codec as codecs
 from multidrop.dialects.mcode.host.codec import MCode
 from multidrop.dialects.mcode.host.quiet_end import EXECUTED, EXECUTING, LIST_QUIET, PATIENT, SHORT
 from multidrop.dialects.mcode.host.state import MCodeState
 from multidrop.dialects.mcode.manual import program_file
+from multidrop.dialects.program_files import Held
 
 PROGRAM = "VA Q1=3\n" + "VM=400000\n" * 9 + "PG 1\nLB G1\nR1=R1+12\nMR 51200\nH\n" + "R1=R1+12\n" * 46 + "E\nPG\n"
 

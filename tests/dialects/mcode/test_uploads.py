@@ -4,12 +4,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from multidrop.dialects.held import Difference, Held, Stored
 from multidrop.dialects.mcode.family import MCODE
 from multidrop.dialects.mcode.host import program_readout as listings
 from multidrop.dialects.mcode.host.codec import MCode
 from multidrop.dialects.mcode.host.state import MCodeState
 from multidrop.dialects.mcode.manual import program_file
+from multidrop.dialects.program_files import Difference, Held, Stored
 from tests.conftest import Bench
 from tests.support.examples import examples
 

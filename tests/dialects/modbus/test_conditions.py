@@ -6,8 +6,7 @@ from typing import Any
 
 from multidrop.dialects import Kind, Procedure
 from multidrop.dialects.modbus.family import MODBUS
-from multidrop.dialects.modbus.host.codec import Modbus
-from multidrop.dialects.modbus.host.state import ModbusState
+from multidrop.dialects.modbus.host.codec import Modbus, ModbusState
 from multidrop.drives.procedure import ProcedureRunner
 from multidrop.simulator.lexium.family import _connect  # the port of an Ethernet drive
 from tests.support.lexium import drive

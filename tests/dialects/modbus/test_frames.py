@@ -8,9 +8,7 @@ from hypothesis import strategies as st
 
 from multidrop.dialects import End, Kind, Request
 from multidrop.dialects.modbus.host import framing, mapping
-from multidrop.dialects.modbus.host.codec import Modbus
-from multidrop.dialects.modbus.host.messages import pdu_codec
-from multidrop.dialects.modbus.host.state import ModbusState
+from multidrop.dialects.modbus.host.codec import Modbus, ModbusState, pdu_codec
 from multidrop.dialects.modbus.manual.registers import REGISTERS
 from tests.support.cases import for_each
 

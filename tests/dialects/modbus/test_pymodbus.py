@@ -25,10 +25,8 @@ from pymodbus.pdu.register_message import ReadHoldingRegistersRequest, WriteMult
 
 from multidrop.dialects import End, Kind, Request
 from multidrop.dialects.modbus.host import framing, mapping
-from multidrop.dialects.modbus.host.codec import Modbus
-from multidrop.dialects.modbus.host.framing import NotModbus
-from multidrop.dialects.modbus.host.messages import pdu_codec
-from multidrop.dialects.modbus.host.state import ModbusState
+from multidrop.dialects.modbus.host.codec import Modbus, ModbusState
+from multidrop.dialects.modbus.host.framing import NotModbus, pdu_codec
 from multidrop.dialects.modbus.manual.registers import REGISTERS
 from tests.support.paths import ROOT
 from tests.support.until import PATIENCE
@@ -211,7 +209,7 @@ def python(code: str, **more: str) -> subprocess.CompletedProcess[str]:
     "work",
     [
         "import dialects.families",
-        "import dialects.modbus.host.codec, dialects.modbus.host.operations, dialects.modbus.host.identify",
+        "import dialects.modbus.host.codec, dialects.modbus.host.operations, dialects.modbus.host.operations",
         "import multidrop.cli, shell.session",
         "from multidrop.__main__ import main; assert main(['send', 'sim:#press', 'PR P']) == 0",
     ],
@@ -226,7 +224,7 @@ def test_it_is_silent_even_where_the_root_logs_everything() -> None:
     done = python(
         "import logging\n"
         "logging.basicConfig(level=logging.DEBUG)\n"
-        "from multidrop.dialects.modbus.host.messages import pdu_codec\n"
+        "from multidrop.dialects.modbus.host.framing import pdu_codec\n"
         "made = pdu_codec()\n"
         "print(made._decoder.decode(bytes.fromhex('8001')), made._decoder.decode(b'\\x03\\x09\\x00'))\n"
         "made._framer.handleFrame(bytes.fromhex('00070001000301830201'), 1, 7)\n"

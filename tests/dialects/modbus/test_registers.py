@@ -6,8 +6,7 @@ import pytest
 
 from multidrop.dialects.families import FAMILIES
 from multidrop.dialects.mcode.manual.table import lookup
-from multidrop.dialects.modbus.host.codec import Modbus
-from multidrop.dialects.modbus.host.state import ModbusState
+from multidrop.dialects.modbus.host.codec import Modbus, ModbusState
 from multidrop.dialects.modbus.manual.registers import AT, REGISTERS, ROWS
 from tests.support.paths import FACTS
 

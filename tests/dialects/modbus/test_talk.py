@@ -5,9 +5,8 @@ import pytest
 from multidrop.dialects import End, Hints, Inexpressible, Kind, NoAnswer, Priority, Refused, Reply
 from multidrop.dialects.modbus.family import MODBUS
 from multidrop.dialects.modbus.host import framing, mapping
-from multidrop.dialects.modbus.host.codec import Modbus
-from multidrop.dialects.modbus.host.identify import identify
-from multidrop.dialects.modbus.host.state import ModbusState
+from multidrop.dialects.modbus.host.codec import Modbus, ModbusState
+from multidrop.dialects.modbus.host.operations import identify
 from multidrop.dialects.modbus.manual.registers import REGISTERS
 from multidrop.drives.procedure import ProcedureRunner
 from tests.support.cases import for_each

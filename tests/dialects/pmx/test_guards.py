@@ -1,8 +1,7 @@
 """Which commands of a PMX need a person's yes."""
 
 from multidrop.dialects.families import FAMILIES
-from multidrop.dialects.pmx.host.codec import Pmx
-from multidrop.dialects.pmx.host.state import PmxState
+from multidrop.dialects.pmx.host.codec import Pmx, PmxState
 
 FAMILY = FAMILIES["pmx"]
 ONE, EVERY = PmxState(Pmx(), "00"), PmxState(Pmx(), "*")

@@ -8,10 +8,9 @@ import pytest
 
 from multidrop.dialects import Diagnostic, NoAnswer, Refused
 from multidrop.dialects.codec import End, Reply
-from multidrop.dialects.pmx.host import download, holding, upload
-from multidrop.dialects.pmx.host.codec import Pmx
-from multidrop.dialects.pmx.host.state import PmxState
-from multidrop.dialects.pmx.manual import program_file, script_decompiler
+from multidrop.dialects.pmx.host import programs
+from multidrop.dialects.pmx.host.codec import Pmx, PmxState
+from multidrop.dialects.pmx.manual import program_file
 from tests.support.pmx_programs import EXAMPLES, TEN_TIMES, plain
 
 
@@ -34,7 +33,7 @@ def test_what_is_listed_of_a_memory_reads_as_the_program(text: str) -> None:
 def test_lines_of_a_unit_are_taken_as_they_are_but_not_made_readable() -> None:
     text = "SA0=PS0\nSA2=&1023$5\nSA3="
     assert program_file.compiled(program_file.read(text, "x")) == [(1, 0, "PS0"), (2, 2, "&1023$5"), (3, 3, "")]
-    with pytest.raises(script_decompiler.Undecodable):
+    with pytest.raises(program_file.Undecodable):
         program_file.readable(text.splitlines())
 
 
@@ -103,7 +102,7 @@ def held(talk, far: Far):  # type: ignore[no-untyped-def]
 
 
 def put(far: Far, text: str) -> None:
-    held(download.download(PmxState(Pmx(), "00"), program_file.read(text, "x"), None, lambda done, total: None), far)
+    held(programs.download(PmxState(Pmx(), "00"), program_file.read(text, "x"), None, lambda done, total: None), far)
 
 
 def test_a_script_is_written_and_what_a_longer_one_has_left_is_erased() -> None:
@@ -116,8 +115,8 @@ def test_a_script_is_written_and_what_a_longer_one_has_left_is_erased() -> None:
         "SA2": "XX",
     }
     state = PmxState(Pmx(), "00")
-    assert upload.readable(held(holding.read(state, (), nothing), far)) == ("X1", "END")
-    assert held(upload.upload(state, True), far) == ("SA0=CV1", "SA1=&X$1", "SA2=XX")
+    assert programs.readable(held(programs.read(state, (), nothing), far)) == ("X1", "END")
+    assert held(programs.upload(state, True), far) == ("SA0=CV1", "SA1=&X$1", "SA2=XX")
 
 
 def test_a_script_is_refused_by_anything_but_the_simulator_before_something_is_written() -> None:
@@ -143,5 +142,5 @@ def test_a_line_that_was_not_kept_names_its_line_of_the_file() -> None:
 
 def test_a_controller_without_a_program_says_so() -> None:
     with pytest.raises(Refused, match="00 holds no program"):
-        held(upload.upload(PmxState(Pmx(), "00"), False), Far())
-    assert upload.readable(held(holding.read(PmxState(Pmx(), "00"), (), nothing), Far())) == ()
+        held(programs.upload(PmxState(Pmx(), "00"), False), Far())
+    assert programs.readable(held(programs.read(PmxState(Pmx(), "00"), (), nothing), Far())) == ()

@@ -10,10 +10,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from multidrop.dialects import Diagnostic
-from multidrop.dialects.pmx.manual import script_checker, script_decompiler
+from multidrop.dialects.pmx.manual import program_file, script_checker
 from multidrop.dialects.pmx.manual.script_parser import parse
 from multidrop.dialects.pmx.manual.script_words import BLOCKS, WORDS
-from multidrop.dialects.problems import errors
+from multidrop.dialects.program_files import errors
 from tests.support.cases import for_each
 from tests.support.examples import examples
 from tests.support.paths import FACTS
@@ -24,10 +24,10 @@ from tests.support.pmx_programs import EVERYTHING, EXAMPLES, THERE_AND_BACK, pla
 def test_a_program_comes_back_from_its_lines(text: str) -> None:
     assert errors(script_checker.check(text)) == []
     made = script_checker.read(text, "x.prg")
-    back = script_decompiler.decompile(made.code)
+    back = program_file.decompile(made.code)
     assert plain("\n".join(back)) == plain(text)
     assert tuple(script_checker.read("\n".join(back), "y").code) == made.code
-    assert script_decompiler.decompile([*made.code, "0", "0"]) == back
+    assert program_file.decompile([*made.code, "0", "0"]) == back
 
 
 def test_known_tokens_are_the_publicly_known_ones() -> None:
@@ -175,8 +175,8 @@ def test_a_program_that_does_not_fit_is_told_with_the_line_where_the_memory_ends
     ],
 )
 def test_lines_of_a_unit_are_not_taken_for_ours(lines: list[str]) -> None:
-    with pytest.raises(script_decompiler.Undecodable):
-        script_decompiler.decompile(lines)
+    with pytest.raises(program_file.Undecodable):
+        program_file.decompile(lines)
 
 
 @given(st.text(alphabet=" \nXYV0123456789=+-<>!;~&|IFELSENDWHTPRGOUBQ", max_size=80))
@@ -215,9 +215,9 @@ TOKENS = [
 @given(st.lists(st.sampled_from([*TOKENS, ""]), max_size=12))
 def test_what_can_be_decompiled_compiles_to_the_same_lines(lines: list[str]) -> None:
     try:
-        text = "\n".join(script_decompiler.decompile(lines))
+        text = "\n".join(program_file.decompile(lines))
         made = script_checker.read(text, "x").code
-    except (script_decompiler.Undecodable, Diagnostic):
+    except (program_file.Undecodable, Diagnostic):
         return
     assert list(made) == lines[: len(made)] and set(lines[len(made) :]) <= {"0"}
 
@@ -255,7 +255,7 @@ def bodies(draw: st.DrawFn, depth: int = 3) -> list[str]:
 def test_any_program_comes_back_from_its_lines(body: list[str]) -> None:
     text = ["PRG 1", *body, "END"]
     made = script_checker.read("\n".join(text), "x").code
-    assert [line.strip() for line in script_decompiler.decompile(made)] == text
+    assert [line.strip() for line in program_file.decompile(made)] == text
 
 
 TABLE_OF_FACTS = FACTS / "pmx-standalone-commands.csv"

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from multidrop.dialects.codec import End
 from multidrop.dialects.errors import Inexpressible
 from multidrop.dialects.tmcl.host.codec import STOP_BYTES, Tmcl
-from multidrop.dialects.tmcl.manual.grammar import parse
+from multidrop.dialects.tmcl.manual.commands import parse
 
 FRAMES = [
     ("ROR 0, 1000", "01 01 00 00 00 00 03 E8 ED"),

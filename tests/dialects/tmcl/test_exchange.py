@@ -7,14 +7,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from multidrop.dialects.codec import Priority
-from multidrop.dialects.controls import BY
 from multidrop.dialects.errors import Inexpressible, NoAnswer, Refused, Stopped
 from multidrop.dialects.family import Hints
 from multidrop.dialects.tmcl.family import TMCL
 from multidrop.dialects.tmcl.host.codec import Tmcl
-from multidrop.dialects.tmcl.manual.commands import Call, Command
+from multidrop.dialects.tmcl.manual.commands import Call, Command, Status
 from multidrop.dialects.tmcl.manual.parameters import AXIS, Axis
-from multidrop.dialects.tmcl.manual.status import Status
+from multidrop.dialects.values import BY
 from multidrop.drives.line import Line
 from multidrop.simulator.tmcl.module import Refused as Lacking
 from tests.conftest import Bench

@@ -4,8 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from multidrop.dialects.tmcl.manual.commands import Call, Command
-from multidrop.dialects.tmcl.manual.grammar import LineError, parse
+from multidrop.dialects.tmcl.manual.commands import Call, Command, LineError, parse
 
 LINES = [
     ("ROR 0, 1000", Call(1, 0, 0, 1000)),

@@ -3,8 +3,7 @@
 import pytest
 
 from multidrop.dialects.families import FAMILIES
-from multidrop.dialects.tmcl.host.codec import Tmcl
-from multidrop.dialects.tmcl.host.state import TmclState
+from multidrop.dialects.tmcl.host.codec import Tmcl, TmclState
 
 FAMILY = FAMILIES["tmcl"]
 ONE, EVERY = TmclState(Tmcl(), "1"), TmclState(Tmcl(), "*")

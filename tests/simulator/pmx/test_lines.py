@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from multidrop.dialects.pmx.manual import program_file, script_checker, script_decompiler
+from multidrop.dialects.pmx.manual import program_file, script_checker
 from multidrop.dialects.pmx.manual.script_compiler import LINES, OPERATION, looks_compiled, split
 from multidrop.dialects.pmx.manual.script_words import WORDS
 from multidrop.simulator.cell.spec import DriveSpec
@@ -48,7 +48,7 @@ def code(text: str) -> str:
 )
 def test_each_statement_as_lines(statement: str, lines: str) -> None:
     assert code(f"{statement}\nEND") == f"{lines} XX"
-    assert script_decompiler.decompile([*lines.split(), "XX"]) == [statement, "END"]
+    assert program_file.decompile([*lines.split(), "XX"]) == [statement, "END"]
 
 
 @pytest.mark.parametrize(
@@ -100,8 +100,8 @@ def test_what_is_not_known_ends_in_an_error_that_names_its_line(text: str) -> No
     (failure,) = made.failures
     assert made.status(0) == ERROR and not any(made.variables)
     assert made.failure(0).endswith(f" at line {wrong}") and 1 <= failure.line <= wrong
-    with pytest.raises(script_decompiler.Undecodable):
-        script_decompiler.decompile([*lines, "XX"])
+    with pytest.raises(program_file.Undecodable):
+        program_file.decompile([*lines, "XX"])
 
 
 def test_no_line_of_a_script_is_taken_for_a_compiled_one() -> None:
@@ -124,8 +124,8 @@ TOKENS = st.one_of(
 def test_any_lines_are_run_or_refused_and_read_as_what_they_are(lines: list[str]) -> None:
     ran(*lines, until=0.05)
     try:
-        text = script_decompiler.decompile(lines)
-    except script_decompiler.Undecodable:
+        text = program_file.decompile(lines)
+    except program_file.Undecodable:
         return
     if text:
         again = script_checker.read("\n".join(text), "x").code
@@ -171,4 +171,4 @@ def test_every_operation_of_a_variable_survives_its_lines(target: int, value: in
     statement = f"V{target}=~{value}" if op == "~" else f"V{target}={value}{op}V1"
     made = script_checker.read(f"{statement}\nEND", "x").code
     assert all(split(token) for token in made)
-    assert script_decompiler.decompile(made) == [statement, "END"]
+    assert program_file.decompile(made) == [statement, "END"]

@@ -2,7 +2,7 @@
 
 import pytest
 
-from multidrop.dialects.tmcl.host import framing
+from multidrop.dialects.tmcl.host import codec
 from tests.support.tmcl_module import Module
 
 
@@ -130,7 +130,7 @@ def test_it_says_when_the_target_is_reached():
     module = Module()
     module.ask("MVP ABS, 0, 5000")
     assert module.ask("138 0, 0, 1") == 1
-    notice = framing.reply(module.wait(5.0))
+    notice = codec.parse_reply(module.wait(5.0))
     assert notice is not None and (notice.status, notice.command, notice.value) == (128, 138, 1)
 
 

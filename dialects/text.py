@@ -1,4 +1,4 @@
-r"""Text from elsewhere made visible: control and direction characters are written out (`\x1b`).
+r"""Text from elsewhere: whole numbers in it, and control and direction characters made visible (`\x1b`).
 
 A drive, a file, a name or a typed line may hold such characters. To a terminal they are commands: OSC 52 sets the
 clipboard, and a C1 code is an escape sequence in one character. Direction characters show text in another order.
@@ -40,3 +40,16 @@ def visible(text: str, tabs: bool = False) -> str:
     if text.isascii() and text.isprintable():
         return text
     return text.translate(_WITH_TABS if tabs else _ESCAPES)
+
+
+_MOST_DIGITS = 24
+"""Leading zeros included; no value needs more."""
+
+
+def whole(text: str, low: int, high: int) -> int | None:
+    """Return the number in a text of digits (0-9) with an optional sign; None unless it is from `low` to `high`."""
+    digits = text[1:] if text[:1] in ("+", "-") else text
+    if not (digits.isascii() and digits.isdigit()) or len(digits) > _MOST_DIGITS:
+        return None
+    number = int(text)
+    return number if low <= number <= high else None

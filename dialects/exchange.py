@@ -1,0 +1,84 @@
+"""One request to a drive whose replies have no numbers, and proof that the reply belongs to no other request.
+
+Theory of operation. A late reply can pass for the next one's. So after a missing or doubtful reply the host sends a
+sync mark: a request that changes nothing, and whose reply no other request has. A drive replies in order, so everything
+before the reply to the mark is late. The host never repeats a command.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Generic, TypeVar
+
+from multidrop.dialects.codec import End, Procedure, Reply, Request
+from multidrop.dialects.errors import NoAnswer, Refused
+from multidrop.dialects.state import DriveState
+
+S = TypeVar("S", bound=DriveState)
+
+
+def _once(request: Request) -> Procedure[Reply]:
+    return (yield request)
+
+
+@dataclass(frozen=True)
+class Exchange(Generic[S]):
+    """The exchange of a family; its functions record in the state what they show."""
+
+    who: Callable[[S], str]
+    """Name a drive in a message."""
+    mark: Callable[[S, Request, bool], Procedure[tuple[str, ...] | None]]
+    """Send a sync mark before a request, or after it (True); None without the mark's reply.
+
+    Return the lines before that reply; after a request only those that can be its reply.
+    """
+    lost: Callable[[S, Request], None]
+    """Record that the reply to a request may arrive late."""
+    refusal: Callable[[S, Request, Reply], Refused]
+    """Describe a refusal."""
+    send: Callable[[S, Request], Procedure[Reply]] = lambda state, request: _once(request)
+    """Send a request once."""
+
+    def answered(self, state: S, request: Request, doubts: list[Request] | None = None) -> Procedure[Reply]:
+        """Send a request once; return the reply. Raises Refused or NoAnswer.
+
+        `doubts`: a list for a request whose reply may belong to another; without it a sync mark follows at once.
+        """
+        yield from self.synchronised(state, request)
+        reply = yield from self.send(state, request)
+        if reply.end in (End.TIMEOUT, End.DAMAGED):
+            self.lost(state, request)
+            raise unanswered(self.who(state), request, reply)
+        if reply.doubtful and doubts is not None:
+            doubts.append(request)
+        elif reply.doubtful:
+            yield from self.beyond_doubt(state, request)
+        state.settings_confirmed()
+        if reply.end is End.REFUSED:
+            raise self.refusal(state, request, reply)
+        return reply
+
+    def synchronised(self, state: S, request: Request) -> Procedure[None]:
+        """Make sure that no reply is outstanding before a request. Raises NoAnswer."""
+        if state.reply_pending and (yield from self.mark(state, request, False)) is None:
+            raise NoAnswer(f"{self.who(state)} does not reply: '{request.text}' was not sent")
+
+    def beyond_doubt(self, state: S, request: Request) -> Procedure[None]:
+        """Prove that a reply was not the outstanding one of another request. Raises NoAnswer."""
+        late = yield from self.mark(state, request, True)
+        if late is None or late:
+            raise NoAnswer(
+                f"{self.who(state)}: a late reply came, perhaps to '{request.text}': it is not known whether that was "
+                "executed; it was sent once"
+            )
+
+
+def unanswered(who: str, request: Request, reply: Reply) -> NoAnswer:
+    """Describe a reply that did not come, or came damaged."""
+    if reply.end is End.DAMAGED:
+        return NoAnswer(
+            f"{who}: the reply to '{request.text}' is damaged ({reply.detail}); it may have been executed and "
+            "was not sent again"
+        )
+    return NoAnswer(f"{who} does not reply: it is not known whether '{request.text}' was executed; it was sent once")

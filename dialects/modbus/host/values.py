@@ -1,0 +1,245 @@
+"""What is read of an Ethernet drive over Modbus: settings, conditions, values for plots, and all of it for a snapshot.
+
+The drive and its rules are those of MCode, so the order of the steps is, too. What has no register, or another form in
+it, is left to MCode/TCP. Nothing moves, and nothing is cleared.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from functools import partial
+
+from multidrop.dialects.codec import Priority, Procedure
+from multidrop.dialects.errors import Diagnostic, Inexpressible, NoAnswer, Refused
+from multidrop.dialects.mcode.host import snapshot
+from multidrop.dialects.mcode.host.parameters import rows_of_list
+from multidrop.dialects.mcode.host.wording import who
+from multidrop.dialects.mcode.manual import parameter_plan, points
+from multidrop.dialects.mcode.manual import parameters as manual
+from multidrop.dialects.mcode.manual.parameters import reading_of
+from multidrop.dialects.mcode.manual.table import words
+from multidrop.dialects.modbus.host import framing, mapping
+from multidrop.dialects.modbus.host.codec import ModbusState, pdu_codec
+from multidrop.dialects.modbus.host.exchange import request, sure
+from multidrop.dialects.modbus.host.operations import OUTPUTS, flag, identification, perform
+from multidrop.dialects.modbus.manual.registers import REGISTERS
+from multidrop.dialects.parameters import (
+    Change,
+    Parameters,
+    Permission,
+    Plan,
+    Progress,
+    Readings,
+    Value,
+    number,
+    same,
+)
+from multidrop.dialects.values import Conditions, Facts, Part, PolledValues, Reader, Snapshot, printed_number
+
+OTHER_FORM = frozenset({"TS", "TA"})
+"""Registers whose values are not those of the word."""
+NO_REGISTER = "no Modbus register; MCode/TCP (tcp://HOST:503) reads it"
+DECLARED = tuple((f"V{n}", "reading it is an error unless a program declares it") for n in range(1, 9))
+
+
+def read_settings(state: ModbusState, progress: Progress) -> Procedure[Readings]:
+    """Read every setting that a register has. Raises NoAnswer; nothing is changed or cleared."""
+    settings = [each.name for each in manual.settings(state.product, state.version, state.part)]
+    names = [name for name in settings if name in REGISTERS and name not in OTHER_FORM]
+    lists = {word: rows for word, rows in manual.lists(state.product, state.version).items() if word != "LS"}
+    found: dict[str, Value] = {}
+    unread = [*manual.unread(state.product), *DECLARED]
+    unread += [(name, NO_REGISTER) for name in settings if name not in names]
+    for done, name in enumerate(names):
+        progress(done, len(names) + len(lists))
+        try:
+            found[name] = yield from _setting(state, name)
+        except Refused as refusal:
+            unread.append((name, str(refusal)))
+    for done, (word, numbers) in enumerate(lists.items(), len(names)):
+        progress(done, len(names) + len(lists))
+        shown = yield from _text(state, word)
+        found |= rows_of_list(word, numbers, shown.replace("\r", "").split("\n"))
+    progress(1, 1)
+    counts, table = manual.counting(found), words(state.product)
+    rows = [reading_of(name, value, table.get(name), counts) for name, value in found.items()]
+    return Readings(tuple(rows), tuple(unread))
+
+
+def _text(state: ModbusState, word: str) -> Procedure[str]:
+    """Print a word without a look at the drive's error, which would clear it."""
+    asked = mapping.reading(word)
+    wanted = request(state, f"PR {word}", asked.pdu)
+    reply = yield wanted
+    return asked.shown(sure(state, wanted, reply))
+
+
+def _setting(state: ModbusState, name: str) -> Procedure[Value]:
+    text = yield from _text(state, name)
+    if not re.fullmatch(r"-?\d+", text):
+        raise NoAnswer(f"{who(state)}: the reply to 'PR {name}' is damaged")
+    return int(text)
+
+
+def plan(state: ModbusState, present: Readings, wanted: Mapping[str, Value], allowed: Permission) -> Plan:
+    """Order the steps to the wanted values; a value that its register does not take is left alone."""
+    given = {name.upper(): value for name, value in wanted.items()}
+    changed = {name: value for name, value in given.items() if not same(value, present.values.get(name))}
+    outside = {name: _why_not(name, value) for name, value in changed.items()}
+    aside = {name: reason for name, reason in outside.items() if reason}
+    inside = {name: value for name, value in given.items() if name not in aside}
+    made = parameter_plan.plan(state.product, present, inside, allowed)
+    return Plan(made.changes, made.withheld, (*made.impossible, *aside.items()), made.remarks)
+
+
+def _why_not(name: str, value: Value) -> str:
+    """The reason for which a register does not take a value; empty: it does."""
+    if re.fullmatch(r"[IO]S\d", name):
+        return ""
+    row = REGISTERS.get(name)
+    if row is None or name in OTHER_FORM:
+        return NO_REGISTER.replace("reads", "writes")
+    if isinstance(value, (int, float)) and not row.allows(int(number(value))):
+        return f"its register takes {row.limits}; MCode/TCP (tcp://HOST:503) may take it"
+    return ""
+
+
+def ready(state: ModbusState) -> Procedure[str]:
+    """Return the reason for which settings must not change now; empty: there is none."""
+    if (yield from flag(state, "MV")):
+        return f"{who(state)} moves: stop it first"
+    if (yield from flag(state, "BY")):
+        return f"{who(state)} runs a program: E ends it"
+    asked = request(state, "PR TE", mapping.read(REGISTERS["TE"]))
+    reply = yield asked
+    armed = pdu_codec().registers(sure(state, asked, reply))[0]
+    return f"{who(state)} has armed trips (TE={armed}): TE=0 disarms them" if armed else ""
+
+
+def write(state: ModbusState, change: Change) -> Procedure[None]:
+    """Send one step, and make sure of it."""
+    yield from perform(state, change.text)
+
+
+def save(state: ModbusState) -> Procedure[None]:
+    """Send S."""
+    yield from perform(state, "S")
+
+
+PARAMETERS = Parameters(read=read_settings, plan=plan, ready=ready, write=write, save=save, language="MCode")
+
+
+FLAGS = ("EF", "BY", "MV", "DE")
+SETTINGS = ("EE", "AS", "RC", "HC", "VI", "VM", "A", "D")
+INPUTS = 4
+
+
+def parts(state: ModbusState, facts: Facts) -> Sequence[Part[ModbusState]]:
+    """The parts of a drive: flags, points, settings, set-ups."""
+    found = [Part("flags", partial(_registers, names=FLAGS)), Part("points", _points)]
+    table = words(state.product)
+    has = [n for n in SETTINGS if not manual.exact(state.product) or state.product in table[n].products]
+    found += [Part(name, partial(_registers, names=(name,)), slow=True) for name in has]
+    lists = manual.lists(state.product, state.version)
+    found += [Part(word, partial(_setups, word=word), slow=True) for word in ("IS", "OS") if word in lists]
+    return found
+
+
+def _registers(state: ModbusState, names: Sequence[str]) -> Procedure[Facts]:
+    found = {}
+    for name in names:
+        register = REGISTERS[name]
+        asked = request(state, f"PR {name}", mapping.read(register), Priority.POLL)
+        answer = sure(state, asked, (yield asked))
+        found[name] = mapping.value_of(register, pdu_codec().registers(answer))
+    if "EF" in found:
+        state.error_flag_read(bool(found["EF"]))
+    return found
+
+
+def _points(state: ModbusState) -> Procedure[Facts]:
+    """Read all inputs, then all outputs; an input's bit is 1 while it is active."""
+    found: dict[str, int] = {}
+    for letter, function, count in (("I", framing.READ_INPUTS, INPUTS), ("O", framing.READ_COILS, OUTPUTS)):
+        asked = request(state, f"{letter}1 to {letter}{count}", pdu_codec().read(function, 0, count), Priority.POLL)
+        bits = pdu_codec().bits(sure(state, asked, (yield asked)), count)
+        found |= {f"{letter}{n}": bit for n, bit in enumerate(bits, 1)}
+    return found
+
+
+def _setups(state: ModbusState, word: str) -> Procedure[Facts]:
+    reading = mapping.reading(word)
+    asked = request(state, f"PR {word}", reading.pdu, Priority.POLL)
+    shown = reading.shown(sure(state, asked, (yield asked)))
+    return rows_of_list(word, manual.LISTS[word], shown.replace("\r", "").split("\n"))
+
+
+def fold(state: ModbusState, facts: Facts) -> tuple[Conditions, ...]:
+    """The conditions of its only axis. No register holds the target."""
+    return (points.conditions(state.product, facts, None),)
+
+
+READER = Reader(parts=parts, fold=fold)
+
+
+_NO_NUMBER = mapping.IDENTITY.keys() | mapping.SETUPS
+
+
+def check(state: ModbusState, word: str) -> str:
+    """Check that a word has a register or an input to read, and that its reading clears nothing."""
+    name = word.upper()
+    try:
+        mapping.reading(name)
+    except (Inexpressible, Refused) as reason:
+        raise Diagnostic(f"{word} cannot be plotted: {reason}") from None
+    if name == "ER" or name in _NO_NUMBER:
+        why = "reading it clears it" if name == "ER" else "it is not a number"
+        raise Diagnostic(f"{word} cannot be plotted: {why}")
+    return name
+
+
+def again(state: ModbusState, word: str, priority: Priority) -> Procedure[float]:
+    """Read a value."""
+    reading = mapping.reading(word)
+    asked = request(state, f"PR {word}", reading.pdu, priority)
+    reply = yield asked
+    try:
+        return printed_number(who(state), word, reading.shown(sure(state, asked, reply)))
+    except framing.NotModbus:
+        raise NoAnswer(f"{who(state)}: the reply to 'PR {word}' is damaged") from None
+    except ValueError as wrong:
+        raise Refused(str(wrong)) from None
+
+
+READINGS = PolledValues(check=check, first=lambda state, word: again(state, word, Priority.OPERATOR), again=again)
+
+
+SERIAL = 5
+"""The object of the identification."""
+DIVIDED = 4
+"""Counts of the analog input in one count of its register."""
+NO_PROGRAM = ("its program and variables", "Modbus reads neither; MCode/TCP (tcp://HOST:503) does")
+
+
+def take(state: ModbusState, progress: Progress) -> Procedure[Snapshot]:
+    """Read a drive. Raises Refused or NoAnswer."""
+    readings = yield from read_settings(state, progress)
+    if not state.serial:
+        state.serial_read((yield from identification(state)).get(SERIAL, ""))
+    known, now = words(state.product), {}
+    for word in snapshot.ASKED:
+        if word in known and state.product in known[word].products:
+            now[word] = yield from _count(state, word)
+    if "I5" in now:
+        now["I5"] *= DIVIDED
+    return snapshot.made(state, replace(readings, unread=(*readings.unread, NO_PROGRAM)), now)
+
+
+def _count(state: ModbusState, word: str) -> Procedure[int]:
+    """Read a register without a look at the drive's error, which would clear it."""
+    reading = mapping.reading(word)
+    asked = request(state, f"PR {word}", reading.pdu)
+    reply = yield asked
+    return int(reading.shown(sure(state, asked, reply)))

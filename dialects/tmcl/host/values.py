@@ -1,0 +1,354 @@
+"""What is read of a module: settings, conditions, values for plots, and all of it for a snapshot.
+
+The extended error flags (207) are not read, since that clears them. (TMCL firmware manuals, "Axis parameters".)
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from functools import partial
+
+from multidrop.dialects.codec import Priority, Procedure
+from multidrop.dialects.errors import Diagnostic, Refused
+from multidrop.dialects.parameters import (
+    COMMUNICATION,
+    Change,
+    Parameters,
+    Permission,
+    Plan,
+    Progress,
+    Reading,
+    Readings,
+    Value,
+    reference_lost,
+    same,
+)
+from multidrop.dialects.tmcl.host.codec import TmclState
+from multidrop.dialects.tmcl.host.exchange import motors, read, who
+from multidrop.dialects.tmcl.host.operations import moving, perform
+from multidrop.dialects.tmcl.manual.commands import STARTING_PARAMETERS, Call, Command
+from multidrop.dialects.tmcl.manual.parameters import AXIS, BAUDS, GLOBAL, RELATIVE_FROM, Axis, Global, Parameter
+from multidrop.dialects.values import (
+    BY,
+    DISABLE,
+    ENABLE,
+    HOME_MINUS,
+    HOME_PLUS,
+    STOP,
+    TO,
+    Conditions,
+    Control,
+    Controls,
+    Facts,
+    Lamp,
+    Pace,
+    Part,
+    PolledValues,
+    Reader,
+    Snapshot,
+)
+
+GLOBAL_PREFIX = "G"
+ADDRESS = f"{GLOBAL_PREFIX}{int(Global.ADDRESS)}"
+STATES_OF_THE_MOMENT = frozenset({Axis.TARGET_POSITION, Axis.ACTUAL_POSITION, Axis.TARGET_VELOCITY})
+WIRE = frozenset({Global.BAUD, Global.ADDRESS, Global.PAUSE, Global.HOST_ADDRESS})
+NOT_STORED = (3, 6)
+"""The statuses of a module that lacks a parameter, or does not store it: wrong type, command not available."""
+_NAME = re.compile(r"(G?)(\d{1,3})(?:_(\d))?", re.ASCII)
+
+
+def setting_names(motors: int) -> tuple[str, ...]:
+    """The settings of a module, in the order in which they are written."""
+    axis = [number for number, each in AXIS.items() if each.writable and number not in STATES_OF_THE_MOMENT]
+    own = [f"{int(number)}{f'_{motor}' if motor else ''}" for motor in range(motors) for number in axis]
+    own_globals = [number for number, each in GLOBAL.items() if each.writable]
+    ordered = sorted(own_globals, key=lambda number: (number in WIRE, number == Global.ADDRESS, number == Global.BAUD))
+    return (*own, *(f"{GLOBAL_PREFIX}{int(number)}" for number in ordered))
+
+
+def _call(name: str, command: Command, value: int = 0) -> Call:
+    """The command for a setting; `command` is the one for an axis parameter."""
+    prefix, number, motor = _name_parts(name)
+    if prefix:
+        command = {Command.GAP: Command.GGP, Command.SAP: Command.SGP}[command]
+    return Call(command, number, motor, value)
+
+
+def reading(name: str, value: int) -> Reading:
+    """Put unit and default to a value."""
+    row, (prefix, number, _) = _row(name), _name_parts(name)
+    unit = ", ".join(each for each in (row.title, row.unit) if each)
+    return Reading(name, value, unit=unit, default=row.fresh, fixed=bool(prefix) and number in WIRE)
+
+
+def _plan(motors: int, present: Readings, wanted: Mapping[str, Value], allowed: Permission) -> Plan:
+    """Order the steps to the wanted values. Raises Diagnostic for a value that the module refuses."""
+    now = present.values
+    changed = {name.upper(): value for name, value in wanted.items() if not same(value, now.get(name.upper()))}
+    withheld = {name: reason for name in changed if (reason := _risk(name, changed[name], now, allowed))}
+    goal = {name: _checked(name, value, motors) for name, value in changed.items() if name not in withheld}
+    order = [name for name in setting_names(motors) if name in goal]
+    steps = [Change(name, now.get(name), goal[name], str(_call(name, Command.SAP, goal[name]))) for name in order]
+    scale = [name for name in goal if _name_parts(name)[:2] == ("", Axis.MICROSTEPS)]
+    return Plan(tuple(steps), tuple(withheld.items()), remarks=reference_lost(steps, scale))
+
+
+def _name_parts(name: str) -> tuple[str, int, int]:
+    found = _NAME.fullmatch(name)
+    return (found[1], int(found[2]), int(found[3] or 0)) if found else ("", -1, 0)
+
+
+def _row(name: str) -> Parameter:
+    prefix, number, _ = _name_parts(name)
+    return (GLOBAL if prefix else AXIS)[number]
+
+
+def _checked(name: str, value: Value, motors: int) -> int:
+    """Return the value as a whole number. Raises Diagnostic."""
+    if name not in setting_names(motors):
+        raise Diagnostic(f"{name}: is not a setting of the module")
+    limits = _row(name).limits
+    if isinstance(value, (str, tuple)) or not float(value).is_integer() or int(value) not in limits:
+        raise Diagnostic(f"{name} = {value}: valid: {limits.start} to {limits.stop - 1}")
+    return int(value)
+
+
+def _risk(name: str, value: Value, now: Mapping[str, Value], allowed: Permission) -> str:
+    """The reason for which a setting waits for a person's word; empty: there is none."""
+    prefix, number, _ = _name_parts(name)
+    communicates = bool(prefix) and number in WIRE
+    if name in allowed.named or (communicates and allowed.communication):
+        return ""
+    if communicates:
+        return COMMUNICATION
+    if prefix and number == Global.AUTOSTART and value:
+        return "the stored program starts at power-up"
+    if not prefix and number in (Axis.RIGHT_LIMIT_OFF, Axis.LEFT_LIMIT_OFF) and value:
+        return "a move that the limit switch holds back may go on"
+    waits = not prefix and number in STARTING_PARAMETERS and now.get(name) == 0
+    return "a move may wait for it" if waits else ""
+
+
+def read_settings(state: TmclState, progress: Progress) -> Procedure[Readings]:
+    """Read every setting; modules differ, so a refused one is listed. Raises NoAnswer."""
+    names = setting_names((yield from motors(state)))
+    found: list[Reading] = []
+    unread: list[tuple[str, str]] = []
+    for done, name in enumerate(names):
+        progress(done, len(names))
+        try:
+            found.append(reading(name, (yield from read(state, _call(name, Command.GAP)))))
+        except Refused as refusal:
+            unread.append((name, str(refusal)))
+    progress(len(names), len(names))
+    return Readings(tuple(found), tuple(unread))
+
+
+def plan(state: TmclState, present: Readings, wanted: Mapping[str, Value], allowed: Permission) -> Plan:
+    """Order the steps to the wanted values. Raises Diagnostic."""
+    return _plan(state.motors or 1, present, wanted, allowed)
+
+
+def conflict(plan: Plan, others: Collection[str]) -> str:
+    """Return the reason for which an address is another module's; empty: it is none's."""
+    numbers = [str(change.after) for change in plan if change.name == ADDRESS]
+    return f"another module of the line has address {numbers[0]}" if numbers and numbers[0] in others else ""
+
+
+def ready(state: TmclState) -> Procedure[str]:
+    """Return the reason for which settings must not change now; empty: there is none."""
+    return f"{who(state)} moves: stop it first" if (yield from moving(state)) else ""
+
+
+def write(state: TmclState, change: Change) -> Procedure[None]:
+    """Send one step, and make sure of it. A module keeps global parameters by itself."""
+    yield from perform(state, change.text)
+
+
+def save(state: TmclState) -> Procedure[None]:
+    """Store the axis parameters in EEPROM, one by one; a module may lack some."""
+    for name in setting_names((yield from motors(state))):
+        if not name.startswith(GLOBAL_PREFIX):
+            call = _call(name, Command.GAP)
+            try:
+                yield from perform(state, f"STAP {call.type}, {call.motor}")
+            except Refused as refusal:
+                if refusal.code not in NOT_STORED:
+                    raise
+
+
+PARAMETERS = Parameters(
+    read=read_settings,
+    plan=plan,
+    ready=ready,
+    write=write,
+    save=save,
+    language="TMCL",
+    saving="STAP",
+    conflict=conflict,
+)
+
+
+STATE = (Axis.TARGET_POSITION, Axis.POSITION_REACHED)
+SWITCHES = ((Axis.HOME_SWITCH, "home"), (Axis.RIGHT_SWITCH, "lim+"), (Axis.LEFT_SWITCH, "lim-"))
+RAMP = (Axis.MAXIMUM_VELOCITY, Axis.MAXIMUM_ACCELERATION)
+SETTINGS = (Axis.RUN_CURRENT, Axis.STANDBY_CURRENT, Axis.FREEWHEELING, *RAMP)
+ABSENT = "absent"
+"""A parameter that the module refuses: it lacks it."""
+FULL_CURRENT = 255
+
+
+def parts(state: TmclState, facts: Facts) -> Sequence[Part[TmclState]]:
+    """The parts of a module, for each motor that was counted; at first they are counted."""
+    if not state.motors:
+        return (Part("motors", _count),)
+    found: list[Part[TmclState]] = []
+    for motor in range(state.motors):
+        asked = [*STATE, *(axis for axis, _ in SWITCHES if facts.get(_key(axis, motor)) != ABSENT)]
+        found.append(Part(f"motor {motor}", partial(_parameters, motor=motor, wanted=asked)))
+        found += [
+            Part(_key(axis, motor), partial(_parameters, motor=motor, wanted=(axis,)), slow=True) for axis in SETTINGS
+        ]
+    return found
+
+
+def _key(axis: Axis, motor: int) -> str:
+    return f"{axis.name} {motor}"
+
+
+def _count(state: TmclState) -> Procedure[Facts]:
+    yield from motors(state, Priority.POLL)
+    return {}
+
+
+def _parameters(state: TmclState, motor: int, wanted: Sequence[Axis]) -> Procedure[Facts]:
+    found: dict[str, int | str] = {}
+    for axis in wanted:
+        try:
+            found[_key(axis, motor)] = yield from read(state, Call(Command.GAP, axis, motor), Priority.POLL)
+        except Refused:
+            found[_key(axis, motor)] = ABSENT
+    return found
+
+
+def fold(state: TmclState, facts: Facts) -> tuple[Conditions, ...]:
+    """The conditions of each motor."""
+    return tuple(_conditions(state, facts, motor) for motor in range(state.motors))
+
+
+def _conditions(state: TmclState, facts: Facts, motor: int) -> Conditions:
+    target = _whole(facts, Axis.TARGET_POSITION, motor)
+    reached = _whole(facts, Axis.POSITION_REACHED, motor)
+    return Conditions(
+        axis=str(motor) if state.motors > 1 else "",
+        lamps=tuple(_lamps(facts, motor)),
+        target=None if reached else target,
+        run_current=_percent(facts, Axis.RUN_CURRENT, motor),
+        hold_current=_percent(facts, Axis.STANDBY_CURRENT, motor),
+        released=_released(facts, motor),
+        unit="microsteps",
+        pace=_pace(facts, motor),
+    )
+
+
+def _whole(facts: Facts, axis: Axis, motor: int) -> int | None:
+    value = facts.get(_key(axis, motor))
+    return value if isinstance(value, int) else None
+
+
+def _percent(facts: Facts, axis: Axis, motor: int) -> int | None:
+    value = _whole(facts, axis, motor)
+    return None if value is None else round(value * 100 / FULL_CURRENT)
+
+
+def _released(facts: Facts, motor: int) -> str:
+    """The reason for which no current holds the motor at rest."""
+    if _whole(facts, Axis.STANDBY_CURRENT, motor) == 0:
+        return "parameter 7 is 0"
+    return "freewheels: parameter 204" if _whole(facts, Axis.FREEWHEELING, motor) else ""
+
+
+def _lamps(facts: Facts, motor: int) -> Iterator[Lamp]:
+    for axis, function in SWITCHES:
+        if isinstance(value := facts.get(_key(axis, motor)), int):
+            yield Lamp("", function, bool(value))
+
+
+def _pace(facts: Facts, motor: int) -> Pace | None:
+    """One ramp up and down; older modules count it in units of their chip, so it may be another."""
+    speed, ramp = (_whole(facts, axis, motor) for axis in RAMP)
+    return Pace(0, speed, ramp, ramp) if speed and ramp else None
+
+
+READER = Reader(parts=parts, fold=fold)
+
+
+_AXIS_WORD = re.compile(r"AP(\d{1,3})(?:/(\d))?", re.IGNORECASE | re.ASCII)
+
+
+def check(state: TmclState, word: str) -> str:
+    """Check that a word names an axis parameter."""
+    found = _AXIS_WORD.fullmatch(word)
+    if found is None or int(found[1]) > 255:
+        raise Diagnostic(
+            f"{word} cannot be plotted", hint="valid: AP and a parameter, /MOTOR after it; as AP206, AP1/1"
+        )
+    return word.upper()
+
+
+def again(state: TmclState, word: str, priority: Priority) -> Procedure[float]:
+    """Read a parameter. The manual has none whose reading changes the module."""
+    found = _AXIS_WORD.fullmatch(word)
+    assert found is not None
+    return float((yield from read(state, Call(Command.GAP, int(found[1]), int(found[2] or 0)), priority)))
+
+
+READINGS = PolledValues(check=check, first=lambda state, word: again(state, word, Priority.OPERATOR), again=again)
+
+
+def take(state: TmclState, progress: Progress) -> Procedure[Snapshot]:
+    """Read a module. Raises NoAnswer."""
+    readings = yield from read_settings(state, progress)
+    remarks = []
+    if active := (yield from moving(state)):
+        remarks.append("moving while it was read: its position is one of that moment")
+    if (count := (yield from motors(state))) > 1:
+        remarks.append(f"it has {count} motors; a simulated module has one")
+    code = readings.values.get(f"G{int(Global.BAUD)}")
+    return Snapshot(
+        kind="tmcl",
+        product=state.product,
+        version=_version(state),
+        name=state.address,
+        baud=BAUDS.get(code, 0) if isinstance(code, int) else 0,
+        readings=readings,
+        counters={"position": ((yield from read(state, Call(Command.GAP, Axis.ACTUAL_POSITION, 0))),)},
+        active=active,
+        remarks=tuple(remarks),
+    )
+
+
+def _version(state: TmclState) -> str:
+    """Module and firmware as the module's text form has them, `1241V115`; empty where it does not report them."""
+    module, (major, _, minor) = state.product.rpartition("-")[2], state.version.partition(".")
+    return f"{module}V{major}{minor}" if module.isdecimal() and major else ""
+
+
+NO_ENABLE = "direct mode has no command for it"
+ONE_WAY = "axis parameter 193 chooses the direction of a reference search"
+
+
+def controls(state: TmclState, axis: str) -> Controls:
+    """The controls of one motor."""
+    motor = axis or "0"
+    counted = RELATIVE_FROM.get(state.relative.get(int(motor), -1), "from where it counts is not known")
+    return {
+        BY: Control((f"MVP REL, {motor}, {{by}}",), counted),
+        TO: Control((f"MVP ABS, {motor}, {{to}}",)),
+        HOME_MINUS: Control((f"RFS START, {motor}",), "reference search, in the mode of axis parameter 193"),
+        HOME_PLUS: Control(absent=ONE_WAY),
+        STOP: Control((f"MST {motor}",), "slows down"),
+        ENABLE: Control(absent=NO_ENABLE),
+        DISABLE: Control(absent=NO_ENABLE),
+    }
