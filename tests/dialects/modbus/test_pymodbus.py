@@ -25,8 +25,8 @@ from pymodbus.pdu.register_message import ReadHoldingRegistersRequest, WriteMult
 
 from multidrop.dialects import End, Kind, Request
 from multidrop.dialects.modbus.host import framing, mapping
-from multidrop.dialects.modbus.host.codec import Modbus, ModbusState
-from multidrop.dialects.modbus.host.framing import NotModbus, pdu_codec
+from multidrop.dialects.modbus.host.codec import Modbus, ModbusState, pdu_codec
+from multidrop.dialects.modbus.host.framing import NotModbus
 from multidrop.dialects.modbus.manual.registers import REGISTERS
 from tests.support.paths import ROOT
 from tests.support.until import PATIENCE
