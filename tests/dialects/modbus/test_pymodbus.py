@@ -224,7 +224,7 @@ def test_it_is_silent_even_where_the_root_logs_everything() -> None:
     done = python(
         "import logging\n"
         "logging.basicConfig(level=logging.DEBUG)\n"
-        "from multidrop.dialects.modbus.host.framing import pdu_codec\n"
+        "from multidrop.dialects.modbus.host.codec import pdu_codec\n"
         "made = pdu_codec()\n"
         "print(made._decoder.decode(bytes.fromhex('8001')), made._decoder.decode(b'\\x03\\x09\\x00'))\n"
         "made._framer.handleFrame(bytes.fromhex('00070001000301830201'), 1, 7)\n"
