@@ -11,11 +11,12 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 
+from multidrop.dialects.mcode.host.wording import who
+
 from multidrop.dialects.codec import Priority, Procedure
 from multidrop.dialects.errors import Diagnostic, Inexpressible, NoAnswer, Refused
 from multidrop.dialects.mcode.host import snapshot
 from multidrop.dialects.mcode.host.parameters import rows_of_list
-from multidrop.dialects.mcode.host.wording import who
 from multidrop.dialects.mcode.manual import parameter_plan, points
 from multidrop.dialects.mcode.manual import parameters as manual
 from multidrop.dialects.mcode.manual.parameters import reading_of
