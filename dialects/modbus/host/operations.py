@@ -10,13 +10,8 @@ from collections.abc import Iterator, Sequence
 
 from multidrop.dialects.codec import Priority, Procedure
 from multidrop.dialects.errors import Inexpressible, NoAnswer, Refused
-<<<<<<< HEAD
-from multidrop.dialects.family import Motion
-from multidrop.dialects.mcode.host.state import who
-=======
 from multidrop.dialects.family import Hints, Motion
-from multidrop.dialects.mcode.host.wording import who
->>>>>>> 9c377cb5 (Coarser dialects: one file for what a family reads, one exchange for replies without numbers)
+from multidrop.dialects.mcode.host.state import who
 from multidrop.dialects.mcode.manual import grammar
 from multidrop.dialects.mcode.manual.points import STATUS, in_words
 from multidrop.dialects.modbus.host import framing, mapping

@@ -11,12 +11,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 
-from multidrop.dialects.mcode.host.wording import who
-
 from multidrop.dialects.codec import Priority, Procedure
 from multidrop.dialects.errors import Diagnostic, Inexpressible, NoAnswer, Refused
-from multidrop.dialects.mcode.host import snapshot
 from multidrop.dialects.mcode.host.parameters import rows_of_list
+from multidrop.dialects.mcode.host.readings import SNAPSHOT_WORDS, snapshot_of
+from multidrop.dialects.mcode.host.state import who
 from multidrop.dialects.mcode.manual import parameter_plan, points
 from multidrop.dialects.mcode.manual import parameters as manual
 from multidrop.dialects.mcode.manual.parameters import reading_of
@@ -230,12 +229,12 @@ def take(state: ModbusState, progress: Progress) -> Procedure[Snapshot]:
     if not state.serial:
         state.serial_read((yield from identification(state)).get(SERIAL, ""))
     known, now = words(state.product), {}
-    for word in snapshot.ASKED:
+    for word in SNAPSHOT_WORDS:
         if word in known and state.product in known[word].products:
             now[word] = yield from _count(state, word)
     if "I5" in now:
         now["I5"] *= DIVIDED
-    return snapshot.made(state, replace(readings, unread=(*readings.unread, NO_PROGRAM)), now)
+    return snapshot_of(state, replace(readings, unread=(*readings.unread, NO_PROGRAM)), now)
 
 
 def _count(state: ModbusState, word: str) -> Procedure[int]:
