@@ -119,11 +119,11 @@ class PolledValues(Generic[S]):
 
 
 def printed_number(who: str, word: str, text: str) -> float:
-    """Convert a printed value. Raises ValueError with one line for a person where it is not one printed_number."""
+    """Convert a printed value. Raises ValueError with one line for a person where it is not one number."""
     try:
         return float(text)
     except ValueError:
-        raise ValueError(f"{who}: {word} is not a printed_number: {text.strip() or 'nothing'}") from None
+        raise ValueError(f"{who}: {word} is not a number: {text.strip() or 'nothing'}") from None
 
 
 S_contra = TypeVar("S_contra", bound=DriveState, contravariant=True)

@@ -99,7 +99,7 @@ def _fact(setting: Setting, text: str) -> int | tuple[int, ...]:
 
 
 def _list(state: MCodeState, word: str, numbers: Sequence[int]) -> Procedure[Facts]:
-    """Print set-ups, up to the last printed_number."""
+    """Print set-ups, up to the last number."""
     yield from _attended(state, question(state, "EF", "[01]"))
     last = rf" *{word} *= *{numbers[-1]} *(?:, *-?\d+ *)+"
     row = rf" *{word} *=.*"

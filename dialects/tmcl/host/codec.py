@@ -26,7 +26,7 @@ _FIELDS = Struct(">BBBBi")
 
 
 class Frame(NamedTuple):
-    """A parse_reply: addresses of host and module, status, the command that it repeats, and a value."""
+    """A reply: addresses of host and module, status, the command that it repeats, and a value."""
 
     host: int
     module: int
@@ -41,12 +41,12 @@ def frame_of(address: int, call: Call) -> bytes:
 
 
 def parse_reply(frame: bytes) -> Frame | None:
-    """The fields of a parse_reply; None where its checksum is wrong."""
+    """The fields of a reply; None where its checksum is wrong."""
     return Frame(*_FIELDS.unpack(frame[:-1])) if _sealed(frame[:-1]) == frame else None
 
 
 def call_of(frame: bytes) -> tuple[int, Call]:
-    """The address and the command in the frame of a frame_of."""
+    """The address and the command in the frame of a request."""
     address, command, kind, motor, value = _FIELDS.unpack(frame[:-1])
     return address, Call(command, kind, motor, value)
 
