@@ -21,7 +21,7 @@ from multidrop.transports import TransportLost
 
 if TYPE_CHECKING:
     from multidrop.drives.drive import Drive
-    from multidrop.shell.roles import Commands
+    from multidrop.shell.session import Session
     from multidrop.shell.workspace import Workspace
 
 PERIOD = 0.1
@@ -45,9 +45,9 @@ Start = Callable[[Any, str], Procedure[None]]
 class Debugger:
     """Observation of one drive's program. Its methods raise what the conversations of `Debugging` raise."""
 
-    def __init__(self, workspace: Workspace, drive: Drive, debugging: Debugging[Any]) -> None:
-        self._workspace, self._drive, self._debugging = workspace, drive, debugging
-        self._listing = Listing(workspace.settings.state, drive.programs)
+    def __init__(self, session: Session, drive: Drive, debugging: Debugging[Any]) -> None:
+        self._session, self._drive, self._debugging = session, drive, debugging
+        self._listing = Listing(session.settings.state, drive.programs)
         self._commands = -1
         """The commands to the drive when the listing was read, ours included: after another one it is read again."""
         self._stops = drive.link.stops
@@ -62,48 +62,48 @@ class Debugger:
         self.break_point = ""
         """The place of the break point that this session has set; empty: none."""
         self._watched = Watched()
-        self._sight = Sight(workspace, drive)
+        self._sight = Sight(session, drive)
         self._checks: set[asyncio.Task[None]] = set()
-        self._unsubscribe = workspace.subscribe(self._notice)
+        self._unsubscribe = session.subscribe(self._notice)
 
     # Starting
 
-    async def trace(self, commands: Commands, place: str) -> None:
+    async def trace(self, place: str) -> None:
         """Run a program, and show its lines until it ends or comes to its break point."""
-        others = [each.address for each in self._workspace.bus(self._drive.link.name).all_drives]
-        with _annotating(self._workspace, self._drive.link.name, self._annotated):
-            await self._start(commands, place, others, self._debugging.trace)
+        others = [each.address for each in self._session.bus(self._drive.link.name).all_drives]
+        with _annotating(self._session, self._drive.link.name, self._annotated):
+            await self._start(place, others, self._debugging.trace)
             await self._follow()
 
-    async def begin(self, commands: Commands, place: str) -> None:
+    async def begin(self, place: str) -> None:
         """Start a program that waits before each line."""
-        await self._start(commands, place, None, self._debugging.begin)
+        await self._start(place, None, self._debugging.begin)
         self.break_point, self._waits = "", True
         self._sight.breaks("")
         first = self._debugging.address(self._listing.rows, self._place)
         for row in self._listing.around(first):
-            self._workspace.output(row)
+            self._session.output(row)
         self._sight.seen(first, Phase.BEFORE)
         self.say(f"waits before the first line of {self._place}: {WAYS}")
 
-    async def _start(self, commands: Commands, place: str, neighbours: Neighbours | None, start: Start) -> None:
+    async def _start(self, place: str, neighbours: Neighbours | None, start: Start) -> None:
         """Start a program, once it is known that it can be started."""
         await self._read_listing()
         place = place.upper() or self._debugging.entry(self._listing.rows)
         await self._run(self._debugging.idle(self._drive.state, place, neighbours))
         self._place, self._last = place, None
-        self._last_at = self._free_at = self._workspace.now()
-        commands.starting(self._drive)
+        self._last_at = self._free_at = self._session.now()
+        self._session.starting(self._drive)
         await self._run(start(self._drive.state, place))
 
-    async def step(self, commands: Commands) -> None:
+    async def step(self) -> None:
         """Execute one line; show it, and the watched values that it changed."""
         if self._debugging.no_step:
-            name = self._workspace.display_name(self._drive)
+            name = self._session.display_name(self._drive)
             raise Inexpressible(f"{name}: {self._debugging.no_step}; nothing was sent")
         await self._check_waits()
         await self._read_listing()
-        commands.starting(self._drive)
+        self._session.starting(self._drive)
         self._waits = True
         stepped = await self._run(self._debugging.step(self._drive.state, self._listing.rows))
         self._executed(stepped.row, stepped.hold)
@@ -111,23 +111,23 @@ class Debugger:
         try:
             changed = await self._changed()
         finally:  # the line was executed, whatever becomes of the values
-            self._workspace.output(self._listing.shown(stepped.row) + changed)
+            self._session.output(self._listing.shown(stepped.row) + changed)
             self._sight.seen(stepped.row.address, Phase.AFTER)
         if not (await self._look()).runs:
             self.say("the program has ended")
 
     async def _check_waits(self) -> None:
         """Raise Refused unless it is known that the program waits."""
-        left = self._free_at - self._workspace.now()
+        left = self._free_at - self._session.now()
         if left > 0 and self._last is not None:
-            name = self._workspace.display_name(self._drive)
+            name = self._session.display_name(self._drive)
             raise Refused(f"{name}: '{self._last.text}' holds for another {left:.1f} s; no key was sent")
         await self._run(self._debugging.waits(self._drive.state, self._place, self._last))
 
-    async def go_on(self, commands: Commands) -> None:
+    async def go_on(self) -> None:
         """Let the program run on at normal speed."""
         await self._check_waits()
-        commands.starting(self._drive)
+        self._session.starting(self._drive)
         await self._run(self._debugging.go_on(self._drive.state, self._place))
         self._waits = False
         self._sight.seen(None)
@@ -141,7 +141,7 @@ class Debugger:
             await asyncio.sleep(PERIOD)
             look = await self._look()
             if look.address is not None and (row := self._listing.row(look.address)) != self._last:
-                self._workspace.output(self._listing.shown(row))
+                self._session.output(self._listing.shown(row))
                 self._last = row
                 self._sight.seen(row.address)
             if not look.runs:
@@ -162,7 +162,7 @@ class Debugger:
 
     async def _broken(self) -> int | None:
         """The address of the break point, if the program waits there: the trace is quiet, and no hold is the reason."""
-        quiet = self._workspace.now() - max(self._last_at, self._free_at)
+        quiet = self._session.now() - max(self._last_at, self._free_at)
         if not self.break_point or self._last is None or quiet < QUIET:
             return None
         procedure = self._debugging.broken(self._drive.state, self._listing.rows, self._last, self.break_point)
@@ -177,7 +177,7 @@ class Debugger:
         """Show where the program waits: the listing around the line that comes next, and the watched values."""
         self._waits = True
         for row in self._listing.around(address):
-            self._workspace.output(row)
+            self._session.output(row)
         self._sight.seen(address, Phase.BEFORE)
         where = f" at the break point {self.break_point}" if self.break_point and address is not None else ""
         self.say(f"the program waits{where}: {WAYS}{await self._changed()}")
@@ -192,7 +192,7 @@ class Debugger:
         return self._listing.shown(row)
 
     def _executed(self, row: Row, hold: float | None) -> None:
-        self._last, self._last_at = row, self._workspace.now()
+        self._last, self._last_at = row, self._session.now()
         self._free_at = self._last_at + (LONGEST_HOLD if hold is None else hold)
 
     # Break points
@@ -231,7 +231,7 @@ class Debugger:
         if upper:
             shown = await self._changed()
             absent = f"   not there now: {', '.join(self._watched.missing)}" if self._watched.missing else ""
-            self._workspace.output((shown + absent).strip())
+            self._session.output((shown + absent).strip())
 
     async def _changed(self) -> str:
         """Read what is watched; return the values that changed, as a person reads them."""
@@ -245,7 +245,7 @@ class Debugger:
         """Read the program of the drive, unless only we have commanded it since."""
         if self._commands != self._drive.commands:
             rows = await self._drive.run(self._debugging.listing(self._drive.state))
-            self._listing = Listing(self._workspace.settings.state, self._drive.programs, rows)
+            self._listing = Listing(self._session.settings.state, self._drive.programs, rows)
             self._commands = self._drive.commands
             self._sight.read(self._listing)
 
@@ -283,7 +283,7 @@ class Debugger:
             self.say(f"stopped: no program runs, and single step is over{left}")
 
     def close(self) -> None:
-        """See `workspace.Observer`."""
+        """See `session.Observer`."""
         self._unsubscribe()
         self._say_left()
 
@@ -308,8 +308,8 @@ class Debugger:
 
     def say(self, text: str, *, warning: bool = False) -> None:
         """Publish a notice about the drive."""
-        self._workspace.notify(
-            f"{self._workspace.display_name(self._drive)}: {text}", bus=self._drive.link.name, warning=warning
+        self._session.notify(
+            f"{self._session.display_name(self._drive)}: {text}", bus=self._drive.link.name, warning=warning
         )
 
 
@@ -326,15 +326,15 @@ def _annotating(workspace: Workspace, bus: str, annotate: Callable[[str], str]) 
             del workspace.annotators[bus]
 
 
-def of(workspace: Workspace, drive: Drive) -> Debugger:
+def of(session: Session, drive: Drive) -> Debugger:
     """Find the debugger of a drive, or make it. Raises Inexpressible where its family has none."""
-    found = workspace.debuggers.get(drive)
+    found = session.debuggers.get(drive)
     if isinstance(found, Debugger):
         return found
     debugging = drive.family.debugging
     if debugging is None:
-        raise Inexpressible(f"{workspace.display_name(drive)}: programs of its family cannot be observed")
-    made = workspace.debuggers[drive] = Debugger(workspace, drive, debugging)
+        raise Inexpressible(f"{session.display_name(drive)}: programs of its family cannot be observed")
+    made = session.debuggers[drive] = Debugger(session, drive, debugging)
     return made
 
 

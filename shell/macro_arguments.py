@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from functools import partial
 
 from multidrop.dialects import Diagnostic
-from multidrop.macros import Macro, Parameter, checked_values, missing
+from multidrop.macros import Macro, Parameter, checked_values, is_role, missing
 from multidrop.macros.parameters import written
 from multidrop.shell.channel import Field
 from multidrop.shell.workspace import Workspace
@@ -92,3 +94,33 @@ def unbound(workspace: Workspace, macro: Macro, role: str) -> Diagnostic:
     """The failure of a role without a bus."""
     hint = f"--role {role}=URL opens one; /play {macro.name} {role}=BUS takes an open one"
     return Diagnostic(f"no bus for the role {role}", f"macro {macro.name}", hint)
+
+
+# The recording that is not ended
+
+
+def roles_in(macro: Macro, buses: list[str]) -> tuple[str, ...]:
+    """The buses that its lines name, if several are open: names for next year's buses."""
+    if len(buses) < 2:
+        return ()
+    named = {bus: re.compile(rf"(?<![\w:/.-]){re.escape(bus)}:") for bus in buses if is_role(bus)}
+    return tuple(bus for bus, place in named.items() if any(map(place.search, macro.lines)))
+
+
+def keep_unended(workspace: Workspace) -> str:
+    """Save a recording that was not ended under a name that no macro has; return what was done, in one line."""
+    recorder, store = workspace.recorder, workspace.macros
+    if not recorder.name:
+        return ""
+    try:
+        macro = recorder.macro()
+    except Diagnostic as problem:
+        return f"the recording was not ended; {problem}"
+    try:
+        name = macro.name if store.contents(macro.name) is None else store.free_name(macro.name)
+        path = store.save(replace(macro, name=name, roles=roles_in(macro, list(workspace.buses))))
+    except Diagnostic as problem:
+        return f"the recording was not ended, and is lost: {problem}"
+    finally:
+        recorder.discard()
+    return f"the recording {macro.name} was not ended: {macro.length} kept in {path}"

@@ -12,7 +12,9 @@ from typing import Protocol
 
 FOREVER = "forever"
 """The word for rounds without an end."""
-_roles: ContextVar[Mapping[str, str]] = ContextVar("roles", default=MappingProxyType({}))
+NO_ROLES: Mapping[str, str] = MappingProxyType({})
+"""No bus plays a role."""
+_roles: ContextVar[Mapping[str, str]] = ContextVar("roles", default=NO_ROLES)
 
 
 class Progress(Protocol):

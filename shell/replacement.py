@@ -28,8 +28,7 @@ from multidrop.simulator.families import family_of, snapshots_of
 if TYPE_CHECKING:
     from multidrop.dialects.values import Snapshot
     from multidrop.drives.drive import Drive
-    from multidrop.shell.roles import Commands
-    from multidrop.shell.workspace import Workspace
+    from multidrop.shell.session import Session
     from multidrop.simulator.cell.spec import Cell, DriveSpec
     from multidrop.simulator.family import Snapshots
 
@@ -68,11 +67,9 @@ def chosen(cell: Cell, file: str, drive: Drive, name: str, several: bool = False
     raise Diagnostic(what, file, hint)
 
 
-async def apply(
-    workspace: Workspace, commands: Commands, drive: Drive, file: str, spec: DriveSpec, wanted: Wanted
-) -> None:
+async def apply(session: Session, drive: Drive, file: str, spec: DriveSpec, wanted: Wanted) -> None:
     """Put the state of a drive in a file onto a drive. Raises Diagnostic, DriveError or TransportLost."""
-    await _Replacement(workspace, commands, drive, file, spec, wanted).run()
+    await _Replacement(session, drive, file, spec, wanted).run()
 
 
 class _Replacement:
@@ -80,14 +77,13 @@ class _Replacement:
 
     def __init__(
         self,
-        workspace: Workspace,
-        commands: Commands,
+        session: Session,
         drive: Drive,
         file: str,
         spec: DriveSpec,
         wanted: Wanted,
     ) -> None:
-        self._workspace, self._commands, self._drive, self._file = workspace, commands, drive, file
+        self._session, self._drive, self._file = session, drive, file
         self._spec, self._wanted, self._parameters = spec, wanted, parameters(drive)
         self._settings = _tables(spec).wanted(spec)
         self._program = _tables(spec).program(spec)
@@ -97,11 +93,11 @@ class _Replacement:
 
     @property
     def _name(self) -> str:
-        return self._workspace.display_name(self._drive)
+        return self._session.display_name(self._drive)
 
     async def run(self) -> None:
         """Read, show, ask, write, verify."""
-        now = await snapshots.read(self._workspace, self._drive)
+        now = await snapshots.read(self._session, self._drive)
         here = _spec(now)
         self._check(now, here)
         changes = self._show(now, here)
@@ -109,11 +105,11 @@ class _Replacement:
             return
         await self._check_ready()
         steps = ", ".join(changes) if changes else f"nothing differs, {self._parameters.saving} saves it"
-        await self._workspace.confirm(f"it gets the state of {self._spec.name!r} in {self._file}: {steps}", self._name)
+        await self._session.confirm(f"it gets the state of {self._spec.name!r} in {self._file}: {steps}", self._name)
         await self._check_ready()  # a person may have thought about it for long
         with self._reporting():
             await self._write(here)
-            now = await snapshots.read(self._workspace, self._drive)
+            now = await snapshots.read(self._session, self._drive)
         self._verify(_spec(now))
 
     @property
@@ -134,7 +130,7 @@ class _Replacement:
             raise Diagnostic(what, self._name, "a drive of its family is needed")
         if here.personality != spec.personality and not self._wanted.other_product:
             raise Diagnostic(what, self._name, "--other-product applies it all the same")
-        bus = self._workspace.buses[self._drive.link.name]
+        bus = self._session.buses[self._drive.link.name]
         others = [each for each in bus.drives.values() if each is not self._drive]
         if any(spec.name in (each.address, each.state.name) for each in others):
             raise Diagnostic(f"another drive on {bus.name} is named {spec.name!r}; nothing was sent", self._name)
@@ -158,7 +154,7 @@ class _Replacement:
 
     def _show(self, now: Snapshot, here: DriveSpec) -> list[str]:
         """Publish everything that will happen; return it in short."""
-        out, spec = self._workspace.output, self._spec
+        out, spec = self._session.output, self._spec
         for key in ("part", "version", "serial"):
             mine, theirs = getattr(here.identity, key), getattr(spec.identity, key)
             if theirs and mine != theirs:
@@ -188,7 +184,7 @@ class _Replacement:
             out(f"{self._name}: {name} is left alone: {reason}")
         if unread := [name for name, _ in now.readings.unread]:
             text = f"{self._name}: no snapshot has what a drive does not print; check it: {', '.join(unread)}"
-            self._workspace.notify(text, warning=True)
+            self._session.notify(text, warning=True)
         out(f"{self._name}: saved at the end ({self._parameters.saving}); its position is not changed")
         for name in final:
             if name in self._parameters.later:
@@ -219,7 +215,7 @@ class _Replacement:
         except BaseException:
             done = "; ".join(self._done) or "nothing"
             text = f"{self._name}: cut off; done: {done}; run it again to go on{self._found_again()}"
-            self._workspace.notify(text, warning=True)
+            self._session.notify(text, warning=True)
             raise
 
     def _found_again(self) -> str:
@@ -250,18 +246,18 @@ class _Replacement:
         text = "".join(f"{line}\n" for line in (*first, *self._program.file))
         name = f"{self._file}#{self._spec.name}"
         saved = transfers.Wanted(save=True)
-        await transfers.download(self._workspace, self._commands, self._drive, name, saved, text)
+        await transfers.download(self._session, self._drive, name, saved, text)
         self._done.append("program")
 
     async def _change(self, communication: bool) -> int:
         """Write the settings that differ now, those of communication in their order; return how many."""
-        drive, workspace = self._drive, self._workspace
+        drive, workspace = self._drive, self._session
         workspace.addressed.add((drive.link.name, drive.address))
         steps = self._plan(await read(workspace, drive, "apply"), communication)
         with running(workspace, f"{self._name}: apply") as progress:
             for number, each in enumerate(steps, 1):
                 if each.name in self._wanted.named and drive.starts(each.text):
-                    self._commands.starting(drive)
+                    self._session.starting(drive)
                 await transferring(drive, self._parameters.write(drive.state, each))
                 self._done.append(each.text)
                 progress(number, len(steps))
@@ -280,7 +276,7 @@ class _Replacement:
             wrong.append("its program")
         if wrong:
             raise DriveError(f"{self._name} is not as {self._spec.name!r} in {self._file}: {'; '.join(wrong)}")
-        self._workspace.notify(f"{self._name}: verified: it is as {self._spec.name!r} in {self._file}", outcome=True)
+        self._session.notify(f"{self._name}: verified: it is as {self._spec.name!r} in {self._file}", outcome=True)
 
 
 def _tables(spec: DriveSpec) -> Snapshots:

@@ -1,22 +1,13 @@
-"""The parts that a session plays for what is below it, as Protocols: its commands, a log, a plot, an observer."""
+"""The parts that a session plays for what is below it, as Protocols: a log, a plot, an observer."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
-from types import MappingProxyType
 from typing import TYPE_CHECKING, NamedTuple, Protocol
-
-from multidrop.shell.events import By
 
 if TYPE_CHECKING:
     from multidrop.drives.bus import Bus
-    from multidrop.drives.drive import Drive
-    from multidrop.macros import Macro
-
-
-NO_ROLES: Mapping[str, str] = MappingProxyType({})
-"""No bus plays a role."""
 
 
 DIFFERENCE = "difference"
@@ -40,51 +31,6 @@ class Series(NamedTuple):
         """The text that a person types for it: `press:b.I1`."""
         target = f"{self.bus}:{self.address}"
         return f"{target}.{self.word}" if self.word else target
-
-
-class Commands(Protocol):
-    """The operations of the running session that a verb may use."""
-
-    async def open(self, url: str, name: str | None = None, *, raw: bool = False) -> object:
-        """Open a URL or a saved connection; `raw`: look for no drives."""
-
-    async def close_bus(self, name: str) -> None:
-        """Close a bus."""
-
-    def url_of(self, bus: Bus) -> str:
-        """The URL that opens a bus again."""
-
-    async def run(self, line: str, by: By = By.OPERATOR, since: int | None = None) -> None:
-        """Run a line."""
-
-    async def play(
-        self,
-        macro: Macro,
-        values: Mapping[str, str],
-        *,
-        times: int | None = 1,
-        fast: bool = False,
-        roles: Mapping[str, str] = NO_ROLES,
-    ) -> None:
-        """Play a macro to its end; `times` None: until it is ended. `roles`: the bus for each role."""
-
-    async def raw_on(self, bus: Bus) -> None:
-        """Put a bus into raw mode."""
-
-    async def raw_off(self, bus: Bus) -> None:
-        """End raw mode, and find the drives of a bus."""
-
-    async def send_bytes(self, bus: Bus, data: bytes, by: By) -> None:
-        """Write bytes on a bus in raw mode."""
-
-    async def guard(self, drive: Drive, text: str, by: By = By.OPERATOR) -> None:
-        """Ask before a guarded line."""
-
-    def starting(self, drive: Drive) -> None:
-        """Note that the next request can start motion or a program."""
-
-    def quit(self) -> None:
-        """Ask the front end to end."""
 
 
 class Observer(Protocol):

@@ -10,13 +10,13 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-from collections.abc import Iterator, Mapping, Sequence
+import importlib
+from collections.abc import Iterator, Sequence
 from contextvars import ContextVar
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from multidrop.dialects import Diagnostic, DriveError, Refused, Stopped
-from multidrop.macros import Macro
 from multidrop.shell.automation import ENDING, Automations, only_ends
 from multidrop.shell.connect.opening import open_buses
 from multidrop.shell.connect.settings import Settings
@@ -25,7 +25,6 @@ from multidrop.shell.lines import EVERYONE, DriveLine, VerbLine, join_target, pa
 from multidrop.shell.motion import in_motion
 from multidrop.shell.openings import Openings
 from multidrop.shell.playing import played_by
-from multidrop.shell.roles import NO_ROLES
 from multidrop.shell.twins import Twins
 from multidrop.shell.workspace import LATCHED, Workspace
 
@@ -35,10 +34,11 @@ if TYPE_CHECKING:
     from multidrop.shell.connect.opening import Opener
     from multidrop.shell.openings import Failed as OpeningFailed
     from multidrop.shell.raw import RawLine
-    from multidrop.shell.scripts.model import Watcher
 
 _published: ContextVar[list[BaseException] | None] = ContextVar("published", default=None)
 """The failures published so far in this task's outermost `run`."""
+VERBS = "multidrop.shell.verbs.table"
+"""The verbs, loaded with the first one. They work on a session, so a session has only their name."""
 
 
 class Session(Workspace):
@@ -97,7 +97,7 @@ class Session(Workspace):
     async def close(self) -> None:
         """Close everything: tasks, plots, log, buses. Moves nothing, stops no drive. May be called again."""
         if self.recording:
-            from multidrop.shell.verbs.recording import keep_unended
+            from multidrop.shell.macro_arguments import keep_unended
 
             self.notify(keep_unended(self), warning=True)
         for task in [*self._background]:
@@ -149,11 +149,10 @@ class Session(Workspace):
                 raise
 
     async def _run_verb(self, line: str, parsed: VerbLine, by: By) -> None:
-        from multidrop.shell.verbs.table import Call, find
-
         self.publish(Entered(self.now(), line, by))
-        verb = find(parsed.name)
-        call = Call(self, self, verb, parsed.rest, by)
+        verbs = importlib.import_module(VERBS)
+        verb = verbs.find(parsed.name)
+        call = verbs.Call(self, verb, parsed.rest, by)
         self._allow(by)
         if verb.recorded is not None and by is not By.MACRO:
             self.recorder.record(verb.recorded(call), self.now())
@@ -279,28 +278,6 @@ class Session(Workspace):
         except FAILURES:
             return False  # published as a Failed event
         return True
-
-    async def play(
-        self,
-        macro: Macro,
-        values: Mapping[str, str],
-        *,
-        times: int | None = 1,
-        fast: bool = False,
-        roles: Mapping[str, str] = NO_ROLES,
-        watcher: Watcher | None = None,
-    ) -> None:
-        """Play a macro to its end, listed in `playing` meanwhile. Its early end stops what it started.
-
-        It is checked whole first. `times` None: until it is ended. `fast`: without recorded pauses. `roles`: the bus
-        for each role. A line without an address goes to the drive that was selected when the macro began, or by a
-        `/use` in it.
-        """
-        from multidrop.shell.scripts.executor import Playback, play_macro
-        from multidrop.shell.scripts.reading import read_macro
-
-        played = read_macro(macro, values, self.macros)
-        await play_macro(self, self, played, Playback(times, fast, roles), watcher)
 
     # The end
 

@@ -28,7 +28,7 @@ from multidrop.shell.unfinished import marked
 
 if TYPE_CHECKING:
     from multidrop.drives.drive import Drive
-    from multidrop.shell.roles import Commands
+    from multidrop.shell.session import Session
     from multidrop.shell.workspace import Workspace
 
 LIMIT = 10.0
@@ -78,8 +78,7 @@ async def checked(
 
 
 async def download(
-    workspace: Workspace,
-    commands: Commands,
+    session: Session,
     drive: Drive,
     file: str,
     wanted: Wanted = Wanted(),
@@ -90,13 +89,13 @@ async def download(
 
     Raises Diagnostic for the file, the backup and lines that were not agreed to, and the drive's failures.
     """
-    text, lines = await checked(workspace, drive, file, text)
+    text, lines = await checked(session, drive, file, text)
     check_one(drive)
     if drive in _under_way:
-        raise Refused(f"{workspace.display_name(drive)}: a download to it is under way (nothing was sent)")
+        raise Refused(f"{session.display_name(drive)}: a download to it is under way (nothing was sent)")
     _under_way.add(drive)
     try:
-        made = _Download(workspace, commands, drive, file, wanted)
+        made = _Download(session, drive, file, wanted)
         await made.agree(lines, by)
         await made.run(text, lines)
     finally:
@@ -106,11 +105,11 @@ async def download(
 class _Download:
     """One download: a drive, a file, and what is wanted of it."""
 
-    def __init__(self, workspace: Workspace, commands: Commands, drive: Drive, file: str, wanted: Wanted) -> None:
-        self._workspace, self._commands, self._drive = workspace, commands, drive
+    def __init__(self, session: Session, drive: Drive, file: str, wanted: Wanted) -> None:
+        self._session, self._drive = session, drive
         self._file, self._wanted = file, wanted
         self._programs = drive.programs
-        self._name = workspace.display_name(drive)
+        self._name = session.display_name(drive)
 
     async def run(self, text: str, lines: Sequence[SourceLine]) -> None:
         """Do all of it."""
@@ -119,14 +118,14 @@ class _Download:
         if ends_program and not self._wanted.only_changed:  # one that prints without a pause lets nothing be listed
             await self._end_program()
             ends_program = False
-        held = await read(self._workspace, self._drive, "backup", lines)
+        held = await read(self._session, self._drive, "backup", lines)
         if self._wanted.only_changed and not await self._is_changed(lines, held):
             await self._use_held(start)
             return
         backup = await self._back_up(lines, held)
-        port = self._workspace.ports.get(self._drive.link.name, "")
+        port = self._session.ports.get(self._drive.link.name, "")
         try:
-            with marked(self._workspace.settings.state, port, self._drive.address, self._file, backup):
+            with marked(self._session.settings.state, port, self._drive.address, self._file, backup):
                 if ends_program:
                     await self._end_program()
                 sent = await self._send(lines, held)
@@ -140,7 +139,7 @@ class _Download:
             await self._start(start)
 
     def _say(self, text: str, warning: bool = False) -> None:
-        self._workspace.notify(f"{self._name}: {text}", bus=self._drive.link.name, warning=warning, outcome=True)
+        self._session.notify(f"{self._name}: {text}", bus=self._drive.link.name, warning=warning, outcome=True)
 
     def _start_line(self, lines: Sequence[SourceLine]) -> str:
         """Return the line that starts the wanted program. Raises Diagnostic for an unknown label."""
@@ -169,7 +168,7 @@ class _Download:
 
     async def agree(self, lines: Sequence[SourceLine], by: By) -> None:
         """Ask before lines outside of a program that act: the drive executes them at once. Raises Diagnostic."""
-        guards, drive = self._workspace.settings.guards, self._drive
+        guards, drive = self._session.settings.guards, self._drive
         found = []
         for line in self._outside(lines):
             what = guards.what(drive.family, drive.state, line.text)
@@ -178,9 +177,9 @@ class _Download:
         if not found:
             return
         what = f"{self._file}, outside of its program, {'; '.join(found)}"
-        if self._workspace.agreed:
+        if self._session.agreed:
             self._say(what, warning=True)
-        await self._workspace.confirm(what, self._name, by=by)
+        await self._session.confirm(what, self._name, by=by)
 
     def _outside(self, lines: Sequence[SourceLine]) -> list[SourceLine]:
         """The lines of a file that the drive executes as they come, without declarations."""
@@ -190,7 +189,7 @@ class _Download:
         """Save what the drive holds. Raises Refused for a locked program that the file would overwrite."""
         if held.locked and self._programs.size(lines):
             raise Refused(f"{self._name}: no backup is possible: {LOCKED} (nothing was sent)")
-        state, workspace = self._drive.state, self._workspace
+        state, workspace = self._drive.state, self._session
         parts = (state.product, state.version, f"part {state.part}" * bool(state.part), f"serial {state.serial}")
         backup = backups.Backup(
             bus=self._drive.link.name,
@@ -212,9 +211,9 @@ class _Download:
         if not await transferring(drive, self._programs.end(drive.state)):
             return
         self._say("its program ran and was ended", warning=True)
-        deadline = self._workspace.now() + LIMIT
+        deadline = self._session.now() + LIMIT
         while await drive.busy() or not await still(drive):
-            if self._workspace.now() >= deadline:
+            if self._session.now() >= deadline:
                 raise DriveError(
                     f"{self._name}: its program goes on for {LIMIT:g} s; stop it (nothing was overwritten)"
                 )
@@ -222,10 +221,10 @@ class _Download:
 
     async def _send(self, lines: Sequence[SourceLine], held: Held) -> Sequence[SourceLine]:
         """Send the file; a refusal names its line."""
-        drive, workspace = self._drive, self._workspace
+        drive, workspace = self._drive, self._session
         workspace.addressed.add((drive.link.name, drive.address))
         if any(drive.codec.starts_motion(line.text) for line in self._programs.executed(lines)):
-            self._commands.starting(drive)
+            self._session.starting(drive)
         try:
             with running(workspace, f"{self._name}: download") as job:
                 sent = await drive.download(lines, held, job)
@@ -256,13 +255,13 @@ class _Download:
 
     async def _verify(self, text: str, lines: Sequence[SourceLine], sent: Sequence[SourceLine], before: Held) -> None:
         """Compare what the drive holds with the lines that were sent. Raises Differs."""
-        held = await read(self._workspace, self._drive, "verify", lines)
+        held = await read(self._session, self._drive, "verify", lines)
         if held.locked:
             self._say("not verified: the program is locked now (LK=1)", warning=True)
             return
         found = self._programs.differences(self._drive.state, sent, held, before)
         for each in found[:MOST]:
-            self._workspace.notify(self._difference(each), warning=True)
+            self._session.notify(self._difference(each), warning=True)
         if found:
             count = f"{len(found)} lines differ" if len(found) > 1 else "1 line differs"
             raise Differs(f"{self._name}: {count} from {self._file}; download it again")
@@ -272,7 +271,7 @@ class _Download:
             size == len(held.lines)
             and text.split() != " ".join(self._programs.file(self._drive.state, held, True)).split()
         ):
-            workspace = self._workspace
+            workspace = self._session
             at = workspace.wall(workspace.now()).isoformat(" ", "seconds")
             sources.remember(workspace.settings.state, held, sources.Source(self._file, text, at))
 
@@ -285,8 +284,8 @@ class _Download:
 
     async def _start(self, line: str) -> None:
         """Execute the program that was wanted."""
-        drive, workspace = self._drive, self._workspace
-        self._commands.starting(drive)
+        drive, workspace = self._drive, self._session
+        self._session.starting(drive)
         for text in await drive.send(line):
             workspace.publish(Printed(workspace.now(), drive.link.name, drive.address, text))
         self._say(f"started ({line})")

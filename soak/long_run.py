@@ -23,6 +23,7 @@ from multidrop.macros import Macro
 from multidrop.macros.model import Step
 from multidrop.shell.connect.settings import Settings
 from multidrop.shell.events import Failed, OnBus
+from multidrop.shell.scripts.executor import play
 from multidrop.shell.session import Session
 from multidrop.simulator import cells
 from multidrop.simulator.floor import Floor
@@ -99,7 +100,7 @@ class LongRun:
         for number in range(10**9):
             at = f"tab{2 * number % TABS}:a"
             lines = [line if line.startswith("/") else f"@{at} {line}" for line in MACRO]
-            await self.session.play(Macro("soak", tuple(Step(0.1, line) for line in lines)), {})
+            await play(self.session, Macro("soak", tuple(Step(0.1, line) for line in lines)), {})
             self.played += 1
 
     def _figures(self) -> dict[str, Any]:

@@ -64,8 +64,8 @@ async def _leave(session: Session) -> None:
     """
     from multidrop.shell import stop_report
     from multidrop.shell.automation import outcome, settled
+    from multidrop.shell.macro_arguments import keep_unended
     from multidrop.shell.output import finish, nonblocking, write
-    from multidrop.shell.verbs.recording import keep_unended
 
     if not session.automations.was_interrupted:
         session.interrupt()

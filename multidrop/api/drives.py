@@ -92,7 +92,7 @@ class AsyncDrive:
         shell = self._owner.shell
         if not line and not _WORD.fullmatch(name):
             raise Diagnostic(f"{name!r} is not a word of a drive", self.name, "valid: as in read('VM')")
-        return await self._owner.call(lambda: ask(shell, shell, word, By.SCRIPT))
+        return await self._owner.call(lambda: ask(shell, word, By.SCRIPT))
 
     async def write(self, name: str, value: Value) -> None:
         """Give a word of the drive a value. Raises Refused; Diagnostic where its language has no such form."""

@@ -61,5 +61,5 @@ class AsyncParameters:
         shell, printed = self._owner.shell, list[str]()
         options = Options(frozenset(named), communication, save, dry_run, other_product)
         loaded = files.load(file)
-        await self._owner.call(lambda: restore(shell, shell, self._drive, loaded, options), printed)
+        await self._owner.call(lambda: restore(shell, self._drive, loaded, options), printed)
         return printed

@@ -57,4 +57,4 @@ class AsyncPrograms:
         Raises Diagnostic for the file, Refused, NoAnswer, Differs.
         """
         shell, wanted = self._owner.shell, Wanted(verify, save, only_changed, run)
-        await self._owner.call(lambda: transfers.download(shell, shell, self._drive, file, wanted, text))
+        await self._owner.call(lambda: transfers.download(shell, self._drive, file, wanted, text))

@@ -43,5 +43,5 @@ async def run_file(owner: Owner, file: str, values: Mapping[str, str]) -> Run:
     shell = owner.shell
     script = read_script(file, values, shell.macros)
     results: list[Result] = []
-    await owner.call(lambda: run_script(shell, shell, script, results.append))
+    await owner.call(lambda: run_script(shell, script, results.append))
     return Run(file, tuple(results))

@@ -59,7 +59,7 @@ def _send_json(chosen: argparse.Namespace, lazy: bool) -> int:
     report = Report("send", as_json=True)
 
     async def body(session: Session) -> None:
-        await run_typed(session, session, chosen.lines, report.executed)
+        await run_typed(session, chosen.lines, report.executed)
 
     tried = targets(chosen.lines)
     code = batch.run([chosen.url], body, lazy=lazy, agreed=chosen.yes, asks=False, replies=False, tried=tried)
@@ -103,7 +103,7 @@ def _execute(chosen: argparse.Namespace, script: Script, report: Report) -> int:
     async def body(session: Session) -> None:
         await report.watched(session, chosen.on, chosen.role)
         with report.noting():
-            await run_script(session, session, script, report.executed)
+            await run_script(session, script, report.executed)
 
     tried = targets(each.text for each in lines_of(script.body))
     return batch.run([], body, agreed=chosen.yes, asks=False, replies=not chosen.json, tried=tried)

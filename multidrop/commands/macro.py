@@ -84,11 +84,12 @@ def _asked(macro: Macro, values: Mapping[str, str]) -> dict[str, str]:
 
 def _play(chosen: argparse.Namespace, macro: Macro, values: Mapping[str, str], report: Report) -> int:
     from multidrop.shell.front import batch
+    from multidrop.shell.scripts.executor import play
 
     async def body(session: Session) -> None:
         await report.watched(session, chosen.on, chosen.role)
         with report.noting():
-            await session.play(macro, values, times=chosen.times, fast=chosen.fast, watcher=report)
+            await play(session, macro, values, times=chosen.times, fast=chosen.fast, watcher=report)
 
     return batch.run([], body, agreed=chosen.yes, asks=False, replies=not chosen.json)
 

@@ -90,6 +90,6 @@ def restore(chosen: argparse.Namespace) -> int:
         return fail(problem)
 
     async def put(session: Session) -> None:
-        await work.restore_each(session, session, chosen.file, chosen.drive, options)
+        await work.restore_each(session, chosen.file, chosen.drive, options)
 
     return batch.run([chosen.url], put, agreed=chosen.yes, unsolicited=False, tried=chosen.drive.split(","))

@@ -57,7 +57,7 @@ def download(chosen: argparse.Namespace) -> int:
     wanted = transfers.Wanted(not chosen.no_verify, chosen.save, chosen.only_changed, chosen.run)
 
     async def put(session: Session, drive: Drive) -> None:
-        await transfers.download(session, session, drive, chosen.file, wanted)
+        await transfers.download(session, drive, chosen.file, wanted)
 
     return _with_drive(chosen, put, agreed=chosen.yes)
 

@@ -47,9 +47,7 @@ def apply(chosen: argparse.Namespace) -> int:
         several = is_several(chosen.drive)
         # All are found in the file before the first one is written to.
         specs = {drive: replacement.chosen(cell, chosen.file, drive, chosen.source, several) for drive in drives}
-        await each(
-            session, drives, lambda drive: replacement.apply(session, session, drive, chosen.file, specs[drive], wanted)
-        )
+        await each(session, drives, lambda drive: replacement.apply(session, drive, chosen.file, specs[drive], wanted))
 
     return batch.run([chosen.url], work, agreed=chosen.yes, tried=chosen.drive.split(","))
 

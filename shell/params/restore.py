@@ -20,7 +20,7 @@ from multidrop.shell.params.readings import listed, parameters, read
 
 if TYPE_CHECKING:
     from multidrop.drives.drive import Drive
-    from multidrop.shell.roles import Commands
+    from multidrop.shell.session import Session
     from multidrop.shell.workspace import Workspace
 
 
@@ -54,30 +54,30 @@ class Wanted:
     """Those of `withheld` that the drive should have, and that could not be read."""
 
 
-async def restore(workspace: Workspace, commands: Commands, drive: Drive, file: SettingsFile, options: Options) -> None:
+async def restore(session: Session, drive: Drive, file: SettingsFile, options: Options) -> None:
     """Send what differs from a file. Raises Diagnostic or DriveError."""
-    who = workspace.display_name(drive)
+    who = session.display_name(drive)
     _check_product(drive, file, options, who)
-    present = await read(workspace, drive, "reading")
+    present = await read(session, drive, "reading")
     wanted = _wanted(present, file, options, who)
     plan = _plan(drive, present, wanted, options, file)
-    _check_neighbours(workspace, drive, plan, file)
-    _show(workspace, who, plan, wanted)
+    _check_neighbours(session, drive, plan, file)
+    _show(session, who, plan, wanted)
     if not plan.changes:
         left = wanted.withheld or plan.withheld or plan.impossible
-        workspace.notify(f"{who}: nothing {'else ' if left else ''}differs from {file.path}")
+        session.notify(f"{who}: nothing {'else ' if left else ''}differs from {file.path}")
         _check_complete(wanted, who)
         return
-    await _check_ready(workspace, drive)
+    await _check_ready(session, drive)
     if options.dry_run:
-        workspace.notify(f"{who}: {len(plan)} steps; nothing was sent (--dry-run)")
+        session.notify(f"{who}: {len(plan)} steps; nothing was sent (--dry-run)")
         return
-    await _agree(workspace, drive, present, plan, file)
+    await _agree(session, drive, present, plan, file)
     aside = {*wanted.withheld, *dict(plan.withheld), *dict(plan.impossible)}
     goal = {name: value for name, value in wanted.values.items() if name not in aside}
-    with _accounted(workspace, who, plan) as written:
-        await _write(workspace, commands, drive, plan, options, written)
-        await _finish(workspace, drive, plan, goal, options)
+    with _accounted(session, who, plan) as written:
+        await _write(session, drive, plan, options, written)
+        await _finish(session, drive, plan, goal, options)
     _check_complete(wanted, who)
 
 
@@ -171,18 +171,16 @@ async def _agree(workspace: Workspace, drive: Drive, present: Readings, plan: Pl
         raise Refused(f"{who}: its settings changed meanwhile; nothing was sent; try again")
 
 
-async def _write(
-    workspace: Workspace, commands: Commands, drive: Drive, plan: Plan, options: Options, written: list[Change]
-) -> None:
+async def _write(session: Session, drive: Drive, plan: Plan, options: Options, written: list[Change]) -> None:
     """Send the steps, and note each that is done.
 
     Only a step that a person has named can start motion: an early end then stops the drive, and with it its line.
     """
-    workspace.addressed.add((drive.link.name, drive.address))
-    with running(workspace, f"{workspace.display_name(drive)}: restore") as progress:
+    session.addressed.add((drive.link.name, drive.address))
+    with running(session, f"{session.display_name(drive)}: restore") as progress:
         for change in plan:
             if change.name in options.named and drive.starts(change.text):
-                commands.starting(drive)
+                session.starting(drive)
             await transferring(drive, parameters(drive).write(drive.state, change))
             written.append(change)
             progress(len(written), len(plan))

@@ -20,7 +20,7 @@ from multidrop.transports import TransportLost
 
 if TYPE_CHECKING:
     from multidrop.drives.drive import Drive
-    from multidrop.shell.roles import Commands
+    from multidrop.shell.session import Session
     from multidrop.shell.workspace import Workspace
 
 ALL = ("all", "*")
@@ -204,20 +204,20 @@ def _line(
     return f"{own}{name}: here {files.shown(here)}, there {files.shown(there)}{unit}"
 
 
-async def restore_each(workspace: Workspace, commands: Commands, name: str, target: str, options: Options) -> None:
+async def restore_each(session: Session, name: str, target: str, options: Options) -> None:
     """Restore drives from their files; every file is read before the first step.
 
     Raises Diagnostic where the file for one of several drives names another drive, or none.
     """
-    drives = targets(workspace, target)
-    loaded = {drive: files.load(file_of(workspace, drive, name, target)) for drive in drives}
+    drives = targets(session, target)
+    loaded = {drive: files.load(file_of(session, drive, name, target)) for drive in drives}
     for drive, file in loaded.items() if is_several(target) else ():
         if file.name != (drive.state.name or drive.address):
-            who, whose = workspace.display_name(drive), f"drive {file.name}" if file.name else "no drive"
+            who, whose = session.display_name(drive), f"drive {file.name}" if file.name else "no drive"
             hint = "for several drives each file names its own; --drive ADDR restores one drive from any file"
             raise Diagnostic(f"names {whose}, and is to be restored to {who}; nothing was sent", file.path, hint)
 
     async def put(drive: Drive) -> None:
-        await restore(workspace, commands, drive, loaded[drive], options)
+        await restore(session, drive, loaded[drive], options)
 
-    await each(workspace, drives, put)
+    await each(session, drives, put)

@@ -20,7 +20,6 @@ from multidrop.shell.channel import PERIOD, Channel
 from multidrop.shell.events import FAILURES, By, Failed, Progressed
 from multidrop.shell.lines import join_target, pinned, split_target
 from multidrop.shell.playing import Playing, cast, played_by
-from multidrop.shell.roles import Commands
 from multidrop.shell.scripts import words
 from multidrop.shell.scripts.expression import (
     Expression,
@@ -47,6 +46,7 @@ from multidrop.shell.scripts.model import (
     ScriptLine,
 )
 from multidrop.shell.scripts.planning import bind
+from multidrop.shell.session import Session
 from multidrop.shell.workspace import LATCHED, Workspace
 
 
@@ -124,8 +124,7 @@ class Place:
 
 
 async def known(
-    workspace: Workspace,
-    commands: Commands,
+    session: Session,
     tree: Expression,
     values: Mapping[str, str],
     by: By,
@@ -138,11 +137,7 @@ async def known(
     found: dict[Name | Word, Value] = {}
     for each in unknowns(tree):
         if each not in found:
-            found[each] = (
-                value_of(values[each.name])
-                if isinstance(each, Name)
-                else await ask(workspace, commands, each, by, place)
-            )
+            found[each] = value_of(values[each.name]) if isinstance(each, Name) else await ask(session, each, by, place)
     return found
 
 
@@ -152,14 +147,14 @@ def drive_of(workspace: Workspace, word: Word, place: Place | None = None) -> Dr
     return workspace.drive(bus, address or None)
 
 
-async def ask(workspace: Workspace, commands: Commands, word: Word, by: By, place: Place | None = None) -> Value:
+async def ask(session: Session, word: Word, by: By, place: Place | None = None) -> Value:
     """Read the value of a word. Raises Diagnostic, DriveError or TransportLost."""
-    drive = drive_of(workspace, word, place)
-    line = _question(workspace, drive, word)
-    await commands.guard(drive, line, by)
+    drive = drive_of(session, word, place)
+    line = _question(session, drive, word)
+    await session.guard(drive, line, by)
     printed = await drive.send(line)
     if len(printed) != 1:
-        raise DriveError(f"{workspace.display_name(drive)}: {line} printed {len(printed)} lines; a value is one")
+        raise DriveError(f"{session.display_name(drive)}: {line} printed {len(printed)} lines; a value is one")
     return value_of(printed[0])
 
 
@@ -252,9 +247,9 @@ class _Reported:
 class Execution:
     """One run of a script or of a macro, with everything that it calls."""
 
-    def __init__(self, workspace: Workspace, commands: Commands, heard: Hearing, executed: Executed) -> None:
-        self.workspace = workspace
-        self.stops = workspace.stops
+    def __init__(self, session: Session, heard: Hearing, executed: Executed) -> None:
+        self.session = session
+        self.stops = session.stops
         """The number of stops of everything before it began."""
         self.unfinished: list[Unfinished] = []
         """The macros that ended early, the innermost first."""
@@ -266,14 +261,13 @@ class Execution:
         """The line under way; after an early end the last one before it."""
         self.is_over = False
         """It ended early, and only the lines after that are executed."""
-        self._commands = commands
         self._heard = heard
         self._executed = executed
 
     @property
     def _quits(self) -> bool:
         """Whether a `/quit` ends it; the lines after an early end are executed all the same."""
-        return self.workspace.quitting and not self.is_over
+        return self.session.quitting and not self.is_over
 
     async def play(
         self,
@@ -285,7 +279,7 @@ class Execution:
         caller: Place | None = None,
     ) -> Playing:
         """Play a macro: one round, several, or until it is ended. `caller`: the selection of the calling macro."""
-        workspace, macro = self.workspace, played.macro
+        workspace, macro = self.session, played.macro
         playing = Playing(macro.name, len(macro.steps), times, macro.key)
         frame = Frame(values, By.MACRO, Place(workspace, caller), Pace(workspace.now, fast), playing)
         with cast(roles), self._listed(playing):
@@ -306,7 +300,7 @@ class Execution:
     @contextlib.contextmanager
     def _listed(self, playing: Playing) -> Iterator[None]:
         """List a macro as playing, and show its progress; then that of the one that plays on."""
-        workspace = self.workspace
+        workspace = self.session
         playing.progress = progress = StepProgress(workspace, playing)
         workspace.playing.append(playing)
         workspace.changed()
@@ -361,7 +355,7 @@ class Execution:
         async def values(text: str, frame: Frame) -> tuple[Values, Mapping[str, str]]:
             call = words.macro_call(text)
             given, roles = call.divided(node.played.macro)
-            return checked_values(node.played.macro, given), bind(self.workspace, node.played.macro, roles)
+            return checked_values(node.played.macro, given), bind(self.session, node.played.macro, roles)
 
         given, roles = await self._own(node.line, frame, values)
         with _noted(node.line):
@@ -381,7 +375,7 @@ class Execution:
             if frame.values is not None:
                 reported.sent = fill(line.text, frame.values)
             place = frame.place
-            await self._commands.run(place.pinned(reported.sent) if place else reported.sent, frame.by)
+            await self.session.run(place.pinned(reported.sent) if place else reported.sent, frame.by)
             if place is not None:
                 place.passed(reported.sent)
 
@@ -389,7 +383,7 @@ class Execution:
         """Execute a verb of scripts. One that only steers has a result only where it fails; any other one `counts`."""
         with self._reporting(line, frame, counts=counts) as reported:
             reported.sent = text = fill(line.text, frame.names)
-            workspace = self.workspace
+            workspace = self.session
             if workspace.ready is not None:
                 await workspace.ready()
             if counts:
@@ -408,7 +402,7 @@ class Execution:
     ) -> Iterator[_Reported]:
         """Report the result of the body; note the place of the line on its failure."""
         self._heard.begin(afresh)
-        reported, begun, error, failed_check = _Reported(line.text), self.workspace.now(), "", False
+        reported, begun, error, failed_check = _Reported(line.text), self.session.now(), "", False
         refused_here = False
         try:
             yield reported
@@ -429,7 +423,7 @@ class Execution:
 
     def _report(self, line: ScriptLine, frame: Frame, sent: str, begun: float, error: str, failed_check: bool) -> None:
         bus, drive = self._heard.target or ("", "")
-        now, at = self.workspace.now(), self.workspace.wall(begun)
+        now, at = self.session.now(), self.session.wall(begun)
         number = frame.playing.round if frame.playing is not None else 0
         printed = self._heard.printed()
         result = Result(line, sent, at, now - begun, printed, bus, drive, error, failed_check, number)
@@ -456,12 +450,12 @@ class Execution:
         return words.call(text)[1]
 
     async def _print(self, text: str, frame: Frame) -> None:
-        self.workspace.output(words.rest_of(text))
+        self.session.output(words.rest_of(text))
 
     async def _assert(self, text: str, frame: Frame) -> None:
         tree = words.check(text, frame.names)
         for word in (each for each in unknowns(tree) if isinstance(each, Word)):
-            drive = drive_of(self.workspace, word, frame.place)
+            drive = drive_of(self.session, word, frame.place)
             self._heard.target = self._heard.target or (drive.link.name, drive.address)
         found = await self._known(tree, frame)
         if evaluate(tree, found):
@@ -480,7 +474,7 @@ class Execution:
         return evaluate(tree, await self._known(tree, frame))
 
     async def _known(self, tree: Expression, frame: Frame) -> Mapping[Name | Word, Value]:
-        return await known(self.workspace, self._commands, tree, frame.names, frame.by, frame.place)
+        return await known(self.session, tree, frame.names, frame.by, frame.place)
 
 
 @contextlib.contextmanager

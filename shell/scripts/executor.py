@@ -5,32 +5,30 @@ from __future__ import annotations
 import asyncio
 import contextlib
 from collections.abc import AsyncIterator, Callable, Collection, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from itertools import islice
-from typing import Protocol
+from typing import TYPE_CHECKING
 
 from multidrop.dialects import Diagnostic, NoAnswer, Stopped
 from multidrop.drives.drive import Drive
 from multidrop.drives.events import Lost
 from multidrop.drives.halt import Halt
+from multidrop.macros import Macro
 from multidrop.shell import unfinished
-from multidrop.shell.automation import Automations, outcome, settled
+from multidrop.shell.automation import outcome, settled
 from multidrop.shell.events import FAILURES, By, OnBus, SessionEvent
 from multidrop.shell.motion import Standing, standings
-from multidrop.shell.playing import cast
-from multidrop.shell.roles import Commands
+from multidrop.shell.playing import NO_ROLES, cast
 from multidrop.shell.scripts.execution import CUT, Execution, Frame, Unfinished
 from multidrop.shell.scripts.hearing import hearing
-from multidrop.shell.scripts.model import Ending, Executed, MacroScript, Result, Script, ScriptLine, Watcher
+from multidrop.shell.scripts.model import Ending, Executed, Result, Script, ScriptLine, Watcher
 from multidrop.shell.scripts.planning import bind, macro_claims, script_claims
-from multidrop.shell.workspace import LATCHED, Workspace
+from multidrop.shell.scripts.reading import read_macro
+from multidrop.shell.workspace import LATCHED
 from multidrop.transports import TransportLost
 
-
-class Runner(Commands, Protocol):
-    """The commands of a session, and its automations."""
-
-    automations: Automations
+if TYPE_CHECKING:
+    from multidrop.shell.session import Session
 
 
 # A connection that is lost while no line uses it: that ends a script or macro too, and not only its next line.
@@ -61,11 +59,11 @@ async def ended_by_loss(execution: Execution, buses: Collection[str]) -> AsyncIt
             losses.append(loss)
             task.cancel()
 
-    leave = execution.workspace.subscribe(take)
+    leave = execution.session.subscribe(take)
     try:
         yield
     except asyncio.CancelledError:
-        if task is None or not losses or execution.stops != execution.workspace.stops:
+        if task is None or not losses or execution.stops != execution.session.stops:
             raise
         task.uncancel()
         loss = TransportLost(str(losses[0]))
@@ -78,18 +76,6 @@ async def ended_by_loss(execution: Execution, buses: Collection[str]) -> AsyncIt
             timer.cancel()
 
 
-@dataclass(frozen=True)
-class Playback:
-    """The manner in which a macro is played."""
-
-    times: int | None = 1
-    """The number of rounds; None: until it is ended."""
-    fast: bool = False
-    """Without recorded pauses."""
-    roles: Mapping[str, str] = field(default_factory=dict)
-    """The bus for each role."""
-
-
 class _Nobody:
     def executed(self, result: Result) -> None:
         """Take no notice."""
@@ -99,59 +85,68 @@ class _Nobody:
 
 
 async def run_script(
-    workspace: Workspace,
-    runner: Runner,
+    session: Session,
     script: Script,
     executed: Executed = lambda result: None,
     by: By = By.SCRIPT,
 ) -> None:
     """Execute a script. `executed` gets the result of each line. Raises the first failure."""
-    own = script_claims(workspace, script)
-    with hearing(workspace.subscribe) as heard:
-        execution = Execution(workspace, runner, heard, executed)
+    own = script_claims(session, script)
+    with hearing(session.subscribe) as heard:
+        execution = Execution(session, heard, executed)
         async with (
-            runner.automations.run(f"script {script.file}", own),
+            session.automations.run(f"script {script.file}", own),
             ended_by_loss(execution, {link.name for link, _ in own}),
-            ending(runner, execution, _Nobody().ended),
+            ending(execution, _Nobody().ended),
         ):
             await execution.block(script.body, Frame(dict(script.values), by))
 
 
-async def run_typed(workspace: Workspace, runner: Runner, lines: Sequence[str], executed: Executed) -> None:
+async def run_typed(session: Session, lines: Sequence[str], executed: Executed) -> None:
     """Execute typed lines in turn, without values and verbs of scripts. Raises the first failure."""
-    with hearing(workspace.subscribe) as heard:
-        execution = Execution(workspace, runner, heard, executed)
+    with hearing(session.subscribe) as heard:
+        execution = Execution(session, heard, executed)
         for count, text in enumerate(lines, 1):
             await execution.line(ScriptLine("", count, text), Frame(None, By.OPERATOR))
-            if workspace.quitting:
+            if session.quitting:
                 return
 
 
-async def play_macro(
-    workspace: Workspace, runner: Runner, played: MacroScript, playback: Playback, watcher: Watcher | None = None
+async def play(
+    session: Session,
+    macro: Macro,
+    values: Mapping[str, str],
+    *,
+    times: int | None = 1,
+    fast: bool = False,
+    roles: Mapping[str, str] = NO_ROLES,
+    watcher: Watcher | None = None,
 ) -> None:
-    """Play a checked macro, as one automation. Raises the first failure.
+    """Play a macro to its end as one automation, listed in `session.playing` meanwhile. Raises the first failure.
 
-    The drives that it moves are claimed first, as far as its lines show them. Its early end stops those that it
-    started, executes its `on_stop` lines, and is reported.
+    It is checked whole first, and the drives that it moves are claimed, as far as its lines show them. Its early end
+    stops those that it started, executes its `on_stop` lines, and is reported. `times` None: until it is ended. `fast`:
+    without recorded pauses. `roles`: the bus for each role. A line without an address goes to the drive that was
+    selected when the macro began, or by a `/use` in it.
     """
-    if workspace.latched:
+    played = read_macro(macro, values, session.macros)
+    if session.latched:
         raise Stopped(LATCHED)
     watcher = watcher or _Nobody()
-    roles = bind(workspace, played.macro, playback.roles)
-    name, begun = played.macro.name, workspace.now()
-    own = macro_claims(workspace, played, roles)
-    state, ports = workspace.settings.state, {link.name: workspace.ports.get(link.name, "") for link, _ in own}
-    with hearing(workspace.subscribe) as heard, unfinished.playing(state, ports.values(), name, workspace.wall(begun)):
-        execution = Execution(workspace, runner, heard, watcher.executed)
+    roles = bind(session, macro, roles)
+    name, begun = macro.name, session.now()
+    own = macro_claims(session, played, roles)
+    state, ports = session.settings.state, {link.name: session.ports.get(link.name, "") for link, _ in own}
+    with hearing(session.subscribe) as heard, unfinished.playing(state, ports.values(), name, session.wall(begun)):
+        execution = Execution(session, heard, watcher.executed)
         async with (
-            runner.automations.run(f"macro {name}", own),
+            session.automations.run(f"macro {name}", own),
             ended_by_loss(execution, ports),
-            ending(runner, execution, watcher.ended),
+            ending(execution, watcher.ended),
         ):
-            playing = await execution.play(played, dict(played.values), playback.times, playback.fast, roles)
-    rounds = f"{playing.rounds} round{'s' * (playing.rounds != 1)}" + ", ended by /quit" * workspace.quitting
-    workspace.notify(f"macro {name}: {rounds} played in {workspace.now() - begun:.1f} s", outcome=True)
+            playing = await execution.play(played, dict(played.values), times, fast, roles)
+    rounds = f"{playing.rounds} round{'s' * (playing.rounds != 1)}" + ", ended by /quit" * session.quitting
+    session.notify(f"macro {name}: {rounds} played in {session.now() - begun:.1f} s", outcome=True)
     watcher.ended(Ending(name, playing.rounds))
 
 
@@ -161,7 +156,7 @@ Ended = Callable[[Ending], None]
 
 
 @contextlib.asynccontextmanager
-async def ending(runner: Runner, execution: Execution, ended: Ended) -> AsyncIterator[None]:
+async def ending(execution: Execution, ended: Ended) -> AsyncIterator[None]:
     """Take care of the macros that the body leaves unfinished, and report them.
 
     Raises what the body raises; Stopped with the place where a stop of everything cancelled it.
@@ -171,7 +166,7 @@ async def ending(runner: Runner, execution: Execution, ended: Ended) -> AsyncIte
     except (*FAILURES, asyncio.CancelledError) as failure:
         if not execution.unfinished:
             raise
-        aftermath = _Aftermath(runner, execution)
+        aftermath = _Aftermath(execution)
         await aftermath.run(ended)
         if aftermath.stopped and isinstance(failure, asyncio.CancelledError):
             raise Stopped(f"{aftermath.at}: stopped before it was done") from None
@@ -179,22 +174,21 @@ async def ending(runner: Runner, execution: Execution, ended: Ended) -> AsyncIte
 
 
 class _Aftermath:
-    def __init__(self, runner: Runner, execution: Execution) -> None:
-        self._runner = runner
+    def __init__(self, execution: Execution) -> None:
         self._execution = execution
-        self._workspace = execution.workspace
+        self._session = execution.session
         self._left = list(execution.unfinished)
         """The macros whose `on_stop` lines are not executed yet, the innermost first."""
 
     async def run(self, ended: Ended) -> None:
         """Stop, report, execute `on_stop`, read where the drives stand. A stop of everything cuts it short."""
-        halts = self._runner.automations.end()
+        halts = self._session.automations.end()
         self._execution.is_over = True
         found: tuple[Standing, ...] = ()
         try:
             await self._stopping(halts)
             await self._on_stop()
-            found = await standings(self._workspace, self._drives())
+            found = await standings(self._session, self._drives())
             if found:
                 self._warn("; ".join(each.text for each in found))
         except asyncio.CancelledError:
@@ -209,17 +203,17 @@ class _Aftermath:
         """Report the place and the last lines, and then the outcome of the stops."""
         for text in self._story():
             self._warn(text)
-        await settled(self._workspace)
-        for text in outcome(self._workspace, halts):
+        await settled(self._session)
+        for text in outcome(self._session, halts):
             self._warn(text)
 
     @property
     def stopped(self) -> bool:
         """Whether a stop of everything came since its beginning."""
-        return self._workspace.stops != self._execution.stops
+        return self._session.stops != self._execution.stops
 
     def _warn(self, text: str) -> None:
-        self._workspace.notify(text, warning=True)
+        self._session.notify(text, warning=True)
 
     # The report
 
@@ -239,8 +233,8 @@ class _Aftermath:
         found: dict[Drive, None] = {}
         for bus, address in self._execution.addressed:
             with contextlib.suppress(Diagnostic, NoAnswer):
-                drive = self._workspace.drive(bus, address)
-                each = [drive] if drive in (listed := self._workspace.buses[bus].all_drives) else listed
+                drive = self._session.drive(bus, address)
+                each = [drive] if drive in (listed := self._session.buses[bus].all_drives) else listed
                 found.update(dict.fromkeys(each))
         return list(found)
 
@@ -250,7 +244,7 @@ class _Aftermath:
         """Say which lines are not executed."""
         for each in self._left:
             if lines := [node.line.text for node in each.played.on_stop]:
-                self._workspace.dropped.append(each.playing.name)
+                self._session.dropped.append(each.playing.name)
                 hint = "type them if the machine needs them"
                 self._warn(
                     f"macro {each.playing.name}: on_stop is not executed after a stop: {' · '.join(lines)}; {hint}"
@@ -267,7 +261,7 @@ class _Aftermath:
 
     async def _lines_of(self, each: Unfinished) -> None:
         """Execute each line of a macro, whatever became of the one before it."""
-        automations = self._runner.automations
+        automations = self._session.automations
         macro, failed = each.played.macro, False
         why = "" if macro.on_stop_moves else f"on_stop of macro {macro.name} would start it, and on_stop_moves is false"
         frame = replace(each.frame, values=dict(each.frame.names), pace=None)
@@ -283,7 +277,7 @@ class _Aftermath:
         if not failed:
             automations.leave()
             return
-        for text in outcome(self._workspace, automations.end()):
+        for text in outcome(self._session, automations.end()):
             self._warn(text)
 
 

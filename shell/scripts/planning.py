@@ -10,8 +10,7 @@ from multidrop.macros import Macro, fill, value_names
 from multidrop.shell.automation import Claim, only_ends
 from multidrop.shell.lines import DriveLine, parse
 from multidrop.shell.macro_arguments import check_bus, only_bus, unbound
-from multidrop.shell.playing import cast, played_by
-from multidrop.shell.roles import NO_ROLES
+from multidrop.shell.playing import NO_ROLES, cast, played_by
 from multidrop.shell.scripts.model import CallFile, CallMacro, If, MacroScript, Node, Repeat, Script, ScriptLine
 from multidrop.shell.scripts.reading import UNKNOWN
 from multidrop.shell.scripts.words import macro_call

@@ -41,7 +41,7 @@ async def trace(call: Call) -> None:
     its break point. For a PMX, LABEL is the number of a program; the lines are those at which the program was seen.
     """
     debugger, words = _parts(call, 0, 1)
-    await debugger.trace(call.commands, words[0] if words else "")
+    await debugger.trace(words[0] if words else "")
 
 
 @verb("/step [ADDR] [LABEL]", recorded=_recorded)
@@ -53,16 +53,16 @@ async def step(call: Call) -> None:
     """
     debugger, words = _parts(call, 0, 1)
     if words:
-        await debugger.begin(call.commands, words[0])
+        await debugger.begin(words[0])
     else:
-        await debugger.step(call.commands)
+        await debugger.step()
 
 
 @verb("/continue [ADDR]", recorded=_recorded)
 async def continue_(call: Call) -> None:
     """Let a program that waits run on at normal speed."""
     debugger, _ = _parts(call, 0, 0)
-    await debugger.go_on(call.commands)
+    await debugger.go_on()
 
 
 @verb(

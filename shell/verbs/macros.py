@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
@@ -16,6 +17,8 @@ from multidrop.shell.workspace import LATCHED
 
 MOST_ROUNDS = 10**9
 """The largest number of rounds."""
+EXECUTOR = "multidrop.shell.scripts.executor"
+"""What plays macros. It executes verbs, so this one has only its name."""
 PLAY = "/play MACRO [NAME=VALUE ...] [--times N|forever] [--fast] | stop [MACRO]"
 Wrong = Callable[[str], Diagnostic]
 """Makes the Diagnostic for wrong words."""
@@ -96,7 +99,8 @@ async def play(call: Call) -> None:
         raise Diagnostic(f"macro {chosen.macro} is playing", "/play", f"/play stop {chosen.macro} ends it")
     macro = workspace.macros.load(chosen.macro)
     values, roles = await settled(workspace, macro, chosen.given)
-    await call.commands.play(macro, values, times=chosen.times, fast=chosen.fast, roles=roles)
+    executor = importlib.import_module(EXECUTOR)
+    await executor.play(call.session, macro, values, times=chosen.times, fast=chosen.fast, roles=roles)
 
 
 def _end(call: Call, names: Sequence[str]) -> None:

@@ -62,7 +62,7 @@ async def params(call: Call) -> None:
         await work.backup(call.workspace, name, target)
     elif what == "restore":
         name, target = _file_and_target(call, words)
-        await work.restore_each(call.workspace, call.commands, name, target, _options(options, values))
+        await work.restore_each(call.session, name, target, _options(options, values))
     else:
         await _diff(call, options, values, words)
 

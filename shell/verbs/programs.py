@@ -116,4 +116,4 @@ async def download(call: Call) -> None:
     The program that it replaces is cleared (CP); a program at another address stays.
     """
     file, target, wanted = _download_parts(call)
-    await transfers.download(call.workspace, call.commands, call.drive(target), file, wanted, by=call.by)
+    await transfers.download(call.session, call.drive(target), file, wanted, by=call.by)

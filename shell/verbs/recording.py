@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import re
 from dataclasses import replace
 
 from multidrop.dialects import Diagnostic
-from multidrop.macros import Macro, check_name, is_role, parse_macro
+from multidrop.macros import Macro, check_name, parse_macro
 from multidrop.macros.pauses import Offer, with_waits
+from multidrop.shell.macro_arguments import roles_in
 from multidrop.shell.verbs.registry import Call, verb
 from multidrop.shell.workspace import Workspace
 
@@ -60,7 +60,7 @@ async def _keep(call: Call, waits: bool) -> None:
     wanted, found = macro.name, workspace.recorder.offers
     if waits:
         macro = with_waits(macro, found)
-    macro = replace(macro, roles=_roles(macro, list(workspace.buses)))
+    macro = replace(macro, roles=roles_in(macro, list(workspace.buses)))
     try:
         if store.contents(wanted) != before:
             macro, before = replace(macro, name=store.free_name(wanted)), None
@@ -81,25 +81,6 @@ async def _keep(call: Call, waits: bool) -> None:
         await _offer(workspace, macro, found)
 
 
-def keep_unended(workspace: Workspace) -> str:
-    """Save a recording that was not ended under a name that no macro has; return what was done, in one line."""
-    recorder, store = workspace.recorder, workspace.macros
-    if not recorder.name:
-        return ""
-    try:
-        macro = recorder.macro()
-    except Diagnostic as problem:
-        return f"the recording was not ended; {problem}"
-    try:
-        name = macro.name if store.contents(macro.name) is None else store.free_name(macro.name)
-        path = store.save(replace(macro, name=name, roles=_roles(macro, list(workspace.buses))))
-    except Diagnostic as problem:
-        return f"the recording was not ended, and is lost: {problem}"
-    finally:
-        recorder.discard()
-    return f"the recording {macro.name} was not ended: {macro.length} kept in {path}"
-
-
 async def _offer(workspace: Workspace, macro: Macro, found: list[Offer]) -> None:
     """Ask whether waits go in place of the pauses; say how where no person can be asked, and after a no."""
     store, saved = workspace.macros, workspace.macros.contents(macro.name)
@@ -110,14 +91,6 @@ async def _offer(workspace: Workspace, macro: Macro, found: list[Offer]) -> None
         return
     for offer in found:
         workspace.notify(f"macro {macro.name}: {offer.text} would fit; /macro edit {macro.name} changes it")
-
-
-def _roles(macro: Macro, buses: list[str]) -> tuple[str, ...]:
-    """The buses that its lines name, if several are open: names for next year's buses."""
-    if len(buses) < 2:
-        return ()
-    named = {bus: re.compile(rf"(?<![\w:/.-]){re.escape(bus)}:") for bus in buses if is_role(bus)}
-    return tuple(bus for bus, place in named.items() if any(map(place.search, macro.lines)))
 
 
 def _in_place_of(before: bytes, macro: Macro) -> Macro:

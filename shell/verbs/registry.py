@@ -15,7 +15,7 @@ from multidrop.shell.lines import split_target
 
 if TYPE_CHECKING:
     from multidrop.drives.drive import Drive
-    from multidrop.shell.roles import Commands
+    from multidrop.shell.session import Session
     from multidrop.shell.workspace import Workspace
 
 
@@ -33,11 +33,17 @@ def split(text: str, where: str) -> list[str]:
 class Call:
     """One use of a verb: where it works, the text after its name, and its origin."""
 
-    workspace: Workspace
-    commands: Commands
+    session: Session
     verb: Verb
     rest: str
     by: By = By.OPERATOR
+
+    @property
+    def workspace(self) -> Session:
+        """The session, under its former name."""
+        return self.session
+
+    commands = workspace
 
     def words(self, low: int = 0, high: int | None = None) -> list[str]:
         """The words after the name, without quotes. Raises Diagnostic with the usage for a wrong number of words."""

@@ -37,7 +37,7 @@ async def script(session, *lines):
     """As `multidrop run` does it."""
     async with session.automations.run():
         body = [model.Step(model.ScriptLine("s", number, line)) for number, line in enumerate(lines, 1)]
-        await run_script(session, session, model.Script("s", body, {}))
+        await run_script(session, model.Script("s", body, {}))
 
 
 async def sent(session, *lines):

@@ -16,7 +16,7 @@ from multidrop.dialects.pmx.manual.table import grouped
 from multidrop.dialects.tmcl.manual import commands
 from multidrop.macros import Macro, Step
 from multidrop.shell.events import By
-from multidrop.shell.scripts.executor import run_script
+from multidrop.shell.scripts.executor import play, run_script
 from multidrop.shell.scripts.reading import read_script
 from tests.support.cases import for_each
 from tests.support.cell_session import CellSession, bus, party, pmx
@@ -95,7 +95,7 @@ async def test_nothing_is_sent_however_the_line_comes(tmp_path) -> None:
                 with pytest.raises(Inexpressible, match="nothing was sent"):
                     await shop.session.run(line, by)
         with pytest.raises(Diagnostic, match="write 200000"):
-            await shop.session.play(Macro("go", (Step(0.0, "@a MA 200,000"),)), {})
+            await play(shop.session, Macro("go", (Step(0.0, "@a MA 200,000"),)), {})
         await asyncio.sleep(1.0)
         assert b"200" not in shop.written("press") + shop.written("stages") and not shop.moving()
         await shop.session.run("@a MA 200,1")
@@ -120,9 +120,9 @@ async def test_a_line_that_no_drive_gets_is_found_before_the_script_moves_anythi
     async with CellSession(tmp_path, bus("press", party("a")), bus("stages", pmx("00")), bus("lab", MODULE)) as shop:
         script = read_script(str(tmp_path / "s.txt"), {"FAR": "200,000"})
         with pytest.raises(Diagnostic, match=r"s.txt:3: .*nothing was sent"):
-            await run_script(shop.session, shop.session, script)
+            await run_script(shop.session, script)
         macro = Macro("go", (Step(0.0, "@a MR 51200"), Step(0.0, wrong)))
         with pytest.raises(Diagnostic, match="go, step 2: "):
-            await shop.session.play(macro, {"FAR": "200,000"} if "{" in wrong else {})
+            await play(shop.session, macro, {"FAR": "200,000"} if "{" in wrong else {})
         await asyncio.sleep(1.0)
         assert b"MR 51200" not in shop.written("press")

@@ -9,6 +9,7 @@ from multidrop.dialects import Diagnostic, Stopped
 from multidrop.macros import Macro, Step
 from multidrop.shell.connect import settings
 from multidrop.shell.events import By
+from multidrop.shell.scripts.executor import play
 from tests.support.cell_session import CellSession, bus, party, pmx
 from tests.support.virtual import in_virtual_time
 
@@ -87,7 +88,7 @@ async def test_a_script_and_a_macro_ask_nobody(tmp_path):
         with pytest.raises(Diagnostic, match="a script cannot ask, nothing was sent; --yes agrees beforehand"):
             await shop.session.run("@a CP", By.SCRIPT)
         with pytest.raises(Diagnostic, match="a macro cannot ask"):
-            await shop.session.play(Macro("wipe", (Step(0.0, "@a CP"),)), {})
+            await play(shop.session, Macro("wipe", (Step(0.0, "@a CP"),)), {})
         assert person.asked == [] and silent(shop)
         shop.session.agreed = True
         await shop.session.run("@a CP", By.SCRIPT)

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from multidrop.dialects import Diagnostic, DriveError
 from multidrop.macros import Macro, MacroStore, Step
 from multidrop.shell.events import Entered, Progressed
-from multidrop.shell.scripts.executor import run_script
+from multidrop.shell.scripts.executor import play, run_script
 from multidrop.shell.scripts.model import Ending, Result
 from multidrop.shell.scripts.reading import WrongScript, read_macro, read_script, stand_in
 from tests.support.cell_session import CellSession, bus, party
@@ -36,7 +36,7 @@ class Shop(CellSession):
         return macro
 
     async def play(self, macro: Macro, values: dict[str, str] | None = None, **manner: object) -> None:
-        await self.session.play(macro, values or {}, watcher=self, **manner)  # type: ignore[arg-type]
+        await play(self.session, macro, values or {}, watcher=self, **manner)  # type: ignore[arg-type]
 
     def executed(self, result: Result) -> None:
         self.results.append(result)
@@ -230,7 +230,7 @@ async def test_a_script_that_calls_a_macro_is_checked_with_its_roles_and_its_end
             (tmp_path / "s.txt").write_text(f"@press:a MR 7000\n/call {name}\n")
             script = read_script(str(tmp_path / "s.txt"), {}, shop.session.macros)
             with pytest.raises(Diagnostic, match=said):
-                await run_script(shop.session, shop.session, script)
+                await run_script(shop.session, script)
         assert shop.written("press") == b""
 
 

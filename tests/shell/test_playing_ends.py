@@ -270,7 +270,7 @@ async def test_a_connection_that_is_lost_while_no_line_uses_it_ends_it_at_once(
         macro = shop.save("m", *lines, on_stop=("@press:a PR 2",))
         (tmp_path / "s.txt").write_text("\n".join(lines))
         script = read_script(str(tmp_path / "s.txt"), {})
-        work = shop.play(macro) if kind == "macro" else run_script(shop.session, shop.session, script)
+        work = shop.play(macro) if kind == "macro" else run_script(shop.session, script)
         playing = asyncio.create_task(work)
         await asyncio.sleep(0.5)
         shop.world("/sim unplug gantry")

@@ -10,7 +10,7 @@ import pytest
 from multidrop.dialects import DriveError, Refused
 from multidrop.shell.events import Notified
 from multidrop.shell.front.report import Report
-from multidrop.shell.scripts.executor import run_script
+from multidrop.shell.scripts.executor import play, run_script
 from multidrop.shell.scripts.reading import read_script
 from tests.shell.test_playing import Shop
 from tests.support.virtual import in_virtual_time
@@ -24,7 +24,7 @@ async def test_a_script_that_plays_a_macro_runs_its_on_stop_and_reports_both(tmp
         script = read_script(str(tmp_path / "s.txt"), {}, shop.session.macros)
         with pytest.raises(DriveError) as caught:
             async with shop.session.automations.run():
-                await run_script(shop.session, shop.session, script, shop.executed)
+                await run_script(shop.session, script, shop.executed)
         assert [note.partition(" (")[0] for note in caught.value.__notes__] == [
             "macro m, step 2",
             f"{tmp_path}/s.txt:2",
@@ -46,7 +46,7 @@ async def test_the_json_of_a_macro_names_macro_step_and_round_and_its_end(
         macro = shop.save("m", "@press:a PR 1", '/expect "2" 0', on_stop=("/print x",))
         told = Report("macro m", as_json=True, junit=str(tmp_path / "r.xml"))
         with pytest.raises(DriveError):
-            await shop.session.play(macro, {}, times=None, watcher=told)
+            await play(shop.session, macro, {}, times=None, watcher=told)
         assert told.finish(1) == 1
         objects = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
     first, second, third, last = objects

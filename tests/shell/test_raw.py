@@ -14,6 +14,7 @@ from multidrop.macros import Macro, Step
 from multidrop.shell.connect.settings import Settings
 from multidrop.shell.events import By, Bytes
 from multidrop.shell.raw import Form, hex_of, parse_bytes, text_of
+from multidrop.shell.scripts.executor import play
 from multidrop.shell.session import Session
 from multidrop.transports import TransportLost
 from tests.support.cell_session import CellSession, bus, moves, party, pmx
@@ -164,7 +165,7 @@ async def test_a_macro_never_sends_its_lines_as_bytes(tmp_path):
     async with opened(tmp_path, party("a"), party("b"), query="?drives=a,b") as shop:
         for line in ("MR 5", "@a MR 5", "@line:a MR 5"):
             with pytest.raises(Diagnostic, match="line is raw: a macro's lines are for drives; |has no address"):
-                await shop.session.play(Macro("go", (Step(0.0, line),)), {})
+                await play(shop.session, Macro("go", (Step(0.0, line),)), {})
         assert shop.written("line") == b""
 
 

@@ -30,7 +30,7 @@ class Shop(CellSession):
         (self.folder / "s.txt").write_text(text)
         script = read_script(str(self.folder / "s.txt"), values, self.session.macros)
         async with self.session.automations.run():
-            await run_script(self.session, self.session, script, self.results.append)
+            await run_script(self.session, script, self.results.append)
 
     async def failure(self, text, kind=DriveError, **values):
         """What a failing script says, without the folder."""
