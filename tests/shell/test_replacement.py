@@ -56,7 +56,7 @@ async def applied(cell: CellSession, folder: Path, source: str = "b", **wanted: 
     drive = cell.session.drive()
     spec = replacement.chosen(machine, "machine.toml", drive, source)
     asked = replacement.Wanted(**wanted)  # type: ignore[arg-type]
-    await replacement.apply(cell.session, cell.session, drive, "machine.toml", spec, asked)
+    await replacement.apply(cell.session, drive, "machine.toml", spec, asked)
 
 
 @pytest.mark.parametrize("present", [FRESH, OTHER, OTHER + '\nname = "x"\nparty = true'])
@@ -102,7 +102,7 @@ async def test_without_a_yes_nothing_is_sent(tmp_path):
         spec = replacement.chosen(cells.load(tmp_path / "machine.toml"), "m", drive, "b")
         cell.session.agreed = False
         with pytest.raises(Diagnostic, match="nothing was sent; --yes agrees to it"):
-            await replacement.apply(cell.session, cell.session, drive, "m", spec, replacement.Wanted())
+            await replacement.apply(cell.session, drive, "m", spec, replacement.Wanted())
         assert drive.commands == 0
 
 
@@ -140,10 +140,10 @@ async def test_what_could_move_the_motor_is_left_alone_and_said(tmp_path):
         drive = cell.session.drive()
         spec = replacement.chosen(cells.load(tmp_path / "m.toml"), "m.toml", drive, "b")
         with pytest.raises(DriveError, match="is not as 'b' in m.toml: AS 0, in the file 1"):
-            await replacement.apply(cell.session, cell.session, drive, "m.toml", spec, replacement.Wanted())
+            await replacement.apply(cell.session, drive, "m.toml", spec, replacement.Wanted())
         assert any("AS is left alone: it can turn the motor" in line for line in cell.printed())
         await replacement.apply(
-            cell.session, cell.session, drive, "m.toml", spec, replacement.Wanted(named=frozenset({"AS"}))
+            cell.session, drive, "m.toml", spec, replacement.Wanted(named=frozenset({"AS"}))
         )
 
 
@@ -217,7 +217,7 @@ async def becomes(folder: Path, machine: str, present: str, name: str, **named: 
     drive = cell.session.drive()
     spec = replacement.chosen(cells.load(folder / "machine.toml"), "machine.toml", drive, name)
     asked = replacement.Wanted(**named)  # type: ignore[arg-type]
-    await replacement.apply(cell.session, cell.session, drive, "machine.toml", spec, asked)
+    await replacement.apply(cell.session, drive, "machine.toml", spec, asked)
     return cell
 
 
