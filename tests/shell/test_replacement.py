@@ -142,9 +142,7 @@ async def test_what_could_move_the_motor_is_left_alone_and_said(tmp_path):
         with pytest.raises(DriveError, match="is not as 'b' in m.toml: AS 0, in the file 1"):
             await replacement.apply(cell.session, drive, "m.toml", spec, replacement.Wanted())
         assert any("AS is left alone: it can turn the motor" in line for line in cell.printed())
-        await replacement.apply(
-            cell.session, drive, "m.toml", spec, replacement.Wanted(named=frozenset({"AS"}))
-        )
+        await replacement.apply(cell.session, drive, "m.toml", spec, replacement.Wanted(named=frozenset({"AS"})))
 
 
 @pytest.mark.slow
