@@ -136,11 +136,3 @@ def test_macros_are_listed_and_shown_as_their_files_have_them(multidrop, tmp_pat
     assert 'line = "@a MR {STEPS}"' in multidrop("macro", "show", "go").stdout
     played = multidrop("macro", "play", "go", "--on", "/dev/does-not-exist")
     assert played.returncode == 2 and "STEPS" in played.stderr
-
-
-@pytest.mark.process
-def test_a_file_of_the_same_name_as_a_room_is_noticed_and_named(process, tmp_path):
-    (tmp_path / "drives.py").write_text("mine = 1\n")
-    done = process("--version")
-    assert done.returncode != 0 and done.stderr.count("\n") == 1
-    assert f"{tmp_path / 'drives.py'} hides a part of multidrop" in done.stderr and "rename" in done.stderr

@@ -118,7 +118,10 @@ def test_pasted_lines_wait_for_enter_and_run_one_after_the_other(prompt):
 def test_ctrl_r_finds_an_earlier_line(prompt):
     prompt.send('PR "find ","me"\rPR "not ","me"\r')
     prompt.expect("not me\r")
-    prompt.send("\x12find\r\r")
+    prompt.expect("b>")  # the library reads the history with the first painting of a prompt
+    prompt.send("\x12find")
+    prompt.expect('reverse-i-search.*"me"')
+    prompt.send("\r\r")
     prompt.expect("find me\r")
 
 
