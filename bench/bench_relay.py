@@ -26,9 +26,9 @@ from bench_line import ANSWER, FRAME, PEER, REQUEST, timed
 from report import Row, alone, compared, main
 
 from multidrop.drives.bus import Bus
-from multidrop.transports.far_port import RELAY, SOCAT, FarPort
-from multidrop.transports.serial_posix import lock_owner
-from multidrop.transports.ssh import open_ssh
+from multidrop.transports.serial_ports import lock_owner
+from multidrop.transports.ssh import RELAY, SOCAT, FarPort
+from multidrop.transports.ssh_session import open_ssh
 from tests.support.ssh_server import SSH, SSHD, ssh_server
 
 ROUNDS = 5

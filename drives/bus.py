@@ -11,13 +11,11 @@ from multidrop.dialects.families import DEFAULT, FAMILIES
 from multidrop.drives.conversations import Conversations
 from multidrop.drives.drive import Drive
 from multidrop.drives.events import BusEvent, Changed
-from multidrop.drives.halt import Halt
-from multidrop.drives.keeping import Keeper, NoKeeper
+from multidrop.drives.keeping import Keeper
 from multidrop.drives.line import Line
-from multidrop.drives.link import Link, Reserved, loss_of
-from multidrop.drives.roster import Roster
-from multidrop.drives.search import Search
-from multidrop.drives.stopping import Stopping
+from multidrop.drives.link import Link, Reserved
+from multidrop.drives.roster import Roster, Search
+from multidrop.drives.stopping import Halt, Stopping
 from multidrop.drives.telemetry import Telemetry
 from multidrop.transports import Transport, TransportLost
 
@@ -38,7 +36,7 @@ class Bus:
         family: str = "",
         keeper: Keeper | None = None,
     ) -> None:
-        keeper = keeper or NoKeeper()
+        keeper = keeper or Keeper()
         assumed = FAMILIES[family or DEFAULT]
         self.line = Line(assumed.codec, baud=baud, local_echo=local_echo, timeout=timeout)
         self.link = Link(name, transport, self.line, keeper)
@@ -58,7 +56,7 @@ class Bus:
     @property
     def lost(self) -> TransportLost | None:
         """The loss of the port, until its drives are found again; None otherwise."""
-        return loss_of(self.link)
+        return self.link.loss
 
     def start(self) -> None:
         """Begin to read."""

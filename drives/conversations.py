@@ -1,6 +1,7 @@
 """Conversations with drives on a link: one at a time with each drive; those with several drives take turns.
 
-A reply steps its conversation at once, in the turn of the event loop that read it: the next request follows without a
+A conversation (`Procedure`) is a generator that a dialect writes: it yields requests and is sent replies or errors. A
+reply steps its conversation at once, in the turn of the event loop that read it: the next request follows without a
 task or a future in between. A stop or a cancellation is thrown into the conversation, which may then clean up; nothing
 interrupts that.
 """
@@ -15,11 +16,9 @@ from typing import Any, Generic, TypeVar
 from weakref import WeakKeyDictionary
 
 from multidrop.dialects import DriveState, End, Kind, Owed, Procedure, Request, Stopped
-from multidrop.drives.conclusions import Concluded, Outcome, Witnesses
-from multidrop.drives.events import Transaction
+from multidrop.drives.events import Concluded, Outcome, Transaction, Witnesses
 from multidrop.drives.keeping import Keeper
 from multidrop.drives.link import Link, LostInFlight
-from multidrop.drives.procedure import ProcedureRunner
 from multidrop.transports import TransportLost
 
 T = TypeVar("T")
@@ -148,7 +147,8 @@ class Conversation(Generic[T]):
         self._stops = conversations.stops(state)
         self._unproven = ""
         """The last command, until a reply shows that it was executed."""
-        self._runner: ProcedureRunner[T] | None = None
+        self._request: Request | None = None
+        """The request that it sends now."""
         self._ticket = 0
         """The ticket of the request that is queued or in flight; 0: none is."""
         self._keeping: asyncio.Task[None] | None = None
@@ -165,10 +165,12 @@ class Conversation(Generic[T]):
             self._procedure.close()
             return self._end(Outcome(error=Stopped(f"{self._name}: stopped before it was sent")))
         try:
-            self._runner = ProcedureRunner(self._procedure)
+            self._request = next(self._procedure)
+        except StopIteration as done:
+            return self._end(Outcome((done.value,)))
         except BaseException as error:  # raised again by the outcome
             return self._end(Outcome(error=error))
-        self._go_on(self._runner)
+        self._go_on()
 
     def interrupt(self) -> None:
         """Stop it, with its clean-up, because its caller has gone."""
@@ -181,7 +183,7 @@ class Conversation(Generic[T]):
         elif self._ticket:
             ticket, self._ticket = self._ticket, 0
             self._link.withdraw(ticket)
-            self._doubts(self._runner)
+            self._doubts()
             self._state.reply_outstanding()
             self._fail(self._interruption())
         else:
@@ -192,17 +194,15 @@ class Conversation(Generic[T]):
 
     # Steps
 
-    def _go_on(self, runner: ProcedureRunner[T]) -> None:
-        """Send the next request, or end."""
-        if runner.request is None:
-            self._end(Outcome((runner.result,)))
-        elif self._all.owes(self._state):
-            self._keep(lambda: self._send(runner))
+    def _go_on(self) -> None:
+        """Send the next request."""
+        if self._all.owes(self._state):
+            self._keep(self._send)
         else:
-            self._send(runner)
+            self._send()
 
-    def _send(self, runner: ProcedureRunner[T]) -> None:
-        request = runner.request
+    def _send(self) -> None:
+        request = self._request
         assert request is not None
         if not self._cleaning_up:
             if self._interrupted:
@@ -212,69 +212,72 @@ class Conversation(Generic[T]):
         try:
             self._ticket = self._link.submit(request, self._answered, self._searching)
         except TransportLost as error:
-            return self._lost(request, error)
+            return self._lost(error)
         self._link.advance()
 
     def _answered(self, answer: Transaction | TransportLost) -> None:
         self._ticket = 0
         if isinstance(answer, TransportLost):
-            runner = self._runner
-            assert runner is not None and runner.request is not None
-            self._lost(runner.request, answer)
+            self._lost(answer)
         else:
-            self._step(lambda runner: self._take(runner, answer))
+            self._step(lambda: self._take(answer))
 
-    def _step(self, step: Callable[[ProcedureRunner[T]], None]) -> None:
-        """Step the procedure, and go on with what it asks then."""
-        runner = self._runner
-        assert runner is not None
+    def _step(self, step: Callable[[], Request | None]) -> None:
+        """Step the procedure. Send the request that it yields, or end with what it returns or raises."""
+        ended: Outcome[T] | None = None
         try:
-            step(runner)
+            self._request = step()
+        except StopIteration as done:
+            ended = Outcome((done.value,))
         except BaseException as error:  # raised again by the outcome
             return self._end(Outcome(error=error))
         self._all.publish_notes(self._state)
-        self._go_on(runner)
+        if ended is None:
+            self._go_on()
+        else:
+            self._end(ended)
 
-    def _doubts(self, runner: ProcedureRunner[T] | None) -> None:
+    def _fail(self, error: Exception) -> None:
+        """Throw an error into the procedure, which may clean up."""
+        self._cleaning_up = True
+        self._step(lambda: self._procedure.throw(error))
+
+    def _doubts(self) -> None:
         """Note that the command that is queued or in flight may be executed."""
-        if runner is not None and runner.request is not None and runner.request.kind not in ASKING:
-            self._unproven = runner.request.text
+        if self._request is not None and self._request.kind not in ASKING:
+            self._unproven = self._request.text
 
-    def _lost(self, request: Request, error: TransportLost) -> None:
+    def _lost(self, error: TransportLost) -> None:
         """Fail with what the loss leaves open: whether the last command was executed."""
         if isinstance(error, LostInFlight):
             self._state.reply_outstanding()
-            self._doubts(self._runner)
+            self._doubts()
         error = (self._link.away or error).again()
         if self._unproven and not self._cleaning_up:
-            done = "stored" if request.kind is Kind.PROGRAM else "executed"
+            done = "stored" if self._request is not None and self._request.kind is Kind.PROGRAM else "executed"
             error = TransportLost(f"{error}; it is not known whether '{self._unproven}' was {done}")
         self._fail(error)
 
-    def _fail(self, error: Exception) -> None:
-        self._cleaning_up = True
-        self._step(lambda runner: runner.fail(error))
-
-    def _take(self, runner: ProcedureRunner[T], transaction: Transaction) -> None:
+    def _take(self, transaction: Transaction) -> Request | None:
+        """Hand a reply or a stop to the procedure; return what it sends next."""
+        request, sent = transaction.request, transaction.sent
         if self._on_ended:
             self._on_ended(transaction)
         if self._all.witnesses:
             self._taken.append(transaction)
-        if transaction.request.kind not in ASKING:
-            self._unproven = "" if transaction.reply.acknowledged else transaction.request.text
+        if request.kind not in ASKING:
+            self._unproven = "" if transaction.reply.acknowledged else request.text
         if transaction.reply.end is not End.STOPPED:
-            runner.answer(transaction.reply)
-        elif not self._cleaning_up:
+            return self._procedure.send(transaction.reply)
+        if not self._cleaning_up:
             self._cleaning_up = True
-            runner.fail(self._stopped(transaction.request, transaction.sent))
-        elif transaction.sent:  # a second stop in the middle of the clean-up, which goes on
-            runner.answer(replace(transaction.reply, end=End.TIMEOUT))
-
-    def _stopped(self, request: Request, sent: bool) -> Stopped:
-        if sent:
-            self._state.reply_outstanding()
-        fate = "it is not known whether it was executed" if sent else "it was not sent"
-        return Stopped(f"{self._name}: '{request.text}' was stopped; {fate}")
+            if sent:
+                self._state.reply_outstanding()
+            fate = "it is not known whether it was executed" if sent else "it was not sent"
+            return self._procedure.throw(Stopped(f"{self._name}: '{request.text}' was stopped; {fate}"))
+        if sent:  # a second stop in the middle of the clean-up, which goes on
+            return self._procedure.send(replace(transaction.reply, end=End.TIMEOUT))
+        return self._request
 
     # The end
 

@@ -26,9 +26,8 @@ from multidrop.dialects.families import family_of, program_languages
 from multidrop.dialects.family import Programs
 from multidrop.dialects.parameters import Value
 from multidrop.dialects.program_files import Held, ProgramFiles
-from multidrop.drives.conclusions import Outcome
 from multidrop.drives.conversations import ASKING, Conversation, Conversations, OnEnded, OnOver, awaited
-from multidrop.drives.events import Changed, Transaction
+from multidrop.drives.events import Changed, Outcome, Transaction
 from multidrop.drives.keeping import GLOBAL
 from multidrop.drives.link import Link
 from multidrop.transports import TransportLost

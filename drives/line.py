@@ -16,16 +16,162 @@ the operating system accepts a line at once and sends it slowly.
 
 from __future__ import annotations
 
+from bisect import insort
 from collections.abc import Container, Iterable, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from multidrop.dialects import Codec, Decoded, End, Reply, Request, StopPiece
-from multidrop.drives.doubt import Doubt
+from multidrop.dialects import Codec, Decoded, End, Kind, Priority, Reply, Request, StopPiece
 from multidrop.drives.events import Transaction, Unsolicited
-from multidrop.drives.flight import NEVER_QUIET, Finished, Flight
-from multidrop.drives.inbox import Inbox
-from multidrop.drives.request_queue import RequestQueue
+from multidrop.drives.inbox import NEVER_QUIET, TAIL, Inbox
+from multidrop.drives.late_replies import Doubt
+
+# A request in flight: written, and neither answered nor given up.
+
+
+CHATTER = 4.0
+"""Longest wait for a reply, in timeouts, while a running program keeps the wire busy."""
+LONGEST_LIST = 60.0
+"""Longest time for a listing, s: 28 kB at 4800 baud."""
+
+
+class Finished(NamedTuple):
+    """The end of a request, and the ticket under which it was queued."""
+
+    ticket: int
+    transaction: Transaction
+
+    @property
+    def request(self) -> Request:
+        """The request."""
+        return self.transaction.request
+
+    @property
+    def reply(self) -> Reply:
+        """Its reply, with how it ended."""
+        return self.transaction.reply
+
+
+@dataclass
+class Flight:
+    """The request that the line waits for. Times are seconds."""
+
+    ticket: int
+    request: Request
+    sent_at: float
+    transmitted_at: float
+    received_at: float
+    """When the last byte came; before the first, when the request was written."""
+    sent: bool = True
+    _judged_length: int = -1
+
+    def may_end_by_quiet(self, buffer: bytes) -> bool:
+        """Quiet can end the reply: it has not been consulted about these bytes before."""
+        return self._judged_length != len(buffer)
+
+    def judged_quiet(self, buffer: bytes) -> None:
+        """Note that quiet was consulted about these bytes."""
+        self._judged_length = len(buffer)
+
+    def deadline(self, buffer: bytes, default: float, by_quiet: bool) -> float:
+        """Time at which it times out, or at which quiet may end it. `default`: the line's timeout, s."""
+        patience = self.request.codec.quiet_time(self.request, buffer)
+        timeout = self._timeout_at(patience, buffer, default)
+        if not by_quiet or self._judged_length == len(buffer):
+            return timeout
+        return min(timeout, self._quiet_at(patience))
+
+    def quiet_at(self, buffer: bytes) -> float:
+        """Time at which a reply without an end of its own is complete."""
+        return self._quiet_at(self.request.codec.quiet_time(self.request, buffer))
+
+    def timeout_at(self, buffer: bytes, default: float) -> float:
+        """Time at which the request times out. `default`: the line's timeout, s."""
+        return self._timeout_at(self.request.codec.quiet_time(self.request, buffer), buffer, default)
+
+    def _quiet_at(self, patience: float) -> float:
+        quiet = self._last_activity + patience
+        if self.request.kind is not Kind.COMMAND:
+            return quiet
+        # A command prints nothing, so a program that prints without a pause does not delay it.
+        return min(quiet, self.transmitted_at + max(2 * patience, NEVER_QUIET))
+
+    def _timeout_at(self, patience: float, buffer: bytes, default: float) -> float:
+        timeout = max(default if self.request.timeout is None else self.request.timeout, patience)
+        longest = self.transmitted_at + (LONGEST_LIST if self.request.kind is Kind.LIST else CHATTER * timeout)
+        if not buffer.endswith(b"\n"):  # not in the middle of a program's line
+            longest = max(longest, min(self.received_at + TAIL, longest + NEVER_QUIET))
+        return min(self._last_activity + timeout, longest)
+
+    def finished(self, reply: Reply, now: float) -> Finished:
+        """The end of this request with a reply."""
+        ended = Transaction(self.request, reply, self.sent_at, now, self.transmitted_at, self.sent)
+        return Finished(self.ticket, ended)
+
+    @property
+    def _last_activity(self) -> float:
+        return max(self.received_at, self.transmitted_at)
+
+
+# Requests that wait for the wire: by priority, then in order; a poll is passed over only once.
+
+
+class Waiting(NamedTuple):
+    """A queued request and its ticket, by which its end is reported. The least is next; no two tickets are equal."""
+
+    priority: Priority
+    ticket: int
+    request: Request
+
+    @property
+    def is_poll(self) -> bool:
+        """A poll yields to everything else, but only once."""
+        return self.priority is Priority.POLL
+
+
+class RequestQueue:
+    """Issues tickets and chooses what is written next."""
+
+    def __init__(self) -> None:
+        self._waiting: list[Waiting] = []
+        self._tickets = 0
+        self._poll_passed_over = False
+
+    def __bool__(self) -> bool:
+        return bool(self._waiting)
+
+    def add(self, request: Request) -> int:
+        """Queue a request; return its ticket."""
+        self._tickets += 1
+        insort(self._waiting, Waiting(request.priority, self._tickets, request))
+        return self._tickets
+
+    def withdraw(self, ticket: int) -> None:
+        """Remove a request that has not been written."""
+        if self._waiting:
+            self._waiting = [each for each in self._waiting if each.ticket != ticket]
+
+    def take(self) -> Waiting:
+        """Remove and return the next request. A poll passed over once goes next, or typing would blind a plot."""
+        poll_waits = self._waiting[-1].is_poll
+        at = 0
+        if poll_waits and self._poll_passed_over:
+            at = next(at for at, each in enumerate(self._waiting) if each.is_poll)
+        chosen = self._waiting.pop(at)
+        self._poll_passed_over = poll_waits and not chosen.is_poll
+        return chosen
+
+    def drop(self, only: Container[str] | None) -> list[Waiting]:
+        """Remove and return all requests, or those for `only` these addresses."""
+        dropped = [each for each in self._waiting if only is None or each.request.address in only]
+        self._waiting = [each for each in self._waiting if each not in dropped]
+        return dropped
+
+    @property
+    def requests(self) -> Sequence[Request]:
+        """The queued requests, next first."""
+        return [each.request for each in self._waiting]
+
 
 QUIET = 0.1
 """Quiet time after which a recovering line is written to again, s."""

@@ -9,15 +9,11 @@ import asyncio
 from collections.abc import Callable, Container, Sequence
 from dataclasses import dataclass
 
-from multidrop.dialects import End, Priority, Request, StopPiece
-from multidrop.drives.alarm import Alarm
-from multidrop.drives.apart import apart
-from multidrop.drives.debris import Debris, Leftovers
-from multidrop.drives.events import Changed, Ended, Lost, Notice, Sent, Traffic, Transaction, Unsolicited
-from multidrop.drives.flight import Finished
-from multidrop.drives.keeping import Departure, Keeper
-from multidrop.drives.line import Line, Write
-from multidrop.drives.news import News
+from multidrop.dialects import End, Kind, Priority, Request, StopPiece
+from multidrop.drives.events import Changed, Ended, Lost, News, Notice, Sent, Traffic, Transaction, Unsolicited, apart
+from multidrop.drives.keeping import GLOBAL, Departure, Keeper
+from multidrop.drives.late_replies import Debris, Leftovers
+from multidrop.drives.line import Finished, Line, Write
 from multidrop.transports import Preemptible, Transport, TransportLost
 
 OnAnswer = Callable[[Transaction | TransportLost], None]
@@ -34,6 +30,7 @@ class WrittenStop:
     """The same stop, to be repeated piece by piece once it is quiet."""
 
 
+TERMINATORS = (b"\r", b"\n")
 LONGEST_HEARD = 60
 """Most characters shown of a reply that was destroyed."""
 
@@ -62,7 +59,7 @@ class Link:
         self._held: TransportLost | None = None
         """The loss after which the drives are not found again yet."""
         self.reserved: Reserved | None = None
-        """A person writes bytes of his own (`drives.typed`), and requests are refused; None: they pass."""
+        """A person writes bytes of his own (`write_raw`), and requests are refused; None: they pass."""
         self.stops = 0
         """Number of stops written so far, of any kind."""
         self.on_unsolicited: Callable[[Sequence[str]], None] = lambda lines: None
@@ -79,7 +76,7 @@ class Link:
         self._advancing = self._further = False
         self._news = News(name)
         self.watch, self.publish = self._news.watch, self._news.publish
-        self._alarm = Alarm(self.advance)
+        self._timer: asyncio.TimerHandle | None = None
         self._answering = apart(f"a conversation on {name}")
 
     def start(self) -> None:
@@ -91,6 +88,11 @@ class Link:
     def away(self) -> TransportLost | None:
         """The reason why requests are refused; None while they pass."""
         return self._held or self.lost or self.reserved
+
+    @property
+    def loss(self) -> TransportLost | None:
+        """The loss of the transport, until the drives are found again; None otherwise."""
+        return None if isinstance(self.away, Reserved) else self.away
 
     @property
     def cut(self) -> str:
@@ -155,6 +157,30 @@ class Link:
         if self._waiting.pop(ticket, None) is not None:
             self.line.withdraw(ticket)
 
+    def write_raw(self, data: bytes) -> bool:
+        """Write a person's own bytes past the queue, once; False where a stop went first. Raises TransportLost.
+
+        Until their end has left, they are on record as a command that may be cut off; without a terminator until more
+        come.
+        """
+        if loss := self.loss:
+            raise loss
+        now = self.now()
+        if not self.transport.write(data):
+            return False
+        self.departure.begins(text := data.decode("latin-1"))
+        self.line.wrote(data, now, whole=True)
+        if data.endswith(TERMINATORS):
+            self._loop.call_at(self.line.transmitted, self._left, text)
+        self.publish(Traffic(now, True, data))
+        self.advance()
+        return True
+
+    def _left(self, text: str) -> None:
+        """Note that bytes have left, unless others were written since or the port broke."""
+        if self.departure.under_way == text and not self.lost:
+            self.departure.arrived()
+
     # Stops
 
     def preempt(self, framed: bool, stop: Callable[[bool], bytes]) -> None:
@@ -205,8 +231,24 @@ class Link:
         finally:
             self._advancing = self._news.held = False
         if (deadline := self.line.deadline) is not None and not self.lost:
-            self._alarm.set(deadline)
+            self._wake_by(deadline)
         self._news.tell()
+
+    def _wake_by(self, deadline: float) -> None:
+        """Advance then at the latest. A call that comes too early costs less than many timers."""
+        if self._timer is not None and self._timer.when() > deadline:
+            self._sleep()
+        if self._timer is None:
+            self._timer = self._loop.call_at(deadline, self._wake)
+
+    def _wake(self) -> None:
+        self._timer = None
+        self.advance()
+
+    def _sleep(self) -> None:
+        if self._timer is not None:
+            self._timer.cancel()
+            self._timer = None
 
     def _do_events(self) -> None:
         stops, now = self.stops, self.now()
@@ -236,7 +278,9 @@ class Link:
             self._debris.stop_repeated(self.line.transmitted)
             self.publish(Traffic(now, True, data))
             return
-        self.departure.begins(request)
+        # A program's lines are stored and do nothing; a part of a setting or of a question moves nothing.
+        if request.kind is Kind.COMMAND or request.address in GLOBAL:
+            self.departure.begins(f"{request.address}{request.text}")
         self._debris.request_written(data, request, now)
         if request.address:  # the trace of a lone drive repeats lines that were sent to be stored
             self.leftovers.request_written(data, now)
@@ -286,7 +330,7 @@ class Link:
     def _lose(self, error: TransportLost) -> None:
         """Fail what waits; who waits for a reply learns that its request was written."""
         self.lost = error
-        self._alarm.cancel()
+        self._sleep()
         flight = self.line.cut_off(self.now(), begun=bool(self.cut))
         in_flight = flight.ticket if flight is not None and flight.sent else None
         waiting, self._waiting = self._waiting, {}
@@ -304,7 +348,7 @@ class Link:
 
     async def close(self) -> None:
         """Close the port. Call `shut` first."""
-        self._alarm.cancel()
+        self._sleep()
         await self.transport.close()
         if self._orderly:
             self.departure.arrived()
@@ -324,8 +368,3 @@ def _short(lines: Sequence[str]) -> str:
     """Quote the begin of destroyed lines."""
     text = " ".join(lines)
     return repr(text if len(text) <= LONGEST_HEARD else text[:LONGEST_HEARD] + "...")
-
-
-def loss_of(link: Link) -> TransportLost | None:
-    """The loss of a link's transport, until the drives are found again; None otherwise."""
-    return None if isinstance(link.away, Reserved) else link.away

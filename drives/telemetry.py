@@ -1,198 +1,500 @@
-"""Position and velocity, polled at the lowest priority while there is a subscription.
+"""Readings of the drives of one link at the lowest priority, while there is a subscription.
 
-Theory of operation. One drive is read at a time: the one that is due for longest. The end of a poll begins the next
-one, in the turn of the event loop that read the reply, and then publishes the sample. So at the highest rate the wire
-is never idle. A drive is due one period after it was due before, so the rate does not sink with the time that a reading
-takes. A drive that cannot keep up is due at once.
+Theory of operation. Three pollers share the wire: positions and velocities, values by their words, and conditions. Each
+reads one thing at a time: the one that is due for longest. A thing is due one period after it was due before, so the
+rate does not sink with the time that a reading takes; one that cannot keep up is due at once. The end of a poll of
+motion begins the next one in the turn of the event loop that read the reply, and then publishes the sample. So at the
+highest rate the wire is never idle. A drive that does not reply is asked again after a pause that grows.
+
+Conditions are read part by part, each in its turn among the conversations with its drive: a typed line waits for one
+part at most. The quick parts are read once a period. The slow ones are read at first and after each request that may do
+more than ask. They are also read now and then, as a program or another host may change a setting. A part that a drive
+refuses is never asked again. Nothing there reports a drive's silence: the polls of motion do.
 """
 
 from __future__ import annotations
 
 import asyncio
 from collections import deque
-from collections.abc import Sequence
+from collections.abc import Callable, Hashable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field
+from functools import partial
+from math import inf
+from typing import Any, Generic, NamedTuple, TypeVar
 
-from multidrop.dialects import DriveError, Motion, NoAnswer, Priority
-from multidrop.drives.apart import apart
-from multidrop.drives.conclusions import Outcome
-from multidrop.drives.conversations import Conversation
-from multidrop.drives.events import Sample, Silent, Transaction
-from multidrop.drives.readings import USUAL, Readings, Value
-from multidrop.drives.roster import PrintWait, Roster
-from multidrop.drives.subscriptions import Subscription, Subscriptions
-from multidrop.drives.watching import PERIOD, Watching
+from multidrop.dialects import DriveError, End, Motion, NoAnswer, Priority, Refused
+from multidrop.dialects.parameters import Value as Fact
+from multidrop.dialects.values import Part, Reader
+from multidrop.drives.conversations import Conversation, OnEnded, OnOver
+from multidrop.drives.drive import Drive, Running
+from multidrop.drives.events import Conditioned, Outcome, Sample, Silent, Transaction, Valued, apart
+from multidrop.drives.roster import Roster
 from multidrop.transports import TransportLost
 
 MODEST = 0.02
-"""Default period of a drive, s: a screen shows no more, and others need the wire."""
+"""Default period of a drive's motion, s: a screen shows no more, and others need the wire."""
 FASTEST = 0.001
-"""Shortest period of a drive, s: a simulated wire without a baud rate has no other limit."""
-RETRY = 0.02
-"""Pause after a drive could not be asked, s."""
-AFTER_SILENCE = 1.0
-"""Pause after a poll without an answer, s; longer by the same with each further one."""
-LONGEST_SILENCE = 5
-"""Longest pause, in multiples of AFTER_SILENCE."""
+"""Shortest period of a drive's motion, s: a simulated wire without a baud rate has no other limit."""
+USUAL = 0.05
+"""Default period of a value, s."""
+PERIOD = 1.0
+"""Default period of a drive's conditions, s."""
+MOST_SILENCES = 5
+"""Most polls without an answer in a row that make the pause longer."""
 AFTER_DEFECT = 60.0
 """Pause after a poll that failed by a defect, s: each one is reported."""
+FAILED = f"the poll failed ({{}}); it is polled again in {AFTER_DEFECT:g} s"
+PRINT_QUIET = 0.1
+"""Quiet time after a print before the next poll of a party line, s."""
+LONGEST_WAIT = 0.2
+"""Longest time for which prints hold up a poll, s."""
 RATE_OVER = 2.0
 """Time over which the rate is averaged, s."""
+NAKS = 3
+"""NAKs in a row after which a value counts as refused."""
+AGED = 30
+"""Periods after which settings are read again."""
+LEAST = 3.0
+"""Seconds between two readings of a setting, however many commands are sent."""
+
+Thing = TypeVar("Thing", bound=Hashable)
+Read = TypeVar("Read")
+
+
+class Value(NamedTuple):
+    """A value by the address of its drive and its word."""
+
+    address: str
+    word: str
+
+
+class Subscription(Generic[Thing]):
+    """A request for readings of some things, each every `period` s, until it is closed."""
+
+    def __init__(self, things: Sequence[Thing], period: float, ended: Callable[[Subscription[Thing]], None]) -> None:
+        self.things, self.period = tuple(things), period
+        self._ended = ended
+
+    def close(self) -> None:
+        """End it; a second call has no effect."""
+        self._ended(self)
 
 
 @dataclass
-class _Poll:
-    """The polling of one drive: when it is due, polls without an answer in a row, times of the samples."""
+class _Due:
+    """When a thing is read next, s, and polls without an answer in a row."""
 
-    due: float = 0.0
+    at: float = 0.0
+    """Infinite: it is not read again."""
     silences: int = 0
-    times: deque[float] = field(default_factory=lambda: deque(maxlen=1000))
+    refusals: int = 0
+    """NAKs in a row: noise damages a request now and then, and a value that is gone is refused each time."""
 
 
-class Telemetry:
-    """The poller of one link. It publishes its samples as events of the link."""
+class _Poller(Generic[Thing]):
+    """Reads things of one link, each as often as the most eager subscription asks."""
+
+    shortest: float
+    """Shortest period, s."""
+    retry: float
+    """Pause after a thing could not be asked, s."""
+    after_silence: float = 1.0
+    """Pause after a poll without an answer, s; longer by the same with each further one."""
 
     def __init__(self, roster: Roster) -> None:
-        self._roster = roster
-        self._link = roster.link
-        self._subscriptions = Subscriptions[str](FASTEST, self._changed)
-        self._polls: dict[str, _Poll] = {}
-        self._under_way: Conversation[tuple[Motion, ...]] | None = None
+        self.periods: dict[Thing, float] = {}
+        """The shortest period requested for each thing, s."""
+        self._roster, self._link = roster, roster.link
+        self._open: list[Subscription[Thing]] = []
+        self._due: dict[Thing, _Due] = {}
         self._busy = self._paused = False
+        self._under_way: Conversation[Any] | None = None
         self._timer: asyncio.TimerHandle | None = None
-        self._print_wait = PrintWait(roster)
-        self._watching = Watching(roster)
-        self._readings = Readings(roster)
+        self._waits_since: float | None = None
+        """When prints began to hold up the next poll."""
 
-    def watch(self, addresses: Sequence[str], period: float = PERIOD) -> Subscription[str]:
-        """Read the conditions of these drives every `period` s, between the polls."""
-        return self._watching.watch(addresses, period)
+    def subscribe(self, things: Sequence[Thing], period: float) -> Subscription[Thing]:
+        subscription = Subscription(things, max(period, self.shortest), self._end)
+        self._open.append(subscription)
+        self._count()
+        return subscription
 
-    def read(self, values: Sequence[Value], period: float = USUAL) -> Subscription[Value]:
-        """Read values by their words, which `dialects.values` has checked, each every `period` s beside the polls."""
-        return self._readings.subscribe(values, period)
-
-    def subscribe(self, addresses: Sequence[str], period: float = MODEST) -> Subscription[str]:
-        """Poll these drives, each every `period` s as far as the wire allows; 0: as fast as it allows."""
-        return self._subscriptions.add(addresses, period)
-
-    def rate(self, address: str) -> float:
-        """Rate of a drive's samples, per second."""
-        poll = self._polls.get(address)
-        now = self._link.now()
-        recent = [t for t in poll.times if t > now - RATE_OVER] if poll else []
-        return (len(recent) - 1) / (recent[-1] - recent[0]) if len(recent) > 2 else 0.0
-
-    def period(self, address: str) -> float:
-        """Shortest period requested for a drive, s; infinite without a subscription."""
-        return self._subscriptions.periods.get(address, float("inf"))
+    def _end(self, subscription: Subscription[Thing]) -> None:
+        if subscription in self._open:
+            self._open.remove(subscription)
+            self._count()
 
     def close(self) -> None:
-        """End all polling."""
-        self._subscriptions.clear()
-        self._watching.close()
-        self._readings.close()
+        self._open.clear()
+        self._count()
         if self._under_way is not None:
             self._under_way.interrupt()
 
-    def _changed(self) -> None:
+    def pause(self) -> None:
+        self._paused = True
+
+    def resume(self) -> None:
+        self._paused = False
+        self._set_timer(self._link.now())
+
+    def _count(self) -> None:
+        self.periods = {}
+        for each in self._open:
+            for thing in each.things:
+                self.periods[thing] = min(each.period, self.periods.get(thing, each.period))
         now = self._link.now()
-        for address, period in self._subscriptions.periods.items():  # one that was asked for at a slower rate
-            poll = self._polls.setdefault(address, _Poll())
-            poll.due = max(now, min(poll.due, now + period)) if not poll.silences else poll.due
+        for thing, period in self.periods.items():
+            due = self._due.setdefault(thing, _Due())
+            if not due.silences and due.at < inf:  # it may have been asked for at a slower rate
+                due.at = max(now, min(due.at, now + period))
         self._set_timer(now)
 
-    # Polls
+    # One poll after the other
 
     def _set_timer(self, at: float) -> None:
         if self._timer is not None:
             self._timer.cancel()
-        self._timer = asyncio.get_running_loop().call_at(at, self._next) if self._subscriptions.periods else None
+        wanted = self.periods and at < inf
+        self._timer = asyncio.get_running_loop().call_at(at, self._next) if wanted else None
 
     def _next(self) -> None:
-        """Poll the drive that is due for longest, or wait for the next one that is due."""
-        periods = self._subscriptions.periods
-        if self._busy or self._paused or self._link.away or not periods:
+        """Read the thing that is due for longest, or wait for the next one that is due."""
+        if self._busy or self._paused or self._link.away or not self.periods:
             return
         now = self._link.now()
-        address = min(periods, key=lambda each: self._polls[each].due)
-        poll = self._polls[address]
-        if poll.due > now:
-            return self._set_timer(poll.due)
-        if left := self._print_wait.left(now):
+        thing = min(self.periods, key=lambda each: self._due[each].at)
+        due = self._due[thing]
+        if due.at > now:
+            return self._set_timer(due.at)
+        if left := self._held_up(now):
             return self._set_timer(now + left)
-        drive = self._roster.at(address)
-        if drive.programming or drive.transferring:
-            poll.due = now + RETRY
+        if not self._readable(thing):
+            due.at = now + self.retry
             return self._set_timer(now)
-        poll.due = max(poll.due + periods[address], now)
-        self._begin(address, poll)
+        due.at = max(due.at + self.periods[thing], now)
+        self._begin(thing, due)
 
-    def pause(self) -> None:
-        """Begin no poll until `resume`."""
-        self._paused = True
-        self._watching.pause()
-        self._readings.pause()
+    def _held_up(self, now: float) -> float:
+        """Seconds for which the next poll of a party line waits after a print. What people ask for never waits.
 
-    def resume(self) -> None:
-        """Go on polling after a pause, or after one of the link."""
-        self._paused = False
-        self._watching.resume()
-        self._readings.resume()
-        self._set_timer(self._link.now())
+        A program often prints several lines in a row, and the reply of another drive runs into the next.
+        """
+        quiet = self._link.line.printed_at + PRINT_QUIET - now
+        if quiet <= 0 or len(self._roster.drives) < 2:
+            self._waits_since = None
+            return 0.0
+        self._waits_since = now if self._waits_since is None else self._waits_since
+        left = min(quiet, self._waits_since + LONGEST_WAIT - now)
+        if left <= 0:
+            self._waits_since = None
+        return max(left, 0.0)
 
-    def _begin(self, address: str, poll: _Poll) -> None:
+    def _drive(self, thing: Thing) -> Drive:
+        raise NotImplementedError
+
+    def _readable(self, thing: Thing) -> bool:
+        drive = self._drive(thing)
+        return not (drive.programming or drive.transferring)
+
+    def _begin(self, thing: Thing, due: _Due) -> None:
+        """Begin to read a thing, which is due."""
+        raise NotImplementedError
+
+    def _converse(
+        self,
+        thing: Thing,
+        due: _Due,
+        start: Callable[[OnOver[Read], OnEnded], Conversation[Read]],
+        took: Callable[[Thing, float, Read], None],
+    ) -> None:
+        """Read a thing in one conversation; `took` is called with the time of its last request and what was read."""
         ended: list[Transaction] = []
 
-        def over(outcome: Outcome[tuple[Motion, ...]]) -> None:
+        def over(outcome: Outcome[Read]) -> None:
             self._busy, self._under_way = False, None
             if outcome.error is None:
-                self._read(address, poll, ended[-1].transmitted_at, outcome.value())
+                due.silences = due.refusals = 0
+                took(thing, ended[-1].transmitted_at if ended else self._link.now(), outcome.value())
             else:
-                self._failed(address, poll, outcome)
+                due.refusals += bool(ended) and ended[-1].reply.end is End.NAK
+                self._failed(thing, due, outcome)
 
         self._busy = True
-        under_way = self._roster.at(address).start_motion(Priority.POLL, over, ended.append)
+        under_way = start(over, ended.append)
         self._under_way = under_way if self._busy else None
 
-    def _read(self, address: str, poll: _Poll, at: float, axes: Sequence[Motion]) -> None:
+    def _failed(self, thing: Thing, due: _Due, outcome: Outcome[Any]) -> None:
+        """Set when a thing is read again that was not read."""
+        with self._isolated(thing, due, f"polling {thing} on {self._link.name}", FAILED):
+            try:
+                outcome.value()
+            except TransportLost:  # `resume` begins again
+                pass
+            except NoAnswer:
+                self._back_off(due)
+                self._silent(thing, due)
+            except Refused as refusal:
+                due.at = self._link.now() + self.retry
+                self._refused(thing, due, str(refusal))
+            except DriveError:  # a stop or program mode kept it from being asked: that is not a silence
+                due.at = self._link.now() + self.retry
+
+    @contextmanager
+    def _isolated(self, thing: Thing, due: _Due, what: str, report: str) -> Iterator[None]:
+        """Report a defect and put the thing off; then set the timer."""
+        trouble: list[str] = []
+        with apart(what, trouble):
+            yield
+        if trouble:
+            due.at = self._link.now() + AFTER_DEFECT
+            drive = self._drive(thing)
+            self._link.notify(f"{drive.shown}: {report.format(trouble[0])}", drive.address, warning=True)
+        self._set_timer(self._link.now())
+
+    def _back_off(self, due: _Due) -> None:
+        due.silences += 1
+        due.at = self._link.now() + self.after_silence * min(due.silences, MOST_SILENCES)
+
+    def _silent(self, thing: Thing, due: _Due) -> None:
+        """Report a poll without an answer."""
+
+    def _refused(self, thing: Thing, due: _Due, why: str) -> None:
+        """Report a refusal."""
+
+
+class _MotionPoller(_Poller[str]):
+    """Polls position and velocity of drives, by address."""
+
+    shortest = FASTEST
+    retry = 0.02
+
+    def __init__(self, roster: Roster) -> None:
+        super().__init__(roster)
+        self._times: dict[str, deque[float]] = {}
+
+    def rate(self, address: str) -> float:
+        now = self._link.now()
+        recent = [t for t in self._times.get(address, ()) if t > now - RATE_OVER]
+        return (len(recent) - 1) / (recent[-1] - recent[0]) if len(recent) > 2 else 0.0
+
+    def _drive(self, thing: str) -> Drive:
+        return self._roster.at(thing)
+
+    def _begin(self, thing: str, due: _Due) -> None:
+        self._converse(thing, due, partial(self._drive(thing).start_motion, Priority.POLL), self._took)
+
+    def _took(self, address: str, at: float, axes: Sequence[Motion]) -> None:
         """Begin the next poll; then publish what was read."""
-        poll.silences = 0
-        poll.times.append(at)
-        loop = asyncio.get_running_loop()
-        seen = self._roster.at(address).seen
+        self._times.setdefault(address, deque(maxlen=1000)).append(at)
+        seen = self._drive(address).seen
         velocities = seen.velocities if seen is not None else [axis.velocity for axis in axes]
         self._next()
         for axis, velocity in zip(axes, velocities, strict=True):
             sample = Sample(at, address, axis.position, velocity, axis.axis, axis.trouble, axis.program)
-            loop.call_soon(self._publish, sample)
+            asyncio.get_running_loop().call_soon(self._publish, sample)
 
     def _publish(self, sample: Sample) -> None:
-        if sample.address in self._subscriptions.periods:  # else the subscription has ended meanwhile
+        if sample.address in self.periods:  # else the subscription has ended meanwhile
             self._link.publish(sample)
 
-    def _failed(self, address: str, poll: _Poll, outcome: Outcome[tuple[Motion, ...]]) -> None:
-        """Set when the drive is polled again."""
-        trouble: list[str] = []
-        with apart(f"polling {address} on {self._link.name}", trouble):
-            self._put_off(address, poll, outcome)
-        if trouble:
-            poll.due = self._link.now() + AFTER_DEFECT
-            shown = self._roster.at(address).shown
-            text = f"{shown}: the poll failed ({trouble[0]}); it is polled again in {AFTER_DEFECT:g} s"
-            self._link.notify(text, address, warning=True)
-        self._set_timer(self._link.now())
+    def _silent(self, thing: str, due: _Due) -> None:
+        self._link.publish(Silent(self._link.now(), thing))
 
-    def _put_off(self, address: str, poll: _Poll, outcome: Outcome[tuple[Motion, ...]]) -> None:
-        """Poll a drive that was not read later; raise what is neither a loss nor a drive's error."""
+
+class _ValuePoller(_Poller[Value]):
+    """Polls values by their words."""
+
+    shortest = 0.002
+    retry = 0.05
+
+    def _count(self) -> None:
+        super()._count()
+        self._due = {value: self._due[value] for value in self.periods}
+
+    def _drive(self, thing: Value) -> Drive:
+        return self._roster.at(thing.address)
+
+    def _readable(self, thing: Value) -> bool:
+        return super()._readable(thing) and self._drive(thing).family.readings is not None
+
+    def _begin(self, thing: Value, due: _Due) -> None:
+        drive = self._drive(thing)
+        assert drive.family.readings is not None
+        procedure = drive.family.readings.again(drive.state, thing.word, Priority.POLL)
+        self._converse(thing, due, partial(drive.start, procedure), self._took)
+
+    def _took(self, value: Value, at: float, read: float) -> None:
+        self._set_timer(self._link.now())
+        self._link.publish(Valued(at, value.address, value.word, read))
+
+    def _silent(self, thing: Value, due: _Due) -> None:
+        if due.refusals >= NAKS:
+            self._refused(thing, due, f"{thing.address or self._link.name} replies NAK to '{thing.word}'")
+
+    def _refused(self, thing: Value, due: _Due, why: str) -> None:
+        """Read a value no longer, and say so once: each refusal may start a subroutine for errors in the drive."""
+        due.at = inf
+        self._link.notify(f"{why}; it is not read again", thing.address, warning=True)
+
+
+@dataclass
+class _Facts:
+    """The facts that were read of one drive, with their times."""
+
+    drive: Drive
+    facts: dict[str, Fact] = field(default_factory=dict)
+    read: dict[str, tuple[float, int]] = field(default_factory=dict)
+    """Time of each part's last reading, and the drive's commands so far."""
+    refused: set[str] = field(default_factory=set)
+
+
+class _ConditionPoller(_Poller[str]):
+    """Reads the conditions of drives that were found, by address, part by part."""
+
+    shortest = 0.1
+    retry = 0.5
+    after_silence = 2.0
+
+    def __init__(self, roster: Roster) -> None:
+        super().__init__(roster)
+        self._known: dict[str, _Facts] = {}
+        self._task: asyncio.Task[None] | None = None
+
+    def subscribe(self, things: Sequence[str], period: float) -> Subscription[str]:
+        """Read the conditions of these drives at once, and then every `period` s."""
         now = self._link.now()
-        try:
-            outcome.value()
-        except TransportLost:  # `resume` begins again
+        for due in (self._due[address] for address in things if address in self._due):
+            due.at = due.at if due.silences else min(due.at, now)
+        return super().subscribe(things, period)
+
+    def close(self) -> None:
+        super().close()
+        if self._task is not None:
+            self._task.cancel()
+
+    def resume(self) -> None:
+        """Read everything again."""
+        self._known.clear()
+        self._due.clear()
+        self._paused = False
+        self._count()
+
+    def _held_up(self, now: float) -> float:
+        return 0.0  # each part waits for itself
+
+    def _drive(self, thing: str) -> Drive:
+        return self._roster.at(thing)
+
+    def _readable(self, thing: str) -> bool:
+        return thing in self._roster.drives
+
+    def _begin(self, thing: str, due: _Due) -> None:
+        due.at = self._link.now() + self.periods[thing]
+        self._busy = True
+        self._task = asyncio.get_running_loop().create_task(self._read(thing, due))
+
+    async def _read(self, address: str, due: _Due) -> None:
+        with self._isolated(address, due, f"reading the conditions of {address} on {self._link.name}", "{}"):
+            try:
+                await self._read_parts(address, due)
+            finally:
+                self._busy = False
+
+    async def _read_parts(self, address: str, due: _Due) -> None:
+        """Read the parts of a drive that are due, and publish its conditions."""
+        drive, known = self._roster.drives[address], self._known.get(address)
+        if known is None or known.drive is not drive:  # another drive is at this address
+            known = self._known[address] = _Facts(drive)
+        reader: Reader[Any] | None = drive.family.conditions
+        if reader is None:
             return
+        ready, begun, period = False, self._link.now(), self.periods[address]
+        for name in [part.name for part in reader.parts(drive.state, known.facts)]:
+            part = next((each for each in reader.parts(drive.state, known.facts) if each.name == name), None)
+            if part is None or not self._part_due(known, part, period):
+                continue
+            # Nothing is read of a drive that stores lines, or whose settings are to be found out first.
+            barred = drive.programming or drive.transferring or drive.state.settings_unknown
+            barred = barred or self._paused or self._link.away is not None or address not in self.periods
+            if barred or not await self._read_part(known, due, part):
+                return
+            ready = True
+        if ready and known.facts:
+            conditions = reader.fold(drive.state, known.facts)
+            if (runs := next((each.runs for each in conditions if each.runs is not None), None)) is not None:
+                drive.running = Running(begun, runs)
+            self._link.publish(Conditioned(self._link.now(), drive.address, conditions))
+
+    def _part_due(self, known: _Facts, part: Part[Any], period: float) -> bool:
+        if part.name in known.refused:
+            return False
+        at, commands = known.read.get(part.name, (-inf, -1))
+        age = self._link.now() - at
+        return not part.slow or age > AGED * period or (age > LEAST and commands != known.drive.commands)
+
+    async def _read_part(self, known: _Facts, due: _Due, part: Part[Any]) -> bool:
+        """Read one part; return whether the next may follow."""
+        while left := super()._held_up(self._link.now()):
+            await asyncio.sleep(left)
+        drive = known.drive
+        commands = drive.commands
+        try:
+            found = await drive.run(part.read(drive.state))
+            known.facts |= found
+            if part.slow:
+                drive.settings[part.name] = (found, commands)
+        except Refused:
+            known.refused.add(part.name)
         except NoAnswer:
-            poll.silences += 1
-            poll.due = now + AFTER_SILENCE * min(poll.silences, LONGEST_SILENCE)
-            self._link.publish(Silent(now, address))
-        except DriveError:  # a stop or program mode kept it from being asked: that is not a silence
-            poll.due = now + RETRY
+            self._back_off(due)
+            return False
+        except (DriveError, TransportLost):  # stopped, in program mode, or away
+            return False
+        due.silences = 0
+        known.read[part.name] = (self._link.now(), commands)
+        return True
+
+
+class Telemetry:
+    """The pollers of one link. They publish what they read as events of the link."""
+
+    def __init__(self, roster: Roster) -> None:
+        self._motion, self._values = _MotionPoller(roster), _ValuePoller(roster)
+        self._conditions = _ConditionPoller(roster)
+        self._pollers = (self._motion, self._conditions, self._values)
+
+    def subscribe(self, addresses: Sequence[str], period: float = MODEST) -> Subscription[str]:
+        """Poll these drives, each every `period` s as far as the wire allows; 0: as fast as it allows."""
+        return self._motion.subscribe(addresses, period)
+
+    def read(self, values: Sequence[Value], period: float = USUAL) -> Subscription[Value]:
+        """Read values by their words, which `dialects.values` has checked, each every `period` s beside the polls."""
+        return self._values.subscribe(values, period)
+
+    def watch(self, addresses: Sequence[str], period: float = PERIOD) -> Subscription[str]:
+        """Read the conditions of these drives every `period` s, between the polls."""
+        return self._conditions.subscribe(addresses, period)
+
+    def rate(self, address: str) -> float:
+        """Rate of a drive's samples, per second."""
+        return self._motion.rate(address)
+
+    def period(self, address: str) -> float:
+        """Shortest period requested for a drive, s; infinite without a subscription."""
+        return self._motion.periods.get(address, inf)
+
+    def pause(self) -> None:
+        """Begin no poll until `resume`."""
+        for each in self._pollers:
+            each.pause()
+
+    def resume(self) -> None:
+        """Poll again after a pause, or after one of the link."""
+        for each in self._pollers:
+            each.resume()
+
+    def close(self) -> None:
+        """End all polling."""
+        for each in self._pollers:
+            each.close()

@@ -22,8 +22,7 @@ from multidrop.dialects.pmx.host.codec import Pmx
 from multidrop.dialects.tmcl.host.codec import Tmcl
 from multidrop.drives.line import Line
 from multidrop.macros.model import Macro
-from multidrop.macros.toml_edit import with_value
-from multidrop.macros.toml_format import format_macro, parse_macro
+from multidrop.macros.toml_format import format_macro, parse_macro, with_value
 from multidrop.macros.vendor import exported, imported
 from multidrop.shell import lines
 from multidrop.shell.connect import settings, urls

@@ -10,13 +10,14 @@ import contextlib
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import NamedTuple
 
 from multidrop.dialects.errors import Diagnostic
 from multidrop.dialects.files import bounded, opened, utf8
+from multidrop.dialects.text import visible
 from multidrop.macros.atomic import create_atomically, write_atomically
 from multidrop.macros.model import FIRST_PAGE, KEYS, Macro, check, check_name, describe_clash, page_order
-from multidrop.macros.toml_edit import with_values
-from multidrop.macros.toml_format import format_macro, parse_macro
+from multidrop.macros.toml_format import format_macro, parse_macro, with_values
 
 
 class MacroStore:
@@ -279,3 +280,114 @@ def _same(first: Path, second: Path) -> bool:
 
 def _unreadable(path: Path, error: OSError) -> Diagnostic:
     return Diagnostic(f"cannot read it ({error.strerror or error})", str(path))
+
+
+# The list of all macros, as a person reads it.
+
+
+class Listing(NamedTuple):
+    """A line for each macro, the warnings about them, and the problems of the files that cannot be read."""
+
+    lines: list[str]
+    warnings: list[str]
+    broken: list[Diagnostic]
+
+
+def listed(store: MacroStore) -> Listing:
+    """List the macros: name, key and page, length, values, roles, note; and which are beside the project."""
+    lines, broken = [], list[Diagnostic]()
+    for name in store.names():
+        try:
+            summary = visible(store.load(name).summary)
+        except Diagnostic as problem:
+            broken.append(problem)
+        else:
+            lines.append(f"{summary}  [{store.project}]" if store.is_project(name) else summary)
+    return Listing(lines, [*store.clashes(), *store.hidden()], broken)
+
+
+# Drafts: copies of macro files that a person edits. A macro changes only once the whole text is right.
+#
+# A draft that is wrong stays, so that nothing typed is lost; the next edit goes on with it.
+
+
+MODE = 0o600
+
+
+class Draft(NamedTuple):
+    """A copy that is being edited."""
+
+    name: str
+    file: Path
+    base: bytes
+    """The macro's file when the copy was made."""
+    remark: str = ""
+    """What a person must know before editing it."""
+
+
+def begin_draft(store: MacroStore, folder: Path, name: str) -> Draft:
+    """Make a draft of a macro, or find the one that is left. Raises Diagnostic for an unknown macro."""
+    current = store.contents(name)
+    if current is None:
+        store.load(name)  # raises, with the names that there are
+        raise Diagnostic(f"no macro {name!r}", str(store.folder))
+    file, kept = folder / f"{name}.toml", folder / f"{name}.base"
+    try:
+        if file.exists() and kept.exists() and kept.read_bytes() == current:
+            changed = file.read_bytes() != current
+            return Draft(name, file, current, f"goes on with the text of the last edit, {file}" if changed else "")
+        remark = _aside(file, name) if file.exists() else ""
+        write_atomically(kept, current, MODE)
+        write_atomically(file, current, MODE)
+    except OSError as error:
+        raise Diagnostic(
+            f"cannot write the copy ({error.strerror or error})", str(file), f"{name} is as it was"
+        ) from None
+    return Draft(name, file, current, remark)
+
+
+def _aside(file: Path, name: str) -> str:
+    """Keep a draft of a macro that has changed since under another name."""
+    number = next(n for n in range(1, 10_000) if not file.with_suffix(f".{n}.toml").exists())
+    other = file.with_suffix(f".{number}.toml")
+    file.rename(other)
+    return f"{name} has changed since the last edit, whose text is in {other}"
+
+
+def finish_draft(store: MacroStore, draft: Draft) -> str:
+    """Put the text of a draft in place of the macro; return what was done, in one line.
+
+    Raises Diagnostic for a wrong text and for a macro that changed meanwhile. The macro is as it was then, and the
+    draft stays.
+    """
+    try:
+        data = draft.file.read_bytes()
+        if data != draft.base:
+            _put(store, draft, data)
+    except OSError as error:
+        raise Diagnostic(
+            f"cannot read it ({error.strerror or error})", str(draft.file), f"{draft.name} is as it was"
+        ) from None
+    except Diagnostic as problem:
+        kept = f"{draft.name} is as it was; your text is in {draft.file}, and macro edit {draft.name} goes on with it"
+        raise Diagnostic(problem.message, problem.where, f"{problem.hint}; {kept}".removeprefix("; ")) from None
+    drop_draft(draft)
+    if data == draft.base:
+        return f"macro {draft.name}: unchanged"
+    return f"macro {draft.name}: {store.load(draft.name).length} in {store.path(draft.name)}"
+
+
+def drop_draft(draft: Draft) -> None:
+    """Delete a draft."""
+    for path in (draft.file, draft.file.with_suffix(".base")):
+        with contextlib.suppress(OSError):
+            path.unlink()
+
+
+def _put(store: MacroStore, draft: Draft, data: bytes) -> None:
+    text = utf8(data, str(draft.file))
+    macro = parse_macro(text, str(draft.file))
+    if macro.name != draft.name:
+        hint = f"write name = {draft.name!r}; macro rename {draft.name} {macro.name} renames it"
+        raise Diagnostic(f"name = {macro.name!r} in the macro {draft.name}", str(draft.file), hint)
+    store.save_text(macro, text, draft.base)

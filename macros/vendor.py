@@ -13,8 +13,7 @@ from dataclasses import dataclass, field
 from multidrop.dialects.errors import Diagnostic
 from multidrop.dialects.files import lines_of
 from multidrop.dialects.text import visible
-from multidrop.macros.braces import escape, fill
-from multidrop.macros.model import KEYS, Macro, Step
+from multidrop.macros.model import KEYS, Macro, Step, escape, fill
 
 MOST = 10_000
 """The largest number of lines that repetitions make of a string."""

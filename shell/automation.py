@@ -16,9 +16,9 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from multidrop.dialects import Diagnostic
-from multidrop.drives.apart import apart
-from multidrop.drives.halt import Halt
+from multidrop.drives.events import apart
 from multidrop.drives.keeping import GLOBAL
+from multidrop.drives.stopping import Halt
 from multidrop.shell import stop_report
 
 if TYPE_CHECKING:

@@ -10,7 +10,7 @@ from datetime import datetime, timedelta
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from multidrop.dialects import Diagnostic, Procedure, Stopped
-from multidrop.drives.apart import apart
+from multidrop.drives.events import apart
 from multidrop.shell.events import By, Notified, Output, Progressed, SessionEvent, StateChanged
 
 if TYPE_CHECKING:

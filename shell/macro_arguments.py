@@ -9,7 +9,7 @@ from functools import partial
 
 from multidrop.dialects import Diagnostic
 from multidrop.macros import Macro, Parameter, checked_values, is_role, missing
-from multidrop.macros.parameters import written
+from multidrop.macros.model import written
 from multidrop.shell.channel import Field
 from multidrop.shell.workspace import Workspace
 

@@ -21,7 +21,7 @@ from multidrop.transports import TransportLost
 if TYPE_CHECKING:
     from multidrop.drives.bus import Bus
     from multidrop.drives.drive import Drive
-    from multidrop.drives.halt import Halt
+    from multidrop.drives.stopping import Halt
     from multidrop.shell.connect.opening import Opened, Opener
     from multidrop.shell.workspace import Workspace
 

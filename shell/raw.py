@@ -12,7 +12,6 @@ from enum import Enum
 from typing import TYPE_CHECKING
 
 from multidrop.dialects import Diagnostic, Priority, Stopped
-from multidrop.drives import typed
 from multidrop.drives.events import Ended, Sent, Traffic
 from multidrop.shell.events import Bytes
 
@@ -169,7 +168,7 @@ class RawLine(ByteView):
 
     def send(self, data: bytes) -> None:
         """Write bytes, once. Raises Stopped where a stop went first, TransportLost where the port is lost."""
-        if not typed.write(self.bus.link, data):
+        if not self.bus.link.write_raw(data):
             raise Stopped(f"{self.bus.name}: a stop went first; '{text_of(data)}' was not sent")
 
     def encoded(self, text: str) -> bytes:

@@ -11,8 +11,7 @@ from dataclasses import dataclass
 from datetime import datetime
 from typing import TYPE_CHECKING
 
-from multidrop.drives.halt import Fate, Halt
-from multidrop.drives.link import loss_of
+from multidrop.drives.stopping import Fate, Halt
 
 if TYPE_CHECKING:
     from multidrop.drives.bus import Bus
@@ -106,7 +105,7 @@ def of_halts(halts: Iterable[Halt], at: datetime, several: bool) -> Tally:
 
 def _found(halt: Halt, drives: Sequence[Drive], several: bool) -> Iterator[Found]:
     bus = halt.link.name
-    lost = "lost" if loss_of(halt.link) else ""
+    lost = "lost" if halt.link.loss else ""
     why = ", ".join(dict.fromkeys(each for each in (lost, *halt.trouble) if each))
     if not drives:
         yield Found(Fate.NOT_KNOWN if halt.data else Fate.NOT_REACHED, bus, bus, why)

@@ -21,8 +21,7 @@ from weakref import WeakKeyDictionary
 
 from multidrop.dialects import Diagnostic, DriveError, NoAnswer, Priority
 from multidrop.dialects.codec import at_priority
-from multidrop.drives.apart import apart
-from multidrop.drives.events import BusEvent, Changed, Conditioned, Lost, Notice, Sample, Unsolicited
+from multidrop.drives.events import BusEvent, Changed, Conditioned, Lost, Notice, Sample, Unsolicited, apart
 from multidrop.macros import MacroStore, Recorder
 from multidrop.shell import stop_report
 from multidrop.shell.channel import Asking, Tasks
@@ -37,7 +36,7 @@ if TYPE_CHECKING:
     from multidrop.dialects.program_files import Held
     from multidrop.drives.bus import Bus
     from multidrop.drives.drive import Drive
-    from multidrop.drives.halt import Halt
+    from multidrop.drives.stopping import Halt
     from multidrop.shell.connect.opening import Opened
     from multidrop.shell.raw import RawLine, Watched
     from multidrop.shell.roles import Observer, OpenLog, RunningPlot, RunningTwins, Series

@@ -16,12 +16,11 @@ from multidrop.dialects import DriveState, End, Procedure, Reply, Stopped
 from multidrop.dialects.families import family_of
 from multidrop.dialects.mcode.host.codec import MCode
 from multidrop.drives.events import Unsolicited
-from multidrop.drives.flight import Finished
-from multidrop.drives.line import Line, Write
-from multidrop.drives.procedure import ProcedureRunner
+from multidrop.drives.line import Finished, Line, Write
 from multidrop.simulator.cell.spec import Faults
 from multidrop.simulator.cells import read
 from multidrop.simulator.floor import Floor
+from tests.support.procedure import ProcedureRunner
 
 pytest_plugins = ["tests.support.marks", "tests.support.front_door"]
 if os.name == "posix":

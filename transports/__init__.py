@@ -1,29 +1,171 @@
-"""Byte pipes: serial, TCP, UDP, RFC 2217, ssh. They carry bytes and interpret none."""
+"""Byte pipes: serial, TCP, UDP, RFC 2217, ssh. They carry bytes and interpret none. Here is their interface.
 
-from multidrop.transports.base import (
-    Controllable,
-    Limited,
-    Lost,
-    PortControl,
-    Preemptible,
-    Queueing,
-    Received,
-    Remote,
-    Transport,
-    TransportLost,
-    Unreachable,
-)
+A transport never buffers more than it can take back. `discard` drops what was written and has not left this machine,
+because a stop must not queue after the command that it is to stop.
+"""
 
-__all__ = [
-    "Controllable",
-    "Limited",
-    "Lost",
-    "PortControl",
-    "Preemptible",
-    "Queueing",
-    "Received",
-    "Remote",
-    "Transport",
-    "TransportLost",
-    "Unreachable",
-]
+from __future__ import annotations
+
+import struct
+import sys
+from collections.abc import Callable
+from typing import Protocol, runtime_checkable
+
+
+class Endpoint(Protocol):
+    """A descriptor that never blocks: `read` and `write` raise BlockingIOError instead."""
+
+    @property
+    def name(self) -> str:
+        """The name for a person."""
+
+    def fileno(self) -> int:
+        """The descriptor."""
+
+    def read(self) -> bytes | None:
+        """Bytes that arrived; empty: only bytes for the endpoint itself; None: the end."""
+
+    def write(self, data: bytes | memoryview) -> int:
+        """Write, and return how many bytes the system took."""
+
+    def unsent(self) -> int:
+        """Number of bytes that the system reports as held and not sent."""
+
+    def drop(self) -> int:
+        """Take back what the system holds, if possible; return how many bytes that was."""
+
+    def explain(self, error: OSError | None) -> str:
+        """Reason of a break, and the remedy; None: the other end closed the pipe."""
+
+    def close(self) -> None:
+        """Close the descriptor; may block."""
+
+
+if sys.platform != "win32":
+    import fcntl
+    import termios
+
+
+class TransportLost(Exception):
+    """The pipe broke, or could not be opened. The text names the pipe and the reason."""
+
+    def again(self) -> TransportLost:
+        """The same loss for another caller: places are noted on what each one is raised."""
+        return type(self)(*self.args)
+
+
+class Unreachable(TransportLost):
+    """The pipe could not be opened: no such port, in use, refused, no such host."""
+
+
+Received = Callable[[bytes], None]
+Lost = Callable[[TransportLost], None]
+
+
+class Transport(Protocol):
+    """An open byte pipe. All of its methods are called from the event loop's thread."""
+
+    @property
+    def name(self) -> str:
+        """The name for a person: `/dev/ttyUSB0`, `tcp://10.0.0.5:503`."""
+
+    def start(self, received: Received, lost: Lost) -> None:
+        """Begin to deliver bytes. The pipe calls `lost` once, and delivers nothing after that."""
+
+    def write(self, data: bytes) -> bool:
+        """Queue bytes without blocking; return False where they were dropped.
+
+        A broken pipe drops them and calls `lost`; a preempted one (see `Preemptible`) drops them silently.
+        """
+
+    def discard(self, whole: bool = False) -> int:
+        """Drop what has not left this machine yet; return the number of bytes that are known of.
+
+        With `whole`, a write that has begun to leave continues to its end, and the system keeps what it holds.
+        """
+
+    async def close(self) -> None:
+        """Close the pipe without a call of `lost`. A second close has no effect."""
+
+
+@runtime_checkable
+class Preemptible(Protocol):
+    """A transport to which another thread may write a stop, ahead of the event loop."""
+
+    def preempt(self, whole: bool, make: Callable[[int], bytes]) -> bool:
+        """Drop what is unsent and write `make(bytes dropped)` at once, from any thread; False on a broken pipe.
+
+        `write` drops everything until `yielded` is called. `make` must not call the pipe.
+        """
+
+    def yielded(self) -> None:
+        """Let the loop write again, once it has taken note of what preempted it."""
+
+
+@runtime_checkable
+class Queueing(Protocol):
+    """A transport that says how much waits in it."""
+
+    @property
+    def pending(self) -> int:
+        """Number of bytes that were written and wait in this program."""
+
+
+class PortControl(Protocol):
+    """The settings of a serial port that change while it is open.
+
+    A call may block, so it is made in a thread. It raises OSError for a setting that the port does not have.
+    """
+
+    @property
+    def baud(self) -> int:
+        """The baud rate, bits/s, also of a port that is closed by now."""
+
+    def set_baud(self, baud: int) -> None:
+        """Change the baud rate, bits/s; a refused one leaves the present one."""
+
+    def set_dtr(self, on: bool) -> None:
+        """Switch the DTR line."""
+
+    def set_rts(self, on: bool) -> None:
+        """Switch the RTS line."""
+
+    def set_break(self, on: bool) -> None:
+        """Begin or end a break."""
+
+
+@runtime_checkable
+class Controllable(Protocol):
+    """A transport that may have the settings of a serial port."""
+
+    @property
+    def control(self) -> PortControl | None:
+        """Its settings; None: it is not a serial port."""
+
+
+@runtime_checkable
+class Limited(Protocol):
+    """A transport that cannot keep a promise that others keep."""
+
+    @property
+    def limits(self) -> str:
+        """The promises it cannot keep, for a person who opens it."""
+
+
+@runtime_checkable
+class Remote(Protocol):
+    """A transport that has measured how far its port is."""
+
+    @property
+    def round_trip(self) -> float:
+        """The time to the far side and back, s."""
+
+
+if sys.platform != "win32":
+
+    def output_queue(descriptor: int) -> int:
+        """Bytes of a tty that have not left the kernel, or of a stream socket that are not confirmed."""
+        try:
+            return int(struct.unpack("i", fcntl.ioctl(descriptor, termios.TIOCOUTQ, bytes(4)))[0])
+        except OSError:
+            return 0

@@ -9,11 +9,13 @@ delays closing by no more than that.
 from __future__ import annotations
 
 import asyncio
+import threading
 from abc import ABC, abstractmethod
+from collections import deque
 from collections.abc import Callable
-from typing import TypeVar
+from typing import Any, Protocol, TypeVar
 
-from multidrop.transports.base import Lost, PortControl, Received, TransportLost
+from multidrop.transports import Endpoint, Lost, PortControl, Received, TransportLost
 
 LINGER = 1.0
 """Seconds that closing waits for bytes that were written and have not left: 960 bytes at 9600 baud."""
@@ -135,3 +137,332 @@ async def in_thread(make: Callable[[], T], undo: Callable[[T], None]) -> T:
     except asyncio.CancelledError:
         made.add_done_callback(forget)
         raise
+
+
+# A pipe over a non-blocking descriptor that the event loop watches.
+#
+# Bytes that the system does not take at once wait here, not in a stream's buffer, so that they can be taken back.
+#
+# A stop must not wait for the event loop, which may be painting or collecting garbage. So another thread may preempt
+# the loop: under the lock it drops what is unsent and writes the stop. The loop then writes nothing until it has taken
+# note of the stop (`yielded`).
+
+
+_READS = 64
+"""Greatest number of reads of a broken pipe, for what arrived before the break."""
+
+
+class DescriptorPipe(Pipe):
+    """A transport over an `Endpoint`. Each `write` is first offered to the endpoint as a whole."""
+
+    def __init__(self, endpoint: Endpoint, control: PortControl | None = None) -> None:
+        super().__init__(endpoint.name, control)
+        self._endpoint = endpoint
+        self._pending: deque[memoryview] = deque()
+        self._reading = self._writing = self._preempted = False
+        self._guard = threading.Lock()
+        """Held for `_pending`, `_preempted` and each write to the endpoint; never during a callback."""
+
+    def write(self, data: bytes) -> bool:
+        """Pass bytes to the system, and keep what it does not take now; False where they were dropped."""
+        if not data or not self._usable:
+            return not data
+        with self._guard:
+            if self._preempted:
+                return False
+            self._pending.append(memoryview(bytes(data)))
+            problem = None if self._writing else self._push()
+        if problem is not None or self._wants_room():
+            self._after_push(problem)
+        return True
+
+    @property
+    def pending(self) -> int:
+        """Number of bytes that the system has not taken yet."""
+        with self._guard:
+            return sum(map(len, self._pending))
+
+    def discard(self, whole: bool = False) -> int:
+        """Drop what waits here and what the system can give back; `whole`: only writes that have not begun."""
+        if not self._usable:
+            return 0
+        with self._guard:
+            dropped = self._drop(whole)
+        self._watch_writable(self._wants_room())
+        return dropped
+
+    def _drop(self, whole: bool) -> int:
+        begun = self._pending[0] if whole and self._pending and _begun(self._pending[0]) else None
+        dropped = sum(map(len, self._pending)) - len(begun or b"")
+        self._pending.clear()
+        if begun:
+            self._pending.append(begun)
+        return dropped + (0 if whole else self._endpoint.drop())
+
+    def preempt(self, whole: bool, make: Callable[[int], bytes]) -> bool:
+        """Drop what is unsent and write `make(bytes dropped)` at once, from any thread; False on a broken pipe.
+
+        `write` drops everything until `yielded` is called. `make` must not call the pipe.
+        """
+        with self._guard:
+            if not self._usable:
+                return False
+            self._preempted = True
+            self._pending.append(memoryview(make(self._drop(whole))))
+            problem = self._push()
+        self._loop.call_soon_threadsafe(self._after_push, problem)
+        return True
+
+    def yielded(self) -> None:
+        """Let the loop write again, once it has taken note of what preempted it."""
+        with self._guard:
+            self._preempted = False
+
+    def _begin(self) -> None:
+        self._reading = True
+        self._loop.add_reader(self._endpoint.fileno(), self._read)
+
+    def _read(self) -> bool:
+        """Read once; return whether there may be more."""
+        try:
+            data = self._endpoint.read()
+        except (BlockingIOError, InterruptedError):
+            return False
+        except OSError as error:
+            self._break(error)
+            return False
+        if data is None:
+            self._break(None)
+            return False
+        if data:
+            self._deliver(data)
+        return True
+
+    def _send(self) -> None:
+        with self._guard:
+            problem = self._push()
+        self._after_push(problem)
+
+    def _push(self) -> OSError | None:
+        """Pass on the waiting bytes that the system takes; return the error of a broken pipe."""
+        while self._pending:
+            chunk = self._pending[0]
+            try:
+                taken = self._endpoint.write(chunk)
+            except (BlockingIOError, InterruptedError):
+                return None
+            except OSError as error:
+                return error
+            if taken < len(chunk):
+                self._pending[0] = chunk[taken:]
+                return None
+            self._pending.popleft()
+        return None
+
+    def _after_push(self, problem: OSError | None) -> None:
+        if problem is not None:
+            self._break(problem)
+        elif self._usable:
+            self._watch_writable(self._wants_room())
+
+    def _wants_room(self) -> bool:
+        """True if the rest can leave once the descriptor is writable."""
+        return bool(self._pending)
+
+    def _watch_writable(self, wanted: bool) -> None:
+        if wanted and not self._writing:
+            self._loop.add_writer(self._endpoint.fileno(), self._send)
+        elif self._writing and not wanted:
+            self._loop.remove_writer(self._endpoint.fileno())
+        self._writing = wanted
+
+    def _halt(self) -> None:
+        with self._guard:
+            self._pending.clear()
+        self._watch_writable(False)
+        if self._reading:
+            self._loop.remove_reader(self._endpoint.fileno())
+            self._reading = False
+
+    def _drain(self) -> None:
+        for _ in range(_READS):
+            if self._told or self._closing is not None or not self._read():
+                return
+
+    def _idle(self) -> bool:
+        return not self._pending and self._endpoint.unsent() == 0
+
+    def _release(self) -> None:
+        self._endpoint.close()
+
+    def _explain(self, error: OSError | None) -> str:
+        return self._endpoint.explain(error)
+
+
+def _begun(chunk: memoryview) -> bool:
+    """True if the system has taken the beginning of the write that this chunk is the rest of."""
+    return chunk.nbytes < memoryview(chunk.obj).nbytes
+
+
+# A pipe over a blocking device, with one thread that reads and one that writes.
+#
+# It serves what the event loop cannot watch: RFC 2217 through pyserial, and every port and socket on Windows. Writes
+# wait in a queue here and go out in small pieces, so that most of them can be taken back.
+
+
+_JOIN = 2.0
+"""Seconds that closing waits for a thread that a driver holds up; then the thread is abandoned."""
+
+
+class Device(Protocol):
+    """A blocking device. Raises OSError (pyserial's errors are that, too) when it is broken."""
+
+    @property
+    def name(self) -> str:
+        """The name for a person."""
+
+    @property
+    def piece(self) -> int:
+        """Number of bytes per write; 0: each write as a whole."""
+
+    def read(self) -> bytes | None:
+        """Wait for bytes; empty: none arrived for a while; None: the end. Called in the reading thread."""
+
+    def write(self, data: bytes) -> None:
+        """Write all bytes. Called in the writing thread."""
+
+    def purge(self) -> None:
+        """Tell the other end to drop what it has not sent. Called in the writing thread, before the next write."""
+
+    def abort(self) -> int:
+        """Drop what this machine holds; return how many bytes are known of. Never blocks; any thread."""
+
+    def cancel(self) -> None:
+        """End a `read` and a `write` that wait. Any thread; both may be called again before `close`."""
+
+    def explain(self, error: OSError | None) -> str:
+        """Reason of a break, and the remedy; None: the other end closed the pipe."""
+
+    def close(self) -> None:
+        """Close the device, once no other thread uses it."""
+
+
+class ThreadedPipe(Pipe):
+    """A transport over a `Device`."""
+
+    def __init__(self, device: Device, control: PortControl | None = None) -> None:
+        super().__init__(device.name, control)
+        self._device = device
+        self._turn = threading.Condition()
+        self._queue: deque[bytes] = deque()
+        self._purge = self._busy = self._ending = False
+        self._begun = False
+        """The head of the queue is the rest of a write."""
+        self._threads: list[threading.Thread] = []
+        self._spawn(self._write_all, "writer")
+
+    def write(self, data: bytes) -> bool:
+        """Queue bytes for the writing thread; False on a broken pipe."""
+        if not data or not self._usable:
+            return not data
+        with self._turn:
+            self._queue.append(bytes(data))
+            self._turn.notify()
+        return True
+
+    @property
+    def pending(self) -> int:
+        """Number of bytes that the writing thread has not taken yet."""
+        with self._turn:
+            return sum(map(len, self._queue))
+
+    def discard(self, whole: bool = False) -> int:
+        """Drop what is queued and what this machine holds, and ask the other end to do the same if it can.
+
+        With `whole`, drop only what has not begun to leave.
+        """
+        if not self._usable:
+            return 0
+        with self._turn:
+            begun = [self._queue[0]] if whole and self._begun else []
+            dropped = sum(map(len, self._queue)) - sum(map(len, begun))
+            self._queue = deque(begun)
+            self._purge = self._purge or not whole
+            self._turn.notify()
+        return dropped + (0 if whole else self._device.abort())
+
+    def _spawn(self, work: Callable[[], None], what: str) -> None:
+        thread = threading.Thread(target=work, name=f"{self._name} {what}", daemon=True)
+        self._threads.append(thread)
+        thread.start()
+
+    def _post(self, function: Callable[[Any], None], value: bytes | OSError | None) -> None:
+        """Call a function in the loop's thread; end if the loop has ended."""
+        try:
+            self._loop.call_soon_threadsafe(function, value)
+        except RuntimeError:
+            self._ending = True
+
+    def _read_all(self) -> None:
+        while not self._ending:
+            try:
+                data = self._device.read()
+            except OSError as error:
+                self._post(self._break, error)
+                return
+            if data is None:
+                self._post(self._break, None)
+                return
+            if data:
+                self._post(self._deliver, data)
+
+    def _write_all(self) -> None:
+        while True:
+            with self._turn:
+                self._busy = False
+                self._turn.wait_for(lambda: self._queue or self._purge or self._ending)
+                if self._ending:
+                    return
+                purge, self._purge, self._busy = self._purge, False, True
+                piece = self._take() if self._queue else b""
+            try:
+                if purge:
+                    self._device.purge()
+                if piece:
+                    self._device.write(piece)
+            except OSError as error:
+                self._post(self._break, error)
+                return
+
+    def _take(self) -> bytes:
+        whole = self._queue.popleft()
+        piece = self._device.piece or len(whole)
+        self._begun = len(whole) > piece
+        if self._begun:
+            self._queue.appendleft(whole[piece:])
+        return whole[:piece]
+
+    def _begin(self) -> None:
+        self._spawn(self._read_all, "reader")
+
+    def _halt(self) -> None:
+        with self._turn:
+            self._queue.clear()
+            self._ending = True
+            self._turn.notify()
+
+    def _drain(self) -> None:
+        """Do nothing: earlier reads are ahead in the loop's queue."""
+
+    def _idle(self) -> bool:
+        with self._turn:
+            return not self._queue and not self._busy
+
+    def _release(self) -> None:
+        self._device.cancel()
+        for thread in self._threads:
+            thread.join(_JOIN)
+        self._device.close()
+
+    def _explain(self, error: OSError | None) -> str:
+        return self._device.explain(error)

@@ -1,4 +1,4 @@
-"""The near side of a relay: a pipe over a connection whose other end speaks the frames of `transports.relay_frames`.
+"""The near side of a relay: a pipe over a connection whose other end speaks the frames of `transports.relay`.
 
 No more than `CREDIT` bytes are on the way or in the far driver. The rest waits here, where a stop drops it. A stop's
 drop is followed by the stop whatever the credit, because the far side obeys the drop ahead of its queue.
@@ -11,8 +11,8 @@ import threading
 from collections.abc import Callable
 from typing import Protocol
 
-from multidrop.transports.descriptor import DescriptorPipe
-from multidrop.transports.relay_frames import BEAT, CREDIT, MISSED, MOST, Frames, Garbled, Kind, Setting, frame
+from multidrop.transports.pipe import DescriptorPipe
+from multidrop.transports.relay import BEAT, CREDIT, MISSED, MOST, Frames, Garbled, Kind, Setting, frame
 
 _READ = 4096
 _PATIENCE = 5.0

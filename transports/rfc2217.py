@@ -9,9 +9,9 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Callable, Iterable
 
-from multidrop.transports import telnet
-from multidrop.transports.base import Lost, Preemptible, Queueing, Received, Transport, TransportLost, Unreachable
-from multidrop.transports.com_port import (
+from multidrop.transports import Lost, Preemptible, Queueing, Received, Transport, TransportLost, Unreachable, telnet
+from multidrop.transports.sockets import open_tcp
+from multidrop.transports.telnet import (
     BREAK,
     FLOW,
     NAMES,
@@ -26,7 +26,6 @@ from multidrop.transports.com_port import (
     message,
     parsed,
 )
-from multidrop.transports.sockets import open_tcp
 
 CONFIRM = 3.0
 """Seconds that a server has to confirm a setting."""

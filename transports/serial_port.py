@@ -1,37 +1,144 @@
-"""Serial ports and pseudo-terminals: 8 data bits, no parity, 1 stop bit, no flow control, exclusive use."""
+"""Serial ports and pseudo-terminals: 8 data bits, no parity, 1 stop bit, no flow control, exclusive use.
+
+pyserial opens and configures a port. On systems with termios it is a descriptor; elsewhere its calls block, in threads.
+Without `open_serial` no event loop is imported: `multidrop relay` needs none.
+"""
 
 from __future__ import annotations
 
 import contextlib
+import errno
+import os
+import shlex
 import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import TypeVar
 
 import serial
 
-from multidrop.transports.base import Transport, Unreachable
-from multidrop.transports.control import SerialControl
-from multidrop.transports.pipe import in_thread
-from multidrop.transports.serial_open import opened
-from multidrop.transports.threaded import ThreadedPipe
+from multidrop.transports import Transport, Unreachable
+from multidrop.transports.serial_ports import holder
 
 if sys.platform != "win32":
-    from multidrop.transports.descriptor import DescriptorPipe
-    from multidrop.transports.serial_posix import SerialEndpoint
+    import fcntl
+    import termios
 
+    from multidrop.transports import output_queue
+
+    _REFUSALS: tuple[type[Exception], ...] = (ValueError, OverflowError, termios.error)
+else:
+    _REFUSALS = (ValueError, OverflowError)
+
+T = TypeVar("T")
 _PIECE = 256
 _PATIENCE = 0.5
 """Seconds after which a waiting read checks for its end: a cancel between two reads would be lost."""
+_READ = 4096
+_GONE = "the port is gone (unplugged, or its other side closed it); plug it in"
 
 
 async def open_serial(port: str, baud: int = 9600) -> Transport:
     """Open a port by its name or path, at `baud` bits/s, and drop stale input. Raises Unreachable."""
     if baud < 1:
         raise Unreachable(f"{port}: invalid baud rate {baud}; give one such as 9600")
+    from multidrop.transports.pipe import DescriptorPipe, ThreadedPipe, in_thread
+
     if sys.platform == "win32":
         device = await in_thread(lambda: opened(SerialDevice, port, baud), SerialDevice.close)
         return ThreadedPipe(device, device.control)
     else:
         endpoint = await in_thread(lambda: opened(SerialEndpoint, port, baud), SerialEndpoint.close)
         return DescriptorPipe(endpoint, endpoint.control)
+
+
+def opened(kind: Callable[[str, int], T], port: str, baud: int) -> T:
+    """Open a port by one of the classes for it. Raises Unreachable with the reason and the remedy."""
+    try:
+        return kind(port, baud)
+    except OSError as error:
+        raise open_error(port, error) from error
+    except (ValueError, OverflowError) as error:
+        raise Unreachable(f"{port}: cannot be set to {baud} baud ({error})") from error
+
+
+def open_error(port: str, error: OSError) -> Unreachable:
+    """Make the reason and the remedy from the error that pyserial raised on opening a port."""
+    why = _why_on_windows(port, str(error)) if sys.platform == "win32" else _why(port, error)
+    return Unreachable(why or f"{port} could not be opened: {error.strerror or error}")
+
+
+def _why(port: str, error: OSError) -> str:
+    number = error.errno
+    if number in (errno.EBUSY, errno.EAGAIN, errno.EWOULDBLOCK):
+        return f"{port} is in use by {holder(port) or 'another program'}; close it there"
+    if number in (errno.EACCES, errno.EPERM):
+        return f"no permission to open {port}; `sudo usermod -aG {shlex.quote(_group(port))} $USER`, then log in again"
+    if number in (errno.ENOENT, errno.ENODEV, errno.ENXIO, errno.ENOTDIR):
+        return _nothing(port)
+    if number in (errno.EISDIR, errno.ENOTTY) or "configure" in str(error):
+        return f"{port} is not a serial port, or has no hardware; see `multidrop ports`"
+    return f"{port} could not be opened: {os.strerror(number)}" if number else ""
+
+
+def _why_on_windows(port: str, text: str) -> str:
+    """Reason on Windows, where pyserial gives no number but only the text of the error."""
+    if "PermissionError" in text:
+        return f"{port} is in use by another program; close it there"
+    return _nothing(port) if "FileNotFoundError" in text else ""
+
+
+def _nothing(port: str) -> str:
+    return f"no port {port}; plug it in, or see `multidrop ports`"
+
+
+def _group(port: str) -> str:
+    """The group that may use a port; most distributions call it `dialout`."""
+    if sys.platform != "win32":
+        with contextlib.suppress(OSError, KeyError):
+            owner = Path(port).group()
+            return owner if owner != "root" else "dialout"
+    return "dialout"
+
+
+class SerialControl:
+    """The settings of one open port."""
+
+    def __init__(self, port: serial.SerialBase) -> None:
+        self._port = port
+
+    @property
+    def baud(self) -> int:
+        """The baud rate, bits/s, also of a port that is closed by now."""
+        return int(self._port.baudrate)
+
+    def set_baud(self, baud: int) -> None:
+        """Change the baud rate; a refused one leaves the present one."""
+        before = self._port.baudrate
+        try:
+            self._set("baudrate", baud)
+        except OSError:
+            with contextlib.suppress(OSError):
+                self._set("baudrate", before)
+            raise
+
+    def set_dtr(self, on: bool) -> None:
+        """Switch the DTR line."""
+        self._set("dtr", on)
+
+    def set_rts(self, on: bool) -> None:
+        """Switch the RTS line."""
+        self._set("rts", on)
+
+    def set_break(self, on: bool) -> None:
+        """Begin or end a break."""
+        self._set("break_condition", on)
+
+    def _set(self, name: str, value: int) -> None:
+        try:
+            setattr(self._port, name, value)
+        except _REFUSALS as error:
+            raise OSError(*error.args) from error
 
 
 class SerialDevice:
@@ -78,3 +185,81 @@ class SerialDevice:
         """Close the port."""
         with contextlib.suppress(OSError):
             self._port.close()
+
+
+if sys.platform != "win32":
+
+    class SerialEndpoint:
+        """The descriptor of an open port. Opening may block briefly; raises what pyserial raises."""
+
+        def __init__(self, port: str, baud: int) -> None:
+            self.name = port
+            # The "inter byte timeout" of 0 is pyserial's way to VMIN=1: a read with nothing to read is then EAGAIN,
+            # and an empty one can only mean that the line was hung up.
+            try:  # pyserial passes on an error of termios, which is not an OSError, where a port goes at this moment
+                self._port = serial.Serial(port, baud, timeout=0, exclusive=True, inter_byte_timeout=0)
+            except termios.error as error:
+                raise OSError(*error.args) from error
+            self.control = SerialControl(self._port)
+            self._descriptor: int = self._port.fileno()
+            try:
+                _ignore_breaks(self._descriptor)
+            except termios.error as error:
+                self._port.close()
+                raise OSError(*error.args) from error
+            self._claim()
+
+        def _claim(self) -> None:
+            """Shut out programs that ignore pyserial's advisory lock.
+
+            A pseudo-terminal is not claimed: it keeps the mark while its other side is open, so a killed program would
+            leave a port that cannot be opened again.
+            """
+            if not os.path.realpath(self.name).startswith("/dev/pts/"):
+                self._exclusive(termios.TIOCEXCL)
+
+        def _exclusive(self, request: int) -> None:
+            with contextlib.suppress(OSError):
+                fcntl.ioctl(self._descriptor, request)
+
+        def fileno(self) -> int:
+            """The descriptor."""
+            return self._descriptor
+
+        def read(self) -> bytes | None:
+            """Bytes that arrived; None if the port was hung up."""
+            return os.read(self._descriptor, _READ) or None
+
+        def write(self, data: bytes | memoryview) -> int:
+            """Write, and return how many bytes the driver took."""
+            return os.write(self._descriptor, data)
+
+        def unsent(self) -> int:
+            """Bytes in the driver's output queue; always 0 for a pseudo-terminal."""
+            return output_queue(self._descriptor)
+
+        def drop(self) -> int:
+            """Empty the driver's output queue."""
+            held = self.unsent()
+            with contextlib.suppress(termios.error):
+                termios.tcflush(self._descriptor, termios.TCOFLUSH)
+            return held
+
+        def explain(self, error: OSError | None) -> str:
+            """Reason of a break in one line for a person."""
+            return _GONE if error is None or error.errno is None else f"{_GONE} ({error.strerror})"
+
+        def close(self) -> None:
+            """Close the port, after dropping what is stuck in the driver: the kernel would wait up to 30 s for it."""
+            if self.unsent():
+                self.drop()
+            self._exclusive(termios.TIOCNXCL)
+            with contextlib.suppress(OSError):
+                self._port.close()
+
+    def _ignore_breaks(descriptor: int) -> None:
+        """Clear BRKINT, which pyserial leaves as it was: a break on the line would empty both queues."""
+        attributes = termios.tcgetattr(descriptor)
+        if attributes[0] & termios.BRKINT:
+            attributes[0] &= ~termios.BRKINT
+            termios.tcsetattr(descriptor, termios.TCSANOW, attributes)

@@ -8,14 +8,26 @@ import errno
 import os
 import socket
 import sys
+from ipaddress import ip_address
 from typing import Any
 
-from multidrop.transports.base import Transport, Unreachable
-from multidrop.transports.threaded import ThreadedPipe
+from multidrop.transports import Transport, Unreachable
+from multidrop.transports.pipe import ThreadedPipe
+
+# Whether other computers can reach an address that this one listens on.
+
+
+def exposed(host: str) -> bool:
+    """True unless the host is a loopback address or localhost; an unknown name counts as reachable."""
+    try:
+        return host != "localhost" and not ip_address(host).is_loopback
+    except ValueError:
+        return True
+
 
 if sys.platform != "win32":
-    from multidrop.transports.descriptor import DescriptorPipe
-    from multidrop.transports.output_queue import output_queue
+    from multidrop.transports import output_queue
+    from multidrop.transports.pipe import DescriptorPipe
 
 CONNECT = 5.0
 """Greatest time in seconds to connect: name look-up and all addresses of a host together."""

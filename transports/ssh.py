@@ -1,47 +1,58 @@
-"""A serial port of another machine, through the user's own `ssh` program: its keys, configuration, and jump hosts."""
+"""A serial port of another machine: its place, and the programs there that lend it. Its imports are quick."""
 
 from __future__ import annotations
 
-import asyncio
-import sys
+import shlex
+from dataclasses import dataclass
 
-from multidrop.transports.base import Transport, Unreachable
-from multidrop.transports.far_port import SOCAT, FarPort, NotInstalled
-from multidrop.transports.pipe import in_thread
+from multidrop.transports import Unreachable
 
-OPENING = 20.0
-"""Seconds until the greeting: several hosts on the way, a slow machine."""
-
-
-async def open_ssh(far: FarPort, baud: int = 9600, within: float | None = None, way: str = "") -> Transport:
-    """Open a port of another machine within a time, s; `way`: see `far_port.WAYS`. Raises Unreachable."""
-    if sys.platform == "win32":
-        raise Unreachable(f"{far.name}: ssh:// needs multidrop on Linux or macOS here")
-    else:
-        try:
-            return await _opened(far, baud, within or OPENING, way)
-        except NotInstalled as neither:
-            if way:
-                raise
-            try:  # a server that allows a few commands only may refuse the first one as a whole
-                return await _opened(far, baud, within or OPENING, SOCAT)
-            except NotInstalled:
-                raise neither from None
+RELAY = "multidrop"
+SOCAT = "socat"
+WAYS = (RELAY, SOCAT)
+"""The programs on the far side; both are tried in this order unless one is asked for."""
 
 
-if sys.platform != "win32":
+class NotInstalled(Unreachable):
+    """None of the programs that were tried is installed on the far side."""
 
-    async def _opened(far: FarPort, baud: int, within: float, way: str) -> Transport:
-        from multidrop.transports.ssh_session import SshSession, greeted
 
-        session = await in_thread(lambda: SshSession(far, baud, way), lambda late: late.close(True))
-        try:
-            async with asyncio.timeout(within):
-                return await greeted(session, far, baud, way)
-        except TimeoutError:
-            why = session.last_words() or "no reply"
-            await asyncio.to_thread(session.close, True)
-            raise Unreachable(f"{far.name}: not reached within {within:g} s: {why}; try `ssh {far.login}`") from None
-        except BaseException:
-            await asyncio.shield(asyncio.to_thread(session.close, True))
-            raise
+_IN_URL = str.maketrans({"%": "%25", "?": "%3F", "#": "%23"})
+
+
+@dataclass(frozen=True)
+class FarPort:
+    """A serial port of another machine."""
+
+    host: str
+    path: str
+    user: str = ""
+    port: int = 0
+    """The ssh server's port; 0: as the user's own configuration says."""
+
+    @property
+    def name(self) -> str:
+        """The URL without keys."""
+        path = self.path.translate(_IN_URL)
+        return f"ssh://{self.place}{path}"
+
+    @property
+    def place(self) -> str:
+        """User, host and port as in a URL."""
+        host = f"[{self.host}]" if ":" in self.host else self.host
+        return (f"{self.user}@" if self.user else "") + host + (f":{self.port}" if self.port else "")
+
+    @property
+    def login(self) -> str:
+        """The arguments of an `ssh` by hand, quoted for a shell."""
+        user = f"{self.user}@" if self.user else ""
+        return (f"-p {self.port} " if self.port else "") + shlex.quote(user + self.host)
+
+
+def wrong_path(path: str) -> str:
+    """Why a path cannot be passed to the far shell; empty if it can."""
+    if not path.startswith("/") or path.endswith("/"):
+        return "no port"
+    if "\\" in path or not path.isprintable():
+        return "a backslash or a control character in the port's path"
+    return ""

@@ -1,4 +1,6 @@
-"""A running `ssh` and its far side: `multidrop relay` or `socat` on another machine.
+"""A serial port of another machine, through the user's own `ssh` program: its keys, configuration, and jump hosts.
+
+The far side is `multidrop relay`, or `socat` where that is not installed.
 
 `ssh` has one socket as its standard input and output. It runs in a session of its own, so a Ctrl+C at the terminal
 does not end it ahead of the stop. Its messages go to a file, of which the last line is the reason of an end.
@@ -19,11 +21,11 @@ import tempfile
 import time
 from collections.abc import Iterator
 
-from multidrop.transports.base import Transport, Unreachable
-from multidrop.transports.descriptor import DescriptorPipe
-from multidrop.transports.far_port import RELAY, SOCAT, FarPort, NotInstalled
-from multidrop.transports.relay_frames import GREETING, WORD, Frames, Garbled, Kind, frame
+from multidrop.transports import Transport, Unreachable
+from multidrop.transports.pipe import DescriptorPipe, in_thread
+from multidrop.transports.relay import GREETING, WORD, Frames, Garbled, Kind, frame
 from multidrop.transports.relay_pipe import RelayPipe
+from multidrop.transports.ssh import RELAY, SOCAT, FarPort, NotInstalled
 
 # The command lines of `ssh` and of the far machine, and the reasons of a failure.
 #
@@ -124,7 +126,7 @@ def reason(far: FarPort, status: int | None, words: str, way: str = "") -> str:
 
 
 if sys.platform != "win32":
-    from multidrop.transports.output_queue import output_queue
+    from multidrop.transports import output_queue
 
 assert sys.platform != "win32"
 
@@ -325,3 +327,34 @@ async def _greeting(session: SshSession, far: FarPort, way: str) -> tuple[str, b
 def _failure(far: FarPort, status: int | None, words: str, way: str) -> Unreachable:
     kind = NotInstalled if status == MISSING else Unreachable
     return kind(f"{far.name}: {reason(far, status, words, way)}")
+
+
+OPENING = 20.0
+"""Seconds until the greeting: several hosts on the way, a slow machine."""
+
+
+async def open_ssh(far: FarPort, baud: int = 9600, within: float | None = None, way: str = "") -> Transport:
+    """Open a port within a time, s; `way`: see `ssh.WAYS`. Raises Unreachable."""
+    try:
+        return await _opened(far, baud, within or OPENING, way)
+    except NotInstalled as neither:
+        if way:
+            raise
+        try:  # a server that allows a few commands only may refuse the first one as a whole
+            return await _opened(far, baud, within or OPENING, SOCAT)
+        except NotInstalled:
+            raise neither from None
+
+
+async def _opened(far: FarPort, baud: int, within: float, way: str) -> Transport:
+    session = await in_thread(lambda: SshSession(far, baud, way), lambda late: late.close(True))
+    try:
+        async with asyncio.timeout(within):
+            return await greeted(session, far, baud, way)
+    except TimeoutError:
+        why = session.last_words() or "no reply"
+        await asyncio.to_thread(session.close, True)
+        raise Unreachable(f"{far.name}: not reached within {within:g} s: {why}; try `ssh {far.login}`") from None
+    except BaseException:
+        await asyncio.shield(asyncio.to_thread(session.close, True))
+        raise

@@ -188,8 +188,7 @@ class ShellAssist(Assist):
 
 def _ports(state: Path) -> list[StartEntry]:
     from multidrop.shell.connect.port_state import memory_of
-    from multidrop.transports.holders import holder
-    from multidrop.transports.listing import list_ports
+    from multidrop.transports.serial_ports import holder, list_ports
 
     entries = []
     for port in list_ports():

@@ -11,7 +11,7 @@ from collections.abc import Callable, Container, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TypeVar
 
-from multidrop.drives.readings import Value
+from multidrop.drives.telemetry import Value
 from multidrop.shell.roles import Series
 from multidrop.tui.screen_model import ScreenModel
 from multidrop.tui.session_view import BusView, Closable, SessionView, TelemetryView

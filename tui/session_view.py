@@ -11,7 +11,7 @@ from typing import Any, NamedTuple, Protocol
 from multidrop.dialects.family import Language
 from multidrop.dialects.parameters import Parameters
 from multidrop.dialects.values import Controls
-from multidrop.drives.readings import Value
+from multidrop.drives.telemetry import Value
 from multidrop.shell.channel import Fill
 from multidrop.shell.events import By, SessionEvent
 from multidrop.shell.roles import RunningPlot, Series

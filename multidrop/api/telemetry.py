@@ -15,7 +15,7 @@ from multidrop.shell.events import OnBus, SessionEvent
 if TYPE_CHECKING:
     from multidrop.api.owner import Owner
     from multidrop.drives.drive import Drive
-    from multidrop.drives.subscriptions import Subscription
+    from multidrop.drives.telemetry import Subscription
 
 RATE = 50.0
 """Samples of each drive a second, at most."""

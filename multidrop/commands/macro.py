@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 from multidrop.commands.failure import fail
 from multidrop.dialects import Diagnostic
 from multidrop.macros import Macro, MacroStore, format_macro, missing
-from multidrop.macros.listing import listed
+from multidrop.macros.store import listed
 from multidrop.shell.connect.settings import Settings
 from multidrop.shell.output import INTERRUPTED, write
 

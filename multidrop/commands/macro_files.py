@@ -11,7 +11,8 @@ from collections.abc import Callable
 from multidrop.commands.failure import fail
 from multidrop.dialects import Diagnostic
 from multidrop.dialects.files import bounded, utf8, why
-from multidrop.macros import MacroStore, drafts
+from multidrop.macros import MacroStore
+from multidrop.macros.store import begin_draft, finish_draft
 from multidrop.shell import macro_changes
 from multidrop.shell.connect.settings import Settings
 from multidrop.shell.output import INTERRUPTED, write
@@ -24,11 +25,11 @@ def edit(chosen: argparse.Namespace) -> int:
 
     def work(store: MacroStore) -> list[str]:
         command = macro_changes.editor()
-        draft = drafts.begin(store, Settings().macro_drafts, chosen.name)
+        draft = begin_draft(store, Settings().macro_drafts, chosen.name)
         if draft.remark:
             write(sys.stderr, draft.remark)
         _run([*command, str(draft.file)], f"{chosen.name} is as it was")
-        return [drafts.finish(store, draft)]
+        return [finish_draft(store, draft)]
 
     return _told(work)
 

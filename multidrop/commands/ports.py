@@ -6,7 +6,7 @@ import argparse
 import sys
 
 from multidrop.shell.output import write
-from multidrop.transports.listing import list_ports
+from multidrop.transports.serial_ports import list_ports
 
 
 def run(chosen: argparse.Namespace) -> int:

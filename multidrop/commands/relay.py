@@ -8,7 +8,7 @@ import sys
 from types import FrameType
 
 from multidrop.dialects.errors import Diagnostic
-from multidrop.transports.base import TransportLost
+from multidrop.transports import TransportLost
 
 
 def run(chosen: argparse.Namespace) -> int:
@@ -40,8 +40,7 @@ def _serve(chosen: argparse.Namespace) -> int:
                 "is no serial port of this machine", url_without_secrets(chosen.port), "as in /dev/ttyUSB0"
             )
         from multidrop.transports.relay import serve
-        from multidrop.transports.serial_open import opened
-        from multidrop.transports.serial_posix import SerialEndpoint
+        from multidrop.transports.serial_port import SerialEndpoint, opened
 
         for number in (signal.SIGTERM, signal.SIGHUP):
             signal.signal(number, _ended)

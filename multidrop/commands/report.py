@@ -148,7 +148,7 @@ def _macros() -> Iterator[str]:
 
 
 def _ports() -> Iterator[str]:
-    from multidrop.transports.listing import list_ports
+    from multidrop.transports.serial_ports import list_ports
 
     found = list_ports()
     for port in found:

@@ -24,7 +24,7 @@ from pygls.io_ import run_async
 from multidrop.dialects import Diagnostic
 from multidrop.lsp.server import Server
 from multidrop.shell.signals import SIGNALS
-from multidrop.transports.exposure import exposed
+from multidrop.transports.sockets import exposed
 
 PIECE = 65536
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import sys
 import time
 from collections.abc import Awaitable, Callable
 from dataclasses import dataclass, replace
@@ -17,8 +18,8 @@ from multidrop.shell.connect import settings
 from multidrop.shell.connect.port_state import PortState
 from multidrop.shell.connect.reconnect import HostAgain, LoginAgain, Reopen, SerialAgain, simulated, timed
 from multidrop.shell.connect.urls import Connection
-from multidrop.transports import Limited
-from multidrop.transports.far_port import FarPort
+from multidrop.transports import Limited, Unreachable
+from multidrop.transports.ssh import FarPort
 
 if TYPE_CHECKING:
     from multidrop.drives.keeping import Keeper
@@ -128,7 +129,7 @@ def port_name(connection: Connection) -> str:
         return replace(far_port(connection), user="", host=connection.host.lower()).name
     if connection.scheme != "serial":
         return f"{connection.host.lower()}:{connection.port}"
-    from multidrop.transports.listing import stable_name
+    from multidrop.transports.serial_ports import stable_name
 
     return stable_name(connection.target)
 
@@ -174,9 +175,13 @@ async def _transport(
 
         return await open_rfc2217(connection.host, connection.port, baud, within)
     if connection.scheme == "ssh":
-        from multidrop.transports.ssh import open_ssh
+        far = far_port(connection)
+        if sys.platform == "win32":
+            raise Unreachable(f"{far.name}: ssh:// needs multidrop on Linux or macOS here")
+        else:
+            from multidrop.transports.ssh_session import open_ssh
 
-        return await open_ssh(far_port(connection), baud, within, connection.relay)
+            return await open_ssh(far, baud, within, connection.relay)
     from multidrop.transports.sockets import open_tcp, open_udp
 
     if connection.scheme == "udp":

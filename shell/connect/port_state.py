@@ -22,6 +22,7 @@ from urllib.parse import quote
 
 from multidrop.dialects import DriveState, Owed
 from multidrop.dialects.state import Remembered
+from multidrop.drives.keeping import Keeper
 from multidrop.macros.atomic import write_atomically
 
 MOST_REPLIED = 64
@@ -105,7 +106,7 @@ LONGEST_NAME = 100
 LOST = "if this session is interrupted, the next one cannot repair this port"
 
 
-class PortState:
+class PortState(Keeper):
     """The record that the last session left on a port, and a `Keeper` for this one.
 
     `cut` is the line that it was sending, `owed` the settings that it did not restore; `remarks` are for a person.

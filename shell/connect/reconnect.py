@@ -14,9 +14,8 @@ from collections.abc import Awaitable, Callable, Collection
 from typing import TYPE_CHECKING
 
 from multidrop.dialects import DriveError, Hints, Stopped
-from multidrop.drives.apart import apart
 from multidrop.drives.drive import confirmed_motion
-from multidrop.drives.events import Changed
+from multidrop.drives.events import Changed, apart
 from multidrop.shell.stop_report import E_STOP, UNCONFIRMED, last_seen
 from multidrop.transports import Controllable, Transport, TransportLost, Unreachable
 
@@ -51,7 +50,7 @@ class SerialAgain:
     """A serial port, by a name that follows its adapter."""
 
     def __init__(self, port: str, open_: Callable[[str], Awaitable[Transport]]) -> None:
-        from multidrop.transports.listing import stable_name
+        from multidrop.transports.serial_ports import stable_name
 
         self._name = stable_name(port)
         self._open = open_

@@ -17,7 +17,7 @@ from multidrop.dialects.families import TABLE
 from multidrop.dialects.text import whole
 from multidrop.shell.connect.url_forms import URL_FORMS, sentence
 from multidrop.shell.secrets import holds_password, url_without_secrets, without_secrets
-from multidrop.transports.far_port import WAYS, wrong_path
+from multidrop.transports.ssh import WAYS, wrong_path
 
 if TYPE_CHECKING:
     from multidrop.shell.connect.settings import SavedConnection

@@ -20,8 +20,7 @@ from multidrop.shell.sharing.actions import Say
 from multidrop.shell.sharing.server import SharedPort
 from multidrop.shell.sharing.stop_bytes import stop_bytes
 from multidrop.transports import Limited, TransportLost
-from multidrop.transports.exposure import exposed
-from multidrop.transports.sockets import explain
+from multidrop.transports.sockets import explain, exposed
 
 AGAIN = 10.0
 """Seconds for which a client that tries again and again is refused without another line."""

@@ -10,9 +10,7 @@ from typing import TYPE_CHECKING
 
 from multidrop.dialects import Diagnostic
 from multidrop.drives.events import Conditioned, Lost, Sample, Unsolicited, Valued
-from multidrop.drives.readings import USUAL, Value
-from multidrop.drives.subscriptions import Subscription
-from multidrop.drives.telemetry import MODEST, Telemetry
+from multidrop.drives.telemetry import MODEST, USUAL, Subscription, Telemetry, Value
 from multidrop.shell.events import (
     Diverged,
     Entered,
@@ -31,7 +29,7 @@ from multidrop.shell.plots.rate import shown
 from multidrop.shell.plots.states import states_of
 from multidrop.shell.plots.target import PlotTarget
 from multidrop.shell.roles import DIFFERENCE, Series
-from multidrop.transports.exposure import exposed
+from multidrop.transports.sockets import exposed
 
 if TYPE_CHECKING:
     from multidrop.shell.workspace import Workspace

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 from multidrop.dialects import Diagnostic, NoAnswer, Stopped
 from multidrop.drives.drive import Drive
 from multidrop.drives.events import Lost
-from multidrop.drives.halt import Halt
+from multidrop.drives.stopping import Halt
 from multidrop.macros import Macro
 from multidrop.shell import unfinished
 from multidrop.shell.automation import outcome, settled

@@ -15,8 +15,8 @@ from typing import NamedTuple, TypeVar
 from multidrop.dialects import Diagnostic
 from multidrop.dialects.files import bounded, bytes_of, lines_of, utf8, why
 from multidrop.macros import Macro, MacroStore, check_name, checked_values, fill, parse_macro, value_names
-from multidrop.macros.parameters import Parameter, plain, written
-from multidrop.macros.places import in_text
+from multidrop.macros.model import Parameter, plain, written
+from multidrop.macros.toml_format import in_text
 from multidrop.shell.lines import VerbLine, parse, uncommented
 from multidrop.shell.scripts import words
 from multidrop.shell.scripts.expression import evaluate, unknowns

@@ -11,7 +11,7 @@ from collections import deque
 from dataclasses import dataclass
 
 from multidrop.transports import telnet
-from multidrop.transports.com_port import OPTION, PURGE_BOTH, REPLY, Setting, message, parsed
+from multidrop.transports.telnet import OPTION, PURGE_BOTH, REPLY, Setting, message, parsed
 
 HELD = 1 << 16
 """Bytes that are kept for a client that has suspended the flow to it."""

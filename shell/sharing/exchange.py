@@ -15,7 +15,7 @@ from multidrop.shell.sharing.actions import Action, Close, Purge, Say, Send, Set
 from multidrop.shell.sharing.client import Client, Input, Request
 from multidrop.shell.sharing.half_line import ENDS, HalfLine
 from multidrop.shell.sharing.stop_bytes import OwedStop, StopBytes
-from multidrop.transports.com_port import FLOW, FLOW_IN, GROUPS, NEEDED, PURGE_RECEIVED, Control, Setting, group_of
+from multidrop.transports.telnet import FLOW, FLOW_IN, GROUPS, NEEDED, PURGE_RECEIVED, Control, Setting, group_of
 
 SILENT = 10.0
 """Seconds of silence after which another client may write."""

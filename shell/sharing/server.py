@@ -15,8 +15,8 @@ from multidrop.shell.sharing.actions import Action, Close, Purge, Say, Send, Set
 from multidrop.shell.sharing.exchange import NEVER, NOT_REACHED, Exchange
 from multidrop.shell.sharing.stop_bytes import StopBytes
 from multidrop.transports import Controllable, PortControl, Queueing, Transport, TransportLost
-from multidrop.transports.com_port import Control, Setting
 from multidrop.transports.sockets import host_port, set_socket_options
+from multidrop.transports.telnet import Control, Setting
 
 UNREAD = 1 << 18
 """Bytes that a client may leave unread before it is disconnected."""

@@ -9,13 +9,12 @@ from dataclasses import dataclass
 from datetime import datetime, timedelta
 from typing import NamedTuple
 
-from multidrop.dialects import DriveError, Priority, Request
+from multidrop.dialects import DriveError, Priority, Procedure, Request
 from multidrop.dialects.codec import Reply
 from multidrop.dialects.family import Motion
 from multidrop.dialects.text import whole
 from multidrop.drives.drive import Drive
 from multidrop.drives.events import Sample
-from multidrop.drives.procedure import ProcedureRunner
 from multidrop.shell.events import Diverged
 from multidrop.shell.lines import EVERYONE, join_target
 from multidrop.shell.log.steps import Exchange, Step
@@ -46,30 +45,31 @@ class Decoding:
 
     def __init__(self, drive: Drive) -> None:
         self._drive = drive
-        self._runner: ProcedureRunner[tuple[Motion, ...]] | None = None
+        self._procedure: Procedure[tuple[Motion, ...]] | None = None
+        self._request: Request | None = None
 
     def take(self, poll: Exchange) -> Iterator[Measured]:
         """Take a request with its reply; yield what the drive's motion was once that is known."""
         try:
             result = self._step(poll)
         except DriveError:  # it is in program mode now, or the reply was damaged then, too
-            self._runner, result = None, ()
+            self._request, result = None, ()
         for each in result:
             yield Measured(poll.where, poll.at, each.axis, each.position, each.velocity)
 
     def _step(self, poll: Exchange) -> tuple[Motion, ...]:
         """Go on with the conversation that the request belongs to, or begin one; return its result at its end."""
-        if self._runner is None or not self._fits(self._runner.request, poll):
-            self._runner = ProcedureRunner(self._drive.family.motion(copy(self._drive.state), Priority.POLL))
-        runner, self._runner = self._runner, None
-        request = runner.request
-        reply = self._reply(request, poll) if request is not None and self._fits(request, poll) else None
-        if reply is None:
-            return ()
-        runner.answer(reply)
-        if runner.request is None:
-            return runner.result
-        self._runner = runner
+        try:
+            if self._request is None or not self._fits(self._request, poll):
+                self._procedure = self._drive.family.motion(copy(self._drive.state), Priority.POLL)
+                self._request = next(self._procedure)
+            request, self._request = self._request, None
+            reply = self._reply(request, poll) if self._fits(request, poll) else None
+            if reply is not None and self._procedure is not None:
+                self._request = self._procedure.send(reply)
+        except StopIteration as done:
+            motion: tuple[Motion, ...] = done.value
+            return motion
         return ()
 
     @staticmethod

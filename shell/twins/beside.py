@@ -9,10 +9,9 @@ from typing import Generic, Protocol, TypeVar
 from multidrop.dialects import End, Priority
 from multidrop.dialects.family import Motion
 from multidrop.dialects.values import Conditions
-from multidrop.drives.conclusions import Concluded
 from multidrop.drives.conversations import ASKING
 from multidrop.drives.drive import Drive
-from multidrop.drives.events import Sample, Transaction
+from multidrop.drives.events import Concluded, Sample, Transaction
 from multidrop.shell.events import Agreed, Diverged, Predicted, TwinEvent
 from multidrop.shell.twins.causes import Known, Pair, causes
 from multidrop.shell.twins.comparing import Comparison, Verdict

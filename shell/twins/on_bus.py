@@ -11,12 +11,10 @@ from collections.abc import Callable
 
 from multidrop.dialects.values import Snapshot
 from multidrop.drives.bus import Bus
-from multidrop.drives.conclusions import Concluded
 from multidrop.drives.drive import Drive
-from multidrop.drives.events import BusEvent, Changed, Conditioned, Lost, Sample, Sent, Traffic, Valued
+from multidrop.drives.events import BusEvent, Changed, Concluded, Conditioned, Lost, Sample, Sent, Traffic, Valued
 from multidrop.drives.keeping import GLOBAL
-from multidrop.drives.readings import Value
-from multidrop.drives.subscriptions import Subscription
+from multidrop.drives.telemetry import Subscription, Value
 from multidrop.shell.events import TwinEnded, TwinEvent
 from multidrop.shell.twins.beside import Beside
 

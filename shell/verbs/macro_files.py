@@ -7,7 +7,7 @@ from collections.abc import Awaitable, Callable
 
 from multidrop.dialects import Diagnostic
 from multidrop.macros import FIRST_PAGE, KEYS
-from multidrop.macros.listing import listed
+from multidrop.macros.store import listed
 from multidrop.shell import macro_changes
 from multidrop.shell.events import By
 from multidrop.shell.verbs.registry import Call, verb

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 from multidrop.dialects import Diagnostic
 from multidrop.macros import Macro, check_name, parse_macro
-from multidrop.macros.pauses import Offer, with_waits
+from multidrop.macros.recorder import Offer, with_waits
 from multidrop.shell.macro_arguments import roles_in
 from multidrop.shell.verbs.registry import Call, verb
 from multidrop.shell.workspace import Workspace

@@ -22,7 +22,7 @@ from multidrop.simulator import cells
 from multidrop.simulator.floor import Floor
 from multidrop.simulator.serving.endpoints import Served, serve_bus
 from multidrop.simulator.serving.running import RunningFloor
-from multidrop.transports.exposure import exposed
+from multidrop.transports.sockets import exposed
 
 INPUT = "standard input"
 LONGEST = 64 * 1024

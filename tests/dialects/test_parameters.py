@@ -11,9 +11,9 @@ from multidrop.dialects.modbus.manual.registers import REGISTERS
 from multidrop.dialects.parameters import COMMUNICATION, Permission, Reading, Readings, same
 from multidrop.dialects.pmx.host import parameters
 from multidrop.dialects.tmcl.host import values
-from multidrop.drives.procedure import ProcedureRunner
 from multidrop.simulator.pmx.settings import REGISTERS as PMX_REGISTERS
 from tests.dialects.modbus.test_talk import Far
+from tests.support.procedure import ProcedureRunner
 
 
 def held(**values):

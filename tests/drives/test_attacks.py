@@ -8,10 +8,9 @@ from hypothesis import strategies as st
 
 from multidrop.dialects import End, Kind, Priority, Request, StopPiece
 from multidrop.dialects.mcode.host.codec import MCode
-from multidrop.drives.doubt import LATE
 from multidrop.drives.events import Unsolicited
-from multidrop.drives.flight import LONGEST_LIST, NEVER_QUIET, Finished
-from multidrop.drives.line import Line, Write
+from multidrop.drives.late_replies import LATE
+from multidrop.drives.line import LONGEST_LIST, NEVER_QUIET, Finished, Line, Write
 from tests.support.examples import examples
 
 QUIETLY = MCode(em=1)

@@ -9,7 +9,7 @@ from multidrop.dialects.mcode.host.codec import MCode
 from multidrop.dialects.state import Owed
 from multidrop.drives.conversations import Conversations
 from multidrop.drives.events import Sent
-from multidrop.drives.keeping import Keeper, NoKeeper
+from multidrop.drives.keeping import Keeper
 from multidrop.drives.line import Line
 from multidrop.drives.link import Link
 from multidrop.transports import TransportLost
@@ -48,7 +48,7 @@ class Desk:
     """Conversations with one drive on such a pipe."""
 
     def __init__(self, keeper: Keeper | None = None) -> None:
-        keeper = keeper or NoKeeper()
+        keeper = keeper or Keeper()
         self.pipe = Pipe()
         self.link = Link("desk", self.pipe, Line(CODEC), keeper)
         self.conversations = Conversations(self.link, keeper)
@@ -176,7 +176,7 @@ async def test_a_loss_ends_every_conversation_even_one_that_would_clean_up():
     assert desk.conversations.under_way == []
 
 
-class SlowKeeper(NoKeeper):
+class SlowKeeper(Keeper):
     """Takes its time to write."""
 
     kept = 0

@@ -4,9 +4,9 @@ import pytest
 
 from multidrop.dialects import DriveError, NoAnswer
 from multidrop.dialects.mcode.family import MCODE
-from multidrop.drives.procedure import ProcedureRunner
 from multidrop.simulator.cell.spec import Faults
 from tests.support.mcode_drives import Desk
+from tests.support.procedure import ProcedureRunner
 
 SLOW = (0.0, 0.05, 0.3, 0.6, 0.9)
 """Delays of a reply, s, up to the time that the host waits."""

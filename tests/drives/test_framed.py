@@ -7,10 +7,9 @@ import pytest
 from multidrop.dialects import Decoded, DriveState, End, Kind, NoAnswer, Reply, Request, StopPiece
 from multidrop.dialects.mcode.host.codec import MCode
 from multidrop.drives.events import Unsolicited
-from multidrop.drives.flight import Finished
 from multidrop.drives.inbox import TAIL
-from multidrop.drives.line import QUIET, Line, Write
-from multidrop.drives.procedure import ProcedureRunner
+from multidrop.drives.line import QUIET, Finished, Line, Write
+from tests.support.procedure import ProcedureRunner
 
 
 @dataclass(frozen=True)

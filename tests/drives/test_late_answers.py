@@ -15,10 +15,9 @@ from multidrop.dialects.mcode.host.framing import sealed
 from multidrop.dialects.mcode.host.state import MCodeState
 from multidrop.dialects.pmx.host.codec import Pmx
 from multidrop.drives.events import Unsolicited
-from multidrop.drives.flight import Finished
-from multidrop.drives.line import Line, Write
-from multidrop.drives.procedure import ProcedureRunner
+from multidrop.drives.line import Finished, Line, Write
 from tests.support.cases import for_each
+from tests.support.procedure import ProcedureRunner
 
 pytestmark = pytest.mark.slow
 

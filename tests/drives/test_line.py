@@ -6,8 +6,7 @@ from multidrop.dialects import End, Kind, Priority, Request, StopPiece
 from multidrop.dialects.mcode.host.codec import MCode
 from multidrop.dialects.mcode.host.framing import sealed
 from multidrop.drives.events import Unsolicited
-from multidrop.drives.flight import Finished
-from multidrop.drives.line import QUIET, Line, Write
+from multidrop.drives.line import QUIET, Finished, Line, Write
 
 ECHO = MCode(em=0)
 QUIETLY = MCode(em=1)

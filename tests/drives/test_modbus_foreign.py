@@ -18,7 +18,7 @@ from multidrop.dialects.modbus.manual.registers import REGISTERS
 from multidrop.drives.bus import Bus
 from multidrop.drives.drive import still
 from multidrop.drives.events import Notice, Traffic, Unsolicited
-from multidrop.drives.halt import Fate
+from multidrop.drives.stopping import Fate
 from multidrop.transports.sockets import open_tcp
 from tests.support.until import PATIENCE
 

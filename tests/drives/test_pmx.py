@@ -9,10 +9,8 @@ from multidrop.dialects import End, Hints, NoAnswer, Priority, Refused, StopPiec
 from multidrop.dialects.pmx.host.codec import GAP, Pmx
 from multidrop.drives.bus import Bus
 from multidrop.drives.events import Unsolicited
-from multidrop.drives.flight import Finished
-from multidrop.drives.halt import Fate
-from multidrop.drives.line import QUIET, Line, Write
-from multidrop.drives.stop_forms import stop_forms
+from multidrop.drives.line import QUIET, Finished, Line, Write
+from multidrop.drives.stopping import Fate, stop_forms
 from tests.support.virtual import in_virtual_time
 
 BYTE = 10 / 9600

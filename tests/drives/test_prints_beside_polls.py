@@ -10,10 +10,10 @@ from multidrop.dialects.families import family_of
 from multidrop.dialects.mcode.host.codec import MCode
 from multidrop.dialects.mcode.host.state import MCodeState
 from multidrop.drives.events import Sent, Traffic, Unsolicited
-from multidrop.drives.procedure import ProcedureRunner
 from multidrop.shell.events import OnBus
 from multidrop.simulator.cell.spec import Faults
 from tests.support.cell_session import CellSession, bus, party
+from tests.support.procedure import ProcedureRunner
 
 LINES = 60
 PRINT = re.compile(rb"(?:^|(?<=[\n\x06>]))(p=\d+)[\x80-\xff]?\r\n")

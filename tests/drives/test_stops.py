@@ -22,7 +22,7 @@ from multidrop.dialects.mcode.manual import program_file
 from multidrop.drives.bus import Bus
 from multidrop.drives.drive import confirmed_motion
 from multidrop.drives.events import Ended, Notice, Sample, Sent, Silent, Traffic, Unsolicited
-from multidrop.drives.halt import Fate
+from multidrop.drives.stopping import Fate
 from multidrop.simulator.cells import read
 from multidrop.simulator.floor import Floor
 from multidrop.simulator.serving.in_process import SimPipe
@@ -484,8 +484,7 @@ async def test_an_answer_that_was_under_way_when_a_stop_came_is_nobodys():
 
 def test_what_was_stopped_says_whether_it_was_sent():
     from multidrop.dialects.mcode.host.codec import MCode
-    from multidrop.drives.flight import Finished
-    from multidrop.drives.line import Line
+    from multidrop.drives.line import Finished, Line
 
     line = Line(MCode(em=1))
     request = Request("", "MR 1", Kind.COMMAND, MCode(em=1), Priority.OPERATOR)

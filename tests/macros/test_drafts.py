@@ -7,7 +7,8 @@ from pathlib import Path
 import pytest
 
 from multidrop.dialects.errors import Diagnostic
-from multidrop.macros import MacroStore, drafts
+from multidrop.macros import MacroStore
+from multidrop.macros.store import begin_draft, finish_draft
 
 TEXT = b"# mine\nname = 'm'\n[[step]]\nline = 'MR 1' # far\n"
 
@@ -26,17 +27,17 @@ def folder(tmp_path: Path) -> Path:
 
 
 def test_a_right_text_replaces_the_macro_byte_for_byte(store: MacroStore, folder: Path) -> None:
-    draft = drafts.begin(store, folder, "m")
+    draft = begin_draft(store, folder, "m")
     assert draft.file.read_bytes() == TEXT and draft.file.stat().st_mode & 0o777 == 0o600
     draft.file.write_bytes(TEXT.replace(b"1", b"2"))
-    assert drafts.finish(store, draft) == f"macro m: 1 line in {store.path('m')}"
+    assert finish_draft(store, draft) == f"macro m: 1 line in {store.path('m')}"
     assert store.path("m").read_bytes() == TEXT.replace(b"1", b"2")
     assert list(folder.iterdir()) == []
 
 
 def test_a_text_that_is_not_changed_writes_nothing(store: MacroStore, folder: Path) -> None:
     before = store.path("m").stat()
-    assert drafts.finish(store, drafts.begin(store, folder, "m")) == "macro m: unchanged"
+    assert finish_draft(store, begin_draft(store, folder, "m")) == "macro m: unchanged"
     assert store.path("m").stat() == before and list(folder.iterdir()) == []
 
 
@@ -54,27 +55,27 @@ def test_a_text_that_is_not_changed_writes_nothing(store: MacroStore, folder: Pa
 def test_a_wrong_text_leaves_the_macro_and_is_edited_on(
     store: MacroStore, folder: Path, text: bytes, says: str
 ) -> None:
-    draft = drafts.begin(store, folder, "m")
+    draft = begin_draft(store, folder, "m")
     draft.file.write_bytes(text)
     with pytest.raises(Diagnostic) as caught:
-        drafts.finish(store, draft)
+        finish_draft(store, draft)
     assert says in str(caught.value)
     assert f"m is as it was; your text is in {draft.file}, and macro edit m goes on with it" in str(caught.value)
     assert store.path("m").read_bytes() == TEXT
-    again = drafts.begin(store, folder, "m")
+    again = begin_draft(store, folder, "m")
     assert again.file.read_bytes() == text and "goes on with the text of the last edit" in again.remark
     again.file.write_bytes(TEXT + b"# right\n")
-    drafts.finish(store, again)
+    finish_draft(store, again)
     assert store.path("m").read_bytes() == TEXT + b"# right\n"
 
 
 def test_a_macro_that_changed_meanwhile_is_not_overwritten(store: MacroStore, folder: Path) -> None:
-    draft = drafts.begin(store, folder, "m")
+    draft = begin_draft(store, folder, "m")
     draft.file.write_bytes(TEXT + b"# one\n")
     store.path("m").write_bytes(TEXT + b"# other\n")
     with pytest.raises(Diagnostic, match="the file has changed meanwhile"):
-        drafts.finish(store, draft)
-    again = drafts.begin(store, folder, "m")
+        finish_draft(store, draft)
+    again = begin_draft(store, folder, "m")
     assert again.file.read_bytes() == TEXT + b"# other\n"
     assert again.remark == f"m has changed since the last edit, whose text is in {folder / 'm.1.toml'}"
     assert (folder / "m.1.toml").read_bytes() == TEXT + b"# one\n"
@@ -82,15 +83,15 @@ def test_a_macro_that_changed_meanwhile_is_not_overwritten(store: MacroStore, fo
 
 def test_a_broken_file_can_be_mended(store: MacroStore, folder: Path) -> None:
     store.path("m").write_bytes(b"name =")
-    draft = drafts.begin(store, folder, "m")
+    draft = begin_draft(store, folder, "m")
     draft.file.write_bytes(TEXT)
-    drafts.finish(store, draft)
+    finish_draft(store, draft)
     assert store.load("m").steps[0].line == "MR 1"
 
 
 def test_there_is_no_draft_of_what_is_not_there(store: MacroStore, folder: Path) -> None:
     with pytest.raises(Diagnostic, match="no macro 'x'.*valid: m"):
-        drafts.begin(store, folder, "x")
+        begin_draft(store, folder, "x")
     assert not folder.exists()
 
 
@@ -98,4 +99,4 @@ def test_a_draft_that_cannot_be_written_is_told(store: MacroStore, folder: Path)
     folder.parent.mkdir()
     folder.write_text("in the way")
     with pytest.raises(Diagnostic, match="cannot write the copy"):
-        drafts.begin(store, folder, "m")
+        begin_draft(store, folder, "m")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from multidrop.macros import Macro, Recorder, Step
-from multidrop.macros.pauses import Observed, offers, with_waits
+from multidrop.macros.recorder import Observed, offers, with_waits
 
 
 def recorded(*lines: tuple[float, str, bool], observed: Observed | None = None) -> Recorder:

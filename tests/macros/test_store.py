@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 
 from multidrop.dialects.errors import Diagnostic
 from multidrop.macros import Macro, MacroStore, Step, format_macro, parse_macro
-from multidrop.macros.listing import listed
-from multidrop.macros.toml_edit import with_value
+from multidrop.macros.store import listed
+from multidrop.macros.toml_format import with_value
 
 SHUTTLE = Macro("shuttle", (Step(0.0, "@b EX Ga"), Step(1.25, 'PR "x \\ y"')), key="F3", note="to and fro")
 GOOD = 'name = "a"\n[[step]]\nafter = 0\nline = "MR 1"\n'

@@ -21,10 +21,9 @@ from multidrop.shell.connect.settings import Settings
 from multidrop.shell.session import Session
 from multidrop.shell.signals import early_ends
 from multidrop.transports import Limited, Transport, TransportLost, Unreachable
-from multidrop.transports.far_port import FarPort
-from multidrop.transports.serial_posix import lock_owner
-from multidrop.transports.ssh import open_ssh
-from multidrop.transports.ssh_session import reason
+from multidrop.transports.serial_ports import lock_owner
+from multidrop.transports.ssh import FarPort
+from multidrop.transports.ssh_session import open_ssh, reason
 from tests.support.ssh_server import fake_ssh, far_programs, script, ssh_server
 from tests.support.until import until
 

@@ -11,7 +11,7 @@ import pytest
 
 from multidrop.dialects import DriveError, Inexpressible, NoAnswer, Refused, Stopped
 from multidrop.dialects.mcode.host.debugging import traced
-from multidrop.drives.halt import Fate
+from multidrop.drives.stopping import Fate
 from multidrop.shell.events import FAILURES, By
 from multidrop.simulator.cell.spec import Faults
 from tests.support.cell_session import CellSession, bus

@@ -19,8 +19,7 @@ from multidrop.shell.connect.urls import Connection, parse
 from multidrop.shell.events import Notified
 from multidrop.shell.scanning import NothingFound, Scanning
 from multidrop.shell.session import Session
-from multidrop.transports import Received, Unreachable
-from multidrop.transports.base import Lost
+from multidrop.transports import Lost, Received, Unreachable
 
 pytestmark = pytest.mark.virtual
 LIMITS = "on pc socat passes the bytes on: a stop waits there"

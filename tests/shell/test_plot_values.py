@@ -10,7 +10,7 @@ import pytest
 
 from multidrop.dialects import Diagnostic, Refused
 from multidrop.drives.events import Sample, Valued
-from multidrop.drives.readings import Value
+from multidrop.drives.telemetry import Value
 from multidrop.shell.events import OnBus
 from multidrop.shell.plots.feed import attach
 from multidrop.shell.plots.series import parse_series

@@ -11,7 +11,7 @@ import pytest
 from multidrop.dialects import Diagnostic
 from multidrop.dialects.values import Conditions, Lamp
 from multidrop.drives.events import Conditioned, Sample, Unsolicited, Valued
-from multidrop.drives.readings import Value
+from multidrop.drives.telemetry import Value
 from multidrop.shell.events import By, Entered, Failed, Notified, OnBus, Output, Printed, SessionEvent
 from multidrop.shell.plots.feed import attach
 from multidrop.shell.plots.target import parse_target

@@ -16,12 +16,12 @@ from hypothesis import strategies as st
 from multidrop.dialects import DriveError, Priority
 from multidrop.dialects.families import FAMILIES
 from multidrop.drives.drive import Drive
-from multidrop.drives.procedure import ProcedureRunner
 from multidrop.shell.front.replay import ReplayReport, replay
 from multidrop.shell.log.steps import Exchange, read
 from multidrop.shell.log.writer import SessionLog
 from multidrop.shell.twins.after import Decoding
 from tests.support.cell_session import ETHERNET, CellSession, bus, party, pmx
+from tests.support.procedure import ProcedureRunner
 from tests.support.twin_cell import encoder, run
 
 pytestmark = pytest.mark.virtual

@@ -13,7 +13,7 @@ from multidrop.dialects import Motion, Priority
 from multidrop.dialects.families import FAMILIES
 from multidrop.drives.drive import Drive
 from multidrop.drives.events import Sample
-from multidrop.drives.halt import Fate
+from multidrop.drives.stopping import Fate
 from multidrop.shell.events import OnBus
 from multidrop.shell.motion import standings
 from tests.support.cell_session import CellSession, bus, party

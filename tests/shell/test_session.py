@@ -10,7 +10,7 @@ from multidrop.dialects.families import DEFAULT, FAMILIES
 from multidrop.dialects.mcode.host.codec import MCode
 from multidrop.dialects.mcode.host.state import MCodeState
 from multidrop.drives.events import Changed, Lost, Notice, Unsolicited
-from multidrop.drives.halt import Halt
+from multidrop.drives.stopping import Halt
 from multidrop.macros import Macro, Step
 from multidrop.shell.connect.opening import Opened
 from multidrop.shell.connect.settings import SavedConnection, Settings

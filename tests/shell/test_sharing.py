@@ -7,7 +7,7 @@ import pytest
 from multidrop.dialects.text import visible
 from multidrop.shell.sharing.exchange import SILENT
 from multidrop.transports import telnet
-from multidrop.transports.com_port import OPTION
+from multidrop.transports.telnet import OPTION
 from tests.support.shared_exchange import ADA, BOB, EVE, Port
 
 HELLO = telnet.option(telnet.WILL, OPTION)

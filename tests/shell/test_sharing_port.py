@@ -26,8 +26,8 @@ from multidrop.shell.sharing.exchange import NOT_REACHED, TURN
 from multidrop.shell.sharing.server import SharedPort
 from multidrop.shell.sharing.stop_bytes import stop_bytes
 from multidrop.transports import TransportLost, Unreachable, telnet
-from multidrop.transports.com_port import OPTION, Setting, message
 from multidrop.transports.rfc2217 import open_rfc2217
+from multidrop.transports.telnet import OPTION, Setting, message
 from tests.support.until import PATIENCE, until
 
 pytestmark = [

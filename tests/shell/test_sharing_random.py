@@ -9,7 +9,7 @@ from multidrop.shell.sharing.actions import Close, Send, Stop, Write
 from multidrop.shell.sharing.exchange import SILENT, Exchange
 from multidrop.shell.sharing.stop_bytes import stop_bytes
 from multidrop.transports import telnet
-from multidrop.transports.com_port import OPTION, Setting, message
+from multidrop.transports.telnet import OPTION, Setting, message
 
 PIECES = st.one_of(
     st.binary(max_size=12),

@@ -11,7 +11,7 @@ from multidrop.dialects.tmcl.host.codec import Tmcl
 from multidrop.shell.sharing.exchange import NEVER, NOT_REACHED, OWED
 from multidrop.shell.sharing.stop_bytes import CERTAIN, NOTICED, stop_bytes
 from multidrop.transports import telnet
-from multidrop.transports.com_port import OPTION, REPLY, Setting, message
+from multidrop.transports.telnet import OPTION, REPLY, Setting, message
 from tests.support.shared_exchange import ADA, BOB, Port
 
 CODECS: list[tuple[str, Codec]] = [

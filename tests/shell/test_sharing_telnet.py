@@ -7,7 +7,7 @@ import pytest
 from multidrop.shell.sharing.actions import Action, Close, Send, Set, Stop, Write
 from multidrop.shell.sharing.exchange import TURN, WAITING
 from multidrop.transports import telnet
-from multidrop.transports.com_port import OPTION, REPLY, Control, Setting, message
+from multidrop.transports.telnet import OPTION, REPLY, Control, Setting, message
 from tests.support.shared_exchange import ADA, BOB, EVE, Port
 
 HELLO = telnet.option(telnet.WILL, OPTION)

@@ -7,7 +7,7 @@ import pytest
 
 from multidrop.dialects import Motion, Stopped
 from multidrop.drives.drive import Drive, confirmed_motion
-from multidrop.drives.halt import Fate
+from multidrop.drives.stopping import Fate
 from multidrop.shell import stop_report
 from multidrop.shell.automation import outcome
 from multidrop.shell.events import OnBus

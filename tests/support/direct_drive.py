@@ -8,8 +8,8 @@ from typing import Any
 from multidrop.dialects import End, Kind, Procedure, Reply
 from multidrop.dialects.mcode.host.codec import MCode
 from multidrop.dialects.mcode.host.state import MCodeState
-from multidrop.drives.procedure import ProcedureRunner
 from tests.support.lexium import drive
+from tests.support.procedure import ProcedureRunner
 
 
 class DirectDrive:

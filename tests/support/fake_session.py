@@ -19,8 +19,8 @@ from multidrop.dialects.families import FAMILIES
 from multidrop.dialects.family import Family
 from multidrop.dialects.values import UNREAD, Conditions, Lamp, Pace
 from multidrop.drives.events import Conditioned, Sample, Silent, Unsolicited
-from multidrop.drives.halt import Fate
-from multidrop.drives.readings import Value
+from multidrop.drives.stopping import Fate
+from multidrop.drives.telemetry import Value
 from multidrop.shell.channel import Fill
 from multidrop.shell.events import By, Entered, Failed, Notified, OnBus, Printed, SessionEvent, StateChanged
 from multidrop.shell.roles import RunningPlot, Series

@@ -8,9 +8,8 @@ import threading
 from collections.abc import Iterator
 
 from multidrop.transports import TransportLost
-from multidrop.transports.relay import serve
-from multidrop.transports.relay_frames import GREETING, SILENCE
-from multidrop.transports.serial_posix import SerialEndpoint
+from multidrop.transports.relay import GREETING, SILENCE, serve
+from multidrop.transports.serial_port import SerialEndpoint
 from tests.support.until import PATIENCE
 
 

@@ -16,9 +16,9 @@ from multidrop.dialects import DriveError, DriveState, End, Priority
 from multidrop.dialects.families import family_of
 from multidrop.dialects.mcode.host.codec import MCode
 from multidrop.dialects.mcode.host.state import MCodeState
-from multidrop.drives.procedure import ProcedureRunner
 from multidrop.simulator.cell.spec import Faults
 from tests.support.mcode_drives import Witness
+from tests.support.procedure import ProcedureRunner
 
 PROGRAM = ("PG 1", "LB G1", 'PR "tick ",R3', "IC R3", "H 170", "PR R3", "H 190", "BR G1", "E", "PG", "EX G1")
 PRINTS = ("PR R1", 'PR "v",R1', 'PR R1," units"', "PR R1 R4", 'PR R4,"/",R1')

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from multidrop.transports.listing import PortInfo, list_ports, natural
+from multidrop.transports.serial_ports import PortInfo, list_ports, natural
 
 
 def machine(monkeypatch: pytest.MonkeyPatch, root: Path, names: Sequence[str]) -> list[str]:

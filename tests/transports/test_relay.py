@@ -11,10 +11,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from multidrop.transports import relay
-from multidrop.transports.relay import Relay
-from multidrop.transports.relay_frames import CREDIT, GREETING, MOST, Frames, Garbled, Kind, Setting, frame
+from multidrop.transports.relay import CREDIT, GREETING, MOST, Frames, Garbled, Kind, Relay, Setting, frame
 from multidrop.transports.relay_pipe import RelayEndpoint
-from multidrop.transports.serial_posix import lock_owner
+from multidrop.transports.serial_ports import lock_owner
 from tests.support.lent_port import lent
 
 FRAMES = st.lists(st.tuples(st.sampled_from(Kind), st.binary(max_size=40)), max_size=20)

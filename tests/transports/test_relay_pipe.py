@@ -10,7 +10,7 @@ from contextlib import asynccontextmanager
 import pytest
 
 from multidrop.transports import TransportLost
-from multidrop.transports.relay_frames import BEAT, MISSED, Frames, Kind, frame
+from multidrop.transports.relay import BEAT, MISSED, Frames, Kind, frame
 from multidrop.transports.relay_pipe import RelayPipe
 from tests.support.lent_port import SocketConnection
 

@@ -8,8 +8,8 @@ from collections.abc import Callable
 import pytest
 
 from multidrop.transports import Lost, Received, TransportLost, Unreachable, telnet
-from multidrop.transports.com_port import OPTION, REPLY, Control, Setting, message, parsed
 from multidrop.transports.rfc2217 import Rfc2217Pipe, negotiated
+from multidrop.transports.telnet import OPTION, REPLY, Control, Setting, message, parsed
 from tests.support.virtual import in_virtual_time
 
 DTR = (Setting.CONTROL, Control.DTR_ON)

@@ -16,8 +16,7 @@ import serial
 
 from multidrop.transports import Controllable, Unreachable
 from multidrop.transports.pipe import in_thread
-from multidrop.transports.serial_open import open_error
-from multidrop.transports.serial_port import open_serial
+from multidrop.transports.serial_port import open_error, open_serial
 from tests.support.until import PATIENCE
 
 if sys.platform == "win32":
@@ -138,7 +137,7 @@ async def test_a_port_that_goes_while_it_is_opened_is_unreachable_and_closed(
         with pytest.raises(Unreachable):
             await open_serial(pty[1])
     with monkeypatch.context() as patched:
-        patched.setattr("multidrop.transports.serial_posix._ignore_breaks", gone)
+        patched.setattr("multidrop.transports.serial_port._ignore_breaks", gone)
         with pytest.raises(Unreachable, match="Input/output error"):
             await open_serial(pty[1])
     assert len(os.listdir("/dev/fd")) == before

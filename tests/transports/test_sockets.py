@@ -11,7 +11,7 @@ from collections.abc import Iterator
 import pytest
 
 from multidrop.transports import TransportLost, Unreachable, rfc2217, sockets
-from multidrop.transports.descriptor import DescriptorPipe
+from multidrop.transports.pipe import DescriptorPipe
 from multidrop.transports.rfc2217 import open_rfc2217
 from multidrop.transports.sockets import open_tcp, open_udp
 from tests.support.until import PATIENCE

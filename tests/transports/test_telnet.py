@@ -7,8 +7,17 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from multidrop.transports import telnet
-from multidrop.transports.com_port import Setting, message, parsed
-from multidrop.transports.telnet import Data, Decoder, Event, Interrupt, Option, Subnegotiation
+from multidrop.transports.telnet import (
+    Data,
+    Decoder,
+    Event,
+    Interrupt,
+    Option,
+    Setting,
+    Subnegotiation,
+    message,
+    parsed,
+)
 
 PIECES = st.lists(
     st.one_of(

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from rich.style import Style
 
 from multidrop.drives.events import Sample
-from multidrop.drives.halt import Fate
+from multidrop.drives.stopping import Fate
 from multidrop.shell.events import OnBus, StateChanged
 from multidrop.shell.stop_report import Found, Tally
 from multidrop.tui.panels.column import column_rows

@@ -7,7 +7,7 @@ from textual.pilot import Pilot
 
 from multidrop.dialects.values import Conditions
 from multidrop.drives.events import Conditioned, Sample
-from multidrop.drives.halt import Fate
+from multidrop.drives.stopping import Fate
 from multidrop.shell.events import OnBus
 from multidrop.transports import TransportLost
 from multidrop.tui.app import MultidropApp

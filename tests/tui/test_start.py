@@ -8,7 +8,7 @@ import pytest
 from multidrop.dialects import Diagnostic
 from multidrop.shell.connect import port_state
 from multidrop.transports import Unreachable
-from multidrop.transports.holders import holder
+from multidrop.transports.serial_ports import holder
 from multidrop.tui.app import MultidropApp
 from multidrop.tui.assist import StartEntry
 from multidrop.tui.screens.dialogs import Options

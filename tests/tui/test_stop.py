@@ -7,7 +7,7 @@ import pytest
 from textual import events
 from textual.pilot import Pilot
 
-from multidrop.drives.halt import Fate
+from multidrop.drives.stopping import Fate
 from multidrop.shell import stop_report
 from multidrop.shell.events import By
 from multidrop.tui.app import MultidropApp, is_stop

@@ -8,7 +8,7 @@ from multidrop.dialects.mcode.host import identify
 from multidrop.dialects.mcode.host.codec import MCode
 from multidrop.dialects.mcode.host.exchange import answered
 from multidrop.dialects.mcode.host.state import MCodeState
-from multidrop.drives.procedure import ProcedureRunner
+from tests.support.procedure import ProcedureRunner
 
 MODES = [(em, party, check) for em in range(4) for party in (False, True) for check in range(3)]
 

@@ -8,7 +8,7 @@ from multidrop.dialects.mcode.host.codec import MCode
 from multidrop.dialects.mcode.host.state import MCodeState
 from multidrop.dialects.mcode.manual import program_file
 from multidrop.dialects.program_files import Held
-from multidrop.drives.procedure import ProcedureRunner
+from tests.support.procedure import ProcedureRunner
 
 pytestmark = pytest.mark.slow
 

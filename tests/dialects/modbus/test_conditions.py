@@ -7,9 +7,9 @@ from typing import Any
 from multidrop.dialects import Kind, Procedure
 from multidrop.dialects.modbus.family import MODBUS
 from multidrop.dialects.modbus.host.codec import Modbus, ModbusState
-from multidrop.drives.procedure import ProcedureRunner
 from multidrop.simulator.lexium.family import _connect  # the port of an Ethernet drive
 from tests.support.lexium import drive
+from tests.support.procedure import ProcedureRunner
 
 
 def carried(port: Any, procedure: Procedure[Any]) -> Any:

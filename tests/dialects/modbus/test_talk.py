@@ -8,8 +8,8 @@ from multidrop.dialects.modbus.host import framing, mapping
 from multidrop.dialects.modbus.host.codec import Modbus, ModbusState
 from multidrop.dialects.modbus.host.operations import identify
 from multidrop.dialects.modbus.manual.registers import REGISTERS
-from multidrop.drives.procedure import ProcedureRunner
 from tests.support.cases import for_each
+from tests.support.procedure import ProcedureRunner
 
 OBJECTS = {0: "SEM USA", 1: "LMDCE571", 2: "6.0.0.2", 3: "www", 4: "Lexium", 5: "0401", 6: "LMDCE 6.002, Hw: 3.2"}
 

@@ -11,8 +11,8 @@ from multidrop.dialects.pmx.family import PMX
 from multidrop.dialects.pmx.host.codec import Pmx, PmxState
 from multidrop.dialects.pmx.host.identify import identify
 from multidrop.dialects.pmx.manual import help, status, table
-from multidrop.drives.procedure import ProcedureRunner
 from tests.support.paths import FACTS
+from tests.support.procedure import ProcedureRunner
 
 ANSWERS = {"ID": "Performax-2ED-SA", "VER": "V128BL", "DN": "2ED00"}
 RESTING = {"PX": "10", "PY": "-20", "PSX": "0", "PSY": "0", "MSTX": "0", "MSTY": "0", "SLSX": "12", "SLSY": "12"}

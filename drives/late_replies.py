@@ -7,7 +7,8 @@ against those that are outstanding, until the slow drive has printed something t
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections import deque
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -126,3 +127,114 @@ def _outstanding(request: Request, reply: Reply, doubtful: bool) -> bool:
     if request.kind is Kind.QUIET:
         return request.expect is not None
     return doubtful or reply.end is End.SILENT
+
+
+# Lines on the wire that no program printed: debris of a stop, and what questions of the host left.
+#
+# Debris is pieces of the reply and echo that a stop cut off, and replies to the stop itself. None of it is shown. A
+# session that was killed leaves replies to its questions, and echoes. A line that may be program output is shown.
+
+
+LASTS = 0.5
+"""How long after the last byte of a stop its debris may come, s."""
+GARBLED = re.compile(r"[^\t -~]")
+"""Two drives that replied at once; a print has no such characters unless it wants them."""
+SCRAP = re.compile(r'[-\w]{0,2}["!~]+[-\w ]{0,2}"?')
+"""A piece of the name between two values, with what ran into it: a digit and the sign of a stop make a space."""
+
+CHECK_BYTES = "".join(map(chr, range(0x80, 0x100)))
+PROMPT = "0123456789>? \x06\x15"
+"""The characters of a prompt; in program mode it shows an address."""
+
+
+class Debris:
+    """What was written last, and how long the debris of a stop may come. Times are seconds."""
+
+    def __init__(self) -> None:
+        self._sent = ""
+        self._asked: Request | None = None
+        self._until = float("-inf")
+
+    def request_written(self, data: bytes, request: Request, now: float) -> None:
+        """Note a request that the next stop may cut off. Within the debris of a stop, what was written adds up."""
+        text = data.decode("latin-1")
+        self._sent = self._sent + text if now <= self._until else text
+        self._asked = request
+
+    def stop_written(self, data: bytes, transmitted: float) -> None:
+        """Note a stop. `transmitted`: when its last byte has left."""
+        self._sent += data.decode("latin-1")
+        self._until = transmitted + LASTS
+
+    def stop_repeated(self, transmitted: float) -> None:
+        """Note that the stop was written once more."""
+        self._until = transmitted + LASTS
+
+    def removed(self, lines: tuple[str, ...], known: re.Pattern[str] | None, now: float) -> tuple[str, ...]:
+        """Unsolicited lines without debris. `known`: what only a stop leaves in this language."""
+        if now > self._until:
+            return lines
+        return tuple(text for text in lines if not self._holds(text, known))
+
+    def _holds(self, text: str, known: re.Pattern[str] | None) -> bool:
+        text = text.lstrip(">?").strip()
+        return (
+            (known is not None and known.fullmatch(text) is not None)
+            or text in self._sent
+            or GARBLED.search(text) is not None
+            or SCRAP.fullmatch(text) is not None
+            or self._answers(text)
+        )
+
+    def _answers(self, text: str) -> bool:
+        expect = self._asked.expect if self._asked is not None else None
+        return expect is not None and re.fullmatch(expect, text) is not None
+
+
+class Leftovers:
+    """Echoes of what this session has sent, and replies to the questions of one before. Times are seconds.
+
+    A drive replies in the order of the questions: once it has replied to this session, it owes the last one nothing.
+    """
+
+    def __init__(self) -> None:
+        self._sent: deque[str] = deque(maxlen=32)
+        """What was sent last, with its check byte and without."""
+        self._sent_at = self._opened_at = float("-inf")
+        self.recovering = False
+        """A session before was cut off, and its drive has not replied to this one yet: all that comes is its echo."""
+
+    def opened(self, now: float) -> None:
+        """Note that the port is open: a reply to a session before may still come."""
+        self._opened_at = now
+
+    def drives_found(self) -> None:
+        """Note that the drives have replied to this session: of one before, nothing comes any more."""
+        self._opened_at = float("-inf")
+
+    def request_written(self, data: bytes, now: float) -> None:
+        """Note a request, which a drive may repeat."""
+        text = data.decode("latin-1").strip("\r\n")
+        self._sent += [each for each in (text, text.rstrip(CHECK_BYTES)) if len(each) > 1]
+        self._sent_at = now
+
+    def divided(
+        self, lines: tuple[str, ...], answers_host: Callable[[str], bool], now: float
+    ) -> tuple[tuple[str, ...], tuple[str, ...]]:
+        """Divide unsolicited lines into those of programs and those that a session before left; echoes are neither.
+
+        `answers_host`: whether only a question of a host makes a drive send a line.
+        """
+        if now <= self._sent_at + LATE:
+            ends = tuple(self._sent)
+            lines = tuple(each for each in lines if not (each.endswith(ends) and self._is_echo(each)))
+        if self.recovering:
+            return (), lines
+        if now > self._opened_at + LATE:
+            return lines, ()
+        left = tuple(filter(answers_host, lines))
+        return tuple(each for each in lines if each not in left), left
+
+    def _is_echo(self, line: str) -> bool:
+        """Whether a line repeats a request, after a prompt at most."""
+        return any(line.endswith(each) and not line.removesuffix(each).strip(PROMPT) for each in self._sent)

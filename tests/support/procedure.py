@@ -1,4 +1,4 @@
-"""A conversation of many requests under way: the next request, until there is a result.
+"""Step a conversation of many requests without a line: the next request, until there is a result.
 
 A conversation (`Procedure`) is a generator that a dialect writes; a `ProcedureRunner` steps it with replies or errors.
 The conversation may answer an error (a stop, a lost port) with more requests, which clean up. So it is over only when
