@@ -3,15 +3,18 @@
 `/word rest` is a verb. `@ADDR text` and `@BUS:ADDR text` address one drive; `@*` and `@^` address all drives of a bus.
 `@BUS:` addresses the drive selected there, or the only one if the bus uses no addresses. Anything else goes to the
 selected drive. This module does not know what is open.
+
+A line is parsed once, at its Enter. What depends on the drive is asked of the parsed line when its turn comes; each
+grammar reads its text once (`dialects.Command`).
 """
 
 from __future__ import annotations
 
 import re
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
-from multidrop.dialects import Diagnostic
+from multidrop.dialects import Command, Diagnostic
 
 EVERYONE = ("*", "^")
 WAITS = ("/wait", "/sleep")
@@ -23,6 +26,8 @@ class VerbLine:
 
     name: str
     rest: str
+    typed: str = field(default="", compare=False)
+    """The whole line."""
 
 
 @dataclass(frozen=True)
@@ -32,19 +37,24 @@ class DriveLine:
     text: str
     bus: str = ""
     address: str | None = None
+    typed: str = field(default="", compare=False)
+    """The whole line."""
 
 
-def parse(line: str) -> VerbLine | DriveLine | None:
+TypedLine = VerbLine | DriveLine
+
+
+def parse(line: str) -> TypedLine | None:
     """Parse a line; None for an empty one. Raises Diagnostic for an address without text."""
-    line = line.strip()
+    typed, line = line, line.strip()
     if not line:
         return None
     if line.startswith("/"):
         name, _, rest = line.partition(" ")
-        return VerbLine(name, rest.strip())
+        return VerbLine(name, rest.strip(), typed)
     if line.startswith("@"):
-        return _addressed(line)
-    return DriveLine(line)
+        return _addressed(line, typed)
+    return DriveLine(Command(line), typed=typed)
 
 
 def each_names_one_drive(lines: Iterable[str]) -> bool:
@@ -70,13 +80,13 @@ def targets(lines: Iterable[str]) -> tuple[str, ...]:
     return tuple(dict.fromkeys(f"{each.bus}:{each.address}" if each.bus else str(each.address) for each in parsed))
 
 
-def _names_one_drive(parsed: VerbLine | DriveLine | None) -> bool:
+def _names_one_drive(parsed: TypedLine | None) -> bool:
     if isinstance(parsed, VerbLine):
         return parsed.name in WAITS
     return parsed is None or parsed.address not in EVERYONE
 
 
-def _addressed(line: str) -> DriveLine:
+def _addressed(line: str, typed: str) -> DriveLine:
     target, _, text = line[1:].partition(" ")
     bus, address = split_target(target)
     if not target:
@@ -86,7 +96,7 @@ def _addressed(line: str) -> DriveLine:
         raise Diagnostic(f"nothing to send to {target}", f"@{target}", f"/use {target} selects it")
     if text.startswith("/"):
         raise Diagnostic(f"{text.split()[0]} is a verb and takes no @{target}", line, f"/help {text.split()[0]}")
-    return DriveLine(text, bus, address or None)
+    return DriveLine(Command(text), bus, address or None, typed)
 
 
 def uncommented(line: str) -> str:

@@ -21,7 +21,7 @@ from multidrop.shell.automation import ENDING, Automations, only_ends
 from multidrop.shell.connect.opening import open_buses
 from multidrop.shell.connect.settings import Settings
 from multidrop.shell.events import FAILURES, By, Entered, Failed, Printed
-from multidrop.shell.lines import EVERYONE, DriveLine, VerbLine, join_target, parse, split_target
+from multidrop.shell.lines import EVERYONE, DriveLine, TypedLine, VerbLine, join_target, parse, split_target
 from multidrop.shell.motion import in_motion
 from multidrop.shell.openings import Openings
 from multidrop.shell.playing import played_by
@@ -122,8 +122,8 @@ class Session(Workspace):
 
     # The path of a command
 
-    async def run(self, line: str, by: By = By.OPERATOR, since: int | None = None) -> None:
-        """Run one line, and publish what it prints.
+    async def run(self, line: str | TypedLine, by: By = By.OPERATOR, since: int | None = None) -> None:
+        """Run one line, as typed or parsed before, and publish what it prints.
 
         `since` is the value of `stops` when the line was typed; a line older than the last stop is refused with
         Stopped. Raises DriveError, Diagnostic or TransportLost, after one Failed event.
@@ -134,13 +134,14 @@ class Session(Workspace):
         with _failures_published_once():
             try:
                 if since is not None and since != self.stops:
-                    raise Stopped(f"a stop came after '{line.strip()}' was typed; it was not sent")
-                parsed = parse(line) if (text := _raw_text(self, line)) is None else DriveLine(text)
+                    typed = line if isinstance(line, str) else line.typed
+                    raise Stopped(f"a stop came after '{typed.strip()}' was typed; it was not sent")
+                parsed = _raw_line(self, line) or (parse(line) if isinstance(line, str) else line)
                 if isinstance(parsed, DriveLine):
                     target = parsed
-                    await self._run_text(line.strip(), parsed, by)
+                    await self._run_text(parsed, by)
                 elif parsed is not None:
-                    await self._run_verb(line.strip(), parsed, by)
+                    await self._run_verb(parsed, by)
             except FAILURES as failure:
                 bus, address = _place_of(target, place)
                 self._publish_failure(failure, bus, address, by)
@@ -148,8 +149,8 @@ class Session(Workspace):
                     failure.add_note(bus)
                 raise
 
-    async def _run_verb(self, line: str, parsed: VerbLine, by: By) -> None:
-        self.publish(Entered(self.now(), line, by))
+    async def _run_verb(self, parsed: VerbLine, by: By) -> None:
+        self.publish(Entered(self.now(), parsed.typed.strip(), by))
         verbs = importlib.import_module(VERBS)
         verb = verbs.find(parsed.name)
         call = verbs.Call(self, verb, parsed.rest, by)
@@ -177,14 +178,16 @@ class Session(Workspace):
             self.automations.starts(raw.everyone)
         raw.send(data)
 
-    async def _run_raw(self, line: str, raw: RawLine, parsed: DriveLine, by: By) -> None:
+    async def _run_raw(self, raw: RawLine, parsed: DriveLine, by: By) -> None:
         """Send a typed text with its terminator."""
         if by is By.MACRO:
-            raise Diagnostic(f"{raw.bus.name} is raw: a macro's lines are for drives", line, "/raw off finds them")
+            raise Diagnostic(
+                f"{raw.bus.name} is raw: a macro's lines are for drives", parsed.typed.strip(), "/raw off finds them"
+            )
         if parsed.address is not None:
             hint = f"@{raw.bus.name}: TEXT sends text; /raw off finds the drives"
-            raise Diagnostic(f"{raw.bus.name} is raw: it has no address {parsed.address}", line, hint)
-        self.publish(Entered(self.now(), line, by, raw.bus.name))
+            raise Diagnostic(f"{raw.bus.name} is raw: it has no address {parsed.address}", parsed.typed.strip(), hint)
+        self.publish(Entered(self.now(), parsed.typed.strip(), by, raw.bus.name))
         self._allow(by)
         await self.guard(raw.bus.at(""), parsed.text, by)
         starts = raw.bus.roster.family.codec.starts_motion(parsed.text)
@@ -192,27 +195,25 @@ class Session(Workspace):
         if self.recording and by is By.OPERATOR:
             self.notify("text in raw mode is not recorded", warning=True)
 
-    async def _run_text(self, line: str, parsed: DriveLine, by: By) -> None:
+    async def _run_text(self, parsed: DriveLine, by: By) -> None:
         bus = self.bus(parsed.bus)
         if (raw := self.raw.get(bus.name)) is not None:
-            return await self._run_raw(line, raw, parsed, by)
+            return await self._run_raw(raw, parsed, by)
         drive = self.drive(bus.name, parsed.address)
-        self.publish(Entered(self.now(), line, by, bus.name, drive.address))
+        self.publish(Entered(self.now(), parsed.typed.strip(), by, bus.name, drive.address))
         self._allow(by)
         await self.guard(drive, parsed.text, by)
-        recorded = None
+        recorded, starts = None, drive.starts(parsed.text)
         if by is not By.MACRO:
             target = self.qualified_address(drive)
             typed = f"@{target} {parsed.text}" if target else parsed.text
-            recorded = self.recorder.record(
-                typed, self.now(), join_target(bus.name, drive.address), drive.starts(parsed.text)
-            )
+            recorded = self.recorder.record(typed, self.now(), join_target(bus.name, drive.address), starts)
         if self.recording:
             self.changed()
         self.addressed.add((bus.name, drive.address))
         self.lately.begin()
         try:
-            printed = await self._send(drive, parsed.text)
+            printed = await self._send(drive, parsed.text, starts)
         except FAILURES as failure:
             if recorded is not None:
                 recorded.came_back([f"failed: {failure}"])
@@ -232,10 +233,10 @@ class Session(Workspace):
             return
         await self.confirm(what, self.display_name(drive), by=by)
 
-    async def _send(self, drive: Drive, text: str) -> tuple[str, ...]:
+    async def _send(self, drive: Drive, text: str, starts: bool) -> tuple[str, ...]:
         """Send a line and return what it printed. The automation records first what the line may start."""
         before = drive.commands
-        recorded = drive.starts(text) and self.automations.starts(drive, only_ends(drive, text))
+        recorded = starts and self.automations.starts(drive, only_ends(drive, text))
         try:
             return await drive.send(text)
         except DriveError:
@@ -262,7 +263,7 @@ class Session(Workspace):
         if published is not None:
             published.append(failure)
 
-    def start(self, line: str, by: By = By.OPERATOR, since: int | None = None) -> asyncio.Task[bool]:
+    def start(self, line: str | TypedLine, by: By = By.OPERATOR, since: int | None = None) -> asyncio.Task[bool]:
         """Run one line in the background; the task returns whether it succeeded. A failure is published only.
 
         `since` as for `run`; by default the line counts as typed now.
@@ -272,7 +273,7 @@ class Session(Workspace):
         task.add_done_callback(self._background.discard)
         return task
 
-    async def _succeeds(self, line: str, by: By, since: int) -> bool:
+    async def _succeeds(self, line: str | TypedLine, by: By, since: int) -> bool:
         try:
             await self.run(line, by, since)
         except FAILURES:
@@ -298,15 +299,19 @@ class Session(Workspace):
         self.changed()
 
 
-def _raw_text(workspace: Workspace, line: str) -> str | None:
-    """The text of a line for the selected bus in raw mode; None for a verb, and for `@BUS:` of another bus.
+def _raw_line(workspace: Workspace, line: str | TypedLine) -> DriveLine | None:
+    """A line for the selected bus in raw mode; None for a verb, and for `@BUS:` of another bus.
 
     An `@` begins a command of some drives, so it is part of the text.
     """
-    if workspace.selected_bus not in workspace.raw or line.lstrip().startswith("/"):
+    if workspace.selected_bus not in workspace.raw:
         return None
-    names_bus = line.lstrip().startswith("@") and split_target(line.split()[0][1:])[0] in workspace.buses
-    return None if names_bus else line.rstrip("\r\n")
+    typed = line if isinstance(line, str) else line.typed
+    if typed.lstrip().startswith("/"):
+        return None
+    if typed.lstrip().startswith("@") and split_target(typed.split()[0][1:])[0] in workspace.buses:
+        return None
+    return DriveLine(typed.rstrip("\r\n"), typed=typed)
 
 
 def _place_of(target: DriveLine, selected: tuple[str, str]) -> tuple[str, str]:

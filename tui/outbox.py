@@ -19,7 +19,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 from multidrop.dialects import Diagnostic
-from multidrop.shell.lines import DriveLine, VerbLine, parse, pinned
+from multidrop.shell.lines import DriveLine, TypedLine, VerbLine, parse, pinned
 from multidrop.tui.session_view import Place, SessionView, selected_place
 
 BURST = 0.5
@@ -35,7 +35,7 @@ class Line:
     text: str
     since: int
     place: Place
-    parsed: DriveLine | VerbLine | None
+    parsed: TypedLine | None
 
     @property
     def bus(self) -> str:
@@ -160,14 +160,14 @@ class Outbox:
     def _next(self, lane: Lane) -> asyncio.Task[bool] | None:
         """Start the next line of a lane; None if it may not be sent."""
         line = lane.waiting[0]
-        text = line.text
+        typed: str | TypedLine = line.parsed or line.text
         if line.place != selected_place(self._session):
             if line.verb:
                 self._hold(lane, f"another drive was selected than {':'.join(filter(None, line.place))}")
                 return None
-            text = pinned(line.text, *line.place)
+            typed = pinned(line.text, *line.place)
         lane.running = lane.waiting.popleft()
-        return self._session.start(text, since=line.since)
+        return self._session.start(typed, since=line.since)
 
     def _ended(self, lane: Lane, done: bool) -> asyncio.Task[bool] | None:
         """Take the end of the line that ran, and start the next one."""

@@ -14,6 +14,7 @@ from multidrop.dialects.values import Controls
 from multidrop.drives.telemetry import Value
 from multidrop.shell.channel import Fill
 from multidrop.shell.events import By, SessionEvent
+from multidrop.shell.lines import TypedLine
 from multidrop.shell.roles import RunningPlot, Series
 from multidrop.shell.stop_report import Tally
 from multidrop.shell.transcripts import Transcripts
@@ -292,7 +293,7 @@ class SessionView(Activity, Protocol):
     async def run(self, line: str, by: By = By.OPERATOR, since: int | None = None) -> None:
         """Run a line that was typed after `since` stops. Raises its failure."""
 
-    def start(self, line: str, by: By = By.OPERATOR, since: int | None = None) -> Task[bool]:
+    def start(self, line: str | TypedLine, by: By = By.OPERATOR, since: int | None = None) -> Task[bool]:
         """Run a line in the background; the task returns whether it was done."""
 
     def enter_alone(self) -> str:

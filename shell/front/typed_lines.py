@@ -19,7 +19,7 @@ from multidrop.dialects.files import lines_of
 from multidrop.dialects.text import visible
 from multidrop.macros.atomic import write_atomically
 from multidrop.shell.events import FAILURES
-from multidrop.shell.lines import VerbLine, parse
+from multidrop.shell.lines import TypedLine, VerbLine, parse
 from multidrop.shell.session import Session
 from multidrop.shell.verbs.table import VERBS, Verb
 
@@ -125,7 +125,7 @@ class LineQueue:
 
     def __init__(self, session: Session) -> None:
         self._session = session
-        self._waiting: asyncio.Queue[tuple[str, int]] = asyncio.Queue()
+        self._waiting: asyncio.Queue[tuple[str | TypedLine, Verb | None, int]] = asyncio.Queue()
         self._entered = 0.0
         """The time of the last Enter."""
         self._held = ""
@@ -155,30 +155,30 @@ class LineQueue:
             self._take(line, self._session.stops)
 
     def _take(self, line: str, since: int) -> None:
-        verb = _verb(line)
+        parsed, verb = _parsed(line)
         self.count += bool(line.strip()) and (verb is None or verb.name != "/quit")
         if verb is not None and verb.name in AHEAD:
-            self._session.start(line, since=since)
+            self._session.start(parsed, since=since)
         elif self._held:
             self.show_unsent(self._held, [line])
         elif verb is not None and verb.concurrent and not self.opening and not self._queued:
-            self._session.start(line, since=since)
+            self._session.start(parsed, since=since)
         elif line.strip():
             self._queued = True
-            self._waiting.put_nowait((line, since))
+            self._waiting.put_nowait((parsed, verb, since))
 
     async def run(self) -> None:
         """Run the lines in turn, until `close` and a cancellation."""
         while not self._closed:
             self.running = ""
             self._queued = self._queued and not self._waiting.empty()
-            line, since = await self._waiting.get()
-            if (verb := _verb(line)) is not None and verb.concurrent:
+            line, verb, since = await self._waiting.get()
+            if verb is not None and verb.concurrent:
                 self._session.start(line, since=since)
                 continue
-            self.running = line
+            self.running = _typed(line)
             try:
-                await self._session.run(self.running, since=since)
+                await self._session.run(line, since=since)
             except FAILURES:
                 if since == self._session.stops:  # else the waiting lines were typed after the stop of this one
                     self._held = f"'{self.running.strip()}' failed"
@@ -191,7 +191,7 @@ class LineQueue:
 
     def drop(self, why: str) -> None:
         """Drop the waiting lines and show them."""
-        self.show_unsent(why, [self._waiting.get_nowait()[0] for _ in range(self._waiting.qsize())])
+        self.show_unsent(why, [_typed(self._waiting.get_nowait()[0]) for _ in range(self._waiting.qsize())])
 
     def close(self) -> None:
         """Run no further line: a stop may have replaced the cancellation of `run`."""
@@ -211,8 +211,14 @@ def shown(line: str) -> str:
     return visible(re.sub("\x1b\\[20[01]~", "", line), tabs=True).strip()
 
 
-def _verb(line: str) -> Verb | None:
-    if not line.strip().startswith("/"):
-        return None
-    parsed = parse(line)
-    return VERBS.get(parsed.name) if isinstance(parsed, VerbLine) else None
+def _parsed(line: str) -> tuple[str | TypedLine, Verb | None]:
+    """The line, parsed, and its verb; a line that cannot be parsed as it is, which the session reports."""
+    try:
+        parsed = parse(line)
+    except Diagnostic:
+        return line, None
+    return parsed or line, VERBS.get(parsed.name) if isinstance(parsed, VerbLine) else None
+
+
+def _typed(line: str | TypedLine) -> str:
+    return line if isinstance(line, str) else line.typed

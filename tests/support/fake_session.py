@@ -23,6 +23,7 @@ from multidrop.drives.stopping import Fate
 from multidrop.drives.telemetry import Value
 from multidrop.shell.channel import Fill
 from multidrop.shell.events import By, Entered, Failed, Notified, OnBus, Printed, SessionEvent, StateChanged
+from multidrop.shell.lines import TypedLine
 from multidrop.shell.roles import RunningPlot, Series
 from multidrop.shell.stop_report import Found, Tally
 from multidrop.shell.transcripts import Transcripts
@@ -219,12 +220,13 @@ class FakeSession:
             self.emit(Failed(self.time, self.refuses[line], self.selected_bus, address))
             raise DriveError(self.refuses[line])
 
-    def start(self, line: str, by: By = By.OPERATOR, since: int | None = None) -> asyncio.Task[bool]:
+    def start(self, line: str | TypedLine, by: By = By.OPERATOR, since: int | None = None) -> asyncio.Task[bool]:
+        text = line if isinstance(line, str) else line.typed
         typed = self.stops if since is None else since
 
         async def quietly() -> bool:
             try:
-                await self.run(line, by, typed)
+                await self.run(text, by, typed)
             except (DriveError, Diagnostic, TransportLost):
                 return False
             return True
