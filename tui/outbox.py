@@ -18,34 +18,12 @@ from collections.abc import Callable, Coroutine, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-from multidrop.dialects import Diagnostic
-from multidrop.shell.lines import DriveLine, TypedLine, VerbLine, parse, pinned
+from multidrop.shell.front.typed_lines import BURST, Line
+from multidrop.shell.lines import pinned
 from multidrop.tui.session_view import Place, SessionView, selected_place
 
-BURST = 0.5
-"""Seconds between two Enters below which no person typed the second line after reading the first answer."""
 NAMED = 4
 """Number of lines that a report of unsent lines quotes."""
-
-
-@dataclass(frozen=True)
-class Line:
-    """A line, the count of stops and the selected drive at its Enter."""
-
-    text: str
-    since: int
-    place: Place
-    parsed: TypedLine | None
-
-    @property
-    def bus(self) -> str:
-        """The bus that the text is for; empty for a verb."""
-        return (self.parsed.bus or self.place.bus) if isinstance(self.parsed, DriveLine) else ""
-
-    @property
-    def verb(self) -> str:
-        """The verb's name; empty for text."""
-        return self.parsed.name if isinstance(self.parsed, VerbLine) else ""
 
 
 @dataclass
@@ -127,11 +105,7 @@ class Outbox:
             self._report("stopped", lines)
 
     def _line(self, text: str) -> Line:
-        try:
-            parsed = parse(text)
-        except Diagnostic:
-            parsed = None  # the session reports the error
-        return Line(text, self._session.stops, selected_place(self._session), parsed)
+        return Line.entered(text, self._session.stops, selected_place(self._session))
 
     def _talking(self, bus: str) -> Lane | None:
         """Find the lane in which a typed line for that bus waits for its answer."""
@@ -160,7 +134,7 @@ class Outbox:
     def _next(self, lane: Lane) -> asyncio.Task[bool] | None:
         """Start the next line of a lane; None if it may not be sent."""
         line = lane.waiting[0]
-        typed: str | TypedLine = line.parsed or line.text
+        typed = line.sent
         if line.place != selected_place(self._session):
             if line.verb:
                 self._hold(lane, f"another drive was selected than {':'.join(filter(None, line.place))}")
@@ -183,7 +157,7 @@ class Outbox:
             self._lanes.remove(lane)
         return None
 
-    def _follow(self, lane: Lane, before: Place) -> None:
+    def _follow(self, lane: Lane, before: tuple[str, str]) -> None:
         """Bind the lines after a `/use` to the drive that it selected."""
         now = selected_place(self._session)
         lane.waiting = deque(replace(each, place=now) if each.place == before else each for each in lane.waiting)

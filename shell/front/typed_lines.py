@@ -1,6 +1,9 @@
-"""The history of typed lines: a text file that the prompt and the TUI share and keep between runs.
+"""Typed lines: those that wait for their turn, and their history, which the prompt and the TUI share.
 
-Several processes may write it at once. A line is appended in one write, under a lock where one is free. To cut the
+At the prompt lines run one after the other; a macro runs beside them, and the stop goes ahead of them. A failed line
+holds back the rest of its burst, and a stop drops everything before it: those lines are shown, and never sent.
+
+The history is a text file, kept between runs. Several processes may write it at once. A line is appended in one write, under a lock where one is free. To cut the
 file, a process replaces it by a new one; another process that waited for the lock then opens the new file.
 """
 
@@ -12,19 +15,22 @@ import os
 import re
 import sys
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from multidrop.dialects import Diagnostic
 from multidrop.dialects.files import lines_of
 from multidrop.dialects.text import visible
 from multidrop.macros.atomic import write_atomically
 from multidrop.shell.events import FAILURES
-from multidrop.shell.lines import TypedLine, VerbLine, parse
-from multidrop.shell.session import Session
-from multidrop.shell.verbs.table import VERBS, Verb
+from multidrop.shell.lines import DriveLine, TypedLine, VerbLine, parse
 
 if sys.platform != "win32":
     import fcntl
+
+if TYPE_CHECKING:
+    from multidrop.shell.session import Session
 
 KEPT = 5000
 """The number of lines read back; a file of twice as many is cut to that number."""
@@ -120,12 +126,47 @@ AHEAD = ("/stop", "/quit")
 """Verbs that run at once, whatever waits or failed."""
 
 
+@dataclass(frozen=True)
+class Line:
+    """A line at its Enter: parsed once, with the count of stops and the drive that was selected."""
+
+    text: str
+    since: int
+    place: tuple[str, str] = ("", "")
+    """The selected bus and drive; empty where that does not matter."""
+    parsed: TypedLine | None = None
+    """None: it cannot be parsed, which the session reports at its turn."""
+
+    @classmethod
+    def entered(cls, text: str, since: int, place: tuple[str, str] = ("", "")) -> Line:
+        """Parse a line."""
+        try:
+            return cls(text, since, place, parse(text))
+        except Diagnostic:
+            return cls(text, since, place)
+
+    @property
+    def verb(self) -> str:
+        """The verb's name; empty for text."""
+        return self.parsed.name if isinstance(self.parsed, VerbLine) else ""
+
+    @property
+    def bus(self) -> str:
+        """The bus that the text is for; empty for a verb."""
+        return (self.parsed.bus or self.place[0]) if isinstance(self.parsed, DriveLine) else ""
+
+    @property
+    def sent(self) -> str | TypedLine:
+        """The line in the form that the session takes."""
+        return self.parsed or self.text
+
+
 class LineQueue:
     """The lines that wait for their turn in one session."""
 
     def __init__(self, session: Session) -> None:
         self._session = session
-        self._waiting: asyncio.Queue[tuple[str | TypedLine, Verb | None, int]] = asyncio.Queue()
+        self._waiting: asyncio.Queue[Line] = asyncio.Queue()
         self._entered = 0.0
         """The time of the last Enter."""
         self._held = ""
@@ -152,35 +193,35 @@ class LineQueue:
             self._session.notify(f"{problem}; nothing was sent", warning=True)
             return
         for line in lines:
-            self._take(line, self._session.stops)
+            self._take(Line.entered(line, self._session.stops))
 
-    def _take(self, line: str, since: int) -> None:
-        parsed, verb = _parsed(line)
-        self.count += bool(line.strip()) and (verb is None or verb.name != "/quit")
-        if verb is not None and verb.name in AHEAD:
-            self._session.start(parsed, since=since)
+    def _take(self, line: Line) -> None:
+        concurrent = _concurrent(line)
+        self.count += bool(line.text.strip()) and line.verb != "/quit"
+        if line.verb in AHEAD:
+            self._session.start(line.sent, since=line.since)
         elif self._held:
-            self.show_unsent(self._held, [line])
-        elif verb is not None and verb.concurrent and not self.opening and not self._queued:
-            self._session.start(parsed, since=since)
-        elif line.strip():
+            self.show_unsent(self._held, [line.text])
+        elif concurrent and not self.opening and not self._queued:
+            self._session.start(line.sent, since=line.since)
+        elif line.text.strip():
             self._queued = True
-            self._waiting.put_nowait((parsed, verb, since))
+            self._waiting.put_nowait(line)
 
     async def run(self) -> None:
         """Run the lines in turn, until `close` and a cancellation."""
         while not self._closed:
             self.running = ""
             self._queued = self._queued and not self._waiting.empty()
-            line, verb, since = await self._waiting.get()
-            if verb is not None and verb.concurrent:
-                self._session.start(line, since=since)
+            line = await self._waiting.get()
+            if _concurrent(line):
+                self._session.start(line.sent, since=line.since)
                 continue
-            self.running = _typed(line)
+            self.running = line.text
             try:
-                await self._session.run(line, since=since)
+                await self._session.run(line.sent, since=line.since)
             except FAILURES:
-                if since == self._session.stops:  # else the waiting lines were typed after the stop of this one
+                if line.since == self._session.stops:  # else the waiting lines were typed after the stop of this one
                     self._held = f"'{self.running.strip()}' failed"
                     self.drop(self._held)
 
@@ -191,7 +232,7 @@ class LineQueue:
 
     def drop(self, why: str) -> None:
         """Drop the waiting lines and show them."""
-        self.show_unsent(why, [_typed(self._waiting.get_nowait()[0]) for _ in range(self._waiting.qsize())])
+        self.show_unsent(why, [self._waiting.get_nowait().text for _ in range(self._waiting.qsize())])
 
     def close(self) -> None:
         """Run no further line: a stop may have replaced the cancellation of `run`."""
@@ -211,14 +252,10 @@ def shown(line: str) -> str:
     return visible(re.sub("\x1b\\[20[01]~", "", line), tabs=True).strip()
 
 
-def _parsed(line: str) -> tuple[str | TypedLine, Verb | None]:
-    """The line, parsed, and its verb; a line that cannot be parsed as it is, which the session reports."""
-    try:
-        parsed = parse(line)
-    except Diagnostic:
-        return line, None
-    return parsed or line, VERBS.get(parsed.name) if isinstance(parsed, VerbLine) else None
+def _concurrent(line: Line) -> bool:
+    """Whether a line runs beside those that are typed after it."""
+    if not line.verb:
+        return False
+    from multidrop.shell.verbs.table import VERBS  # more than the first frame of a screen needs
 
-
-def _typed(line: str | TypedLine) -> str:
-    return line if isinstance(line, str) else line.typed
+    return line.verb in VERBS and VERBS[line.verb].concurrent

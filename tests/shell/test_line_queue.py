@@ -5,6 +5,7 @@ from typing import Any
 
 from multidrop.dialects import Refused
 from multidrop.shell.front.typed_lines import BURST, SHOWN, LineQueue
+from multidrop.shell.lines import TypedLine
 from tests.support.virtual import in_virtual_time
 
 
@@ -20,14 +21,14 @@ class FakeSession:
     def now(self) -> float:
         return asyncio.get_running_loop().time()
 
-    async def run(self, line: str, since: int) -> None:
+    async def run(self, line: TypedLine, since: int) -> None:
         await asyncio.sleep(1.0)
-        if line == "bad":
+        if line.typed == "bad":
             raise Refused("bad")
-        self.done.append(line)
+        self.done.append(line.typed)
 
-    def start(self, line: str, since: int) -> None:
-        self.started.append(line)
+    def start(self, line: TypedLine, since: int) -> None:
+        self.started.append(line.typed)
 
     def notify(self, text: str, warning: bool = False) -> None:
         self.notices.append(text)
