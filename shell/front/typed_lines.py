@@ -3,8 +3,9 @@
 At the prompt lines run one after the other; a macro runs beside them, and the stop goes ahead of them. A failed line
 holds back the rest of its burst, and a stop drops everything before it: those lines are shown, and never sent.
 
-The history is a text file, kept between runs. Several processes may write it at once. A line is appended in one write, under a lock where one is free. To cut the
-file, a process replaces it by a new one; another process that waited for the lock then opens the new file.
+The history is a text file, kept between runs. Several processes may write it at once. A line is appended in one write,
+under a lock where one is free. To cut the file, a process replaces it by a new one; another process that waited for the
+lock then opens the new file.
 """
 
 from __future__ import annotations
