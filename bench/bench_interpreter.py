@@ -41,7 +41,7 @@ def rows(full: bool) -> Iterator[Row]:
     for name, text in PROGRAMS.items():
         device = running(text)
         rounds = [(rate(device, each * SECONDS), calls()) for each in range(1, ROUNDS + 1)]
-        assert device.running and not device.error_flag
+        assert device.running and not device.memory.error_flag
         ours, bare = zip(*rounds, strict=True)
         yield compared(f"program lines, {name}", "/s", ours, bare, "bare calls", aim=AIM, better="more")
 

@@ -1,47 +1,38 @@
 """A simulated MCode drive, put together: what its ports, the world and a program run ask of it.
 
-`execute` carries out one line at once, between two lines of the program; how time passes is the matter of
-`event_loop`. The port in front of a device deals with echo, prompts and checksums.
+`execute` carries out one line at once, between two lines of the program; `event_loop` lets time pass. The port in front
+of a device does echo, prompts and checksums. A cell file puts into a drive its identity, variables, program, settings
+and counters: lines that are carried out as if they were sent.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import lru_cache, partial
 from typing import NamedTuple
 
+from multidrop.dialects import Diagnostic
+from multidrop.dialects.files import split_lines
 from multidrop.dialects.mcode.manual.errors import text as error_text
 from multidrop.dialects.mcode.manual.grammar import LineError, parse, strip
 from multidrop.simulator.cell.spec import DriveSpec
-from multidrop.simulator.lexium import set_up
 from multidrop.simulator.lexium.event_loop import EventLoop
-from multidrop.simulator.lexium.language import io_variables, motion_variables
-from multidrop.simulator.lexium.language.flow import Flow
-from multidrop.simulator.lexium.language.input_functions import InputFunctions
 from multidrop.simulator.lexium.language.instructions import Instructions
-from multidrop.simulator.lexium.language.interpreter import Interpreter
-from multidrop.simulator.lexium.language.motor_commands import MotorCommands
-from multidrop.simulator.lexium.language.pausing import Pausing
-from multidrop.simulator.lexium.language.printed_setups import PrintedSetups
-from multidrop.simulator.lexium.language.prints import Prints
-from multidrop.simulator.lexium.language.program_commands import ProgramCommands
-from multidrop.simulator.lexium.language.program_mode import Names, ProgramMode
-from multidrop.simulator.lexium.language.setups import Setups
-from multidrop.simulator.lexium.language.thread import Thread
-from multidrop.simulator.lexium.language.variable_access import VariableAccess
-from multidrop.simulator.lexium.motion.inputs import Inputs
 from multidrop.simulator.lexium.motion.motor import Motor
 from multidrop.simulator.lexium.motion.outputs import Outputs
-from multidrop.simulator.lexium.motion.rotor import Rotor
-from multidrop.simulator.lexium.nvm import Nvm
-from multidrop.simulator.lexium.power import Power
-from multidrop.simulator.lexium.state.comm_settings import CommSettings
-from multidrop.simulator.lexium.state.error_flag import ErrorFlag
+from multidrop.simulator.lexium.power import Nvm, Power
 from multidrop.simulator.lexium.state.errors import Fault
-from multidrop.simulator.lexium.state.printer import CRLF, Printer
-from multidrop.simulator.lexium.state.program_memory import Program
-from multidrop.simulator.lexium.state.timeline import Timeline
+from multidrop.simulator.lexium.state.interpreter import Core
+from multidrop.simulator.lexium.state.memory import Memory
+from multidrop.simulator.lexium.state.timeline import CRLF
 from multidrop.simulator.world import World
 
+WORDS = {"position": "P"}
+"""Words by the key of a counter in `identity`; the other keys are words."""
+PASSES = 3
+"""Times that `set` is carried out: until nothing is refused any more, and what that has scaled is set again."""
+Execute = Callable[[str], str]
+"""Carries out a line; returns the reason for a refusal, empty for none."""
 SHORTEST_US = 1.0
 """No line takes less, so that a loop always ends at some time."""
 parsed = lru_cache(maxsize=1024)(parse)
@@ -56,66 +47,35 @@ class Answer(NamedTuple):
     refused: bool = False
 
 
-class MCodeDevice(CommSettings):
+class MCodeDevice:
     """One drive. Times are seconds and never go back. Raises Diagnostic for a spec that it cannot be set up with."""
 
     def __init__(self, spec: DriveSpec, world: World) -> None:
-        memory = set_up.memory_of(spec)
-        super().__init__(memory)
-        self.spec, self.world, self.model = spec, world, memory.model
-        self._timeline = timeline = Timeline()
-        self.program = program = Program(product=spec.personality)
-        self.errors = errors = ErrorFlag(memory.values, memory.model.codes, timeline)
-        thread = Thread(timeline)
-        self.printer = printer = Printer(timeline, memory.model.waits_to_print, thread.delay)
+        self.spec, self.world = spec, world
+        self.memory = memory = _memory(spec)
         period = max(spec.instruction_us, SHORTEST_US) / 1e6
-        self.interpreter = Interpreter(
-            memory, program, timeline, errors, printer, thread, period, lambda line: self.language.compile_stored(line)
-        )
-        errors.line = self.interpreter.line
-        rotor = Rotor(memory.values, world)
-        self.inputs = inputs = Inputs(memory, world, rotor)
-        self.motor = motor = Motor(
-            memory, timeline, world, rotor, inputs, self.interpreter, lambda: printer.emit(self.name + CRLF)
-        )
-        self.output_lines = outputs = Outputs(memory, timeline, motor)
-        inputs.put_out = outputs.put_out
-        self.nvm = nvm = Nvm(memory, program, timeline, inputs, outputs, motor, lambda: self._power.restart())
-        self._names = Names(memory, program)
-        self.mode = ProgramMode(program, self._names, self.interpreter.linked, nvm)
-        self._power = Power(
-            memory,
-            program,
-            timeline,
-            world,
-            self,
-            errors,
-            printer,
-            self.interpreter,
-            self.mode,
-            inputs,
-            outputs,
-            motor,
-            nvm,
-        )
-        pausing = Pausing(timeline, thread, motor)
-        functions = InputFunctions(timeline, errors, inputs, motor, self.interpreter, pausing, self._power.restart)
-        self._loop = EventLoop(timeline, printer, self._power, inputs, motor, self.interpreter, functions)
-        self.language, self.motions = _language(self, timeline, pausing, functions)
+        self.core = core = Core(memory, world, period, lambda line: self.language.compile_stored(line))
+        self.program, self.errors, self.interpreter, self._mode = core.program, core.errors, core.interpreter, core.mode
+        self.motor = motor = Motor(core)
+        self.output_lines = outputs = Outputs(core, motor)
+        motor.inputs.put_out = outputs.put_out
+        self.nvm = Nvm(core, motor, outputs)
+        self._power = Power(core, motor, outputs, self.nvm)
+        self._loop = EventLoop(core, motor, self._power)
+        serial = spec.identity.serial or f"0401{ord(spec.name[:1] or '!'):05d}"
+        self.language = Instructions(serial, core, motor, outputs, self._loop)
         _set_up(self, spec)
         self._power.boot()
-        set_up.begin_counters(spec, partial(_reason, self))
+        _begin_counters(spec, partial(_reason, self))
 
     # What is read.
 
     @property
     def now(self) -> float:
-        """The drive's time."""
-        return self._timeline.now
+        return self.core.timeline.now
 
     @property
     def powered(self) -> bool:
-        """Whether it has power, and is up."""
         return self._power.on
 
     @property
@@ -126,17 +86,17 @@ class MCodeDevice(CommSettings):
     @property
     def running(self) -> bool:
         """BY."""
-        return self.interpreter.running
+        return self.core.thread.running
 
     @property
     def stepping(self) -> bool:
         """Whether a program is executed step by step, and waits for keys."""
-        return self.interpreter.thread.stepping
+        return self.core.thread.stepping
 
     @property
     def programming(self) -> int | None:
         """Where program mode stores the next line; None: it is not on."""
-        return self.mode.address
+        return self._mode.address
 
     def position(self, now: float) -> int:
         """P at a time not before the last one."""
@@ -180,38 +140,38 @@ class MCodeDevice(CommSettings):
         self._loop.advance_to_line(now)
         if not self.powered:
             return Answer(refused=True)
-        self.printer.begin_answer()
+        self.core.printer.begin_answer()
         self._loop.calm = refused = False
-        immediate = immediate or self.mode.address is None
+        immediate = immediate or self._mode.address is None
         try:
             self._carry_out(text, immediate)
         except (LineError, Fault) as error:
             refused = True
             self.interpreter.refuse(error.code, handle=immediate)
-        *lines, tail = self.printer.end_answer().split(CRLF)
+        *lines, tail = self.core.printer.end_answer().split(CRLF)
         return Answer(tuple(lines), tail, refused)
 
     def _carry_out(self, text: str, immediate: bool) -> None:
-        statement = parsed(text, self._names.known())
+        statement = parsed(text, self._mode.known_names())
         if statement is None:
             return
         if immediate:
             self.language.compile(statement, stored=False)()
             self._loop.calm = statement.word == "PR"  # which changes nothing that there is to look at
         elif statement.word == "PG" and not statement.arguments:
-            self.mode.address = None
+            self._mode.address = None
         else:
             self.language.compile(statement, stored=True)
-            self.mode.store(statement, strip(text))
+            self._mode.store(statement, strip(text))
 
     def fail(self, code: int, now: float) -> None:
         """Set an error that the port has found, such as a line that is too long."""
         self.advance(now)
-        self.interpreter.refuse(code, handle=self.mode.address is None)
+        self.interpreter.refuse(code, handle=self._mode.address is None)
 
     def prints(self) -> list[tuple[float, str]]:
         """What was printed by itself since this was last asked, with the times."""
-        return self.printer.take()
+        return self.core.printer.take()
 
     # Keys and power.
 
@@ -220,8 +180,8 @@ class MCodeDevice(CommSettings):
         self.advance(now)
         self.motor.torque.halt()
         self.motor.stop(self.now)
-        self.interpreter.finish()
-        self._timeline.replan()
+        self.core.thread.finish()
+        self.core.timeline.replan()
 
     def step(self, key: str, now: float) -> None:
         """A key of single step: space or carriage return."""
@@ -241,7 +201,7 @@ class MCodeDevice(CommSettings):
 
     def world_changed(self) -> None:
         """Look at the world again: `/sim` has changed it."""
-        self._timeline.replan()
+        self.core.timeline.replan()
 
     def supply(self, on: bool, now: float) -> None:
         """Switch +V alone, with the auxiliary supply left on (manual 5.1.127)."""
@@ -249,56 +209,67 @@ class MCodeDevice(CommSettings):
         self._power.supply(on)
 
 
-def _language(
-    device: MCodeDevice, timeline: Timeline, pausing: Pausing, functions: InputFunctions
-) -> tuple[Instructions, MotorCommands]:
-    """The language over all other parts."""
-    memory, program, timeline, printer = device.memory, device.program, timeline, device.printer
-    motor, inputs, outputs, interpreter = device.motor, device.inputs, device.output_lines, device.interpreter
-    nvm, trips, serial = device.nvm, motor.trips, set_up.serial_of(device.spec)
-    variables = VariableAccess(
-        memory,
-        program,
-        timeline,
-        running=lambda: interpreter.running,
-        saved_lock=lambda: nvm.locked,
-        readers={
-            **motion_variables.readers(timeline, motor),
-            **io_variables.readers(timeline, inputs, trips),
-        },
-        writers={
-            **motion_variables.MotionWriters(memory, timeline, motor).table(),
-            **io_variables.IoWriters(memory, timeline, inputs, outputs, trips, motor.jog).table(),
-        },
+def _memory(spec: DriveSpec) -> Memory:
+    """Make the working memory of a drive with this identity."""
+    memory, own = Memory(spec.personality), spec.identity
+    memory.model = memory.model._replace(
+        part=own.part or memory.model.part, version=own.version or memory.model.version
     )
-    motions = MotorCommands(memory, timeline, variables, motor)
-    setups = PrintedSetups(inputs, outputs, motor.limits, trips)
-    return Instructions(
-        memory,
-        program,
-        variables,
-        Flow(memory, program, timeline, printer, variables, device._names, interpreter, pausing, motor),
-        ProgramCommands(memory, program, timeline, printer, variables, interpreter, device.mode, motor.status, nvm),
-        motions,
-        Setups(memory, program, timeline, variables, inputs, outputs, motor, functions),
-        Prints(serial, memory, program, timeline, printer, device.errors, variables, motor, setups),
-        nvm,
-    ), motions
+    return memory
+
+
+def _load(spec: DriveSpec, execute: Execute) -> None:
+    """Declare the variables, and store the program. Raises Diagnostic."""
+    for name, value in spec.variables.items():
+        _accepted(f"VA {name}={value}", f"drive {spec.name}: variables", execute)
+    for number, line in enumerate(split_lines(spec.program), 1):
+        _accepted(line, f"{spec.program_name or 'program'}:{number}", execute)
+
+
+def _assign(spec: DriveSpec, execute: Execute) -> None:
+    """Carry out `set`. One line may need another first, and MS and EE change speeds. Raises Diagnostic.
+
+    A line that was accepted once may be refused later and be in force all the same: MF, when VM is below it.
+
+    AS comes last, as the motor may turn from there on; EE just before it, so that speeds in steps stay in steps.
+    """
+    lines = [*spec.assignments(), *([("PY", "1")] if spec.party else [])]
+    last = ("EE", "AS") if spec.set.get("AS") else ("AS",)
+    late = [each for name in last for each in lines if each[0] == name]
+    early = [each for each in lines if each not in late]
+    refused = early
+    for _ in range(PASSES):
+        again = [each for each in early if execute("=".join(each))]
+        refused = [each for each in refused if each in again]
+    for each in (*late, *refused):
+        _accepted("=".join(each), f"drive {spec.name}: set", execute)
+
+
+def _begin_counters(spec: DriveSpec, execute: Execute) -> None:
+    """Let the counters begin where a snapshot found them: P first, then what P does not say. Raises Diagnostic."""
+    counters = {WORDS.get(key, key): value for key, (value,) in spec.identity.counters.items()}
+    for word in sorted(counters, key=lambda word: word != "P"):
+        _accepted(f"{word}={counters[word]}", f"drive {spec.name}: identity", execute)
+
+
+def _accepted(line: str, where: str, execute: Execute) -> None:
+    if why := execute(line):
+        raise Diagnostic(f"{line.strip()}: {why}", where)
 
 
 def _set_up(device: MCodeDevice, spec: DriveSpec) -> None:
     """Put what the spec says into NVM. What the inputs are meanwhile is nothing to react to. Raises Diagnostic."""
     execute = partial(_reason, device)
-    device.inputs.begin(0.0)
-    device.inputs.watched = False
-    set_up.load(spec, execute)
-    device.mode.address = None
-    device.interpreter.finish()
+    device.motor.inputs.begin(0.0)
+    device.motor.inputs.watched = False
+    _load(spec, execute)
+    device.core.mode.address = None
+    device.core.thread.finish()
     device.motor.stop(0.0)
     device.memory.texts["DN"] = spec.name
-    set_up.assign(spec, execute)
+    _assign(spec, execute)
     device.nvm.keep()
-    device.inputs.watched = True
+    device.motor.inputs.watched = True
 
 
 def _reason(device: MCodeDevice, line: str) -> str:

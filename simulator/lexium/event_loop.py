@@ -1,8 +1,12 @@
-"""The discrete events of a simulated drive, in virtual time.
+"""The discrete events of a simulated drive, in virtual time, and the functions of its dedicated inputs.
 
 Theory of operation. `advance(now)` works out the next thing that happens whatever the program does (the end of a
 motion, a trip, an input, the end of a hold), lets the interpreter run up to it, lets it happen, and goes on until
 `now`. Nothing here reads a clock.
+
+Limits, home, clocks and trips act on motion, all other inputs on the program. What the manual leaves open (3.4.3,
+5.1.64, 7.2.3): G0 does nothing while a program runs; a pause lasts as long as its input is active; a soft stop of a
+motion is error 91, of a program 48, which is the one that stays if it stops both.
 """
 
 from __future__ import annotations
@@ -10,34 +14,39 @@ from __future__ import annotations
 from functools import partial
 from math import inf, nextafter
 
-from multidrop.simulator.lexium.language.input_functions import InputFunctions
-from multidrop.simulator.lexium.language.interpreter import Interpreter
-from multidrop.simulator.lexium.motion.inputs import Inputs
+from multidrop.dialects.mcode.manual.errors import ErrorNumber as E
+from multidrop.dialects.mcode.manual.grammar import Number
+from multidrop.simulator.lexium.motion.inputs import GO, JOG_MINUS, JOG_PLUS, PAUSE, RESET, SOFT_STOP
 from multidrop.simulator.lexium.motion.motor import Motor
 from multidrop.simulator.lexium.power import Power
-from multidrop.simulator.lexium.state.printer import Printer
-from multidrop.simulator.lexium.state.timeline import Event, Timeline, nothing, when
+from multidrop.simulator.lexium.state.errors import Fault
+from multidrop.simulator.lexium.state.interpreter import Core
+from multidrop.simulator.lexium.state.timeline import Event, nothing, when
+
+JOGS = (JOG_PLUS, JOG_MINUS)
+GO_ADDRESS = Number(1)
+RESET_TIME = 0.01
+"""s, before the line of SU that follows a reset by an input."""
 
 
 class EventLoop:
     """The events of one drive. `calm`: the last line changed nothing that there is to look at."""
 
-    def __init__(
-        self,
-        timeline: Timeline,
-        printer: Printer,
-        power: Power,
-        inputs: Inputs,
-        motor: Motor,
-        interpreter: Interpreter,
-        functions: InputFunctions,
-    ) -> None:
-        self._timeline, self._printer, self._power = timeline, printer, power
-        self._inputs, self._motor, self._functions = inputs, motor, functions
-        self._interpreter, self._thread = interpreter, interpreter.thread
+    def __init__(self, core: Core, motor: Motor, power: Power) -> None:
+        self._core, self._timeline, self._printer, self._thread = core, core.timeline, core.printer, core.thread
+        self._interpreter, self._motor, self._inputs, self.power = core.interpreter, motor, motor.inputs, power
         self.calm = False
         self._before: tuple[bool, bool, int] | None = None
         self._next: Event = inf, nothing
+        jogs = dict.fromkeys(JOGS, motor.update_jog)
+        self._risen = {
+            GO: self._go,
+            SOFT_STOP: self._soft_stop,
+            PAUSE: self._pause,
+            RESET: self._reset,
+            **jogs,
+        }
+        self._fallen = {PAUSE: self._resume, **jogs}
 
     def proceed(self, now: float) -> float | None:
         """Let time pass up to `now`, or to where there is news; gives when that is, None for nothing.
@@ -57,7 +66,7 @@ class EventLoop:
         """
         timeline = self._timeline
         self.calm = False
-        while self._power.on or self._comes_up(now):
+        while self.power.on or self._comes_up(now):
             if self._news() or not self._run(now, program):
                 return
             timeline.now = max(timeline.now, now)
@@ -67,7 +76,7 @@ class EventLoop:
 
     def advance_to_line(self, now: float) -> None:
         """Advance to a typed line: quickly where nothing has happened since the one before."""
-        if self.calm and self.quiet(now, self._interpreter.running):
+        if self.calm and self.quiet(now, self._thread.running):
             self._timeline.now = max(self._timeline.now, now)
         else:
             self.advance(now)
@@ -75,8 +84,8 @@ class EventLoop:
     @property
     def deadline(self) -> float | None:
         """When something next happens by itself; None if nothing will."""
-        if not self._power.on:
-            return self._power.boots_at
+        if not self.power.on:
+            return self.power.boots_at
         if self._timeline.outdated:
             self._plan()
         due = min(self._next[0], self._thread.due)
@@ -87,18 +96,18 @@ class EventLoop:
 
         It has power and has printed nothing, nothing happens by itself, and its program has neither begun nor ended.
         """
-        if self._timeline.outdated or self._printer.pending or not self._power.on or self._next[0] <= now:
+        if self._timeline.outdated or self._printer.pending or not self.power.on or self._next[0] <= now:
             return False
         thread = self._thread
         return thread.running == running and (not thread.live or thread.next_at > now)
 
     def _comes_up(self, now: float) -> bool:
         """Whether it has booted by now."""
-        boots_at = self._power.boots_at
+        boots_at = self.power.boots_at
         if boots_at is None or boots_at > now:
             return False
         self._timeline.now = max(self._timeline.now, boots_at)
-        self._power.come_up()
+        self.power.come_up()
         return True
 
     def _run(self, now: float, program: bool) -> bool:
@@ -123,7 +132,7 @@ class EventLoop:
         return False
 
     def _state(self) -> tuple[bool, bool, int]:
-        return self._thread.running, self._power.on, self._power.boots
+        return self._thread.running, self.power.on, self.power.boots
 
     def _news(self) -> bool:
         """Whether `proceed` waits for news, and there is some."""
@@ -162,6 +171,65 @@ class EventLoop:
                 motor.trips.input(n, now)
             kind = inputs.types[n][0]
             motor.input_changed(kind, active, now)
-            self._functions.changed(kind, active)
+            self._changed(kind, active)
         self._timeline.replan()
         return True
+
+    # Inputs.
+
+    def _changed(self, kind: int, active: bool) -> None:
+        """Act on an input of a type that has become active or inactive."""
+        act = (self._risen if active else self._fallen).get(kind)
+        if act is None:
+            return
+        try:
+            act()
+        except Fault as fault:
+            self._interpreter.raise_error(fault.code)
+
+    def wired(self, n: int, was: tuple[int, ...]) -> None:
+        """Act on an input's new set-up. One that is active already stops or resets; a jog ends with its input.
+
+        Where the level that is active has changed too, the next look at the inputs sees that.
+        """
+        kind, active = self._inputs.types[n][:2]
+        if not self._inputs.watched:
+            return
+        if kind != was[0] and active == was[1] and self._inputs.active(n) and kind in (SOFT_STOP, RESET):
+            self._changed(kind, True)
+        if self._motor.jog or kind in JOGS:
+            self._motor.update_jog()
+
+    def _go(self) -> None:
+        if not self._thread.running:
+            self._interpreter.start(GO_ADDRESS, self._timeline.now)
+
+    def _pause(self) -> None:
+        if self._thread.running and not self._thread.paused:
+            self._motor.pause_program()
+
+    def _resume(self) -> None:
+        if self._thread.paused:
+            self._motor.resume_program()
+
+    def _reset(self) -> None:
+        """Restart. SU takes a moment to start, or one that sets up such an input would reset the drive in no time."""
+        self.power.restart()
+        if self._thread.running:
+            self._thread.next_at = self._timeline.now + RESET_TIME
+
+    def _soft_stop(self) -> None:
+        t, thread, motor = self._timeline.now, self._thread, self._motor
+        running, moving = thread.running, motor.status.moving(t)
+        if thread.paused or not (running or moving):
+            return
+        if moving:
+            if not motor.torque.halt():
+                motor.axis.slow_to(0, t)
+            self._core.errors.set(E.MOTION_STOPPED_BY_INPUT)
+        if running:
+            thread.finish()
+            self._core.errors.set(E.PROGRAM_STOPPED_BY_INPUT)
+        motor.end_jog()
+        self._interpreter.on_error(t)
+        self._timeline.replan()

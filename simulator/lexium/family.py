@@ -1,20 +1,297 @@
-"""The family of the MCode drives: the Lexium MDrives of four kinds and the older MDrivePlus."""
+"""The family of simulated MCode drives: built from a cell file's `[[bus.drive]]` table, which is read and written here.
+
+A drive as it was read from a unit becomes such a table, and a table the settings to write to a unit.
+"""
 
 from __future__ import annotations
 
+import re
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
+from difflib import get_close_matches
+from functools import partial
 
 from multidrop.dialects.family import Motion
-from multidrop.simulator.cell.spec import DriveSpec
-from multidrop.simulator.family import Family, Place, Shadow, Unit
-from multidrop.simulator.lexium import drive_table, drive_text
+from multidrop.dialects.mcode.manual.grammar import LineError, is_name, parse
+from multidrop.dialects.mcode.manual.statements import UNNAMED, canonical, size_of
+from multidrop.dialects.mcode.manual.table import Mnemonic, lookup, words
+from multidrop.dialects.parameters import VARIABLES, Reading, Scalar, Value, same
+from multidrop.dialects.values import Snapshot
+from multidrop.simulator.cell.identities import read_identity, read_variables
+from multidrop.simulator.cell.reader import common_keys
+from multidrop.simulator.cell.settings import Check, read_settings
+from multidrop.simulator.cell.spec import DriveSpec, WorldSpec
+from multidrop.simulator.cell.table import Folder, Table, quoted, shown
+from multidrop.simulator.cell.worlds import KEYS, read_world
+from multidrop.simulator.cell.writer import DriveText, Entry, plain, remark
+from multidrop.simulator.family import Family, Place, Shadow, Snapshots, StoredProgram, Unit
 from multidrop.simulator.lexium.device import MCodeDevice
 from multidrop.simulator.lexium.ports.mcode import MCodePort
 from multidrop.simulator.lexium.ports.modbus import ModbusPort
-from multidrop.simulator.lexium.ports.registers import Registers
 from multidrop.simulator.lexium.power import BAUDS
 from multidrop.simulator.lexium.state.models import MODELS
 from multidrop.simulator.world import World
+
+KEY_OF = {"DN": "name", "PY": "party"}
+"""Mnemonics that have a key of their own in the table."""
+
+
+def read_drive(table: Table, folder: Folder) -> DriveSpec:
+    """Read the table of one drive. Raises Diagnostic."""
+    common = common_keys(table, folder)
+    personality = common["personality"]
+    name = table.text("name", "!")
+    if not _can_be_a_name(name):
+        raise table.wrong("name", f"cannot be {quoted(name)}", "valid: one of a-z, A-Z, 0-9 or !")
+    points = MODELS[personality].points
+    variables = table.table("variables", "[bus.drive.variables]")
+    identity = table.table("identity", "[bus.drive.identity]")
+    world = table.table("world", "[bus.drive.world]")
+    world.only(*KEYS)
+    return DriveSpec(
+        **common,
+        name=name,
+        party=table.boolean("party", False),
+        variables=read_variables(variables, partial(_can_be_a_variable, personality), "as in Q1"),
+        identity=read_identity(identity, ("part", "version", "serial"), _counters(personality)),
+        set=read_settings(table.table("set", "set"), _checker(personality)),
+        world=read_world(world, points.inputs, points.analog),
+    )
+
+
+def _can_be_a_name(name: str) -> bool:
+    return len(name) == 1 and name.isascii() and (name.isalnum() or name == "!")
+
+
+def _can_be_a_variable(personality: str, name: str) -> bool:
+    return is_name(name) and lookup(name, personality) is None and len(name) <= MODELS[personality].longest_name
+
+
+def _counters(personality: str) -> dict[str, int]:
+    """The keys of its counters, each of one axis."""
+    known = words(personality)
+    return {"position": 1} | {name: 1 for name in ("C1", "C2") if name in known and personality in known[name].products}
+
+
+def _checker(personality: str) -> Check:
+    def check(table: Table, word: str, value: Value) -> None:
+        _check_value(table, word, value, _settable(table, word, personality))
+
+    return check
+
+
+def _settable(table: Table, word: str, personality: str) -> Mnemonic:
+    """Find the row of a mnemonic that can be set. Raises Diagnostic."""
+    if (key := KEY_OF.get(word.upper())) is not None:
+        raise table.wrong(word, "has a key of its own", f'use "{key}"')
+    row = lookup(word, personality)
+    if row is None:
+        settable = [name for name, each in words(personality).items() if "W" in each.access and name.isalnum()]
+        near = get_close_matches(word.upper(), settable, n=1)
+        hint = f'did you mean "{near[0]}"?' if near else ""
+        raise table.wrong(quoted(word), f"is not an MCode mnemonic of an {personality}", hint)
+    if "W" not in row.access:
+        raise table.wrong(word, f"cannot be set ({row.title})")
+    return row
+
+
+def _check_value(table: Table, word: str, value: Value, row: Mnemonic) -> None:
+    encoder = table.values.get("EE") == 1 and not table.values.get("AS")
+    if isinstance(value, (int, float)) and not row.accepts(value, encoder):
+        low, high = row.bounds(encoder)
+        wanted = f"one of {', '.join(map(str, row.values))}" if row.values else f"from {low} to {high}"
+        raise table.wrong(word, f"must be {wanted}, not {shown(value)}")
+
+
+TRIPS = frozenset({"TA", "TC", "TI", "TM", "TP", "TR", "TT"})
+_LISTED = re.compile(r"(IS|OS|LS)(\d+)")
+"""Settings of which a cell file has one list."""
+_NAMED = re.compile(r"\s*(?:LB|VA)[\s=]+([A-Z][A-Z0-9]{0,2})", re.I)
+Row = tuple[int, str]
+"""A program line and its address."""
+
+
+def describe(snapshot: Snapshot) -> DriveText:
+    """Make the table of a drive."""
+    personality = nearest(snapshot.product)
+    readings = [each for each in snapshot.readings.readings if each.name not in KEY_OF]
+    users = [each for each in readings if each.section == VARIABLES and lookup(each.name, personality) is None]
+    variables = {each.name: each.value for each in users if isinstance(each.value, int)}
+    model = MODELS[personality]
+    lines, drift = _placed(_remarked(snapshot) or snapshot.program, personality, variables)
+    remarks = [*snapshot.remarks, *drift]
+    remarks += [
+        f"not in set: {each.name} = {each.value} (the simulator does not take it)"
+        for each in readings
+        if not (_acceptable(each, personality) or _unset(each, personality))
+    ]
+    if personality != snapshot.product:
+        remarks.insert(
+            0, f"the unit is an {snapshot.product}; the simulator knows none, and {personality} is the nearest"
+        )
+    return DriveText(
+        personality=personality,
+        name=snapshot.name,
+        party=snapshot.party,
+        remarks=remarks,
+        unread=snapshot.readings.unread,
+        program=lines,
+        settings=[*_settings([each for each in readings if each.name not in variables], personality)],
+        variables=[Entry(name, held) for name, held in variables.items()],
+        identity=[*_identity(snapshot)],
+        worlds={"": _world(snapshot)} if snapshot.inputs or snapshot.analog else {},
+        ethernet=model.ethernet,
+        baud=snapshot.baud,
+    )
+
+
+def wanted(spec: DriveSpec) -> dict[str, Value]:
+    """The settings of a drive in a cell file, as its family names them. No line gives a drive the name !; FD does."""
+    found: dict[str, Value] = {**spec.variables}
+    if not MODELS[spec.personality].ethernet:
+        found |= {"PY": int(spec.party)} if spec.name == UNNAMED else {"DN": spec.name, "PY": int(spec.party)}
+    for name, held in spec.set.items():
+        if name in ("IS", "OS", "LS"):
+            for row in held if isinstance(held, tuple) else (str(held),):
+                number, *fields = row.split(",")
+                found[f"{name}{number.strip()}"] = tuple(map(_scalar, fields))
+        elif isinstance(held, str) and "," in held:
+            found[name] = tuple(map(_scalar, held.split(",")))
+        elif not isinstance(held, tuple):
+            found[name] = _scalar(held) if isinstance(held, str) else held
+    return found
+
+
+def nearest(product: str) -> str:
+    """The personality of a product; for one that is not simulated the one that is most like it."""
+    if product in MODELS:
+        return product
+    if product.startswith("LMM"):
+        return "LMM"
+    if product.startswith("LM"):
+        return "LMDCE" if product.endswith("E") else "LMDCM"
+    return "MDI"
+
+
+def _settings(readings: list[Reading], personality: str) -> Iterator[Entry]:
+    lists: dict[str, list[str]] = {}
+    for each in readings:
+        row = _LISTED.fullmatch(each.name)
+        if row is not None:
+            lists.setdefault(row[1], []).append(f"{row[2]},{_fields(each.value)}")
+        elif _acceptable(each, personality) and not _unset(each, personality):
+            yield Entry(each.name, _plain(each.value), remark(each))
+    for name, rows in lists.items():
+        yield Entry(name, rows)
+
+
+def _unset(reading: Reading, personality: str) -> bool:
+    """Whether a value shows that nothing was set: a default that cannot be written, and PF, which pads once it is set.
+
+    A trip without a set-up has the default 0.
+    """
+    if reading.name == "PF" or reading.name in TRIPS:
+        return same(reading.value, reading.default)
+    return same(reading.value, reading.default) and not _acceptable(reading, personality)
+
+
+def _acceptable(reading: Reading, personality: str) -> bool:
+    """Whether the simulated drive takes a number, whatever the unit of motion is."""
+    row = lookup(reading.name, personality)
+    if row is None or isinstance(reading.value, (tuple, str)):
+        return True
+    return row.accepts(reading.value, True) or row.accepts(reading.value, False)
+
+
+def _plain(held: Value) -> Value:
+    if isinstance(held, float) and abs(held) >= 2.0**63:
+        return repr(held)
+    return _fields(held) if isinstance(held, tuple) else held
+
+
+def _fields(held: Value) -> str:
+    return ",".join(map(str, held)) if isinstance(held, tuple) else str(held)
+
+
+def _scalar(text: str) -> Scalar:
+    text = text.strip().upper()
+    return int(text) if re.fullmatch(r"-?\d+", text) else text
+
+
+def _identity(snapshot: Snapshot) -> Iterator[Entry]:
+    for key, text in (("part", snapshot.part), ("version", snapshot.version), ("serial", snapshot.serial)):
+        if text:
+            yield Entry(key, plain(text))
+    for key, (count,) in snapshot.counters.items():
+        yield Entry(key, count)
+
+
+def _world(snapshot: Snapshot) -> dict[str, object]:
+    world: dict[str, object] = {}
+    if snapshot.inputs:
+        world["inputs"] = [[0.0, n, level] for n, level in snapshot.inputs]
+    if snapshot.analog:
+        world["analog"] = [[0.0, snapshot.analog[0]]]
+    return world
+
+
+def program(spec: DriveSpec) -> StoredProgram:
+    """The program of a drive in a cell file."""
+    held = MCodeDevice(replace(spec, set={}, party=False), World(WorldSpec())).program
+    rows = [(at, held.lines[at].text) for at in held.order]
+    lines, _ = _placed(rows, spec.personality, spec.variables)
+    names = _names(rows, spec.variables)
+    return StoredProgram(
+        lines=tuple(canonical(text, names) for _, text in rows),
+        file=(*(f"VA {name}={value}" for name, value in spec.variables.items()), *lines),
+        labels=tuple(held.labels),
+    )
+
+
+def _placed(rows: Sequence[Row], personality: str, variables: Iterable[str]) -> tuple[list[str], list[str]]:
+    """Program lines with PG wherever the simulated drive would store the next one elsewhere; remarks on addresses."""
+    names = _names(rows, variables)
+    lines: list[str] = []
+    following = moved = 0
+    for address, text in rows:
+        if address and (not following or following < address):
+            lines += ["PG", f"PG {address}"] if following else [f"PG {address}"]
+            following = address
+        moved += address not in (0, following)
+        lines.append(text)
+        following += _size(text, names, personality) if address else 0
+    if lines:
+        lines.append("PG")
+    return lines, [f"{moved} lines of its program have other addresses in the simulator"] if moved else []
+
+
+def _remarked(snapshot: Snapshot) -> list[Row]:
+    """The program with the remarks and the layout of its file; a line that the drive does not store has no address."""
+    addresses, rows = dict(snapshot.program), []
+    width = max((len(str(each)) for each in addresses), default=0)
+    for line in snapshot.remarked:
+        place, text = line[:width].strip(), line[width + 2 :]
+        rows.append((int(place) if place.isdecimal() else 0, text))
+    known = [address for address, _ in rows if address]
+    return rows if known == list(addresses) else []
+
+
+def _size(text: str, names: frozenset[str], personality: str) -> int:
+    try:
+        statement = parse(text, names)
+    except LineError:
+        return 0
+    return size_of(statement, personality) if statement is not None else 0
+
+
+def _names(rows: Iterable[Row], variables: Iterable[str]) -> frozenset[str]:
+    """The labels and variables of a program."""
+    found = (_NAMED.match(text) for _, text in rows)
+    return frozenset((*variables, *(each[1].upper() for each in found if each is not None)))
+
+
+SNAPSHOTS = Snapshots(describe, wanted, program)
+
 
 DEFAULT = 96
 """BD from the factory."""
@@ -26,7 +303,7 @@ def build(spec: DriveSpec, place: Place) -> Unit:
     world = World(spec.world)
     device = MCodeDevice(_at_baud(spec, place.baud), world)
     device.prints()  # no client can be connected at its sign-on
-    model, ethernet = device.model, spec.personality in ETHERNET
+    model, ethernet = device.memory.model, spec.personality in ETHERNET
     port = MCodePort(device, serial=not ethernet, baud=0 if model.waits_to_print else place.baud)
     return Unit(
         device=device,
@@ -36,7 +313,7 @@ def build(spec: DriveSpec, place: Place) -> Unit:
         inputs=model.points.inputs,
         counts=model.points.analog,
         single_supply=model.single_supply,
-        connect=(lambda: _connect(device)) if ethernet else None,
+        connect=(lambda: ModbusPort(device)) if ethernet else None,
     )
 
 
@@ -63,23 +340,10 @@ def _at_baud(spec: DriveSpec, baud: int) -> DriveSpec:
     return replace(spec, set={"BD": code, **spec.set})
 
 
-def _connect(device: MCodeDevice) -> ModbusPort:
-    motor = device.motor
-    registers = Registers(
-        device,
-        errors=device.errors,
-        inputs=device.inputs,
-        trips=motor.trips,
-        torque=motor.torque,
-        program=device.program,
-    )
-    return ModbusPort(device, registers)
-
-
 MCODE = Family(
     name="mcode",
-    read_drive=drive_table.read_drive,
+    read_drive=read_drive,
     build=build,
-    snapshots=drive_text.SNAPSHOTS,
+    snapshots=SNAPSHOTS,
     ethernet=ETHERNET,
 )

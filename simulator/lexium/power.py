@@ -1,26 +1,22 @@
-"""The supply of a simulated drive: on, off, without +V, and how it begins (manual 3.4.4, 5.1.121, 5.1.127).
+"""The supply of a simulated drive and its memory that lasts: on, off, without +V, how it begins, S, IP and FD.
 
 A serial drive begins at once. One with Ethernet is silent for `ETHERNET_BOOT` seconds after it was switched on, reset
 (^C, an input of that type) or set to factory defaults, as real ones are; a cell begins with all of its drives up.
+Manual 3.4.4, 5.1.45, 5.1.63, 5.1.113, 5.1.121, 5.1.127.
 """
 
 from __future__ import annotations
 
 from multidrop.dialects.mcode.manual.errors import ErrorNumber as E
 from multidrop.dialects.mcode.manual.grammar import Name
-from multidrop.simulator.lexium.language.interpreter import Interpreter
-from multidrop.simulator.lexium.language.program_mode import ProgramMode
-from multidrop.simulator.lexium.motion.inputs import Inputs
+from multidrop.simulator.lexium.motion.axis import MOVES
+from multidrop.simulator.lexium.motion.counters import FRESH
 from multidrop.simulator.lexium.motion.motor import Motor
 from multidrop.simulator.lexium.motion.outputs import Outputs
-from multidrop.simulator.lexium.nvm import Nvm
-from multidrop.simulator.lexium.state.comm_settings import CommSettings
-from multidrop.simulator.lexium.state.error_flag import ErrorFlag
-from multidrop.simulator.lexium.state.memory import Memory
-from multidrop.simulator.lexium.state.printer import Printer
+from multidrop.simulator.lexium.state.errors import Fault
+from multidrop.simulator.lexium.state.interpreter import Core
+from multidrop.simulator.lexium.state.memory import KEPT_BY_FD, Memory, Store
 from multidrop.simulator.lexium.state.program_memory import Program
-from multidrop.simulator.lexium.state.timeline import Timeline
-from multidrop.simulator.world import World
 
 ETHERNET_BOOT = 20.0
 """Seconds, of the device's own time."""
@@ -29,31 +25,83 @@ BAUDS = {48: 4800, 96: 9600, 19: 19200, 38: 38400, 11: 115200}
 """By BD."""
 
 
+class Nvm:
+    """NVM of one drive. A product with `lasting_programs` keeps each program line at once, without S."""
+
+    def __init__(self, core: Core, motor: Motor, outputs: Outputs) -> None:
+        self._memory, self._program, self._timeline = core.memory, core.program, core.timeline
+        self._motor, self._outputs = motor, outputs
+        self.store = Store(program=self._kept(Program(product=core.memory.product)))
+
+    @property
+    def locked(self) -> bool:
+        """Whether a lock (LK) has been saved."""
+        return bool(self.store.values.get("LK"))
+
+    def save(self) -> None:
+        """S. Raises Fault (73)."""
+        if self._moving() and self._motor.axis.kind in MOVES:
+            raise Fault(E.MOVING_SAVE)
+        self.keep()
+
+    def initialise(self) -> None:
+        """IP. Raises Fault (74)."""
+        if self._moving():
+            raise Fault(E.MOVING_CLEAR)
+        self.load()
+
+    def erase(self) -> None:
+        """Reset NVM to factory defaults, except what these leave alone. Raises Fault (73)."""
+        if self._moving():
+            raise Fault(E.MOVING_SAVE)
+        fresh, kept = Store(program=self._kept(Program(product=self._memory.product))), self.store
+        Memory(self._memory.product).save(fresh)
+        fresh.values.update({name: value for name, value in kept.values.items() if name in KEPT_BY_FD})
+        fresh.texts.update({name: value for name, value in kept.texts.items() if name in KEPT_BY_FD})
+        fresh.program.clear()
+        self.store = fresh
+
+    def keep(self) -> None:
+        """Copy everything that lasts to NVM."""
+        store = self.store
+        self._memory.save(store)
+        store.inputs, store.outputs = dict(self._motor.inputs.types), dict(self._outputs.types)
+        store.limits = dict(self._motor.limits.software)
+        store.trips = dict(self._motor.trips.defined)
+        store.program = self._kept(self._program.copy())
+
+    def load(self) -> None:
+        """Take back variables, flags and set-ups; programs stay as they are."""
+        store = self.store
+        self._motor.reload(lambda: self._memory.load(store), self._timeline.now)
+        self._motor.inputs.restore(store.inputs)
+        self._outputs.restore(store.outputs)
+        self._motor.limits.software.update({**FRESH, **store.limits})
+        self._motor.trips.restore(store.trips)
+
+    def load_program(self) -> None:
+        self._program.load(self.store.program)
+
+    def _moving(self) -> bool:
+        return self._motor.status.moving(self._timeline.now)
+
+    def _kept(self, program: Program) -> Program:
+        return self._program if self._memory.model.lasting_programs else program
+
+
 class Power:
     """The supply of one drive. `boots_at` is when one that begins again will be up; `boots` counts its beginnings."""
 
-    def __init__(
-        self,
-        memory: Memory,
-        program: Program,
-        timeline: Timeline,
-        world: World,
-        settings: CommSettings,
-        errors: ErrorFlag,
-        printer: Printer,
-        interpreter: Interpreter,
-        mode: ProgramMode,
-        inputs: Inputs,
-        outputs: Outputs,
-        motor: Motor,
-        nvm: Nvm,
-    ) -> None:
-        self._memory, self._program, self._timeline, self._world = memory, program, timeline, world
-        self._settings, self._errors, self._printer = settings, errors, printer
-        self._interpreter, self._mode, self._nvm = interpreter, mode, nvm
-        self._inputs, self._outputs, self._motor = inputs, outputs, motor
+    def __init__(self, core: Core, motor: Motor, outputs: Outputs, nvm: Nvm) -> None:
+        self._core, self._timeline = core, core.timeline
+        self._motor, self._outputs, self.nvm = motor, outputs, nvm
         self.boots_at: float | None = None
         self.boots = 0
+
+    def factory_defaults(self) -> None:
+        """FD: programs, variables and settings are gone. Raises Fault (73)."""
+        self.nvm.erase()
+        self.restart()
 
     @property
     def on(self) -> bool:
@@ -65,15 +113,15 @@ class Power:
         if on == (self.on or self.boots_at is not None):
             return
         if on:
-            self._world.powered_up(self._timeline.now)
+            self._core.world.powered_up(self._timeline.now)
             self.restart()
         else:
             self._go_down()
-            self._printer.take()
+            self._core.printer.take()
 
     def restart(self) -> None:
         """Begin as at power-up: now, or when it has booted."""
-        if not self._settings.ethernet:
+        if not self._core.model.ethernet:
             self.come_up()
             return
         self._go_down()
@@ -88,36 +136,32 @@ class Power:
     def supply(self, on: bool) -> None:
         """Switch +V alone, with the auxiliary supply left on."""
         if self._motor.supply(on, self._timeline.now):
-            self._interpreter.raise_error(E.MOTOR_VOLTAGE)
+            self._core.interpreter.raise_error(E.MOTOR_VOLTAGE)
             self._motor.trips.power_lost(self._timeline.now)
         self._timeline.replan()
 
     def boot(self) -> None:
         """Begin with what NVM holds: sign on, but not in party mode, and run SU."""
-        memory, t = self._memory, self._timeline.now
-        self._interpreter.clear()
+        core, memory, t = self._core, self._core.memory, self._timeline.now
+        core.interpreter.clear()
         memory.defaults()
         self._outputs.defaults()
-        self._nvm.load()
-        self._nvm.load_program()
-        self._errors.clear()
+        self.nvm.load()
+        self.nvm.load_program()
+        core.errors.clear()
         memory.await_input("")
-        self._mode.address = None
+        core.mode.address = None
         self._motor.restart(t)
-        self._inputs.begin(t)
-        self._printer.baud = BAUDS[int(memory.values.get("BD", 96))]
-        if not self._settings.party:
-            self._sign_on()
-        if "SU" in self._program.labels:
-            self._interpreter.start(Name("SU"), t)
-
-    def _sign_on(self) -> None:
-        model, settings = self._memory.model, self._settings
-        prompts = model.prompts_at_start and settings.echo_mode == 0 and not settings.checksum
-        self._printer.announce(model.sign_on + (PROMPT if prompts else ""))
+        self._motor.inputs.begin(t)
+        core.printer.baud = BAUDS[int(memory.values.get("BD", 96))]
+        if not memory.party:
+            prompts = core.model.prompts_at_start and memory.echo_mode == 0 and not memory.checksum
+            core.printer.announce(core.model.sign_on + (PROMPT if prompts else ""))
+        if "SU" in core.program.labels:
+            core.interpreter.start(Name("SU"), t)
 
     def _go_down(self) -> None:
         self._motor.stop(self._timeline.now)
-        self._interpreter.finish()
+        self._core.thread.finish()
         self._motor.trips.clear()
         self._motor.bridges.powered, self.boots_at = False, None

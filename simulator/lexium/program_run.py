@@ -30,8 +30,8 @@ from multidrop.simulator.lexium.device import MCodeDevice
 from multidrop.simulator.lexium.state.errors import Failure, Fault
 from multidrop.simulator.lexium.state.expressions import Read
 from multidrop.simulator.lexium.state.models import MODELS
-from multidrop.simulator.lexium.state.printer import CRLF
 from multidrop.simulator.lexium.state.program_memory import SPACE
+from multidrop.simulator.lexium.state.timeline import CRLF
 from multidrop.simulator.program_run import (
     LONGEST,
     MOST_LINES,
@@ -337,7 +337,7 @@ class ProgramRun:
                 if address is None and line.section == "program":
                     if not anywhere:
                         return
-                    device.mode.address = FIRST_ADDRESS
+                    device.core.mode.address = FIRST_ADDRESS
             elif address is not None:
                 self._stored[address] = line
         self._failures.clear()
@@ -345,7 +345,7 @@ class ProgramRun:
     def _start(self, label: str) -> None:
         device = self._device
         if not device.running or label:
-            self._interpreter.finish()
+            device.core.thread.finish()
             target = self._target(label)
             try:
                 self._interpreter.start(target, 0.0)
@@ -364,7 +364,7 @@ class ProgramRun:
             index=linked.index,
         )
         self._watcher = Watcher(subject, debugging, self._executed, self._stored, self._source, self._name)
-        self._interpreter.observer = self._watcher
+        self._interpreter.watch(self._watcher.before, self._watcher.after)
 
     def _target(self, label: str) -> Name | Number:
         if (address := whole(label, 0, LAST_ADDRESS)) is not None:
@@ -391,7 +391,7 @@ class ProgramRun:
             device.advance(limit if due is None else min(max(due, device.now) + SLICE, limit), program=True)
             yield from self._news()
             if self._watcher is not None and self._watcher.recorder.done:
-                self._interpreter.observer = None
+                self._interpreter.watch(None, None)
         if self._held:
             yield Printed(device.now, self._held)
         if device.running:
@@ -434,7 +434,7 @@ class ProgramRun:
             ended=ended,
             t=device.now,
             position=device.position(device.now),
-            moves=device.motions.begun,
+            moves=device.language.motions.begun,
             instructions=self._interpreter.executed,
             errors=tuple(self._errors),
             line=self._at(self._interpreter.line()).number if self._executed else 0,

@@ -186,7 +186,9 @@ async def test_whoever_is_cancelled_in_a_download_leaves_the_drive_as_it_was():
         await loading
     assert await desk.send("b", "PR EM") == ("1",)
     device, drive = desk.devices["b"], desk.bus.drives["b"]
-    assert device.programming is None and device.echo_mode == 1 and not drive.programming and not drive.transferring
+    assert (
+        device.programming is None and device.memory.echo_mode == 1 and not drive.programming and not drive.transferring
+    )
     assert any("the program in it is incomplete" in text for text in desk.told)
 
 

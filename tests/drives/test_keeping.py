@@ -57,7 +57,7 @@ async def test_the_echo_mode_is_written_down_before_it_is_changed_and_struck_out
     desk = await opened()
     await desk.bus.drives["b"].download(program_file.read(LOOP, "loop.mxt"))
     assert desk.keeper.told == [("b", 1, 0, 0), ("b", None, 1, 1)]
-    assert desk.devices["b"].echo_mode == 1
+    assert desk.devices["b"].memory.echo_mode == 1
 
 
 @in_virtual_time
@@ -65,7 +65,7 @@ async def test_whoever_types_pg_owes_it_until_the_program_is_left():
     desk = await opened()
     await desk.send("a", "PG 1")
     await desk.send("a", "R1=5")
-    assert desk.keeper.told == [("a", 1, 0, 0)] and desk.devices["a"].echo_mode == 0
+    assert desk.keeper.told == [("a", 1, 0, 0)] and desk.devices["a"].memory.echo_mode == 0
     await desk.send("a", "PG")
     assert desk.keeper.told == [("a", 1, 0, 0), ("a", None, 1, 1)]
 
@@ -84,7 +84,7 @@ async def test_whoever_is_cancelled_or_stopped_while_it_is_written_down_changes_
         with pytest.raises(Stopped if way == "stop" else asyncio.CancelledError):
             await loading
         await until(lambda desk=desk: desk.keeper.owed is None)
-        assert b"PG" not in desk.sent and desk.devices["b"].echo_mode == 1
+        assert b"PG" not in desk.sent and desk.devices["b"].memory.echo_mode == 1
 
 
 @in_virtual_time

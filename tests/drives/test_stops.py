@@ -258,7 +258,7 @@ async def test_a_moving_drive_stands_after_a_stop_whatever_its_escape_mode(cell,
     assert "stopped, velocity 0" in shop.said and "still moves" not in shop.said
     assert len(shop.sent[before]) <= 6
     for device in shop.devices.values():
-        assert not device.error_flag
+        assert not device.memory.error_flag
 
 
 @pytest.mark.parametrize("escape", [0, 1, 2, 3])
@@ -313,7 +313,7 @@ async def test_a_second_stop_in_the_middle_of_the_clean_up_does_not_leave_progra
         assert shop.devices["a"].programming is None
         assert not drive.programming
         assert await drive.send("PR P") == ("0",)
-        assert drive.codec.em == shop.devices["a"].echo_mode
+        assert drive.codec.em == shop.devices["a"].memory.echo_mode
         await drive.send("CP")
 
 

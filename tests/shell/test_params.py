@@ -233,7 +233,7 @@ async def test_communication_is_restored_when_told(session, tmp_path):
     sent = await say(session, "/params restore kept.toml b --communication")
     assert [line.split(" ")[1] for line in sent] == ["RC=50", "EM=0", 'DN="c"', "CK=0"]
     one = device(session)
-    assert (one.name, one.echo_mode, one.checksum, one.memory.values["RC"]) == ("c", 0, 0, 50)
+    assert (one.memory.name, one.memory.echo_mode, one.memory.checksum, one.memory.values["RC"]) == ("c", 0, 0, 50)
     assert await say(session, "/params diff kept.toml c") == []
 
 

@@ -118,12 +118,12 @@ async def test_a_download_ends_and_the_drive_is_put_right(tmp_path: Path) -> Non
         device = shop.device("line:a")
         loading = asyncio.create_task(shop.session.run(f"/download {tmp_path / 'long.mxt'} a"))
         await until(lambda: device.programming is not None and device.programming > 20)
-        assert device.echo_mode == 0
+        assert device.memory.echo_mode == 0
         await lost(shop)
         with WAITING:
             await loading
         await back(shop)
-        assert device.programming is None and device.echo_mode == 1
+        assert device.programming is None and device.memory.echo_mode == 1
         assert not shop.session.buses["line"].drives["a"].programming
         assert any("was in program mode and was taken out with PG" in text for text in shop.warned())
         await shop.session.run("@b PR P")
@@ -135,7 +135,7 @@ async def test_program_mode_that_a_person_left_open_is_ended(tmp_path: Path) -> 
         await shop.session.run("@a PG 1")
         await lost(shop)
         await back(shop)
-        assert shop.device("line:a").programming is None and shop.device("line:a").echo_mode == 1
+        assert shop.device("line:a").programming is None and shop.device("line:a").memory.echo_mode == 1
         await shop.session.run("@a PR P")
 
 

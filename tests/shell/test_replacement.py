@@ -297,7 +297,12 @@ async def test_no_line_takes_a_name_away(tmp_path):
     cell = await becomes(tmp_path, 'personality = "LMDCM"\nset = { EM = 1 }', present, "!")
     assert "q: its name stays 'q': only FD gives back '!'" in cell.printed()
     device = cell.device("line:q")
-    assert (device.name, device.party, device.checksum, device.echo_mode) == ("q", False, 1, 1)
+    assert (device.memory.name, device.memory.party, device.memory.checksum, device.memory.echo_mode) == (
+        "q",
+        False,
+        1,
+        1,
+    )
     await cell.session.close()
 
 

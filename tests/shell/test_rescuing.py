@@ -44,7 +44,12 @@ async def test_a_drive_in_any_mode_under_any_name_at_any_baud_rate_is_free(tmp_p
         (baud, name if py else "", em, bool(py), ck)
     ]
     [device] = port.devices
-    assert (device.echo_mode, device.party, device.checksum, device.name) == (em, bool(py), ck, name)
+    assert (device.memory.echo_mode, device.memory.party, device.memory.checksum, device.memory.name) == (
+        em,
+        bool(py),
+        ck,
+        name,
+    )
 
 
 @pytest.mark.nightly
@@ -132,7 +137,7 @@ async def test_plain_sets_the_modes_after_a_question(tmp_path):
     port.session.agreed = True
     await work.make_plain(scanning.found[0])
     [device] = port.devices
-    assert (device.echo_mode, device.party, device.checksum) == (0, False, 0)
+    assert (device.memory.echo_mode, device.memory.party, device.memory.checksum) == (0, False, 0)
     assert scanning.found[0].url == "serial:/dev/ttyUSB9?baud=9600&party=0"
 
 

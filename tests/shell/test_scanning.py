@@ -195,7 +195,7 @@ async def test_no_drive_that_hears_its_own_language_and_baud_rate_moves(tmp_path
     found, search = scanning(port)
     await search.run([], False)
     assert {each["address"] for each in found} == set("PRa")
-    assert not any(device.position(port.floor.now()) or device.error_flag for device in port.devices)
+    assert not any(device.position(port.floor.now()) or device.memory.error_flag for device in port.devices)
 
 
 @in_virtual_time

@@ -12,7 +12,7 @@ from multidrop.dialects.mcode.manual.table import words
 from multidrop.shell import snapshots
 from multidrop.simulator import cells
 from multidrop.simulator.floor import Floor
-from multidrop.simulator.lexium.drive_table import KEY_OF
+from multidrop.simulator.lexium.family import KEY_OF
 from multidrop.simulator.lexium.state.models import MODELS
 from tests.shell.test_snapshots import taken
 from tests.support.cell_session import CellSession, bus

@@ -44,7 +44,7 @@ async def test_a_locked_program_is_said_and_left_as_it_is(tmp_path: Path) -> Non
         for line in (f"/download {tmp_path / 'p.mxt'} a", "/list a", f"/upload {tmp_path / 'new.mxt'} a"):
             with pytest.raises(Refused, match=r"its program is locked \(LK=1\)"):
                 await shop.session.run(line)
-        assert not shop.device("line:a").error_flag and not (tmp_path / "new.mxt").exists()
+        assert not shop.device("line:a").memory.error_flag and not (tmp_path / "new.mxt").exists()
 
 
 @pytest.mark.parametrize("label", ["G1", "G2"])
@@ -95,7 +95,7 @@ async def test_a_refused_line_is_named_with_its_file_and_the_backup(tmp_path: Pa
         with pytest.raises(Refused, match=r"p.mxt:6: a refused 'VM=2': error 2\d: .*; 3 lines are stored"):
             await load(shop, tmp_path)
         assert shop.warned()[-1] == f"a: what was in it before is in {kept(tmp_path)[0]}"
-        assert (shop.device("line:a").programming, shop.device("line:a").echo_mode) == (None, 1)
+        assert (shop.device("line:a").programming, shop.device("line:a").memory.echo_mode) == (None, 1)
 
 
 @in_virtual_time
@@ -141,7 +141,7 @@ def test_an_interrupted_download_leaves_a_drive_that_listens(tmp_path: Path, how
             {"stop": shop.session.stop, "interrupt": shop.session.interrupt, "cancel": loading.cancel}[how]()
             with pytest.raises((Stopped, asyncio.CancelledError)):
                 await loading
-            await until(lambda: device.programming is None and device.echo_mode == 1)
+            await until(lambda: device.programming is None and device.memory.echo_mode == 1)
             assert any("lines are stored (addresses 1 to" in text for text in shop.told())
             assert f"a: what was in it before is in {kept(tmp_path)[0]}" in shop.warned()
             await shop.session.run("@a PR P")
@@ -162,7 +162,7 @@ async def test_a_line_that_is_unplugged_names_the_backup_and_the_drive_comes_out
             await loading
         assert f"a: what was in it before is in {kept(tmp_path)[0]}" in shop.warned()
         shop.world("/sim plug line")
-        await until(lambda: device.programming is None and device.echo_mode == 1)
+        await until(lambda: device.programming is None and device.memory.echo_mode == 1)
 
 
 @in_virtual_time

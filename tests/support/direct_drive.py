@@ -30,7 +30,7 @@ class DirectDrive:
             if done.refused:
                 self.refused.append(request.text)
             lines = tuple(line for each in done.lines for line in each.split("\r\n"))
-            flag = "?" if self.device.error_flag else ">"
+            flag = "?" if self.device.memory.error_flag else ">"
             end = End.REFUSED if done.refused else End.DONE
             asked = request.kind is Kind.PRINT and request.expect and not done.refused
             if asked and not any(re.fullmatch(request.expect or "", line) for line in lines):

@@ -75,7 +75,7 @@ class Desk:
         bench.wait(0.1)
         device.power(True, bench.now)
         bench.wait(0.3)
-        if device.party:
+        if device.memory.party:
             bench.wire.receive(b"\n\n", bench.now)
             bench.wait(0.2)
 
@@ -84,9 +84,9 @@ class Desk:
         state, device = self.knowns[drive], self.devices[drive]
         mode = state.codec
         return (mode.em, mode.party, mode.checksum, mode.escape, state.programming) == (
-            device.echo_mode,
-            device.party,
-            device.checksum,
-            device.escape_mode,
+            device.memory.echo_mode,
+            device.memory.party,
+            device.memory.checksum,
+            device.memory.escape_mode,
             device.programming is not None,
-        ) and (not mode.party or state.address == device.name)
+        ) and (not mode.party or state.address == device.memory.name)

@@ -48,7 +48,7 @@ class Crowd:
         self.bench = bench(tables, baud=9600)
         self.bench.wire.receive(b"\n\n", 0.0)
         self.bench.wait(0.5)
-        self.devices = {placed.device.name: placed.device for placed in self.bench.floor.drives}
+        self.devices = {placed.device.memory.name: placed.device for placed in self.bench.floor.drives}
         self.witnesses = {name: Witness(device) for name, device in self.devices.items()}
         self.rng = Random(f"{em} {check} {seed}")
         self.held: dict[int, str] = {}

@@ -2,8 +2,8 @@
 
 `compile` is the one way from a statement to an action, for typed lines and program lines alike. What is wrong with the
 form of a line is raised as Fault when it is compiled; what is wrong with a value, when it runs.
-The instructions of a running program are in `flow`, those on program memory in `program_commands`, those of the motor
-in `motor_commands`, those with several settings in `setups`, PR in `prints`.
+The instructions on programs are in `program_commands`, those of the motor and with several settings in
+`motor_commands`, PR in `prints`.
 """
 
 from __future__ import annotations
@@ -14,54 +14,45 @@ from functools import partial
 from multidrop.dialects.mcode.manual.errors import ErrorNumber as E
 from multidrop.dialects.mcode.manual.grammar import Name, Statement
 from multidrop.dialects.mcode.manual.table import Mnemonic
-from multidrop.simulator.lexium.language.arguments import Compile, bare, is_place, only
-from multidrop.simulator.lexium.language.flow import Flow
-from multidrop.simulator.lexium.language.motor_commands import MotorCommands
+from multidrop.simulator.lexium.event_loop import EventLoop
+from multidrop.simulator.lexium.language.motor_commands import MotorCommands, Setups
 from multidrop.simulator.lexium.language.prints import REGISTERS, Prints
 from multidrop.simulator.lexium.language.program_commands import ProgramCommands
-from multidrop.simulator.lexium.language.program_mode import Action, Storage
-from multidrop.simulator.lexium.language.setups import Setups
-from multidrop.simulator.lexium.language.variable_access import VariableAccess
+from multidrop.simulator.lexium.language.variables import Compile, Variables, bare, is_place, only
+from multidrop.simulator.lexium.motion.motor import Motor
+from multidrop.simulator.lexium.motion.outputs import Outputs
 from multidrop.simulator.lexium.state.errors import Fault
 from multidrop.simulator.lexium.state.expressions import Read, whole, wrap
-from multidrop.simulator.lexium.state.memory import Memory
-from multidrop.simulator.lexium.state.program_memory import Program
+from multidrop.simulator.lexium.state.interpreter import Action, Core
 
 
 class Instructions:
     """The instructions of one drive. `commands` gives the compiler of a word."""
 
-    def __init__(
-        self,
-        memory: Memory,
-        program: Program,
-        variables: VariableAccess,
-        flow: Flow,
-        program_commands: ProgramCommands,
-        motor_commands: MotorCommands,
-        setups: Setups,
-        prints: Prints,
-        storage: Storage,
-    ) -> None:
-        self._memory, self._program, self._variables = memory, program, variables
-        self._flow, self._motor_commands = flow, motor_commands
+    def __init__(self, serial: str, core: Core, motor: Motor, outputs: Outputs, loop: EventLoop) -> None:
+        power, nvm = loop.power, loop.power.nvm
+        self._memory, self._program = core.memory, core.program
+        self._variables = variables = Variables(core, motor, outputs, nvm)
+        self._programs = programs = ProgramCommands(core, variables, motor, nvm)
+        self.motions = MotorCommands(core, variables, motor)
+        setups = Setups(core, variables, motor, outputs, loop)
+        prints = Prints(serial, core, variables, motor, outputs)
         self.commands: Mapping[str, Compile] = {
             "IC": partial(self._step, 1),
             "DC": partial(self._step, -1),
             "PR": prints.compile,
-            "S": bare(storage.save),
-            "IP": bare(storage.initialise),
-            "FD": bare(storage.factory_defaults),
+            "S": bare(nvm.save),
+            "IP": bare(nvm.initialise),
+            "FD": bare(power.factory_defaults),
             "UG": _refused,
-            **flow.commands(),
-            **program_commands.commands(),
-            **motor_commands.commands(),
+            **programs.commands(),
+            **self.motions.commands(),
             **setups.commands(),
         }
 
     def reader(self, word: str) -> Read | None:
         """A closure that gives a variable's value; None for a name that is not a variable, now or in the program."""
-        if self._variables.row(word) is None and not self._variables.declared(word):
+        if self._memory.row(word) is None and not self._variables.declared(word):
             return None
         try:
             return self._variables.reader(word)
@@ -72,8 +63,8 @@ class Instructions:
         """A closure that carries a line out; `stored`: it is a program's. Raises Fault for what cannot stand there."""
         word = statement.word
         if not word:
-            return self._motor_commands.counted(word, self._flow.number(statement))
-        row = self._variables.row(word)
+            return self.motions.counted(word, self._programs.number(statement))
+        row = self._memory.row(word)
         if row is None:
             return self._user_variable(statement)
         if row.kind in ("math", "reserved"):
@@ -131,7 +122,7 @@ class Instructions:
         if not isinstance(target, Name):
             raise Fault(E.ILLEGAL_DATA)
         word = target.word
-        row = variables.row(word)
+        row = self._memory.row(word)
         if row is not None and row.step:
             raise Fault(E.ILLEGAL_DATA if row.kind == "reserved" else row.step)
         if row is None and not variables.declared(word):

@@ -1,6 +1,7 @@
-"""Instructions of the motor: moves, homing, locked rotor, make-up, configuration test.
+"""Instructions of the motor, and those with several settings: inputs, outputs, limits, trips, print format, name.
 
-Manual 5.1.20, 5.1.52 to 5.1.54, 5.1.80, 5.1.84, 5.1.87, 5.1.115, 5.1.117.
+Manual 5.1.20, 5.1.33, 5.1.52 to 5.1.54, 5.1.64, 5.1.78, 5.1.80, 5.1.84, 5.1.87, 5.1.93, 5.1.97, 5.1.104, 5.1.115,
+5.1.117, 5.1.122 to 5.1.132.
 """
 
 from __future__ import annotations
@@ -10,22 +11,31 @@ from functools import partial
 from math import inf
 
 from multidrop.dialects.mcode.manual.errors import ErrorNumber as E
-from multidrop.dialects.mcode.manual.grammar import Number, Statement
-from multidrop.simulator.lexium.language.arguments import Compile, bare, numbers, only
-from multidrop.simulator.lexium.language.program_mode import Action
-from multidrop.simulator.lexium.language.variable_access import VariableAccess
+from multidrop.dialects.mcode.manual.grammar import Argument, Number, Statement
+from multidrop.dialects.mcode.manual.statements import device_name as device_name_of
+from multidrop.dialects.mcode.manual.table import lookup
+from multidrop.simulator.lexium.event_loop import EventLoop
+from multidrop.simulator.lexium.language.variables import Compile, Variables, bare, is_place, missing, only
+from multidrop.simulator.lexium.motion.inputs import ANALOG
 from multidrop.simulator.lexium.motion.motor import Motor
+from multidrop.simulator.lexium.motion.outputs import Outputs
+from multidrop.simulator.lexium.motion.trips import BITS
 from multidrop.simulator.lexium.state.errors import Fault
 from multidrop.simulator.lexium.state.expressions import whole
-from multidrop.simulator.lexium.state.memory import Memory
-from multidrop.simulator.lexium.state.timeline import Timeline
+from multidrop.simulator.lexium.state.interpreter import Action, Core
+from multidrop.simulator.lexium.state.memory import Trip
+
+FIRST_INPUT = 1
+MOST_REPEATS = 65000
+PRINT_FORMAT = (10, 6, 0, 0)
+"""PF: width, decimals, scientific, left."""
 
 
 class MotorCommands:
     """The instructions of the motor of one drive. `begun` counts the motions that they have begun."""
 
-    def __init__(self, memory: Memory, timeline: Timeline, variables: VariableAccess, motor: Motor) -> None:
-        self._memory, self._timeline, self._variables, self._motor = memory, timeline, variables, motor
+    def __init__(self, core: Core, variables: Variables, motor: Motor) -> None:
+        self._memory, self._timeline, self._variables, self._motor = core.memory, core.timeline, variables, motor
         self.begun = 0
 
     def commands(self) -> Mapping[str, Compile]:
@@ -97,7 +107,7 @@ class MotorCommands:
 
     def _make_up(self, statement: Statement) -> Action:
         """MU: the mode, and 1 to clear lead and lag."""
-        read = numbers(self._variables, statement, 1, 2)
+        read = self._variables.numbers(statement, 1, 2)
 
         def set_up() -> None:
             mode, clearing = (*read(), 0)[:2]
@@ -111,11 +121,202 @@ class MotorCommands:
         """SC 1. Raises Fault (24) without its number."""
         if not statement.arguments:
             raise Fault(E.ILLEGAL_DATA)
-        read = numbers(self._variables, statement, 1, 1)
+        read = self._variables.numbers(statement, 1, 1)
 
         def start() -> None:
             if read() != [1]:
                 raise Fault(E.OUT_OF_RANGE)
-            self._motor.test.start(self._timeline.now)
+            self._motor.start_test(self._timeline.now)
 
         return start
+
+
+class Setups:
+    """The instructions with several settings, for one drive."""
+
+    def __init__(self, core: Core, variables: Variables, motor: Motor, outputs: Outputs, loop: EventLoop) -> None:
+        self._memory, self._program, self._timeline, self._variables = (
+            core.memory,
+            core.program,
+            core.timeline,
+            variables,
+        )
+        self._motor, self._inputs, self._outputs, self._loop = motor, motor.inputs, outputs, loop
+        self._points = core.model.points
+
+    def commands(self) -> Mapping[str, Compile]:
+        """By word."""
+        return {
+            "DN": self._device_name,
+            "IS": self._input,
+            "OS": self._output,
+            "LS": self._software_limit,
+            "PF": self._print_format,
+            "PW": partial(self._texts, 4),
+            **{f"S{n}": partial(self._point, n) for n in (*range(1, 6), *range(7, 14))},
+            **{word: partial(self._place_trip, word) for word in ("TC", "TM")},
+            **{word: partial(self._value_trip, word) for word in ("TI", "TP", "TT", "TR", "TA")},
+        }
+
+    # Inputs and outputs.
+
+    def _input(self, statement: Statement) -> Action:
+        """IS (manual 5.1.64)."""
+        read = self._variables.numbers(statement, 2, 3)
+
+        def set_up() -> None:
+            n, *rest = read()
+            was = self._inputs.types.get(n, (0, 0))
+            self._inputs.set_up([n, *rest])
+            self._wired(n, was)
+
+        return set_up
+
+    def _wired(self, n: int, was: tuple[int, ...]) -> None:
+        """Act on an input's new set-up."""
+        self._motor.limit_stop.wired(n, was[0], self._timeline.now)
+        self._timeline.replan()
+        if n in self._inputs.numbers:
+            self._loop.wired(n, was)
+
+    def _output(self, statement: Statement) -> Action:
+        """OS (manual 5.1.93)."""
+        read = self._variables.numbers(statement, 2, 3)
+        return lambda: self._outputs.set_up(read())
+
+    def _point(self, n: int, statement: Statement) -> Action:
+        """S<n> of an MDrivePlus: type, active level, and of a point that is either, whether it sources."""
+        points = self._points
+        fields = len(points.fresh[n])
+        read = self._variables.numbers(statement, 1 if n == ANALOG else 2, fields)
+
+        def set_up() -> None:
+            values = (*read(), 0, 0)[:fields]
+            if any(each not in (0, 1) for each in values[1:]):
+                raise Fault(E.OUT_OF_RANGE)
+            was = self._inputs.types[n]
+            for each in points.clocks if n in points.clocks else (n,):
+                self._set_point(each, values)
+            self._wired(n, was)
+
+        return set_up
+
+    def _set_point(self, n: int, values: tuple[int, ...]) -> None:
+        """Make a point an input or an output. Raises Fault (6, 8, 21)."""
+        points, kind, active = self._points, values[0], values[1]
+        if kind in points.output_types.get(n, ()):
+            if any(values[2:]) and not points.sources:
+                raise Fault(E.OUT_OF_RANGE)
+            self._outputs.set_up([n, kind, active])
+        else:
+            self._inputs.set_up([n, kind, active])
+            self._outputs.release(n)
+        self._inputs.types[n] = values
+
+    def _software_limit(self, statement: Statement) -> Action:
+        """LS; the minus limit must be below the plus limit while both are enabled (manual 5.1.78)."""
+        read, limits = self._variables.numbers(statement, 3, 3), self._motor.limits.software
+
+        def set_up() -> None:
+            which, position, enabled = read()
+            if which not in (0, 1) or enabled not in (0, 1) or not -0x80000000 <= position <= 0x7FFFFFFF:
+                raise Fault(E.OUT_OF_RANGE)
+            other, other_enabled = limits[1 - which]
+            crossed = position <= other if which else position >= other
+            if enabled and other_enabled and crossed:
+                raise Fault(E.OUT_OF_RANGE)
+            change = {which: (position, enabled)}
+            self._motor.limit_stop.relocate(lambda: limits.update(change), self._timeline.now)
+            self._timeline.replan()
+
+        return set_up
+
+    # Texts.
+
+    def _print_format(self, statement: Statement) -> Action:
+        """PF (manual 5.1.97)."""
+        read = self._variables.numbers(statement, 1, 4)
+
+        def set_up() -> None:
+            values = (*read(), *PRINT_FORMAT[len(statement.arguments) :])
+            ranges = (16, 16, 1, 1)
+            if not all(0 <= value <= most for value, most in zip(values, ranges, strict=True)):
+                raise Fault(E.OUT_OF_RANGE)
+            self._memory.texts["PF"] = ",".join(str(each) for each in values)
+
+        return set_up
+
+    def _texts(self, count: int, statement: Statement) -> Action:
+        """Numbers that are kept as they are."""
+        read, word = self._variables.numbers(statement, count, count), statement.word
+
+        def keep() -> None:
+            self._memory.texts[word] = ",".join(str(each) for each in read())
+
+        return keep
+
+    def _device_name(self, statement: Statement) -> Action:
+        """DN: a letter or digit, in the forms that the product takes (manual 5.1.33)."""
+        if statement.equals and not statement.arguments:  # `DN='a'`: its apostrophe begins a remark
+            raise Fault(E.OUT_OF_RANGE)
+        if len(statement.arguments) != 1:
+            raise Fault(E.ILLEGAL_DATA if statement.arguments else E.NOT_EXECUTABLE)
+        name = device_name_of(statement.arguments[0], not self._memory.model.name_codes)
+
+        def set_up() -> None:
+            if not name:
+                raise Fault(E.OUT_OF_RANGE)
+            self._memory.texts["DN"] = name
+
+        return set_up
+
+    # Trips.
+
+    def _place_trip(self, word: str, statement: Statement) -> Action:
+        """TC, TM: a place."""
+        if not statement.arguments:
+            raise missing(statement)
+        target = self._target(statement.arguments, 1)
+        return lambda: self._define(word, Trip(FIRST_INPUT, target))
+
+    def _value_trip(self, word: str, statement: Statement) -> Action:
+        """TI, TP, TT, TR, TA: a value and a place; TR also how often it repeats. TA=0 takes it away."""
+        arguments, repeats_too = statement.arguments, word == "TR"
+        if not arguments:
+            raise missing(statement)
+        if word == "TA" and arguments == (Number(0),):
+            return lambda: self._motor.trips.forget(BITS[word])
+        if len(arguments) < 2 and not repeats_too:
+            raise Fault(E.NO_SEPARATOR)
+        value_at, *more = arguments
+        target = self._target(more, 2 if repeats_too else 1)
+        read = self._variables.value(value_at)
+        repeats = self._variables.value(more[1]) if len(more) > 1 else lambda: 0
+
+        def define() -> None:
+            value, times = whole(read()), whole(repeats())
+            self._check_trip(word, value, times)
+            self._define(word, Trip(value, target, times))
+
+        return define
+
+    def _target(self, places: tuple[Argument | None, ...] | list[Argument | None], most: int) -> Argument | None:
+        """The subroutine of a trip; None for 0 and for none. Raises Fault (24)."""
+        if len(places) > most or any(not is_place(each) for each in places[:1]):
+            raise Fault(E.ILLEGAL_DATA)
+        return None if not places or places[0] == Number(0) else places[0]
+
+    def _check_trip(self, word: str, value: int, times: int) -> None:
+        """Check what a trip waits for. Raises Fault (10, 21)."""
+        row = lookup(word, self._memory.product)
+        if (row is not None and not row.accepts(value)) or not 0 <= times <= MOST_REPEATS:
+            raise Fault(E.NO_SUCH_POINT if word == "TI" else E.OUT_OF_RANGE)
+        if word == "TI" and value not in self._inputs.numbers:
+            raise Fault(E.NO_SUCH_POINT)
+        if word == "TR" and not value:
+            raise Fault(E.OUT_OF_RANGE)
+
+    def _define(self, word: str, trip: Trip) -> None:
+        if trip.target is not None:
+            self._program.check(trip.target)
+        self._motor.trips.define(BITS[word], trip)

@@ -1,6 +1,6 @@
-"""What PR prints, and how: numbers, texts, and the lists of parameters, variables and set-ups.
+"""PR: numbers, texts, and the lists of parameters, variables and set-ups.
 
-Manual 5.1.4, 5.1.64, 5.1.93, 5.1.97, 5.1.101, 5.1.102, 5.1.119, 5.1.134, 5.1.141, 5.1.142.
+Manual 5.1.4, 5.1.64, 5.1.78, 5.1.93, 5.1.97, 5.1.101, 5.1.102, 5.1.119, 5.1.122, 5.1.134, 5.1.141, 5.1.142.
 """
 
 from __future__ import annotations
@@ -12,19 +12,17 @@ from functools import partial
 from multidrop.dialects.mcode.manual.errors import ErrorNumber as E
 from multidrop.dialects.mcode.manual.grammar import Argument, Name, Number, Statement, Text
 from multidrop.dialects.mcode.manual.table import MNEMONICS
-from multidrop.simulator.lexium.language.printed_setups import PrintedSetups, fields
-from multidrop.simulator.lexium.language.program_mode import Action
-from multidrop.simulator.lexium.language.variable_access import VariableAccess
+from multidrop.simulator.lexium.language.variables import Variables
 from multidrop.simulator.lexium.motion.motor import Motor
+from multidrop.simulator.lexium.motion.outputs import Outputs
 from multidrop.simulator.lexium.motion.trips import BITS
-from multidrop.simulator.lexium.state.error_flag import ErrorFlag
 from multidrop.simulator.lexium.state.errors import Fault
 from multidrop.simulator.lexium.state.expressions import FLOATS, Value
-from multidrop.simulator.lexium.state.memory import Memory, slot
-from multidrop.simulator.lexium.state.printer import CRLF, Printer
-from multidrop.simulator.lexium.state.program_memory import Program
-from multidrop.simulator.lexium.state.timeline import Timeline
+from multidrop.simulator.lexium.state.interpreter import Action, Core
+from multidrop.simulator.lexium.state.memory import slot
+from multidrop.simulator.lexium.state.timeline import CRLF
 
+PRINTED_INPUTS = (1, 2, 3, 4, 6)
 Item = Callable[[], str]
 Optional = Callable[[int], str]
 
@@ -42,25 +40,15 @@ def unescape(text: str) -> str:
 class Prints:
     """PR of one drive with this serial number."""
 
-    def __init__(
-        self,
-        serial: str,
-        memory: Memory,
-        program: Program,
-        timeline: Timeline,
-        printer: Printer,
-        errors: ErrorFlag,
-        variables: VariableAccess,
-        motor: Motor,
-        setups: PrintedSetups,
-    ) -> None:
-        self._memory, self._program, self._timeline, self._printer = memory, program, timeline, printer
-        self._errors, self._variables, self._motor, self._setups = errors, variables, motor, setups
-        values, model = memory.values, memory.model
-
-        def texts(word: str) -> str:
-            return memory.texts.get(word, "")
-
+    def __init__(self, serial: str, core: Core, variables: Variables, motor: Motor, outputs: Outputs) -> None:
+        self._memory, self._program, self._timeline, self._printer = (
+            core.memory,
+            core.program,
+            core.timeline,
+            core.printer,
+        )
+        self._errors, self._variables, self._motor, self._outputs = core.errors, variables, motor, outputs
+        values, model, texts = core.values, core.model, self._text
         self._shapes: Mapping[str, Item] = {
             "ER": self._error,
             "AL": lambda: _listed(self._parameters()),
@@ -75,8 +63,8 @@ class Prints:
             "SN": lambda: serial,
             "VR": lambda: model.version,
             "CR": lambda: f"{values['CR']:.3f}",
-            **{f"S{n}": partial(setups.point, n) for n in (*range(1, 6), *range(7, 14))},
-            **{word: partial(setups.trip, word) for word in BITS},
+            **{f"S{n}": partial(self._point, n) for n in (*range(1, 6), *range(7, 14))},
+            **{word: partial(self._trip, word) for word in BITS},
         }
         self._with_option: Mapping[str, Optional] = {"IT": self._temperature, "VT": self._voltage}
 
@@ -91,7 +79,7 @@ class Prints:
         while rest:
             argument = rest.pop(0)
             word = argument.word if isinstance(argument, Name) else ""
-            if word in self._with_option and self._variables.row(word):
+            if word in self._with_option and self._memory.row(word):
                 option = rest.pop(0) if rest and isinstance(rest[0], Number) else None
                 yield self._optional(word, option)
             else:
@@ -106,7 +94,7 @@ class Prints:
             return lambda: constant
         if not isinstance(argument, Name):
             raise Fault(E.NOT_PRINTABLE)
-        word, row = argument.word, self._variables.row(argument.word)
+        word, row = argument.word, self._memory.row(argument.word)
         if row is not None and row.access in ("-", "WO"):
             raise Fault(E.NOT_PRINTABLE)
         if row is not None and word in self._shapes:
@@ -151,7 +139,10 @@ class Prints:
     # Lists.
 
     def _joined(self, word: str) -> str:
-        return CRLF.join(self._setups.lines(word))
+        return CRLF.join(self._setups(word))
+
+    def _text(self, word: str) -> str:
+        return self._memory.texts.get(word, "")
 
     def _names(self) -> list[str]:
         """The lines of PR UV: variables with their scope, labels with their address."""
@@ -164,10 +155,10 @@ class Prints:
         """The lines of PR AL: every variable and flag of this drive, in alphabetical order. Nothing is cleared."""
         rows: list[str] = []
         for name, row in self._memory.words.items():
-            if row.kind not in ("variable", "flag") or row.access == "WO" or not self._memory.knows(row):
+            if row.kind not in ("variable", "flag") or row.access == "WO" or self._memory.product not in row.products:
                 continue
             if name in ("IS", "OS", "LS"):
-                rows += self._setups.lines(name)
+                rows += self._setups(name)
             else:
                 rows.append(f"{name} = {self._parameter(name)}")
         return rows
@@ -179,6 +170,28 @@ class Prints:
             return self._with_option[name](0)
         return self._item(Name(name))()
 
+    def _setups(self, word: str) -> list[str]:
+        """The lines of PR IS, PR OS or PR LS."""
+        if word == "IS":
+            return [f"IS = {n}, {self._point(n)}" for n in PRINTED_INPUTS]
+        rows = self._outputs.types if word == "OS" else self._motor.limits.software
+        return [f"{word} = {n}, {_fields(each)}" for n, each in rows.items()]
+
+    def _point(self, n: int) -> str:
+        """PR S<n>."""
+        return _fields(self._motor.inputs.types[n])
+
+    def _trip(self, word: str) -> str:
+        """PR of a trip; 0 for one that is not set up."""
+        trip = self._motor.trips.defined.get(BITS[word])
+        if trip is None:
+            return "0"
+        target = trip.target
+        name = target.word if isinstance(target, Name) else str(target.value if isinstance(target, Number) else 0)
+        if word in ("TC", "TM"):
+            return name
+        return f"{trip.value}, {name}" + (f", {trip.repeats}" if word == "TR" else "")
+
     # Words that may be followed by a number that chooses.
 
     def _voltage(self, option: int) -> str:
@@ -187,15 +200,19 @@ class Prints:
         status = (0 if auxiliary else 1) + (0 if supply else 2)
         bridge = VOLTS if supply else 0
         volts = {1: (AUXILIARY_VOLTS,), 2: (bridge,)}.get(option, (AUXILIARY_VOLTS, bridge) if auxiliary else (bridge,))
-        return fields((status, *volts))
+        return _fields((status, *volts))
 
     def _temperature(self, option: int) -> str:
         """The bridge, the controller, or both (manual 5.1.67)."""
         heat, t = self._motor.heat, self._timeline.now
         both = (round(heat.bridge(t)), round(heat.controller(t)))
-        return fields(both if not option else both[option - 1 : option])
+        return _fields(both if not option else both[option - 1 : option])
 
 
 def _listed(lines: list[str]) -> str:
     """Lines, and then an empty one."""
     return "".join(line + CRLF for line in lines)
+
+
+def _fields(values: tuple[int, ...]) -> str:
+    return ", ".join(str(each) for each in values)

@@ -1,25 +1,25 @@
-"""Instructions that act on program memory, and start a program: EX, L, LB, PG, CP, OE, BP.
+"""Instructions on programs: program memory, start, branches, calls, holds, errors, declarations, IV, bare numbers.
 
-Manual 3.3, 5.1.13, 5.1.23, 5.1.42, 5.1.70, 5.1.71, 5.1.91, 5.1.98.
+Manual 3.3, 5.1.13, 5.1.14, 5.1.22, 5.1.23, 5.1.35, 5.1.42, 5.1.50, 5.1.68, 5.1.70, 5.1.71, 5.1.89, 5.1.91, 5.1.98,
+5.1.103, 5.1.112, 5.1.136.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 
 from multidrop.dialects.mcode.manual.errors import ErrorNumber as E
-from multidrop.dialects.mcode.manual.grammar import Argument, Name, Number, Statement
-from multidrop.simulator.lexium.language.arguments import Compile, is_place, pair
-from multidrop.simulator.lexium.language.interpreter import Interpreter
-from multidrop.simulator.lexium.language.program_mode import Action, ProgramMode, Storage
-from multidrop.simulator.lexium.language.variable_access import VariableAccess
-from multidrop.simulator.lexium.motion.motion_status import MotionStatus
+from multidrop.dialects.mcode.manual.grammar import Argument, Compare, Name, Number, Statement, Text
+from multidrop.dialects.mcode.manual.table import lookup
+from multidrop.simulator.lexium.language.variables import Compile, Variables, bare, is_place, only, pair
+from multidrop.simulator.lexium.motion.motor import Motor
+from multidrop.simulator.lexium.power import Nvm
 from multidrop.simulator.lexium.state.errors import Fault
-from multidrop.simulator.lexium.state.expressions import whole
-from multidrop.simulator.lexium.state.memory import Memory
-from multidrop.simulator.lexium.state.printer import CRLF, Printer
-from multidrop.simulator.lexium.state.program_memory import FIRST, SPACE, Program
-from multidrop.simulator.lexium.state.timeline import Timeline
+from multidrop.simulator.lexium.state.expressions import compile_condition, whole
+from multidrop.simulator.lexium.state.interpreter import Action, Core
+from multidrop.simulator.lexium.state.memory import within
+from multidrop.simulator.lexium.state.program_memory import FIRST, SPACE
+from multidrop.simulator.lexium.state.timeline import CRLF
 
 MOST_PASSES = 65535
 OPTIONS = (Number(0), Number(1))
@@ -27,27 +27,30 @@ OPTIONS = (Number(0), Number(1))
 
 
 class ProgramCommands:
-    """The instructions on program memory, for one drive."""
+    """The instructions on programs, for one drive."""
 
-    def __init__(
-        self,
-        memory: Memory,
-        program: Program,
-        timeline: Timeline,
-        printer: Printer,
-        variables: VariableAccess,
-        interpreter: Interpreter,
-        mode: ProgramMode,
-        status: MotionStatus,
-        storage: Storage,
-    ) -> None:
-        self._memory, self._program, self._timeline, self._printer = memory, program, timeline, printer
-        self._variables, self._interpreter, self._mode = variables, interpreter, mode
-        self._status, self._storage = status, storage
+    def __init__(self, core: Core, variables: Variables, motor: Motor, nvm: Nvm) -> None:
+        self._memory, self._program, self._timeline, self._printer = (
+            core.memory,
+            core.program,
+            core.timeline,
+            core.printer,
+        )
+        self._interpreter, self._thread, self._mode = core.interpreter, core.thread, core.mode
+        self._variables, self._motor, self._nvm = variables, motor, nvm
 
     def commands(self) -> Mapping[str, Compile]:
         """By word."""
         return {
+            "E": bare(self._end),
+            "RT": bare(self._thread.give_back),
+            "PS": bare(self._motor.pause_program),
+            "RS": bare(self._motor.resume_program),
+            "BR": lambda statement: self._jump(statement, self._interpreter.branch),
+            "CL": lambda statement: self._jump(statement, self._interpreter.call),
+            "H": self._hold,
+            "IV": self._input_variable,
+            "VA": self._declare,
             "EX": self._execute,
             "L": self._listing,
             "LB": self._label,
@@ -57,6 +60,124 @@ class ProgramCommands:
             "BP": self._break_point,
         }
 
+    # A program that runs.
+
+    def _end(self) -> None:
+        """E: a program's own ends it at once, a typed one after the motion (manual 5.1.35)."""
+        thread, t = self._thread, self._timeline.now
+        if self._printer.immediate and thread.running and not thread.paused and self._motor.status.moving(t):
+            thread.finish_after_motion()
+        else:
+            thread.finish()
+
+    def _check_running(self) -> None:
+        """Raise Fault (40) for a typed line that needs a program to act on."""
+        if self._printer.immediate and not self._thread.running:
+            raise Fault(E.NO_PROGRAM_RUNNING)
+
+    def _jump(self, statement: Statement, jump: Callable[[Argument], None]) -> Action:
+        """BR, CL; a condition may also be a value, which holds while it is not 0 (manual 5.1.2, 5.1.14)."""
+        target, condition = pair(statement)
+        if target is None or not is_place(target) or isinstance(condition, Text):
+            raise Fault(E.ILLEGAL_DATA)
+
+        def go() -> None:
+            self._check_running()
+            jump(target)
+
+        if condition is None:
+            return go
+        holds = compile_condition(condition, self._variables.reader, self._memory.model.floating)
+
+        def go_if() -> None:
+            if holds():
+                go()
+
+        return go_if
+
+    def _hold(self, statement: Statement) -> Action:
+        """H (manual 5.1.50). Where 0 is taken it is for motion."""
+        if len(statement.arguments) > 1:
+            raise Fault(E.ILLEGAL_DATA)
+        read = self._variables.value(statement.arguments[0]) if statement.arguments else None
+        row = lookup("H", self._memory.product)
+
+        def wait() -> None:
+            self._check_running()
+            milliseconds = None if read is None else whole(read())
+            if row is None or not (milliseconds is None or row.accepts(milliseconds)):
+                raise Fault(E.OUT_OF_RANGE)
+            if milliseconds:
+                self._thread.hold(milliseconds / 1000)
+            elif self._motor.status.settled_at() > self._timeline.now:
+                self._thread.hold_for_motion()
+
+        return wait
+
+    def _input_variable(self, statement: Statement) -> Action:
+        """IV: the next number that comes goes to a variable (manual 5.1.68)."""
+        target, more = pair(statement)
+        if not isinstance(target, Name) or more is not None:
+            raise Fault(E.ILLEGAL_DATA)
+        word = target.word
+        self._variables.writer(word)
+
+        def wait() -> None:
+            if self._memory.awaited:
+                raise Fault(E.INPUT_PENDING)
+            self._memory.await_input(word)
+
+        return wait
+
+    def number(self, statement: Statement) -> Action:
+        """A bare number: what IV waits for, or with NE=1 another move of the last kind (manual 5.1.68, 5.1.89)."""
+        figure, memory, motor = statement.arguments[0], self._memory, self._motor
+        if not isinstance(figure, Number):
+            raise Fault(E.UNKNOWN_COMMAND)
+        read = self._variables.value(figure)
+
+        def take() -> None:
+            if memory.awaited:
+                name = memory.awaited
+                memory.await_input("")
+                self._variables.writer(name)(read())
+            elif memory.values["NE"]:
+                kind, value, t = memory.texts["MD"], whole(read()), self._timeline.now
+                if kind == "SL":
+                    motor.slew(value, t)
+                else:
+                    motor.axis.go(kind, value, t)
+                self._timeline.replan()
+            else:
+                raise Fault(E.UNKNOWN_COMMAND)
+
+        return take
+
+    def _declare(self, statement: Statement) -> Action:
+        """VA: global from outside, local in a program (manual 3.2.2, 5.1.136)."""
+        target, memory = only(statement), self._memory
+        read: Callable[[], int | float] = lambda: 0  # noqa: E731
+        if isinstance(target, Compare) and target.op == "=":
+            read = self._variables.value(target.right)
+            target = target.left
+        if not isinstance(target, Name):
+            raise Fault(E.ILLEGAL_DATA)
+        word = target.word
+        self._mode.check_new(word)
+
+        def make() -> None:
+            scope = "G" if self._printer.immediate else "L"
+            if word in self._program.labels or memory.scopes.get(word, "L") != "L":
+                raise Fault(E.NAME_EXISTS)
+            value = within(whole(read()), -0x80000000, 0x7FFFFFFF)
+            if word not in memory.scopes:
+                self._mode.check_room()
+            memory.declare(word, scope, value)
+
+        return make
+
+    # Program memory.
+
     def _check_unlocked(self) -> None:
         """Raise Fault (44) while the program is locked (manual 5.1.75)."""
         if self._memory.values["LK"]:
@@ -64,9 +185,9 @@ class ProgramCommands:
 
     def _check_idle(self, moving: E) -> None:
         """Raise Fault (41) while a program runs, and the given one while the motor moves."""
-        if self._interpreter.running:
+        if self._thread.running:
             raise Fault(E.PROGRAM_RUNNING)
-        if self._status.moving(self._timeline.now):
+        if self._motor.status.moving(self._timeline.now):
             raise Fault(moving)
 
     def _execute(self, statement: Statement) -> Action:
@@ -189,7 +310,7 @@ class ProgramCommands:
 
     def _clear_and_save(self) -> None:
         self._clear_from(None, variables=False)
-        self._storage.save()
+        self._nvm.save()
 
     def _clear_locked(self, variables: bool) -> None:
         """CP 0 and CP 1: all of program memory; only CP without a parameter opens a lock (manual 5.1.75)."""
@@ -204,7 +325,7 @@ class ProgramCommands:
         self._check_unlocked()
         everything = target is None or target == Number(FIRST)  # the beginning of memory is there in an empty one too
         self._program.clear(FIRST if everything else self._program.resolve(target))
-        self._mode.changed()
+        self._interpreter.linked.forget()
         if target is None and memory.model.clear_ends_handler:
             interpreter.handler = None
         if variables:

@@ -1,8 +1,9 @@
-"""The motion commands of a simulated MCode drive, and the motion that is under way.
+"""The motion commands of a simulated MCode drive, the motion that is under way, and what the drive reports of it.
 
 Positions are motor steps since power-up. `profile` is what the drive commands; the rotor follows it (`rotor`), and
 the counters read both (`counters`). With EE=1 targets and speeds come in encoder counts and become steps here. A
-motion that ends between two steps ends on the nearest one. Manual 5.1.16, 5.1.17, 5.1.80 to 5.1.88, 5.1.117, 7.3.
+motion that ends between two steps ends on the nearest one. Manual 5.1.8, 5.1.16, 5.1.17, 5.1.38, 5.1.80 to 5.1.88,
+5.1.110, 5.1.117, 5.1.137, 5.1.139, 7.3.
 """
 
 from __future__ import annotations
@@ -14,15 +15,42 @@ from typing import Protocol, TypedDict
 from multidrop.dialects.mcode.manual.errors import ErrorNumber as E
 from multidrop.simulator.kinematics.profile import Profile, halt, move, slew
 from multidrop.simulator.kinematics.segments import LINEAR, Shape
-from multidrop.simulator.lexium.motion.bridges import Bridges
 from multidrop.simulator.lexium.motion.counters import Counters
-from multidrop.simulator.lexium.motion.rotor import Rotor
-from multidrop.simulator.lexium.motion.units import Units
+from multidrop.simulator.lexium.motion.rotor import CATCHING, Rotor
 from multidrop.simulator.lexium.state.errors import Fault
 from multidrop.simulator.lexium.state.expressions import Value
 from multidrop.simulator.lexium.state.memory import Memory
 
-# Ramps: how the velocity changes, from VI, A, D and the S-curves (manual 5.1.7, 5.1.9, 5.1.27, 5.1.30).
+
+class Bridges:
+    """The output bridges of one drive (manual 5.1.29, 5.1.127, 8.2).
+
+    `powered`: the drive has power at all. `supply`: +V is there.
+    `locked`: a locked rotor has switched the bridges off, until CF. `count_when_disabled`: with DE=0 the product counts
+    moves, and does not refuse them.
+    """
+
+    def __init__(self, memory: Memory) -> None:
+        self._values, self.count_when_disabled = memory.values, memory.model.disabled_moves
+        self.powered = self.supply = True
+        self.locked = False
+
+    @property
+    def enabled(self) -> bool:
+        """DE."""
+        return bool(self._values["DE"])
+
+    @property
+    def driving(self) -> bool:
+        """Whether they can turn the motor: enabled, supplied, and not switched off by a locked rotor."""
+        return bool(self._values["DE"]) and self.supply and not self.locked
+
+    def check(self) -> None:
+        """Check that a motion may be commanded at all. Raises Fault (94, 96)."""
+        if self.locked or not (self.enabled or self.count_when_disabled):
+            raise Fault(E.DRIVE_DISABLED)
+        if not self.supply:
+            raise Fault(E.NO_MOTOR_VOLTAGE)
 
 
 STEEPEST = 1.1e9
@@ -30,8 +58,8 @@ STEEPEST = 1.1e9
 STRAIGHT = Shape()
 
 
-class RampValues(TypedDict):
-    """Steps/s, steps/s2, and the shapes of both ramps."""
+class Ramps(TypedDict):
+    """How the velocity changes (manual 5.1.7, 5.1.9, 5.1.27, 5.1.30): steps/s, steps/s2, the shapes of both ramps."""
 
     vi: float
     a: float
@@ -40,43 +68,14 @@ class RampValues(TypedDict):
     down: Shape
 
 
-class Ramps:
-    """The ramps that are set."""
-
-    def __init__(self, values: Mapping[str, Value], units: Units) -> None:
-        self._values, self._units = values, units
-
-    def check(self) -> None:
-        """Check that a motion may begin with these S-curves. Raises Fault (98, 99) for too steep a middle."""
-        for shape, rate, code in (("AT", "A", E.NO_ACCELERATION_FITS), ("DT", "D", E.NO_DECELERATION_FITS)):
-            if self._shape(shape, rate) is None:
-                raise Fault(code)
-
-    def values(self) -> RampValues:
-        """The ramps in steps: straight where a curve would be too steep, as a stop is never refused."""
-        values, scale = self._values, self._units.scale
-        up, down = self._shape("AT", "A") or STRAIGHT, self._shape("DT", "D") or STRAIGHT
-        return {"vi": values["VI"] * scale, "a": values["A"] * scale, "d": values["D"] * scale, "up": up, "down": down}
-
-    def _shape(self, kind: str, rate: str) -> Shape | None:
-        """What AT and AJ, or DT and DJ, make of a ramp; None where its middle would be too steep."""
-        values = self._values
-        if int(values.get(kind, LINEAR)) == LINEAR:
-            return STRAIGHT
-        shape = Shape(int(values.get(kind, LINEAR)), int(values.get(f"{rate}J", 0)))
-        return shape if values[rate] * self._units.scale * shape.peak <= STEEPEST else None
-
-
-# Backlash: what a move is lengthened by to make up for play in the gear (manual 5.1.10 to 5.1.12).
-#
-# Mode 0 (BM=0) adds |BL| to each move that reverses the axis; the counters show it. The sum of all that was added is
-# part of the targets of absolute moves until P is set again, so these stay true on both flanks. The first move counts
-# as along the flank that is loaded already. Mode 1 passes a target by |BL| and returns, unless the move has the
-# direction of BL's sign. So it reaches every target from one side.
-
-
 class Backlash:
-    """The flank that is loaded, and the sum of what was added, in the unit of commands."""
+    """The compensation of play in the gear (manual 5.1.10 to 5.1.12): the loaded flank, the sum of what was added.
+
+    Mode 0 (BM=0) adds |BL| to each move that reverses the axis; the counters show it. The sum of all that was added, in
+    the unit of commands, is part of the targets of absolute moves until P is set again, so these stay true on both
+    flanks. The first move counts as along the flank that is loaded already. Mode 1 passes a target by |BL| and returns,
+    unless the move has the direction of BL's sign. So it reaches every target from one side.
+    """
 
     def __init__(self, values: Mapping[str, Value]) -> None:
         self.values = values
@@ -84,7 +83,6 @@ class Backlash:
         self.added = 0
 
     def restart(self) -> None:
-        """Begin at power-up: no flank is loaded."""
         self.flank = self.added = 0
 
     def forget(self) -> None:
@@ -123,7 +121,7 @@ FASTEST_COUNTS, FASTEST_STEPS = 200_000, 5_000_000
 
 
 class Supervisor(Protocol):
-    """What the axis asks before a motion, and informs of one; the motor is one."""
+    """What the axis asks before a motion, and informs of one: the motor, which the axis is built before."""
 
     @property
     def homing_active(self) -> bool:
@@ -143,12 +141,10 @@ class Axis:
     when a motion that runs on passes its target, `back` the steps that follow the motion (BM=1).
     """
 
-    def __init__(
-        self, memory: Memory, units: Units, bridges: Bridges, rotor: Rotor, counters: Counters, supervisor: Supervisor
-    ) -> None:
-        self._memory, self._units, self._bridges, self._supervisor = memory, units, bridges, supervisor
-        self.rotor, self._counters = rotor, counters
-        self._ramps = Ramps(memory.values, units)
+    def __init__(self, memory: Memory, rotor: Rotor, counters: Counters, supervisor: Supervisor) -> None:
+        self._memory, self._supervisor = memory, supervisor
+        self.rotor, self.counters, self.bridges = rotor, counters, Bridges(memory)
+        self.status = MotionStatus(self, memory, supervisor)
         self.backlash = Backlash(memory.values)
         self.profile: Profile = rotor.command
         self.kind = ""
@@ -188,7 +184,7 @@ class Axis:
 
     def go(self, kind: str, value: int, t: float, announce: bool = False, run_on: bool = False) -> None:
         """Carry out MA or MR. `announce`: send the name when it is over; `run_on`: do not stop there. Raises Fault."""
-        counters, scale = self._counters, self._units.scale
+        counters, scale = self.counters, self._memory.scale
         if not -0x80000000 <= value <= 0x7FFFFFFF:
             raise Fault(E.OUT_OF_RANGE)
         distance = value - counters.position(t) if kind == "MA" else value
@@ -196,7 +192,7 @@ class Axis:
         self._ready(t, distance)
         if self.kind == CORRECTION and self.commanded(t):
             raise Fault(E.STILL_CORRECTING)
-        velocity, ramps = self.profile.velocity(t), self._ramps.values()
+        velocity, ramps = self.profile.velocity(t), self._ramps()
         if self.kind in (SLEW, HOMING, TORQUE):
             self.backlash.flank = int(self.direction(t))
         first, after = self.backlash.plan(distance, absolute=kind == "MA")
@@ -223,7 +219,7 @@ class Axis:
             raise Fault(E.VELOCITY_TOO_HIGH)
         if value:
             self._ready(t, value)
-        self.slow_to(value * self._units.scale, t, stopping=not value and self.kind in MOVES)
+        self.slow_to(value * self._memory.scale, t, stopping=not value and self.kind in MOVES)
 
     def slow_to(self, velocity: float, t: float, stopping: bool = False, kind: str = "") -> None:
         """Change to a velocity, steps/s, with the ramps in force. `kind`: what asks for it, if not SL."""
@@ -234,17 +230,17 @@ class Axis:
         here, now = self.profile.position(t), self.profile.velocity(t)
         default = SLEW if velocity or self.kind not in MOVES else self.kind
         self.back = 0.0
-        self.begin(kind or default, slew(t, here, now, velocity, **self._ramps.values()), t)
+        self.begin(kind or default, slew(t, here, now, velocity, **self._ramps()), t)
         self._stopping, self.announce = stopping, False
 
     def correct(self, distance: float, t: float) -> None:
         """Go back to where the last motion should have ended: at VI, without ramps (PM)."""
-        here, vi = self.profile.position(t), self._memory.values["VI"] * self._units.scale
+        here, vi = self.profile.position(t), self._memory.values["VI"] * self._memory.scale
         self.begin(CORRECTION, move(t, here, 0.0, here + distance, vi=vi, vm=vi, a=1.0, d=1.0), t)
 
     def step(self, steps: int, t: float) -> None:
         """Make a few steps at once, as a clock on the inputs asks for them (FL)."""
-        if self.at_rest(t) and self._bridges.driving:
+        if self.at_rest(t) and self.bridges.driving:
             self._direction = 1.0 if steps > 0 else -1.0
             self.profile = halt(t, self.profile.position(t) + steps)
             self.rotor.jump(self.profile, t)
@@ -270,12 +266,12 @@ class Axis:
             self.announce = False
 
     def arrive(self, t: float) -> bool:
-        """End the motion on a whole step, or go on with what follows. Gives whether the name is sent."""
+        """End the motion on a whole step, or go on with what follows. Return whether the name is sent."""
         self._take(halt(t, floor(self.profile.target + 0.5)), t)
         self.arriving = self._stopping = False
         if self.back:
             place, self.back = self.profile.position(t) + self.back, 0.0
-            announce, ramps = self.announce, self._ramps.values()
+            announce, ramps = self.announce, self._ramps()
             self.begin(self.kind, move(t, self.profile.position(t), 0.0, place, vm=self._top, **ramps), t)
             self.announce = announce
             return False
@@ -287,7 +283,7 @@ class Axis:
         self.back, self.announce = 0.0, False
 
     def pass_mark(self) -> bool:
-        """Take note that a motion that runs on passes its target. Gives whether the name is sent."""
+        """Take note that a motion that runs on passes its target. Return whether the name is sent."""
         announce, self.announce, self.mark, self.kind = self.announce, False, None, SLEW
         return announce
 
@@ -328,8 +324,8 @@ class Axis:
         elif kind == CORRECTION:
             self.correct(value - here, t)
         else:
-            top = self._memory.values["VM"] * self._units.scale
-            self.begin(kind, move(t, here, now, value, vm=top, **self._ramps.values()), t)
+            top = self._memory.values["VM"] * self._memory.scale
+            self.begin(kind, move(t, here, now, value, vm=top, **self._ramps()), t)
 
     def _take(self, profile: Profile, t: float) -> None:
         self._direction = self.direction(t)
@@ -351,18 +347,126 @@ class Axis:
 
     def allow(self, t: float, direction: float) -> None:
         """Check that the bridges may turn the motor in a direction. Raises Fault (83, 84, 85, 88, 94, 96)."""
-        self._bridges.check()
+        self.bridges.check()
         code = self._supervisor.refuse(t, direction)
         if code:
             raise Fault(code)
 
     def check_ramps(self) -> None:
-        """Check that a motion may begin with the S-curves that are set. Raises Fault (98, 99)."""
-        self._ramps.check()
+        """Check that a motion may begin with these S-curves. Raises Fault (98, 99) for too steep a middle."""
+        for shape, rate, code in (("AT", "A", E.NO_ACCELERATION_FITS), ("DT", "D", E.NO_DECELERATION_FITS)):
+            if self._shape(shape, rate) is None:
+                raise Fault(code)
+
+    def _ramps(self) -> Ramps:
+        """The ramps in steps: straight where a curve would be too steep, as a stop is never refused."""
+        values, scale = self._memory.values, self._memory.scale
+        up, down = self._shape("AT", "A") or STRAIGHT, self._shape("DT", "D") or STRAIGHT
+        return {"vi": values["VI"] * scale, "a": values["A"] * scale, "d": values["D"] * scale, "up": up, "down": down}
+
+    def _shape(self, kind: str, rate: str) -> Shape | None:
+        """Make a shape of AT and AJ, or DT and DJ; None where the middle of the ramp would be too steep."""
+        values = self._memory.values
+        if int(values.get(kind, LINEAR)) == LINEAR:
+            return STRAIGHT
+        shape = Shape(int(values.get(kind, LINEAR)), int(values.get(f"{rate}J", 0)))
+        return shape if values[rate] * self._memory.scale * shape.peak <= STEEPEST else None
 
     def _ready(self, t: float, direction: float) -> None:
         """Check that a motion may begin at all. Raises Fault."""
         if self._supervisor.homing_active or (self._stopping and self.commanded(t)):
             raise Fault(E.HOMING_OR_MOVING)
         self.allow(t, direction)
-        self._ramps.check()
+        self.check_ramps()
+
+    # What a motor step and an encoder count are: EE, AS, MS, SA, EL, RD. The rotor stays where it is.
+
+    def set_counter(self, name: str, value: int, t: float) -> None:
+        """Make a counter read `value` now."""
+        self.counters.set(name, value, t)
+        if name == self.counters.source:
+            self.backlash.forget()
+
+    def switch_unit(self, word: str, value: int, t: float) -> None:
+        """Change EE or AS, and with them perhaps the unit of commands."""
+        if value == self._memory.values[word]:
+            return
+        unit = self._memory.scale
+        self.rescale(lambda: self._memory.switch(word, value), t)
+        self.backlash.convert(unit / self._memory.scale)
+        self.align(t)
+
+    def rescale(self, change: Callable[[], None], t: float) -> None:
+        """Change what a step and a count are: the encoder goes on counting where it is."""
+        self.counters.hold_counts(t)
+        change()
+        self.orient(t)
+
+    def orient(self, t: float) -> None:
+        """Keep the rotor where it is after MS, SA or RD may have changed."""
+        self.rotor.orient(t, self._memory.steps_per_turn, bool(self._memory.values.get("RD")))
+
+
+class MotionStatus:
+    """The flags and values that a drive reports of its motion: MV, MP, VC, V, AV, I6, and when a motion is over."""
+
+    def __init__(self, axis: Axis, memory: Memory, supervisor: Supervisor) -> None:
+        self._memory, self._values, self._model = memory, memory.values, memory.model
+        self._axis, self._rotor, self._supervisor = axis, axis.rotor, supervisor
+
+    def speed(self, t: float) -> int:
+        """V: signed velocity as commanded, steps/s; counts/s with EE=1; 0 in torque mode."""
+        return 0 if self._axis.kind == TORQUE else round(self._axis.profile.velocity(t) / self._memory.scale)
+
+    def rotor_speed(self, t: float) -> int:
+        """AV: what the rotor does, steps/s; 0 without hMT."""
+        return round(self._rotor.velocity(t)) if self._values.get("AS") else 0
+
+    def moving(self, t: float) -> bool:
+        """Whether pulses are put out, or about to be; those of make-up are some too."""
+        if t < self._axis.profile.end or self._supervisor.homing_active:
+            return True
+        return self._rotor.state == CATCHING and t < self._rotor.caught_up_at()
+
+    def reported(self, t: float) -> bool:
+        """MV: moving, and on some products the settling time MT after it."""
+        if self.moving(t):
+            return True
+        return self._model.settles and self._axis.kind != "" and t < self.settled_at()
+
+    def positioning(self, t: float) -> bool:
+        """MP: whether MA or MR is under way, or in what follows it: HT and MT, or MT alone."""
+        values, axis = self._values, self._axis
+        delay = (values["MT"] if self._model.settles else values["HT"] + values["MT"]) / 1000
+        return axis.kind in (*MOVES, CORRECTION) and axis.profile.start <= t < self.over_at() + delay
+
+    def moving_or_settling(self, t: float) -> bool:
+        """The moving output: with the settling and holding delays after a motion of any kind (manual 5.1.93)."""
+        values = self._values
+        if self._model.settles:
+            return self.reported(t)
+        delay = (values["HT"] + values["MT"]) / 1000
+        return self.moving(t) or (self._axis.kind != "" and t < self.over_at() + delay)
+
+    def changing(self, t: float) -> bool:
+        """VC: whether it speeds up or slows down."""
+        return self._axis.profile.changing(t)
+
+    def over_at(self) -> float:
+        """When the pulses of the motion that is under way end; infinite while nothing will end it."""
+        axis, rotor = self._axis, self._rotor
+        if self._supervisor.homing_active or axis.back:
+            return inf
+        late = rotor.caught_up_at() if rotor.closed else -inf
+        if late == inf and abs(rotor.lag(axis.profile.end)) < self._memory.bound:
+            late = -inf
+        return max(axis.profile.end, late)
+
+    def settled_at(self) -> float:
+        """When what H waits for is over: the motion, then MT."""
+        return self.over_at() + self._values["MT"] / 1000
+
+    def at_index(self, t: float) -> bool:
+        """I6: whether the encoder is at its index mark."""
+        here, reach = self._rotor.position(t), self._memory.steps_per_count / 2
+        return self._rotor.frame.index_ahead(here - reach, 1) <= here + reach

@@ -1,16 +1,18 @@
-"""The position counters: C1 (motor steps), C2 (encoder counts), and P, which is one of them.
+"""The position counters: C1 (motor steps), C2 (encoder counts), P, which is one of them; and the limits on it.
 
 Positions inside are motor steps since power-up; a counter is these plus an offset, so setting P moves nothing. C1
-follows the command, C2 the rotor. A counter rolls over at the ends of 32 bits. Manual 5.1.16, 5.1.17, 5.1.95.
+follows the command, C2 the rotor. A counter rolls over at the ends of 32 bits. Limits are switches on inputs (IS types
+2 and 3) and positions in software (LS). Manual 5.1.16, 5.1.17, 5.1.76, 5.1.78, 5.1.95.
 """
 
 from __future__ import annotations
 
-from math import floor, inf
+from math import floor, inf, nextafter
 
+from multidrop.dialects.mcode.manual.errors import ErrorNumber as E
 from multidrop.simulator.kinematics.profile import Profile
-from multidrop.simulator.lexium.motion.rotor import Rotor
-from multidrop.simulator.lexium.motion.units import Units
+from multidrop.simulator.lexium.motion.inputs import MINUS, PLUS
+from multidrop.simulator.lexium.motion.rotor import TOUCH, Rotor
 from multidrop.simulator.lexium.state.expressions import wrap
 from multidrop.simulator.lexium.state.memory import Memory
 
@@ -21,8 +23,8 @@ TURNOVER = 2**32
 class Counters:
     """The counters of one drive, and where P is for trips and limits."""
 
-    def __init__(self, memory: Memory, rotor: Rotor, units: Units) -> None:
-        self._memory, self._rotor, self._units = memory, rotor, units
+    def __init__(self, memory: Memory, rotor: Rotor) -> None:
+        self._memory, self._rotor = memory, rotor
         self._offsets = {"C1": 0, "C2": 0}
         self._base = (0.0, 0.0)
 
@@ -72,7 +74,7 @@ class Counters:
         if not self._memory.counting:
             return raw
         steps, counts = self._base
-        return steps + (raw - counts) * self._units.steps_per_count
+        return steps + (raw - counts) * self._memory.steps_per_count
 
     def places_of(self, value: float, t: float) -> tuple[float, float]:
         """Where P reads a value, on either side of here: it rolls over."""
@@ -106,4 +108,61 @@ class Counters:
 
     def _counts(self, t: float) -> float:
         steps, counts = self._base
-        return counts + (self._rotor.position(t) - steps) / self._units.steps_per_count
+        return counts + (self._rotor.position(t) - steps) / self._memory.steps_per_count
+
+
+DIRECTIONS = {PLUS: 1, MINUS: -1}
+"""Types of the limit switches, and their directions."""
+ERRORS = {1: E.PLUS_LIMIT, -1: E.MINUS_LIMIT}
+"""Codes by direction."""
+SOFTWARE = {1: 1, -1: 0}
+"""The first number of LS, by direction."""
+FRESH = {0: (0, 0), 1: (0, 0)}
+"""LS from the factory: position and whether it is enabled."""
+
+
+class Limits:
+    """The limits of one drive. A limit acts on motion in its own direction only, which it refuses while it is active.
+
+    `homing.LimitStop` ends the motion that reaches one, as LM says. `switches` are the directions of limit switches
+    that are active, `software` is LS.
+    """
+
+    def __init__(self, counters: Counters) -> None:
+        self._counters = counters
+        self.switches: set[int] = set()
+        self.software: dict[int, tuple[int, ...]] = dict(FRESH)
+
+    def refuse(self, t: float, direction: float) -> int:
+        """What forbids a motion in a direction: 83, 84 or 0."""
+        sign = 1 if direction > 0 else -1
+        if not direction:
+            return 0
+        return ERRORS[sign] if sign in self.switches or self._beyond(t, sign) else 0
+
+    def beyond(self, t: float) -> set[int]:
+        """The directions of the software limits that P is beyond."""
+        return {direction for direction in SOFTWARE if self._beyond(t, direction)}
+
+    def next_passed(self, t: float) -> tuple[float, int]:
+        """When P next passes a software limit on its way out, and in which direction."""
+        first = inf, 0
+        for direction, n in SOFTWARE.items():
+            if self.software[n][1] != 0 and (at := self._passes(t, direction)) < first[0]:
+                first = at, direction
+        return first
+
+    def _place(self, direction: int) -> float:
+        return self._counters.place_of(self.software[SOFTWARE[direction]][0])
+
+    def _beyond(self, t: float, direction: int) -> bool:
+        if not self.software[SOFTWARE[direction]][1]:
+            return False
+        return (self._counters.place(t) - self._place(direction)) * direction >= -TOUCH
+
+    def _passes(self, t: float, direction: int) -> float:
+        counters, place = self._counters, self._place(direction)
+        if self._beyond(t, direction):
+            back = counters.passing(place, t, -direction)
+            t = inf if back == inf else nextafter(back, inf)
+        return inf if t == inf else counters.passing(place, t, direction)

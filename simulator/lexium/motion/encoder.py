@@ -14,13 +14,10 @@ from math import inf
 
 from multidrop.dialects.mcode.manual.errors import ErrorNumber as E
 from multidrop.simulator.lexium.motion.axis import CORRECTION, MOVES, Axis
-from multidrop.simulator.lexium.motion.bridges import Bridges
-from multidrop.simulator.lexium.motion.limits import Limits
-from multidrop.simulator.lexium.motion.program_control import ProgramControl
+from multidrop.simulator.lexium.motion.counters import Limits
 from multidrop.simulator.lexium.motion.rotor import FOLLOWING
-from multidrop.simulator.lexium.motion.units import Units
-from multidrop.simulator.lexium.state.memory import Memory
-from multidrop.simulator.lexium.state.timeline import Event, Timeline, when
+from multidrop.simulator.lexium.state.interpreter import Core
+from multidrop.simulator.lexium.state.timeline import Event, when
 
 TOUCH = 1e-3
 """Steps that are rounding."""
@@ -29,20 +26,9 @@ TOUCH = 1e-3
 class Encoder:
     """The encoder functions of one drive."""
 
-    def __init__(
-        self,
-        memory: Memory,
-        timeline: Timeline,
-        units: Units,
-        bridges: Bridges,
-        axis: Axis,
-        limits: Limits,
-        program: ProgramControl,
-        stop: Callable[[float], None],
-    ) -> None:
-        self._values, self._tries_allowed, self._timeline = memory.values, memory.model.tries, timeline
-        self._units, self._bridges, self._axis, self._limits = units, bridges, axis, limits
-        self._program, self._stop = program, stop
+    def __init__(self, core: Core, axis: Axis, limits: Limits, stop: Callable[[float], None]) -> None:
+        self._memory, self._values, self._timeline = core.memory, core.values, core.timeline
+        self._axis, self._limits, self._interpreter, self._stop = axis, limits, core.interpreter, stop
         self._stalled = False
         self._check_at = inf
         self._tries = 0
@@ -51,7 +37,7 @@ class Encoder:
     def watching(self) -> bool:
         """Whether they are in force."""
         values = self._values
-        return bool(values.get("EE") and not values.get("AS") and self._bridges.driving)
+        return bool(values.get("EE") and not values.get("AS") and self._axis.bridges.driving)
 
     def error(self, t: float) -> float:
         """The lag of the rotor, steps, with a sign."""
@@ -101,7 +87,7 @@ class Encoder:
 
     @property
     def _stall_at(self) -> float:
-        return max(float(self._values["SF"]), 1.0) * self._units.steps_per_count
+        return max(float(self._values["SF"]), 1.0) * self._memory.steps_per_count
 
     def _stalls(self, t: float) -> float:
         axis = self._axis
@@ -117,21 +103,21 @@ class Encoder:
         if not self._values["SM"]:
             self._stop(t)
             self._check_at = inf
-        self._program.raise_error(E.STALL)
+        self._interpreter.raise_error(E.STALL)
 
     def _check(self, t: float) -> None:
         self._check_at = inf
         self._tries = self._tries + 1 if self._axis.kind == CORRECTION else 0
-        self._correct(t, tried=self._tries >= self._tries_allowed)
+        self._correct(t, tried=self._tries >= self._memory.model.tries)
 
     def _correct(self, t: float, tried: bool) -> None:
         """Go back, unless that has been tried or may not be."""
         error, axis, values = self.error(t), self._axis, self._values
-        if abs(error) <= values["DB"] * self._units.steps_per_count + TOUCH:
+        if abs(error) <= values["DB"] * self._memory.steps_per_count + TOUCH:
             return
         self._timeline.replan()
         limit = self._limits.refuse(t, error)
         if tried or limit:
-            self._program.raise_error(E.POSITION_OFF if tried else limit)
+            self._interpreter.raise_error(E.POSITION_OFF if tried else limit)
         elif abs(error) < self._stall_at - TOUCH or values["SM"]:
             axis.correct(error, t)

@@ -14,13 +14,10 @@ from collections.abc import Callable
 from math import exp, inf, log
 
 from multidrop.dialects.mcode.manual.errors import ErrorNumber as E
-from multidrop.simulator.lexium.motion.bridges import Bridges
-from multidrop.simulator.lexium.motion.motion_status import MotionStatus
-from multidrop.simulator.lexium.motion.program_control import ProgramControl
-from multidrop.simulator.lexium.motion.torque import VARIABLE, Torque
-from multidrop.simulator.lexium.state.memory import Memory
+from multidrop.simulator.lexium.motion.axis import Axis
+from multidrop.simulator.lexium.motion.hmt import VARIABLE, Torque
+from multidrop.simulator.lexium.state.interpreter import Core
 from multidrop.simulator.lexium.state.timeline import Event, nothing, when
-from multidrop.simulator.world import World
 
 AMBIENT, RISE, TIME_CONSTANT = 35.0, 25.0, 300.0
 HOTTEST = 85.0
@@ -30,21 +27,13 @@ LEAST_SHARE = 0.25
 class Heat:
     """The temperature of one drive: an exponential from where it was at a time towards where it would end."""
 
-    def __init__(
-        self,
-        memory: Memory,
-        world: World,
-        bridges: Bridges,
-        status: MotionStatus,
-        torque: Torque,
-        program: ProgramControl,
-        disable: Callable[[float], None],
-    ) -> None:
-        self._values, self._model, self._world, self._bridges = memory.values, memory.model, world, bridges
-        self._status, self._torque, self._program, self._disable = status, torque, program, disable
+    def __init__(self, core: Core, axis: Axis, torque: Torque, disable: Callable[[float], None]) -> None:
+        self._values, self._model, self._world = core.values, core.model, core.world
+        self._bridges, self._status, self._torque = axis.bridges, axis.status, torque
+        self._interpreter, self._disable = core.interpreter, disable
         self._since, self._was, self._towards = 0.0, AMBIENT, AMBIENT
         self._warned = self._tripped = False
-        self._sensed = "IT" in memory.values
+        self._sensed = "IT" in core.values
 
     def current(self, t: float) -> float:
         """Percent of the greatest one."""
@@ -108,9 +97,9 @@ class Heat:
 
     def _warn(self, t: float) -> None:
         self._warned = True
-        self._program.raise_error(E.TEMPERATURE_WARNING)
+        self._interpreter.raise_error(E.TEMPERATURE_WARNING)
 
     def _trip(self, t: float) -> None:
         self._tripped = True
         self._disable(t)
-        self._program.raise_error(E.OVERTEMPERATURE)
+        self._interpreter.raise_error(E.OVERTEMPERATURE)

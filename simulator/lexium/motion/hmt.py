@@ -1,10 +1,11 @@
-"""hMT, the closed loop of an LMDC drive: lead and lag, the locked rotor, calibration.
+"""hMT, the closed loop of an LMDC drive: lead and lag, the locked rotor, calibration; and its torque mode.
 
 With AS=1 and 2 the drive knows how far the rotor lags the command (LL) and makes that good as MU says (the way
 it catches up is in `rotor`). LD and LG are errors (106, 107). A rotor at rest for LT at the bounds (CB) is
 locked: error 104, and the bridges are off until CF. A TA that waits for one of these takes the error's place. With
-MU=1 or 2, where a move is to end on time, one that ends without its rotor is error 108. AS=3 is the matter of
-`torque`. Manual 5.1.2, 5.1.6, 5.1.18, 5.1.20, 5.1.72 to 5.1.79, 5.1.87, 5.1.122 to 5.1.131, section 8.
+MU=1 or 2, where a move is to end on time, one that ends without its rotor is error 108. In torque mode (AS=3) the motor
+turns at TS towards TD, as long as TQ is more than the load needs. Manual 5.1.2, 5.1.6, 5.1.18, 5.1.20, 5.1.72 to
+5.1.79, 5.1.87, 5.1.122 to 5.1.131, section 8.
 
 Chosen where the manual is silent: calibration takes `CALIBRATION` when AS leaves 0 (at power-up it is done by the time
 of the sign-on). 16 is in AF while there is lead or lag, 64 once that has been made good. Lead and lag are counted
@@ -17,20 +18,68 @@ from collections.abc import Callable
 from math import inf
 
 from multidrop.dialects.mcode.manual.errors import ErrorNumber as E
-from multidrop.simulator.kinematics.profile import meeting
+from multidrop.simulator.kinematics.profile import halt, meeting
 from multidrop.simulator.lexium.motion.axis import MOVES, TORQUE, Axis
-from multidrop.simulator.lexium.motion.bridges import Bridges
-from multidrop.simulator.lexium.motion.motion_status import MotionStatus
-from multidrop.simulator.lexium.motion.program_control import ProgramControl
-from multidrop.simulator.lexium.motion.rotor import FOLLOWING, STANDING
-from multidrop.simulator.lexium.motion.scale import Scale
-from multidrop.simulator.lexium.motion.torque import FIXED, TORQUE_MODE, VARIABLE, Torque
+from multidrop.simulator.lexium.motion.counters import Limits
+from multidrop.simulator.lexium.motion.rotor import FOLLOWING, STANDING, TOUCH
 from multidrop.simulator.lexium.motion.trips import Trips
-from multidrop.simulator.lexium.motion.units import Units
-from multidrop.simulator.lexium.motion.world_frame import TOUCH
 from multidrop.simulator.lexium.state.errors import Fault
-from multidrop.simulator.lexium.state.memory import Memory
-from multidrop.simulator.lexium.state.timeline import Event, Timeline, nothing, when
+from multidrop.simulator.lexium.state.interpreter import Core
+from multidrop.simulator.lexium.state.timeline import Event, nothing, when
+
+FIXED, VARIABLE, TORQUE_MODE = 1, 2, 3
+"""Values of AS."""
+
+
+class Torque:
+    """Torque mode of one drive. `halted`: a stop lets it stand until AS is set again, a pause until it goes on."""
+
+    def __init__(self, core: Core, axis: Axis, limits: Limits) -> None:
+        self._values, self._timeline, self._world = core.values, core.timeline, core.world
+        self._axis, self._limits = axis, limits
+        self.halted = False
+
+    @property
+    def active(self) -> bool:
+        return self._values.get("AS") == TORQUE_MODE
+
+    def set_speed(self, speed: int) -> None:
+        self._values["TS"] = speed
+        self._timeline.replan()
+
+    def halt(self) -> bool:
+        """Slow down and stand, in torque mode. Gives whether the drive is in that mode."""
+        if not self.active:
+            return False
+        self.halted = True
+        self._timeline.replan()
+        return True
+
+    def go_on(self, t: float) -> None:
+        self.halted = False
+        self._timeline.replan()
+
+    def turn(self, t: float) -> bool:
+        """Turn as TS and TD say, or stand while halted or at a limit. Gives whether something holds the rotor."""
+        values, axis = self._values, self._axis
+        direction = 1.0 if values["TD"] else -1.0
+        free = self._axis.bridges.driving and not self.halted and not self._limits.refuse(t, direction)
+        speed = float(values["TS"]) if free else 0.0
+        if speed and self._held(direction):
+            if axis.profile.moving(t) and axis.profile.velocity(t) * direction >= 0:
+                axis.begin(TORQUE, halt(t, axis.position(t)), t)
+                self._timeline.replan()
+            return True
+        wanted = direction * speed
+        final = axis.profile.segments[-1].velocity if axis.profile.end == inf else 0.0
+        if wanted != final and (wanted or axis.profile.end == inf):
+            axis.slow_to(wanted, t, kind=TORQUE)
+            self._timeline.replan()
+        return False
+
+    def _held(self, direction: float) -> bool:
+        return self._axis.rotor.holds(direction) or self._values["TQ"] <= 100 * self._world.load
+
 
 CALIBRATION = 0.02
 """s."""
@@ -46,24 +95,10 @@ NEAR = 1e-3
 class Hmt:
     """hMT of one drive; in force on products that have AS."""
 
-    def __init__(
-        self,
-        memory: Memory,
-        timeline: Timeline,
-        units: Units,
-        bridges: Bridges,
-        axis: Axis,
-        scale: Scale,
-        status: MotionStatus,
-        torque: Torque,
-        trips: Trips,
-        program: ProgramControl,
-        stop: Callable[[float], None],
-    ) -> None:
-        self._values, self._timeline, self._units, self._bridges = memory.values, timeline, units, bridges
-        self._axis, self._rotor, self._scale = axis, axis.rotor, scale
-        self._motion, self._torque = status, torque
-        self._trips, self._program, self._stop = trips, program, stop
+    def __init__(self, core: Core, axis: Axis, torque: Torque, trips: Trips, stop: Callable[[float], None]) -> None:
+        self._memory, self._values, self._timeline = core.memory, core.values, core.timeline
+        self._axis, self._rotor, self._bridges, self._torque = axis, axis.rotor, axis.bridges, torque
+        self._trips, self._interpreter, self._stop = trips, core.interpreter, stop
         self._ready_at = inf
         self._failed = self._zero = self._active = False
         self._held_since = inf
@@ -128,12 +163,12 @@ class Hmt:
         """Set AS. Raises Fault (87, 109)."""
         axis, was = self._axis, self.mode
         turning = was == TORQUE_MODE and axis.kind == TORQUE
-        if self._motion.moving(t) and not turning:
+        if self._axis.status.moving(t) and not turning:
             raise Fault(E.AS_WHILE_MOVING)
         if mode and not self._bridges.enabled:
             self._failed = True
             raise Fault(E.CALIBRATION_FAILED)
-        self._scale.switch("AS", mode, t)
+        self._axis.switch_unit("AS", mode, t)
         self._torque.halted = self._failed = False
         self._timeline.replan()
         if was == TORQUE_MODE and mode != was:
@@ -192,7 +227,7 @@ class Hmt:
         """Report a move that has ended without its rotor."""
         over = self._axis.kind in MOVES and not self._axis.back
         if self.closed and over and self._values["MU"] and self.lag(t):
-            self._program.raise_error(E.LEAD_LAG_LEFT)
+            self._interpreter.raise_error(E.LEAD_LAG_LEFT)
 
     def look(self, t: float) -> None:
         """See where the rotor is."""
@@ -213,7 +248,7 @@ class Hmt:
         locks_at = inf if reported else self._held_since + self._values["LT"] / 1000
         found = [(self._ready_at, self._calibrated), (locks_at, self._lock)]
         if self.closed and self._rotor.state != FOLLOWING:
-            levels = (self._units.bound, float(self._values["LG"]), float(self._values["LD"]))
+            levels = (self._memory.bound, float(self._values["LG"]), float(self._values["LD"]))
             found += [(self._lags_at(limit, t), nothing) for limit in levels]
             turned = self._axis.profile.turning(-self._axis.direction(t), t)
             found.append((inf if turned is None else turned, nothing))
@@ -237,7 +272,7 @@ class Hmt:
         """Report lead and lag that have reached their limits, and see the rotor stand at its bounds."""
         values, rotor = self._values, self._rotor
         lag = self._axis.direction(t) * rotor.lag(t)
-        active = abs(lag) >= self._units.bound - NEAR
+        active = abs(lag) >= self._memory.bound - NEAR
         self._note_held(active and rotor.state == STANDING, t)
         self._report(E.LAG_LIMIT, TA_LAG, lag >= values["LG"] - NEAR and lag > 0, t)
         self._report(E.LEAD_LIMIT, TA_LEAD, -lag >= values["LD"] - NEAR and lag < 0, t)
@@ -258,7 +293,7 @@ class Hmt:
         elif code not in self._reported:
             self._reported.add(code)
             if not self._trips.hmt(bit, t):
-                self._program.raise_error(code)
+                self._interpreter.raise_error(code)
 
     def _lock(self, t: float) -> None:
         """Lock the rotor: switch the bridges off; in torque mode there is only the flag, LR."""
@@ -271,7 +306,7 @@ class Hmt:
         self.tune()
         self._timeline.replan()
         if not self._trips.hmt(TA_LOCKED, t):
-            self._program.raise_error(E.LOCKED_ROTOR)
+            self._interpreter.raise_error(E.LOCKED_ROTOR)
 
     def _calibrated(self, t: float) -> None:
         self._ready_at = inf

@@ -18,16 +18,12 @@ from multidrop.dialects.mcode.manual.errors import ErrorNumber as E
 from multidrop.simulator.kinematics.profile import slew
 from multidrop.simulator.kinematics.segments import Shape
 from multidrop.simulator.lexium.motion.axis import HOMING, TORQUE, Axis
-from multidrop.simulator.lexium.motion.bridges import Bridges
+from multidrop.simulator.lexium.motion.counters import DIRECTIONS, ERRORS, Limits
 from multidrop.simulator.lexium.motion.inputs import HOME, Inputs
-from multidrop.simulator.lexium.motion.limits import DIRECTIONS, ERRORS, Limits
-from multidrop.simulator.lexium.motion.motion_status import MotionStatus
-from multidrop.simulator.lexium.motion.program_control import ProgramControl
-from multidrop.simulator.lexium.motion.units import Units
-from multidrop.simulator.lexium.motion.world_frame import TOUCH
+from multidrop.simulator.lexium.motion.rotor import TOUCH
 from multidrop.simulator.lexium.state.errors import Fault
-from multidrop.simulator.lexium.state.memory import Memory
-from multidrop.simulator.lexium.state.timeline import Event, Timeline
+from multidrop.simulator.lexium.state.interpreter import Core
+from multidrop.simulator.lexium.state.timeline import Event
 
 SEEK, BRAKE, TURN, APPROACH = "seek", "brake", "turn", "approach"
 TYPES = {1: (-1, 1), 2: (-1, -1), 3: (1, -1), 4: (1, 1)}
@@ -39,21 +35,9 @@ WITHOUT_RAMP, TURNS_ROUND = (4, 5, 6), (1, 4)
 class Homing:
     """The homing of one drive. `phase` is empty while there is none."""
 
-    def __init__(
-        self,
-        memory: Memory,
-        timeline: Timeline,
-        units: Units,
-        bridges: Bridges,
-        axis: Axis,
-        status: MotionStatus,
-        inputs: Inputs,
-        limits: Limits,
-        program: ProgramControl,
-    ) -> None:
-        self._values, self._timeline, self._units, self._bridges = memory.values, timeline, units, bridges
-        self._axis, self._status, self._inputs, self._limits = axis, status, inputs, limits
-        self._program = program
+    def __init__(self, core: Core, axis: Axis, inputs: Inputs, limits: Limits) -> None:
+        self._memory, self._values, self._timeline = core.memory, core.values, core.timeline
+        self._axis, self._inputs, self._limits, self._interpreter = axis, inputs, limits, core.interpreter
         self.phase = ""
         self._word = ""
         self._directions = (0, 0)
@@ -66,10 +50,10 @@ class Homing:
         """Begin HM, HI or HF. Raises Fault (80, 81, 83, 84, 85, 94, 96)."""
         if kind not in TYPES:
             raise Fault(E.NO_HOMING_TYPE)
-        self._bridges.check()
+        self._axis.bridges.check()
         if word == "HM" and not self._inputs.has(HOME):
             raise Fault(E.NO_HOME_INPUT)
-        if self._status.moving(t):
+        if self._axis.status.moving(t):
             raise Fault(E.HOMING_OR_MOVING)
         seek, approach = TYPES[kind]
         begun = word == "HM" and self._at_switch()
@@ -120,7 +104,6 @@ class Homing:
         return go_on
 
     def cancel(self) -> None:
-        """End the homing: something else has stopped the motor."""
         self.phase = ""
 
     def home(self, active: bool, t: float) -> None:
@@ -168,7 +151,7 @@ class Homing:
                 self._axis.stop(t)
             else:
                 self._axis.slow_to(0, t)
-            self._program.raise_error(E.NO_HOME_SWITCH)
+            self._interpreter.raise_error(E.NO_HOME_SWITCH)
             return True
         if self.phase == SEEK and mode in TURNS_ROUND:
             if mode in WITHOUT_RAMP:
@@ -182,7 +165,7 @@ class Homing:
 
     def _seek(self, direction: int, t: float) -> None:
         self.phase, self._sought = SEEK, direction
-        self._axis.slow_to(direction * self._values["VM"] * self._units.scale, t, kind=HOMING)
+        self._axis.slow_to(direction * self._values["VM"] * self._memory.scale, t, kind=HOMING)
         self._set_mark(direction, t)
 
     def _brake(self, phase: str, t: float) -> None:
@@ -191,7 +174,7 @@ class Homing:
 
     def _approach(self, t: float) -> None:
         self.phase = APPROACH
-        here, direction, vi = self._axis.position(t), self._directions[1], self._values["VI"] * self._units.scale
+        here, direction, vi = self._axis.position(t), self._directions[1], self._values["VI"] * self._memory.scale
         still = Shape()
         profile = slew(t, here, 0.0, direction * vi, vi=vi, a=1.0, d=1.0, up=still, down=still)
         self._axis.begin(HOMING, profile, t)
@@ -202,7 +185,7 @@ class Homing:
         if self._word == "HM":
             return
         self._offset, self._toward = self._values["FS"] if self._word == "HF" else 0.0, direction
-        self._see_mark(self._axis.rotor.position(t) + direction * self._units.steps_per_count / 2)
+        self._see_mark(self._axis.rotor.position(t) + direction * self._memory.steps_per_count / 2)
 
     def _see_mark(self, here: float) -> None:
         frame = self._axis.rotor.frame
@@ -242,18 +225,10 @@ WITH_PROGRAM = (3, 6)
 class LimitStop:
     """The stop at a limit, of one drive."""
 
-    def __init__(
-        self,
-        memory: Memory,
-        timeline: Timeline,
-        limits: Limits,
-        axis: Axis,
-        homing: Homing,
-        inputs: Inputs,
-        program: ProgramControl,
-    ) -> None:
-        self._values, self._timeline, self._limits, self._axis = memory.values, timeline, limits, axis
-        self._homing, self._inputs, self._program = homing, inputs, program
+    def __init__(self, core: Core, axis: Axis, inputs: Inputs, limits: Limits, homing: Homing) -> None:
+        self._values, self._timeline, self._thread = core.values, core.timeline, core.thread
+        self._axis, self._inputs, self._limits, self._homing = axis, inputs, limits, homing
+        self._interpreter = core.interpreter
         self._barred = 0
 
     def next(self, t: float) -> Event:
@@ -307,5 +282,5 @@ class LimitStop:
 
     def _report(self, direction: int) -> None:
         if self._values["LM"] in WITH_PROGRAM:
-            self._program.finish()
-        self._program.raise_error(ERRORS[direction])
+            self._thread.finish()
+        self._interpreter.raise_error(ERRORS[direction])

@@ -1,7 +1,7 @@
 """Inputs of a simulated MCode drive: their set-up, levels, filters, and what becomes active when.
 
 An input's level comes from the hand or the schedule that holds it, else from the switch that its type wires to it, else
-it idles, inactive. `refresh` looks at the levels and gives the edges, on which `input_functions` and trips act. I<n> is
+it idles, inactive. `refresh` reads the levels and returns the edges, on which `event_loop` and trips act. I<n> is
 active and filtered, IN is the raw level. D1 to D4 do not filter a capture or clock input: FC and FM do, by less
 than a program can see. A point of an MDrivePlus that is an output reads as what it puts out, and has no edges. Manual
 5.1.25, 5.1.26, 5.1.44, 5.1.56 to 5.1.66.
@@ -15,9 +15,8 @@ from math import inf
 from multidrop.dialects.mcode.manual.errors import ErrorNumber as E
 from multidrop.simulator.lexium.motion.rotor import Rotor
 from multidrop.simulator.lexium.state.errors import Fault
-from multidrop.simulator.lexium.state.memory import Memory
+from multidrop.simulator.lexium.state.interpreter import Core
 from multidrop.simulator.lexium.state.models import STEP_DIRECTION, UP_DOWN
-from multidrop.simulator.world import World
 
 GENERAL, HOME, PLUS, MINUS, GO, SOFT_STOP, PAUSE, JOG_PLUS, JOG_MINUS, RESET = 0, 1, 2, 3, 4, 5, 6, 7, 8, 11
 """Types of inputs; those of clocks and captures differ between products."""
@@ -38,9 +37,9 @@ class Inputs:
     `put_out` gives the level of a point that is an output, None for an input.
     """
 
-    def __init__(self, memory: Memory, world: World, rotor: Rotor) -> None:
-        self._memory, self._world, self._rotor = memory, world, rotor
-        self.points = memory.model.points
+    def __init__(self, core: Core, rotor: Rotor) -> None:
+        self._values, self._world, self._rotor = core.values, core.world, rotor
+        self.points = core.model.points
         self.numbers = self.points.inputs
         self.types: dict[int, tuple[int, ...]] = {}
         self.watched = True
@@ -170,7 +169,7 @@ class Inputs:
     def _settle_analog(self, t: float) -> None:
         """Add the analog readings since the last look to the average."""
         average, counts, since = self._analog
-        weight, fresh = self._memory.values["D5"], self._counts(t)
+        weight, fresh = self._values["D5"], self._counts(t)
         if weight < 2:
             self._analog = (float(fresh), fresh, t)
             return
@@ -185,7 +184,7 @@ class Inputs:
 
     def _due(self, n: int) -> float:
         """When the level that an input has now passes its filter."""
-        filtered = 0.0 if self.types[n][0] in self._unfiltered else self._memory.values.get(f"D{n}", 0) / 1000
+        filtered = 0.0 if self.types[n][0] in self._unfiltered else self._values.get(f"D{n}", 0) / 1000
         return self._since.get(n, 0.0) + filtered
 
     def _levels(self, t: float) -> list[int]:
@@ -220,8 +219,8 @@ _TURNS = {(0, 0): 0, (0, 1): 1, (1, 1): 2, (1, 0): 3}
 class ClockInputs:
     """The clock of one drive, which is two of its inputs."""
 
-    def __init__(self, memory: Memory, inputs: Inputs) -> None:
-        self._values, self._inputs = memory.values, inputs
+    def __init__(self, core: Core, inputs: Inputs) -> None:
+        self._values, self._inputs = core.values, inputs
         self._states = (1, 1)
         self._part = 0.0
 

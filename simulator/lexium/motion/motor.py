@@ -1,7 +1,10 @@
-"""The parts that have a hand in a simulated drive's motion, put together: what they see, and what happens next.
+"""The parts of a simulated drive's motion, put together: what they see, and what happens next.
 
 The axis moves, the rotor follows; homing, limits, encoder, hMT, heat and the clock inputs watch both and command the
-axis in turn. The device asks `next` what happens next and lets it happen; `look` sees what has changed from outside.
+axis in turn. The device asks `next` for the next event and lets it happen; `look` reads what has changed from outside.
+The configuration test (SC) makes half a turn and compares what the encoder has seen of it. The jog inputs (types 7 and
+8) turn at VM while one of them is active and JE=1; chosen where the manual is silent: a jog does not change another
+motion, and both inputs at once cancel each other. Manual 3.4.3, 5.1.64, 5.1.103, 5.1.112, 5.1.115, 7.2.3.
 """
 
 from __future__ import annotations
@@ -9,116 +12,47 @@ from __future__ import annotations
 from collections.abc import Callable
 from math import inf
 
+from multidrop.dialects.mcode.manual.errors import JOG_IN_CLOCK_MODE
 from multidrop.dialects.mcode.manual.errors import ErrorNumber as E
 from multidrop.simulator.kinematics.profile import move
-from multidrop.simulator.lexium.motion.axis import HOMING, Axis
-from multidrop.simulator.lexium.motion.bridges import Bridges
-from multidrop.simulator.lexium.motion.counters import Counters
+from multidrop.simulator.lexium.motion.axis import HOMING, SLEW, Axis
+from multidrop.simulator.lexium.motion.counters import DIRECTIONS, Counters, Limits
 from multidrop.simulator.lexium.motion.encoder import Encoder
 from multidrop.simulator.lexium.motion.heat import Heat
-from multidrop.simulator.lexium.motion.hmt import Hmt
+from multidrop.simulator.lexium.motion.hmt import Hmt, Torque
 from multidrop.simulator.lexium.motion.homing import Homing, LimitStop
-from multidrop.simulator.lexium.motion.inputs import HOME, ClockInputs, Inputs
-from multidrop.simulator.lexium.motion.jog import Jog
-from multidrop.simulator.lexium.motion.limits import DIRECTIONS, Limits
-from multidrop.simulator.lexium.motion.motion_status import MotionStatus
-from multidrop.simulator.lexium.motion.program_control import ProgramControl
+from multidrop.simulator.lexium.motion.inputs import HOME, JOG_MINUS, JOG_PLUS, ClockInputs, Inputs
 from multidrop.simulator.lexium.motion.rotor import Rotor
-from multidrop.simulator.lexium.motion.scale import Scale
-from multidrop.simulator.lexium.motion.torque import Torque
 from multidrop.simulator.lexium.motion.trips import Trips
-from multidrop.simulator.lexium.motion.units import Units
 from multidrop.simulator.lexium.state.errors import Fault
-from multidrop.simulator.lexium.state.memory import Memory
-from multidrop.simulator.lexium.state.timeline import Event, Timeline, when
-from multidrop.simulator.world import World
-
-# The configuration test (SC): half a turn, to see what the encoder makes of it. Manual 5.1.115.
-
+from multidrop.simulator.lexium.state.interpreter import Core
+from multidrop.simulator.lexium.state.timeline import CRLF, Event, when
 
 TEST = "test"
 """The kind of motion that SC makes."""
 
 
-class ConfigurationTest:
-    """The configuration test of one drive."""
-
-    def __init__(
-        self,
-        memory: Memory,
-        timeline: Timeline,
-        units: Units,
-        bridges: Bridges,
-        axis: Axis,
-        status: MotionStatus,
-        program: ProgramControl,
-    ) -> None:
-        self._values, self._timeline, self._units, self._bridges = memory.values, timeline, units, bridges
-        self._axis, self._status, self._program = axis, status, program
-        self._begun_at = 0.0
-
-    def start(self, t: float) -> None:
-        """Begin. Raises Fault (89, 94, 96, 103)."""
-        values, scale, axis = self._values, self._units.scale, self._axis
-        if not self._bridges.enabled:
-            raise Fault(E.NOT_TESTED)
-        if self._status.moving(t):
-            raise Fault(E.CALIBRATION_WHILE_MOVING)
-        axis.allow(t, 1.0)
-        here, vi = axis.position(t), values["VI"] * scale
-        self._begun_at = axis.rotor.position(t)
-        top, rate = values["VM"] * scale, values["A"] * scale
-        target = here + self._units.steps_per_turn / 2
-        axis.begin(TEST, move(t, here, 0.0, target, vi=vi, vm=top, a=rate, d=rate), t)
-        self._timeline.replan()
-
-    def moving(self, t: float) -> bool:
-        """Whether its motion is under way."""
-        return self._axis.kind == TEST and self._axis.profile.moving(t)
-
-    def arrive(self, t: float) -> None:
-        """Compare what the encoder has seen, where its motion has ended."""
-        seen = self._axis.rotor.position(t) - self._begun_at
-        if self._axis.kind == TEST and abs(seen - self._units.steps_per_turn / 2) > 1:
-            self._program.raise_error(E.ENCODER_RESOLUTION_WRONG)
-
-
 class Motor:
-    """The motor of one drive. It is the axis's supervisor.
+    """The motor of one drive. It is the axis's supervisor. `jog` is the direction of the jog, 0 while there is none."""
 
-    `announce` sends the drive's name at the end of a motion that asks for that.
-    """
-
-    def __init__(
-        self,
-        memory: Memory,
-        timeline: Timeline,
-        world: World,
-        rotor: Rotor,
-        inputs: Inputs,
-        program: ProgramControl,
-        announce: Callable[[], None],
-    ) -> None:
-        values, model = memory.values, memory.model
-        self._memory, self._timeline, self._announce = memory, timeline, announce
-        self.rotor, self._inputs = rotor, inputs
-        self.units = units = Units(memory)
-        self.bridges = bridges = Bridges(values, model.disabled_moves)
-        self.counters = Counters(memory, rotor, units)
-        self.axis = axis = Axis(memory, units, bridges, rotor, self.counters, self)
-        self.status = status = MotionStatus(memory, units, axis, self)
+    def __init__(self, core: Core) -> None:
+        self._core, self._memory, self._timeline = core, core.memory, core.timeline
+        self.rotor = rotor = Rotor(core)
+        self.inputs = inputs = Inputs(core, rotor)
+        self.counters = Counters(core.memory, rotor)
+        self.axis = axis = Axis(core.memory, rotor, self.counters, self)
+        self.status, self.bridges = axis.status, axis.bridges
         self.limits = limits = Limits(self.counters)
-        self.trips = Trips(memory, timeline, units, self.counters, inputs, program)
-        self.homing = Homing(memory, timeline, units, bridges, axis, status, inputs, limits, program)
-        self.limit_stop = LimitStop(memory, timeline, limits, axis, self.homing, inputs, program)
-        self.encoder = Encoder(memory, timeline, units, bridges, axis, limits, program, self.stop)
-        self.torque = torque = Torque(memory, timeline, world, axis, bridges, limits)
-        self.scale = scale = Scale(memory, units, axis, self.counters)
-        self.hmt = Hmt(memory, timeline, units, bridges, axis, scale, status, torque, self.trips, program, self.stop)
-        self.test = ConfigurationTest(memory, timeline, units, bridges, axis, status, program)
-        self.heat = Heat(memory, world, bridges, status, torque, program, lambda t: self.enable(0, t))
-        self.jog = Jog(memory, timeline, axis, status, inputs, program)
-        self._clock = ClockInputs(memory, inputs)
+        self.trips = Trips(core, self.counters, inputs)
+        self.homing = Homing(core, axis, inputs, limits)
+        self.limit_stop = LimitStop(core, axis, inputs, limits, self.homing)
+        self.encoder = Encoder(core, axis, limits, self.stop)
+        self.torque = Torque(core, axis, limits)
+        self.hmt = Hmt(core, axis, self.torque, self.trips, self.stop)
+        self.heat = Heat(core, axis, self.torque, lambda t: self.enable(0, t))
+        self.jog = 0
+        self._tested_from = 0.0
+        self._clock = ClockInputs(core, inputs)
 
     # What the axis asks.
 
@@ -129,7 +63,7 @@ class Motor:
 
     def refuse(self, t: float, direction: float) -> int:
         """The code of what forbids a motion in a direction, or 0."""
-        if self.hmt.calibrating or self.test.moving(t):
+        if self.hmt.calibrating or (self.axis.kind == TEST and self.axis.profile.moving(t)):
             return E.MOVE_WHILE_CALIBRATING
         return E.HOMING_OR_MOVING if self.torque.active else self.limits.refuse(t, direction)
 
@@ -174,7 +108,7 @@ class Motor:
         switches = self.limits.switches
         switches.clear()
         if not self._memory.values.get("CM"):
-            switches.update([DIRECTIONS[kind] for kind in self._inputs.active_types() if kind in DIRECTIONS])
+            switches.update([DIRECTIONS[kind] for kind in self.inputs.active_types() if kind in DIRECTIONS])
 
     def input_changed(self, kind: int, active: bool, t: float) -> None:
         """Act on an input of a type that is a matter of motion."""
@@ -190,10 +124,26 @@ class Motor:
         self.homing.cancel()
         self.axis.stop(t)
         self.encoder.begin()
-        self.jog.direction = 0  # the jog input, once released, then stops nothing that was begun since
+        self.end_jog()
 
-    def pause(self, t: float) -> Callable[[float], None]:
-        """Slow down and stop; what is given takes up the same motion again."""
+    def pause_program(self) -> None:
+        """Carry out PS: the program pauses; the motion slows down and stops. Raises Fault (40)."""
+        thread, t = self._core.thread, self._timeline.now
+        if not thread.running:
+            raise Fault(E.NO_PROGRAM_RUNNING)
+        thread.pause(self._pause(t) if not thread.paused and self.status.moving(t) else None)
+
+    def resume_program(self) -> None:
+        """Carry out RS. Raises Fault (40, 41, and the motion's own where it may not begin again)."""
+        thread, t = self._core.thread, self._timeline.now
+        if not thread.paused:
+            raise Fault(E.PROGRAM_RUNNING if thread.running else E.NO_PROGRAM_RUNNING)
+        again = thread.go_on(t)
+        if again is not None:
+            again(t)
+
+    def _pause(self, t: float) -> Callable[[float], None]:
+        """Slow down and stop; return what takes up the same motion again."""
         if self.torque.halt():
             return self.torque.go_on
         homing = self.homing.again()
@@ -207,6 +157,54 @@ class Motor:
         if velocity or not self.torque.halt():
             self.axis.slew(velocity, t)
 
+    def start_test(self, t: float) -> None:
+        """Carry out SC 1. Raises Fault (89, 94, 96, 103)."""
+        memory, values, axis = self._memory, self._memory.values, self.axis
+        if not self.bridges.enabled:
+            raise Fault(E.NOT_TESTED)
+        if self.status.moving(t):
+            raise Fault(E.CALIBRATION_WHILE_MOVING)
+        axis.allow(t, 1.0)
+        here, vi = axis.position(t), values["VI"] * memory.scale
+        self._tested_from = self.rotor.position(t)
+        top, rate = values["VM"] * memory.scale, values["A"] * memory.scale
+        target = here + memory.steps_per_turn / 2
+        axis.begin(TEST, move(t, here, 0.0, target, vi=vi, vm=top, a=rate, d=rate), t)
+        self._timeline.replan()
+
+    def update_jog(self) -> None:
+        """Turn as the jog inputs and JE say now; a motion that may not begin is an error that no line has caused."""
+        try:
+            self._update_jog()
+        except Fault as fault:
+            self._core.interpreter.raise_error(fault.code)
+
+    def end_jog(self) -> None:
+        """Forget the jog: its input, once released, then stops nothing that was begun since."""
+        self.jog = 0
+
+    def _update_jog(self) -> None:
+        t, before, wanted = self._timeline.now, self.jog, self._wanted_jog()
+        if wanted == before or (not before and self.status.moving(t)):
+            return
+        self.jog = 0
+        self._timeline.replan()
+        if wanted:
+            self.axis.slew(wanted * int(self._memory.values["VM"]), t)
+            self.jog = wanted
+        elif self.axis.kind == SLEW:
+            self.axis.slow_to(0, t)
+            self._core.thread.drop_motion()
+
+    def _wanted_jog(self) -> int:
+        """The direction that the inputs ask for. Raises Fault (87) where the motor follows a clock."""
+        values, inputs = self._memory.values, self.inputs
+        if not values["JE"] or not inputs.watched:
+            return 0
+        if values.get("CM"):
+            raise Fault(JOG_IN_CLOCK_MODE)
+        return inputs.wants(JOG_PLUS) - inputs.wants(JOG_MINUS)
+
     def enable(self, on: int, t: float) -> None:
         """Carry out DE."""
         was, self._memory.values["DE"] = self._memory.values["DE"], on
@@ -219,7 +217,7 @@ class Motor:
         self._timeline.replan()
 
     def supply(self, on: bool, t: float) -> bool:
-        """Switch +V. Gives whether it is lost."""
+        """Switch +V. Return whether it is lost."""
         was, self.bridges.supply = self.bridges.supply, on
         self.hmt.tune()
         if on and not was:
@@ -232,7 +230,7 @@ class Motor:
         """Take other values from NVM: the rotor stays where it is, whatever its steps become."""
         values, mode = self._memory.values, self.hmt.mode
         was = self._memory.counting, values["DE"]
-        self.scale.change(load, t)
+        self.axis.rescale(load, t)
         if was != (self._memory.counting, values["DE"]):
             self.axis.align(t)
         self.hmt.changed(mode, t)
@@ -244,15 +242,17 @@ class Motor:
         self.encoder.restart()
         self.hmt.restart()
         self.axis.restart(t)
-        self.scale.orient(t)
+        self.axis.orient(t)
         self.counters.restart(t)
         self.limits.switches.clear()
-        self.jog.direction = 0
+        self.jog = 0
         self.hmt.tune()
 
     def _arrive(self, t: float) -> None:
         self.encoder.arrive(t)
-        self.test.arrive(t)
+        seen = self.rotor.position(t) - self._tested_from
+        if self.axis.kind == TEST and abs(seen - self._memory.steps_per_turn / 2) > 1:
+            self._core.interpreter.raise_error(E.ENCODER_RESOLUTION_WRONG)
         self.hmt.arrive(t)
         self.limit_stop.turn_back(t)
         if self.axis.arrive(t):
@@ -263,6 +263,10 @@ class Motor:
     def _pass_mark(self, t: float) -> None:
         if self.axis.pass_mark():
             self._announce()
+
+    def _announce(self) -> None:
+        """Send the drive's name: a motion that asks for that has ended."""
+        self._core.printer.emit(self._memory.name + CRLF)
 
     def _follow_clock(self, t: float) -> None:
         """Make the steps that a clock asks for, where the command may jump."""

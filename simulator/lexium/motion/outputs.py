@@ -5,7 +5,7 @@ Active is a matter of the program, the level one of the wiring: the third number
 The trip output (28, output 3 only) gives a pulse as long as CW says. Manual 3.4.3, 5.1.5, 5.1.24, 5.1.90 to 5.1.94.
 
 Of the events of AO the manual's text has lost the table. Known are 1 (error), 4 and 8 (lead and lag limit), 512 (hold
-current), 16384 (moving) and 32768 (stall); the others in `_attention` are a choice, and bits above 32768 do nothing.
+current), 16384 (moving) and 32768 (stall); the others in `_states` are a choice, and bits above 32768 do nothing.
 """
 
 from __future__ import annotations
@@ -13,12 +13,10 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 
 from multidrop.dialects.mcode.manual.errors import ErrorNumber as E
-from multidrop.simulator.lexium.motion.hmt import HYBRID, LAG, LEAD, MOST
+from multidrop.simulator.lexium.motion.hmt import FIXED, HYBRID, LAG, LEAD, MOST, VARIABLE
 from multidrop.simulator.lexium.motion.motor import Motor
-from multidrop.simulator.lexium.motion.torque import FIXED, VARIABLE
 from multidrop.simulator.lexium.state.errors import Fault
-from multidrop.simulator.lexium.state.memory import Memory
-from multidrop.simulator.lexium.state.timeline import Timeline
+from multidrop.simulator.lexium.state.interpreter import Core
 
 GENERAL, MOVING, ERROR, STALL, CHANGING, LOCKED_ROTOR, POSITIONING = 16, 17, 18, 19, 20, 21, 23
 HMT_ACTIVE, MAKING_UP, COUNT_A, COUNT_B, TRIP, ATTENTION, POINT_TRIP = 24, 25, 26, 27, 28, 29, 61
@@ -39,11 +37,11 @@ State = Callable[[float], bool]
 class Outputs:
     """All outputs of a drive. `types` holds type and active level by number, `driven` what O<n> said."""
 
-    def __init__(self, memory: Memory, timeline: Timeline, motor: Motor) -> None:
-        self._values, self._timeline, self._points = memory.values, timeline, memory.model.points
+    def __init__(self, core: Core, motor: Motor) -> None:
+        self._values, self._timeline, self._points = core.values, core.timeline, core.model.points
         self.types: dict[int, tuple[int, ...]] = {}
         self.driven: dict[int, int] = {}
-        self._states = _states(memory, timeline, motor)
+        self._states = _states(core, motor)
         self.defaults()
 
     def defaults(self) -> None:
@@ -119,9 +117,10 @@ class Outputs:
         return self.types[n][1] if self.active(n, t) else 1 - self.types[n][1]
 
 
-def _states(memory: Memory, timeline: Timeline, motor: Motor) -> Mapping[int, State]:
-    """What each type of output follows."""
-    values, status, hmt, trips, counters = memory.values, motor.status, motor.hmt, motor.trips, motor.counters
+def _states(core: Core, motor: Motor) -> Mapping[int, State]:
+    """Make the state that each type of output follows."""
+    values, timeline = core.values, core.timeline
+    status, hmt, trips, counters = motor.status, motor.hmt, motor.trips, motor.counters
 
     def flag(word: str) -> State:
         return lambda t: bool(values.get(word))
@@ -152,25 +151,8 @@ def _states(memory: Memory, timeline: Timeline, motor: Motor) -> Mapping[int, St
         TRIP: tripped,
         POINT_TRIP: tripped,
     }
-    events = _attention(memory, timeline, motor, states, hmt_bit)
-
-    def attention(t: float) -> bool:
-        mask = int(values["AO"])
-        return any(mask & bit and holds(t) for bit, holds in events.items())
-
-    return {**states, ATTENTION: attention}
-
-
-def _attention(
-    memory: Memory,
-    timeline: Timeline,
-    motor: Motor,
-    states: Mapping[int, State],
-    hmt_bit: Callable[[int], State],
-) -> Mapping[int, State]:
-    """What each bit of AO looks at."""
-    values, heat, switches, bridges = memory.values, motor.heat, motor.limits.switches, motor.bridges
-    return {
+    heat, switches, bridges = motor.heat, motor.limits.switches, motor.bridges
+    events: dict[int, State] = {
         1: states[ERROR],
         2: states[LOCKED_ROTOR],
         4: hmt_bit(LEAD),
@@ -188,3 +170,9 @@ def _attention(
         16384: states[MOVING],
         32768: states[STALL],
     }
+
+    def attention(t: float) -> bool:
+        mask = int(values["AO"])
+        return any(mask & bit and holds(t) for bit, holds in events.items())
+
+    return {**states, ATTENTION: attention}

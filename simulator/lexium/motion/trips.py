@@ -11,12 +11,9 @@ from math import inf
 from multidrop.dialects.mcode.manual.errors import ErrorNumber as E
 from multidrop.simulator.lexium.motion.counters import Counters
 from multidrop.simulator.lexium.motion.inputs import Inputs
-from multidrop.simulator.lexium.motion.program_control import ProgramControl
-from multidrop.simulator.lexium.motion.units import Units
 from multidrop.simulator.lexium.state.errors import Fault
-from multidrop.simulator.lexium.state.memory import Memory
-from multidrop.simulator.lexium.state.timeline import Timeline
-from multidrop.simulator.lexium.state.trip import Trip
+from multidrop.simulator.lexium.state.interpreter import Core
+from multidrop.simulator.lexium.state.memory import Trip
 
 INPUT, POSITION, CAPTURE, TIME, RELATIVE, HMT, POWER = 1, 2, 4, 8, 16, 32, 64
 BITS: Mapping[str, int] = {
@@ -27,17 +24,9 @@ BITS: Mapping[str, int] = {
 class Trips:
     """The trips of one drive. `defined` holds their set-up by bit; `fired_at` is when one last happened."""
 
-    def __init__(
-        self,
-        memory: Memory,
-        timeline: Timeline,
-        units: Units,
-        counters: Counters,
-        inputs: Inputs,
-        program: ProgramControl,
-    ) -> None:
-        self._memory, self._values, self._timeline = memory, memory.values, timeline
-        self._units, self._counters, self._inputs, self._program = units, counters, inputs, program
+    def __init__(self, core: Core, counters: Counters, inputs: Inputs) -> None:
+        self._memory, self._values, self._timeline = core.memory, core.values, core.timeline
+        self._counters, self._inputs, self._interpreter = counters, inputs, core.interpreter
         self.defined: dict[int, Trip] = {}
         self.fired_at = -inf
         self._armed_at = 0.0
@@ -118,7 +107,7 @@ class Trips:
         if self.armed & POSITION and not self._on_steps:
             found += [(POSITION, place) for place in self._counters.places_of(self.defined[POSITION].value, t)]
         if self.armed & RELATIVE:
-            distance = abs(self.defined[RELATIVE].value) * self._units.scale
+            distance = abs(self.defined[RELATIVE].value) * self._memory.scale
             found += [(RELATIVE, self._base - distance), (RELATIVE, self._base + distance)]
         return found
 
@@ -160,4 +149,4 @@ class Trips:
             values["PC"] = self._counters.position(t)
         self._timeline.replan()
         self.fired_at = t
-        self._program.interrupt(trip.target, t)
+        self._interpreter.interrupt(trip.target, t)

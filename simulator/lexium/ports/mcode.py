@@ -32,27 +32,24 @@ There is no clock: bytes and times come in, bytes with times go out. Times are s
 
 from __future__ import annotations
 
-from multidrop.simulator.lexium.ports.received import (
-    ADDRESSES,
-    CR,
-    CTRL_C,
-    CTRL_E,
-    DEAF,
-    ENDS,
-    ESC,
-    KEYS,
-    LF,
-    PLAIN,
-    STOPS,
-    KeyTail,
-    Line,
-    Overheard,
-)
-from multidrop.simulator.lexium.ports.replier import Device, Replier
-from multidrop.simulator.lexium.ports.replies import Mode
-from multidrop.simulator.lexium.ports.transmitter import Transmitter
+import re
+
+from multidrop.simulator.lexium.device import MCodeDevice
+from multidrop.simulator.lexium.ports.replies import LINE_BUFFER, Line, Mode, Replier
 from multidrop.simulator.wire.wire import Transmission
 
+CR, LF, ESC, CTRL_C, CTRL_E = 0x0D, 0x0A, 0x1B, 0x03, 0x05
+KEYS = frozenset({CR, LF, ESC, CTRL_C, CTRL_E})
+"""Bytes that have a meaning within a line for another drive."""
+PLAIN = re.compile(b"[^\r\n\x1b\x03\x05]+")
+"""Text of a line: bytes that are no keys."""
+ENDS, STOPS = re.compile(rb"[\r\n]"), re.compile(rb"[\x03\x05\x1b]")
+ADDRESSES = frozenset({CR, LF, *b"*^"})
+"""Bytes that begin a line in party mode, except for names."""
+KEY_ALONE, KEY_WITH_CHECK = "alone", "with its check byte"
+"""The bytes received so far of a key that acts at once: a check byte and a CR after it belong to it."""
+DEAF = Line(Mode(echo=0, party=True, checksum=0, name=""), mine=False)
+"""A line for another drive, in party mode: nothing of it is kept."""
 STEP_KEYS = {0x20: " ", CR: "\r"}
 MOST_WAITING = 64
 """Commands that wait in party mode for the LF after the last; one more is like a character too many in a line."""
@@ -68,12 +65,10 @@ class MCodePort:
     baud = 0
     """It understands any: the drives of a cell have the baud rate of their wire."""
 
-    def __init__(self, device: Device, serial: bool = True, baud: int = 0) -> None:
-        self._device = device
-        self._serial = serial
-        self._transmitter = Transmitter(baud)
-        self._replier = Replier(device, serial, self._transmitter)
-        self._overheard = Overheard()
+    def __init__(self, device: MCodeDevice, serial: bool = True, baud: int = 0) -> None:
+        self._device, self._memory, self._serial = device, device.memory, serial
+        self._replier = Replier(device, serial, baud)
+        self._overheard = bytearray()
         self._last = 0.0
         self._powered, self._boots = device.powered, device.boots
         self._running = device.running
@@ -88,7 +83,7 @@ class MCodePort:
         """See `wire.Port`."""
         device = self._device
         same = self._powered and self._boots == device.boots
-        return same and not self._transmitter.queue and device.quiet(now, self._running)
+        return same and not self._replier.queue and device.quiet(now, self._running)
 
     def hears(self, byte: int) -> bool:
         """Within a line for another drive only `KEYS` mean anything; of other bytes only the last one matters."""
@@ -122,15 +117,21 @@ class MCodePort:
     def sent(self, now: float) -> list[Transmission]:
         """Give the same as transmissions; other drives overhear prints in party mode."""
         self._settle(now)
-        return self._transmitter.take()
+        return self._replier.take()
 
     def overhear(self, data: bytes, now: float) -> None:
         """Take what another drive has printed: in party mode, whole lines, while the host sends no line."""
         receiving = self._line is not None or self._waiting
         if receiving or not self._replier.mode().party or not self._device.powered:
             self._overheard.clear()
-        elif lines := self._overheard.add(data):
-            self.receive(lines, now)
+        else:
+            heard = self._overheard
+            heard += data
+            end = heard.rfind(b"\n") + 1
+            lines = bytes(heard[:end])
+            del heard[: max(end, len(heard) - LINE_BUFFER)]
+            if lines:
+                self.receive(lines, now)
 
     # -- time ---------------------------------------------------------------------------------------
 
@@ -165,7 +166,7 @@ class MCodePort:
         self._overheard.clear()
         self._active = False
         self._before = 0
-        self._key = KeyTail()
+        self._key = ""
 
     # -- bytes --------------------------------------------------------------------------------------
 
@@ -180,7 +181,10 @@ class MCodePort:
 
     def _on_byte(self, byte: int, now: float) -> None:
         before, self._before = self._before, byte
-        if self._key.takes(byte):
+        is_check = self._key == KEY_ALONE and byte >= 0x80
+        is_end = self._key == KEY_WITH_CHECK and byte == CR
+        self._key = KEY_WITH_CHECK if is_check else ""
+        if is_check or is_end:
             return
         if byte in (ESC, CTRL_E):
             self._on_escape(byte, before, now)
@@ -193,7 +197,9 @@ class MCodePort:
 
     def _on_first(self, byte: int, now: float) -> None:
         device = self._device
-        if self._is_for_another(byte):
+        memory = self._memory
+        in_party = self._serial and self._active and memory.party
+        if in_party and byte not in ADDRESSES and chr(byte) != memory.name:  # found without the settings of a line
             self._line = DEAF
             return
         mode = self._replier.mode()
@@ -212,12 +218,6 @@ class MCodePort:
             else:
                 self._on_text(self._line, bytes([byte]), now)
 
-    def _is_for_another(self, byte: int) -> bool:
-        """Whether the first byte of a line is the name of another drive; found without the settings of a line."""
-        device = self._device
-        in_party = self._serial and self._active and device.party
-        return in_party and byte not in ADDRESSES and chr(byte) != device.name
-
     def _on_address(self, mode: Mode, byte: int, now: float) -> None:
         """Take the first byte of a line in party mode: it is the addressee."""
         if byte == LF:
@@ -229,9 +229,9 @@ class MCodePort:
             self._line = DEAF
         else:
             name = bytes([byte])
-            own = name == _encoded(mode.name)
-            group = name == b"*" or (name == b"^" and self._device.queued)
-            replies = own or (group and not self._device.quiet_global)
+            own = name == mode.name.encode("latin-1", "replace")
+            group = name == b"*" or (name == b"^" and self._memory.queued)
+            replies = own or (group and not self._memory.quiet_global)
             self._line = Line(mode, name, mine=own or group, replies=replies)
             if replies:
                 self._replier.echo(mode, name, now)
@@ -273,18 +273,18 @@ class MCodePort:
 
     def _on_escape(self, byte: int, before: int, now: float) -> None:
         """ES 0 and 2 take ^E, 1 and 3 take ESC, and 2 and 3 want the name before it (5.1.41)."""
-        mode = self._device.escape_mode
+        mode = self._memory.escape_mode
         if byte != (ESC if mode % 2 else CTRL_E) or (mode >= 2 and not self._named(before)):
             return
         self._line, self._waiting = None, []
-        self._key.begin()
+        self._key = KEY_ALONE
         self._device.escape(now)
         self._replier.collect(self._last)
         self._replier.escaped(now)
 
     def _on_reset(self, before: int, now: float) -> None:
         """CE 1 always resets; CE 2 in party mode only after the name (5.1.19)."""
-        mode = self._device.reset_mode
+        mode = self._memory.reset_mode
         if mode == 0 or (mode == 2 and self._replier.mode().party and not self._named(before)):
             return
         self._device.reset(now)
@@ -292,8 +292,4 @@ class MCodePort:
         self._replier.collect(self._last)
 
     def _named(self, before: int) -> bool:
-        return bytes([before]) == _encoded(self._device.name)
-
-
-def _encoded(name: str) -> bytes:
-    return name.encode("latin-1", "replace")
+        return bytes([before]) == self._memory.name.encode("latin-1", "replace")

@@ -17,11 +17,11 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from struct import pack, unpack
 
+from multidrop.simulator.lexium.device import MCodeDevice
 from multidrop.simulator.lexium.ports.registers import (
     ILLEGAL_ADDRESS,
     ILLEGAL_VALUE,
     MOST_REGISTERS,
-    Drive,
     Refusal,
     Registers,
 )
@@ -45,10 +45,9 @@ Function = Callable[["ModbusPort", bytes, float], bytes]
 class ModbusPort:
     """A connection. `closed`: the bytes made no sense, and no more are taken."""
 
-    def __init__(self, drive: Drive, registers: Registers) -> None:
+    def __init__(self, device: MCodeDevice) -> None:
         self.closed = False
-        self._drive = drive
-        self._registers = registers
+        self._drive, self._registers = device, Registers(device)
         self._begun = bytearray()
 
     def receive(self, data: bytes, now: float) -> bytes:

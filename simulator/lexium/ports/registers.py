@@ -20,16 +20,11 @@ Decisions where the manual is silent (facts that a unit may correct):
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import Protocol
 
 from multidrop.dialects.mcode.manual.grammar import Name, Number
 from multidrop.dialects.modbus.manual.registers import AT, REGISTERS, Register
-from multidrop.simulator.lexium.motion.inputs import Inputs
-from multidrop.simulator.lexium.motion.torque import Torque
-from multidrop.simulator.lexium.motion.trips import HMT, RELATIVE, Trips
-from multidrop.simulator.lexium.ports.replier import Answer
-from multidrop.simulator.lexium.state.error_flag import ErrorFlag
-from multidrop.simulator.lexium.state.program_memory import Program
+from multidrop.simulator.lexium.device import Answer, MCodeDevice
+from multidrop.simulator.lexium.motion.trips import HMT, RELATIVE
 
 ILLEGAL_ADDRESS, ILLEGAL_VALUE, FAILURE = 2, 3, 4
 VALUE_ERRORS = frozenset({21, 22, 23, 76, 77})
@@ -59,27 +54,12 @@ class Refusal(Exception):
         self.code = code
 
 
-class Drive(Protocol):
-    """What Modbus needs of the drive as a whole."""
-
-    @property
-    def now(self) -> float: ...  # noqa: D102
-    @property
-    def powered(self) -> bool: ...  # noqa: D102
-    def advance(self, now: float) -> None: ...  # noqa: D102
-    def outputs(self, now: float) -> dict[int, bool]: ...  # noqa: D102
-    def execute(self, text: str, now: float, *, immediate: bool) -> Answer: ...  # noqa: D102
-
-
 class Registers:
     """One drive's registers. Times are the drive's; raises Refusal."""
 
-    def __init__(
-        self, drive: Drive, *, errors: ErrorFlag, inputs: Inputs, trips: Trips, torque: Torque, program: Program
-    ) -> None:
-        self._drive = drive
-        self._errors, self._inputs, self._trips, self._program = errors, inputs, trips, program
-        self._torque = torque
+    def __init__(self, device: MCodeDevice) -> None:
+        self._drive, self._errors, self._program = device, device.errors, device.program
+        self._inputs, self._trips, self._torque = device.motor.inputs, device.motor.trips, device.motor.torque
 
     # Registers.
 

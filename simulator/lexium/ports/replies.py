@@ -1,4 +1,4 @@
-"""The replies of a drive: echo mode, ACK and NAK, checksums and prompts as one pure function.
+"""Lines carried out on a drive, and the replies to them: echo mode, ACK and NAK, checksums, prompts, prints.
 
 Tables 7.1 to 7.4 of the MCode manual follow one rule. A reply consists of a *head*, the printed lines, and in EM=0 a
 prompt. The head acknowledges the line: CR LF without checksum, and ACK or NAK in its place with checksum. EM=3 puts the
@@ -12,8 +12,16 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+from multidrop.dialects.mcode.manual.errors import ErrorNumber
+from multidrop.simulator.lexium.device import MCodeDevice
+from multidrop.simulator.wire.baud import BITS_A_BYTE
+from multidrop.simulator.wire.wire import Transmission
+
 CRLF = b"\r\n"
 ACK, NAK = b"\x06", b"\x15"
+LINE_BUFFER = 64
+TRANSMIT_BUFFER = 256
+"""Bytes that wait to be sent when a program's next print is lost (the manual names the error, not the size)."""
 
 
 class Mode(NamedTuple):
@@ -25,39 +33,20 @@ class Mode(NamedTuple):
     name: str
 
 
-class Typed(NamedTuple):
-    """A received line: the name (or `*`, `^`) before it, the command, the checksum after it."""
+class Line:
+    """A line that is being received: its settings, its addressee, and its text.
 
-    name: bytes = b""
-    command: bytes = b""
-    checksum: bytes = b""
+    `mine`: it is for this drive. `replies`: this drive replies to it.
+    """
 
+    def __init__(self, mode: Mode, name: bytes = b"", mine: bool = True, replies: bool = True) -> None:
+        self.mode, self.name, self.mine, self.replies = mode, name, mine, replies
+        self.text = bytearray()
 
-def checksum(text: bytes) -> int:
-    """Compute the byte that makes the low seven bits of the sum zero; bit 7 is set, so it ends no line (7.1.2)."""
-    return (128 - sum(text) % 128) % 128 | 0x80
-
-
-def split(mode: Mode, name: bytes, text: bytes) -> tuple[Typed, bool]:
-    """Split a received line; say whether its checksum is there and right (with CK=0 it need be neither)."""
-    if not mode.checksum:
-        end = len(text) - (text[-1:] >= b"\x80")
-        return Typed(name, text[:end], text[end:]), True
-    if not text or text[-1] < 0x80:
-        return Typed(name, text), False
-    return Typed(name, text[:-1], text[-1:]), (sum(name) + sum(text)) % 128 == 0
-
-
-def printed(mode: Mode, lines: tuple[str, ...]) -> bytes:
-    """Encode printed lines: each with its own checksum if there is one, each terminated by CR LF."""
-    out = bytearray()
-    for line in lines:
-        raw = line.encode("latin-1", "replace")
-        out += raw
-        if mode.checksum:
-            out.append(checksum(raw))
-        out += CRLF
-    return bytes(out)
+    @property
+    def room(self) -> int:
+        """The number of bytes that still fit."""
+        return LINE_BUFFER - len(self.name) - len(self.text)
 
 
 class Outcome(NamedTuple):
@@ -71,14 +60,36 @@ class Outcome(NamedTuple):
     flagged: bool = False
 
 
-def compose(mode: Mode, typed: Typed, outcome: Outcome, prompt: str) -> bytes:
-    """Compose the whole reply to one line, without the characters that EM=0 has echoed before."""
-    data = printed(mode, outcome.lines) + outcome.tail.encode("latin-1", "replace")
+def checksum(text: bytes) -> int:
+    """Compute the byte that makes the low seven bits of the sum zero; bit 7 is set, so it ends no line (7.1.2)."""
+    return (128 - sum(text) % 128) % 128 | 0x80
+
+
+def split(line: Line) -> tuple[bytes, bool]:
+    """Split off the checksum; return the command, and whether the checksum is right (with CK=0 it may be absent)."""
+    text = bytes(line.text)
+    if not line.mode.checksum:
+        return text[: len(text) - (text[-1:] >= b"\x80")], True
+    if not text or text[-1] < 0x80:
+        return text, False
+    return text[:-1], (sum(line.name) + sum(text)) % 128 == 0
+
+
+def compose(mode: Mode, text: bytes, outcome: Outcome, prompt: str) -> bytes:
+    """Compose the whole reply to one line of this text, without the characters that EM=0 has echoed before."""
+    out = bytearray()
+    for line in outcome.lines:
+        raw = line.encode("latin-1", "replace")
+        out += raw
+        if mode.checksum:
+            out.append(checksum(raw))
+        out += CRLF
+    data = bytes(out) + outcome.tail.encode("latin-1", "replace")
     if mode.echo == 2:
         return data
     answer = _head(mode, outcome) + data
     if mode.echo == 3:
-        return typed.command + typed.checksum + answer
+        return text + answer
     return answer + prompt.encode() if mode.echo == 0 else answer
 
 
@@ -93,14 +104,93 @@ def _head(mode: Mode, outcome: Outcome) -> bytes:
     return b"" if mode.checksum == 2 and outcome.busy else ACK
 
 
-class PrintSeal:
-    """Puts checksums into unsolicited prints, which come in pieces: one may begin a line and another end it."""
+class Replier:
+    """Carries lines out, and holds what is to be sent, with the times at which it begins.
 
-    def __init__(self) -> None:
+    `serial=False`: the Ethernet kind, without party mode and checksum. `baud` 0: bytes take no time, no print is lost.
+    `queue` is what has not been taken yet.
+    """
+
+    def __init__(self, device: MCodeDevice, serial: bool, baud: int) -> None:
+        self._device, self._memory, self._serial = device, device.memory, serial
+        self._byte_time = BITS_A_BYTE / baud if baud else 0.0
+        self._busy_until = 0.0
+        self.queue: list[Transmission] = []
         self._begun = b""
 
-    def seal(self, text: str, checksummed: bool) -> bytes:
-        """Encode a piece, with a checksum before each CR LF if prints carry one."""
+    def mode(self) -> Mode:
+        """The settings under which a line begins now."""
+        memory, serial = self._memory, self._serial
+        return Mode(memory.echo_mode, serial and memory.party, memory.checksum if serial else 0, memory.name)
+
+    def echo(self, mode: Mode, text: bytes, now: float) -> None:
+        """Send received characters back, in EM=0."""
+        if mode.echo == 0:
+            self.send(now, text)
+
+    def overflow(self, line: Line, now: float) -> None:
+        """Refuse a line that is too long; the rest of it is dropped."""
+        self._device.fail(ErrorNumber.UNKNOWN_VARIABLE, now)
+        if line.replies:
+            self.send(now, compose(line.mode, bytes(line.text), Outcome(good=False), "?"))
+        line.mine = False
+
+    def carry_out(self, line: Line, now: float) -> None:
+        """Carry out a complete line, and reply."""
+        device, memory, mode = self._device, self._memory, line.mode
+        command, sound = split(line)
+        before, busy, flagged = memory.checksum, device.running, memory.answers_by_nak
+        if sound and command.strip():
+            answer = device.execute(command.decode("latin-1"), now)
+            outcome = Outcome(answer.lines, answer.tail, not answer.refused, busy=busy, flagged=flagged)
+        else:
+            outcome = Outcome(damaged=not sound, busy=busy, flagged=flagged)
+        if self._serial and memory.checksum != before:
+            mode = mode._replace(checksum=memory.checksum)
+        if line.replies:
+            prompt = self._prompt(outcome) if mode.echo == 0 else ""
+            self.send(now, compose(mode, bytes(line.text), outcome, prompt))
+
+    def collect(self, now: float) -> None:
+        """Send what the device has printed by itself; a print is lost, and an error, where the buffer is full."""
+        printed = self._device.prints()
+        if not printed:
+            return
+        mode, lost = self.mode(), False
+        for at, text in printed:
+            if self._busy_until - at > TRANSMIT_BUFFER * self._byte_time > 0:
+                lost = True
+            else:
+                self.send(at, self._sealed(text, mode.checksum), overheard=mode.party)
+        if lost:
+            self._device.fail(ErrorNumber.TRANSMIT_BUFFER_FULL, now)
+
+    def program_ended(self, now: float) -> None:
+        """Send the prompt that follows a program, in EM=0."""
+        if self._memory.echo_mode == 0:
+            self.send(now, CRLF + self._prompt().encode())
+
+    def escaped(self, now: float) -> None:
+        """Reply to ESC."""
+        echo = self._memory.echo_mode
+        if echo == 0:
+            self.send(now, b"#" + CRLF + self._prompt().encode())
+        elif echo != 2:
+            self.send(now, CRLF)
+
+    def send(self, at: float, data: bytes, *, overheard: bool = False) -> None:
+        """Send bytes."""
+        if data:
+            self.queue.append(Transmission(at, data, overheard))
+            self._busy_until = max(self._busy_until, at) + len(data) * self._byte_time
+
+    def take(self) -> list[Transmission]:
+        """Take what there is to send."""
+        queue, self.queue = self.queue, []
+        return queue
+
+    def _sealed(self, text: str, checksummed: int) -> bytes:
+        """Encode an unsolicited print, with a checksum before each CR LF; one may begin a line and another end it."""
         raw = text.encode("latin-1", "replace")
         if not checksummed:
             self._begun = b""
@@ -114,3 +204,10 @@ class PrintSeal:
             self._begun = b""
         self._begun += rest
         return bytes(out + rest)
+
+    def _prompt(self, outcome: Outcome | None = None) -> str:
+        """EM=0's prompt; in program mode the address that the next stored line gets, and two spaces."""
+        at = self._device.programming
+        if at is not None:
+            return "?" if outcome and not outcome.good else f"{at}  "
+        return "?" if self._memory.error_flag else ">"

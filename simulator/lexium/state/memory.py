@@ -1,17 +1,31 @@
-"""Working memory of a simulated MCode drive: what its variables and flags hold, and what NVM holds of them."""
+"""Working memory of a simulated MCode drive, the ranges of its words, its units of motion, and what NVM keeps."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import lru_cache
+from typing import NamedTuple
 
+from multidrop.dialects.mcode.manual.errors import ErrorNumber as E
+from multidrop.dialects.mcode.manual.grammar import Argument
 from multidrop.dialects.mcode.manual.table import Mnemonic, lookup, words
-from multidrop.simulator.lexium.state.expressions import Value
+from multidrop.simulator.lexium.state.errors import Fault
+from multidrop.simulator.lexium.state.expressions import Value, whole
 from multidrop.simulator.lexium.state.models import MODELS
 from multidrop.simulator.lexium.state.program_memory import Program
-from multidrop.simulator.lexium.state.trip import Trip
 
+
+class Trip(NamedTuple):
+    """What one trip waits for (input, position, ms, distance or mask), its target, and how often it repeats."""
+
+    value: int
+    target: Argument | None
+    repeats: int = 0
+
+
+STATOR_BOUNDS = (1.1, 1.3, 1.5, 1.7)
+"""Full steps between rotor and stator, by CB (manual 5.1.18)."""
 TABLE_SIZE = 192
 """Labels and user variables together (manual 3.3.1)."""
 BANKED = ("A", "D", "VI", "VM")
@@ -55,6 +69,22 @@ def _factory_values(product: str) -> Mapping[str, Value]:
     return values
 
 
+@lru_cache(maxsize=4096)
+def row_of(word: str, product: str) -> Mnemonic | None:
+    """The table's row of a word that a product knows; None where it is a free name. Raises Fault (37)."""
+    row = lookup(word, product)
+    if row is not None and product not in row.products:
+        raise Fault(E.NOT_AVAILABLE)
+    return row
+
+
+def within(value: Value, low: Value, high: Value) -> Value:
+    """A value in a range. Raises Fault (21)."""
+    if not low <= value <= high:
+        raise Fault(E.OUT_OF_RANGE)
+    return value
+
+
 class Memory:
     """Values by name, mnemonics and user variables alike: the one dictionary that compiled lines read and write.
 
@@ -73,10 +103,6 @@ class Memory:
         self.awaited = ""
         self.defaults()
 
-    def knows(self, row: Mnemonic) -> bool:
-        """Whether this product executes the word (else it is error 37)."""
-        return self.product in row.products
-
     def defaults(self) -> None:
         """Reset everything to factory defaults, and delete user variables."""
         kept = {name: self.values[name] for name in KEPT_BY_FD if name in self.values}
@@ -88,6 +114,8 @@ class Memory:
         self.bank["MS"] = ENCODER_MS
         self.texts = {"DN": "!", "PF": "", "MD": "MA"}
 
+    # Units of motion: motor steps, or encoder counts (manual 3.4.2).
+
     @property
     def counting(self) -> bool:
         """Whether motion is in encoder counts: EE=1, and no hMT (manual 3.4.2)."""
@@ -97,6 +125,111 @@ class Memory:
     def steps(self) -> dict[str, Value]:
         """A, D, VI, VM and MS in motor steps, whether they are in force or not."""
         return self.bank if self.counting else self.values
+
+    @property
+    def scale(self) -> float:
+        """Motor steps in the unit that commands are in."""
+        return self.steps_per_count if self.counting else 1.0
+
+    @property
+    def steps_per_turn(self) -> float:
+        return self.values["MS"] * round(360 / self.values.get("SA", 1.8))
+
+    @property
+    def steps_per_count(self) -> float:
+        """Motor steps in one encoder count."""
+        return self.steps_per_turn / (self.values.get("EL", self.model.encoder_lines) * 4)
+
+    @property
+    def bound(self) -> float:
+        """CB: the greatest distance between rotor and stator, steps."""
+        return STATOR_BOUNDS[int(self.values.get("CB", 1))] * self.values["MS"]
+
+    # Communication settings.
+
+    @property
+    def name(self) -> str:
+        """DN (manual 5.1.33)."""
+        return self.texts["DN"]
+
+    @property
+    def party(self) -> bool:
+        """PY (manual 5.1.105)."""
+        return bool(self.values.get("PY"))
+
+    @property
+    def checksum(self) -> int:
+        """CK (manual 5.1.21)."""
+        return int(self.values.get("CK", 0))
+
+    @property
+    def echo_mode(self) -> int:
+        """EM (manual 5.1.37)."""
+        return int(self.values["EM"])
+
+    @property
+    def escape_mode(self) -> int:
+        """ES (manual 5.1.41)."""
+        return int(self.values["ES"])
+
+    @property
+    def reset_mode(self) -> int:
+        """CE (manual 5.1.19)."""
+        return int(self.values["CE"])
+
+    @property
+    def quiet_global(self) -> bool:
+        """DG (manual 5.1.31)."""
+        return bool(self.values.get("DG", 1))
+
+    @property
+    def queued(self) -> bool:
+        """QD (manual 5.1.106)."""
+        return bool(self.values.get("QD"))
+
+    @property
+    def error_flag(self) -> bool:
+        """EF (manual 5.1.39)."""
+        return bool(self.values["EF"])
+
+    @property
+    def answers_by_nak(self) -> bool:
+        """Whether a reply with checksum is NAK now: the product says so while an error is set."""
+        return self.model.flags_by_nak and self.error_flag
+
+    # Ranges of words; those of motion depend on EE.
+
+    def row(self, word: str) -> Mnemonic | None:
+        """The row of a word, None for a free name. Raises Fault (37)."""
+        return row_of(word, self.product)
+
+    def checked(self, word: str, value: Value) -> int:
+        """A whole number that a word takes. Raises Fault (21, 37)."""
+        number, row = whole(value), self.row(word)
+        if row is None or not row.accepts(number, self.counting):
+            raise Fault(E.OUT_OF_RANGE)
+        return number
+
+    def flag(self, word: str, value: Value) -> int:
+        """A value for a flag that the drive sets: 0 clears it, another value only where it may be written.
+
+        Raises Fault (21).
+        """
+        row, number = self.row(word), whole(value)
+        writable = row is not None and row.access == "RW" and row.accepts(number)
+        if number != 0 and not writable:
+            raise Fault(E.OUT_OF_RANGE)
+        return number
+
+    def write(self, row: Mnemonic, value: Value) -> None:
+        """Write a variable whose range depends on EE, or that takes certain numbers only. Raises Fault (21)."""
+        if not isinstance(row.default, float):
+            value = whole(value)
+        if not row.accepts(value, self.counting):
+            raise Fault(E.OUT_OF_RANGE)
+        self.values[row.name] = value
+
+    # Names that a user gives, and IV.
 
     def await_input(self, name: str) -> None:
         """Wait for a number for a variable (IV); an empty name: for none."""

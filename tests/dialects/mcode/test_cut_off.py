@@ -65,7 +65,7 @@ def test_on_a_clean_line_opening_raises_no_error_and_stops_nothing(bench, em, pa
     desk, device, _ = left(bench, em, party, check, program=MOVES_ON_ERROR)
     device.execute("SL 1000", desk.now)
     found(desk, party)
-    assert not device.error_flag and device.velocity(desk.now) == 1000
+    assert not device.memory.error_flag and device.velocity(desk.now) == 1000
     assert not any(TILDES in data or b"\x1b" in data or b"\x05" in data for data in desk.written)
 
 
@@ -100,7 +100,7 @@ def test_what_was_owed_is_put_back_and_said(bench, em, party, check, half):
     desk, device, _, owed = killed(bench, em, party, check)
     desk.wire.receive(half, desk.now)
     [state] = found(desk, party, owed=(owed,), cut=half.decode())
-    assert (device.programming, device.echo_mode, state.codec.em) == (None, em, em)
+    assert (device.programming, device.memory.echo_mode, state.codec.em) == (None, em, em)
     assert state.restore is None and device.position(desk.now) == 0
     who = "a" if party else "the drive"
     assert [note for note in state.notes if "interrupted" in note] == [
@@ -122,7 +122,7 @@ def test_what_was_owed_is_put_back_and_said(bench, em, party, check, half):
 def test_nothing_is_put_back_in_another_drive(bench, other):
     desk, device, *_ = killed(bench)
     [state] = found(desk, True, owed=(other,))
-    assert (device.programming, device.echo_mode, state.restore) == (None, 0, None)
+    assert (device.programming, device.memory.echo_mode, state.restore) == (None, 0, None)
     assert not any(b"EM=" in data for data in desk.written)
 
 
@@ -130,7 +130,7 @@ def test_nothing_is_put_back_in_another_drive(bench, other):
 def test_a_drive_that_was_set_since_stays_as_it_is(bench, em):
     desk, device, *_ = left(bench, em=em)
     [state] = found(desk, True, owed=(Owed(3 if em == 1 else 1, *OWED_NAMES),))
-    assert (device.echo_mode, state.restore) == (em, None) and not any("cut off" in note for note in state.notes)
+    assert (device.memory.echo_mode, state.restore) == (em, None) and not any("cut off" in note for note in state.notes)
 
 
 def test_what_could_not_be_put_back_at_opening_stays_owed_and_is_put_back_before_the_next_line(bench):
@@ -156,8 +156,8 @@ def test_a_download_says_what_is_owed_before_the_echo_mode_is_changed(bench):
     seen = []
 
     def look(desk):
-        seen.append((state.restore, device.echo_mode))
+        seen.append((state.restore, device.memory.echo_mode))
 
     lines = program_file.read("PG 1\nLB G1\nE\nPG\n", "x")
     desk.run(MCODE.programs.download(state, lines, None, lambda done, total: None), state, at=look)
-    assert (None, 0) not in seen and (OWED, 0) in seen and (state.restore, device.echo_mode) == (None, 1)
+    assert (None, 0) not in seen and (OWED, 0) in seen and (state.restore, device.memory.echo_mode) == (None, 1)

@@ -61,7 +61,7 @@ def test_a_print_confirms_itself_and_is_sent_once(bench, em, check, party, hints
     state = again.open()
     assert state.codec.escape is None and state.settings_unknown
     assert again.type("PR VM") == ("768000",)
-    assert again.executed("PR VM") == 1 and not again.device.error_flag
+    assert again.executed("PR VM") == 1 and not again.device.memory.error_flag
     if state.unconfirmed:
         assert state.codec.escape is None and state.settings_unknown  # a stop still takes every form
         assert identify.remember(state) == again.last
@@ -75,7 +75,7 @@ def test_before_any_other_line_the_drive_prints_what_it_is_and_how_it_is_set(ben
     assert again.type("VM=300000") == ()
     assert again.state.codec == MCode(em=em, party=party, checksum=check, escape=3)
     assert (again.state.serial, again.state.unconfirmed) == (again.last.serial, None)
-    assert again.executed("VM=300000") == 1 and not again.device.error_flag
+    assert again.executed("VM=300000") == 1 and not again.device.memory.error_flag
     frames = [frame for frame in again.desk.written if b"SN" in frame or b"VM" in frame]
     assert b"SN" in frames[0]
     assert identify.remember(again.state) == again.last
@@ -109,7 +109,9 @@ def test_a_checksum_that_the_user_states_wrongly_is_no_error_in_the_drive(bench,
     desk = bench([table(True, em=em, check=check)])
     [state] = desk.run(identify.identify(replace(STATED, checksum=stated, lazy=lazy)))
     desk.type(state, line)
-    assert not desk.devices["a"].error_flag and state.codec.checksum == (check if state.unconfirmed is None else 0)
+    assert not desk.devices["a"].memory.error_flag and state.codec.checksum == (
+        check if state.unconfirmed is None else 0
+    )
 
 
 # --- what is not as it was
@@ -133,7 +135,7 @@ def test_other_settings_than_last_time_are_read_and_no_line_is_carried_out_twice
     except NoAnswer as error:
         assert "not known" in str(error) or "not sent" in str(error)
         assert again.executed(line) == (0 if "not sent" in str(error) else 1)
-    assert not again.device.error_flag
+    assert not again.device.memory.error_flag
     if again.state.unconfirmed is None and (em, check) != (now_em, now_check):
         assert any("not those of last time" in note for note in again.desk.notes)
 
@@ -146,7 +148,7 @@ def test_a_drive_that_left_party_mode_is_found_and_none_of_the_lines_before_was_
     again.open()
     again.type(line)
     assert again.state.codec == MCode(em=em, party=False, escape=3) and again.state.address == ""
-    assert again.executed(line) == 1 and not again.device.error_flag
+    assert again.executed(line) == 1 and not again.device.memory.error_flag
     assert any("not those of last time" in note for note in again.desk.notes)
 
 
@@ -157,7 +159,7 @@ def test_a_drive_that_is_in_party_mode_now_is_found(bench, em):
     again.open()
     again.type("VM=300000")
     assert again.state.codec == MCode(em=em, party=True, escape=3)
-    assert again.executed("VM=300000") == 1 and not again.device.error_flag
+    assert again.executed("VM=300000") == 1 and not again.device.memory.error_flag
 
 
 def test_another_drive_at_the_same_name_is_reported(bench):
@@ -180,7 +182,7 @@ def test_a_drive_that_is_gone_or_renamed_is_sent_nothing_and_forgotten(bench, pa
     with pytest.raises(NoAnswer, match="does not reply"):
         again.type(line)
     assert again.executed(line) == 0 and identify.remember(again.state) is None
-    assert not party or not again.device.error_flag
+    assert not party or not again.device.memory.error_flag
 
 
 @pytest.mark.parametrize("line", ["PR VM", "VM=300000"])
@@ -228,7 +230,7 @@ def test_a_program_that_prints_all_the_time_is_not_taken_for_the_reply(bench, em
     again = Again(bench, hints, at_home(party, em=em, check=check), before=program)
     again.open()
     assert again.type("PR VM") == ("768000",)
-    assert again.executed("PR VM") == 1 and not again.device.error_flag
+    assert again.executed("PR VM") == 1 and not again.device.memory.error_flag
 
 
 def test_a_late_reply_to_the_last_session_is_not_credited(bench):

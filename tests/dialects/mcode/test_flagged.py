@@ -33,7 +33,7 @@ def test_while_an_error_stands_values_are_read_and_it_is_told_before_the_next_co
     device.fail(86, desk.now)
     assert desk.type(state, "PR R1") == ("0",)
     assert desk.run(desk_motion(state)).position == 0
-    assert device.error_flag and state.error is (em != 2)
+    assert device.memory.error_flag and state.error is (em != 2)
     state.error = True
     assert desk.type(state, "R1=5") == ()
     assert any("error 86" in note and "an old error" in note for note in desk.notes)
@@ -66,7 +66,7 @@ def test_a_refusal_is_one_where_the_flag_was_clear(bench, em, party, check):
     desk, state, device, _ = unit(bench, em, party, check)
     with pytest.raises(Refused, match="error 21"):
         desk.type(state, "RC=500")
-    assert not device.error_flag
+    assert not device.memory.error_flag
     assert desk.type(state, "R1=5") == ()
 
 
@@ -79,7 +79,7 @@ def test_it_is_opened_while_an_error_stands_and_that_is_said(bench, em, party, c
     hints = Hints(drives=("a",), party=True) if party else Hints()
     [state] = desk.run(identify.identify(hints))
     assert state.codec == MCode(em=em, party=party, checksum=check, escape=1)
-    assert state.error and device.error_flag and state.product.startswith("MDI")
+    assert state.error and device.memory.error_flag and state.product.startswith("MDI")
     assert any("EF=1" in note for note in state.notes)
 
 

@@ -31,7 +31,7 @@ def test_a_program_that_prints_all_the_time_is_not_mistaken_for_answers(bench, e
     program = ("PG 1", "LB G1", line, "H 20", "BR G1", "E", "PG", "EX G1")
     _, device, [state] = opened(bench, {"set": {"EM": em, "CK": check, "ES": 3}}, before=program)
     assert state.codec == MCode(em=em, checksum=check, escape=3)
-    assert (state.product, state.name, state.error, device.error_flag) == ("LMDCM", "!", False, False)
+    assert (state.product, state.name, state.error, device.memory.error_flag) == ("LMDCM", "!", False, False)
 
 
 def test_half_a_line_on_a_party_line_is_not_executed_by_opening(bench):
@@ -45,7 +45,7 @@ def test_half_a_line_on_a_party_line_is_not_executed_by_opening(bench):
 
 def test_a_drive_named_p_is_taken_for_one_on_a_party_line(bench):
     desk, device, [state] = opened(bench, {"name": "P", "party": True}, hints=Hints(drives=("P",)))
-    assert state.address == "P" and not device.error_flag
+    assert state.address == "P" and not device.memory.error_flag
 
 
 def test_a_lost_answer_does_not_lead_to_a_checksum_that_the_drive_would_refuse(bench):
@@ -68,7 +68,7 @@ def test_a_name_of_two_characters_is_refused_before_anything_is_sent(bench):
         desk = bench([{"name": "a", "party": True}, {"name": "b", "party": True}])
         with pytest.raises(Inexpressible, match="no drive name 'ab'"):
             desk.run(identify.identify(Hints(drives=("a", "ab"), cut=cut)))
-        assert desk.written == [] and not any(device.error_flag for device in desk.devices.values())
+        assert desk.written == [] and not any(device.memory.error_flag for device in desk.devices.values())
 
 
 @pytest.mark.wide
@@ -86,7 +86,7 @@ def test_several_drives_are_found_as_each_is_set_and_only_print(bench, names, em
     assert [(dict(device.memory.values), repr(device.nvm.store)) for device in devices] == before
     for device, witness in zip(devices, witnesses, strict=True):
         assert {(text[:3], refused, stored) for text, refused, stored in witness.lines} == {("PR ", False, False)}
-        assert not device.error_flag and device.position(desk.now) == 0
+        assert not device.memory.error_flag and device.position(desk.now) == 0
 
 
 @pytest.mark.parametrize("name", "PES")
@@ -97,7 +97,7 @@ def test_a_drive_named_like_a_command_is_found_on_a_party_line(bench, name, part
     [device] = desk.devices.values()
     witness = Witness(device)
     [state] = desk.run(identify.identify(Hints(drives=(name,), party=party)))
-    assert (state.address, state.product, device.error_flag) == (name, "LMDCM", False)
+    assert (state.address, state.product, device.memory.error_flag) == (name, "LMDCM", False)
     assert all(text.startswith("PR ") for text, _, _ in witness.lines)
 
 
@@ -106,14 +106,14 @@ def test_a_drive_named_like_a_command_that_is_alone_is_found(bench, name):
     desk = bench([{"name": name}])
     [state] = desk.run(identify.identify(Hints(drives=(name,), party=False)))
     assert (state.address, state.name, state.product) == ("", name, "LMDCM")
-    assert not desk.devices[name].error_flag
+    assert not desk.devices[name].memory.error_flag
 
 
 def test_what_helps_where_a_single_drive_named_p_is_not_in_party_mode_is_said(bench):
     desk = bench([{"name": "P"}])
     with pytest.raises(NoAnswer, match="party=0"):
         desk.run(identify.identify(Hints(drives=("P",))))
-    assert not desk.devices["P"].error_flag
+    assert not desk.devices["P"].memory.error_flag
 
 
 @pytest.mark.parametrize("name", ["", "a"])
@@ -232,7 +232,7 @@ def test_a_drive_that_prints_all_the_time_is_not_mistaken_for_one_that_is_not_th
         assert not device.execute(text, 0.0).refused
     absent, present = desk.run(identify.identify(Hints(drives=("a", "b"))))
     assert (absent.product, absent.settings_unknown, absent.notes) == ("", True, ["a does not reply"])
-    assert (present.product, present.settings_unknown, device.error_flag) == ("LMDCM", False, False)
+    assert (present.product, present.settings_unknown, device.memory.error_flag) == ("LMDCM", False, False)
 
 
 # --- MDrivePlus
@@ -250,7 +250,7 @@ def test_version_and_part_number_tell_an_mdriveplus_from_another(bench, personal
     (device,) = desk.devices.values()
     witness = Witness(device)
     (state,) = desk.run(identify.identify(hints))
-    assert (state.product, state.version) == (personality, "3.010") and state.part.endswith(device.model.part)
+    assert (state.product, state.version) == (personality, "3.010") and state.part.endswith(device.memory.model.part)
     assert all(text.startswith("PR ") and not refused for text, refused, _ in witness.lines)
 
 
@@ -270,18 +270,18 @@ def test_names_that_are_likely_are_tried_before_anything_is_absent_and_nothing_m
     tables = [{"name": name, "party": True, "set": {"EM": em, "CK": check, "ES": 3}} for name in "ab"]
     desk, _, [state] = opened(bench, *tables, hints=Hints(tried=("b", "left")))
     assert (state.address, state.product) == ("b", "LMDCM")
-    assert not any(device.error_flag or device.moving(desk.now) for device in desk.devices.values())
+    assert not any(device.memory.error_flag or device.moving(desk.now) for device in desk.devices.values())
     last = identify.remember(state)
     both = (replace(last, address="z", name="z"), last, replace(last, address="a", name="a"))
     found = desk.run(identify.identify(Hints(remembered=both)))
     assert [each.address for each in found] == ["a", "b", "z"]  # the first is selected, whichever was used last
     assert [each.unconfirmed is None for each in found] == [True, True, False]
     assert identify.remember(found[2]) == both[0] and "z replied here last time" in found[2].notes[0]
-    assert not any(device.error_flag for device in desk.devices.values())
+    assert not any(device.memory.error_flag for device in desk.devices.values())
 
 
 def test_a_drive_alone_is_found_though_the_line_was_a_party_line_last_time(bench):
     desk, _, [state] = opened(bench, {"name": "b", "party": True}, hints=Hints(tried=("b",)))
     alone, device, [found] = opened(bench, {"set": {"EM": 1}}, hints=Hints(remembered=(identify.remember(state),)))
-    assert (found.address, found.product, device.error_flag) == ("", "LMDCM", False)
+    assert (found.address, found.product, device.memory.error_flag) == ("", "LMDCM", False)
     assert alone.devices

@@ -82,7 +82,7 @@ def test_an_old_error_is_neither_cleared_nor_in_the_way(bench, product, em, chec
     desk.device.execute("XYZ", desk.bench.now)
     code = desk.device.memory.values["ER"]
     found = read(desk)
-    assert code and desk.device.memory.values["ER"] == code and desk.device.error_flag
+    assert code and desk.device.memory.values["ER"] == code and desk.device.memory.error_flag
     assert {each.name for each in manual.settings(product)} <= found.values.keys()
 
 
@@ -121,7 +121,7 @@ def test_a_refused_line_is_said_and_not_asked_in_pieces():
     found = one.run(MCODE.parameters.read(one.state, nothing))
     refused = [name for name, reason in found.unread if "refuses" in reason]
     assert "AS" in refused and len(set(one.refused)) == len(one.refused)
-    assert one.device.error_flag
+    assert one.device.memory.error_flag
 
 
 def test_a_print_in_an_unknown_form_takes_no_other_setting_with_it():

@@ -160,7 +160,7 @@ def test_what_a_program_of_another_drive_prints_is_no_answer(bench, text, em, ch
             if not told and bench.now >= begun:
                 told.append(bench.now)
                 for line in ("100", "v100", "tick 100"):
-                    desk.devices[1].printer.announce(f"{line}\r\n")
+                    desk.devices[1].core.printer.announce(f"{line}\r\n")
 
         try:
             answer = desk.bench.run(MCODE.perform(desk.state, text), desk.state, at=talk)

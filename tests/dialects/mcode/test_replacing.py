@@ -67,7 +67,7 @@ def test_an_edited_file_is_downloaded_over_itself_again_and_again(bench, em, par
     for value in range(30, 34):
         edited = PROGRAM.replace("25", str(value)).replace("K1=3", f"K1={value}").replace("G2", f"B{value}")
         download(desk, state, first + edited)
-        assert desk.type(state, "PR Q1") == (str(value),) and not device.error_flag
+        assert desk.type(state, "PR Q1") == (str(value),) and not device.memory.error_flag
         assert listed(desk, state)[:2] == ["LB G1", f"VA K1={value}"]
         assert listed(desk, state)[-2:] == [f"LB B{value}", "E"]
         desk.type(state, "EX G1")
@@ -77,7 +77,7 @@ def test_an_edited_file_is_downloaded_over_itself_again_and_again(bench, em, par
         desk.type(state, "Q2=7")
     assert (state.codec.em, state.programming, state.restore) == (em, False, None)
     device.reset(device.now)
-    assert device.echo_mode == em and device.program.labels.keys() == {"G1", "B33"}
+    assert device.memory.echo_mode == em and device.program.labels.keys() == {"G1", "B33"}
 
 
 def test_a_drive_without_the_files_names_keeps_its_other_programs(bench):

@@ -67,4 +67,9 @@ def test_factory_defaults_reach_a_drive_in_every_mode(bench, em, party, check):
     desk = bench([{"name": "k", "party": party, "set": {"EM": em, "CK": check}}], baud=9600)
     desk.run(scan.erase())
     [device] = [placed.device for placed in desk.floor.drives]
-    assert (device.echo_mode, device.party, device.checksum, device.name) == (0, False, 0, "!")
+    assert (device.memory.echo_mode, device.memory.party, device.memory.checksum, device.memory.name) == (
+        0,
+        False,
+        0,
+        "!",
+    )

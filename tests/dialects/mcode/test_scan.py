@@ -41,8 +41,8 @@ class Searched:
     def harmed(self):
         """Lines that a drive refused or stored, errors, and drives away from their place."""
         lines = [line for witness in self.witnesses for line in witness.lines if line[1] or line[2]]
-        errors = [device.name for device in self.devices if device.error_flag]
-        moved = [device.name for device in self.devices if device.position(self.desk.now)]
+        errors = [device.memory.name for device in self.devices if device.memory.error_flag]
+        moved = [device.memory.name for device in self.devices if device.position(self.desk.now)]
         return lines + errors + moved
 
 
@@ -112,7 +112,7 @@ def test_a_new_drive_outside_of_party_mode_is_found_on_a_party_line_and_harms_no
     desk.wire.receive(b"\n", desk.now)
     desk.wait(0.5)
     assert [(each.address, each.name, each.codec) for each in found] == [("", "V", MCode(em, False, check, 1))]
-    assert not any(device.error_flag or device.position(desk.now) for device in (*old, new))
+    assert not any(device.memory.error_flag or device.position(desk.now) for device in (*old, new))
 
 
 def test_half_a_line_of_an_interrupted_session_overflows_first(bench):

@@ -158,11 +158,11 @@ def test_a_program_that_prints_numbers_hides_no_refusal(bench, em, check, line):
 @pytest.mark.parametrize("em", range(4))
 def test_a_setting_that_was_made_while_an_error_came_by_itself_is_not_taken_for_refused(bench, em):
     desk = Desk(bench, (em, 0))
-    desk.state.codec = MCode(em=em, escape=desk.device.escape_mode)
+    desk.state.codec = MCode(em=em, escape=desk.device.memory.escape_mode)
     desk.device.fail(84, desk.bench.now)
     with pytest.raises(Refused, match="error 84"):
         desk.type("ES=0")
-    assert desk.device.escape_mode == 0
+    assert desk.device.memory.escape_mode == 0
     assert desk.state.settings_unknown or desk.agrees()  # stale: a stop takes every form
     desk.type("R1=1")
     assert desk.agrees()
@@ -210,7 +210,7 @@ BARE = [("DN b", "b"), ("DN=Q", "Q"), ("dn 7", "7"), ("DN=66", "B"), ('DN="66"',
 def test_an_mdriveplus_takes_a_name_without_quotation_marks_and_the_host_follows(bench, line, name, em):
     desk = Desk(bench, (em, 0), party=True, personality="MDI")
     desk.type(line)
-    assert desk.device.name == desk.state.address == name
+    assert desk.device.memory.name == desk.state.address == name
     assert desk.type("PR P") == ("0",)
 
 
@@ -220,7 +220,7 @@ def test_a_lexium_refuses_it_and_keeps_its_name(bench, line, em):
     desk = Desk(bench, (em, 0), party=True)
     with pytest.raises(Refused) as refused:
         desk.type(line)
-    assert refused.value.code == 21 and desk.device.name == desk.state.address == "a"
+    assert refused.value.code == 21 and desk.device.memory.name == desk.state.address == "a"
     assert desk.type("PR P") == ("0",)
 
 
@@ -229,4 +229,4 @@ def test_what_names_no_letter_or_digit_is_refused_by_an_mdriveplus_too(bench, li
     desk = Desk(bench, (0, 0), party=True, personality="MDI")
     with pytest.raises(Refused):
         desk.type(line)
-    assert desk.device.name == desk.state.address == "a"
+    assert desk.device.memory.name == desk.state.address == "a"

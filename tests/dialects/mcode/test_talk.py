@@ -360,7 +360,7 @@ def test_how_a_drive_is_set_is_found_out_and_nothing_moves(bench, em, party, che
     assert state.codec == MCode(em=em, party=party, checksum=check, escape=1)
     assert (state.product, state.name) == ("LMDCM", "a" if party else "!")
     device = next(iter(desk.devices.values()))
-    assert not device.error_flag
+    assert not device.memory.error_flag
     assert not any(word in frame for frame in desk.written for word in (b"ER", b"\x1b", b"\x05", b"\x03"))
 
 
@@ -380,7 +380,7 @@ def test_an_ethernet_drive_is_not_asked_what_it_would_refuse(bench):
     desk = bench([{"personality": "LMDCE"}])
     [state] = desk.run(identify.identify(Hints()))
     assert (state.product, state.address) == ("LMDCE", "")
-    assert not desk.devices["!"].error_flag
+    assert not desk.devices["!"].memory.error_flag
     assert not any(word in frame for frame in desk.written for word in (b"PY", b"CK", b"DN", b"BD"))
 
 
@@ -411,7 +411,7 @@ def test_a_standing_error_is_found_without_clearing_it(bench):
     desk.devices["!"].fail(86, 0.0)
     [state] = desk.run(identify.identify(Hints()))
     assert state.error
-    assert desk.devices["!"].error_flag
+    assert desk.devices["!"].memory.error_flag
 
 
 def test_a_kind_is_told_from_the_words(bench):

@@ -65,7 +65,7 @@ def test_what_the_file_saves_is_the_echo_mode_that_was_there(bench, em, party, c
     download(desk, state)
     device = desk.devices["a" if party else "!"]
     device.reset(device.now)
-    assert (device.echo_mode, device.program.lines != {}) == (em, True)
+    assert (device.memory.echo_mode, device.program.lines != {}) == (em, True)
 
 
 @pytest.mark.parametrize("wanted", range(4))
@@ -74,9 +74,9 @@ def test_an_echo_mode_that_the_file_sets_is_kept_and_saved(bench, em, party, che
     desk, state = desk_and_known(bench, em, party, check)
     download(desk, state, PROGRAM.replace("VM=400000", f"EM={wanted}"))
     device = desk.devices["a" if party else "!"]
-    assert (state.codec.em, device.echo_mode) == (wanted, wanted)
+    assert (state.codec.em, device.memory.echo_mode) == (wanted, wanted)
     device.reset(device.now)
-    assert (device.echo_mode, device.program.lines != {}) == (wanted, True)
+    assert (device.memory.echo_mode, device.program.lines != {}) == (wanted, True)
 
 
 @pytest.mark.parametrize(("em", "party", "check"), [(0, False, 0), (1, True, 1), (2, True, 0), (3, True, 2)])

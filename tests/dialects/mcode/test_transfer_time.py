@@ -56,9 +56,9 @@ def test_a_program_that_the_file_starts_saves_the_echo_mode_that_was_there(bench
     desk.run(MCODE.programs.download(state, program_file.read(text, "x.mxt"), None, lambda done, total: None), state)
     desk.wait(2.0)
     device = desk.devices["a"]
-    assert (state.restore, state.codec.em, device.echo_mode) == (None, em, em)
+    assert (state.restore, state.codec.em, device.memory.echo_mode) == (None, em, em)
     device.reset(device.now)
-    assert (device.echo_mode, device.program.lines != {}) == (em, True)
+    assert (device.memory.echo_mode, device.program.lines != {}) == (em, True)
 
 
 @pytest.mark.parametrize(

@@ -77,7 +77,12 @@ class Trial:
         if text == "PR R1" and not error and not stored and (state.codec.checksum or not self.noisy):
             assert printed == (str(device.memory.values["R1"]),)
         if not error and sure and not (state.settings_unknown or state.reply_pending or self.restarted):
-            assert self.desk.agrees(who), (state, device.echo_mode, device.checksum, device.escape_mode)
+            assert self.desk.agrees(who), (
+                state,
+                device.memory.echo_mode,
+                device.memory.checksum,
+                device.memory.escape_mode,
+            )
 
 
 @examples(20, nightly=200)

@@ -7,7 +7,7 @@ from typing import Any
 from multidrop.dialects import Kind, Procedure
 from multidrop.dialects.modbus.family import MODBUS
 from multidrop.dialects.modbus.host.codec import Modbus, ModbusState
-from multidrop.simulator.lexium.family import _connect  # the port of an Ethernet drive
+from multidrop.simulator.lexium.ports.modbus import ModbusPort
 from tests.support.lexium import drive
 from tests.support.procedure import ProcedureRunner
 
@@ -24,7 +24,7 @@ def carried(port: Any, procedure: Procedure[Any]) -> Any:
 
 def test_flags_points_settings_and_set_ups_make_the_conditions() -> None:
     device = drive("IS=1,1,0", "OS=2,18,1", "OS=1,16,1", "O1=1", "RC=60", personality="LMDCE")
-    port = _connect(device)
+    port = ModbusPort(device)
     state = ModbusState(Modbus(), product="LMDCE", version="LMDCE 6.002")
     reader = MODBUS.conditions
     assert reader is not None
@@ -36,11 +36,11 @@ def test_flags_points_settings_and_set_ups_make_the_conditions() -> None:
     assert shown[0] == ("1", "home", False)
     assert shown[-3:] == [("1", "", True), ("2", "error", False), ("3", "", False)]
     assert (found.error, found.program, found.run_current, found.hold_current) == (0, "", 60, 5)
-    assert not device.error_flag
+    assert not device.memory.error_flag
 
 
 def test_a_disabled_drive_is_read_with_its_flags() -> None:
-    port = _connect(drive("DE=0", personality="LMDCE"))
+    port = ModbusPort(drive("DE=0", personality="LMDCE"))
     state = ModbusState(Modbus(), product="LMDCE", version="LMDCE 6.002")
     reader = MODBUS.conditions
     assert reader is not None

@@ -111,7 +111,7 @@ def run(script, personality="LMDCM", **world):
 def test_an_error_comes_with_its_code(code):
     script, more = CODES[code]
     device = run(script, **more)
-    assert device.error_flag == bool(code)
+    assert device.memory.error_flag == bool(code)
     assert device.execute("PR ER", device.now).lines == (str(code),)
     assert device.execute("PR EF", device.now).lines == ("0",)
 
@@ -184,5 +184,5 @@ def test_a_product_has_no_errors_but_those_of_its_list(personality, state):
         say(device, *STATES[state])
         for arguments in ("", "=1", "=2", "=99999999999", " K1", " 1,2,3", " 5,K1", ' "a"'):
             device.execute(word + arguments, 0.01)
-            device.mode.address = None
+            device.core.mode.address = None
             assert device.memory.values["ER"] in known, word + arguments

@@ -219,7 +219,7 @@ def test_a_bare_number_repeats_the_last_kind_of_move():
 
 def test_settings_of_a_cell_are_those_at_power_up():
     device = drive(name="b", party=True, set={"EM": 1, "VI": 800000, "VM": 900000, "IS": ("1,1,0", "2,2,1")})
-    assert (device.name, device.party, device.echo_mode) == ("b", True, 1)
+    assert (device.memory.name, device.memory.party, device.memory.echo_mode) == ("b", True, 1)
     assert say(device, "PR VI", "PR IS")[:3] == ["800000", "IS = 1, 1, 0", "IS = 2, 2, 1"]
 
 

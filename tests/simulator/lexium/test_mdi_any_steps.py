@@ -40,7 +40,7 @@ def history(personality: str, seed: int, parts: int) -> list[tuple[object, ...]]
     t, told = 0.0, []
     for _ in range(40):
         line, push = random.choice(LINES), random.choice([0, 0, 0, 300, -300, 5000])
-        point, level = random.choice([0, 0, 1, 4, *device.inputs.numbers]), random.choice([0, 1, None])
+        point, level = random.choice([0, 0, 1, 4, *device.motor.inputs.numbers]), random.choice([0, 1, None])
         step = random.choice([0.001, 0.05, 0.3, 1.5])
         refused = device.execute(line, t).refused
         if push:
@@ -94,6 +94,6 @@ def test_no_line_crashes_a_unit(personality: str) -> None:
             for line in (f"{word} {argument}", f"{word}={argument}", f"PR {word}", f"IC {word}", f"R1={word}"):
                 device.execute(line, device.now)
                 assert device.memory.values["ER"] in TEXTS["MDI"], line
-                device.mode.address = None
+                device.core.mode.address = None
         device.escape(device.now)
         device.advance(device.now + 0.01)

@@ -168,7 +168,7 @@ def test_what_has_no_register_is_written_by_its_name_backwards(asked, answered, 
 def test_the_analog_input_is_set_up_like_the_others():
     port, device, _ = drive()
     assert ask(port, "42 2020 5349 07 3D352C31302C31") == "42 07 20 20 53 49"
-    assert device.inputs.types[5] == (10, 1)
+    assert device.motor.inputs.types[5] == (10, 1)
 
 
 def test_a_program_is_run_paused_resumed_and_ended():
@@ -178,9 +178,9 @@ def test_a_program_is_run_paused_resumed_and_ended():
     assert ask(port, "42 2020 5845 02 4133", 1.0) == "42 02 20 20 58 45"  # EX A3
     assert ask(port, "03 0004 0001", 1.5) == "03 02 00 01"  # BY
     assert ask(port, "42 2020 5350 00", 2.0) == "42 00 20 20 53 50"  # PS
-    assert device.interpreter.thread.paused
+    assert device.core.thread.paused
     assert ask(port, "42 2020 5352 00", 3.0) == "42 00 20 20 53 52"  # RS
-    assert not device.interpreter.thread.paused
+    assert not device.core.thread.paused
     assert ask(port, "42 2020 2045 00", 4.0) == "42 00 20 20 20 45"  # E
     assert ask(port, "03 0004 0001", 4.0) == "03 02 00 00"
     assert ask(port, "42 2020 5845 02 4133", 5.0) == "42 02 20 20 58 45"
@@ -225,7 +225,7 @@ def test_other_functions_are_exception_1(function):
 def test_what_is_wrong_with_a_request_is_told_by_its_exception(pdu, code):
     port, device, _ = drive()
     assert ask(port, pdu) == f"{int(pdu[:2], 16) | 0x80:02x} {code:02x}"
-    assert device.error_flag == (code == 4), "a refusal of the drive, and only that, sets its error"
+    assert device.memory.error_flag == (code == 4), "a refusal of the drive, and only that, sets its error"
 
 
 # Messages in a stream.

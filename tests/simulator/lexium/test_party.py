@@ -128,12 +128,12 @@ def test_a_baud_rate_acts_after_it_was_saved_and_a_reset_only():
     drive = MCodeDevice(DriveSpec(), World(WorldSpec()))
     drive.execute("BD=11", 0.0)
     drive.reset(0.1)
-    assert drive.printer.baud == 9600 and drive.execute("PR BD", 0.1).lines == ("96",)
+    assert drive.core.printer.baud == 9600 and drive.execute("PR BD", 0.1).lines == ("96",)
     drive.execute("BD=11", 0.2)
     drive.execute("S", 0.2)
-    assert drive.printer.baud == 9600
+    assert drive.core.printer.baud == 9600
     drive.reset(0.3)
-    assert drive.printer.baud == 115200
+    assert drive.core.printer.baud == 115200
 
 
 def test_an_ethernet_drive_is_silent_while_it_boots():
@@ -246,9 +246,9 @@ def test_three_drives_are_moved_alone_and_together_and_taken_out_of_party_mode()
     assert terminal.type("cVM200000\n") == "cVM200000\r\n>"
     assert terminal.type("cPR VM\n") == "cPR VM\r\n200000\r\n>"
     assert terminal.type("aPY=0\n") == "aPY=0\r\n>"
-    assert [device.party for device in terminal.devices] == [False, True, True]
+    assert [device.memory.party for device in terminal.devices] == [False, True, True]
     assert terminal.type("*PY=0\n") == "*PY=0\n"  # shown by the one that hears lines for all
-    assert [device.party for device in terminal.devices] == [False, False, False]
+    assert [device.memory.party for device in terminal.devices] == [False, False, False]
 
 
 def test_a_new_drive_is_put_into_party_mode_by_hand():

@@ -27,6 +27,7 @@ class Drive:
     def __init__(self, **settings: object) -> None:
         self.powered = True
         self.boots = 0
+        self.memory = self
         self.name, self.party, self.checksum, self.echo_mode = "a", False, 0, 0
         self.escape_mode, self.reset_mode, self.quiet_global, self.queued = 1, 1, True, False
         self.error_flag = self.running = self.stepping = self.flags_by_nak = False
@@ -37,6 +38,10 @@ class Drive:
         for name, value in settings.items():
             assert hasattr(self, name)
             setattr(self, name, value)
+
+    @property
+    def answers_by_nak(self) -> bool:
+        return self.flags_by_nak and self.error_flag
 
     @property
     def deadline(self) -> float | None:

@@ -255,9 +255,9 @@ def test_an_error_handler_runs_for_immediate_errors_too():
 def test_starting_a_program_clears_the_error_flag():
     device = switched_on("PG 1\nE\nPG")
     device.execute("XX=5", 0.0)
-    assert device.error_flag
+    assert device.memory.error_flag
     device.execute("EX 1", 0.0)
-    assert not device.error_flag
+    assert not device.memory.error_flag
 
 
 # Trips.
@@ -331,11 +331,11 @@ def test_a_program_called_su_runs_at_power_up_and_after_a_reset():
 def test_save_keeps_and_fd_forgets():
     device = switched_on()
     say(device, "VA Q1=5", "VM=500000", "BD=38", "PG 1", "LB G1", "E", "PG", "S")
-    assert device.printer.baud == 9600
+    assert device.core.printer.baud == 9600
     say(device, "VM=400000", "Q1=6", "CP")
     device.reset(1.0)
     assert say(device, "PR VM", "PR Q1", "L") == ["500000", "5", "1  LB G1", "6  E"]
-    assert device.printer.baud == 38400
+    assert device.core.printer.baud == 38400
     device.prints()
     say(device, "FD")
     assert [text for _, text in device.prints()] == ["Copyright\xa9 2010 Schneider Electric Motion USA\r\n"]

@@ -44,4 +44,4 @@ def test_numeric_enable_takes_signs():
 def test_every_motion_that_a_line_begins_is_counted():
     device = drive("NE=1", "MR 500")
     assert say(device, 1.0, "500", 1.0, "SC 1", 3.0, "HF 1", 100.0, "SL 500", "SL 0", 1.0, "0") == []
-    assert device.motions.begun == 5
+    assert device.language.motions.begun == 5

@@ -209,7 +209,7 @@ def test_the_analog_input_sets_a_velocity_either_way_with_a_dead_zone():
         device.advance(at)
         found.append(device.velocity(at))
     assert found == [2063 * 625, 0, -80 * 625, -2032 * 625]
-    assert not device.error_flag
+    assert not device.memory.error_flag
 
 
 # 9.10: the analog input drives the motor until it stalls.

@@ -55,7 +55,6 @@ class Thread:
         self._hold_until = -inf
 
     def begin(self, entry: int, t: float, mode: int) -> None:
-        """Start at a line."""
         self.running, self.paused, self.waiting, self.ending = True, False, False, False
         self.stack.clear()
         self.handling, self._hold_until, self.steps = 0, -inf, 0
@@ -64,7 +63,6 @@ class Thread:
         self.refresh()
 
     def finish(self) -> None:
-        """End the program."""
         self.running = self.paused = self.waiting = self.ending = False
         self.stack.clear()
         self.handling = 0
@@ -77,7 +75,6 @@ class Thread:
         self.refresh()
 
     def refresh(self) -> None:
-        """See whether it is live now."""
         stepped = self.mode == STEPPED and self.steps <= 0
         self.live = self.running and not (self.paused or self.waiting or self.ending or stepped)
         self._timeline.replan()
@@ -109,18 +106,23 @@ class Thread:
 
     # Pausing and stepping.
 
-    def pause(self) -> None:
-        """Stand still until it goes on."""
+    def pause(self, stopped_motion: Resume | None) -> None:
+        """Pause; `stopped_motion` takes up the motion that the pause has stopped, if it has stopped one."""
         self.paused = True
+        self.stopped_motion = stopped_motion or self.stopped_motion
         self.refresh()
 
     def go_on(self, t: float) -> Resume | None:
-        """Go on after a pause; gives what takes up the motion that the pause has stopped."""
+        """Go on after a pause; return what takes up the motion that the pause has stopped."""
         self.paused = False
         self.next_at = max(self.next_at, t)
         again, self.stopped_motion = self.stopped_motion, None
         self.refresh()
         return again
+
+    def drop_motion(self) -> None:
+        """Forget the motion that a pause has stopped: RS does not take it up."""
+        self.stopped_motion = None
 
     @property
     def stepping(self) -> bool:
@@ -145,7 +147,7 @@ class Thread:
 
     def call(self, entry: int) -> None:
         """Go on elsewhere until RT. Raises Fault (43)."""
-        self._push(Frame(self.pc))
+        self.push(Frame(self.pc))
         self.pc = entry
 
     def give_back(self) -> None:
@@ -165,14 +167,14 @@ class Thread:
     def interrupt(self, entry: int, t: float) -> None:
         """Call a subroutine before the next line, in the middle of a hold too. Raises Fault (43)."""
         holding = self._hold_until > t
-        self._push(Frame(self.pc, self.waiting, self._hold_until if holding else -inf, self.ending))
+        self.push(Frame(self.pc, self.waiting, self._hold_until if holding else -inf, self.ending))
         if self.waiting or holding or self.ending:
             self.next_at, self._hold_until = t, -inf
         self.waiting = self.ending = False
         self.pc = entry
         self.refresh()
 
-    def _push(self, frame: Frame) -> None:
+    def push(self, frame: Frame) -> None:
         if len(self.stack) >= STACK_DEPTH:
             raise Fault(E.STACK_FULL, fatal=True)
         self.stack.append(frame)

@@ -1,0 +1,275 @@
+"""The variables and flags of a simulated drive, and the forms of arguments that several instructions share.
+
+A plain variable is a number in memory with the range that the table of mnemonics gives it. The others have a reader or
+a writer, those of motion in `motion_variables`. Compiled lines get closures from `reader` and `writer`, which raise
+Fault: 20 unknown, 21 wrong value, 25 read only, 30 not there, 32 a label, 35 cannot be read, 37 not in this drive.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+
+from multidrop.dialects.mcode.manual.errors import ErrorNumber as E
+from multidrop.dialects.mcode.manual.grammar import Argument, Compare, Name, Number, Statement, Text
+from multidrop.dialects.mcode.manual.table import Mnemonic
+from multidrop.simulator.lexium.language.motion_variables import MotionVariables, Write
+from multidrop.simulator.lexium.motion.motor import Motor
+from multidrop.simulator.lexium.motion.outputs import Outputs
+from multidrop.simulator.lexium.motion.trips import BITS
+from multidrop.simulator.lexium.power import Nvm
+from multidrop.simulator.lexium.state.errors import Fault
+from multidrop.simulator.lexium.state.expressions import PI, Read, Value, compile_value, compile_whole, whole
+from multidrop.simulator.lexium.state.interpreter import Action, Core
+from multidrop.simulator.lexium.state.memory import slot, within
+
+WATCHED = ("HC", "LD", "LG", "LT", "RC", "SM", "TD", "TQ", "WT", "CM")
+"""Plain variables on which it depends what happens next."""
+POINTS = (1, 2, 3, 4, 9, 10, 11, 12)
+"""Inputs and outputs that bear a word each."""
+WITH_VALUE = ("TI", "TP", "TT", "TR", "TA")
+"""Trips that read as the first number of their set-up."""
+Compile = Callable[[Statement], Action]
+"""Compiles the statement of one instruction. Raises Fault for a wrong form."""
+
+
+def is_place(argument: Argument | None) -> bool:
+    """Whether an argument can be a label or an address."""
+    return isinstance(argument, (Name, Number))
+
+
+def only(statement: Statement) -> Argument | None:
+    """The one argument. Raises Fault (24) for none or several."""
+    if len(statement.arguments) != 1:
+        raise Fault(E.ILLEGAL_DATA)
+    return statement.arguments[0]
+
+
+def pair(statement: Statement) -> tuple[Argument | None, Argument | None]:
+    """One or two arguments. Raises Fault (24)."""
+    if not 1 <= len(statement.arguments) <= 2:
+        raise Fault(E.ILLEGAL_DATA)
+    first, second = (*statement.arguments, None)[:2]
+    return first, second
+
+
+def bare(action: Action) -> Compile:
+    """An instruction without arguments."""
+
+    def compiler(statement: Statement) -> Action:
+        if statement.arguments or statement.equals:
+            raise Fault(E.INSTRUCTION_NOT_SETTABLE if statement.equals else E.ILLEGAL_DATA)
+        return action
+
+    return compiler
+
+
+def missing(statement: Statement) -> Fault:
+    """The error of an instruction that lacks its arguments."""
+    return Fault(E.ILLEGAL_DATA if statement.equals else E.NOT_EXECUTABLE)
+
+
+def _unreadable() -> Value:
+    raise Fault(E.NOT_PRINTABLE)
+
+
+class Variables:
+    """The variables of one drive."""
+
+    def __init__(self, core: Core, motor: Motor, outputs: Outputs, nvm: Nvm) -> None:
+        self._memory, self._values, self._program, self._nvm = core.memory, core.values, core.program, nvm
+        self._timeline, self._inputs, self._outputs, self._motor = core.timeline, motor.inputs, outputs, motor
+        motion = MotionVariables(core, motor)
+        self._readers: dict[str, Read] = {
+            "LS": _unreadable,
+            "PI": lambda: PI,
+            "BY": lambda: int(core.thread.running),
+            **motion.readers(),
+            **self._io_readers(),
+        }
+        self._writers: dict[str, Write] = {
+            "BD": self._write_baud,
+            "ER": self._write_error,
+            "IF": self._write_input_flag,
+            "LK": self._write_lock,
+            **{name: partial(self._write_watched, name) for name in WATCHED},
+            **motion.writers(),
+            **self._io_writers(),
+        }
+
+    def _io_readers(self) -> dict[str, Read]:
+        inputs, timeline = self._inputs, self._timeline
+        low, high = inputs.points.low, inputs.points.high
+
+        def trip(bit: int) -> Value:
+            defined = self._motor.trips.defined.get(bit)
+            return defined.value if defined else 0
+
+        return {
+            **{word: partial(trip, BITS[word]) for word in WITH_VALUE},
+            "IN": lambda: inputs.levels((*low, *high)),
+            "IL": lambda: inputs.levels(low),
+            "IH": lambda: inputs.levels(high),
+            "I5": lambda: inputs.analog(timeline.now),
+            **{f"I{n}": partial(lambda n: int(inputs.active(n)), n) for n in POINTS},
+        }
+
+    def _io_writers(self) -> dict[str, Write]:
+        """By word. A Lexium's outputs are one group."""
+        memory, outputs, points = self._memory, self._outputs, self._inputs.points
+        low = points.low if points.shared else points.outputs
+        groups = {"OT": (*low, *points.high), "OL": low, "OH": points.high}
+
+        def write_group(word: str, group: tuple[int, ...], value: Value) -> None:
+            outputs.write_all(memory.checked(word, value), group)
+
+        def write_output(n: int, value: Value) -> None:
+            outputs.write(n, memory.checked(f"O{n}", value))
+
+        return {
+            "TE": lambda value: self._motor.trips.arm(memory.checked("TE", value), self._timeline.now),
+            "JE": self._write_je,
+            "FL": self._write_fl,
+            **{word: partial(write_group, word, group) for word, group in groups.items()},
+            **{f"O{n}": partial(write_output, n) for n in POINTS},
+            **{f"D{n}": partial(self._write_filter, n) for n in POINTS},
+        }
+
+    def reader(self, word: str) -> Read:
+        """A closure that gives a variable's value."""
+        row = self._memory.row(word)
+        if row is not None and word in self._readers:
+            return self._readers[word]
+        values, key = self._values, word if row else slot(word)
+        if row is not None and row.kind == "reserved":
+            raise Fault(E.ILLEGAL_DATA)
+        if row is not None and (word not in values or row.access == "WO"):
+            raise Fault(E.NOT_PRINTABLE)
+
+        def read() -> Value:
+            try:
+                return values[key]
+            except KeyError:
+                raise Fault(E.NO_SUCH_NAME) from None
+
+        return read
+
+    def writer(self, word: str) -> Write:
+        """A closure that gives a variable a value, or raises Fault."""
+        row = self._memory.row(word)
+        if row is None:
+            return self._user_writer(word)
+        if word in self._writers:
+            return self._writers[word]
+        if row.access in ("RO", "RC") or row.kind in ("keyword", "math"):
+            raise Fault(E.READ_ONLY)
+        if word not in self._values:
+            raise Fault(E.UNKNOWN_VARIABLE)
+        if row.low_encoder is not None or row.values:
+            return partial(self._memory.write, row)
+        return self._plain_writer(row)
+
+    def value(self, argument: Argument | None, floating: bool = False) -> Read:
+        """A closure that gives an argument's value. Raises Fault (21, 24) for what has none."""
+        if isinstance(argument, Text):
+            raise Fault(E.OUT_OF_RANGE)
+        if argument is None or isinstance(argument, Compare):
+            raise Fault(E.ILLEGAL_DATA)
+        if not self._memory.model.floating:
+            return compile_whole(argument, self.reader)
+        return compile_value(argument, self.reader, floating)
+
+    def numbers(self, statement: Statement, least: int, most: int) -> Callable[[], list[int]]:
+        """A closure that gives all arguments as whole numbers. Raises Fault (24, 34, 38)."""
+        count = len(statement.arguments)
+        if not count:
+            raise missing(statement)
+        if count < least:
+            raise Fault(E.NO_SEPARATOR)
+        if count > most:
+            raise Fault(E.ILLEGAL_DATA)
+        reads = [self.value(each) for each in statement.arguments]
+        return lambda: [whole(read()) for read in reads]
+
+    def declared(self, word: str) -> bool:
+        """Whether a user variable is there, or will be once the program has run its VA line."""
+        return word in self._memory.scopes or word in self._program.declared
+
+    def _user_writer(self, word: str) -> Write:
+        values, key = self._values, slot(word)
+        if word in self._program.labels:
+            raise Fault(E.LABEL_NOT_SETTABLE)
+        if not self.declared(word):
+            raise Fault(E.UNKNOWN_VARIABLE)
+
+        def write(value: Value) -> None:
+            if key not in values:
+                raise Fault(E.UNKNOWN_VARIABLE)
+            values[key] = within(whole(value), -0x80000000, 0x7FFFFFFF)
+
+        return write
+
+    def _plain_writer(self, row: Mnemonic) -> Write:
+        values, name = self._values, row.name
+        low, high = row.low or 0, row.high or 0
+        if isinstance(row.default, float):
+
+            def write_float(value: Value) -> None:
+                values[name] = float(within(value, low, high))
+
+            return write_float
+
+        def write(value: Value) -> None:
+            if not isinstance(value, int):
+                value = whole(value)
+            if not low <= value <= high:
+                raise Fault(E.OUT_OF_RANGE)
+            values[name] = value
+
+        return write
+
+    def _write_watched(self, name: str, value: Value) -> None:
+        row = self._memory.row(name)
+        if row is not None:
+            self._memory.write(row, value)
+        self._timeline.replan()
+
+    def _write_error(self, value: Value) -> None:
+        """Only 0 clears; programs also set a code of their own."""
+        number = self._memory.checked("ER", value)
+        self._values["ER"], self._values["EF"] = number, int(number != 0)
+
+    def _write_input_flag(self, value: Value) -> None:
+        """Clearing IF ends what IV waits for."""
+        self._values["IF"] = self._memory.flag("IF", value)
+        self._memory.awaited = ""
+
+    def _write_lock(self, value: Value) -> None:
+        """A lock that has been saved is opened by CP or FD only (manual 5.1.75)."""
+        number = self._memory.checked("LK", value)
+        if not number and self._values["LK"] and self._nvm.locked:
+            raise Fault(E.PROGRAM_LOCKED)
+        self._values["LK"] = number
+
+    def _write_baud(self, value: Value) -> None:
+        row, number = self._memory.row("BD"), whole(value)
+        if row is None or not row.accepts(number):
+            raise Fault(E.NO_SUCH_BAUD)
+        self._values["BD"] = number
+
+    def _write_filter(self, n: int, value: Value) -> None:
+        self._values[f"D{n}"] = self._memory.checked(f"D{n}", value)
+        self._timeline.replan()
+
+    def _write_fl(self, value: Value) -> None:
+        """Following wants inputs 3 and 4 to be a clock; they are so together (manual 5.1.46)."""
+        number, points = self._memory.checked("FL", value), self._inputs.points
+        if number and self._inputs.types[points.clocks[0]][0] not in points.clock_types:
+            raise Fault(E.WRONG_CLOCK_TYPE)
+        self._values["FL"] = number
+        self._timeline.replan()
+
+    def _write_je(self, value: Value) -> None:
+        """Write JE, and let an active jog input turn. The line succeeds even if the motion may not begin."""
+        self._values["JE"] = self._memory.checked("JE", value)
+        self._motor.update_jog()

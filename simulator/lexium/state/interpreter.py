@@ -1,0 +1,348 @@
+"""Program execution in virtual time, program mode, and the core of a drive that every other part is built on.
+
+Theory of operation. When a program starts, its lines are compiled to closures (`LinkedProgram`). Each line takes
+effect at the time at which it begins and then takes the drive's instruction time; the next line begins after that.
+`run` executes everything that is due before a time at which something else happens. A part that changes what else may
+happen (a motion, a trip, an input) calls `timeline.replan`, and `run` comes back so that the next event can be worked
+out again. So the order of all events is that of their exact times, however time is advanced.
+Manual 3.3, 5.1.13, 5.1.22, 5.1.42, 5.1.91, 5.1.98.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from multidrop.dialects.mcode.manual.errors import ErrorNumber as E
+from multidrop.dialects.mcode.manual.grammar import Argument, Name, Statement, is_name
+from multidrop.dialects.mcode.manual.table import lookup
+from multidrop.simulator.lexium.state.errors import ErrorFlag, Fault
+from multidrop.simulator.lexium.state.memory import TABLE_SIZE, Memory
+from multidrop.simulator.lexium.state.program_memory import Program
+from multidrop.simulator.lexium.state.thread import NORMAL, SILENT, STEPPED, TRACED, Frame, Thread
+from multidrop.simulator.lexium.state.timeline import CRLF, Printer, Timeline
+from multidrop.simulator.world import World
+
+# Program memory compiled to closures in a list; labels are no lines of it (they are marks and take no time).
+
+
+Action = Callable[[], None]
+"""What a line does."""
+
+
+class LinkedProgram:
+    """The lines of program memory as they were when a program was last started.
+
+    `actions` and `texts` are by line, `index` gives the line of an address. Where a gap or the end of memory follows a
+    line, `finish` ends the program.
+    """
+
+    def __init__(self, program: Program, compile_line: Callable[[Statement], Action], finish: Action) -> None:
+        self._program, self._compile_line, self._finish = program, compile_line, finish
+        self.actions: list[Action] = [finish]
+        self.texts: list[str] = [""]
+        self.index: dict[int, int] = {}
+        self._linked = False
+
+    def forget(self) -> None:
+        """Compile again when something is started: program memory has changed."""
+        self._linked = False
+
+    def entry(self, target: Argument | None) -> int:
+        """The line at which a program starts. Raises Fault (24, 30, 34, 42)."""
+        address = self._program.resolve(target)
+        if not self._linked:
+            self._link()
+        return self.index[address]
+
+    def place(self, target: Argument | None) -> int:
+        """Where the program that runs goes on. Raises Fault (30, 34, 42), 42 too for what was stored since it began."""
+        address = self._program.resolve(target)
+        if address not in self.index:
+            raise Fault(E.NO_SUCH_ADDRESS, fatal=True)
+        return self.index[address]
+
+    def _link(self) -> None:
+        self.actions, self.texts, self.index = [], [], {}
+        program, expected = self._program, None
+        for address in program.order:
+            line = program.lines[address]
+            if expected not in (None, address):
+                self._append(self._finish, "")
+            expected = address + line.size
+            self.index[address] = len(self.actions)
+            if line.statement.word != "LB":
+                self._append(self._compile_line(line.statement), f"{address}  {line.text}")
+        self._append(self._finish, "")
+        self._linked = True
+
+    def _append(self, action: Action, text: str) -> None:
+        self.actions.append(action)
+        self.texts.append(text)
+
+
+class ProgramMode:
+    """Program mode of one drive: between PG with an address and PG lines are stored (manual 3.3, 5.1.98).
+
+    `address` is where the next line is stored; None: it is not on. The names that a user gives, labels and variables,
+    share one table (manual 3.2.2, 3.3.1, 5.1.71, 5.1.136).
+    """
+
+    def __init__(self, memory: Memory, program: Program, linked: LinkedProgram) -> None:
+        self._memory, self._program, self._linked = memory, program, linked
+        self.address: int | None = None
+
+    def store(self, statement: Statement, text: str) -> None:
+        """Store one more line, which compiles. Raises Fault (24, 28, 29, 31, 45)."""
+        address = self.address or 0
+        name = self._new_label(statement) if statement.word == "LB" else ""
+        self.address = self._program.store(address, text, statement)
+        if name:
+            self._program.labels[name] = address
+        self._linked.forget()
+
+    def known_names(self) -> frozenset[str]:
+        return frozenset((*self._memory.scopes, *self._program.labels, *self._program.declared))
+
+    def check_new(self, word: str) -> None:
+        """Check that a name may be given. Raises Fault (24 bad or reserved, 28 taken, 29 a mnemonic)."""
+        row = lookup(word, self._memory.product)
+        if row is not None:
+            raise Fault(E.ILLEGAL_DATA if row.kind == "reserved" else E.NAME_IS_COMMAND)
+        if not is_name(word) or len(word) > self._memory.model.longest_name:
+            raise Fault(E.ILLEGAL_DATA)
+        if word in self._program.labels or self._memory.scopes.get(word) == "G":
+            raise Fault(E.NAME_EXISTS)
+
+    def check_room(self) -> None:
+        """Check that one more name fits. Raises Fault (31)."""
+        if len(self._program.labels) + len(self._memory.scopes) >= TABLE_SIZE:
+            raise Fault(E.NAME_TABLE_FULL)
+
+    def _new_label(self, statement: Statement) -> str:
+        """The name that an LB line gives. Raises Fault (24, 28, 29, 31)."""
+        name = statement.arguments[0]
+        if not isinstance(name, Name):
+            raise Fault(E.ILLEGAL_DATA)
+        if name.word == "SU":
+            if "SU" in self._program.labels:
+                raise Fault(E.NAME_EXISTS)
+        else:
+            self.check_new(name.word)
+            if name.word in self._memory.scopes or name.word in self._program.declared:
+                raise Fault(E.NAME_EXISTS)
+        self.check_room()
+        return name.word
+
+
+class Interpreter:
+    """Runs the program of one drive.
+
+    `period` is the time of a line, `handler` the target of OE, `executed` counts lines.
+    """
+
+    def __init__(self, core: Core, period: float, compile_line: Callable[[Statement], Action]) -> None:
+        self._memory, self._program, self._timeline = core.memory, core.program, core.timeline
+        self._errors, self._printer, self._thread = core.errors, core.printer, core.thread
+        self.period = period
+        self.linked = LinkedProgram(core.program, compile_line, core.thread.finish)
+        self.handler: Argument | None = None
+        self.executed = 0
+        self._break: tuple[int, int] | None = None
+        self._passes = 0
+        self._executing = False
+        self._before: Callable[[int], bool] | None = None
+        self._after: Callable[[int], None] | None = None
+
+    def watch(self, before: Callable[[int], bool] | None, after: Callable[[int], None] | None) -> None:
+        """Call `before` and `after` each line; the program ends where `before` returns True."""
+        self._before, self._after = before, after
+
+    # Starting and ending.
+
+    def start(self, target: Argument | None, t: float, mode: int = NORMAL) -> None:
+        """EX; a program that runs is left for it, as clients of real units rely on. Raises Fault (24, 30, 34, 42)."""
+        self._program.resolve(target)
+        self._memory.forget_local()
+        self._errors.clear()
+        self._memory.await_input("")
+        self._begin(self.linked.entry(target), t, mode)
+
+    def _begin(self, entry: int, t: float, mode: int) -> None:
+        self._passes = 0
+        if mode == STEPPED and self._break is not None:
+            mode = SILENT
+        self._thread.begin(entry, t, mode)
+
+    def clear(self) -> None:
+        """Become as at power-up: nothing runs, no handler, no break point."""
+        self._thread.finish()
+        self.linked.forget()
+        self.handler, self._break = None, None
+
+    # Stepping.
+
+    def step(self, key: str, t: float) -> None:
+        """Space runs one line, Enter the rest, or up to the break point (manual 5.1.42)."""
+        thread = self._thread
+        if not thread.stepping:
+            return
+        if key == " ":
+            thread.steps += 1
+        else:
+            thread.mode = NORMAL if self._break is None else SILENT
+            self._passes = -int(self._at_break(thread.pc))
+        thread.next_at = max(thread.next_at, t)
+        thread.refresh()
+
+    def break_at(self, target: Argument | None, passes: int) -> None:
+        """BP: step from a place on, when it has been come to so many times; None: nowhere. Raises Fault (30, 42)."""
+        self._passes = 0
+        self._break = None if target is None else (self._program.resolve(target), passes)
+
+    def break_here(self) -> None:
+        """BP alone: step from here on. Raises Fault (40)."""
+        if not self._thread.running:
+            raise Fault(E.NO_PROGRAM_RUNNING)
+        self._thread.step_from_here()
+
+    def _at_break(self, pc: int) -> bool:
+        return self._break is not None and self.linked.index.get(self._break[0]) == pc
+
+    def _breaks(self, pc: int) -> bool:
+        """Whether stepping begins before this line."""
+        if self._thread.mode in (NORMAL, STEPPED) or not self._at_break(pc):
+            return False
+        self._passes += 1
+        if self._break is None or self._passes < self._break[1]:
+            return False
+        self._thread.step_from_here()
+        return True
+
+    # Execution.
+
+    def run(self, until: float) -> None:
+        """Execute the lines that are due at or before `until`, or up to the one that changes what else is due."""
+        self._executing = True
+        if self._thread.mode == NORMAL and self._after is None:
+            self._run(until)
+        else:
+            self._run_shown(until)
+        self._executing = False
+
+    def _run(self, until: float) -> None:
+        thread, timeline, actions, period = self._thread, self._timeline, self.linked.actions, self.period
+        count = 0
+        while thread.live and thread.next_at <= until and not timeline.outdated:
+            count += 1
+            at, pc = thread.next_at, thread.pc
+            timeline.now = at
+            thread.pc = pc + 1
+            thread.next_at = at + period
+            try:
+                actions[pc]()
+            except Fault as fault:
+                self._on_fault(fault)
+        self.executed += count
+
+    def _run_shown(self, until: float) -> None:
+        """Execute line by line, each printed before it is executed (EX modes 1 and 2), and with break points."""
+        thread, timeline, linked = self._thread, self._timeline, self.linked
+        while thread.live and thread.next_at <= until and not timeline.outdated:
+            timeline.now, pc = thread.next_at, thread.pc
+            if self._breaks(pc):
+                return
+            if self._before is not None and self._before(pc):
+                return thread.finish()
+            if linked.texts[pc] and thread.mode in (TRACED, STEPPED) and not self._memory.values["LK"]:
+                self._printer.emit(linked.texts[pc] + CRLF)
+            thread.pc = pc + 1
+            thread.next_at = timeline.now + self.period
+            thread.steps -= thread.mode == STEPPED
+            self.executed += 1
+            try:
+                linked.actions[pc]()
+            except Fault as fault:
+                self._on_fault(fault)
+            if self._after is not None:
+                self._after(pc)
+            if thread.mode != NORMAL:
+                thread.refresh()
+
+    def line(self) -> int:
+        """The line of the program that is at work or holds; between two lines, the next one."""
+        thread = self._thread
+        holding = thread.waiting or thread.next_at > self._timeline.now + self.period
+        return thread.pc - (self._executing or holding)
+
+    def branch(self, target: Argument | None) -> None:
+        """Go on elsewhere. Raises Fault (30, 42)."""
+        self._thread.pc = self.linked.place(target)
+
+    def call(self, target: Argument | None) -> None:
+        """Go on elsewhere until RT. Raises Fault (30, 42, 43)."""
+        self._thread.call(self.linked.place(target))
+
+    # Trips and errors.
+
+    def interrupt(self, target: Argument | None, t: float) -> None:
+        """Call the subroutine of a trip before the next line. Faults go to the drive's error register."""
+        if target is None:
+            return
+        try:
+            self._call_between_lines(target, t)
+        except Fault as fault:
+            self._on_fault(fault)
+
+    def _call_between_lines(self, target: Argument, t: float) -> None:
+        if self._thread.running:
+            self._thread.interrupt(self.linked.place(target), t)
+        else:  # its RT ends it
+            self._begin(self.linked.entry(target), t, NORMAL)
+            self._thread.push(Frame(len(self.linked.actions) - 1))
+
+    def raise_error(self, code: int) -> None:
+        """Set an error that no line has caused, and call its handler."""
+        self._errors.set(code)
+        self.on_error(self._timeline.now)
+        self._timeline.replan()
+
+    def refuse(self, code: int, handle: bool) -> None:
+        """Set the error of a typed line; `handle`: call its handler."""
+        self._errors.set(code)
+        if handle:
+            self.on_error(self._timeline.now)
+
+    def on_error(self, t: float) -> bool:
+        """Call the error handler, if one is declared and not at work already. Gives whether it was called."""
+        if self.handler is None or self._thread.handling:
+            return False
+        try:
+            self._call_between_lines(self.handler, t)
+        except Fault:
+            return False
+        self._thread.handling = len(self._thread.stack)
+        self._errors.handled()
+        return True
+
+    def _on_fault(self, fault: Fault) -> None:
+        """Act on an error in a line: without a handler the next one follows, unless there is none to follow."""
+        self._errors.set(fault.code)
+        if not self.on_error(self._timeline.now) and fault.fatal:
+            self._thread.finish()
+
+
+class Core:
+    """The parts of a drive that all others are built on; `compile_line` compiles a stored line."""
+
+    def __init__(
+        self, memory: Memory, world: World, period: float, compile_line: Callable[[Statement], Action]
+    ) -> None:
+        self.memory, self.values, self.model, self.world = memory, memory.values, memory.model, world
+        self.timeline = Timeline()
+        self.program = Program(product=memory.product)
+        self.errors = ErrorFlag(memory.values, memory.model.codes, self.timeline)
+        self.thread = Thread(self.timeline)
+        self.printer = Printer(self.timeline, memory.model.waits_to_print, self.thread.delay)
+        self.interpreter = Interpreter(self, period, compile_line)
+        self.errors.line = self.interpreter.line
+        self.mode = ProgramMode(memory, self.program, self.interpreter.linked)
