@@ -11,10 +11,11 @@ its result and raises what a person must read. A line, a bus or a test can run i
 from __future__ import annotations
 
 import re
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Generator, Sequence
 from dataclasses import dataclass, field, replace
 from enum import Enum, IntEnum
-from typing import Any, NamedTuple, Protocol, TypeVar
+from typing import Any, ClassVar, NamedTuple, TypeVar
 
 
 class Kind(Enum):
@@ -192,80 +193,85 @@ class StopPiece(NamedTuple):
     quiet: float = 0.1
 
 
-class Codec(Protocol):
+class Codec(ABC):
     """One drive's language as that drive is set: bytes out, replies in, and the stop."""
 
-    @property
-    def family(self) -> str:
-        """The name of its record in `families.FAMILIES`."""
+    family: ClassVar[str]
+    """The name of its record in `families.FAMILIES`."""
+    framed: ClassVar[bool] = False
+    """Messages carry their length, so neither direction of the stream may be cut within a message."""
+    numbered: ClassVar[bool] = False
+    """Replies carry their request's number, so a late reply is never taken for another request's."""
+    broadcasts: ClassVar[bool] = False
+    """One command reaches every drive of the line; otherwise the host sends it to each drive in turn."""
+    stop_replies: ClassVar[bool] = False
+    """Drives reply to a stop, so two stops that are written at once have replies that collide."""
+    stop_debris: ClassVar[re.Pattern[str] | None] = None
+    """Unsolicited lines that a stop leaves and no program prints: replies to it, damaged ones; None: none."""
 
-    @property
-    def framed(self) -> bool:
-        """Messages carry their length, so neither direction of the stream may be cut within a message."""
-
-    @property
-    def numbered(self) -> bool:
-        """Replies carry their request's number, so a late reply is never taken for another request's."""
-
-    @property
-    def broadcasts(self) -> bool:
-        """One command reaches every drive of the line; otherwise the host sends it to each drive in turn."""
-
-    @property
-    def stop_replies(self) -> bool:
-        """Drives reply to a stop, so two stops that are written at once have replies that collide."""
-
-    @property
-    def stop_debris(self) -> re.Pattern[str] | None:
-        """Unsolicited lines that a stop leaves and no program prints: replies to it, damaged ones; None: none."""
-
+    @abstractmethod
     def encode(self, request: Request) -> bytes:
         """Return the whole frame: address, text, checksum, terminator."""
 
+    @abstractmethod
     def decode(self, request: Request, buffer: bytes) -> Decoded | None:
         """Find the reply in the bytes received since the request was written; None while it is incomplete."""
 
     def on_quiet(self, request: Request, buffer: bytes) -> Decoded | None:
         """Return the reply after a quiet time, where it has no end of its own; None: wait for the timeout."""
+        return Decoded(Reply(), len(buffer)) if request.kind is Kind.QUIET else None
 
+    @abstractmethod
     def on_timeout(self, request: Request, buffer: bytes) -> Decoded:
         """Return the outcome when time is up: TIMEOUT, or DAMAGED where bytes were received."""
 
     def quiet_time(self, request: Request, buffer: bytes) -> float:
         """Seconds of quiet after which the line calls `on_quiet`."""
+        return request.settle or 0.0
 
+    @abstractmethod
     def parse_unsolicited(self, buffer: bytes) -> tuple[tuple[str, ...], int]:
         """Lines received while no request is open, and how many bytes they took."""
 
+    @abstractmethod
     def stop(self, addresses: Sequence[str], sure: bool = True, half_sent: bool = False) -> bytes:
         """The bytes that stop motion and program of these drives at once.
 
         Not `sure`: their settings may have changed. `half_sent`: no byte may end the line that a drive's buffer holds.
         """
 
+    @abstractmethod
     def stop_again(self, addresses: Sequence[str], sure: bool = True) -> Sequence[StopPiece]:
         """The stop to repeat, in pieces."""
 
+    @abstractmethod
     def hears_stop(self, data: bytes, address: str, sure: bool = True) -> bool:
         """Whether the bytes of other drives' stop also stop the drive at this address. `sure`: as for `stop`."""
 
+    @abstractmethod
     def starts_motion(self, text: str) -> bool:
         """Whether a typed line can start motion or a program; an unknown command can."""
 
     def damaged(self, line: str) -> bool:
         """Whether a checksum shows that an unsolicited line was damaged on the wire."""
+        return False
 
     def answers_host(self, line: str) -> bool:
         """Whether an unsolicited line is a late reply: only a question of multidrop has this form."""
+        return False
 
     def answers(self, request: Request, line: str) -> bool:
         """Whether an unsolicited line is a late reply to this question, which no program prints."""
+        return False
 
     def restarted(self, line: str) -> bool:
         """Whether an unsolicited line is the drive's message after power-up or a reset."""
+        return False
 
     def stored_stop(self, line: str) -> str:
         """The address of a drive that stored a stop instead of executing it, as a line shows; empty: none."""
+        return ""
 
     def invalidate(self) -> bytes:
         """The bytes that make a drive refuse a half-sent line; empty: none are needed."""
+        return b""

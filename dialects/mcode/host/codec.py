@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import ClassVar
 
-from multidrop.dialects.codec import Decoded, End, Kind, Reply, Request, StopPiece
+from multidrop.dialects.codec import Codec, Decoded, End, Kind, Reply, Request, StopPiece
 from multidrop.dialects.errors import Inexpressible
 from multidrop.dialects.mcode.host import classify
 from multidrop.dialects.mcode.host.framing import SIGN_ON, UNPRINTED, pieces, printable, sealed, unasked
@@ -72,7 +72,7 @@ STOP_BYTES = re.compile(rb"(?<![ -~])(?:[!-~][\x05\x1b])+\n?|[\x03\x05\x1b]|~{%d
 
 
 @dataclass(frozen=True)
-class MCode:
+class MCode(Codec):
     """The settings of one drive that determine its codec. `escape` is ES, None while it is unknown."""
 
     em: int = 0

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from functools import cache
 from typing import TYPE_CHECKING, ClassVar
 
-from multidrop.dialects.codec import Decoded, End, Reply, Request, StopPiece
+from multidrop.dialects.codec import Codec, Decoded, End, Reply, Request, StopPiece
 from multidrop.dialects.modbus.host import framing
 from multidrop.dialects.modbus.manual.registers import REGISTERS
 from multidrop.dialects.state import DriveState
@@ -32,16 +32,13 @@ def pdu_codec() -> PduCodec:
 
 
 @dataclass(frozen=True)
-class Modbus:
+class Modbus(Codec):
     """One Ethernet drive. It replies to any unit identifier."""
 
     unit: int = 1
     family: ClassVar[str] = "modbus"
     framed: ClassVar[bool] = True
     numbered: ClassVar[bool] = True
-    broadcasts: ClassVar[bool] = False
-    stop_replies: ClassVar[bool] = False
-    stop_debris: ClassVar[None] = None
 
     def encode(self, request: Request) -> bytes:
         """Return the whole message, numbered by the request's tag."""
@@ -59,10 +56,6 @@ class Modbus:
             return Decoded(Reply(end=End.DAMAGED, detail=_foreign(buffer[at:])), len(buffer))
         return None
 
-    def on_quiet(self, request: Request, buffer: bytes) -> Decoded | None:
-        """Return None: every reply has an end of its own."""
-        return None
-
     def on_timeout(self, request: Request, buffer: bytes) -> Decoded:
         """Return TIMEOUT, or DAMAGED where the rest of a reply is missing; that rest may still arrive."""
         at, foreign = _whole(buffer)
@@ -71,10 +64,6 @@ class Modbus:
         if at == len(buffer):
             return Decoded(Reply(end=End.TIMEOUT), at)
         return Decoded(Reply(end=End.DAMAGED, detail=f"it ends after {len(buffer) - at} bytes"), at)
-
-    def quiet_time(self, request: Request, buffer: bytes) -> float:
-        """Return 0: no quiet time ends a reply."""
-        return 0.0
 
     def parse_unsolicited(self, buffer: bytes) -> tuple[tuple[str, ...], int]:
         """Drop whole messages, which are late or reply to a stop; return bytes that are not Modbus."""
@@ -100,26 +89,6 @@ class Modbus:
     def starts_motion(self, text: str) -> bool:
         """Whether a line is a write, each of which may start motion; a print only reads."""
         return text.strip()[:2].upper() != "PR"
-
-    def damaged(self, line: str) -> bool:
-        """No: no line carries a checksum."""
-        return False
-
-    def answers_host(self, line: str) -> bool:
-        """No: nothing marks the reply to a question."""
-        return False
-
-    def answers(self, request: Request, line: str) -> bool:
-        """No: nothing marks the reply to a question."""
-        return False
-
-    def restarted(self, line: str) -> bool:
-        """Return False: a drive that restarts closes the connection."""
-        return False
-
-    def stored_stop(self, line: str) -> str:
-        """Never: no drive of the family replies so to a stop."""
-        return ""
 
     def invalidate(self) -> bytes:
         """Return nothing: a message that has begun is always sent whole."""

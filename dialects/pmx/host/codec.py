@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import ClassVar
 
-from multidrop.dialects.codec import Decoded, End, Kind, Reply, Request, StopPiece
+from multidrop.dialects.codec import Codec, Decoded, End, Kind, Reply, Request, StopPiece
 from multidrop.dialects.errors import Inexpressible
 from multidrop.dialects.pmx.manual.table import reads, starts_motion
 from multidrop.dialects.state import DriveState
@@ -34,16 +34,12 @@ STOP_BYTES = re.compile(rb"(?:@\d\d)?(?:ABORT|SR[01]=0)\r|~~~\r")
 
 
 @dataclass(frozen=True)
-class Pmx:
+class Pmx(Codec):
     """One controller, alone or on a line. `addressed`: its number precedes each command."""
 
     addressed: bool = True
     family: ClassVar[str] = "pmx"
-    framed: ClassVar[bool] = False
-    numbered: ClassVar[bool] = False
-    broadcasts: ClassVar[bool] = False
     stop_replies: ClassVar[bool] = True
-    stop_debris: ClassVar[None] = None
 
     def request(self, address: str, text: str) -> Request:
         """Build the request for a command, as typed: case matters. Raises Inexpressible where it cannot be sent."""
@@ -82,10 +78,6 @@ class Pmx:
             return Decoded(_reply(text), at, tuple(strays))
         return None
 
-    def on_quiet(self, request: Request, buffer: bytes) -> Decoded | None:
-        """Return what was collected where the request asks for that; otherwise None: every reply ends in CR."""
-        return Decoded(Reply(), len(buffer)) if request.kind is Kind.QUIET else None
-
     def on_timeout(self, request: Request, buffer: bytes) -> Decoded:
         """Return TIMEOUT, or DAMAGED where the bytes received are no reply."""
         if (collected := self.on_quiet(request, buffer)) is not None:
@@ -98,10 +90,6 @@ class Pmx:
         if shown == own:
             detail = "our own bytes came back and nothing else; echo=local is for adapters that repeat them"
         return Decoded(Reply(end=End.DAMAGED, detail=detail), len(buffer))
-
-    def quiet_time(self, request: Request, buffer: bytes) -> float:
-        """Return the quiet time that ends a collection; 0 otherwise: none ends a reply."""
-        return request.settle or 0.0
 
     def parse_unsolicited(self, buffer: bytes) -> tuple[tuple[str, ...], int]:
         """Late replies, without `OK`, the reply to a stop."""
@@ -142,26 +130,6 @@ class Pmx:
     def starts_motion(self, text: str) -> bool:
         """Whether the table lists the command as one that starts motion; a read starts none, an unknown command may."""
         return starts_motion(text)
-
-    def damaged(self, line: str) -> bool:
-        """No: no line carries a checksum."""
-        return False
-
-    def answers_host(self, line: str) -> bool:
-        """No: nothing marks the reply to a question."""
-        return False
-
-    def answers(self, request: Request, line: str) -> bool:
-        """No: nothing marks the reply to a question."""
-        return False
-
-    def restarted(self, line: str) -> bool:
-        """Return False: a controller prints nothing after power-up."""
-        return False
-
-    def stored_stop(self, line: str) -> str:
-        """Never: no drive of the family replies so to a stop."""
-        return ""
 
     def invalidate(self) -> bytes:
         """Return the end of a command that no unit knows; should a unit read it otherwise, ABORT follows at once."""

@@ -15,7 +15,7 @@ from dataclasses import dataclass, field, replace
 from struct import Struct
 from typing import ClassVar, NamedTuple
 
-from multidrop.dialects.codec import Decoded, End, Kind, Reply, Request, StopPiece
+from multidrop.dialects.codec import Codec, Decoded, End, Kind, Reply, Request, StopPiece
 from multidrop.dialects.errors import Inexpressible
 from multidrop.dialects.state import DriveState, Owed
 from multidrop.dialects.tmcl.manual import commands
@@ -82,7 +82,7 @@ STORED_STOP = re.compile(r"module (\d+): in download mode: the stop was stored a
 
 
 @dataclass(frozen=True)
-class Tmcl:
+class Tmcl(Codec):
     """The modules of a line. `motors`: how many each has, by address, where that was counted."""
 
     motors: tuple[tuple[str, int], ...] = ()
@@ -90,8 +90,6 @@ class Tmcl:
     """The module is in download mode: a stop ends that first."""
     family: ClassVar[str] = "tmcl"
     framed: ClassVar[bool] = True
-    numbered: ClassVar[bool] = False
-    broadcasts: ClassVar[bool] = False
     stop_replies: ClassVar[bool] = True
     stop_debris: ClassVar[re.Pattern[str]] = re.compile(r"heard .*")
 
@@ -125,10 +123,6 @@ class Tmcl:
                 continue
             return _found(request, fields, frame, end, strays)
         return None
-
-    def on_quiet(self, request: Request, buffer: bytes) -> Decoded | None:
-        """The end of a request without a reply; None for the others."""
-        return Decoded(Reply(), len(buffer)) if request.kind is Kind.QUIET else None
 
     def on_timeout(self, request: Request, buffer: bytes) -> Decoded:
         """TIMEOUT, or DAMAGED where bytes came; or the refusal of a damaged request."""
@@ -188,14 +182,6 @@ class Tmcl:
         except commands.LineError:
             return True
 
-    def damaged(self, line: str) -> bool:
-        """No: no line carries a checksum."""
-        return False
-
-    def answers_host(self, line: str) -> bool:
-        """No: nothing marks the reply to a question."""
-        return False
-
     def answers(self, request: Request, line: str) -> bool:
         """Whether the line is a reply of this module to a command that only reads."""
         _, call = call_of(request.body)
@@ -203,18 +189,10 @@ class Tmcl:
             f"module {request.address}: {late_reply_to(call.command)}:"
         )
 
-    def restarted(self, line: str) -> bool:
-        """Never: a module says nothing after power-up."""
-        return False
-
     def stored_stop(self, line: str) -> str:
         """The address of a module whose reply to a stop was status 101."""
         found = STORED_STOP.match(line)
         return found[1] if found else ""
-
-    def invalidate(self) -> bytes:
-        """Nothing: a frame that has begun to leave is sent whole."""
-        return b""
 
 
 def number_of(address: str) -> int:

@@ -82,13 +82,13 @@ def reading(name: str, value: int) -> Reading:
     return Reading(name, value, unit=unit, default=row.fresh, fixed=bool(prefix) and number in WIRE)
 
 
-def _plan(motors: int, present: Readings, wanted: Mapping[str, Value], allowed: Permission) -> Plan:
+def plan(state: TmclState, present: Readings, wanted: Mapping[str, Value], allowed: Permission) -> Plan:
     """Order the steps to the wanted values. Raises Diagnostic for a value that the module refuses."""
-    now = present.values
+    now, names = present.values, setting_names(state.motors or 1)
     changed = {name.upper(): value for name, value in wanted.items() if not same(value, now.get(name.upper()))}
     withheld = {name: reason for name in changed if (reason := _risk(name, changed[name], now, allowed))}
-    goal = {name: _checked(name, value, motors) for name, value in changed.items() if name not in withheld}
-    order = [name for name in setting_names(motors) if name in goal]
+    goal = {name: _checked(name, value, names) for name, value in changed.items() if name not in withheld}
+    order = [name for name in names if name in goal]
     steps = [Change(name, now.get(name), goal[name], str(_call(name, Command.SAP, goal[name]))) for name in order]
     scale = [name for name in goal if _name_parts(name)[:2] == ("", Axis.MICROSTEPS)]
     return Plan(tuple(steps), tuple(withheld.items()), remarks=reference_lost(steps, scale))
@@ -104,9 +104,9 @@ def _row(name: str) -> Parameter:
     return (GLOBAL if prefix else AXIS)[number]
 
 
-def _checked(name: str, value: Value, motors: int) -> int:
+def _checked(name: str, value: Value, names: Collection[str]) -> int:
     """Return the value as a whole number. Raises Diagnostic."""
-    if name not in setting_names(motors):
+    if name not in names:
         raise Diagnostic(f"{name}: is not a setting of the module")
     limits = _row(name).limits
     if isinstance(value, (str, tuple)) or not float(value).is_integer() or int(value) not in limits:
@@ -143,11 +143,6 @@ def read_settings(state: TmclState, progress: Progress) -> Procedure[Readings]:
             unread.append((name, str(refusal)))
     progress(len(names), len(names))
     return Readings(tuple(found), tuple(unread))
-
-
-def plan(state: TmclState, present: Readings, wanted: Mapping[str, Value], allowed: Permission) -> Plan:
-    """Order the steps to the wanted values. Raises Diagnostic."""
-    return _plan(state.motors or 1, present, wanted, allowed)
 
 
 def conflict(plan: Plan, others: Collection[str]) -> str:
