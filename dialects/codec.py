@@ -157,7 +157,6 @@ class Decoded:
 
 
 def _with(frozen: T, **changes: object) -> T:
-    """Copy a frozen value with some fields changed."""
     made = object.__new__(type(frozen))
     made.__dict__.update(frozen.__dict__, **changes)
     return made

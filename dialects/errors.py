@@ -39,7 +39,6 @@ class Diagnostic(Exception):
         super().__init__(message)
 
     def __str__(self) -> str:
-        """Return the whole as one line."""
         head = f"{self.where}: " if self.where else ""
         tail = f"; {self.hint}" if self.hint else ""
         return f"{head}{self.message}{tail}"

@@ -62,12 +62,10 @@ def family_of(codec: Codec) -> Family[Any]:
 
 
 def languages() -> list[Language]:
-    """The languages that people type, each once."""
     return list({id(family.language): family.language for family in FAMILIES.values()}.values())
 
 
 def program_languages() -> dict[str, ProgramFiles]:
-    """Program files by the name of their family."""
     return {name: row.files for name, row in TABLE.items() if row.files is not None}
 
 

@@ -39,7 +39,6 @@ class Guard(NamedTuple):
 
 
 def to_all(line: str) -> Guard:
-    """Guard a line that can start motion of every drive."""
     return Guard(EVERYONE, f"'{line}' can start every drive of the line")
 
 
@@ -306,13 +305,11 @@ class Family(Generic[S]):
 
     @property
     def programs(self) -> Programs[S] | None:
-        """Programs of its drives; None: the host neither lists nor loads them."""
         found: Programs[S] | None = imported_if(self.programs_at)
         return found
 
     @property
     def parameters(self) -> Parameters[S] | None:
-        """Parameters of its drives; None: the host neither reads nor writes all of them."""
         found: Parameters[S] | None = imported_if(self.parameters_at)
         return found
 

@@ -75,17 +75,14 @@ def bounded(file: IO[bytes], where: str, largest: int = LARGEST) -> bytes:
 
 
 def text_of(path: str | Path) -> str:
-    """Read a text file, UTF-8 or of Windows (Latin-1). Raises Diagnostic, also for a binary file."""
     return _decoded(bytes_of(path), str(path))[0]
 
 
 def utf8_of(path: str | Path) -> str:
-    """Read a text file, UTF-8. Raises Diagnostic."""
     return utf8(bytes_of(path), str(path))
 
 
 def utf8(data: bytes, where: str) -> str:
-    """The text of a file. Raises Diagnostic with its line."""
     try:
         return data.decode("utf-8-sig")
     except UnicodeDecodeError as error:
@@ -147,7 +144,6 @@ def wrong_characters(lines: Iterable[str]) -> Iterator[tuple[int, int, str]]:
 
 
 def named(character: str) -> str:
-    """Name a character that no line may have."""
     return f"{_NAMES.get(character, 'control character')} (U+{ord(character):04X})"
 
 

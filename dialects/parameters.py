@@ -12,6 +12,7 @@ from math import isclose
 from typing import Generic, TypeVar
 
 from multidrop.dialects.codec import Procedure
+from multidrop.dialects.errors import Refused
 from multidrop.dialects.state import DriveState
 
 Scalar = int | float | str
@@ -52,12 +53,10 @@ class Readings:
 
     @property
     def values(self) -> dict[str, Value]:
-        """The values by name."""
         return {each.name: each.value for each in self.readings}
 
     @property
     def defaults(self) -> dict[str, Value]:
-        """The defaults by name, as far as they are known."""
         return {each.name: each.default for each in self.readings if each.default is not None}
 
 
@@ -107,15 +106,28 @@ class Plan:
     """What the steps mean for the next moves, for a person."""
 
     def __iter__(self) -> Iterator[Change]:
-        """Iterate over the steps."""
         return iter(self.changes)
 
     def __len__(self) -> int:
-        """The number of steps."""
         return len(self.changes)
 
 
 S = TypeVar("S", bound=DriveState)
+
+
+def read_each(
+    names: Sequence[str], read: Callable[[str], Procedure[Reading]], progress: Progress, unread: Pairs = ()
+) -> Procedure[Readings]:
+    """Read settings one by one; a refused one is listed as unread. Raises NoAnswer."""
+    found, refused = [], [*unread]
+    for done, name in enumerate(names):
+        progress(done, len(names))
+        try:
+            found.append((yield from read(name)))
+        except Refused as refusal:
+            refused.append((name, str(refusal)))
+    progress(len(names), len(names))
+    return Readings(tuple(found), tuple(refused))
 
 
 def no_conflict(plan: Plan, others: Collection[str]) -> str:
@@ -133,9 +145,9 @@ class Parameters(Generic[S]):
     """Order the steps from the present to the wanted values. Raises Diagnostic for a value that the drive refuses."""
     ready: Callable[[S], Procedure[str]]
     """Return the reason for which settings must not be changed now: it moves, a program runs; empty: there is none."""
-    write: Callable[[S, Change], Procedure[None]]
+    write: Callable[[S, Change], Procedure[object]]
     """Carry out a step, and make sure of it."""
-    save: Callable[[S], Procedure[None]]
+    save: Callable[[S], Procedure[object]]
     """Keep the settings over power-off."""
     language: str
     """The language whose names the settings bear; two families may share it."""
@@ -148,12 +160,10 @@ class Parameters(Generic[S]):
 
 
 def number(value: Value | None) -> float:
-    """A value as a number; 0 for a text and a set-up."""
     return value if isinstance(value, (int, float)) else 0
 
 
 def same(one: Value | None, other: Value | None) -> bool:
-    """Compare two values as numbers where both are."""
     if isinstance(one, tuple) and isinstance(other, tuple):
         return len(one) == len(other) and all(map(same, one, other))
     if isinstance(one, (int, float)) and isinstance(other, (int, float)):

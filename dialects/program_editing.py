@@ -40,7 +40,6 @@ class UserName(NamedTuple):
 
     @property
     def about(self) -> str:
-        """Its kind, the line that declares it, and the remark there."""
         line = f", line {self.declared[0].line + 1}" if self.declared else ""
         return f"{self.kind}{line}{': ' if self.remark else ''}{self.remark}"
 
@@ -98,7 +97,6 @@ class EditingLanguage(Protocol):
 
 
 def replaced(lines: Sequence[str], places: Iterable[Span], new: str) -> list[str]:
-    """Return the lines with other words at these places."""
     found = list(lines)
     for place in sorted(places, reverse=True):
         line = found[place.line]

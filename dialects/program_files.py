@@ -30,11 +30,9 @@ class Problem(NamedTuple):
     warning: bool = False
 
     def where(self, name: str) -> str:
-        """Return `file:line:column`."""
         return f"{name}:{self.line}:{self.column}"
 
     def line_for(self, name: str) -> str:
-        """Return the one line that a person reads of it."""
         hint = f"; {self.hint}" if self.hint else ""
         return f"{self.where(name)}: {'warning: ' if self.warning else ''}{self.what}{hint}"
 
@@ -45,7 +43,6 @@ def in_order(problems: Iterable[Problem]) -> list[Problem]:
 
 
 def errors(problems: Sequence[Problem]) -> list[Problem]:
-    """The problems that are not warnings."""
     return [each for each in problems if not each.warning]
 
 

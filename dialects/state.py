@@ -85,15 +85,12 @@ class DriveState:
     # Messages for a person
 
     def note(self, warning: str) -> None:
-        """Add a warning."""
         self.notes.append(warning)
 
     def remark(self, text: str) -> None:
-        """Add a side effect of a typed line."""
         self.remarks.append(text)
 
     def take_messages(self) -> tuple[list[str], list[str]]:
-        """Return the warnings and remarks, and forget them."""
         taken = self.notes, self.remarks
         self.notes, self.remarks = [], []
         return taken
@@ -101,21 +98,17 @@ class DriveState:
     # Identity
 
     def identified(self, product: str, version: str, part: str = "") -> None:
-        """Record what the drive reports of itself."""
         self.product, self.version, self.part = product, version, part or self.part
 
     def named(self, name: str) -> None:
-        """Record the name that the drive bears."""
         self.name = name
 
     def serial_read(self, serial: str) -> None:
-        """Record the serial number."""
         self.serial = serial
 
     # Replies
 
     def reply_outstanding(self) -> None:
-        """Record that a reply may arrive late."""
         self.reply_pending = True
 
     def synchronised(self) -> None:
@@ -123,7 +116,6 @@ class DriveState:
         self.reply_pending = False
 
     def next_sync_mark(self) -> int:
-        """Return the number of a fresh sync mark."""
         self.sync_marks += 1
         return self.sync_marks
 
@@ -131,7 +123,6 @@ class DriveState:
         """Record that a stop was written to the drive."""
 
     def found_storing(self) -> None:
-        """Record that the drive stores what it receives."""
         self.programming = True
 
     # Settings and error flag
@@ -149,7 +140,6 @@ class DriveState:
         self.settings_unknown = False
 
     def error_flag_read(self, flag: bool) -> None:
-        """Record the drive's error flag."""
         self.error = flag
 
     # Reference

@@ -202,11 +202,9 @@ class Control:
     """The reason for which the family has no such control; it has no lines then."""
 
     def filled(self, by: int = 0, to: int = 0) -> tuple[str, ...]:
-        """The lines with their numbers."""
         return tuple(line.format(by=by, to=to) for line in self.lines)
 
     def shown(self, by: str = "", to: str = "") -> str:
-        """The lines as a person reads them."""
         return ", ".join(line.format(by=by, to=to) for line in self.lines)
 
 

@@ -22,17 +22,14 @@ FIRST = "X"
 
 
 def move(axis: str, steps: int) -> tuple[str, ...]:
-    """Move an axis by a distance."""
     return "INC", f"{axis.upper() or FIRST}{steps}"
 
 
 def move_to(axis: str, position: int) -> tuple[str, ...]:
-    """Move an axis to a position."""
     return "ABS", f"{axis.upper() or FIRST}{position}"
 
 
 def assign(word: str, value: str) -> str:
-    """Give a word a value."""
     return f"{word}={value}"
 
 

@@ -23,12 +23,10 @@ FIRST = "0"
 
 
 def move(axis: str, steps: int) -> tuple[str, ...]:
-    """Move a motor by a distance."""
     return (f"MVP REL, {axis or FIRST}, {steps}",)
 
 
 def move_to(axis: str, position: int) -> tuple[str, ...]:
-    """Move a motor to a position."""
     return (f"MVP ABS, {axis or FIRST}, {position}",)
 
 

@@ -41,7 +41,6 @@ class Modbus(Codec):
     numbered: ClassVar[bool] = True
 
     def encode(self, request: Request) -> bytes:
-        """Return the whole message, numbered by the request's tag."""
         return pdu_codec().message(request.tag % NUMBERS, request.body, self.unit)
 
     def decode(self, request: Request, buffer: bytes) -> Decoded | None:
@@ -83,7 +82,6 @@ class Modbus(Codec):
         )
 
     def hears_stop(self, data: bytes, address: str, sure: bool = True) -> bool:
-        """Return True: a connection has one drive."""
         return True
 
     def starts_motion(self, text: str) -> bool:
@@ -91,7 +89,6 @@ class Modbus(Codec):
         return text.strip()[:2].upper() != "PR"
 
     def invalidate(self) -> bytes:
-        """Return nothing: a message that has begun is always sent whole."""
         return b""
 
 
@@ -109,7 +106,6 @@ def _reply(asked: bytes, answer: bytes) -> Reply:
 
 
 def _whole(buffer: bytes) -> tuple[int, bool]:
-    """Find the end of the last whole message, and whether bytes that are not Modbus follow it."""
     at = 0
     try:
         while (found := framing.first(buffer, at)) is not None:

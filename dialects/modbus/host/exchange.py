@@ -9,8 +9,9 @@ read and reported first. The host never repeats a request.
 from __future__ import annotations
 
 from multidrop.dialects.codec import End, Kind, Priority, Procedure, Reply, Request
-from multidrop.dialects.errors import NoAnswer, Refused
-from multidrop.dialects.mcode.host.state import described, unknown, who
+from multidrop.dialects.errors import Refused
+from multidrop.dialects.exchange import unanswered
+from multidrop.dialects.mcode.host.state import described, who
 from multidrop.dialects.modbus.host import framing, mapping
 from multidrop.dialects.modbus.host.codec import ModbusState, pdu_codec
 from multidrop.dialects.modbus.manual.registers import AT, REGISTERS
@@ -42,13 +43,8 @@ def sure(state: ModbusState, asked: Request, reply: Reply) -> bytes:
     """Return the content of a reply. Raises NoAnswer where there is none, Refused for an exception."""
     if reply.end is End.REFUSED:
         raise refusal(state, asked, reply, None)
-    if reply.end is End.DAMAGED:
-        raise NoAnswer(
-            f"{who(state)}: the reply to '{asked.text}' is damaged ({reply.detail}); it may have been executed "
-            "and was not sent again"
-        )
     if reply.end is not End.DONE:
-        raise NoAnswer(unknown(state, asked))
+        raise unanswered(who(state), asked, reply)
     return reply.body
 
 
@@ -78,7 +74,6 @@ def error_number(state: ModbusState) -> Procedure[int | None]:
 
 
 def _quietly(state: ModbusState, name: str) -> Procedure[int | None]:
-    """Read a register whose failure does not matter."""
     register = REGISTERS[name]
     reply = yield request(state, f"PR {name}", mapping.read(register))
     return mapping.value_of(register, pdu_codec().registers(reply.body)) if reply.end is End.DONE else None

@@ -74,7 +74,6 @@ def _value(word: str, arguments: Sequence[Argument | None]) -> int:
 
 
 def _number(word: str, arguments: Sequence[Argument | None]) -> int:
-    """Return the one whole number after a word."""
     if not arguments:
         raise Inexpressible(f"{word} needs a value, as in {word}=1")
     if len(arguments) > 1:
@@ -88,7 +87,6 @@ def _number(word: str, arguments: Sequence[Argument | None]) -> int:
 
 
 def _variable(word: str, arguments: Sequence[Argument | None]) -> Register:
-    """Return the variable that IC or DC steps."""
     name = arguments[0] if len(arguments) == 1 else None
     if not isinstance(name, Name):
         raise Inexpressible(f"{word} needs a variable, as in {word} R1")
@@ -171,7 +169,6 @@ def _set_up(answer: bytes) -> str:
 
 
 def read(register: Register) -> bytes:
-    """Read a value from its registers."""
     return pdu_codec().read(framing.READ_REGISTERS, register.address, register.count)
 
 
@@ -181,7 +178,6 @@ def value_of(register: Register, words: Sequence[int]) -> int:
 
 
 def unavailable(word: str) -> Inexpressible:
-    """Describe a word that has no register."""
     if lookup(word) is not None:
         return Inexpressible(f"{word} has no Modbus register; {ALTERNATIVE} knows it")
     return Inexpressible(

@@ -119,7 +119,6 @@ def every_register(state: ModbusState) -> Procedure[tuple[str, ...]]:
 
 
 def _listed(word: str, shown: str) -> list[str]:
-    """Return the lines of PR AL for a word; a set-up has lines of its own."""
     if word not in mapping.SETUPS - REGISTERS.keys():
         return [f"{word} = {shown}"]
     return [line for line in shown.replace("\r", "").split("\n") if line]
@@ -137,7 +136,6 @@ def motion(state: ModbusState, priority: Priority) -> Procedure[tuple[Motion, ..
 
 
 def flag(state: ModbusState, name: str) -> Procedure[bool]:
-    """Read a flag's register."""
     answer = yield from answered(state, request(state, f"PR {name}", mapping.read(REGISTERS[name])))
     return pdu_codec().registers(answer)[0] != 0
 
@@ -194,14 +192,12 @@ def write_registers(state: ModbusState, address: int, values: Sequence[int]) -> 
 
 
 def read_coil(state: ModbusState, number: int) -> Procedure[tuple[str, ...]]:
-    """Print an output's state."""
     asked = request(state, f"/coil {number}", pdu_codec().read(framing.READ_COILS, number - 1, 1))
     answer = yield from answered(state, asked)
     return (f"O{number} = {pdu_codec().bits(answer, 1)[0]}",)
 
 
 def write_coil(state: ModbusState, number: int, on: bool) -> Procedure[tuple[str, ...]]:
-    """Switch an output."""
     yield from carried_out(state, f"/coil {number} {int(on)}", pdu_codec().write_coil(number - 1, on))
     return ()
 
@@ -223,7 +219,6 @@ def identification(state: ModbusState, code: int = mapping.EVERY_OBJECT) -> Proc
 
 
 def device(state: ModbusState) -> Procedure[tuple[str, ...]]:
-    """Print the device identification, one line for each object."""
     found = yield from identification(state)
     names = dict(enumerate(mapping.OBJECTS))
     return tuple(f"{names.get(number, f'object {number}')}: {text}" for number, text in sorted(found.items()))
@@ -236,7 +231,6 @@ PART, VERSION = 1, 6
 
 
 def identify(hints: Hints) -> Procedure[list[ModbusState]]:
-    """Identify the drive at the other end. Raises NoAnswer where none replies."""
     state = ModbusState(Modbus())
     found = yield from _objects(state)
     text = " ".join(found.get(number, "") for number in (VERSION, PART))

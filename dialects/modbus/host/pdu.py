@@ -47,11 +47,9 @@ class ReadSpecific(ModbusPDU):
         self.mnemonic, self.text = mnemonic, b""
 
     def encode(self) -> bytes:
-        """Return the mnemonic of the request."""
         return backwards(self.mnemonic)
 
     def decode(self, data: bytes) -> None:
-        """Store the text of the reply; it may have one byte more than the count."""
         self.text = data[1:]
 
 
@@ -65,17 +63,14 @@ class WriteSpecific(ModbusPDU):
         self.mnemonic, self.text = mnemonic, text
 
     def encode(self) -> bytes:
-        """Return the mnemonic, and the parameters after their number."""
         text = self.text.encode("ascii")
         return backwards(self.mnemonic) + bytes((len(text),)) + text
 
     def decode(self, data: bytes) -> None:
-        """Store the mnemonic of the reply."""
         self.mnemonic = data[1:].decode("latin-1").lstrip(" ")[::-1]
 
 
 def backwards(mnemonic: str) -> bytes:
-    """Return a mnemonic in the form of the specific functions: reversed, four bytes, padded with spaces in front."""
     return mnemonic[::-1].rjust(4).encode("ascii")
 
 
@@ -90,17 +85,14 @@ class PduCodec:
         self._framer = FramerSocket(self._decoder)
 
     def message(self, transaction: int, pdu: bytes, unit: int) -> bytes:
-        """Return the whole message around a PDU."""
         return self._framer.encode(pdu, unit, transaction)
 
     # Requests.
 
     def read(self, function: int, address: int, count: int) -> bytes:
-        """Read coils, inputs or registers."""
         return _bytes(_READ[function](address=address, count=count))
 
     def write_coil(self, address: int, on: bool) -> bytes:
-        """Switch one output."""
         return _bytes(WriteSingleCoilRequest(address=address, bits=[on]))
 
     def write_registers(self, address: int, words: Sequence[int]) -> bytes:
@@ -122,7 +114,6 @@ class PduCodec:
     # Replies that fit.
 
     def registers(self, answer: bytes) -> tuple[int, ...]:
-        """The words of a READ_REGISTERS reply."""
         return tuple(self._decoded(answer).registers)
 
     def bits(self, answer: bytes, count: int) -> tuple[int, ...]:
@@ -130,7 +121,6 @@ class PduCodec:
         return tuple(int(bit) for bit in self._decoded(answer).bits[:count])
 
     def specific(self, answer: bytes) -> str:
-        """The text of a READ_SPECIFIC reply."""
         pdu = self._decoded(answer)
         assert isinstance(pdu, ReadSpecific)
         return pdu.text.decode("latin-1").strip("\0 ")

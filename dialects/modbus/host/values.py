@@ -119,12 +119,10 @@ def ready(state: ModbusState) -> Procedure[str]:
 
 
 def write(state: ModbusState, change: Change) -> Procedure[None]:
-    """Send one step, and make sure of it."""
     yield from perform(state, change.text)
 
 
 def save(state: ModbusState) -> Procedure[None]:
-    """Send S."""
     yield from perform(state, "S")
 
 
@@ -137,7 +135,6 @@ INPUTS = 4
 
 
 def parts(state: ModbusState, facts: Facts) -> Sequence[Part[ModbusState]]:
-    """The parts of a drive: flags, points, settings, set-ups."""
     found = [Part("flags", partial(_registers, names=FLAGS)), Part("points", _points)]
     table = words(state.product)
     has = [n for n in SETTINGS if not manual.exact(state.product) or state.product in table[n].products]
@@ -177,7 +174,6 @@ def _setups(state: ModbusState, word: str) -> Procedure[Facts]:
 
 
 def fold(state: ModbusState, facts: Facts) -> tuple[Conditions, ...]:
-    """The conditions of its only axis. No register holds the target."""
     return (points.conditions(state.product, facts, None),)
 
 
@@ -201,7 +197,6 @@ def check(state: ModbusState, word: str) -> str:
 
 
 def again(state: ModbusState, word: str, priority: Priority) -> Procedure[float]:
-    """Read a value."""
     reading = mapping.reading(word)
     asked = request(state, f"PR {word}", reading.pdu, priority)
     reply = yield asked

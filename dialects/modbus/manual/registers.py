@@ -37,17 +37,14 @@ class Register:
 
     @property
     def readable(self) -> bool:
-        """Whether the manual allows reading it."""
         return self.access != "WO"
 
     @property
     def writable(self) -> bool:
-        """Whether the manual allows writing it."""
         return self.access != "RO"
 
     @property
     def addresses(self) -> range:
-        """The registers that it takes."""
         return range(self.address, self.address + self.count)
 
     @cached_property

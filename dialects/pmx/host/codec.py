@@ -57,7 +57,6 @@ class Pmx(Codec):
         return Request(address, text, Kind.PRINT if reads(text) else Kind.COMMAND, self, timeout=timeout)
 
     def encode(self, request: Request) -> bytes:
-        """Return `@`, number, command, CR; without a number the command and CR."""
         return self._command(request.address, request.text)
 
     def _command(self, address: str, text: str) -> bytes:
@@ -79,7 +78,6 @@ class Pmx(Codec):
         return None
 
     def on_timeout(self, request: Request, buffer: bytes) -> Decoded:
-        """Return TIMEOUT, or DAMAGED where the bytes received are no reply."""
         if (collected := self.on_quiet(request, buffer)) is not None:
             return collected
         if not buffer.strip(NO_TEXT):
@@ -137,7 +135,6 @@ class Pmx(Codec):
 
 
 def _text(piece: bytes) -> str:
-    """Decode a line, without the bytes that some gateways and drivers add."""
     return piece.translate(None, NO_TEXT).decode("latin-1")
 
 

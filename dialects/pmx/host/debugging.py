@@ -19,7 +19,6 @@ from multidrop.dialects.pmx.host.programs import listing
 from multidrop.dialects.pmx.manual import program_file, script_checker
 from multidrop.dialects.pmx.manual.program_file import RAW, Undecodable
 from multidrop.dialects.pmx.manual.table import lookup
-from multidrop.dialects.program_files import Held
 
 RUNNING, PAUSED = 1, 2
 """Values of SASTAT."""
@@ -32,11 +31,6 @@ def rows(state: PmxState) -> Procedure[tuple[Row, ...]]:
     """Read the compiled lines in the controller; where they can be decompiled, the statements at their first lines."""
     lines = yield from listing(state)
     return _rows(tuple(Row(int(found[1]), found[2]) for line in lines if (found := RAW.fullmatch(line))))
-
-
-def rows_of(held: Held) -> tuple[Row, ...]:
-    """Return the lines of what was read, as `rows` does."""
-    return _rows(tuple(Row(*line) for line in held.lines))
 
 
 def _rows(held: tuple[Row, ...]) -> tuple[Row, ...]:
@@ -52,7 +46,6 @@ def _rows(held: tuple[Row, ...]) -> tuple[Row, ...]:
 
 
 def idle(state: PmxState, program: str, neighbours: Neighbours | None) -> Procedure[None]:
-    """Raise Refused while a program runs."""
     if neighbours is None:
         raise _lacks(state, NO_STEP)
     if (yield from _status(state, program)) in (RUNNING, PAUSED):
@@ -60,12 +53,10 @@ def idle(state: PmxState, program: str, neighbours: Neighbours | None) -> Proced
 
 
 def trace(state: PmxState, program: str) -> Procedure[None]:
-    """Start a program."""
     yield from perform(state, f"SR{_program(program)}={START}")
 
 
 def look(state: PmxState, program: str) -> Procedure[Look]:
-    """Read whether a program runs, and its program counter."""
     status = yield from _status(state, program)
     active = status in (RUNNING, PAUSED)
     address = (yield from number(state, f"SPC{_program(program)}")) if active else None
@@ -73,18 +64,15 @@ def look(state: PmxState, program: str) -> Procedure[Look]:
 
 
 def waits(state: PmxState, program: str, last: Row | None) -> Procedure[None]:
-    """Raise Refused unless a program is paused."""
     if (yield from _status(state, program)) != PAUSED:
         raise Refused(f"{who(state)}: program {_program(program)} is not paused; nothing was sent")
 
 
 def go_on(state: PmxState, program: str) -> Procedure[None]:
-    """Continue a paused program."""
     yield from perform(state, f"SR{_program(program)}={CONTINUE}")
 
 
 def break_now(state: PmxState, program: str) -> Procedure[None]:
-    """Pause a running program."""
     if (yield from _status(state, program)) != RUNNING:
         raise Refused(f"{who(state)}: program {_program(program)} does not run; nothing was sent")
     yield from perform(state, f"SR{_program(program)}={PAUSE}")
@@ -96,23 +84,17 @@ def _status(state: PmxState, program: str) -> Procedure[int]:
 
 def _program(place: str) -> str:
     """The number of a program; 0 where none is named."""
-    return _checked(place or "0")
-
-
-def _checked(place: str) -> str:
-    if place not in ("0", "1"):
+    if (place or "0") not in ("0", "1"):
         raise Diagnostic(f"no program {place}", "", "valid: 0 or 1")
-    return place
+    return place or "0"
 
 
 def no_step(state: PmxState, *_: object) -> Procedure[Any]:
-    """Refuse single step."""
     raise _lacks(state, NO_STEP)
     yield  # a procedure
 
 
 def no_break(state: PmxState, *_: object) -> Procedure[None]:
-    """Refuse a break point."""
     raise _lacks(state, "a PMX has no break points: /break now pauses a program; program test --break has them")
     yield  # a procedure
 
@@ -121,14 +103,12 @@ def _lacks(state: PmxState, what: str) -> Inexpressible:
     return Inexpressible(f"{who(state)}: {what}; nothing was sent")
 
 
-def never_broken(state: PmxState, program: Sequence[Row], last: Row, place: str) -> Procedure[int | None]:
-    """Return None: there are no break points."""
+def never_broken(*_: object) -> Procedure[int | None]:
     return None
     yield  # a procedure
 
 
 def check_names(state: PmxState, names: Sequence[str]) -> None:
-    """Check names to watch: commands that read a value."""
     for name in names:
         row = lookup(name)
         if row is None or "R" not in row.access:
@@ -136,7 +116,6 @@ def check_names(state: PmxState, names: Sequence[str]) -> None:
 
 
 def values(state: PmxState, names: Sequence[str]) -> Procedure[Mapping[str, str]]:
-    """Read variables and registers."""
     found = {}
     for name in names:
         reply = yield from answered(state, state.codec.request(state.address, name))
@@ -146,7 +125,7 @@ def values(state: PmxState, names: Sequence[str]) -> Procedure[Mapping[str, str]
 
 DEBUGGING = Debugging(
     listing=rows,
-    rows=rows_of,
+    rows=lambda held: _rows(tuple(Row(*line) for line in held.lines)),
     entry=lambda program: "0",
     address=lambda program, place: None,
     idle=idle,

@@ -66,7 +66,6 @@ def refusal(state: PmxState, request: Request, reply: Reply) -> Refused:
 
 
 def _advice(text: str) -> str:
-    """Suggest what is wrong with an unknown command."""
     if text != text.upper() and lookup(text.upper()) is not None:
         return f"it reads capitals only: {text.upper()}"
     if " " in text and lookup(text.replace(" ", "")) is not None:

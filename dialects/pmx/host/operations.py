@@ -62,12 +62,10 @@ def referencing(known: PmxState, text: str) -> Referencing | None:
 
 
 def homed(known: PmxState) -> Procedure[bool]:
-    """Whether no axis has an error after a homing."""
     return not any(axis.trouble for axis in (yield from motion(known, Priority.OPERATOR)))
 
 
 def moving(known: PmxState) -> Procedure[bool]:
-    """Whether an axis makes pulses."""
     for axis in AXES:
         if (yield from number(known, f"MST{axis}")) & words.MOVING:
             return True
@@ -75,7 +73,6 @@ def moving(known: PmxState) -> Procedure[bool]:
 
 
 def busy(known: PmxState) -> Procedure[bool]:
-    """Whether one of the programs runs."""
     for program in PROGRAMS:
         if (yield from number(known, f"SASTAT{program}")) == 1:
             return True
@@ -83,7 +80,6 @@ def busy(known: PmxState) -> Procedure[bool]:
 
 
 def status(known: PmxState) -> Procedure[tuple[str, ...]]:
-    """Describe each axis and each program, one line each, and the inputs and outputs that are on."""
     lines = []
     for axis in AXES:
         state = yield from number(known, f"MST{axis}")

@@ -10,9 +10,10 @@ from __future__ import annotations
 import re
 from collections.abc import Collection, Mapping
 from dataclasses import replace
+from functools import partial
 
 from multidrop.dialects.codec import Procedure
-from multidrop.dialects.errors import Diagnostic, Refused
+from multidrop.dialects.errors import Diagnostic
 from multidrop.dialects.parameters import (
     COMMUNICATION,
     VARIABLES,
@@ -25,10 +26,10 @@ from multidrop.dialects.parameters import (
     Readings,
     Value,
     number,
+    read_each,
     reference_lost,
     same,
 )
-from multidrop.dialects.parameters import PARAMETERS as SETTINGS
 from multidrop.dialects.pmx.host.codec import PmxState
 from multidrop.dialects.pmx.host.exchange import answered, who
 from multidrop.dialects.pmx.host.operations import LATER, busy, moving, perform
@@ -54,15 +55,7 @@ RATIO = "SLR"
 _AXIS = re.compile(rf"([A-Z]+?)([{''.join(AXES)}])\Z")
 
 
-def setting_names() -> tuple[str, ...]:
-    """The settings in the order in which they are written."""
-    rows = [row for row in COMMANDS.values() if row.access == "RW" and row.name not in STATES]
-    found = [word for row in rows for word in row.words()]
-    return tuple(sorted(found, key=lambda name: (base(name) not in SPEEDS, base(name) in (*LOOP, "SL"))))
-
-
 def base(name: str) -> str:
-    """The command of a setting, without axis or number."""
     if name in COMMANDS:
         return name
     found = _AXIS.match(name)
@@ -70,19 +63,28 @@ def base(name: str) -> str:
 
 
 def axis(name: str) -> str:
-    """The axis of a setting; empty for one of the whole controller."""
     found = _AXIS.match(name)
     return found[2] if found is not None and name not in COMMANDS and found[1] in COMMANDS else ""
 
 
 def reading(name: str, value: Value) -> Reading:
-    """Put section and unit to a value."""
-    row, section = COMMANDS[base(name)], VARIABLES if base(name) == "V" else SETTINGS
-    unit = "ms" if row.name in ("ACC", "DEC", "TOC") else "pulses/s" if row.name in SPEEDS else ""
-    return Reading(name, value, section, unit, 0 if section == VARIABLES else None, name in WIRE)
+    word = base(name)
+    if word == "V":
+        return Reading(name, value, VARIABLES, default=0)
+    unit = "ms" if word in ("ACC", "DEC", "TOC") else "pulses/s" if word in SPEEDS else ""
+    return Reading(name, value, unit=unit, fixed=name in WIRE)
 
 
-def _plan(present: Readings, wanted: Mapping[str, Value], allowed: Permission) -> Plan:
+NAMES = tuple(
+    sorted(
+        (word for row in COMMANDS.values() if row.access == "RW" and row.name not in STATES for word in row.words()),
+        key=lambda name: (base(name) not in SPEEDS, base(name) in (*LOOP, "SL")),
+    )
+)
+"""The settings in the order in which they are written."""
+
+
+def plan(state: PmxState, present: Readings, wanted: Mapping[str, Value], allowed: Permission) -> Plan:
     """Order the steps to the wanted values. Raises Diagnostic for a value that the controller refuses."""
     now = present.values
     changed = {name.upper(): value for name, value in wanted.items() if not same(value, now.get(name.upper()))}
@@ -90,17 +92,12 @@ def _plan(present: Readings, wanted: Mapping[str, Value], allowed: Permission) -
     goal = {name: value for name, value in changed.items() if name not in withheld}
     for name, value in goal.items():
         _check(name, value)
-    order = sorted(goal, key=_place)
+    order = sorted(goal, key=NAMES.index)
     for low in [name for name in order if base(name) == "LSPD"]:
         order = _speeds_in_order(order, low, now, goal)
     steps = [Change(name, now.get(name), goal[name], f"{name}={_text(name, goal[name])}") for name in order]
     scale = [name for name in goal if base(name) in ("POL", "SLR", "SL")]
     return Plan(tuple(steps), tuple(withheld.items()), remarks=reference_lost(steps, scale))
-
-
-def _place(name: str) -> int:
-    every = setting_names()
-    return every.index(name) if name in every else len(every)
 
 
 def _speeds_in_order(order: list[str], low: str, now: Mapping[str, Value], goal: Mapping[str, Value]) -> list[str]:
@@ -130,7 +127,7 @@ def _risk(name: str, value: Value, now: Mapping[str, Value], allowed: Permission
 
 def _check(name: str, value: Value) -> None:
     """Raise Diagnostic for an unknown setting, or a value out of range."""
-    if name not in setting_names():
+    if name not in NAMES:
         raise Diagnostic(f"{name}: is not a setting of the controller")
     if name == "DN":
         if not re.fullmatch(r"2ED\d\d", str(value)):
@@ -149,42 +146,24 @@ def _check(name: str, value: Value) -> None:
 
 
 def _text(name: str, value: Value) -> str:
-    return (
-        f"{number(value):.3f}" if base(name) == RATIO else str(value if isinstance(value, str) else int(number(value)))
-    )
+    if base(name) == RATIO:
+        return f"{number(value):.3f}"
+    return value if isinstance(value, str) else str(int(number(value)))
 
 
-FORM = r"-?\d{1,19}"
-RATIO_FORM = r"\d{1,6}(?:\.\d+)?"
-NAME_FORM = r"[0-9A-Za-z]{1,8}"
+NAME_FORM, RATIO_FORM, WHOLE_FORM = r"[0-9A-Za-z]{1,8}", r"\d{1,6}(?:\.\d+)?", r"-?\d{1,19}"
 
 
 def read(state: PmxState, progress: Progress) -> Procedure[Readings]:
     """Read every setting; a refused word is listed. Raises NoAnswer. Nothing is changed."""
-    names = setting_names()
-    found, unread = [], [*UNREAD]
-    for done, name in enumerate(names):
-        progress(done, len(names))
-        try:
-            found.append(reading(name, (yield from _value(state, name))))
-        except Refused as refusal:
-            unread.append((name, str(refusal)))
-    progress(len(names), len(names))
-    return Readings(tuple(found), tuple(unread))
+    return (yield from read_each(NAMES, partial(_read, state), progress, UNREAD))
 
 
-def _value(state: PmxState, name: str) -> Procedure[Value]:
-    form = {"DN": NAME_FORM}.get(name, RATIO_FORM if base(name) == RATIO else FORM)
-    asked = replace(state.codec.request(state.address, name), expect=form)
-    text = (yield from answered(state, asked)).text
-    if name == "DN":
-        return text
-    return float(text) if base(name) == RATIO else int(text)
-
-
-def plan(state: PmxState, present: Readings, wanted: Mapping[str, Value], allowed: Permission) -> Plan:
-    """Order the steps to the wanted values. Raises Diagnostic."""
-    return _plan(present, wanted, allowed)
+def _read(state: PmxState, name: str) -> Procedure[Reading]:
+    ratio = base(name) == RATIO
+    form = NAME_FORM if name == "DN" else RATIO_FORM if ratio else WHOLE_FORM
+    reply = yield from answered(state, replace(state.codec.request(state.address, name), expect=form))
+    return reading(name, reply.text if name == "DN" else float(reply.text) if ratio else int(reply.text))
 
 
 def conflict(plan: Plan, others: Collection[str]) -> str:
@@ -194,7 +173,6 @@ def conflict(plan: Plan, others: Collection[str]) -> str:
 
 
 def ready(state: PmxState) -> Procedure[str]:
-    """Return the reason for which settings must not change now; empty: there is none."""
     if (yield from moving(state)):
         return f"{who(state)} moves: stop it first"
     if (yield from busy(state)):
@@ -202,22 +180,12 @@ def ready(state: PmxState) -> Procedure[str]:
     return ""
 
 
-def write(state: PmxState, change: Change) -> Procedure[None]:
-    """Send one step, and make sure of it."""
-    yield from perform(state, change.text)
-
-
-def save(state: PmxState) -> Procedure[None]:
-    """Send STORE, which keeps all but speeds, times and variables below V32."""
-    yield from perform(state, "STORE")
-
-
 PARAMETERS = Parameters(
     read=read,
     plan=plan,
     ready=ready,
-    write=write,
-    save=save,
+    write=lambda state, change: perform(state, change.text),
+    save=lambda state: perform(state, "STORE"),  # not speeds, times and variables below V32
     language="PMX",
     saving="STORE",
     conflict=conflict,

@@ -23,6 +23,8 @@ from multidrop.dialects.pmx.manual.table import PROBE, PROBED
 from multidrop.dialects.program_files import Difference, Held, Stored
 from multidrop.dialects.text import whole
 
+RUNS = (1, 2)
+"""The states of a program that runs or waits to go on."""
 BLANK = 16
 """Number of empty lines in a row that mark the end of the stored programs."""
 
@@ -41,9 +43,7 @@ def listing(state: PmxState, start: str = "") -> Procedure[tuple[str, ...]]:
 
 
 def read_line(state: PmxState, at: int) -> Procedure[str]:
-    """Read one stored line."""
-    request = state.codec.request(state.address, f"SA{at}")
-    reply = yield from answered(state, request)
+    reply = yield from answered(state, state.codec.request(state.address, f"SA{at}"))
     return reply.text.strip()
 
 
@@ -56,30 +56,22 @@ def download(
     """Write a program and read back each line. Both programs must be idle. Raises Refused, NoAnswer or Diagnostic.
 
     Compiled lines (`SAn=TOKEN`, or `TOKEN` alone) are written unchanged. A-SCRIPT is compiled, and only our simulator
-    can run the result: any other controller is refused before anything is written.
+    can run the result: any other controller is refused before anything is written. It alone erases what follows it.
     """
     raw = program_file.is_raw(lines)
     stored = program_file.compiled(lines)
     if not raw:
         yield from _simulator_only(state)
-    for program in (0, 1):
-        if (yield from number(state, f"SASTAT{program}")) in (1, 2):
+    for program in PROGRAMS:
+        if (yield from number(state, f"SASTAT{program}")) in RUNS:
             raise Refused(f"{who(state)}: program {program} runs; SR{program}=0 ends it (nothing was written)")
-    yield from _write_all(state, stored, progress, alone=not raw)
-    return lines
-
-
-def _write_all(
-    state: PmxState, stored: Sequence[tuple[int, int, str]], progress: Progress, alone: bool
-) -> Procedure[None]:
-    """Write the lines, and erase what follows them if they are `alone`; say what is stored if that ends early."""
     done, reported = 0, False
     try:
         for source, at, token in stored:
             yield from _write(state, source, at, token)
             done += 1
             progress(done, len(stored))
-        if alone:
+        if not raw:
             yield from _erase_behind(state, len(stored))
         reported = True
     except DriveError as error:
@@ -89,10 +81,10 @@ def _write_all(
     finally:
         if not reported:
             state.note(f"{who(state)}: the download was cut off: {_incomplete(state, done, len(stored))}")
+    return lines
 
 
 def _incomplete(state: PmxState, done: int, total: int) -> str:
-    """Describe what is stored after a download that ended early."""
     if done == total:
         return f"all {total} lines are stored; lines of a longer program may be left behind them"
     return f"{done} of {total} lines are stored: the program in {who(state)} is incomplete"
@@ -124,18 +116,13 @@ def _erase_behind(state: PmxState, at: int) -> Procedure[None]:
 
 
 def _write(state: PmxState, source: int, at: int, token: str) -> Procedure[None]:
-    request = state.codec.request(state.address, f"SA{at}={token}")
     try:
-        yield from answered(state, request)
+        yield from answered(state, state.codec.request(state.address, f"SA{at}={token}"))
     except Refused as refused:
         raise Refused(f"line {source}: {refused}") from None
     written = yield from read_line(state, at)
     if written != token:
         raise NoAnswer(f"line {source}: {who(state)} has {written!r} at SA{at} after {token!r} was written")
-
-
-RUNS = (1, 2)
-"""The states of a program that runs or waits to go on."""
 
 
 def read(state: PmxState, lines: Sequence[SourceLine], progress: Progress) -> Procedure[Held]:
@@ -162,20 +149,18 @@ def end(state: PmxState) -> Procedure[bool]:
 
     Raises Refused where a motor moves without a program.
     """
-    running = []
+    lines = []
     for program in PROGRAMS:
         if (yield from number(state, f"SASTAT{program}")) in RUNS:
-            running.append(program)
+            lines.append(f"SR{program}=0")
     moves = yield from moving(state)
-    if not running:
-        if moves:
-            raise Refused(f"{who(state)} moves: stop it first (nothing was written)")
-        return False
-    for program in running:
-        yield from _command(state, f"SR{program}=0")
-    if (yield from moving(state)):
+    if not lines and moves:
+        raise Refused(f"{who(state)} moves: stop it first (nothing was written)")
+    for text in lines:
+        yield from _command(state, text)
+    if lines and (yield from moving(state)):
         yield from _command(state, "STOP")
-    return True
+    return bool(lines)
 
 
 def _command(state: PmxState, text: str) -> Procedure[None]:
@@ -228,13 +213,12 @@ def annotated(text: str, held: Held) -> tuple[str, ...]:
 
 
 def refreshed(text: str, _: Held) -> tuple[str, ...]:
-    """Return the lines of a file: it gives variables no values."""
     return tuple(split_lines(text.removesuffix("\x1a").removesuffix("\n")))
 
 
 def readable(held: Held) -> tuple[str, ...]:
     """Return the program as A-SCRIPT, or as compiled lines with a remark where a unit's own compiler made them."""
-    listed = _compiled(held)
+    listed = tuple(f"SA{line.at}={line.text}" for line in held.lines)
     try:
         return tuple(program_file.readable(listed))
     except Undecodable as problem:
@@ -250,12 +234,7 @@ def upload(state: PmxState, raw: bool) -> Procedure[tuple[str, ...]]:
 
 def file_of(_: PmxState, held: Held, raw: bool) -> tuple[str, ...]:
     """Return the lines of a file that reproduces what a controller holds."""
-    return _compiled(held) if raw else readable(held)
-
-
-def _compiled(held: Held) -> tuple[str, ...]:
-    """Return compiled lines, as they are stored."""
-    return tuple(f"SA{line.at}={line.text}" for line in held.lines)
+    return tuple(f"SA{line.at}={line.text}" for line in held.lines) if raw else readable(held)
 
 
 PROGRAM_FILES: Programs[PmxState] = Programs(

@@ -54,7 +54,6 @@ def names(text: str) -> list[UserName]:
 
 
 def _found(code: str) -> Iterator[tuple[str, str, int, int]]:
-    """Yield the names of a line: word, kind, and columns."""
     if numbered := _NUMBERED.fullmatch(code):
         head, kind = _NAME_KINDS[numbered[1]]
         yield f"{head} {int(numbered[2])}", kind, *numbered.span(2)
@@ -196,7 +195,6 @@ def _fits(register: Register | None, first: bool) -> bool:
 
 
 def outline(text: str) -> list[Block]:
-    """Return programs and subroutines with their blocks."""
     return _Outline(text).blocks
 
 

@@ -16,7 +16,6 @@ SPELT_OUT = 8
 
 
 def names() -> list[str]:
-    """The names that have help."""
     return list(COMMANDS)
 
 
@@ -49,7 +48,6 @@ def describe(word: str, product: str = "") -> list[str]:
 
 
 def syntax(row: Command) -> str:
-    """Its forms, in one line."""
     forms = EXAMPLES.get(row.name) or [_form(row, shape) for shape in row.shapes]
     if row.access == "W":
         forms = [f"{form}=VALUE" for form in forms]

@@ -155,7 +155,6 @@ class _Reader:
             raise Undecodable(at, self.lines[at])
 
     def jump(self, at: int, word: str) -> int:
-        """The target of the JR or JO of line `at`."""
         found = split(self.lines[at]) if at < len(self.lines) else None
         if found is None or found[0] != word or not at < at + int(found[1]) < len(self.lines):
             raise Undecodable(at, self.lines[at] if at < len(self.lines) else "")
@@ -274,7 +273,6 @@ def is_raw(lines: Sequence[SourceLine]) -> bool:
 
 
 def _placed(lines: Sequence[SourceLine]) -> bool:
-    """Whether lines show their places."""
     return any(RAW.fullmatch(line.text) for line in lines)
 
 
@@ -305,7 +303,6 @@ def readable(lines: Iterable[str]) -> list[str]:
 
 
 def _held(stored: Mapping[int, str]) -> list[str]:
-    """The memory up to its last line."""
     return [stored.get(at, ERASED) for at in range(max(stored, default=-1) + 1)]
 
 

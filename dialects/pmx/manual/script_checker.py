@@ -34,7 +34,6 @@ class Script:
 
 
 def check(text: str) -> list[Problem]:
-    """Report every error of a program, by line."""
     return _checked(text)[1]
 
 
@@ -117,7 +116,6 @@ class _Checker:
             self.open.clear()
 
     def within(self, each: Statement) -> None:
-        """Check a statement that must be in a program or a subroutine."""
         if len(self.open) == 1 and self.open[0].wrong and self.open[0].kind == "block":
             self.open.clear()
         if self.open:
@@ -157,7 +155,6 @@ class _Checker:
         self.open.clear()
 
     def inner(self, each: Statement) -> None:
-        """ELSEIF, ELSE, ENDIF, ENDWHILE."""
         wanted = _OPENS[each.word]
         if not any(outer.word == wanted for outer in self.open):
             self.wrong(each, f"{each.word} without {wanted}")
@@ -192,7 +189,6 @@ def _called(block: Statement) -> str:
 
 
 def _calls(statements: Sequence[Statement]) -> list[Problem]:
-    """Report calls to undefined subroutines and endless recursion."""
     subroutines = [each for each in statements if each.word == "SUB"]
     defined = {each.number for each in subroutines if not each.wrong}
     surely = len(defined) == len(subroutines)
@@ -255,7 +251,6 @@ def _check_flow(statements: Sequence[Statement]) -> Iterator[Problem]:
 
 
 def _unreachable(flow: _Flow) -> Iterator[Problem]:
-    """Report the first statement of each part that no path reaches."""
     reached = walk(flow.beginnings, flow.ways)
     dead = False
     for at, each in enumerate(flow.statements):
@@ -268,7 +263,6 @@ def _unreachable(flow: _Flow) -> Iterator[Problem]:
 
 
 def _unawaited(move: Statement, other: Statement, axes: str) -> Problem:
-    """Report a move that another statement does not wait for."""
     if other is move:
         what = f"the next {move} begins before this one has ended"
     else:
@@ -288,7 +282,6 @@ class _Flow:
         self._match()
 
     def _match(self) -> None:
-        """Find where each block leads."""
         outside, opened = True, list[list[int]]()
         for at, each in enumerate(self.statements):
             if each.word in ("PRG", "SUB") and not each.wrong:
@@ -335,7 +328,6 @@ def _holds(each: Statement) -> bool | None:
 
 
 def _axis(pattern: re.Pattern[str], word: str) -> str:
-    """The axis in a word of this form; empty for any other word."""
     found = pattern.fullmatch(word)
     return "".join(filter(None, found.groups())) if found else ""
 
@@ -346,7 +338,6 @@ def _moved(each: Statement) -> str:
 
 
 def _disturbed(flow: _Flow, move: int, axes: str) -> int | None:
-    """Find the statement that does not wait for the end of a move, if any."""
 
     def disturbs(at: int) -> bool:
         each = flow.statements[at]

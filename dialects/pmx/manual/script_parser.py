@@ -65,11 +65,9 @@ class Statement:
 
     @property
     def number(self) -> int:
-        """The number of a PRG, SUB or GOSUB."""
         return int(self.values[0].text)
 
     def __str__(self) -> str:
-        """The statement as written."""
         values = [each.text for each in self.values]
         if self.word in ("IF", "ELSEIF", "WHILE"):
             return f"{self.word} {values[0]}{self.op}{values[1]}"
@@ -179,7 +177,6 @@ def _constant(text: str, at: int, low: int, high: int) -> Value:
 
 
 def _long(text: str) -> bool:
-    """Report a number too long for any use."""
     return len(text.lstrip("-0")) > 10
 
 
@@ -229,7 +226,6 @@ def _set(found: re.Match[str], line: int, column: int) -> Statement:
 
 
 def _unknown(text: str, column: int) -> _Wrong:
-    """Describe an unknown word, with a similar one."""
     first = text.split()[0] if text.split() else text
     if first.upper() != first and (first.upper() in KNOWN or first.upper()[:1] in AXES):
         return _Wrong(column, f"{first} is not all in capitals", f"write {first.upper()}")

@@ -63,12 +63,10 @@ def trouble_words(status: int) -> str:
 
 
 def loop_words(state: int) -> str:
-    """Describe the state of StepNLoop."""
     return LOOP.get(state, f"state {state}")
 
 
 def program_words(state: int) -> str:
-    """Describe the state of a program."""
     return PROGRAM.get(state, f"state {state}")
 
 

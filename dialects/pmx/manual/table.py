@@ -35,7 +35,6 @@ class Command:
 
     @property
     def shapes(self) -> list[str]:
-        """The continuations of its name."""
         return self.shape.split()
 
     def words(self) -> Iterator[str]:

@@ -36,7 +36,6 @@ class Frame(NamedTuple):
 
 
 def frame_of(address: int, call: Call) -> bytes:
-    """The frame of a command."""
     return _sealed(_FIELDS.pack(address, call.command, call.type, call.motor, call.value))
 
 
@@ -46,7 +45,6 @@ def parse_reply(frame: bytes) -> Frame | None:
 
 
 def call_of(frame: bytes) -> tuple[int, Call]:
-    """The address and the command in the frame of a request."""
     address, command, kind, motor, value = _FIELDS.unpack(frame[:-1])
     return address, Call(command, kind, motor, value)
 
@@ -99,7 +97,6 @@ class Tmcl(Codec):
         return Request(address, text, kind, self, body=frame_of(number_of(address), call))
 
     def encode(self, request: Request) -> bytes:
-        """The frame, as it is."""
         return request.body
 
     def decode(self, request: Request, buffer: bytes) -> Decoded | None:
@@ -207,12 +204,10 @@ def _modules(addresses: Sequence[str]) -> list[str]:
 
 
 def is_address(text: str) -> bool:
-    """Whether a text is the address of a module, as a person writes it."""
     return text in ADDRESSES
 
 
 def _found(request: Request, fields: Frame, frame: bytes, end: int, strays: list[str]) -> Decoded:
-    """The reply that a frame is."""
     if request.gather:  # a refusal proves as much as a value
         return Decoded(Reply((*strays, str(fields.value)), acknowledged=True, body=frame), end, tuple(strays))
     if not accepted(fields.status):
@@ -240,7 +235,6 @@ def _unsolicited(frames: bytes) -> Iterator[str]:
 
 
 def _described(fields: Frame) -> str:
-    """A frame that answers nothing, for a person."""
     if fields.command == Command.NOTIFY and fields.status == Status.TARGET_REACHED:
         motors = [str(n) for n in range(8) if fields.value >> n & 1]
         return f"module {fields.module}: target reached, motor {', '.join(motors) or 'not named'}"
@@ -248,7 +242,6 @@ def _described(fields: Frame) -> str:
 
 
 def late_reply_to(command: int) -> str:
-    """How a line that no request expects names the command of its frame."""
     name = Command(command).name if command in tuple(Command) else f"command {command}"
     return f"late reply to {name}"
 
@@ -267,7 +260,6 @@ class TmclState(DriveState):
     """Axis parameter 127 of each motor: from where MVP REL counts; a motor without an entry: not known."""
 
     def reply_lost(self, command: int) -> None:
-        """The reply to a command did not come."""
         self.lost_commands.add(command)
         self.reply_outstanding()
 
@@ -277,15 +269,12 @@ class TmclState(DriveState):
         self.synchronised()
 
     def motors_counted(self, motors: int) -> None:
-        """Record how many motors the module has."""
         self.motors = motors
 
     def relative_read(self, motor: int, value: int) -> None:
-        """Record axis parameter 127 of a motor."""
         self.relative[motor] = value
 
     def relative_forgotten(self) -> None:
-        """Axis parameter 127 may have changed."""
         self.relative.clear()
 
     def readdressed(self, address: int) -> None:
@@ -298,7 +287,6 @@ class TmclState(DriveState):
         self.owes(Owed(0, self.name, self.product, self.version, self.part, self.serial))
 
     def executes(self) -> None:
-        """The module executes commands again."""
         self.programming, self.codec = False, replace(self.codec, storing=False)
 
     def stopped(self) -> None:

@@ -71,7 +71,6 @@ def read(state: TmclState, call: Call, priority: Priority = Priority.OPERATOR) -
 
 
 def refusal(state: TmclState, request: Request, reply: Reply) -> Refused:
-    """The exception for a refusal: its status, meaning and remedy."""
     code = int(reply.text)
     meaning, advice = REFUSALS.get(code, ("", ""))
     text = f"{meaning} ({advice})" if meaning else "unknown status"

@@ -71,7 +71,6 @@ def _store(state: TmclState, request: Request, call: Call) -> Procedure[None]:
 
 
 def motion(state: TmclState, priority: Priority) -> Procedure[tuple[Motion, ...]]:
-    """Position and velocity of each motor."""
     found = []
     count = yield from motors(state, priority)
     for motor in range(count):
@@ -82,7 +81,6 @@ def motion(state: TmclState, priority: Priority) -> Procedure[tuple[Motion, ...]
 
 
 def referencing(state: TmclState, text: str) -> Referencing | None:
-    """Find out whether a command searches the reference of a motor or sets its position."""
     try:
         call = commands.parse(text)
     except commands.LineError:
@@ -128,7 +126,6 @@ def busy(state: TmclState) -> Procedure[bool]:
 
 
 def status(state: TmclState) -> Procedure[tuple[str, ...]]:
-    """Position, velocity, target and switches of each motor, one line each."""
     lines = []
     for motor in range((yield from motors(state))):
         parts = []
@@ -217,13 +214,11 @@ def _found(state: TmclState) -> Procedure[bool]:
 
 
 def _end_download(state: TmclState, why: str) -> Procedure[None]:
-    """End the download mode of a module and say so."""
     yield state.codec.request(state.address, END, Call(Command.END_DOWNLOAD))
     state.note(f"{who(state)}: {why}; it was ended with 133: check the program in the module")
 
 
 def _count_motors(state: TmclState) -> Procedure[None]:
-    """Count the motors of a module, or say that it was not possible."""
     try:
         yield from motors(state)
     except NoAnswer as error:

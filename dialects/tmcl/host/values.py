@@ -6,7 +6,7 @@ The extended error flags (207) are not read, since that clears them. (TMCL firmw
 from __future__ import annotations
 
 import re
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from functools import partial
 
 from multidrop.dialects.codec import Priority, Procedure
@@ -21,6 +21,7 @@ from multidrop.dialects.parameters import (
     Reading,
     Readings,
     Value,
+    read_each,
     reference_lost,
     same,
 )
@@ -28,7 +29,7 @@ from multidrop.dialects.tmcl.host.codec import TmclState
 from multidrop.dialects.tmcl.host.exchange import motors, read, who
 from multidrop.dialects.tmcl.host.operations import moving, perform
 from multidrop.dialects.tmcl.manual.commands import STARTING_PARAMETERS, Call, Command
-from multidrop.dialects.tmcl.manual.parameters import AXIS, BAUDS, GLOBAL, RELATIVE_FROM, Axis, Global, Parameter
+from multidrop.dialects.tmcl.manual.parameters import AXIS, BAUDS, GLOBAL, RELATIVE_FROM, Axis, Global
 from multidrop.dialects.values import (
     BY,
     DISABLE,
@@ -69,17 +70,17 @@ def setting_names(motors: int) -> tuple[str, ...]:
 
 def _call(name: str, command: Command, value: int = 0) -> Call:
     """The command for a setting; `command` is the one for an axis parameter."""
-    prefix, number, motor = _name_parts(name)
-    if prefix:
+    of_module, number, motor = _parts(name)
+    if of_module:
         command = {Command.GAP: Command.GGP, Command.SAP: Command.SGP}[command]
     return Call(command, number, motor, value)
 
 
 def reading(name: str, value: int) -> Reading:
-    """Put unit and default to a value."""
-    row, (prefix, number, _) = _row(name), _name_parts(name)
+    of_module, number, _ = _parts(name)
+    row = (GLOBAL if of_module else AXIS)[number]
     unit = ", ".join(each for each in (row.title, row.unit) if each)
-    return Reading(name, value, unit=unit, default=row.fresh, fixed=bool(prefix) and number in WIRE)
+    return Reading(name, value, unit=unit, default=row.fresh, fixed=of_module and number in WIRE)
 
 
 def plan(state: TmclState, present: Readings, wanted: Mapping[str, Value], allowed: Permission) -> Plan:
@@ -90,25 +91,22 @@ def plan(state: TmclState, present: Readings, wanted: Mapping[str, Value], allow
     goal = {name: _checked(name, value, names) for name, value in changed.items() if name not in withheld}
     order = [name for name in names if name in goal]
     steps = [Change(name, now.get(name), goal[name], str(_call(name, Command.SAP, goal[name]))) for name in order]
-    scale = [name for name in goal if _name_parts(name)[:2] == ("", Axis.MICROSTEPS)]
+    scale = [name for name in goal if _parts(name)[:2] == (False, Axis.MICROSTEPS)]
     return Plan(tuple(steps), tuple(withheld.items()), remarks=reference_lost(steps, scale))
 
 
-def _name_parts(name: str) -> tuple[str, int, int]:
+def _parts(name: str) -> tuple[bool, int, int]:
+    """Divide a name: whether it is a global parameter, the number, the motor."""
     found = _NAME.fullmatch(name)
-    return (found[1], int(found[2]), int(found[3] or 0)) if found else ("", -1, 0)
-
-
-def _row(name: str) -> Parameter:
-    prefix, number, _ = _name_parts(name)
-    return (GLOBAL if prefix else AXIS)[number]
+    return (bool(found[1]), int(found[2]), int(found[3] or 0)) if found else (False, -1, 0)
 
 
 def _checked(name: str, value: Value, names: Collection[str]) -> int:
     """Return the value as a whole number. Raises Diagnostic."""
     if name not in names:
         raise Diagnostic(f"{name}: is not a setting of the module")
-    limits = _row(name).limits
+    of_module, number, _ = _parts(name)
+    limits = (GLOBAL if of_module else AXIS)[number].limits
     if isinstance(value, (str, tuple)) or not float(value).is_integer() or int(value) not in limits:
         raise Diagnostic(f"{name} = {value}: valid: {limits.start} to {limits.stop - 1}")
     return int(value)
@@ -116,49 +114,37 @@ def _checked(name: str, value: Value, names: Collection[str]) -> int:
 
 def _risk(name: str, value: Value, now: Mapping[str, Value], allowed: Permission) -> str:
     """The reason for which a setting waits for a person's word; empty: there is none."""
-    prefix, number, _ = _name_parts(name)
-    communicates = bool(prefix) and number in WIRE
+    of_module, number, _ = _parts(name)
+    communicates = of_module and number in WIRE
     if name in allowed.named or (communicates and allowed.communication):
         return ""
     if communicates:
         return COMMUNICATION
-    if prefix and number == Global.AUTOSTART and value:
+    if of_module and number == Global.AUTOSTART and value:
         return "the stored program starts at power-up"
-    if not prefix and number in (Axis.RIGHT_LIMIT_OFF, Axis.LEFT_LIMIT_OFF) and value:
+    if not of_module and number in (Axis.RIGHT_LIMIT_OFF, Axis.LEFT_LIMIT_OFF) and value:
         return "a move that the limit switch holds back may go on"
-    waits = not prefix and number in STARTING_PARAMETERS and now.get(name) == 0
+    waits = not of_module and number in STARTING_PARAMETERS and now.get(name) == 0
     return "a move may wait for it" if waits else ""
 
 
 def read_settings(state: TmclState, progress: Progress) -> Procedure[Readings]:
     """Read every setting; modules differ, so a refused one is listed. Raises NoAnswer."""
     names = setting_names((yield from motors(state)))
-    found: list[Reading] = []
-    unread: list[tuple[str, str]] = []
-    for done, name in enumerate(names):
-        progress(done, len(names))
-        try:
-            found.append(reading(name, (yield from read(state, _call(name, Command.GAP)))))
-        except Refused as refusal:
-            unread.append((name, str(refusal)))
-    progress(len(names), len(names))
-    return Readings(tuple(found), tuple(unread))
+    return (yield from read_each(names, partial(_read, state), progress))
+
+
+def _read(state: TmclState, name: str) -> Procedure[Reading]:
+    return reading(name, (yield from read(state, _call(name, Command.GAP))))
 
 
 def conflict(plan: Plan, others: Collection[str]) -> str:
-    """Return the reason for which an address is another module's; empty: it is none's."""
     numbers = [str(change.after) for change in plan if change.name == ADDRESS]
     return f"another module of the line has address {numbers[0]}" if numbers and numbers[0] in others else ""
 
 
 def ready(state: TmclState) -> Procedure[str]:
-    """Return the reason for which settings must not change now; empty: there is none."""
     return f"{who(state)} moves: stop it first" if (yield from moving(state)) else ""
-
-
-def write(state: TmclState, change: Change) -> Procedure[None]:
-    """Send one step, and make sure of it. A module keeps global parameters by itself."""
-    yield from perform(state, change.text)
 
 
 def save(state: TmclState) -> Procedure[None]:
@@ -177,7 +163,7 @@ PARAMETERS = Parameters(
     read=read_settings,
     plan=plan,
     ready=ready,
-    write=write,
+    write=lambda state, change: perform(state, change.text),  # a module keeps global parameters by itself
     save=save,
     language="TMCL",
     saving="STAP",
@@ -189,6 +175,7 @@ STATE = (Axis.TARGET_POSITION, Axis.POSITION_REACHED)
 SWITCHES = ((Axis.HOME_SWITCH, "home"), (Axis.RIGHT_SWITCH, "lim+"), (Axis.LEFT_SWITCH, "lim-"))
 RAMP = (Axis.MAXIMUM_VELOCITY, Axis.MAXIMUM_ACCELERATION)
 SETTINGS = (Axis.RUN_CURRENT, Axis.STANDBY_CURRENT, Axis.FREEWHEELING, *RAMP)
+KNOWN = (*STATE, *(axis for axis, _ in SWITCHES), *SETTINGS)
 ABSENT = "absent"
 """A parameter that the module refuses: it lacks it."""
 FULL_CURRENT = 255
@@ -202,9 +189,8 @@ def parts(state: TmclState, facts: Facts) -> Sequence[Part[TmclState]]:
     for motor in range(state.motors):
         asked = [*STATE, *(axis for axis, _ in SWITCHES if facts.get(_key(axis, motor)) != ABSENT)]
         found.append(Part(f"motor {motor}", partial(_parameters, motor=motor, wanted=asked)))
-        found += [
-            Part(_key(axis, motor), partial(_parameters, motor=motor, wanted=(axis,)), slow=True) for axis in SETTINGS
-        ]
+        for axis in SETTINGS:
+            found.append(Part(_key(axis, motor), partial(_parameters, motor=motor, wanted=(axis,)), slow=True))
     return found
 
 
@@ -228,52 +214,25 @@ def _parameters(state: TmclState, motor: int, wanted: Sequence[Axis]) -> Procedu
 
 
 def fold(state: TmclState, facts: Facts) -> tuple[Conditions, ...]:
-    """The conditions of each motor."""
     return tuple(_conditions(state, facts, motor) for motor in range(state.motors))
 
 
 def _conditions(state: TmclState, facts: Facts, motor: int) -> Conditions:
-    target = _whole(facts, Axis.TARGET_POSITION, motor)
-    reached = _whole(facts, Axis.POSITION_REACHED, motor)
+    """The conditions of a motor: one ramp up and down, which older modules count in units of their chip."""
+    values = {axis: value for axis in KNOWN if isinstance(value := facts.get(_key(axis, motor)), int)}
+    run, hold = values.get(Axis.RUN_CURRENT), values.get(Axis.STANDBY_CURRENT)
+    speed, ramp = (values.get(axis) for axis in RAMP)
+    freewheels = "freewheels: parameter 204" if values.get(Axis.FREEWHEELING) else ""
     return Conditions(
         axis=str(motor) if state.motors > 1 else "",
-        lamps=tuple(_lamps(facts, motor)),
-        target=None if reached else target,
-        run_current=_percent(facts, Axis.RUN_CURRENT, motor),
-        hold_current=_percent(facts, Axis.STANDBY_CURRENT, motor),
-        released=_released(facts, motor),
+        lamps=tuple(Lamp("", function, bool(values[axis])) for axis, function in SWITCHES if axis in values),
+        target=None if values.get(Axis.POSITION_REACHED) else values.get(Axis.TARGET_POSITION),
+        run_current=None if run is None else round(run * 100 / FULL_CURRENT),
+        hold_current=None if hold is None else round(hold * 100 / FULL_CURRENT),
+        released="parameter 7 is 0" if hold == 0 else freewheels,
         unit="microsteps",
-        pace=_pace(facts, motor),
+        pace=Pace(0, speed, ramp, ramp) if speed and ramp else None,
     )
-
-
-def _whole(facts: Facts, axis: Axis, motor: int) -> int | None:
-    value = facts.get(_key(axis, motor))
-    return value if isinstance(value, int) else None
-
-
-def _percent(facts: Facts, axis: Axis, motor: int) -> int | None:
-    value = _whole(facts, axis, motor)
-    return None if value is None else round(value * 100 / FULL_CURRENT)
-
-
-def _released(facts: Facts, motor: int) -> str:
-    """The reason for which no current holds the motor at rest."""
-    if _whole(facts, Axis.STANDBY_CURRENT, motor) == 0:
-        return "parameter 7 is 0"
-    return "freewheels: parameter 204" if _whole(facts, Axis.FREEWHEELING, motor) else ""
-
-
-def _lamps(facts: Facts, motor: int) -> Iterator[Lamp]:
-    for axis, function in SWITCHES:
-        if isinstance(value := facts.get(_key(axis, motor)), int):
-            yield Lamp("", function, bool(value))
-
-
-def _pace(facts: Facts, motor: int) -> Pace | None:
-    """One ramp up and down; older modules count it in units of their chip, so it may be another."""
-    speed, ramp = (_whole(facts, axis, motor) for axis in RAMP)
-    return Pace(0, speed, ramp, ramp) if speed and ramp else None
 
 
 READER = Reader(parts=parts, fold=fold)
@@ -283,7 +242,6 @@ _AXIS_WORD = re.compile(r"AP(\d{1,3})(?:/(\d))?", re.IGNORECASE | re.ASCII)
 
 
 def check(state: TmclState, word: str) -> str:
-    """Check that a word names an axis parameter."""
     found = _AXIS_WORD.fullmatch(word)
     if found is None or int(found[1]) > 255:
         raise Diagnostic(
@@ -311,10 +269,11 @@ def take(state: TmclState, progress: Progress) -> Procedure[Snapshot]:
     if (count := (yield from motors(state))) > 1:
         remarks.append(f"it has {count} motors; a simulated module has one")
     code = readings.values.get(f"G{int(Global.BAUD)}")
+    module, (major, _, minor) = state.product.rpartition("-")[2], state.version.partition(".")
     return Snapshot(
         kind="tmcl",
         product=state.product,
-        version=_version(state),
+        version=f"{module}V{major}{minor}" if module.isdecimal() and major else "",  # as in its text form, `1241V115`
         name=state.address,
         baud=BAUDS.get(code, 0) if isinstance(code, int) else 0,
         readings=readings,
@@ -324,18 +283,11 @@ def take(state: TmclState, progress: Progress) -> Procedure[Snapshot]:
     )
 
 
-def _version(state: TmclState) -> str:
-    """Module and firmware as the module's text form has them, `1241V115`; empty where it does not report them."""
-    module, (major, _, minor) = state.product.rpartition("-")[2], state.version.partition(".")
-    return f"{module}V{major}{minor}" if module.isdecimal() and major else ""
-
-
 NO_ENABLE = "direct mode has no command for it"
 ONE_WAY = "axis parameter 193 chooses the direction of a reference search"
 
 
 def controls(state: TmclState, axis: str) -> Controls:
-    """The controls of one motor."""
     motor = axis or "0"
     counted = RELATIVE_FROM.get(state.relative.get(int(motor), -1), "from where it counts is not known")
     return {

@@ -98,12 +98,10 @@ class Row:
 
     @property
     def word(self) -> str:
-        """How it is typed."""
         return self.command.name
 
     @property
     def syntax(self) -> str:
-        """How it is typed, with its fields."""
         names = ["|".join(self.types) if name == TYPE and self.types else name for name in self.fields]
         return f"{self.word} {', '.join(names)}".strip()
 
@@ -152,7 +150,6 @@ class Call:
     value: int = 0
 
     def __str__(self) -> str:
-        """The command in TMCL's notation."""
         row = self.row
         if row is None:
             return f"{self.command} {self.type}, {self.motor}, {self.value}"
@@ -303,7 +300,6 @@ class Status(IntEnum):
 
 
 def accepted(status: int) -> bool:
-    """Whether the module has executed the command."""
     return status >= Status.DONE and status != Status.STORED
 
 

@@ -13,12 +13,10 @@ ON_MODULE = frozenset({Command.SGP, Command.GGP, Command.STGP, Command.RSGP})
 
 
 def names() -> list[str]:
-    """The words that have help."""
     return list(WORDS)
 
 
 def knows(word: str) -> bool:
-    """Whether a word has help."""
     return word.strip().upper() in WORDS
 
 
@@ -46,7 +44,6 @@ def describe_error(code: int, product: str = "") -> list[str]:
 
 
 def complete(prefix: str, product: str = "") -> list[tuple[str, str]]:
-    """Words that begin with a prefix, each with its meaning."""
     typed = prefix.strip().upper()
     return [(word, row.title) for word, row in WORDS.items() if word.startswith(typed)]
 
@@ -70,14 +67,12 @@ def hint(text: str, product: str = "") -> str:
 
 
 def _table(row: Row) -> Mapping[int, Parameter]:
-    """The parameters that a command takes."""
     if row.command in ON_AXIS:
         return AXIS
     return GLOBAL if row.command in ON_MODULE else {}
 
 
 def _parameters(row: Row) -> list[str]:
-    """A line for each parameter that a command takes."""
     setting = row.command in (Command.SAP, Command.SGP)
     rows = [(number, each) for number, each in _table(row).items() if each.writable or not setting]
     return [f"{number:>3}  {each.title}{_unit(each)}" for number, each in rows]
