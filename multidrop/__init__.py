@@ -19,21 +19,21 @@ TYPE_CHECKING = False  # `typing` is not imported: this file runs at the start o
 if TYPE_CHECKING:
     from typing import Any
 
+    from multidrop.api.blocking import Drive as Drive
     from multidrop.api.blocking import Session as Session
+    from multidrop.api.blocking import Telemetry as Telemetry
     from multidrop.api.blocking import connect as connect
-    from multidrop.api.blocking_drive import Drive as Drive
-    from multidrop.api.blocking_telemetry import Telemetry as Telemetry
+    from multidrop.api.calls import StopReport as StopReport
     from multidrop.api.drives import AsyncDrive as AsyncDrive
-    from multidrop.api.recordings import read_rrd as read_rrd
-    from multidrop.api.runs import Run as Run
-    from multidrop.api.samples import Sample as Sample
-    from multidrop.api.samples import Samples as Samples
     from multidrop.api.sessions import AsyncSession as AsyncSession
+    from multidrop.api.sessions import Run as Run
     from multidrop.api.sessions import connect_async as connect_async
     from multidrop.api.simulated import SimulatedCell as SimulatedCell
     from multidrop.api.simulated import simulate as simulate
-    from multidrop.api.stopping import StopReport as StopReport
     from multidrop.api.telemetry import AsyncTelemetry as AsyncTelemetry
+    from multidrop.api.telemetry import Sample as Sample
+    from multidrop.api.telemetry import Samples as Samples
+    from multidrop.api.telemetry import read_rrd as read_rrd
     from multidrop.dialects.errors import Diagnostic as Diagnostic
     from multidrop.dialects.errors import Differs as Differs
     from multidrop.dialects.errors import DriveError as DriveError
@@ -57,17 +57,12 @@ _PLACES = {
         "Refused",
         "Stopped",
     ),
-    "multidrop.api.blocking": ("Session", "connect"),
-    "multidrop.api.blocking_drive": ("Drive",),
-    "multidrop.api.blocking_telemetry": ("Telemetry",),
+    "multidrop.api.blocking": ("Drive", "Session", "Telemetry", "connect"),
+    "multidrop.api.calls": ("StopReport",),
     "multidrop.api.drives": ("AsyncDrive",),
-    "multidrop.api.recordings": ("read_rrd",),
-    "multidrop.api.runs": ("Run",),
-    "multidrop.api.samples": ("Sample", "Samples"),
-    "multidrop.api.sessions": ("AsyncSession", "connect_async"),
+    "multidrop.api.sessions": ("AsyncSession", "Run", "connect_async"),
     "multidrop.api.simulated": ("SimulatedCell", "simulate"),
-    "multidrop.api.stopping": ("StopReport",),
-    "multidrop.api.telemetry": ("AsyncTelemetry",),
+    "multidrop.api.telemetry": ("AsyncTelemetry", "Sample", "Samples", "read_rrd"),
     "multidrop.transports": ("TransportLost", "Unreachable"),
 }
 _PUBLIC = {name: module for module, names in _PLACES.items() for name in names}

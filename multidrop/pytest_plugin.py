@@ -12,8 +12,7 @@ from typing import TYPE_CHECKING
 import pytest
 
 if TYPE_CHECKING:
-    from multidrop.api.blocking import Session
-    from multidrop.api.blocking_drive import Drive
+    from multidrop.api.blocking import Drive, Session
     from multidrop.api.simulated import SimulatedCell
 
 CELL = """

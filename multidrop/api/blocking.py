@@ -1,24 +1,39 @@
-"""The blocking session: the awaited one in a thread of its own. It works in a notebook, whose own loop runs already."""
+"""The blocking API, made from the awaited one: each call is awaited in a thread of the session.
+
+So it works in a notebook, too, whose own loop runs already.
+"""
 
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Callable, Coroutine
+from collections.abc import Callable, Coroutine, Iterator
+from functools import update_wrapper
 from types import TracebackType
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, Concatenate, ParamSpec, TypeVar
 
 from multidrop.api import endings
-from multidrop.api.blocking_drive import Drive
-from multidrop.api.blocking_telemetry import Telemetry
-from multidrop.api.drives import AsyncDrive
-from multidrop.api.runs import Run
-from multidrop.api.sessions import CLOSED, AsyncSession, Notice, log
-from multidrop.api.stopping import StopReport
-from multidrop.api.telemetry import RATE, AsyncTelemetry
+from multidrop.api.calls import CLOSED, StopReport
+from multidrop.api.drives import AsyncDrive, AsyncParameters, AsyncPrograms, DriveFacts
+from multidrop.api.sessions import AsyncSession, Notice, log
+from multidrop.api.telemetry import RATE, AsyncTelemetry, Sample
 from multidrop.api.threads import LoopThread, Notices
 from multidrop.dialects import Diagnostic
 
+if TYPE_CHECKING:
+    from multidrop.dialects import Motion
+
+P = ParamSpec("P")
 T = TypeVar("T")
+
+
+def blocking(method: Callable[Concatenate[Any, P], Coroutine[Any, Any, T]]) -> Callable[Concatenate[Any, P], T]:
+    """Make the blocking form of an awaited method, for an object with `awaited` and `call`."""
+
+    def call(self: Any, /, *arguments: P.args, **named: P.kwargs) -> T:
+        found: T = self.call(lambda: method(self.awaited, *arguments, **named))
+        return found
+
+    return update_wrapper(call, method, ("__doc__", "__name__", "__annotations__"), ())
 
 
 class Session:
@@ -55,9 +70,7 @@ class Session:
         """Close it; after an exception stop what was started, and say what the stop did not reach."""
         self._close(stop=failure is not None)
 
-    def add(self, /, *urls: str, **named: str) -> None:
-        """Open further connections; those with a name become buses of that name. Moves nothing."""
-        self.call(lambda: self.awaited.add(*urls, **named))
+    add = blocking(AsyncSession.add)
 
     def close(self) -> None:
         """Close everything. Drives go on as they are. May be called again."""
@@ -88,55 +101,43 @@ class Session:
             return future.result()
         except (KeyboardInterrupt, SystemExit):  # of this thread: no call raises them
             if future is None or not future.done():
-                self._interrupted()
+                with contextlib.suppress(Diagnostic):
+                    self.thread.begin(self.awaited.interrupt()).result()
             raise
 
-    def _interrupted(self) -> None:
-        with contextlib.suppress(Diagnostic):
-            self.thread.begin(self.awaited.interrupt()).result()
+    def run_there(self, function: Callable[[], T]) -> T:
+        """Call a function in the session's thread."""
+
+        async def run() -> T:
+            return function()
+
+        return self.call(run)
 
     # Drives
 
     @property
     def drives(self) -> list[Drive]:
         """Every drive that was found."""
-
-        async def found() -> list[AsyncDrive]:
-            return self.awaited.drives
-
-        return [Drive(self, each) for each in self.call(found)]
+        return [Drive(self, each) for each in self.run_there(lambda: self.awaited.drives)]
 
     def drive(self, address: str = "", axis: str = "") -> Drive:
         """The drive at an address: `a`, `press:a`, a name of the saved connection; without one the selected drive.
 
         `axis`: for a drive with several, such as `y`; by default the first. Raises Diagnostic, NoAnswer.
         """
-
-        async def found() -> AsyncDrive:
-            return self.awaited.drive(address, axis)
-
-        return Drive(self, self.call(found))
+        return Drive(self, self.run_there(lambda: self.awaited.drive(address, axis)))
 
     # Lines, scripts, samples
 
-    def send(self, line: str) -> list[str]:
-        """Run a line as typed at the prompt (`PR P`, `@b MR 100`, `/drives`); return the lines that it prints."""
-        return self.call(lambda: self.awaited.send(line))
-
-    def run(self, file: str, /, **values: object) -> Run:
-        """Execute a script of lines. It is checked whole before; `values` are those of `--set`. Raises its failure."""
-        return self.call(lambda: self.awaited.run(file, **values))
+    send = blocking(AsyncSession.send)
+    run = blocking(AsyncSession.run)
 
     def telemetry(self, *addresses: str, rate: float = RATE) -> Telemetry:
         """Read position and velocity of drives (all without an address), each `rate` times a second at most.
 
         A rate of `math.inf` is as fast as the line allows.
         """
-
-        async def begin() -> AsyncTelemetry:
-            return self.awaited.telemetry(*addresses, rate=rate)
-
-        return Telemetry(self, self.call(begin))
+        return Telemetry(self, self.run_there(lambda: self.awaited.telemetry(*addresses, rate=rate)))
 
     # Stop
 
@@ -157,13 +158,123 @@ class Session:
             self.thread.soon(shell.stop)  # which must follow what was written ahead
             raise
 
-    def resume(self) -> None:
-        """Let commands be sent again after a stop."""
-        self.call(self.awaited.resume)
+    resume = blocking(AsyncSession.resume)
 
     def _repr_html_(self) -> str:
         """Return a table of the drives, for a notebook."""
         return self.awaited._repr_html_()
+
+
+class Drive(DriveFacts):
+    """A drive of a session. Steps are the drive's own units: motor steps, or counts with its encoder in use."""
+
+    def __init__(self, session: Session, awaited: AsyncDrive) -> None:
+        super().__init__(awaited.calls, awaited.drive, awaited.axis)
+        self.awaited, self.call = awaited, session.call
+        self._session = session
+        self.programs = Programs(session, awaited.programs)
+        self.parameters = Parameters(session, awaited.parameters)
+
+    send = blocking(AsyncDrive.send)
+    read = blocking(AsyncDrive.read)
+    write = blocking(AsyncDrive.write)
+    move = blocking(AsyncDrive.move)
+    move_to = blocking(AsyncDrive.move_to)
+    wait = blocking(AsyncDrive.wait)
+
+    @property
+    def position(self) -> int:
+        """The position, read now."""
+        return self.call(self.awaited.position)
+
+    @property
+    def velocity(self) -> int:
+        """The velocity, signed, per second, read now."""
+        return self.call(self.awaited.velocity)
+
+    @property
+    def moving(self) -> bool:
+        """Whether it moves, read now."""
+        return self.call(self.awaited.moving)
+
+    @property
+    def motion(self) -> Motion:
+        """Position and velocity of its axis at one time, read now."""
+        return self.call(self.awaited.motion)
+
+    def stop(self) -> StopReport:
+        """Stop this drive now; return what is known of it then. It refuses nothing afterwards."""
+
+        async def stop() -> StopReport:
+            return await self.awaited.stop()
+
+        return self.call(stop)
+
+    def telemetry(self, rate: float = RATE) -> Telemetry:
+        """Read position and velocity `rate` times a second at most, as an iterator of samples."""
+        return self._session.telemetry(self.target, rate=rate)
+
+
+class Programs:
+    """The program of one drive. Raises Inexpressible where its family has none."""
+
+    def __init__(self, session: Session, awaited: AsyncPrograms) -> None:
+        self.awaited, self.call = awaited, session.call
+
+    list = blocking(AsyncPrograms.list)
+    upload = blocking(AsyncPrograms.upload)
+    download = blocking(AsyncPrograms.download)
+
+
+class Parameters:
+    """The settings of one drive. Raises Inexpressible where the host reads none of its family."""
+
+    def __init__(self, session: Session, awaited: AsyncParameters) -> None:
+        self.awaited, self.call = awaited, session.call
+
+    read = blocking(AsyncParameters.read)
+    backup = blocking(AsyncParameters.backup)
+    diff = blocking(AsyncParameters.diff)
+    restore = blocking(AsyncParameters.restore)
+
+
+class Telemetry:
+    """Samples from now until `close`, the end of the session, or the loss of a line: iterate over it."""
+
+    def __init__(self, session: Session, awaited: AsyncTelemetry) -> None:
+        self.awaited, self.call = awaited, session.call
+        self._session = session
+
+    @property
+    def missed(self) -> int:
+        """The number of samples that were dropped because the program did not take them."""
+        return self.awaited.missed
+
+    def __enter__(self) -> Telemetry:
+        """Return it; the end of the block closes it."""
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """Close it."""
+        self.close()
+
+    def close(self) -> None:
+        """End it. Samples that came can still be taken. May be called again."""
+        with contextlib.suppress(Diagnostic):
+            self._session.run_there(self.awaited.close)
+
+    def __iter__(self) -> Iterator[Sample]:
+        """Return it."""
+        return self
+
+    def __next__(self) -> Sample:
+        """Wait for the next sample. Raises TransportLost once the samples before the loss are taken."""
+        try:
+            return self.call(self.awaited.__anext__)
+        except StopAsyncIteration:
+            raise StopIteration from None
+
+    samples = blocking(AsyncTelemetry.samples)
 
 
 def connect(*urls: str, yes: bool = False) -> Session:

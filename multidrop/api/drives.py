@@ -4,53 +4,143 @@ from __future__ import annotations
 
 import operator
 import re
-from typing import TYPE_CHECKING, Protocol
+from collections.abc import Collection
+from typing import TYPE_CHECKING
 
-from multidrop.api import owner
-from multidrop.api.parameters import AsyncParameters
+from multidrop.api.calls import Calls, Stopping
 from multidrop.api.pictures import table
-from multidrop.api.programs import AsyncPrograms
-from multidrop.api.stopping import Stopping
 from multidrop.dialects import Diagnostic, Motion, Refused
 from multidrop.drives.drive import still
-from multidrop.shell import stop_report, waits
+from multidrop.shell import listings, new_file, stop_report, transfers, waits
 from multidrop.shell.events import By
 from multidrop.shell.lines import join_target
+from multidrop.shell.params import file as files
+from multidrop.shell.params import readings
+from multidrop.shell.params.readings import Difference
+from multidrop.shell.params.restore import Options, restore
 from multidrop.shell.scripts.execution import ask
 from multidrop.shell.scripts.expression import Value, Word, written
+from multidrop.shell.transfers import Wanted
 
 if TYPE_CHECKING:
     from multidrop.api.telemetry import AsyncTelemetry
+    from multidrop.dialects.parameters import Readings
+    from multidrop.drives.drive import Drive
     from multidrop.drives.drive import Drive as Wire
+
+
+Lines = list[str]
+
+
+class AsyncPrograms:
+    """The program of one drive. Raises Inexpressible where its family has none."""
+
+    def __init__(self, calls: Calls, drive: Drive) -> None:
+        self._calls, self._drive = calls, drive
+
+    async def list(self) -> Lines:
+        """Read the program as a listing, with the remarks of its file where those are known."""
+        shell = self._calls.shell
+        return await self._calls.run(lambda: listings.readable(shell, self._drive))
+
+    async def upload(self, file: str = "", *, raw: bool = False) -> Lines:
+        """Read the program as the lines of a file; write them to a new `file` if one is named.
+
+        `raw`: as they are stored. Raises Diagnostic for a file that exists.
+        """
+        from multidrop.shell import new_file
+
+        if file:
+            new_file.check(file)
+        shell = self._calls.shell
+        lines = await self._calls.run(lambda: listings.upload(shell, self._drive, raw))
+        if file:
+            new_file.write(file, "".join(f"{line}\n" for line in lines))
+        return lines
+
+    async def download(
+        self,
+        file: str,
+        text: str | None = None,
+        *,
+        save: bool = False,
+        verify: bool = True,
+        only_changed: bool = False,
+        run: str = "",
+    ) -> None:
+        """Check a program file, back up what the drive holds, send the file, and compare.
+
+        `text`: what a file of that name would hold. `save`: keep it over power-off. `run`: the label to execute then.
+        Raises Diagnostic for the file, Refused, NoAnswer, Differs.
+        """
+        shell, wanted = self._calls.shell, Wanted(verify, save, only_changed, run)
+        await self._calls.run(lambda: transfers.download(shell, self._drive, file, wanted, text))
+
+
+class AsyncParameters:
+    """The settings of one drive. Raises Inexpressible where the host reads none of its family."""
+
+    def __init__(self, calls: Calls, drive: Drive) -> None:
+        self._calls, self._drive = calls, drive
+
+    async def read(self) -> Readings:
+        """Read every setting: `.values` by name, `.defaults`, and each with its unit in `.readings`."""
+        shell = self._calls.shell
+        return await self._calls.run(lambda: readings.read(shell, self._drive, "reading"))
+
+    async def backup(self, file: str) -> Readings:
+        """Read every setting, and write them to a new file. Raises Diagnostic for a file that exists."""
+        new_file.check(file)
+        found = await self.read()
+        identity = files.identity(self._drive.state, readings.parameters(self._drive).language)
+        new_file.write(file, files.formatted(identity, found))
+        return found
+
+    async def diff(self, file: str = "") -> list[Difference]:
+        """Compare with a file, or without one with the defaults: (name, value here, value there)."""
+        there = files.load(file) if file else None
+        found = await self.read()
+        if there is None:
+            return readings.from_defaults(found, self._calls.shell.display_name(self._drive))
+        return readings.from_file(found, there)
+
+    async def restore(
+        self,
+        file: str,
+        *,
+        save: bool = False,
+        named: Collection[str] = (),
+        communication: bool = False,
+        other_product: bool = False,
+        dry_run: bool = False,
+    ) -> list[str]:
+        """Send what differs from a file; return the steps. It needs `connect(URL, yes=True)`, or `dry_run`.
+
+        `named`: settings that are only written when named, since they can move the motor or lock the drive.
+        """
+        shell, printed = self._calls.shell, list[str]()
+        options = Options(frozenset(named), communication, save, dry_run, other_product)
+        loaded = files.load(file)
+        await self._calls.run(lambda: restore(shell, self._drive, loaded, options), printed)
+        return printed
+
 
 _WORD = re.compile(r"[A-Za-z]\w*", re.ASCII)
 
 
-class Owner(owner.Owner, Protocol):
-    """The session of a drive, with its telemetry."""
+class DriveFacts:
+    """What is known of a drive without asking it."""
 
-    def telemetry(self, *addresses: str, rate: float = ...) -> AsyncTelemetry:
-        """Read drives."""
-
-
-class AsyncDrive:
-    """A drive of a session. Steps are the drive's own units: motor steps, or counts with its encoder in use."""
-
-    def __init__(self, session: Owner, drive: Wire, axis: str = "") -> None:
+    def __init__(self, calls: Calls, drive: Wire, axis: str) -> None:
         self.drive = drive
         self.axis = axis
         """The axis that it moves and reads; empty: the first."""
-        self._owner = session
-        self._axis_known = not axis
-        self.programs = AsyncPrograms(session, drive)
-        self.parameters = AsyncParameters(session, drive)
-
-    # What it is
+        self.calls = calls
 
     @property
     def name(self) -> str:
         """Its address, with the bus where several are open."""
-        return self._owner.shell.display_name(self.drive)
+        return self.calls.shell.display_name(self.drive)
 
     @property
     def address(self) -> str:
@@ -67,32 +157,59 @@ class AsyncDrive:
         """The version that it reports."""
         return self.drive.version
 
-    # Lines
-
-    async def send(self, line: str) -> list[str]:
-        """Send a line in the drive's own language; return the lines that it prints. Raises Refused, NoAnswer."""
-        printed: list[str] = []
-        await self._owner.call(lambda: self._send(line), printed)
-        return printed
-
-    async def _send(self, *lines: str) -> None:
-        shell = self._owner.shell
-        for line in lines:
-            await shell.run(f"@{self.target} {line}", By.SCRIPT)
+    @property
+    def referenced(self) -> bool:
+        """False after a restart that was seen, until a homing has ended or the position was set."""
+        lost = self.drive.state.unreferenced
+        return not (lost & {self.axis.lower(), ""} if self.axis else lost)
 
     @property
     def target(self) -> str:
         """Its address with its bus, as after an `@`."""
         return join_target(self.drive.link.name, self.drive.address)
 
+    def __repr__(self) -> str:
+        """Return its name and product."""
+        axis = f", axis {self.axis}" if self.axis else ""
+        return f"<{self.name or 'drive'} {self.product}{axis}>"
+
+    def _repr_html_(self) -> str:
+        """Return what is known of it, for a notebook."""
+        seen = "" if self.drive.seen is None else f"{self.drive.seen.velocity}"
+        heads = ("drive", "axis", "product", "version", "last velocity")
+        return table("drive", heads, [(self.name, self.axis, self.product, self.version, seen)])
+
+
+class AsyncDrive(DriveFacts):
+    """A drive of a session. Steps are the drive's own units: motor steps, or counts with its encoder in use."""
+
+    def __init__(self, calls: Calls, drive: Wire, axis: str = "") -> None:
+        super().__init__(calls, drive, axis)
+        self._axis_known = not axis
+        self.programs = AsyncPrograms(calls, drive)
+        self.parameters = AsyncParameters(calls, drive)
+
+    # Lines
+
+    async def send(self, line: str) -> list[str]:
+        """Send a line in the drive's own language; return the lines that it prints. Raises Refused, NoAnswer."""
+        printed: list[str] = []
+        await self.calls.run(lambda: self._send(line), printed)
+        return printed
+
+    async def _send(self, *lines: str) -> None:
+        shell = self.calls.shell
+        for line in lines:
+            await shell.run(f"@{self.target} {line}", By.SCRIPT)
+
     async def read(self, name: str) -> Value:
         """Read the value of a word of the drive, such as `VM`; `[LINE]` asks with a line that prints one value."""
         line = name.startswith("[") and name.endswith("]")
         word = Word(name[1:-1] if line else name, self.target, line)
-        shell = self._owner.shell
+        shell = self.calls.shell
         if not line and not _WORD.fullmatch(name):
             raise Diagnostic(f"{name!r} is not a word of a drive", self.name, "valid: as in read('VM')")
-        return await self._owner.call(lambda: ask(shell, word, By.SCRIPT))
+        return await self.calls.run(lambda: ask(shell, word, By.SCRIPT))
 
     async def write(self, name: str, value: Value) -> None:
         """Give a word of the drive a value. Raises Refused; Diagnostic where its language has no such form."""
@@ -100,7 +217,7 @@ class AsyncDrive:
         if line is None:
             raise Diagnostic(f"no line gives {name!r} a value", self.name, "send() takes any line of the drive")
         self._check_executes()
-        await self._owner.call(lambda: self._send(line))
+        await self.calls.run(lambda: self._send(line))
 
     # Motion
 
@@ -116,26 +233,20 @@ class AsyncDrive:
         self._check_executes()
         if not self._axis_known:
             await self.motion()
-        async with self._owner.moves(self.drive):  # a mode and its move belong together
-            await self._owner.call(lambda: self._send(*lines))
+        async with self.calls.moves(self.drive):  # a mode and its move belong together
+            await self.calls.run(lambda: self._send(*lines))
 
     async def wait(self, timeout: float = waits.LIMIT, *, idle: bool = False) -> None:
         """Wait until two readings show it at rest; with `idle` also until no program runs.
 
         Raises DriveError after `timeout` seconds.
         """
-        shell, drives = self._owner.shell, [self.drive]
-        await self._owner.call(lambda: waits.wait(shell, timeout, idle=idle, drives=drives))
+        shell, drives = self.calls.shell, [self.drive]
+        await self.calls.run(lambda: waits.wait(shell, timeout, idle=idle, drives=drives))
 
     async def position(self) -> int:
         """Read the position."""
         return (await self.motion()).position
-
-    @property
-    def referenced(self) -> bool:
-        """False after a restart that was seen, until a homing has ended or the position was set."""
-        lost = self.drive.state.unreferenced
-        return not (lost & {self.axis.lower(), ""} if self.axis else lost)
 
     async def velocity(self) -> int:
         """Read the velocity, signed, per second."""
@@ -144,12 +255,12 @@ class AsyncDrive:
     async def moving(self) -> bool:
         """Read whether it moves; at rest, two readings say so."""
         self._check_executes()
-        return not await self._owner.call(lambda: still(self.drive))
+        return not await self.calls.run(lambda: still(self.drive))
 
     async def motion(self) -> Motion:
         """Read position and velocity of its axis at one time."""
         self._check_executes()
-        axes = await self._owner.call(self.drive.motion)
+        axes = await self.calls.run(self.drive.motion)
         wanted = self.axis.lower()
         found = next((each for each in axes if wanted in ("", each.axis.lower())), None)
         if found is None:
@@ -167,22 +278,11 @@ class AsyncDrive:
 
     def stop(self) -> Stopping:
         """Stop this drive now; await what is returned for the report. It refuses nothing afterwards."""
-        shell = self._owner.shell
+        shell = self.calls.shell
         halt = shell.bus(self.drive.link.name).stop([self.drive])
         several = len(shell.buses) > 1
         return Stopping(shell, lambda: stop_report.of_halts([halt], shell.wall(halt.at), several))
 
     def telemetry(self, rate: float = 50.0) -> AsyncTelemetry:
         """Read position and velocity `rate` times a second at most, as an iterator of samples."""
-        return self._owner.telemetry(self.target, rate=rate)
-
-    def __repr__(self) -> str:
-        """Return its name and product."""
-        axis = f", axis {self.axis}" if self.axis else ""
-        return f"<{self.name or 'drive'} {self.product}{axis}>"
-
-    def _repr_html_(self) -> str:
-        """Return what is known of it, for a notebook."""
-        seen = "" if self.drive.seen is None else f"{self.drive.seen.velocity}"
-        heads = ("drive", "axis", "product", "version", "last velocity")
-        return table("drive", heads, [(self.name, self.axis, self.product, self.version, seen)])
+        return self.calls.telemetry([self.drive], rate)

@@ -2,20 +2,17 @@
 
 from __future__ import annotations
 
-import asyncio
 import logging
-from collections.abc import Callable, Coroutine, Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from functools import partial
 from types import TracebackType
-from typing import TYPE_CHECKING, Any, TypeVar
-from weakref import WeakKeyDictionary, WeakSet
+from typing import TYPE_CHECKING, TypeVar
 
 from multidrop.api import endings
-from multidrop.api.automation import Calls
+from multidrop.api.calls import Calls, Stopping
 from multidrop.api.drives import AsyncDrive
-from multidrop.api.pictures import drives_table
-from multidrop.api.runs import Run, run_file
-from multidrop.api.stopping import Stopping
+from multidrop.api.pictures import drives_table, table
 from multidrop.api.telemetry import RATE, AsyncTelemetry
 from multidrop.dialects import Diagnostic
 from multidrop.shell import stop_report
@@ -26,9 +23,32 @@ from multidrop.shell.session import Session as Shell
 
 if TYPE_CHECKING:
     from multidrop.drives.drive import Drive
+    from multidrop.shell.scripts.model import Result
+
+
+@dataclass(frozen=True)
+class Run:
+    """A script that was executed to its end."""
+
+    file: str
+    results: tuple[Result, ...]
+    """What each line sent and printed; lines that only steer have none."""
+
+    @property
+    def printed(self) -> list[str]:
+        """All lines that it printed."""
+        return [text for result in self.results for text in result.printed]
+
+    def _repr_html_(self) -> str:
+        """Return a table of the lines, for a notebook."""
+        rows = [
+            (f"{result.line.number}", result.sent, "\n".join(result.printed) or result.error, f"{result.seconds:.3f}")
+            for result in self.results
+        ]
+        return table(self.file, ("line", "sent", "printed", "s"), rows)
+
 
 T = TypeVar("T")
-CLOSED = ("the session is closed", "session", "connect(URL) opens one")
 Notice = Callable[[str, bool], object]
 """Takes a line for a person, and whether it is a warning; otherwise it is the outcome of what was asked for."""
 
@@ -49,10 +69,7 @@ class AsyncSession:
         self._urls = urls
         self._yes = yes
         self._notice = notice
-        self._shell: Shell | None = None
-        self._calls: Calls | None = None
-        self._telemetry: WeakSet[AsyncTelemetry] = WeakSet()
-        self._moves: WeakKeyDictionary[Drive, asyncio.Lock] = WeakKeyDictionary()
+        self._calls = Calls()
 
     # Beginning and end
 
@@ -73,24 +90,23 @@ class AsyncSession:
 
     def end_early(self) -> None:
         """Write the stop of every line: the process ends, and the event loop does no more."""
-        if self._shell is not None:
-            self._shell.stop_ahead()
+        if self._calls.opened:
+            self.shell.stop_ahead()
             self._notice("a session was not closed; the stop of its lines was sent, and no drive was asked", True)
 
     async def open(self) -> None:
         """Open the connections and find their drives. Moves nothing."""
-        if self._shell is not None:
+        if self._calls.opened:
             return
         from multidrop.shell.log.writer import begin as begin_log
 
         shell = Shell(load())
         shell.agreed, shell.way = self._yes, "connect(URL, yes=True)"
         shell.subscribe(self._take)
-        calls = Calls(shell)
-        self._shell, self._calls = shell, calls
+        self._calls.open(shell)
         begin_log(shell)
         try:
-            await calls.begin()
+            await self._calls.begin()
             await self.add(*self._urls)
         except BaseException:
             await self.close(stop=True)
@@ -98,31 +114,26 @@ class AsyncSession:
 
     async def add(self, /, *urls: str, **named: str) -> None:
         """Open further connections; those with a name become buses of that name. Moves nothing."""
-        await self.call(lambda: self.shell.open_all(urls))
+        await self._calls.run(lambda: self.shell.open_all(urls))
         for name, url in named.items():
-            await self.call(partial(self.shell.open, url, name))
+            await self._calls.run(partial(self.shell.open, url, name))
 
     async def close(self, *, stop: bool = False) -> None:
         """Close everything. Drives go on as they are, unless a `stop` is asked for. May be called again."""
-        shell, calls = self._shell, self._calls
-        if shell is None or calls is None:
+        if not self._calls.closing():
             return
-        self._calls = None
         try:
             if stop:
-                await self._interrupt(calls)
-            await calls.end()
-            await settled(shell)  # a stop that is under way is repeated and confirmed
-            if shell.latched:
-                self._notice(f"stop: {stop_report.words(shell.tally())}", True)
+                await self._interrupt()
+            await self._calls.end()
+            await settled(self.shell)  # a stop that is under way is repeated and confirmed
+            if self.shell.latched:
+                self._notice(f"stop: {stop_report.words(self.shell.tally())}", True)
         finally:
-            for each in self._telemetry:
-                each.close()
-            self._shell = None
-            await shell.close()
+            await self._calls.closed().close()
 
-    async def _interrupt(self, calls: Calls) -> None:
-        for text in await calls.interrupt():
+    async def _interrupt(self) -> None:
+        for text in await self._calls.interrupt():
             self._notice(text, True)
 
     def _take(self, event: SessionEvent) -> None:
@@ -132,24 +143,12 @@ class AsyncSession:
     @property
     def shell(self) -> Shell:
         """The session of the house, with its events and everything else. Raises Diagnostic where none is open."""
-        if self._shell is None:
-            raise Diagnostic(*CLOSED)
-        return self._shell
-
-    async def call(self, work: Callable[[], Coroutine[Any, Any, T]], printed: list[str] | None = None) -> T:
-        """Run work as a call of this session: a stop ends it, and an early end stops what it started."""
-        if self._calls is None:
-            raise Diagnostic(*CLOSED)
-        return await self._calls.run(work, printed)
-
-    def moves(self, drive: Drive) -> asyncio.Lock:
-        """The lock of a drive for moves of several lines."""
-        return self._moves.setdefault(drive, asyncio.Lock())
+        return self._calls.shell
 
     async def interrupt(self) -> None:
         """End all calls, and stop what this session started. It stays open."""
-        if self._calls is not None:
-            await self._interrupt(self._calls)
+        if self._calls.accepted:
+            await self._interrupt()
             await self._calls.begin()
 
     # Drives
@@ -157,14 +156,14 @@ class AsyncSession:
     @property
     def drives(self) -> list[AsyncDrive]:
         """Every drive that was found."""
-        return [AsyncDrive(self, drive) for bus in self.shell.buses.values() for drive in bus.drives.values()]
+        return [AsyncDrive(self._calls, drive) for bus in self.shell.buses.values() for drive in bus.drives.values()]
 
     def drive(self, address: str = "", axis: str = "") -> AsyncDrive:
         """The drive at an address: `a`, `press:a`, a name of the saved connection; without one the selected drive.
 
         `axis`: for a drive with several, such as `y`; by default the first. Raises Diagnostic, NoAnswer.
         """
-        return AsyncDrive(self, self.found(address), axis)
+        return AsyncDrive(self._calls, self.found(address), axis)
 
     def found(self, address: str) -> Drive:
         """The drive at an address, if there is one. Raises Diagnostic, NoAnswer."""
@@ -183,7 +182,7 @@ class AsyncSession:
     async def send(self, line: str) -> list[str]:
         """Run a line as typed at the prompt (`PR P`, `@b MR 100`, `/drives`); return the lines that it prints."""
         printed: list[str] = []
-        await self.call(lambda: self._run(line), printed)
+        await self._calls.run(lambda: self._run(line), printed)
         return printed
 
     async def _run(self, line: str) -> None:
@@ -191,7 +190,13 @@ class AsyncSession:
 
     async def run(self, file: str, /, **values: object) -> Run:
         """Execute a script of lines. It is checked whole before; `values` are those of `--set`. Raises its failure."""
-        return await run_file(self, file, {name: str(value) for name, value in values.items()})
+        from multidrop.shell.scripts.executor import run_script
+        from multidrop.shell.scripts.reading import read_script  # with all verbs, which few programs need
+
+        script = read_script(file, {name: str(value) for name, value in values.items()}, self.shell.macros)
+        results: list[Result] = []
+        await self._calls.run(lambda: run_script(self.shell, script, results.append))
+        return Run(file, tuple(results))
 
     def telemetry(self, *addresses: str, rate: float = RATE) -> AsyncTelemetry:
         """Read position and velocity of drives (all without an address), each `rate` times a second at most.
@@ -199,11 +204,7 @@ class AsyncSession:
         A rate of `math.inf` is as fast as the line allows.
         """
         drives = [self.found(each) for each in addresses] or [each.drive for each in self.drives]
-        if not rate > 0:
-            raise Diagnostic(f"no rate {rate:g}", "telemetry", "valid: above 0, samples a second; math.inf")
-        opened = AsyncTelemetry(self, drives, rate)
-        self._telemetry.add(opened)
-        return opened
+        return self._calls.telemetry(drives, rate)
 
     # Stop
 
@@ -222,7 +223,7 @@ class AsyncSession:
 
     def _repr_html_(self) -> str:
         """Return a table of the drives, for a notebook."""
-        return drives_table(self.shell) if self._shell is not None else "<p>multidrop: a closed session</p>"
+        return drives_table(self.shell) if self._calls.opened else "<p>multidrop: a closed session</p>"
 
 
 def connect_async(*urls: str, yes: bool = False) -> AsyncSession:

@@ -3,19 +3,116 @@
 from __future__ import annotations
 
 import asyncio
+import math
+from array import array
 from collections import deque
-from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from collections.abc import Iterable, Iterator, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple, overload
 
-from multidrop.api.samples import Sample, Samples
+from multidrop.api.pictures import Curve, plot
+from multidrop.dialects import Diagnostic
+from multidrop.dialects.files import why
 from multidrop.drives.events import Lost
 from multidrop.drives.events import Sample as Read
 from multidrop.shell.events import OnBus, SessionEvent
 
 if TYPE_CHECKING:
-    from multidrop.api.owner import Owner
+    from typing import SupportsIndex
+
     from multidrop.drives.drive import Drive
     from multidrop.drives.telemetry import Subscription
+    from multidrop.shell.session import Session
+
+
+class Sample(NamedTuple):
+    """Position and velocity of one axis of one drive."""
+
+    elapsed: float
+    """Seconds since the telemetry began."""
+    time: float
+    """Time of day, seconds since 1970."""
+    drive: str
+    axis: str
+    position: int
+    velocity: int
+
+
+class Samples(Sequence[Sample]):
+    """Samples in the order of their times."""
+
+    def __init__(self, rows: Iterable[Sample] = ()) -> None:
+        self._rows = tuple(rows)
+
+    @overload
+    def __getitem__(self, at: SupportsIndex) -> Sample: ...
+    @overload
+    def __getitem__(self, at: slice) -> Samples: ...
+    def __getitem__(self, at: SupportsIndex | slice) -> Sample | Samples:
+        """Return one of them, or some."""
+        return Samples(self._rows[at]) if isinstance(at, slice) else self._rows[at]
+
+    def __len__(self) -> int:
+        """Return their number."""
+        return len(self._rows)
+
+    def __iter__(self) -> Iterator[Sample]:
+        """Iterate over them."""
+        return iter(self._rows)
+
+    def __eq__(self, other: object) -> bool:
+        """Return whether the others are the same."""
+        return isinstance(other, Samples) and self._rows == other._rows
+
+    def __hash__(self) -> int:
+        """Return a hash of all."""
+        return hash(self._rows)
+
+    def __repr__(self) -> str:
+        """Return their number and span."""
+        span = f", {self._rows[-1].elapsed - self._rows[0].elapsed:.3f} s" if self._rows else ""
+        return f"<{len(self)} samples{span}>"
+
+    def of(self, drive: str, axis: str = "") -> Samples:
+        """The samples of one drive; of one axis of it if that is named."""
+        return Samples(row for row in self._rows if row.drive == drive and axis in ("", row.axis))
+
+    def arrays(self) -> dict[str, list[str] | array[float] | array[int]]:
+        """The columns by name: lists of text, arrays of numbers, which numpy takes without a copy."""
+        return {
+            "elapsed": array("d", (row.elapsed for row in self._rows)),
+            "time": array("d", (row.time for row in self._rows)),
+            "drive": [row.drive for row in self._rows],
+            "axis": [row.axis for row in self._rows],
+            "position": array("q", (row.position for row in self._rows)),
+            "velocity": array("q", (row.velocity for row in self._rows)),
+        }
+
+    def arrow(self) -> Any:
+        """The columns as a table of pyarrow. Raises Diagnostic where pyarrow is not installed."""
+        try:
+            import pyarrow
+        except ModuleNotFoundError:
+            hint = "pip install pyarrow; arrays() needs nothing"
+            raise Diagnostic("Arrow needs pyarrow, which is not installed", "samples", hint) from None
+        return pyarrow.table({name: pyarrow.array(column) for name, column in self.arrays().items()})
+
+    def __arrow_c_stream__(self, requested_schema: object = None) -> object:
+        """Return the columns for another library that speaks Arrow. Needs pyarrow."""
+        return self.arrow().__arrow_c_stream__(requested_schema)
+
+    def _repr_html_(self) -> str:
+        """Return plots of position and velocity, for a notebook."""
+        return plot("position", self._curves("position")) + plot("velocity", self._curves("velocity"))
+
+    def _curves(self, field: str) -> Iterator[Curve]:
+        series: dict[tuple[str, str], list[Sample]] = {}
+        for row in self._rows:
+            series.setdefault((row.drive, row.axis), []).append(row)
+        for (drive, axis), rows in series.items():
+            finite = [row for row in rows if math.isfinite(getattr(row, field))]
+            yield f"{drive} {axis}".strip(), [row.elapsed for row in finite], [getattr(row, field) for row in finite]
+
 
 RATE = 50.0
 """Samples of each drive a second, at most."""
@@ -26,11 +123,11 @@ KEPT = 200_000
 class AsyncTelemetry:
     """Samples from now until `close`, the end of the session, or the loss of a line. Polls only while it is open."""
 
-    def __init__(self, owner: Owner, drives: Sequence[Drive], rate: float = RATE) -> None:
+    def __init__(self, shell: Session, drives: Sequence[Drive], rate: float = RATE) -> None:
         """Begin to read. A rate of `math.inf` is as fast as the line allows."""
         self.missed = 0
         """The number of samples that were dropped because the program did not take them."""
-        self._shell = owner.shell
+        self._shell = shell
         self._names = {(drive.link.name, drive.address): self._shell.display_name(drive) for drive in drives}
         self._rows: deque[Sample] = deque()
         self._news = asyncio.Event()
@@ -98,3 +195,78 @@ class AsyncTelemetry:
         """Take all samples that have come and were not taken yet."""
         rows, self._rows = self._rows, deque()
         return Samples(rows)
+
+
+QUANTITIES = ("position", "velocity")
+"""Both are in every sample of a drive, and of its twin."""
+Key = tuple[float, str, str]
+"""Seconds since the plot began, drive, axis."""
+
+
+def read_rrd(file: str | Path, *, twin: bool = False) -> Samples:
+    """Read the samples of a plot that multidrop wrote; `twin`: those that the twins of its drives predicted.
+
+    Raises Diagnostic for another file, for one without such samples, and without rerun.
+    """
+    from multidrop.shell.plots.sink import load
+
+    load()
+    path = Path(file)
+    if not path.exists():
+        raise Diagnostic("cannot be read: there is no such file", str(path))
+    rows: dict[Key, dict[str, float]] = {}
+    for drive, axis, what, elapsed, wall, value in _values(path, twin):
+        rows.setdefault((elapsed, drive, axis), {"time": wall})[what] = value
+    whole = (each for each in sorted(rows.items()) if all(what in each[1] for what in QUANTITIES))
+    found = Samples(
+        Sample(elapsed, row["time"], drive, axis, int(row["position"]), int(row["velocity"]))
+        for (elapsed, drive, axis), row in whole
+    )
+    if not found:
+        missing, hint = (
+            ("twins", "/twin on, then /plot --to FILE.rrd")
+            if twin
+            else ("multidrop", "multidrop plot URL --to FILE.rrd")
+        )
+        raise Diagnostic(f"has no samples of {missing}", str(path), f"{hint} writes such a file")
+    return found
+
+
+def _values(path: Path, twin: bool) -> Iterator[tuple[str, str, str, float, float, float]]:
+    """Drive, axis, quantity, elapsed, time of day and value of each entry."""
+    from rerun.chunk import RrdReader
+
+    try:
+        for chunk in RrdReader(str(path)).stream():
+            series = _series(chunk.entity_path, twin)
+            if series is not None and "elapsed" in chunk.timeline_names:
+                yield from ((*series, *row) for row in _column(chunk.to_record_batch()))
+    except (OSError, RuntimeError, ValueError) as problem:
+        reason = why(problem) if isinstance(problem, OSError) else "not a recording of rerun"
+        raise Diagnostic(f"cannot be read: {reason}", str(path)) from None
+
+
+def _series(entity: str, twin: bool) -> tuple[str, str, str] | None:
+    """The drive, axis and quantity of an entity `/BUS/ADDRESS/AXIS/position`; None for another one.
+
+    `twin`: of `/BUS/ADDRESS/AXIS/twin/position`.
+    """
+    from multidrop.shell.plots.layout import TWIN
+
+    *parts, what = entity.strip("/").replace("\\", "").split("/")
+    of_twin = len(parts) > 1 and parts[-1] == TWIN
+    if not parts or what not in QUANTITIES or of_twin is not twin:
+        return None
+    bus, address, axis = (*(parts[:-1] if twin else parts), "", "")[:3]
+    return f"{bus}:{address}" if address else bus, axis, what
+
+
+def _column(batch: Any) -> Iterator[tuple[float, float, float]]:
+    names = batch.schema.names
+    if "Scalars:scalars" not in names:
+        return
+    for elapsed, wall, values in zip(
+        batch.column("elapsed"), batch.column("time"), batch.column("Scalars:scalars"), strict=True
+    ):
+        if elapsed.is_valid and values.as_py():
+            yield elapsed.value / 1e9, wall.value / 1e9, values.as_py()[0]

@@ -1,0 +1,198 @@
+"""The calls of a program's session: what they have started, and its stop.
+
+The calls run in tasks of their own. They share one automation of the session, which another task holds open. So a call
+from any task or thread counts, and any of them can end it.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+from collections.abc import Callable, Coroutine, Generator, Sequence
+from contextvars import Context, ContextVar, copy_context
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, TypeVar
+from weakref import WeakKeyDictionary, WeakSet
+
+from multidrop.api.telemetry import AsyncTelemetry
+from multidrop.dialects import Diagnostic, Stopped
+from multidrop.shell import stop_report
+from multidrop.shell.automation import ENDING, outcome, settled
+from multidrop.shell.events import Output, Printed, SessionEvent
+
+if TYPE_CHECKING:
+    from multidrop.drives.drive import Drive
+    from multidrop.shell.session import Session
+
+T = TypeVar("T")
+CLOSED = ("the session is closed", "session", "connect(URL) opens one")
+_printed: ContextVar[list[str] | None] = ContextVar("printed", default=None)
+"""The lines that the current call has printed."""
+
+
+class Calls:
+    """The calls of a session: one automation, until it is interrupted; then another one."""
+
+    def __init__(self) -> None:
+        self._shell: Session | None = None
+        self._context = Context()
+        self._holder: asyncio.Task[None] | None = None
+        self._over = asyncio.Event()
+        self._going = self._closing = False
+        """Calls are accepted; the session is being closed."""
+        self._reported = 0
+        """The number of stops by interruptions whose outcome was returned."""
+        self._tasks: set[asyncio.Task[Any]] = set()
+        self._moves: WeakKeyDictionary[Drive, asyncio.Lock] = WeakKeyDictionary()
+        self._telemetry: WeakSet[AsyncTelemetry] = WeakSet()
+
+    @property
+    def opened(self) -> bool:
+        """Whether the session is open."""
+        return self._shell is not None
+
+    @property
+    def accepted(self) -> bool:
+        """Whether the session is open, and not being closed."""
+        return self._shell is not None and not self._closing
+
+    @property
+    def shell(self) -> Session:
+        """The session of the house, with its events and everything else. Raises Diagnostic where none is open."""
+        if self._shell is None:
+            raise Diagnostic(*CLOSED)
+        return self._shell
+
+    def open(self, shell: Session) -> None:
+        """Take the session that the calls are for; `begin` follows."""
+        self._shell, self._closing = shell, False
+        shell.subscribe(_collect)
+
+    def closing(self) -> bool:
+        """Refuse further calls, as the session is being closed; return False where it was before."""
+        if not self.accepted:
+            return False
+        self._closing = True
+        return True
+
+    def closed(self) -> Session:
+        """End all telemetry, and give the session up."""
+        shell, self._shell = self.shell, None
+        for each in self._telemetry:
+            each.close()
+        return shell
+
+    def moves(self, drive: Drive) -> asyncio.Lock:
+        """The lock of a drive for moves of several lines."""
+        return self._moves.setdefault(drive, asyncio.Lock())
+
+    def telemetry(self, drives: Sequence[Drive], rate: float) -> AsyncTelemetry:
+        """Begin to read drives until the session is closed. Raises Diagnostic."""
+        if not rate > 0:
+            raise Diagnostic(f"no rate {rate:g}", "telemetry", "valid: above 0, samples a second; math.inf")
+        opened = AsyncTelemetry(self.shell, drives, rate)
+        self._telemetry.add(opened)
+        return opened
+
+    async def begin(self) -> None:
+        """Begin an automation."""
+        self._over.clear()
+        begun = asyncio.get_running_loop().create_future()
+        self._holder = asyncio.get_running_loop().create_task(self._hold(begun), context=Context())
+        self._context = await begun
+        self._going = True
+
+    async def _hold(self, begun: asyncio.Future[Context]) -> None:
+        async with self.shell.automations.run():
+            begun.set_result(copy_context())
+            try:
+                await self._over.wait()
+            except asyncio.CancelledError:  # the loop ends, and cancels all tasks
+                self.shell.automations.interrupt()
+                raise
+
+    async def run(self, work: Callable[[], Coroutine[Any, Any, T]], printed: list[str] | None = None) -> T:
+        """Run a call as a part of the automation; `printed` gets the lines that it prints. A stop ends it.
+
+        Raises Stopped while an interruption ends the calls before, Diagnostic where the session is closed.
+        """
+        if not self.accepted:
+            raise Diagnostic(*CLOSED)
+        if not self._going:
+            raise Stopped("the session is being interrupted; nothing was sent")
+        context = self._context.copy()
+        context.run(_printed.set, printed)
+        task = asyncio.get_running_loop().create_task(self.shell.tasks.run(work()), context=context)
+        self._tasks.add(task)
+        task.add_done_callback(self._tasks.discard)
+        try:
+            return await task
+        except asyncio.CancelledError:
+            caller = asyncio.current_task()
+            if caller is not None and caller.cancelling():
+                raise
+            raise Stopped("the session was interrupted; what it had started was stopped") from None
+
+    async def interrupt(self) -> list[str]:
+        """End all calls, and stop what they started; return the outcome in lines. The session can go on."""
+        self._going = False
+        self.shell.interrupt()
+        if self._tasks:  # a macro executes its `on_stop` lines
+            await asyncio.wait([*self._tasks], timeout=ENDING)
+        await self._end(early=True)
+        every = self.shell.automations.interrupted
+        halts, self._reported = every[self._reported :], len(every)
+        if halts:
+            await settled(self.shell)
+        return outcome(self.shell, halts)
+
+    async def end(self) -> None:
+        """End the automation as a success: what it started goes on."""
+        self._going = False
+        await self._end(early=False)
+
+    async def _end(self, early: bool) -> None:
+        holder, self._holder = self._holder, None
+        if holder is None:
+            return
+        if early:
+            holder.cancel()
+        self._over.set()
+        with contextlib.suppress(asyncio.CancelledError):
+            await asyncio.wait([holder])
+
+
+def _collect(event: SessionEvent) -> None:
+    """Take what the current call prints: events are published in its context."""
+    lines = _printed.get()
+    if lines is not None and isinstance(event, Printed | Output):
+        lines.append(event.text)
+
+
+@dataclass(frozen=True)
+class StopReport:
+    """The state of the drives after a stop, as far as it is known. It reads as one line."""
+
+    at_rest: bool
+    """Every drive that it was for was read at velocity 0 since."""
+    text: str
+
+    def __str__(self) -> str:
+        """Return the line."""
+        return self.text
+
+
+class Stopping:
+    """A stop that is written. Await it for its report; it works without that, too."""
+
+    def __init__(self, shell: Session, tally: Callable[[], stop_report.Tally]) -> None:
+        self._shell, self._tally = shell, tally
+
+    def __await__(self) -> Generator[Any, None, StopReport]:
+        """Wait until the stop is confirmed or not, 3 s at most."""
+        return self._report().__await__()
+
+    async def _report(self) -> StopReport:
+        await settled(self._shell)
+        tally = self._tally()
+        return StopReport(tally.stand, stop_report.words(tally))
