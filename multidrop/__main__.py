@@ -9,7 +9,7 @@ import signal
 import sys
 from collections.abc import Sequence
 
-PROTOCOLS = ("relay.run", "lsp.run")
+PROTOCOLS = ("serving.relay", "serving.lsp")
 """Commands whose standard output is a connection: they notice its end themselves."""
 
 

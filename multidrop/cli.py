@@ -1,4 +1,4 @@
-"""The command line: the parser that the table of commands makes.
+"""The command line: the parser that the declarations of operations make.
 
 Building the parser imports nothing but argparse, so that --help and --version are quick. Only the requested command
 becomes a parser of its own. Its arguments are added when it is parsed, and its file in `multidrop.commands` is imported
@@ -10,15 +10,16 @@ from __future__ import annotations
 import argparse
 import os
 import sys
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from importlib.machinery import PathFinder
 from typing import TYPE_CHECKING, Any, NoReturn
 
-from multidrop.command_table import COMMANDS, Command
 from multidrop.dialects.on_demand import imported
 
 if TYPE_CHECKING:
     from _typeshed import SupportsWrite
+
+    from multidrop.shell.operations.operation import Operation
 
 URLS = """A URL is {}; sim: alone is the demo cell. Keys after a ?: dialect, drives=a,b,c, baud,
 party=0|1, checksum=0|1|2, em=0..3, echo=local, address=none, timeout=SECONDS, relay=multidrop|socat."""
@@ -28,6 +29,8 @@ EPILOG = (
     "Without a command: the screen, with saved connections, serial ports and the demo cell. "
     "multidrop COMMAND --help shows its arguments."
 )
+EXTRAS = {"cluster": "distributed", "lsp": "pygls", "mqtt": "paho", "pytest": "pytest", "rerun": "rerun"}
+"""The modules of the extras in pyproject.toml, by extra."""
 
 
 class Formatter(argparse.HelpFormatter):
@@ -55,7 +58,7 @@ def _columns() -> int:
 class Parser(argparse.ArgumentParser):
     """An argument parser that reports wrong usage in one line, and adds a command's arguments when it parses them."""
 
-    command: Command | None = None
+    operation: Operation | None = None
     """None: the parser of all commands."""
     complete = True
     """False until the arguments of the command have been added."""
@@ -64,14 +67,48 @@ class Parser(argparse.ArgumentParser):
         self, args: Sequence[str] | None = None, namespace: argparse.Namespace | None = None
     ) -> tuple[argparse.Namespace, list[str]]:
         """Parse; see argparse."""
-        self.complete_for(args or ())
+        self.add_arguments(args or ())
         return super().parse_known_args(args, namespace)
 
-    def complete_for(self, given: Sequence[str]) -> None:
-        """Add the arguments of the command, and of its part that is asked for."""
-        if self.command is not None and not self.complete:
-            self.complete = True
-            _add_arguments(self, self.command, given)
+    def add_arguments(self, given: Sequence[str]) -> None:
+        """Add the arguments of the command, or its parts. One with both is a part if the first word names one."""
+        if self.operation is None or self.complete:
+            return
+        from multidrop.shell.operations.operation import add_arguments
+        from multidrop.shell.operations.table import parts
+
+        self.complete = True
+        own = parts(self.operation.command)
+        named = given[:1] and given[0] in own
+        if self.operation.run and not named:
+            add_arguments(self, self.operation.arguments)
+            self.set_defaults(run_by=self.operation.run)
+        if own and (named or not self.operation.run):
+            self.add_commands(own, given, "|".join(own), required=True)
+
+    def add_commands(
+        self, commands: dict[str, Operation], given: Sequence[str], metavar: str, *, required: bool
+    ) -> None:
+        """Add the commands, or only the one that the first word names."""
+        added = self.add_subparsers(prog=self.prog, metavar=metavar, required=required, parser_class=Parser)
+        asked = given[0] if given else ""
+        for name, operation in ({asked: commands[asked]} if asked in commands else commands).items():
+            part = added.add_parser(
+                name,
+                help=operation.meaning,
+                description=operation.meaning[0].upper() + operation.meaning[1:] + ".",
+                formatter_class=ExamplesFormatter,
+            )
+            part.operation, part.complete = operation, False
+
+    def add_all(self) -> None:
+        """Add the arguments and the examples of the command and of its parts."""
+        self.add_arguments(())
+        if self.operation is not None:
+            self.epilog = _epilog(self.operation)
+        for action in self._actions:
+            for part in (action.choices or {}).values() if isinstance(action, argparse._SubParsersAction) else ():
+                part.add_all()
 
     def error(self, message: str) -> NoReturn:
         """Report wrong usage and where to look, and exit with 2."""
@@ -82,13 +119,19 @@ class Parser(argparse.ArgumentParser):
 
     def format_help(self) -> str:
         """Return the help, with the examples of the command."""
-        if self.command is not None:
-            self.epilog = _epilog(self.command)
+        if self.operation is not None:
+            self.epilog = _epilog(self.operation)
         return super().format_help()
 
     def print_help(self, file: SupportsWrite[str] | None = None) -> None:
         """Print the help. Raises OSError, which argparse suppresses."""
         (file or sys.stdout).write(self.format_help())
+
+
+class _Version(argparse.Action):
+    def __call__(self, parser: argparse.ArgumentParser, *_: Any) -> None:
+        sys.stdout.write(f"{version()}\n")
+        parser.exit()
 
 
 def parse(given: Sequence[str]) -> argparse.Namespace:
@@ -103,16 +146,6 @@ def run(chosen: argparse.Namespace) -> int:
     return command(chosen)
 
 
-EXTRAS = {"cluster": "distributed", "lsp": "pygls", "mqtt": "paho", "pytest": "pytest", "rerun": "rerun"}
-"""The modules of the extras in pyproject.toml, by extra."""
-
-
-class _Version(argparse.Action):
-    def __call__(self, parser: argparse.ArgumentParser, *_: Any) -> None:
-        sys.stdout.write(f"{version()}\n")
-        parser.exit()
-
-
 def version() -> str:
     """Describe the installation, as in `multidrop 0.1.0, Python 3.11.7, extras: rerun`; import no module for it."""
     import multidrop
@@ -122,54 +155,16 @@ def version() -> str:
     return f"multidrop {multidrop.__version__}, Python {python}, extras: {', '.join(found) or 'none'}"
 
 
-def build(given: Sequence[str] = (), *, whole: bool = False) -> Parser:
-    """Make the parser of the command that is asked for, or of all commands.
-
-    A `whole` one has the arguments of each command, too.
-    """
+def build(given: Sequence[str] = ()) -> Parser:
+    """Make the parser of the command that is asked for, or of all commands."""
     parser = Parser(prog="multidrop", description=DESCRIPTION, epilog=EPILOG, formatter_class=Formatter)
     parser.add_argument("--version", action=_Version, nargs=0, help="show the version and exit")
-    parser.set_defaults(run_by="screen.start")
+    parser.set_defaults(run_by="lines.start")
     if given[:1] != ["--version"]:
-        _add_commands(parser, COMMANDS, given, "COMMAND", required=False)
-    if whole:
-        _complete(parser)
+        from multidrop.shell.operations.table import parts
+
+        parser.add_commands(parts(""), given, "COMMAND", required=False)
     return parser
-
-
-def _complete(parser: argparse.ArgumentParser) -> None:
-    """Add the arguments and the examples of a command and of its parts."""
-    if isinstance(parser, Parser) and parser.command is not None:
-        parser.complete_for(())
-        parser.epilog = _epilog(parser.command)
-    for action in parser._actions:
-        for part in (action.choices or {}).values() if isinstance(action, argparse._SubParsersAction) else ():
-            _complete(part)
-
-
-def _add_commands(
-    parser: Parser, commands: Mapping[str, Command], given: Sequence[str], metavar: str, *, required: bool
-) -> None:
-    parts = parser.add_subparsers(prog=parser.prog, metavar=metavar, required=required, parser_class=Parser)
-    asked = given[0] if given else ""
-    for name, command in ({asked: commands[asked]} if asked in commands else commands).items():
-        part = parts.add_parser(
-            name,
-            help=command.meaning,
-            description=command.meaning[0].upper() + command.meaning[1:] + ".",
-            formatter_class=ExamplesFormatter,
-        )
-        part.command, part.complete = command, False
-
-
-def _add_arguments(parser: Parser, command: Command, given: Sequence[str]) -> None:
-    """Add the arguments of a command, or its parts. A command with both is a part only if the first word names one."""
-    named = given[:1] and given[0] in command.parts
-    if command.run and not named:
-        command.add(parser)
-        parser.set_defaults(run_by=command.run)
-    if command.parts and (named or not command.run):
-        _add_commands(parser, command.parts, given, "|".join(command.parts), required=True)
 
 
 def urls() -> str:
@@ -179,10 +174,13 @@ def urls() -> str:
     return URLS.format(sentence())
 
 
-def _epilog(command: Command) -> str:
+def _epilog(operation: Operation) -> str:
     import textwrap
 
-    lines = ["examples:", *(f"  multidrop {each}" for each in command.examples)]
-    if command.urls:
+    from multidrop.shell.operations.table import parts
+
+    examples = operation.examples or [each.examples[-1] for each in parts(operation.command).values()]
+    lines = ["examples:", *(f"  multidrop {each}" for each in examples)]
+    if operation.urls:
         lines += ["", *textwrap.wrap(urls(), WIDTH, break_on_hyphens=False, break_long_words=False)]
     return "\n".join(lines)

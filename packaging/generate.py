@@ -23,7 +23,7 @@ from argparse_manpage.manpage import Manpage
 
 import multidrop
 from multidrop.cli import build, urls
-from multidrop.commands.completion import FILES
+from multidrop.commands.serving import FILES
 from multidrop.shell.connect.url_forms import URL_FORMS
 
 SHIPPED = ROOT / "multidrop" / "shipped"
@@ -129,7 +129,8 @@ def files() -> dict[str, str]:
 
 def completion(shell: str) -> str:
     """The completion for one shell."""
-    parser = build(whole=True)
+    parser = build()
+    parser.add_all()
     for action in actions(parser):
         if action.metavar == "URL":
             action.complete = URL  # type: ignore[attr-defined]
@@ -152,7 +153,8 @@ def actions(parser: argparse.ArgumentParser) -> Iterator[argparse.Action]:
 
 def manual() -> str:
     """The man page."""
-    parser = build(whole=True)
+    parser = build()
+    parser.add_all()
     page = Manpage(parser)
     page.date, page.source, page.manual = "", f"multidrop {multidrop.__version__}", "User commands"
     page.description = "terminal and scripting shell for motion drives"

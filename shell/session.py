@@ -10,13 +10,13 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-import importlib
 from collections.abc import Iterator, Sequence
 from contextvars import ContextVar
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from multidrop.dialects import Diagnostic, DriveError, Refused, Stopped
+from multidrop.dialects.on_demand import imported
 from multidrop.shell.automation import ENDING, Automations, only_ends
 from multidrop.shell.connect.opening import open_buses
 from multidrop.shell.connect.settings import Settings
@@ -24,6 +24,7 @@ from multidrop.shell.events import FAILURES, By, Entered, Failed, Printed
 from multidrop.shell.lines import EVERYONE, DriveLine, TypedLine, VerbLine, join_target, parse, split_target
 from multidrop.shell.motion import in_motion
 from multidrop.shell.openings import Openings
+from multidrop.shell.operations.table import find
 from multidrop.shell.playing import played_by
 from multidrop.shell.twins import Twins
 from multidrop.shell.workspace import LATCHED, Workspace
@@ -37,8 +38,8 @@ if TYPE_CHECKING:
 
 _published: ContextVar[list[BaseException] | None] = ContextVar("published", default=None)
 """The failures published so far in this task's outermost `run`."""
-VERBS = "multidrop.shell.verbs.table"
-"""The verbs, loaded with the first one. They work on a session, so a session has only their name."""
+CALL = "multidrop.shell.verbs.call:Call"
+"""One use of a verb; it knows this class, so this module has only its name."""
 
 
 class Session(Workspace):
@@ -151,13 +152,12 @@ class Session(Workspace):
 
     async def _run_verb(self, parsed: VerbLine, by: By) -> None:
         self.publish(Entered(self.now(), parsed.typed.strip(), by))
-        verbs = importlib.import_module(VERBS)
-        verb = verbs.find(parsed.name)
-        call = verbs.Call(self, verb, parsed.rest, by)
+        verb = find(parsed.name)
+        call = imported(CALL)(self, verb, parsed.rest, by)
         self._allow(by)
-        if verb.recorded is not None and by is not By.MACRO:
-            self.recorder.record(verb.recorded(call), self.now())
-        work = verb.function(call)
+        if verb.recorded and by is not By.MACRO:
+            self.recorder.record(call.recorded(), self.now())
+        work = call.work()
         await (work if verb.immediate else self.tasks.run(work))
 
     def enter_alone(self) -> str:

@@ -171,9 +171,9 @@ class ShellAssist(Assist):
 
     def verbs(self) -> Sequence[tuple[str, str, str]]:
         """The host's commands: name, usage, meaning."""
-        from multidrop.shell.verbs.table import VERBS
+        from multidrop.shell.operations.table import VERBS
 
-        return [(verb.name, verb.usage, verb.meaning) for verb in VERBS.values()]
+        return [(verb.name, verb.usage, verb.lines[0]) for verb in VERBS.values()]
 
     def drafts(self) -> Drafts | None:
         """The copies in the folder of the state."""

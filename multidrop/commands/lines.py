@@ -1,4 +1,4 @@
-"""`multidrop shell`, `multidrop send` and `multidrop run`: lines from a prompt, the command line, or a script."""
+"""`multidrop`, `demo`, `tui`, `shell`, `send` and `run`: the screen, the prompt, lines and scripts."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import sys
 from functools import partial
 from typing import TYPE_CHECKING
 
-from multidrop.commands.failure import fail
+from multidrop.commands import fail
 from multidrop.dialects import Diagnostic
 from multidrop.dialects.on_demand import importing
 
@@ -79,9 +79,9 @@ def run(chosen: argparse.Namespace) -> int:
     try:
         report.begin()
         if chosen.script.endswith(".py"):
-            from multidrop.commands import python_script
+            from multidrop.commands import python_program
 
-            return python_script.run(chosen, report)
+            return python_program.run(chosen, report)
         settings = Settings()
         macros = MacroStore(settings.macros, settings.project_macros)
         script = read_script(chosen.script, dict(chosen.set), macros)
@@ -107,3 +107,30 @@ def _execute(chosen: argparse.Namespace, script: Script, report: Report) -> int:
 
     tried = targets(each.text for each in lines_of(script.body))
     return batch.run([], body, agreed=chosen.yes, asks=False, replies=not chosen.json, tried=tried)
+
+
+def start(chosen: argparse.Namespace) -> int:
+    """Show the start page."""
+    return _screen([])
+
+
+def demo(chosen: argparse.Namespace) -> int:
+    """Show the demo cell."""
+    return _screen(["sim:"])
+
+
+def tui(chosen: argparse.Namespace) -> int:
+    """Show what the URLs name."""
+    return _screen(chosen.urls, reconnect=not chosen.no_reconnect, raw=chosen.raw, twin=chosen.twin)
+
+
+def _screen(urls: list[str], reconnect: bool = True, raw: bool = False, twin: bool = False) -> int:
+    if not (sys.stdin.isatty() and sys.stdout.isatty()):
+        return fail(Diagnostic("the screen needs a terminal", hint="multidrop shell reads lines from anywhere"))
+    with importing():
+        from multidrop.tui.launch import run
+
+    try:
+        return run(urls, reconnect, raw, twin)
+    except Diagnostic as wrong:  # the configuration
+        return fail(wrong)

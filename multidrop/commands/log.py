@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from multidrop.commands.failure import fail
+from multidrop.commands import fail
 from multidrop.dialects import Diagnostic
 from multidrop.shell.connect import settings
 from multidrop.shell.log import files, steps

@@ -1,4 +1,4 @@
-"""`multidrop scan`: find drives on a port of which nothing is known."""
+"""`multidrop scan` and `rescue`: find drives on a port of which nothing is known; free a drive that does not reply."""
 
 from __future__ import annotations
 
@@ -8,13 +8,14 @@ import shlex
 from dataclasses import replace
 from functools import partial
 
-from multidrop.commands.failure import fail
+from multidrop.commands import fail
 from multidrop.dialects import Diagnostic
 from multidrop.shell.connect import settings
 from multidrop.shell.connect.opening import open_buses
 from multidrop.shell.connect.urls import parse
 from multidrop.shell.found import FoundDrive, url_of
 from multidrop.shell.front import batch
+from multidrop.shell.rescuing import Rescue
 from multidrop.shell.scanning import Scanning
 from multidrop.shell.session import Session
 
@@ -30,12 +31,12 @@ def run(chosen: argparse.Namespace) -> int:
 
 
 async def _scan(chosen: argparse.Namespace, session: Session) -> None:
-    scanning = made(chosen, session)
+    scanning = _made(chosen, session)
     await scanning.run([chosen.baud] if chosen.baud else [], chosen.all)
-    conclude(chosen, session, scanning.found)
+    _conclude(chosen.json, session, scanning.found, chosen.save)
 
 
-def made(chosen: argparse.Namespace, session: Session) -> Scanning:
+def _made(chosen: argparse.Namespace, session: Session) -> Scanning:
     """Make the search that the arguments ask for; it prints each drive that it finds. Raises Diagnostic."""
     connection = parse(chosen.url, session.settings.connections)
     if chosen.dialect:
@@ -47,19 +48,36 @@ def made(chosen: argparse.Namespace, session: Session) -> Scanning:
     return Scanning(session, partial(open_buses, state=session.settings.state), connection, report)
 
 
-def conclude(chosen: argparse.Namespace, session: Session, found: list[FoundDrive]) -> None:
+def _conclude(as_json: bool, session: Session, found: list[FoundDrive], name: str = "") -> None:
     """Say how the drives are opened, and save the connection of the first ones where that is asked for."""
     same = [each for each in found if _form(each) == _form(found[0])]
     url = url_of(same)
-    if chosen.save:
-        path = settings.save(chosen.save, url)
-        session.notify(f"{path}: connection {chosen.save} is saved: {url}", outcome=True)
-    elif not chosen.json:
+    if name:
+        path = settings.save(name, url)
+        session.notify(f"{path}: connection {name} is saved: {url}", outcome=True)
+    elif not as_json:
         session.notify(f"open with: multidrop shell {shlex.quote(url)}", outcome=True)
-    if (others := len(found) - len(same)) and not chosen.json:
+    if (others := len(found) - len(same)) and not as_json:
         session.notify(f"{others} more replied in another form; --json shows a URL for each", outcome=True)
 
 
 def _form(drive: FoundDrive) -> tuple[object, ...]:
     codec = drive.state.codec
     return drive.port, drive.connection.baud, codec.family, bool(drive.state.address)
+
+
+def rescue(chosen: argparse.Namespace) -> int:
+    """Take one step after the other until a drive replies."""
+    return batch.run([], partial(_rescue, chosen), agreed=chosen.yes, unsolicited=False)
+
+
+async def _rescue(chosen: argparse.Namespace, session: Session) -> None:
+    scanning = _made(chosen, session)
+    rescue = Rescue(session, scanning)
+    await rescue.run([chosen.baud] if chosen.baud else [], everything=chosen.all, erase=chosen.erase)
+    if chosen.plain:
+        if len(scanning.found) > 1:
+            names = ", ".join(each.state.address for each in scanning.found)
+            raise Diagnostic(f"--plain is for a drive that is alone; {names} replied", chosen.url, "nothing was set")
+        await rescue.make_plain(scanning.found[0])
+    _conclude(chosen.json, session, scanning.found)

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 
 from multidrop.dialects import Diagnostic
 from multidrop.shell.lines import EVERYONE, DriveLine, VerbLine, parse
-from multidrop.shell.verbs.offers import PLACEHOLDERS, Found, meant, spoken, targets, verbs
-from multidrop.shell.verbs.table import VERBS
-from multidrop.shell.verbs.usage import following, narrowed
+from multidrop.shell.operations.offers import PLACEHOLDERS, Found, meant, spoken, targets, verbs
+from multidrop.shell.operations.table import VERBS
+from multidrop.shell.operations.usage import following, narrowed
 
 if TYPE_CHECKING:
     from multidrop.drives.drive import Drive

@@ -26,6 +26,7 @@ from multidrop.dialects.text import visible
 from multidrop.macros.atomic import write_atomically
 from multidrop.shell.events import FAILURES
 from multidrop.shell.lines import DriveLine, TypedLine, VerbLine, parse
+from multidrop.shell.operations.table import VERBS
 
 if sys.platform != "win32":
     import fcntl
@@ -257,6 +258,4 @@ def _concurrent(line: Line) -> bool:
     """Whether a line runs beside those that are typed after it."""
     if not line.verb:
         return False
-    from multidrop.shell.verbs.table import VERBS  # more than the first frame of a screen needs
-
     return line.verb in VERBS and VERBS[line.verb].concurrent

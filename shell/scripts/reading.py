@@ -18,10 +18,10 @@ from multidrop.macros import Macro, MacroStore, check_name, checked_values, fill
 from multidrop.macros.model import Parameter, plain, written
 from multidrop.macros.toml_format import in_text
 from multidrop.shell.lines import VerbLine, parse, uncommented
+from multidrop.shell.operations.table import find
 from multidrop.shell.scripts import words
 from multidrop.shell.scripts.expression import evaluate, unknowns
 from multidrop.shell.scripts.model import CallFile, CallMacro, If, MacroScript, Node, Repeat, Script, ScriptLine, Step
-from multidrop.shell.verbs.table import find
 
 UNKNOWN = "0"
 """Stands for a value that is only known when the line is executed."""
@@ -279,7 +279,7 @@ class _Checker:
             if isinstance(parsed, VerbLine):
                 verb = find(parsed.name)
                 if not self._unknown(line.text):
-                    verb.check(verb, parsed.rest)
+                    verb.check(parsed.rest)
 
     def _call(self, line: ScriptLine, text: str) -> Node:
         target, given = words.call(text)

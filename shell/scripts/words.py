@@ -3,17 +3,20 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import dataclass
 from functools import cache
 from typing import TypeVar
 
 from multidrop.dialects import Diagnostic
 from multidrop.dialects.families import FAMILIES
+from multidrop.dialects.text import whole
+from multidrop.macros import Macro
 from multidrop.shell import waits
+from multidrop.shell.operations.table import SCRIPT_WORDS, VERBS
+from multidrop.shell.operations.usage import split
+from multidrop.shell.playing import FOREVER
 from multidrop.shell.scripts.expression import Comparison, Expression, Name, Value, parse, parse_check, quoted, unknowns
-from multidrop.shell.verbs.macros import PLAY, PlayCall, play_call
-from multidrop.shell.verbs.registry import split
-from multidrop.shell.verbs.script_words import SCRIPT_WORDS
 
 T = TypeVar("T", bound=Expression)
 NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]*", re.ASCII)
@@ -21,6 +24,8 @@ MOST = 10**9
 """The largest number of repetitions."""
 SECONDS = 1.0
 """The default time in which `/expect` looks for its text, s."""
+MOST_ROUNDS = 10**9
+"""The largest number of rounds."""
 
 
 def wrong(word: str, message: str = "") -> Diagnostic:
@@ -79,7 +84,7 @@ def call(text: str) -> tuple[str, dict[str, str]]:
 def macro_call(text: str) -> PlayCall:
     """Parse `/play MACRO`, or `/call MACRO`, which has values only."""
     word = text.split(maxsplit=1)[0]
-    usage = f"usage: {SCRIPT_WORDS.get(word, PLAY)}"
+    usage = f"usage: {SCRIPT_WORDS.get(word) or VERBS['/play'].usage}"
     if word == "/call":
         target, given = call(text)
         return PlayCall(target, given)
@@ -87,6 +92,53 @@ def macro_call(text: str) -> PlayCall:
     if not found or found[0] == "stop":
         raise Diagnostic(usage, word)
     return play_call(found, lambda why: Diagnostic(why, word, usage))
+
+
+@dataclass(frozen=True)
+class PlayCall:
+    """The words after `/play`."""
+
+    macro: str
+    given: Mapping[str, str]
+    """Values and roles."""
+    times: int | None = 1
+    """None: until it is ended."""
+    fast: bool = False
+
+    def divided(self, macro: Macro) -> tuple[dict[str, str], dict[str, str]]:
+        """The values, and the buses of the roles."""
+        roles = {name: value for name, value in self.given.items() if name in macro.roles}
+        return {name: value for name, value in self.given.items() if name not in roles}, roles
+
+
+def play_call(words: Sequence[str], wrong: Callable[[str], Diagnostic]) -> PlayCall:
+    """Read the words after `/play`. Raises Diagnostic."""
+    name, *rest = words
+    given: dict[str, str] = {}
+    times: int | None = 1
+    fast = False
+    while rest:
+        word = rest.pop(0)
+        if word == "--fast":
+            fast = True
+        elif word == "--times":
+            times = rounds(rest.pop(0) if rest else "", wrong)
+        else:
+            name_of, sign, value = word.partition("=")
+            if not (name_of and sign):
+                raise wrong(f"no value {word}; valid: NAME=VALUE")
+            given[name_of] = value
+    return PlayCall(name, given, times, fast)
+
+
+def rounds(text: str, wrong: Callable[[str], Diagnostic]) -> int | None:
+    """Read a number of rounds; None: without an end. Raises the Diagnostic that `wrong` returns."""
+    if text == FOREVER:
+        return None
+    number = whole(text, 1, MOST_ROUNDS)
+    if number is None:
+        raise wrong(f"no number of rounds {text}".rstrip() + f"; valid: 1 to {MOST_ROUNDS}, or {FOREVER}")
+    return number
 
 
 def repetitions(value: Value) -> int:

@@ -1,72 +1,60 @@
-"""Verbs for open buses and their drives: open, close, select, list, status."""
+"""The work of the verbs on ports and buses: open, close, select, list, name, raw bytes."""
 
 from __future__ import annotations
 
+import asyncio
+from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 from multidrop.dialects import Diagnostic, Inexpressible
-from multidrop.shell import scanning
-from multidrop.shell.connect.url_forms import table
+from multidrop.dialects.text import whole
+from multidrop.shell import scanning, tabs
+from multidrop.shell.connect import settings
 from multidrop.shell.lines import split_target
 from multidrop.shell.openings import model
-from multidrop.shell.verbs.registry import Call, verb
+from multidrop.shell.raw import TERMINATORS, Form, RawLine, Watched, parse_bytes
+from multidrop.shell.verbs.call import Call
 
 if TYPE_CHECKING:
-    from multidrop.drives.bus import Bus
-    from multidrop.shell.workspace import Workspace
+    pass
+
+BREAK = 250
+"""The length of a break, ms."""
+LONGEST_BREAK = 2000
+"""The same, at most: a break holds back a stop, which is then repeated."""
+HIGHEST_BAUD = 10_000_000
+SWITCH = {"on": True, "off": False}
+FORMS = {form.value[0]: form for form in Form}
 
 
-@verb("/open URL [NAME]", table=table)
 async def open_(call: Call) -> None:
-    """Open a line of drives; moves nothing.
-
-    NAME becomes the name of the bus. URL is a port, the name of a saved connection, or one of these:
-    """
-    words = call.words(1, 2)
-    await call.commands.open(words[0], words[1] if len(words) > 1 else None)
+    url, *name = call.words()
+    await call.session.open(url, name[0] if name else None)
 
 
-@verb("/close BUS")
 async def close(call: Call) -> None:
-    """Close a bus; moves nothing and stops nothing."""
-    (name,) = call.words(1, 1)
-    await call.commands.close_bus(name)
-    call.workspace.notify(f"{name} is closed")
+    (name,) = call.words()
+    await call.session.close_bus(name)
+    call.session.notify(f"{name} is closed")
 
 
-@verb("/use ADDR|BUS[:ADDR]", immediate=True)
 async def use(call: Call) -> None:
-    """Select the drive or the bus for lines without an address.
-
-    A drive of the selected bus takes precedence over a bus of the same name.
-    """
-    workspace = call.workspace
-    (target,) = call.words(1, 1)
+    workspace = call.session
+    (target,) = call.words()
     bus, address = split_target(target)
-    if not bus and target in workspace.buses and not _names_drive(workspace.buses.get(workspace.selected_bus), target):
-        bus, address = target, ""
+    if not bus and target in workspace.buses:
+        selected = workspace.buses.get(workspace.selected_bus)
+        if not selected or all(target not in (drive.address, drive.label) for drive in selected.drives.values()):
+            bus, address = target, ""
     workspace.select(address, bus)
-    workspace.notify(f"lines go to {selection(call)}")
+    drive = workspace.selected
+    empty = f"{workspace.selected_bus}, where no drive has replied"
+    workspace.notify(f"lines go to {workspace.display_name(drive) if drive else empty}")
 
 
-def _names_drive(bus: Bus | None, name: str) -> bool:
-    """Whether a drive of the bus has this address or label."""
-    return bus is not None and any(name in (drive.address, drive.label) for drive in bus.drives.values())
-
-
-def selection(call: Call) -> str:
-    """The selection, for a person."""
-    drive = call.workspace.selected
-    if drive is None:
-        return f"{call.workspace.selected_bus}, where no drive has replied"
-    return call.workspace.display_name(drive)
-
-
-@verb("/drives", immediate=True)
 async def drives(call: Call) -> None:
-    """List the drives of every open bus; * marks the selected drive."""
-    workspace = call.workspace
-    call.words(0, 0)
+    workspace = call.session
+    call.words()
     if not workspace.buses:
         raise Diagnostic("nothing is open", "/drives", "/open URL opens a line of drives")
     for bus in workspace.buses.values():
@@ -80,15 +68,9 @@ async def drives(call: Call) -> None:
             workspace.output(" ".join(word for word in words if word) + mode)
 
 
-@verb("/scan [BUS]")
 async def scan(call: Call) -> None:
-    """Search an open line for drives that are not listed: every name or number, at its baud rate; moves nothing.
-
-    `multidrop scan PORT` searches other baud rates and languages.
-    """
-    workspace = call.workspace
-    words = call.words(0, 1)
-    bus = workspace.bus(words[0] if words else "")
+    workspace = call.session
+    bus = workspace.bus(call.word())
     found = await scanning.extend(workspace, bus)
     for address in found:
         workspace.output(f"{bus.name}: {address} {model(bus.drives[address])}")
@@ -96,33 +78,152 @@ async def scan(call: Call) -> None:
         workspace.notify(f"{bus.name}: no other drive replies", outcome=True)
 
 
-@verb("/referenced [ADDR]", immediate=True)
 async def referenced(call: Call) -> None:
-    """Take the position of a drive for right again after a restart; nothing is sent.
-
-    A homing that ends well, or a position that is set, does the same. Until then `~` is before the position.
-    """
-    words = call.words(0, 1)
-    drive = call.drive(words[0] if words else "")
-    name = call.workspace.display_name(drive) or drive.shown
-    if drive not in call.workspace.bus(drive.link.name).drives.values():
+    drive = call.drive(call.word())
+    name = call.session.display_name(drive) or drive.shown
+    if drive not in call.session.bus(drive.link.name).drives.values():
         raise Diagnostic(f"no drive {name}", hint="/drives lists them")
     lost = bool(drive.state.unreferenced)
     drive.state.referenced()
-    call.workspace.notify(f"{name}: its position {'counts again' if lost else 'was not marked as not referenced'}")
-    call.workspace.changed()
+    call.session.notify(f"{name}: its position {'counts again' if lost else 'was not marked as not referenced'}")
+    call.session.changed()
 
 
-def _reports_status(workspace: Workspace) -> bool:
-    return workspace.selected is not None and workspace.selected.family.status is not None
-
-
-@verb("/status [ADDR]", fits=_reports_status)
 async def status(call: Call) -> None:
-    """Show the state of a drive in words: motion, program, errors, inputs, outputs."""
-    words = call.words(0, 1)
-    drive = call.drive(words[0] if words else "")
+    drive = call.drive(call.word())
     if (read := drive.family.status) is None:
-        raise Inexpressible(f"{call.workspace.display_name(drive)}: drives of this family do not report their state")
+        raise Inexpressible(f"{call.session.display_name(drive)}: drives of this family do not report their state")
     for line in await drive.run(read(drive.state)):
-        call.workspace.output(line)
+        call.session.output(line)
+
+
+async def rename(call: Call) -> None:
+    name, *bus = call.words()
+    tabs.rename(call.session, call.session.bus("".join(bus)), name)
+
+
+async def tab(call: Call) -> None:
+    where, *bus = call.words()
+    if where not in ("left", "right"):
+        raise call.wrong()
+    tabs.move(call.session, call.session.bus("".join(bus)), 1 if where == "right" else -1)
+
+
+async def keep(call: Call) -> None:
+    name, *bus = call.words()
+    url = call.session.url_of(call.session.bus("".join(bus)))
+    path = settings.save(name, url)
+    call.session.notify(f"{path}: connection {name} is saved: {url}", outcome=True)
+
+
+def _raw(call: Call) -> RawLine:
+    """The selected bus in raw mode. Raises Diagnostic for any other."""
+    bus = call.session.bus()
+    found = call.session.raw.get(bus.name)
+    if found is None:
+        raise Diagnostic(f"{bus.name} is not in raw mode", call.verb.name, "/raw on begins it")
+    return found
+
+
+async def raw(call: Call) -> None:
+    match call.words() or ["on"]:
+        case [("on" | "off") as word]:
+            bus = call.session.bus()
+            if (word == "on") == (bus.name in call.session.raw):
+                state = "already" if word == "on" else "not"
+                raise Diagnostic(f"{bus.name} is {state} in raw mode", call.verb.name)
+            await (call.session.raw_on(bus) if word == "on" else call.session.raw_off(bus))
+        case ["open", url]:
+            before = {*call.session.buses}
+            await call.session.open(url, raw=True)
+            call.session.select("", next(name for name in call.session.buses if name not in before))
+        case ["baud", number]:
+            await _set_baud(call, number)
+        case [("dtr" | "rts") as pin, word]:
+            await _set_pin(call, pin, word)
+        case ["break", *length]:
+            await _send_break(call, length[0] if length else str(BREAK))
+        case ["end", word]:
+            line = _raw(call)
+            if word not in TERMINATORS:
+                raise call.wrong()
+            line.end = TERMINATORS[word]
+            call.session.notify(f"{line.bus.name}: {word} follows a typed text")
+        case ["show", word]:
+            line = _raw(call)
+            if word not in FORMS:
+                raise call.wrong()
+            line.form = FORMS[word]
+            call.session.notify(f"{line.bus.name}: bytes are shown as {word}")
+        case _:
+            raise call.wrong()
+
+
+async def _set_baud(call: Call, text: str) -> None:
+    line, baud = _raw(call), whole(text, 1, HIGHEST_BAUD)
+    if baud is None:
+        raise call.wrong(f"no baud rate {text}")
+    await _set(line, f"the baud rate {baud}", lambda: line.control().set_baud(baud))
+    line.bus.line.baud, line.bus.line.byte_time = baud, 10.0 / baud
+    call.session.notify(f"{line.bus.name}: {baud} baud")
+
+
+async def _set_pin(call: Call, pin: str, word: str) -> None:
+    line = _raw(call)
+    if word not in SWITCH:
+        raise call.wrong()
+    control = line.control()
+    await _set(line, pin.upper(), lambda: (control.set_dtr if pin == "dtr" else control.set_rts)(SWITCH[word]))
+    call.session.notify(f"{line.bus.name}: {pin.upper()} {word}")
+
+
+async def _send_break(call: Call, text: str) -> None:
+    line = _raw(call)
+    length = whole(text, 1, LONGEST_BREAK)
+    if length is None:
+        raise call.wrong(f"a break takes 1 to {LONGEST_BREAK} ms")
+    control = line.control()
+    try:
+        await _set(line, "break", lambda: control.set_break(True))
+        await asyncio.sleep(length / 1000)
+    finally:  # also when a stop ends the wait: a break holds back what is written
+        await _set(line, "break", lambda: control.set_break(False))
+    call.session.notify(f"{line.bus.name}: a break of {length} ms was sent")
+
+
+async def _set(line: RawLine, what: str, change: Callable[[], None]) -> None:
+    """Change a setting of the port, in a thread: a server may have to confirm it. Raises Diagnostic."""
+    try:
+        await asyncio.to_thread(change)
+    except OSError as error:
+        why = error.strerror or str(error)
+        raise Diagnostic(f"the port does not take {what} ({why})", line.bus.name, "nothing was changed") from None
+
+
+async def hex_(call: Call) -> None:
+    words, workspace = call.words(), call.session
+    bus = workspace.bus()
+    if bus.name in workspace.raw:
+        raise Diagnostic(f"{bus.name} is raw: its bytes are shown", call.verb.name, "/raw show text|hex|both")
+    shown = workspace.byte_views.get(bus.name)
+    word = words[0] if words else "off" if shown else "on"
+    form = FORMS.get("both" if word == "on" else word)
+    if form is None and word != "off":
+        raise call.wrong()
+    if form is None:
+        if shown is not None:
+            workspace.byte_views.pop(bus.name).close()
+        workspace.notify(f"{bus.name}: bytes are not shown")
+        return
+    if shown is None:
+        shown = workspace.byte_views[bus.name] = Watched(bus, workspace.publish, workspace.wall)
+        shown.open()
+    shown.form = form
+    workspace.notify(f"{bus.name}: bytes are shown as {form.value[0]}, without polls; /hex off ends it")
+
+
+async def bytes_(call: Call) -> None:
+    line, data = _raw(call), parse_bytes(call.rest)
+    if not data:
+        raise call.wrong()
+    await call.session.send_bytes(line.bus, data, call.by)

@@ -1,96 +1,33 @@
-"""The verb that plays macros."""
+"""The work of the verbs on macros: play, list, change, record."""
 
 from __future__ import annotations
 
-import importlib
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+import shlex
+from dataclasses import replace
 
 from multidrop.dialects import Diagnostic, Stopped
-from multidrop.dialects.text import whole
-from multidrop.macros import Macro
+from multidrop.macros import FIRST_PAGE, KEYS, Macro, check_name, parse_macro
+from multidrop.macros.recorder import Offer, with_waits
+from multidrop.macros.store import listed
+from multidrop.shell import macro_changes
 from multidrop.shell.events import By
-from multidrop.shell.macro_arguments import settled
-from multidrop.shell.playing import FOREVER
-from multidrop.shell.verbs.registry import Call, as_typed, verb
-from multidrop.shell.workspace import LATCHED
-
-MOST_ROUNDS = 10**9
-"""The largest number of rounds."""
-EXECUTOR = "multidrop.shell.scripts.executor"
-"""What plays macros. It executes verbs, so this one has only its name."""
-PLAY = "/play MACRO [NAME=VALUE ...] [--times N|forever] [--fast] | stop [MACRO]"
-Wrong = Callable[[str], Diagnostic]
-"""Makes the Diagnostic for wrong words."""
+from multidrop.shell.macro_arguments import roles_in, settled
+from multidrop.shell.scripts import executor
+from multidrop.shell.scripts.words import play_call
+from multidrop.shell.verbs.call import Call
+from multidrop.shell.workspace import LATCHED, Workspace
 
 
-@dataclass(frozen=True)
-class PlayCall:
-    """The words after `/play`."""
-
-    macro: str
-    given: Mapping[str, str]
-    """Values and roles."""
-    times: int | None = 1
-    """None: until it is ended."""
-    fast: bool = False
-
-    def divided(self, macro: Macro) -> tuple[dict[str, str], dict[str, str]]:
-        """The values, and the buses of the roles."""
-        roles = {name: value for name, value in self.given.items() if name in macro.roles}
-        return {name: value for name, value in self.given.items() if name not in roles}, roles
-
-
-def play_call(words: Sequence[str], wrong: Wrong) -> PlayCall:
-    """Read the words after `/play`. Raises Diagnostic."""
-    name, *rest = words
-    given: dict[str, str] = {}
-    times: int | None = 1
-    fast = False
-    while rest:
-        word = rest.pop(0)
-        if word == "--fast":
-            fast = True
-        elif word == "--times":
-            times = rounds(rest.pop(0) if rest else "", wrong)
-        else:
-            name_of, sign, value = word.partition("=")
-            if not (name_of and sign):
-                raise wrong(f"no value {word}; valid: NAME=VALUE")
-            given[name_of] = value
-    return PlayCall(name, given, times, fast)
-
-
-def rounds(text: str, wrong: Wrong) -> int | None:
-    """Read a number of rounds; None: without an end. Raises the Diagnostic that `wrong` returns."""
-    if text == FOREVER:
-        return None
-    number = whole(text, 1, MOST_ROUNDS)
-    if number is None:
-        raise wrong(f"no number of rounds {text}".rstrip() + f"; valid: 1 to {MOST_ROUNDS}, or {FOREVER}")
-    return number
-
-
-@verb(
-    PLAY,
-    recorded=as_typed,
-    concurrent=True,
-    words={
-        "stop": "end what plays, and stop what it set in motion",
-        "--times": "play several rounds",
-        FOREVER: "play until it is ended",
-        "--fast": "leave out the recorded pauses",
-    },
-)
 async def play(call: Call) -> None:
-    """Play a macro; {NAME} in its lines takes the given value. The first failure ends it.
-
-    A role of the macro takes the name of an open bus. What is missing is asked for. `/play stop` ends what plays and
-    stops the drives that it set in motion; its on_stop lines follow. After Ctrl+X they do not.
-    """
-    words, workspace = call.words(1), call.workspace
+    words, workspace = call.words(), call.session
     if words[0] == "stop":
-        _end(call, words[1:])
+        if len(words) > 2:
+            raise call.wrong()
+        found = [each for each in workspace.playing if each.name in words[1:] or not words[1:]]
+        if not found:
+            raise Diagnostic(f"macro {words[1]} does not play" if words[1:] else "no macro plays", "/play stop")
+        for each in found:
+            each.end()
         return
     chosen = play_call(words, call.wrong)
     if workspace.latched:
@@ -99,16 +36,149 @@ async def play(call: Call) -> None:
         raise Diagnostic(f"macro {chosen.macro} is playing", "/play", f"/play stop {chosen.macro} ends it")
     macro = workspace.macros.load(chosen.macro)
     values, roles = await settled(workspace, macro, chosen.given)
-    executor = importlib.import_module(EXECUTOR)
     await executor.play(call.session, macro, values, times=chosen.times, fast=chosen.fast, roles=roles)
 
 
-def _end(call: Call, names: Sequence[str]) -> None:
-    """End the macros of these names, or all of them."""
-    if len(names) > 1:
+async def macros(call: Call) -> None:
+    call.words()
+    found = listed(call.session.macros)
+    for line in found.lines:
+        call.session.output(line, columns=True)
+    for line in (*found.warnings, *map(str, found.broken[:-1])):
+        call.session.notify(line, warning=True)
+    if found.broken:
+        raise found.broken[-1]
+
+
+async def macro(call: Call) -> None:
+    words, workspace = call.words(), call.session
+    if call.by is By.MACRO:
+        raise Diagnostic("a macro does not change macros", "/macro", "type the line")
+    store, plain = workspace.macros, not any(word.startswith("--") for word in words[:-1])
+    done: list[str] = []
+    match words:
+        case ["show", name]:
+            for line in macro_changes.text_of_macro(store, name):
+                workspace.output(line)
+        case ["edit", name]:
+            await _edit(workspace, name)
+        case ["describe", name, *text]:
+            done = macro_changes.describe(store, name, " ".join(text))
+        case ["copy", name, new, "--project"] if plain:
+            done = macro_changes.copy(store, name, new, True)
+        case ["import", file, "--force"] if plain:
+            done = macro_changes.import_(store, file, True)
+        case [("rename" | "copy") as what, name, new] if plain and not new.startswith("--"):
+            done = (macro_changes.rename if what == "rename" else macro_changes.copy)(store, name, new)
+        case ["import", file] if not file.startswith("--"):
+            done = macro_changes.import_(store, file)
+        case ["delete", name]:
+            await workspace.confirm(macro_changes.deletion(store, name), so_far="nothing was deleted")
+            done = macro_changes.delete(store, name)
+        case ["export", file, *names]:
+            done = macro_changes.export(store, call.output_file(file), names, workspace.output)
+        case _:
+            raise call.wrong()
+    for line in done:
+        workspace.notify(line)
+    workspace.changed()
+
+
+async def _edit(workspace: Workspace, name: str) -> None:
+    """Open the screen's editor. Elsewhere name the command: an editor on this terminal would take the stop key."""
+    macro_changes.check(workspace.macros, name)
+    if workspace.edit is not None:
+        return await workspace.edit(str(workspace.macros.path(name)))
+    hint = f"in another terminal: multidrop macro edit {shlex.quote(name)}"
+    raise Diagnostic("an editor would take Ctrl+X, which must stop the drives", f"/macro edit {name}", hint)
+
+
+async def key(call: Call) -> None:
+    words, store = call.words(), call.session.macros
+    if len(words) == 3 or (len(words) == 4 and words[2] != "--page"):
         raise call.wrong()
-    found = [each for each in call.workspace.playing if each.name in names or not names]
-    if not found:
-        raise Diagnostic(f"macro {names[0]} does not play" if names else "no macro plays", "/play stop")
-    for each in found:
-        each.end()
+    if words[0].upper() not in KEYS:
+        raise call.wrong(f"no key {words[0]}; valid: F2 to F12")
+    page = words[3] if len(words) == 4 else FIRST_PAGE
+    done, doubtful = macro_changes.set_key(store, words[0], words[1], page)
+    call.session.notify(done)
+    for each in doubtful:
+        call.session.notify(each, warning=True)
+    call.session.changed()
+
+
+async def record(call: Call) -> None:
+    words, workspace = call.words(), call.session
+    if len(words) == 2 and words[1] != ("--waits" if words[0] == "stop" else "--replace"):
+        raise call.wrong()
+    if not words:
+        workspace.output(f"recording: {workspace.recording or 'nothing'}")
+    elif words[0] == "stop":
+        await _keep(call, waits=len(words) == 2)
+    else:
+        _begin(call, words[0], replacing=len(words) == 2)
+    workspace.changed()
+
+
+def _begin(call: Call, name: str, replacing: bool) -> None:
+    workspace = call.session
+    check_name(name, "/record")
+    before = workspace.macros.contents(name)
+    if before is not None and not replacing:
+        hint = f"use another name; /record {name} --replace replaces it"
+        raise Diagnostic(f"macro {name} exists already", "/record", hint)
+    if before is not None:
+        workspace.macros.load(name)  # what cannot be read is never replaced
+    time = workspace.wall(workspace.now()).isoformat(" ", "seconds")
+    workspace.recorder.start(name, workspace.now(), before, time)
+    workspace.notify(f"recording {name}; /record stop ends it")
+
+
+async def _keep(call: Call, waits: bool) -> None:
+    """Save the recording, in another file if its own was changed meanwhile; then offer waits."""
+    workspace, store = call.session, call.session.macros
+    macro, before = workspace.recorder.macro(), workspace.recorder.before
+    wanted, found = macro.name, workspace.recorder.offers
+    if waits:
+        macro = with_waits(macro, found)
+    macro = replace(macro, roles=roles_in(macro, list(workspace.buses)))
+    try:
+        if store.contents(wanted) != before:
+            macro, before = replace(macro, name=store.free_name(wanted)), None
+        if before is not None:
+            macro = _in_place_of(before, macro)
+        path = store.save(macro, before)
+    except Diagnostic as problem:
+        hint = "nothing is lost, the recording goes on; correct this and type /record stop again"
+        raise Diagnostic(problem.message, problem.where, hint) from None
+    workspace.recorder.discard()
+    if macro.name != wanted:
+        workspace.notify(f"{wanted} was changed meanwhile and stays unchanged", warning=True)
+    workspace.notify(f"macro {macro.name}: {macro.length} in {path}")
+    if waits:
+        for offer in found:
+            workspace.notify(f"macro {macro.name}: {offer.text}")
+    elif found:
+        await _offer(workspace, macro, found)
+
+
+async def _offer(workspace: Workspace, macro: Macro, found: list[Offer]) -> None:
+    """Ask whether waits go in place of the pauses; say how where no person can be asked, and after a no."""
+    store, saved = workspace.macros, workspace.macros.contents(macro.name)
+    changes = "; ".join(offer.text for offer in found)
+    if await workspace.agrees(f"macro {macro.name}: put waits in place of pauses: {changes}"):
+        store.save(with_waits(macro, found), saved)
+        workspace.notify(f"macro {macro.name}: {len(found)} {'pause' if len(found) == 1 else 'pauses'} replaced")
+        return
+    for offer in found:
+        workspace.notify(f"macro {macro.name}: {offer.text} would fit; /macro edit {macro.name} changes it")
+
+
+def _in_place_of(before: bytes, macro: Macro) -> Macro:
+    """The macro with the key, the note and the on_stop lines of the one before it, if that one can be read."""
+    try:
+        old = parse_macro(before.decode("utf-8-sig", "replace"))
+    except Diagnostic:
+        return macro
+    kept = replace(macro, key=old.key, page=old.page, note=old.note)
+    return replace(kept, on_stop=old.on_stop, on_stop_moves=old.on_stop_moves)

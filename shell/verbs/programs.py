@@ -1,119 +1,162 @@
-"""Verbs for the program in a drive: list it, save it to a file, replace it."""
+"""The work of the verbs on programs: check, list, transfer, trace and step."""
 
 from __future__ import annotations
 
+import asyncio
 import shlex
+from math import inf
 
+from multidrop.dialects import Diagnostic, Inexpressible
+from multidrop.dialects.families import program_language_of
+from multidrop.dialects.program_files import errors
 from multidrop.drives.drive import Drive
-from multidrop.shell import listings, new_file, transfers
-from multidrop.shell.verbs.registry import Call, verb
+from multidrop.shell import debugging, listings, new_file, transfers
+from multidrop.shell.checking import examine
+from multidrop.shell.debugging import LEFT, Debugger
+from multidrop.shell.lines import split_target
+from multidrop.shell.verbs.call import Call
+from multidrop.simulator.families import PROGRAMS, TABLE
+
+FLAGS = ("--save", "--only-changed", "--no-verify")
 
 
-def _list_parts(call: Call) -> tuple[Drive, str]:
-    words = call.words(0, 2)
+def _listed(call: Call) -> tuple[Drive, str]:
+    """The drive, and the file: the word with a dot or a slash."""
+    words = call.words()
     files = [word for word in words if "." in word or "/" in word]
     targets = [word for word in words if word not in files]
     if len(files) > 1 or len(targets) > 1:
         raise call.wrong()
-    return call.drive(targets[0] if targets else ""), files[0] if files else ""
+    return call.drive("".join(targets)), "".join(files)
 
 
-def _list_recorded(call: Call) -> str:
-    drive, file = _list_parts(call)
-    words = ("/list", call.workspace.qualified_address(drive), shlex.quote(file) if file else "")
+def list_recorded(call: Call) -> str:
+    drive, file = _listed(call)
+    words = ("/list", call.session.qualified_address(drive), shlex.quote(file) if file else "")
     return " ".join(word for word in words if word)
 
 
-@verb("/list [ADDR] [FILE]", recorded=_list_recorded)
 async def list_(call: Call) -> None:
-    """List the program of a drive, or write the list into a new file.
-
-    A word with a dot or a slash is a file. `/upload` writes a file that can be downloaded again.
-    """
-    drive, file = _list_parts(call)
+    drive, file = _listed(call)
     if file:
         new_file.check(call.output_file(file), printed=True)
-    lines = await listings.readable(call.workspace, drive)
-    if not file:
-        for line in lines:
-            call.workspace.output(line)
-        return
-    listings.save_new(call.workspace, drive, file, lines)
+    lines = await listings.readable(call.session, drive)
+    if file:
+        return listings.save_new(call.session, drive, file, lines)
+    for line in lines:
+        call.session.output(line)
 
 
-def _upload_recorded(call: Call) -> str:
-    words = call.words(1, 2)
-    drive = call.drive(words[1] if len(words) > 1 else "")
-    return f"/upload {shlex.quote(words[0])} {call.workspace.qualified_address(drive)}".rstrip()
+def upload_recorded(call: Call) -> str:
+    file, *target = call.words()
+    return f"/upload {shlex.quote(file)} {call.session.qualified_address(call.drive(''.join(target)))}".rstrip()
 
 
-@verb("/upload FILE [ADDR]", recorded=_upload_recorded)
 async def upload(call: Call) -> None:
-    """Save the program of a drive, with its variables, to a new file that can be downloaded again.
-
-    It has the remarks and the layout of the file that was downloaded last with the same lines.
-    """
-    words = call.words(1, 2)
-    file, drive = call.output_file(words[0]), call.drive(words[1] if len(words) > 1 else "")
+    name, *target = call.words()
+    file, drive = call.output_file(name), call.drive("".join(target))
     new_file.check(file, printed=True)
-    listings.save_new(call.workspace, drive, file, await listings.upload(call.workspace, drive))
+    listings.save_new(call.session, drive, file, await listings.upload(call.session, drive))
 
 
-OPTIONS = {
-    "--save": "save it with S",
-    "--only-changed": "send nothing where the drive holds it already",
-    "--no-verify": "do not read it back",
-    "--run": "execute the program at this label",
-}
-
-
-def _download_parts(call: Call) -> tuple[str, str, transfers.Wanted]:
-    """The file, the address, and the options, in any order."""
-    places: list[str] = []
-    options: dict[str, str] = {}
-    words = iter(call.words(1))
-    for word in words:
-        if word in options or (word.startswith("--") and word not in OPTIONS):
-            raise call.wrong(f"{word} is given twice" if word in options else f"no option {word}")
-        if word not in OPTIONS:
-            places.append(word)
-        elif not (value := next(words, "") if word == "--run" else word):
-            raise call.wrong("--run needs a label")
-        else:
-            options[word] = value
+def _downloaded(call: Call) -> tuple[str, str, dict[str, str]]:
+    """The file, the address, and the options."""
+    places, options = call.sort(FLAGS, {"--run": "a label"}, once=True)
     if not 1 <= len(places) <= 2:
         raise call.wrong()
+    return places[0], "".join(places[1:]), dict(options)
+
+
+def download_recorded(call: Call) -> str:
+    file, target, options = _downloaded(call)
+    given = [f"{name} {options[name]}".rstrip() for name in (*FLAGS, "--run") if name in options]
+    words = ("/download", shlex.quote(file), call.session.qualified_address(call.drive(target)), *given)
+    return " ".join(word for word in words if word)
+
+
+async def download(call: Call) -> None:
+    file, target, options = _downloaded(call)
     wanted = transfers.Wanted(
         verify="--no-verify" not in options,
         save="--save" in options,
         only_changed="--only-changed" in options,
         run=options.get("--run", ""),
     )
-    return places[0], places[1] if len(places) > 1 else "", wanted
-
-
-def _download_recorded(call: Call) -> str:
-    file, target, wanted = _download_parts(call)
-    address = call.workspace.qualified_address(call.drive(target))
-    options = {
-        "--save": wanted.save,
-        "--only-changed": wanted.only_changed,
-        "--no-verify": not wanted.verify,
-        f"--run {wanted.run}": bool(wanted.run),
-    }
-    words = ("/download", shlex.quote(file), address, *(word for word, given in options.items() if given))
-    return " ".join(word for word in words if word)
-
-
-@verb(
-    "/download FILE [ADDR] [--save] [--only-changed] [--no-verify] [--run NAME]",
-    recorded=_download_recorded,
-    words=OPTIONS,
-)
-async def download(call: Call) -> None:
-    """Send a program file to a drive: check it, back up what the drive holds, send it, read it back.
-
-    The program that it replaces is cleared (CP); a program at another address stays.
-    """
-    file, target, wanted = _download_parts(call)
     await transfers.download(call.session, call.drive(target), file, wanted, by=call.by)
+
+
+async def check(call: Call) -> None:
+    file, *personality = call.words()
+    wanted, language = "".join(personality).upper(), program_language_of(file)
+    valid = TABLE[language].personalities
+    if wanted and wanted not in valid:
+        raise Diagnostic(f"no personality {wanted}", call.verb.name, f"valid for {file}: {', '.join(valid)}")
+    selected = call.session.selected
+    own = selected.product if selected else ""
+    product = wanted or (own if own in valid else PROGRAMS[language].drive.personality)
+    checked = await asyncio.to_thread(examine, file, product)
+    for each in checked.problems:
+        call.session.notify(each.line_for(file), warning=True)
+    if not checked.right:
+        count = len(errors(checked.problems))
+        raise Inexpressible(f"{file}: {count} error{'' if count == 1 else 's'} for {product}")
+    call.session.output(f"{file}: {checked.facts}")
+
+
+def _at_drive(call: Call) -> tuple[str, list[str]]:
+    """The target, and the other words. A drive's name goes before a label's."""
+    words = call.split()
+    bus, address = split_target(words[0] if words else "")
+    known = call.session.bus(bus).drives if words and ":" not in words[0] else {}
+    if words and (":" in words[0] or address in known or any(drive.label == address for drive in known.values())):
+        return words[0], words[1:]
+    return "", words
+
+
+def debugger_recorded(call: Call) -> str:
+    """The line with the drive's address."""
+    target, words = _at_drive(call)
+    return " ".join(filter(None, (call.verb.name, call.session.qualified_address(call.drive(target)), *words)))
+
+
+def _parts(call: Call, low: int, high: float) -> tuple[Debugger, list[str]]:
+    """The debugger of the drive that the line is for, and the other words."""
+    target, words = _at_drive(call)
+    if not low <= len(words) <= high:
+        raise call.wrong()
+    return debugging.of(call.session, call.drive(target)), words
+
+
+async def trace(call: Call) -> None:
+    debugger, words = _parts(call, 0, 1)
+    await debugger.trace("".join(words))
+
+
+async def step(call: Call) -> None:
+    debugger, words = _parts(call, 0, 1)
+    if words:
+        await debugger.begin(words[0])
+    else:
+        await debugger.step()
+
+
+async def continue_(call: Call) -> None:
+    debugger, _ = _parts(call, 0, 0)
+    await debugger.go_on()
+
+
+async def break_(call: Call) -> None:
+    debugger, words = _parts(call, 0, 2)
+    if not words:
+        debugger.say(LEFT.format(debugger.break_point) if debugger.break_point else "no break point of this session")
+    elif words == ["off"]:
+        await debugger.break_off()
+    elif words == ["now"]:
+        await debugger.break_now()
+    else:
+        await debugger.break_at(words[0], debugging.passes_of(words[1]) if len(words) > 1 else 1)
+
+
+async def watch(call: Call) -> None:
+    debugger, words = _parts(call, 1, inf)
+    await debugger.watch([] if words == ["off"] else words)

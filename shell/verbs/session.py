@@ -1,50 +1,53 @@
-"""Verbs for the session itself: stop, log, the end."""
+"""The work of the verbs on the session: help, waits, the stop, the screen, its transcript, the log."""
 
 from __future__ import annotations
 
+import asyncio
+import difflib
+import re
+from typing import TYPE_CHECKING, NamedTuple
+
 from multidrop.dialects import Diagnostic, Stopped
-from multidrop.shell import stop_report
+from multidrop.dialects.families import DEFAULT, FAMILIES, languages
+from multidrop.dialects.family import Language
+from multidrop.shell import stop_report, waits
+from multidrop.shell.connect import settings
 from multidrop.shell.events import By
 from multidrop.shell.log import files
 from multidrop.shell.log.writer import SessionLog
 from multidrop.shell.new_file import STANDARD_OUTPUT
-from multidrop.shell.verbs.registry import Call, verb
+from multidrop.shell.operations.operation import Operation
+from multidrop.shell.operations.table import VERBS
+from multidrop.shell.operations.usage import split
+from multidrop.shell.transcripts import EVERYTHING, TIMES, Filter, Transcripts
+from multidrop.shell.verbs.call import Call, words
+
+if TYPE_CHECKING:
+    pass
 
 
-@verb("/stop", immediate=True)
 async def stop(call: Call) -> None:
-    """Stop every drive on every bus, and macros, scripts and waits.
-
-    Ctrl+X does the same from anywhere. Macros and scripts are refused until /resume.
-    """
-    call.words(0, 0)
-    call.workspace.stop("/stop")
+    call.words()
+    call.session.stop("/stop")
 
 
-@verb("/resume", immediate=True)
 async def resume(call: Call) -> None:
-    """Let macros and scripts run again after a stop."""
-    call.words(0, 0)
+    call.words()
     if call.by is not By.OPERATOR:
         raise Stopped("/resume works only when a person types it")
-    state = f"; {stop_report.words(call.workspace.tally())}" if call.workspace.latched else ""
-    call.workspace.resume()
-    call.workspace.notify(f"macros and scripts may run again{state}")
-    if dropped := call.workspace.dropped:
+    state = f"; {stop_report.words(call.session.tally())}" if call.session.latched else ""
+    call.session.resume()
+    call.session.notify(f"macros and scripts may run again{state}")
+    if dropped := call.session.dropped:
         names = ", ".join(dict.fromkeys(dropped))
-        call.workspace.notify(
+        call.session.notify(
             f"on_stop of {names} was not executed and will not be; type its lines if needed", warning=True
         )
         dropped.clear()
 
 
-@verb("/log [FILE|on|off]", immediate=True, words={"on": "a new file in the state folder", "off": "end the log"})
 async def log(call: Call) -> None:
-    """Append everything typed, sent, received and printed to a file, in JSON lines with the time of day.
-
-    Without a word it shows the file. `multidrop log show` shows what is in it.
-    """
-    words, workspace = call.words(0, 1), call.workspace
+    words, workspace = call.words(), call.session
     if not words:
         workspace.output(f"log: {workspace.log.path if workspace.log else 'off'}")
         return
@@ -61,13 +64,204 @@ async def log(call: Call) -> None:
     workspace.changed()
 
 
-@verb("/quit", immediate=True)
 async def quit_(call: Call) -> None:
-    """End multidrop; drives go on as they are.
-
-    At a terminal it first names the drives that move or may move, and asks.
-    """
-    call.words(0, 0)
-    ask = call.workspace.before_quit
+    call.words()
+    ask = call.session.before_quit
     if ask is None or await ask():
-        call.commands.quit()
+        call.session.quit()
+
+
+_TEXT = re.compile(r"""(?P<quote>["'])(?P<text>.+?)(?P=quote)(?:\s+(?P<seconds>\S+))?""")
+_VALUE = re.compile(r"(?P<condition>(?:@\S+\s+)?[^\s=!<>]+\s*[=!<>]=?\s*\S+)(?:\s+(?P<seconds>\S+))?")
+
+
+class Wait(NamedTuple):
+    """A wait as typed: for a text, for a value, or for drives that stand."""
+
+    limit: float
+    text: str = ""
+    value: waits.Condition | None = None
+    idle: bool = False
+
+
+def duration(verb: Operation, rest: str) -> float:
+    (text,) = words(verb, rest)
+    return waits.seconds(text, verb.wrong)
+
+
+def wanted_wait(verb: Operation, rest: str) -> Wait:
+    """Parse a wait. Raises Diagnostic."""
+    if match := _TEXT.fullmatch(rest):
+        return Wait(_limit(verb, match["seconds"]), text=match["text"])
+    if match := _VALUE.fullmatch(rest):
+        wanted = waits.condition(match["condition"])
+        if wanted is None:
+            raise verb.wrong(f"no condition {match['condition']}; valid: I1=1, @b P>=51200")
+        return Wait(_limit(verb, match["seconds"]), value=wanted)
+    match split(rest, verb.name):
+        case [("stopped" | "idle") as state]:
+            return Wait(waits.LIMIT, idle=state == "idle")
+        case [("stopped" | "idle") as state, seconds]:
+            return Wait(_limit(verb, seconds), idle=state == "idle")
+    raise verb.wrong()
+
+
+def _limit(verb: Operation, text: str | None) -> float:
+    """The time limit, s."""
+    return waits.LIMIT if text is None else waits.seconds(text, verb.wrong)
+
+
+async def sleep(call: Call) -> None:
+    await waits.sleep(duration(call.verb, call.rest))
+
+
+def with_drive(call: Call) -> str:
+    """Record the line, with the selected drive's address for a value."""
+    line = f"{call.verb.name} {call.rest}".strip()
+    if not _VALUE.fullmatch(call.rest) or call.rest.startswith("@"):
+        return line
+    target = call.session.qualified_address(call.session.drive())
+    return f"{call.verb.name} @{target} {call.rest}" if target else line
+
+
+async def wait(call: Call) -> None:
+    wanted = wanted_wait(call.verb, call.rest)
+    if wanted.text:
+        await waits.wait_text(call.session, wanted.text, wanted.limit)
+    elif wanted.value is not None:
+        await waits.wait_value(call.session, call.drive(wanted.value.target), wanted.value, wanted.limit)
+    else:
+        await waits.wait(call.session, wanted.limit, idle=wanted.idle)
+
+
+async def page(call: Call) -> None:
+    (name,) = call.words()
+    await _show(call, name)
+
+
+async def tour(call: Call) -> None:
+    call.words()
+    await _show(call, "tour")
+
+
+async def _show(call: Call, name: str) -> None:
+    if call.session.screen is None:
+        raise Diagnostic("this front end has no screen", call.verb.name, "multidrop tui opens it")
+    await call.session.screen(name)
+
+
+def _transcripts(call: Call) -> Transcripts:
+    """The transcripts of the screen. Raises Diagnostic where there is none."""
+    found = call.session.transcripts
+    if found is None:
+        raise Diagnostic("only the screen has a transcript", call.verb.name, "multidrop tui opens it")
+    return found
+
+
+async def times(call: Call) -> None:
+    transcripts, forms = _transcripts(call), list(TIMES)
+    words = call.words()
+    form = words[0] if words else forms[(forms.index(transcripts.times) + 1) % len(forms)]
+    if form not in TIMES:
+        raise call.wrong(f"no form {form}")
+    transcripts.set_times(form)
+    kept = await _kept(form) if call.by is By.OPERATOR else ""
+    call.session.notify(f"times: {form}, {TIMES[form]}{kept}", warning=bool(kept))
+
+
+async def _kept(form: str) -> str:
+    """Keep the form in the configuration; return why that failed."""
+    try:
+        await asyncio.to_thread(settings.keep, "screen", "times", form)
+    except Diagnostic as problem:
+        return f"; not kept for the next start ({problem})"
+    return ""
+
+
+async def filter_(call: Call) -> None:
+    transcripts = _transcripts(call)
+    wanted = _wanted(call)
+    transcripts.choose(wanted)
+    call.session.notify(f"{wanted.words}; /filter off shows all" if wanted else "all lines are shown")
+
+
+def _wanted(call: Call) -> Filter:
+    """The filter of a line. Raises Diagnostic."""
+    what, _, rest = call.rest.strip().partition(" ")
+    if what == "text":
+        if not rest.strip():
+            raise call.wrong()
+        return Filter(text=rest.strip())
+    words = call.words()
+    if words == ["off"]:
+        return EVERYTHING
+    targets = [word for word in words if word not in ("errors", "mine")]
+    if len(targets) > 1 or len({*words}) < len(words):
+        raise call.wrong()
+    address = _address(call, targets[0]) if targets else ""
+    return Filter(address, "errors" in words, "mine" in words)
+
+
+def _address(call: Call, target: str) -> str:
+    """The address of a drive of the selected bus, by address or name. Raises Diagnostic."""
+    bus = call.session.bus()
+    for drive in bus.drives.values():
+        if drive.address and target in (drive.address, drive.label):
+            return drive.address
+    named = ", ".join(filter(None, bus.drives))
+    raise call.wrong(f"no drive {target} on {bus.name}" + (f"; valid: {named}" if named else ""))
+
+
+async def save(call: Call) -> None:
+    (file,) = call.words()
+    saved = await _transcripts(call).save(call.output_file(file))
+    call.session.notify(saved, outcome=True)
+
+
+async def unsent(call: Call) -> None:
+    call.words()
+    await _transcripts(call).offer_unsent()
+
+
+WIDTH = 28
+"""Columns for usages in the overview."""
+
+
+async def help_(call: Call) -> None:
+    words, selected = call.words(), call.session.selected
+    language, product = (selected.family.language, selected.product) if selected else (FAMILIES[DEFAULT].language, "")
+    if words and words[0].isdecimal() and words[0].isascii():
+        lines = language.describe_error(int(words[0][:9]), product)
+    else:
+        lines = described(words[0], language, product) if words else overview()
+    for line in lines:
+        call.session.output(line, columns=True)
+
+
+def overview() -> list[str]:
+    """All verbs, a line each; a long usage has a line of its own."""
+    lines = []
+    for each in VERBS.values():
+        if len(each.usage) > WIDTH:
+            lines.append(each.usage)
+        lines.append(f"{each.usage if len(each.usage) <= WIDTH else '':<{WIDTH}}  {each.lines[0]}")
+    return lines
+
+
+def described(name: str, language: Language | None = None, product: str = "") -> list[str]:
+    """The help on a verb (with or without its slash) or a command, for a product where that matters.
+
+    The selected drive's language (None: the default one) comes before others. Raises Diagnostic for an unknown name.
+    """
+    language = language or FAMILIES[DEFAULT].language
+    if name.startswith("/") and name in VERBS:
+        return VERBS[name].described()
+    for each in (language, *languages()):
+        if each.knows(name):
+            return each.describe(name, product if each is language else "")
+    if f"/{name}" in VERBS:
+        return described(f"/{name}")
+    near = difflib.get_close_matches(name.upper(), [*language.names(), *(key.upper() for key in VERBS)], 3)
+    shown = [each.lower() if name.startswith("/") else each for each in near]
+    hint = f"similar: {', '.join(shown)}" if shown else "/help lists the verbs"
+    raise Diagnostic(f"no verb or command {name}", "/help", hint)

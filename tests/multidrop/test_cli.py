@@ -6,14 +6,15 @@ import sys
 
 import pytest
 
-from multidrop import cli, command_table
+from multidrop import cli
+from multidrop.shell.operations import table
 from multidrop.simulator.families import PROGRAMS, TABLE
 from tests.support.paths import ROOT
 from tests.support.processes import environment
 from tests.support.until import PATIENCE
 
 COMMANDS = ["demo", "tui", "shell", "send", "run", "sim", "program", "macro", "plot", "ports", "report", "completion"]
-RUN = [each.run for one in command_table.COMMANDS.values() for each in (one, *one.parts.values()) if not each.parts]
+RUN = [each.run for each in table.COMMANDS.values() if each.run]
 
 
 @pytest.fixture

@@ -26,7 +26,7 @@ NO_LINE = HEAVY | LOOP | HOSTS | SIMULATORS | {"serial"}
 MCODE = {"multidrop.dialects.mcode.family"}
 OTHERS = HOSTS - MCODE - {"multidrop.drives.bus", "multidrop.shell.session"}
 VERBS = {
-    "multidrop.shell.verbs.table",
+    "multidrop.shell.verbs.call",
     "multidrop.shell.plots",
     "multidrop.shell.transfers",
     "secrets",

@@ -16,11 +16,12 @@ from lsprotocol import types
 from pytest_lsp import client_capabilities
 from pytest_lsp.client import make_test_lsp_client
 
-from multidrop.arguments.editors import add
-from multidrop.commands import lsp
+from multidrop.commands import serving
 from multidrop.dialects import Diagnostic
 from multidrop.lsp.server import Server
 from multidrop.lsp.serving import serve_port
+from multidrop.shell.operations.operation import add_arguments
+from multidrop.shell.operations.programs import LSP
 from tests.support.lsp_session import Editor
 from tests.support.processes import environment
 from tests.support.until import PATIENCE
@@ -117,7 +118,7 @@ def test_without_its_extra_it_says_what_to_install(
     monkeypatch.setitem(sys.modules, "pygls", None)
     monkeypatch.setitem(sys.modules, "lsprotocol", None)
     chosen = argparse.Namespace(personality="LMDCM", tcp=None)
-    assert lsp.run(chosen) == 2
+    assert serving.lsp(chosen) == 2
     line = "the language server needs pygls, which is not installed; pipx install 'multidrop[lsp]'\n"
     assert capsys.readouterr().err == line
 
@@ -134,7 +135,7 @@ def test_without_its_extra_it_says_what_to_install(
 )
 def test_a_port_is_on_this_computer_unless_a_host_is_named(text: str, address: tuple[str, int] | None) -> None:
     parser = argparse.ArgumentParser(exit_on_error=False)
-    add(parser)
+    add_arguments(parser, LSP.arguments)
     if address is None:
         with pytest.raises(argparse.ArgumentError, match="valid: PORT or HOST:PORT"):
             parser.parse_args(["--tcp", text])

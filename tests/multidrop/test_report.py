@@ -7,7 +7,7 @@ from datetime import date
 
 import pytest
 
-from multidrop.commands import report
+from multidrop.commands import machine
 
 
 class Terminal(io.StringIO):
@@ -28,13 +28,13 @@ def run(monkeypatch, output="", yes=False, typed=None):
     printed = Terminal() if typed is not None else io.StringIO()
     monkeypatch.setattr(sys, "stdin", Terminal(typed) if typed is not None else io.StringIO())
     monkeypatch.setattr(sys, "stdout", printed)
-    code = report.run(argparse.Namespace(output=output, yes=yes))
+    code = machine.report(argparse.Namespace(output=output, yes=yes))
     return code, printed.getvalue()
 
 
 def test_in_a_pipe_it_is_printed_and_not_written(folder, monkeypatch):
     code, printed = run(monkeypatch)
-    assert code == 0 and [f"== {title}" in printed for title in report.SECTIONS] == [True] * len(report.SECTIONS)
+    assert code == 0 and [f"== {title}" in printed for title in machine.SECTIONS] == [True] * len(machine.SECTIONS)
     assert list(folder.iterdir()) == []
 
 

@@ -7,7 +7,7 @@ import sys
 
 import pytest
 
-from multidrop.command_table import COMMANDS
+from multidrop.shell.operations.table import COMMANDS
 from tests.support.paths import ROOT
 from tests.support.until import PATIENCE
 

@@ -8,9 +8,9 @@ from multidrop.dialects.families import FAMILIES
 from multidrop.shell.connect.url_forms import URL_FORMS
 from multidrop.shell.connect.urls import KEYS
 from multidrop.shell.front.complete import complete, hint
-from multidrop.shell.verbs.offers import PLACEHOLDERS
-from multidrop.shell.verbs.table import VERBS
-from multidrop.shell.verbs.usage import forms, is_placeholder
+from multidrop.shell.operations.offers import PLACEHOLDERS
+from multidrop.shell.operations.table import VERBS
+from multidrop.shell.operations.usage import forms, is_placeholder
 from multidrop.simulator.sim_words import USAGES
 from tests.support.cases import for_each
 

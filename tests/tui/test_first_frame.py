@@ -57,7 +57,7 @@ LATER = {
     *(
         "multidrop.tui.editor.widget",
         "multidrop.shell.params.page",
-        "multidrop.shell.verbs.table",
+        "multidrop.shell.operations.offers",
         "multidrop.shell.front.complete",
     ),
     *(

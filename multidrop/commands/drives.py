@@ -1,0 +1,213 @@
+"""`multidrop program list|upload|download`, `params` and `snapshot`: what is in the drives of a URL."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Awaitable, Callable
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from multidrop.commands import fail
+from multidrop.dialects import Diagnostic
+from multidrop.dialects.families import program_language_of, program_languages
+from multidrop.dialects.files import program_text_of
+from multidrop.dialects.program_files import errors
+from multidrop.shell import listings, new_file, replacement, snapshots, transfers
+from multidrop.shell.connect import settings
+from multidrop.shell.front import batch
+from multidrop.shell.lines import split_target
+from multidrop.shell.new_file import STANDARD_OUTPUT
+from multidrop.shell.params import file as files
+from multidrop.shell.params import work
+from multidrop.shell.params.restore import Options
+from multidrop.shell.params.work import check_new, each, file_of, is_several, targets
+from multidrop.simulator import cells
+
+if TYPE_CHECKING:
+    from multidrop.drives.drive import Drive
+    from multidrop.shell.session import Session
+
+
+def list_(chosen: argparse.Namespace) -> int:
+    """Print the program, a line each, in its most readable form."""
+
+    async def show(session: Session, drive: Drive) -> None:
+        own = f"{session.display_name(drive)}: " if is_several(chosen.drive) else ""
+        for line in await listings.readable(session, drive):
+            session.output(f"{own}{line}")
+
+    return _with_drive(chosen, show)
+
+
+def upload(chosen: argparse.Namespace) -> int:
+    """Save the program to a new file that can be downloaded again; several to a folder."""
+    try:
+        check_new(chosen.file, chosen.drive)
+    except Diagnostic as problem:
+        return fail(problem)
+
+    async def save(session: Session, drive: Drive) -> None:
+        lines = await listings.upload(session, drive, chosen.raw)
+        file = file_of(session, drive, chosen.file, chosen.drive, drive.program_files.endings[0])
+        if is_several(chosen.drive):
+            Path(file).parent.mkdir(parents=True, exist_ok=True)
+        listings.save_new(session, drive, file, lines)
+
+    return _with_drive(chosen, save, unsolicited=chosen.file != STANDARD_OUTPUT)
+
+
+def download(chosen: argparse.Namespace) -> int:
+    """Send a file to the drive; report a wrong file before anything is opened."""
+    if (problem := _wrong(chosen.file)) is not None:
+        return fail(problem)
+    wanted = transfers.Wanted(not chosen.no_verify, chosen.save, chosen.only_changed, chosen.run)
+
+    async def put(session: Session, drive: Drive) -> None:
+        await transfers.download(session, drive, chosen.file, wanted)
+
+    return _with_drive(chosen, put, agreed=chosen.yes)
+
+
+def _wrong(file: str) -> Diagnostic | None:
+    """Return the error of a file that is correct in no language, found in the language of its name."""
+    own = program_languages()[program_language_of(file)]
+    try:
+        text = program_text_of(file)
+        if all(errors(source.language.check(text)) for source in program_languages().values() if source is not own):
+            own.language.load(file)
+    except Diagnostic as problem:
+        return problem
+    return None
+
+
+def _with_drive(
+    chosen: argparse.Namespace,
+    body: Callable[[Session, Drive], Awaitable[None]],
+    agreed: bool = False,
+    unsolicited: bool = True,
+) -> int:
+    async def work(session: Session) -> None:
+        await each(session, targets(session, chosen.drive, "programs"), lambda drive: body(session, drive))
+
+    return batch.run([chosen.url], work, agreed=agreed, unsolicited=unsolicited, tried=chosen.drive.split(","))
+
+
+DIFFERS = 1
+"""The exit code of a comparison where something differs, as where a drive did not reply or refused."""
+
+
+def params_backup(chosen: argparse.Namespace) -> int:
+    """Save the settings of a drive to a new file."""
+    try:
+        work.check_new(chosen.file, chosen.drive)
+    except Diagnostic as problem:
+        return fail(problem)
+    return batch.run(
+        [chosen.url],
+        lambda session: work.backup(session, chosen.file, chosen.drive),
+        unsolicited=False,
+        tried=chosen.drive.split(","),
+    )
+
+
+def params_diff(chosen: argparse.Namespace) -> int:
+    """Print what differs; the exit code says whether anything does."""
+    try:
+        _check_comparison(chosen)
+    except Diagnostic as problem:
+        return fail(problem)
+    differs = False
+
+    async def compare(session: Session) -> None:
+        nonlocal differs
+        other = await _other(session, chosen)
+        differs = await work.diff(session, chosen.drive, name=chosen.file, other=other, as_json=chosen.json)
+
+    tried = [*chosen.drive.split(","), "" if chosen.against else chosen.other]
+    code = batch.run([chosen.url], compare, unsolicited=False, tried=tried)
+    return code or (DIFFERS if differs else 0)
+
+
+def _check_comparison(chosen: argparse.Namespace) -> None:
+    """Raise Diagnostic unless one thing to compare with is named, and can be read."""
+    given = [bool(chosen.file), bool(chosen.against or chosen.other), chosen.defaults]
+    if sum(given) != 1:
+        raise Diagnostic(
+            "params diff compares with one thing", hint="FILE, --against URL or --other ADDR, or --defaults"
+        )
+    if chosen.file and not work.is_several(chosen.drive):
+        files.load(chosen.file)
+
+
+async def _other(session: Session, chosen: argparse.Namespace) -> Drive | None:
+    """The other drive, of another URL or of this one; None where a file or the defaults are compared."""
+    if not (chosen.against or chosen.other):
+        return None
+    bus, address = split_target(chosen.other)
+    if chosen.against and chosen.against != chosen.url:
+        bus = (await session.open(chosen.against))[0].name
+    return session.drive(bus, address or None)
+
+
+def params_restore(chosen: argparse.Namespace) -> int:
+    """Send what differs from a file, after a question."""
+    options = Options(
+        named=frozenset(name.strip().upper() for each in chosen.named for name in each.split(",") if name.strip()),
+        communication=chosen.communication,
+        save=chosen.save,
+        dry_run=chosen.dry_run,
+        other_product=chosen.other_product,
+    )
+    try:
+        if not work.is_several(chosen.drive):
+            files.load(chosen.file)
+    except Diagnostic as problem:
+        return fail(problem)
+
+    async def put(session: Session) -> None:
+        await work.restore_each(session, chosen.file, chosen.drive, options)
+
+    return batch.run([chosen.url], put, agreed=chosen.yes, unsolicited=False, tried=chosen.drive.split(","))
+
+
+def snapshot(chosen: argparse.Namespace) -> int:
+    """Read every drive of the URLs into one new file."""
+    try:
+        new_file.check(chosen.output, printed=True)
+    except Diagnostic as problem:
+        return fail(problem)
+    printed = chosen.output == new_file.STANDARD_OUTPUT
+    return batch.run(chosen.urls, lambda session: snapshots.save(session, chosen.output), unsolicited=not printed)
+
+
+def apply(chosen: argparse.Namespace) -> int:
+    """Put the state of one drive of a cell file onto a replacement; report a wrong file before anything is opened."""
+    try:
+        if chosen.source and is_several(chosen.drive):
+            raise Diagnostic(f"--from {chosen.source} is for one drive", "snapshot apply", "--drive names one")
+        cell = cells.load(chosen.file, settings.load().allowed)
+    except Diagnostic as problem:
+        return fail(problem)
+    wanted = replacement.Wanted(
+        named=frozenset(name.strip().upper() for name in ",".join(chosen.named).split(",") if name.strip()),
+        dry=chosen.dry_run,
+        other_product=chosen.other_product,
+    )
+
+    async def work(session: Session) -> None:
+        drives = _drives(session, chosen.drive)
+        several = is_several(chosen.drive)
+        # All are found in the file before the first one is written to.
+        specs = {drive: replacement.chosen(cell, chosen.file, drive, chosen.source, several) for drive in drives}
+        await each(session, drives, lambda drive: replacement.apply(session, drive, chosen.file, specs[drive], wanted))
+
+    return batch.run([chosen.url], work, agreed=chosen.yes, tried=chosen.drive.split(","))
+
+
+def _drives(session: Session, target: str) -> list[Drive]:
+    """Find the replacements. Raises Diagnostic where one of several drives can be meant."""
+    drives = [drive for each in session.buses.values() for drive in each.drives.values()]
+    if not target and len(drives) > 1:
+        names = ", ".join(session.display_name(drive) for drive in drives)
+        raise Diagnostic("several drives have replied", hint=f"--drive names one of {names}")
+    return targets(session, target)

@@ -1,0 +1,294 @@
+"""`multidrop config` and `report`: what counts on this machine, what is wrong, and what a bug report needs."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import platform
+import shutil
+import sys
+from collections.abc import Callable, Collection, Iterator, Mapping
+from dataclasses import asdict
+from datetime import date, datetime
+from importlib.metadata import PackageNotFoundError, requires, version
+from pathlib import Path
+
+from multidrop.commands import fail
+from multidrop.dialects import Diagnostic
+from multidrop.dialects.files import bounded, opened, split_lines, toml_of, utf8_of, why
+from multidrop.dialects.text import visible
+from multidrop.macros import MacroStore
+from multidrop.shell.connect import settings
+from multidrop.shell.connect.settings import Settings
+from multidrop.shell.new_file import STANDARD_OUTPUT
+from multidrop.shell.output import write
+from multidrop.shell.secrets import HIDDEN, holds_password, toml_without_secrets, url_without_secrets, without_secrets
+
+REFUSED = "   # default; the file's does not count"
+WRONG = 2
+"""The exit code of a configuration that cannot be used as it is."""
+
+
+def path(chosen: argparse.Namespace) -> int:
+    """Print the path of the file."""
+    write(sys.stdout, str(settings.config_file()))
+    return 0
+
+
+def show(chosen: argparse.Namespace) -> int:
+    """Print every setting as TOML; a remark marks those that the file does not set."""
+    try:
+        found = settings.load()
+    except Diagnostic as failure:
+        return fail(failure)
+    for line in shown(found, _keys(found), _text(settings.config_file())):
+        write(sys.stdout, line)
+    return 0
+
+
+def shown(found: Settings, keys: dict[str, str], text: str) -> list[str]:
+    """The settings, line by line. `keys`: those that count; `text`: the file."""
+    import tomlkit
+
+    from multidrop.tui.widgets.theme import wrong_theme
+
+    given = toml_of(text, "")
+
+    def rows(table: str, values: Mapping[str, object], refused: Collection[str] = ()) -> list[str]:
+        has = given.get(table, {})
+        remarks = {key: REFUSED if key in refused else "" if key in has else "   # default" for key in values}
+        return ["", f"[{table}]", *(f"{key} = {tomlkit.item(values[key]).as_string()}{remarks[key]}" for key in values)]
+
+    lines = [f"# {settings.config_file()}" + ("" if text else " does not exist: all settings are the defaults")]
+    for name, each in found.connections.items():
+        url = url_without_secrets(each.url) if holds_password(each.url) else each.url
+        lines += ["", f"[connections.{name}]", f"url = {tomlkit.item(url).as_string()}"]
+        if each.names:
+            names = ", ".join(f"{key} = {tomlkit.item(value).as_string()}" for key, value in each.names.items())
+            lines.append(f"names = {{ {names} }}")
+    look, log, guards = found.look, found.log, found.guards
+    wrong = {"theme"} if wrong_theme(look.theme) else set[str]()
+    theme = "by the terminal" if wrong else look.theme or "by the terminal"
+    lines += rows("screen", {"theme": theme, "signs": look.signs, "times": look.times}, wrong)
+    lines += rows("keys", keys, {name for name, text in look.keys.items() if keys.get(name) != text})
+    lines += rows("log", {"always": log.always, "megabytes": log.size / 1e6, "files": log.files})
+    login = {key: HIDDEN if key == "password" and value else value for key, value in asdict(found.mqtt).items()}
+    lines += rows("mqtt", login)
+    lines += rows("simulator", {"allow": list(map(str, found.allowed))})
+    lines += rows("sweep", {"clusters": list(found.clusters)})
+    return lines + rows("guards", {"off": sorted(guards.off), "also": sorted(guards.also)})
+
+
+def check(chosen: argparse.Namespace) -> int:
+    """Report what is wrong; exit code 0 if nothing is."""
+    try:
+        found = settings.load()
+    except Diagnostic as failure:
+        return fail(failure)
+    text = _text(settings.config_file())
+    troubles = _troubles(found)
+    for trouble in troubles:
+        write(sys.stderr, str(settings.placed(trouble, text, str(settings.config_file()))))
+    if not troubles:
+        state = "is right" if text else "does not exist: all settings are the defaults"
+        write(sys.stdout, f"{settings.config_file()} {state}")
+    return WRONG if troubles else 0
+
+
+def _troubles(found: Settings) -> list[str]:
+    """The errors in keys and theme, which only the screen knows, and files that cannot be read."""
+    from multidrop.tui.app import bindings
+    from multidrop.tui.keymap import keymap
+    from multidrop.tui.widgets.theme import wrong_theme
+
+    look = found.look
+    return [*keymap(bindings(), look.keys).troubles, *wrong_theme(look.theme), *found.mqtt.unreadable()]
+
+
+def _keys(found: Settings) -> dict[str, str]:
+    """The keys that count by the names of their functions: as the file writes them, else the program's own."""
+    from multidrop.tui.app import bindings
+    from multidrop.tui.keymap import keymap
+
+    kept = keymap(bindings(), found.look.keys)
+    return {name: found.look.keys[name] if name in kept.changed else kept.shown(name) for name in sorted(kept.keys)}
+
+
+def _text(file: Path) -> str:
+    return utf8_of(file) if file.exists() else ""
+
+
+TERMINAL = ("TERM", "COLORTERM", "TERM_PROGRAM", "LANG", "LC_ALL", "LC_CTYPE", "NO_COLOR", "PYTHONUTF8")
+PRESENT = ("SSH_CONNECTION", "TMUX", "STY")
+"""Variables of which only the presence matters: they hold addresses and paths."""
+LONGEST = 200
+"""Lines of a file in the report; the rest is counted."""
+
+
+def report(chosen: argparse.Namespace) -> int:
+    """Show the report, and write it to a file if the user agrees."""
+    text = report_text()
+    for line in text.splitlines():
+        write(sys.stdout, line)
+    if chosen.output == STANDARD_OUTPUT:
+        return 0
+    asked = sys.stdin.isatty() and sys.stdout.isatty()
+    if not (chosen.output or asked):
+        return 0
+    path = Path(chosen.output or f"multidrop-report-{date.today().isoformat()}.txt")
+    try:
+        return _keep(path, text, chosen.yes, asked)
+    except Diagnostic as problem:
+        return fail(problem)
+
+
+def _keep(path: Path, text: str, agreed: bool, asked: bool) -> int:
+    """Write the report to a new file. Raises Diagnostic."""
+    if not agreed and not asked:
+        raise Diagnostic("not written: this is not a terminal", str(path), "read the report above, then add --yes")
+    if not agreed and not _agrees(path):
+        write(sys.stderr, "nothing was written")
+        return 0
+    try:
+        with path.open("x", encoding="utf-8") as file:
+            file.write(text)
+    except FileExistsError:
+        raise Diagnostic("exists already", str(path), "choose another name with -o") from None
+    except (OSError, ValueError) as problem:
+        raise Diagnostic(f"cannot be written: {why(problem)}", str(path)) from None
+    write(sys.stderr, f"the report is in {path}")
+    return 0
+
+
+def _agrees(path: Path) -> bool:
+    sys.stderr.write(f"\nWrite the report to {path}? [y/N] ")
+    sys.stderr.flush()
+    try:
+        return input().strip().lower() in ("y", "yes")
+    except EOFError:
+        return False
+
+
+def report_text() -> str:
+    """All sections, without control characters and secrets."""
+    parts = []
+    for title, lines in SECTIONS.items():
+        parts += [f"== {title}", *(f"  {visible(without_secrets(line), tabs=True)}" for line in lines()), ""]
+    return "\n".join(parts).rstrip() + "\n"
+
+
+def _program() -> Iterator[str]:
+    import multidrop
+
+    yield f"multidrop {multidrop.__version__} in {Path(multidrop.__file__).parent.parent}"
+    yield f"{platform.python_implementation()} {platform.python_version()} ({sys.executable})"
+    yield " ".join((platform.system(), platform.release(), platform.machine(), *platform.libc_ver()))
+    yield f"time {datetime.now().astimezone().isoformat(timespec='seconds')}"
+
+
+def _packages() -> Iterator[str]:
+    """The version of every package that multidrop may use."""
+    try:
+        needed = requires("multidrop") or []
+    except PackageNotFoundError:
+        yield "not installed: it runs from a source tree"
+        return
+    for need in needed:
+        name = need.partition(";")[0].split("<")[0].split(">")[0].split("=")[0].split("[")[0].strip()
+        extra = need.partition("extra ==")[2].strip(" '\"")
+        try:
+            found = version(name)
+        except PackageNotFoundError:
+            found = "not installed"
+        yield f"{name} {found}" + (f" (extra {extra})" if extra else "")
+
+
+def _terminal() -> Iterator[str]:
+    columns, rows = shutil.get_terminal_size()
+    streams = [name for name in ("stdin", "stdout", "stderr") if getattr(sys, name).isatty()]
+    yield f"terminals: {', '.join(streams) or 'none'}; {columns}x{rows}; encoding {sys.stdout.encoding}"
+    for name in TERMINAL:
+        if name in os.environ:
+            yield f"{name}={os.environ[name]}"
+    for name in PRESENT:
+        if name in os.environ:
+            yield f"{name} is set"
+
+
+def _configuration() -> Iterator[str]:
+    path = settings.config_file()
+    yield str(path)
+    yield from _contents(path)
+    try:
+        settings.load()
+    except Diagnostic as problem:
+        yield f"problem: {problem}"
+
+
+def _macros() -> Iterator[str]:
+    """The names of the macros; the problem of a file in place of its contents."""
+    store = MacroStore(settings.config_folder() / "macros")
+    yield str(store.folder)
+    try:
+        names = store.names()
+    except Diagnostic as problem:
+        yield f"problem: {problem}"
+        return
+    for name in names:
+        try:
+            macro = store.load(name)
+        except Diagnostic as problem:
+            yield f"problem: {problem}"
+        else:
+            yield f"{macro.name} {macro.key}".rstrip()
+
+
+def _ports() -> Iterator[str]:
+    from multidrop.transports.serial_ports import list_ports
+
+    found = list_ports()
+    for port in found:
+        yield "  ".join(part for part in (port.device, port.stable_name, port.description) if part)
+    if not found:
+        yield "no serial port"
+
+
+def _state() -> Iterator[str]:
+    """The files of the state folder. Their contents stay: the history has what was typed."""
+    folder = settings.state_folder()
+    yield str(folder)
+    try:
+        files = sorted(path for path in folder.rglob("*") if path.is_file())
+        for path in files[:LONGEST]:
+            yield f"{path.stat().st_size:>10} {path.relative_to(folder)}"
+    except OSError as problem:
+        yield f"problem: {why(problem)}"
+
+
+def _contents(path: Path) -> Iterator[str]:
+    """The lines of a file; the reason where it cannot be read."""
+    try:
+        with opened(path) as file:
+            text = bounded(file, str(path)).decode("utf-8", "backslashreplace")
+        lines = split_lines(toml_without_secrets(text))
+    except FileNotFoundError:
+        yield "no such file"
+    except OSError as problem:
+        yield f"problem: {why(problem)}"
+    except Diagnostic as problem:
+        yield f"problem: {problem}"
+    else:
+        yield from lines[:LONGEST]
+        if len(lines) > LONGEST:
+            yield f"... {len(lines) - LONGEST} more lines"
+
+
+SECTIONS: dict[str, Callable[[], Iterator[str]]] = {
+    "multidrop": _program,
+    "packages": _packages,
+    "terminal": _terminal,
+    "configuration": _configuration,
+    "macros": _macros,
+    "serial ports": _ports,
+    "state folder": _state,
+}

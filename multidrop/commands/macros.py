@@ -1,0 +1,214 @@
+"""`multidrop macro`: list, show, play and change macros."""
+
+from __future__ import annotations
+
+import argparse
+import signal
+import subprocess
+import sys
+from collections.abc import Callable, Mapping
+from typing import TYPE_CHECKING
+
+from multidrop.commands import fail
+from multidrop.dialects import Diagnostic
+from multidrop.dialects.files import bounded, utf8, why
+from multidrop.macros import Macro, MacroStore, format_macro, missing
+from multidrop.macros.store import begin_draft, finish_draft, listed
+from multidrop.shell import macro_changes
+from multidrop.shell.connect.settings import Settings
+from multidrop.shell.output import INTERRUPTED, write
+
+if TYPE_CHECKING:
+    from multidrop.shell.front.report import Report
+    from multidrop.shell.session import Session
+
+
+def list_(chosen: argparse.Namespace) -> int:
+    """Print a line for each macro; one that cannot be read is reported and does not hide the others."""
+    try:
+        found = listed(_store())
+    except Diagnostic as problem:
+        return fail(problem)
+    for line in found.lines:
+        write(sys.stdout, line)
+    code = max(map(fail, found.broken), default=0)
+    for line in found.warnings:
+        write(sys.stderr, line)
+    return code
+
+
+def show(chosen: argparse.Namespace) -> int:
+    """Print a macro in the form of its file."""
+    try:
+        for line in format_macro(_store().load(chosen.name)).rstrip("\n").split("\n"):
+            write(sys.stdout, line)
+    except Diagnostic as problem:
+        return fail(problem)
+    return 0
+
+
+def play(chosen: argparse.Namespace) -> int:
+    """Play a macro; report wrong values and lines before anything is opened."""
+    from multidrop.shell.front.report import Report
+    from multidrop.shell.scripts.reading import WrongScript, read_macro
+
+    if not (chosen.on or chosen.role):
+        return fail(Diagnostic("nothing to open", "multidrop macro play", "--on URL, or --role NAME=URL"))
+    report = Report(f"macro {chosen.name}", as_json=chosen.json, junit=chosen.junit)
+    try:
+        report.begin()
+        store, values = _store(), dict(chosen.set)
+        macro = store.load(chosen.name)
+        values |= _asked(macro, values)
+        if hides := store.hides(macro.name):
+            write(sys.stderr, hides)
+        read_macro(macro, values, store)
+    except WrongScript as wrong:
+        report.wrong(wrong.problems)
+        return max(map(fail, wrong.problems))
+    except Diagnostic as problem:
+        report.wrong((problem,))
+        return fail(problem)
+    except KeyboardInterrupt:
+        return INTERRUPTED
+    return report.finish(_play(chosen, macro, values, report))
+
+
+def _asked(macro: Macro, values: Mapping[str, str]) -> dict[str, str]:
+    """Ask at the terminal for the values, if one is missing that must be given."""
+    if not missing(macro, values):
+        return {}
+    from multidrop.shell.front import terminal_input
+    from multidrop.shell.macro_arguments import value_fields
+
+    if not terminal_input.can_ask():
+        return {}
+    return terminal_input.at_terminal(f"macro {macro.name}", value_fields(macro, values)) or {}
+
+
+def _play(chosen: argparse.Namespace, macro: Macro, values: Mapping[str, str], report: Report) -> int:
+    from multidrop.shell.front import batch
+    from multidrop.shell.scripts.executor import play
+
+    async def body(session: Session) -> None:
+        await report.watched(session, chosen.on, chosen.role)
+        with report.noting():
+            await play(session, macro, values, times=chosen.times, fast=chosen.fast, watcher=report)
+
+    return batch.run([], body, agreed=chosen.yes, asks=False, replies=not chosen.json)
+
+
+def _store() -> MacroStore:
+    settings = Settings()
+    return MacroStore(settings.macros, settings.project_macros)
+
+
+INPUT = "standard input"
+
+
+def edit(chosen: argparse.Namespace) -> int:
+    """Open a copy in the person's editor; put it in place of the macro once it is right."""
+
+    def work(store: MacroStore) -> list[str]:
+        command = macro_changes.editor()
+        draft = begin_draft(store, Settings().macro_drafts, chosen.name)
+        if draft.remark:
+            write(sys.stderr, draft.remark)
+        _run([*command, str(draft.file)], f"{chosen.name} is as it was")
+        return [finish_draft(store, draft)]
+
+    return _told(work)
+
+
+def _run(command: list[str], otherwise: str) -> None:
+    """Run an editor to its end; Ctrl+C is its own. Raises Diagnostic where it cannot run or fails."""
+    before = signal.getsignal(signal.SIGINT)
+    try:
+        with subprocess.Popen(command) as process:
+            signal.signal(signal.SIGINT, signal.SIG_IGN)
+            code = process.wait()
+    except OSError as error:
+        raise Diagnostic(f"cannot run ({why(error)})", command[0], f"set VISUAL or EDITOR; {otherwise}") from None
+    finally:
+        signal.signal(signal.SIGINT, before)
+    if code:
+        raise Diagnostic(f"the editor ended with {code}", command[0], f"{otherwise}; your text is in {command[-1]}")
+
+
+def describe(chosen: argparse.Namespace) -> int:
+    """Change a macro's note."""
+    return _told(lambda store: macro_changes.describe(store, chosen.name, " ".join(chosen.text)))
+
+
+def rename(chosen: argparse.Namespace) -> int:
+    """Give a macro another name."""
+    return _told(lambda store: macro_changes.rename(store, chosen.name, chosen.new))
+
+
+def copy(chosen: argparse.Namespace) -> int:
+    """Copy a macro."""
+    return _told(lambda store: macro_changes.copy(store, chosen.name, chosen.new, chosen.project))
+
+
+def delete(chosen: argparse.Namespace) -> int:
+    """Delete a macro, after a question."""
+
+    def work(store: MacroStore) -> list[str]:
+        what = macro_changes.deletion(store, chosen.name)
+        if not chosen.yes and not _agreed(what):
+            raise Diagnostic(f"{what}; nothing was deleted", "macro delete", "--yes agrees to it")
+        return macro_changes.delete(store, chosen.name)
+
+    return _told(work)
+
+
+def _agreed(what: str) -> bool:
+    """Ask at the terminal, if there is one."""
+    if not (sys.stdin.isatty() and sys.stderr.isatty()):
+        return False
+    sys.stderr.write(f"macro delete {what}. Go on? [y/N] ")
+    sys.stderr.flush()
+    return sys.stdin.readline().strip() in ("y", "Y")
+
+
+def key(chosen: argparse.Namespace) -> int:
+    """Put a macro on a function key, or free the key."""
+
+    def work(store: MacroStore) -> list[str]:
+        done, doubtful = macro_changes.set_key(store, chosen.key, chosen.name, chosen.page)
+        return [done, *doubtful]
+
+    return _told(work)
+
+
+def import_(chosen: argparse.Namespace) -> int:
+    """Make macros of a file of function keys; `-` is standard input."""
+
+    def work(store: MacroStore) -> list[str]:
+        if chosen.file != "-":
+            return macro_changes.import_(store, chosen.file, chosen.force)
+        return macro_changes.import_text(store, utf8(bounded(sys.stdin.buffer, INPUT), INPUT), INPUT, chosen.force)
+
+    return _told(work)
+
+
+def export(chosen: argparse.Namespace) -> int:
+    """Write macros into a new file of function keys; `-` is standard output."""
+
+    def work(store: MacroStore) -> list[str]:
+        return macro_changes.export(store, chosen.file, chosen.names, lambda line: write(sys.stdout, line))
+
+    return _told(work)
+
+
+def _told(work: Callable[[MacroStore], list[str]]) -> int:
+    """Do it, and say what was done on standard error: it is narration."""
+    settings = Settings()
+    try:
+        for line in work(MacroStore(settings.macros, settings.project_macros)):
+            write(sys.stderr, line)
+    except Diagnostic as problem:
+        return fail(problem)
+    except KeyboardInterrupt:
+        return INTERRUPTED
+    return 0

@@ -1,0 +1,137 @@
+"""`multidrop program check|test`: find the errors in program files; run them on a simulated drive in virtual time.
+
+Prints, facts and summaries go to standard output, errors to standard error. With --json everything is an object on
+standard output.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import time
+from collections.abc import Iterator, Mapping
+from typing import TYPE_CHECKING
+
+from multidrop.commands import fail
+from multidrop.dialects import Diagnostic
+from multidrop.dialects.families import program_language_of
+from multidrop.dialects.files import program_text_of
+from multidrop.dialects.program_files import errors
+from multidrop.shell.checking import Checked, examine, rewrite
+from multidrop.shell.output import reader_left, shortened, write
+
+if TYPE_CHECKING:
+    from multidrop.simulator.cell.spec import DriveSpec
+    from multidrop.simulator.program_run import Line
+
+WRONG = 1
+MOST = 100
+"""The largest number of problems of a file that are shown."""
+
+
+def check(chosen: argparse.Namespace) -> int:
+    """Check the files in turn; return the highest exit code."""
+    return max(_check_file(file, chosen) for file in chosen.files)
+
+
+def _check_file(file: str, chosen: argparse.Namespace) -> int:
+    try:
+        checked = examine(file, chosen.personality, chosen.language)
+        _report(checked, chosen.json)
+        if chosen.format:
+            rewrite(checked)
+    except Diagnostic as problem:
+        return fail(problem)
+    _summarize(checked, chosen)
+    return 0 if checked.right else WRONG
+
+
+def _report(checked: Checked, json: bool) -> None:
+    """Write each problem; for a person MOST of them."""
+    for each in checked.problems if json else checked.problems[:MOST]:
+        if json:
+            kind = "warning" if each.warning else "error"
+            fact = {"file": checked.file, "line": each.line, "column": each.column, kind: each.what, "hint": each.hint}
+            _write_fact({key: value for key, value in fact.items() if value != ""})
+        else:
+            write(sys.stderr, shortened(each.line_for(checked.file)))
+    if not json and (more := len(checked.problems) - MOST) > 0:
+        write(sys.stderr, f"{checked.file}: {more} more problem{'' if more == 1 else 's'}, not shown")
+
+
+def _summarize(checked: Checked, chosen: argparse.Namespace) -> None:
+    """Write what the file is, and how many of its lines were rewritten."""
+    if chosen.json:
+        fact = {"file": checked.file, "errors": len(errors(checked.problems)), "summary": checked.facts}
+        _write_fact({**fact, "formatted": checked.respelled} if chosen.format else fact)
+    elif checked.right:
+        count = f"{checked.respelled} line{'' if checked.respelled == 1 else 's'}"
+        write(sys.stdout, f"{checked.file}: {checked.facts}" + (f"; {count} formatted" if chosen.format else ""))
+
+
+def _write_fact(fact: Mapping[str, object]) -> None:
+    import json
+
+    write(sys.stdout, json.dumps(fact))
+
+
+FAILED = 1
+
+
+def test(chosen: argparse.Namespace) -> int:
+    """Test the files in turn; return the highest exit code."""
+    several = len(chosen.files) > 1
+    try:
+        given = None if chosen.cell is None and chosen.personality is None else drive(chosen.cell, chosen.personality)
+    except Diagnostic as problem:
+        return fail(problem)
+    return max(_test(file, chosen, given, several) for file in chosen.files)
+
+
+def drive(cell: str | None, personality: str | None) -> DriveSpec:
+    """Find the drive to test on: `CELL` if it has only one, else `CELL#BUS` or `CELL#BUS:NAME`. Raises Diagnostic.
+
+    No CELL before the # means the demo cell, as in `sim:#press`. No cell means an LMDCM in empty surroundings.
+    """
+    from dataclasses import replace
+
+    from multidrop.shell.connect import settings
+    from multidrop.simulator import cells
+    from multidrop.simulator.cell.spec import DriveSpec
+
+    spec = DriveSpec() if cell is None else cells.placed(cell, settings.load().allowed).spec
+    return spec if personality is None else replace(spec, personality=personality)
+
+
+def _test(file: str, chosen: argparse.Namespace, given: DriveSpec | None, several: bool) -> int:
+    from multidrop.simulator.families import PROGRAMS
+    from multidrop.simulator.program_run import Debugging
+
+    began = time.perf_counter()
+    programs = PROGRAMS[chosen.language or program_language_of(file)]
+    head = {"file": file} if several else {}
+    debugging = Debugging(chosen.trace, chosen.breaks, chosen.watch)
+    failed = False
+    try:
+        loaded = programs.read(program_text_of(file), file)(given or programs.drive)
+        if several and not chosen.json:
+            write(sys.stdout, f"{file}:")
+        for event in loaded.run(chosen.run, chosen.until, debugging):
+            failed = failed or event.failed
+            real = time.perf_counter() - began
+            if chosen.json:
+                _write_fact(head | event.fact(real))
+            else:
+                _write_lines(event.lines(file, real))
+    except Diagnostic as problem:
+        return fail(problem)
+    except KeyboardInterrupt:
+        if not reader_left():
+            write(sys.stderr, f"{file}: interrupted")
+        raise
+    return FAILED if failed else 0
+
+
+def _write_lines(lines: Iterator[Line]) -> None:
+    for line in lines:
+        write(sys.stderr if line.problem else sys.stdout, line.text)

@@ -1,0 +1,350 @@
+"""`multidrop run SCRIPT.py`: a Python program with a session, its report, its exit code, the stop of what it started.
+
+The program runs in the main thread, the session in a thread of its own. A signal and the stop key raise in the program.
+"""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import io
+import os
+import signal
+import sys
+import traceback
+from collections.abc import Callable, Coroutine, Iterator
+from datetime import datetime
+from functools import partial
+from itertools import dropwhile, takewhile
+from linecache import getline
+from pathlib import Path
+from types import CodeType, FrameType, ModuleType
+from typing import Any, TypeVar
+
+import multidrop
+from multidrop import script
+from multidrop.api.blocking import Session
+from multidrop.api.sessions import Notice
+from multidrop.commands import fail
+from multidrop.dialects import Diagnostic, Stopped
+from multidrop.dialects.files import bytes_of
+from multidrop.shell.events import FAILURES, Entered, Output, Printed, SessionEvent
+from multidrop.shell.front.keyboard import on_stop_key
+from multidrop.shell.front.report import Report
+from multidrop.shell.output import INTERRUPTED, exit_code, lost_reader, why_interrupted, work_done, write
+from multidrop.shell.scripts.model import Result, ScriptLine
+from multidrop.shell.signals import SIGNALS, early_ends
+
+T = TypeVar("T")
+
+
+def result_of(end: BaseException, file: str, number: int) -> Result:
+    """The result of the line at which a program ended."""
+    line = ScriptLine(file, number, getline(file, number).strip() or file)
+    error = str(end) if isinstance(end, FAILURES) else f"{type(end).__name__}: {end}".removesuffix(": ")
+    failed = isinstance(end, AssertionError)
+    return Result(line, line.text, datetime.now().astimezone(), 0.0, error=error, failed_check=failed)
+
+
+class ReportedSession(Session):
+    """A session that reports what each call of a program sends and prints."""
+
+    def __init__(self, file: str, report: Report | None, *, yes: bool, notice: Notice) -> None:
+        self._file = file
+        self._report = report
+        self._out = sys.stdout
+        self.stopped_by_person = False
+        self._sent: list[Entered] = []
+        self._printed: list[str] = []
+        self._failed: tuple[BaseException, Result] | None = None
+        """The last call, if it failed, and its result: the program may end with it, or go on."""
+        super().__init__(yes=yes, notice=notice)
+        self.awaited.shell.subscribe(self._take)
+
+    def _take(self, event: SessionEvent) -> None:
+        if isinstance(event, Entered):
+            self._sent.append(event)
+        elif isinstance(event, Printed | Output):
+            self._printed.append(event.text)
+
+    def call(self, work: Callable[[], Coroutine[Any, Any, T]]) -> T:
+        """Await work, and report it if it has sent a line."""
+        self.went_on()
+        self._sent, self._printed = [], []
+        begun = datetime.now().astimezone()
+        try:
+            done = super().call(work)
+        except FAILURES as failure:
+            if self._sent:
+                self._failed = failure, self._result(str(failure), begun)
+            raise
+        if self._sent:
+            self._tell(self._result("", begun))
+        return done
+
+    def resume(self) -> None:
+        """Let commands be sent again after a stop of the program's own. Raises Stopped after one of a person."""
+        if self.stopped_by_person:
+            raise Stopped("Ctrl+X stopped every drive; this program sends nothing more")
+        super().resume()
+
+    def went_on(self) -> None:
+        """Report the failure of the call before: the program has caught it."""
+        if self._failed is not None:
+            self._tell(self._failed[1])
+            self._failed = None
+
+    def ended(self, end: BaseException) -> Result | None:
+        """The result of the call with whose failure the program ended; None if it was none."""
+        failed, self._failed = self._failed, None
+        if failed is not None and failed[0] is end:
+            return failed[1]
+        if failed is not None:
+            self._tell(failed[1])
+        return None
+
+    def _tell(self, result: Result) -> None:
+        if self._report is not None:
+            with replaced("stdout", self._out):
+                self._report.executed(result, counts=False)
+
+    def _result(self, error: str, begun: datetime) -> Result:
+        first, text = self._sent[0], "; ".join(each.line for each in self._sent)
+        seconds = (datetime.now().astimezone() - begun).total_seconds()
+        line = ScriptLine(self._file, _called_at(self._file), text)
+        return Result(line, text, begun, seconds, tuple(self._printed), first.bus, first.address, error)
+
+
+def _called_at(file: str) -> int:
+    """The line of the program that is being executed."""
+    frame: FrameType | None = sys._getframe()
+    while frame is not None and frame.f_code.co_filename != file:
+        frame = frame.f_back
+    return frame.f_lineno if frame is not None else 0
+
+
+def place(end: BaseException, file: str) -> int:
+    """The line of the program at which it ended; 0: none."""
+    lines = [number for frame, number in traceback.walk_tb(end.__traceback__) if frame.f_code.co_filename == file]
+    return lines[-1] if lines else 0
+
+
+def traceback_of(end: BaseException) -> list[str]:
+    """The traceback without the frames of multidrop."""
+    found = traceback.TracebackException.from_exception(end)
+    each: traceback.TracebackException | None = found
+    ours = _ours()
+    while each is not None:
+        frames: list[traceback.FrameSummary] = list(each.stack)
+        inside = dropwhile(lambda frame: frame.filename in ours, frames)
+        kept: list[traceback.FrameSummary] = list(takewhile(lambda frame: frame.filename not in ours, inside))
+        each.stack = traceback.StackSummary.from_list(kept)
+        each = each.__cause__ or each.__context__
+    return "".join(found.format()).rstrip().splitlines()
+
+
+def _ours() -> set[str]:
+    """The files of multidrop that run."""
+    loaded = [module for name, module in sys.modules.items() if name.partition(".")[0] == multidrop.__name__]
+    return {getattr(module, "__file__", None) or "" for module in loaded}
+
+
+@contextlib.contextmanager
+def replaced(name: str, stream: object) -> Iterator[None]:
+    """Replace a standard stream while the body runs."""
+    before = getattr(sys, name)
+    setattr(sys, name, stream)
+    try:
+        yield
+    finally:
+        setattr(sys, name, before)
+
+
+def run(chosen: argparse.Namespace, report: Report) -> int:
+    """Execute a Python program; return its exit code."""
+    file = chosen.script
+    try:
+        code = _compiled(file)
+    except Diagnostic as problem:
+        report.wrong((problem,))
+        return fail(problem)
+    return report.finish(_Execution(chosen, report, code).run())
+
+
+def _compiled(file: str) -> CodeType:
+    """Compile a program whole, before anything is opened. Raises Diagnostic with `file:line`."""
+    try:
+        return compile(bytes_of(file), file, "exec", dont_inherit=True)
+    except SyntaxError as problem:
+        raise Diagnostic(f"{problem.msg}", f"{file}:{problem.lineno or 1}") from None
+    except ValueError as problem:  # a NUL
+        raise Diagnostic(f"is not Python: {problem}", file) from None
+
+
+class _Execution:
+    """One program: its signals, its session, and how it ended."""
+
+    def __init__(self, chosen: argparse.Namespace, report: Report, code: CodeType) -> None:
+        self._chosen = chosen
+        self._report = report
+        self._code = code
+        self._file: str = chosen.script
+        self._stopped = self._interrupted = self._ending = False
+        self._on_continue: list[Callable[[], None]] = []
+        self._called: Result | None = None
+        """The result of the call with whose failure the program ended."""
+
+    def run(self) -> int:
+        """Open, execute, close; return the exit code. What goes wrong is said."""
+        with contextlib.ExitStack() as around:
+            around.enter_context(self._signals())
+            try:
+                with self._session() as session:
+                    try:
+                        self._execute(session)
+                        if self._interrupted:  # the program caught it and went on to its end
+                            raise KeyboardInterrupt
+                    finally:
+                        self._ending = True
+                        work_done()
+                code = 0
+            except BaseException as end:
+                self._ending = True
+                code = self._ended(end)
+        if self._stopped:
+            return exit_code(Stopped())
+        return INTERRUPTED if self._interrupted else code
+
+    # Signals and the stop key
+
+    @contextlib.contextmanager
+    def _signals(self) -> Iterator[None]:
+        """Take the signals that end a program."""
+        with early_ends():
+            for each in SIGNALS:
+                signal.signal(each, self._signalled)
+            if sys.platform == "win32":
+                yield
+                return
+            before = signal.signal(signal.SIGCONT, self._continued)
+            try:
+                yield
+            finally:
+                signal.signal(signal.SIGCONT, before)
+
+    def _signalled(self, number: int, frame: object) -> None:
+        """Raise in the program; the end of it is not cut off."""
+        if self._ending:
+            return
+        if self._stopped:
+            raise Stopped("Ctrl+X stopped every drive")
+        self._interrupted = True
+        raise KeyboardInterrupt
+
+    def _continued(self, number: int, frame: object) -> None:
+        for each in self._on_continue:
+            each()
+
+    # The session
+
+    @contextlib.contextmanager
+    def _session(self) -> Iterator[Session]:
+        chosen = self._chosen
+        report = self._report if chosen.json else None
+        opened = ReportedSession(self._file, report, yes=chosen.yes, notice=_say)
+        with opened:
+            self._watch_keys(opened)
+            opened.add(*chosen.on, **dict(chosen.role))
+            try:
+                yield opened
+            except BaseException as end:
+                self._called = opened.ended(end)
+                raise
+            opened.went_on()
+
+    def _watch_keys(self, session: ReportedSession) -> None:
+        """Watch for the stop key, to the end of the session, where standard input is a terminal: it belongs to it."""
+        shell = session.awaited.shell
+
+        def stop() -> None:
+            self._stopped = session.stopped_by_person = True
+            shell.stop("Ctrl+X")
+            _interrupt()
+
+        def after_continue(callback: Callable[[], None]) -> Callable[[], object]:
+            self._on_continue.append(partial(session.thread.soon, callback))
+            return self._on_continue.clear
+
+        keys = on_stop_key(shell.stop_ahead, stop, _interrupt, after_continue)
+        session.thread.enter(keys, session.leaving)
+        if self._on_continue:
+            session.leaving.enter_context(replaced("stdin", _NoInput()))
+
+    # The program
+
+    def _execute(self, session: Session) -> None:
+        module = ModuleType("__main__")
+        module.__file__ = self._file
+        with contextlib.ExitStack() as around:
+            around.enter_context(_main(module, self._file))
+            if self._chosen.json:
+                around.enter_context(replaced("stdout", sys.stderr))
+            script.session, script.values = session, dict(self._chosen.set)
+            around.callback(lambda: [script.__dict__.pop(each) for each in ("session", "values")])
+            exec(self._code, module.__dict__)
+
+    def _ended(self, end: BaseException) -> int:
+        """Say why a program ended; return its exit code."""
+        if isinstance(end, SystemExit):
+            return _exit_code(end)
+        if isinstance(end, KeyboardInterrupt) or lost_reader(end):
+            write(sys.stderr, why_interrupted())
+            return INTERRUPTED
+        line = place(end, self._file)
+        if isinstance(end, FAILURES):
+            if line:
+                end.add_note(f"{self._file}:{line}")
+            code = fail(end)
+        else:
+            write(sys.stderr, *traceback_of(end))
+            code = 1
+        self._report.executed(self._called or result_of(end, self._file, line))
+        return code
+
+
+def _say(text: str, warning: bool) -> None:
+    write(sys.stderr, text)
+
+
+def _interrupt() -> None:
+    """Raise in the main thread, whatever it does."""
+    os.kill(os.getpid(), signal.SIGINT)
+
+
+class _NoInput(io.TextIOBase):
+    """Standard input while the terminal belongs to the stop key."""
+
+    def readline(self, size: int | None = -1, /) -> str:  # type: ignore[override]
+        """Raise Diagnostic."""
+        raise Diagnostic("the terminal belongs to the stop key here", "input", "give values with --set NAME=VALUE")
+
+    read = readline
+
+
+@contextlib.contextmanager
+def _main(module: ModuleType, file: str) -> Iterator[None]:
+    """Make a program the main module, with its folder in the path."""
+    main, arguments, path = sys.modules["__main__"], sys.argv, sys.path[:]
+    sys.modules["__main__"], sys.argv = module, [file]
+    sys.path.insert(0, str(Path(file).resolve().parent))
+    try:
+        yield
+    finally:
+        sys.modules["__main__"], sys.argv, sys.path[:] = main, arguments, path
+
+
+def _exit_code(end: SystemExit) -> int:
+    if end.code is None or isinstance(end.code, int):
+        return end.code or 0
+    write(sys.stderr, str(end.code))
+    return 1

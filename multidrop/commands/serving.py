@@ -1,0 +1,153 @@
+"""Commands that serve until interrupted, and small ones: each imports what it needs when it runs.
+
+`multidrop sim`, `share`, `relay`, `plot`, `publish`, `lsp`, `ports`, `completion`.
+"""
+
+from __future__ import annotations
+
+import argparse
+import signal
+import sys
+from types import FrameType
+
+from multidrop.commands import fail
+from multidrop.dialects import Diagnostic
+from multidrop.shell.output import write
+
+FILES = {"bash": "multidrop.bash", "zsh": "_multidrop", "fish": "multidrop.fish"}
+"""The completion of each shell in `multidrop/shipped`, which `make shipped` writes."""
+
+
+def sim(chosen: argparse.Namespace) -> int:
+    """Serve a simulated cell until a signal, or until the reader of its output leaves."""
+    import asyncio
+    from pathlib import Path
+
+    from multidrop.shell.connect import settings
+    from multidrop.shell.output import finish, nonblocking
+    from multidrop.simulator.serving.command import serve
+
+    async def body() -> int:
+        with nonblocking() as streams:
+            try:
+                allow = (*map(Path, chosen.allow), *(settings.load().allowed if chosen.cell else ()))
+                out = sys.stdout
+                await serve(chosen.cell, json=chosen.json, speed=chosen.speed, stdin=sys.stdin, stdout=out, allow=allow)
+            except Diagnostic as problem:
+                return fail(problem)
+            finally:
+                await finish(streams, lambda: True)
+        return 0
+
+    return asyncio.run(body())
+
+
+def share(chosen: argparse.Namespace) -> int:
+    """Lend a port to several clients until interrupted."""
+    from multidrop.shell.front import sharing
+
+    return sharing.run(chosen.url, chosen.rfc2217, as_json=chosen.json)
+
+
+def plot(chosen: argparse.Namespace) -> int:
+    """Plot until interrupted."""
+    from multidrop.shell.front import plotting
+
+    return plotting.run(
+        chosen.url,
+        [] if "all" in chosen.drive else chosen.drive,
+        to=chosen.to,
+        serve=chosen.serve,
+        rate=chosen.rate,
+        reconnect=not chosen.no_reconnect,
+    )
+
+
+def publish(chosen: argparse.Namespace) -> int:
+    """Publish samples, states, errors and transcripts until interrupted."""
+    from multidrop.shell.front import publishing
+
+    return publishing.run(chosen.urls, to=chosen.to, rate=chosen.rate, reconnect=not chosen.no_reconnect)
+
+
+def relay(chosen: argparse.Namespace) -> int:
+    """Lend a port to the multidrop at the other end of standard input and output, until that is gone."""
+    from multidrop.transports import TransportLost
+
+    try:
+        return _relay(chosen)
+    except (Diagnostic, TransportLost) as problem:
+        return fail(problem)
+
+
+def _relay(chosen: argparse.Namespace) -> int:
+    if sys.platform == "win32":
+        raise Diagnostic(
+            "relay needs Linux or macOS", "multidrop relay", "open the port from a program on this machine"
+        )
+    else:
+        if sys.stdin.isatty():
+            raise Diagnostic(
+                "another multidrop starts this, through ssh, and speaks frames to it",
+                "multidrop relay",
+                f"open ssh://THIS-HOST{chosen.port} on the other machine",
+            )
+        if "://" in chosen.port:
+            from multidrop.shell.secrets import url_without_secrets
+
+            raise Diagnostic(
+                "is no serial port of this machine", url_without_secrets(chosen.port), "as in /dev/ttyUSB0"
+            )
+        from multidrop.transports.relay import serve
+        from multidrop.transports.serial_port import SerialEndpoint, opened
+
+        def ended(number: int, _: FrameType | None) -> None:
+            sys.exit(128 + number)  # closes the port
+
+        for number in (signal.SIGTERM, signal.SIGHUP):
+            signal.signal(number, ended)
+        serve(opened(SerialEndpoint, chosen.port, chosen.baud))
+        return 0
+
+
+def lsp(chosen: argparse.Namespace) -> int:
+    """Serve one editor until it ends the session."""
+    try:
+        try:
+            from multidrop.lsp.serving import serve
+        except ModuleNotFoundError as missing:
+            if (missing.name or "").partition(".")[0] not in ("pygls", "lsprotocol"):
+                raise
+            what = "the language server needs pygls, which is not installed"
+            raise Diagnostic(what, hint="pipx install 'multidrop[lsp]'") from None
+        if chosen.tcp is None and sys.stdin.isatty():
+            write(sys.stderr, "multidrop lsp speaks to an editor, which starts it; see docs/editors.md")
+        return serve(chosen.personality, chosen.tcp)
+    except Diagnostic as problem:
+        return fail(problem)
+
+
+def ports(chosen: argparse.Namespace) -> int:
+    """Print a line for each serial port of this machine."""
+    from multidrop.transports.serial_ports import list_ports
+
+    found = list_ports()
+    for port in found:
+        if chosen.json:
+            import json
+
+            fact = {"port": port.device, "stable": port.stable_name, "description": port.description}
+            write(sys.stdout, json.dumps(fact))
+        else:
+            write(sys.stdout, "  ".join(part for part in (port.device, port.stable_name, port.description) if part))
+    if not found and not chosen.json:
+        write(sys.stderr, "no serial port was found; multidrop demo needs none")
+    return 0
+
+
+def completion(chosen: argparse.Namespace) -> int:
+    """Print the completion of this command line for a shell."""
+    from importlib.resources import files
+
+    sys.stdout.write((files("multidrop") / "shipped" / FILES[chosen.shell]).read_text(encoding="utf-8"))
+    return 0

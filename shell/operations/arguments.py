@@ -1,0 +1,202 @@
+"""Arguments that several commands have, and the types of their values: from a text, or argparse's one line of error."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+from multidrop.shell.operations.operation import typed
+
+HOST = "127.0.0.1"
+KEYS = [f"F{number}" for number in range(2, 13)]
+WHAT = "what to open"
+YES = "answer every question with yes beforehand"
+JSON = "print one JSON object a line"
+SUMMED = "print one JSON object a line, and a summary"
+JUNIT = "write the checks to a JUnit XML file"
+NO_RECONNECT = "give up a lost connection, and do not try again"
+START = "the label or program to execute (default: its own start)"
+
+
+class Several(argparse.Action):
+    """Joins the drives of an option that is repeated: `a,b`."""
+
+    def __call__(self, parser: object, chosen: argparse.Namespace, values: object, option: object = None) -> None:
+        """Add a drive to those before it."""
+        before = getattr(chosen, self.dest)
+        setattr(chosen, self.dest, f"{before},{values}" if before else values)
+
+
+def drives(about: str) -> Mapping[str, Any]:
+    """Declare the drives of a command: one, several, or `all`."""
+    return typed(f"{about}; may be repeated", action=Several)
+
+
+# Values
+
+
+def number(text: str, low: int, high: int, other: str = "") -> int:
+    """Read a whole number; `other`: the words that are valid in place of one."""
+    from multidrop.dialects.text import whole
+
+    found = whole(text, low, high)
+    if found is None:
+        raise argparse.ArgumentTypeError(f"{text} is not a number from {low} to {high}{other and f', or {other}'}")
+    return found
+
+
+def baud(text: str) -> int:
+    return number(text, 300, 1_000_000)
+
+
+def any_baud(text: str) -> int:
+    return number(text, 1, 99_999_999)
+
+
+def count(text: str) -> int:
+    return number(text, 1, 100_000)
+
+
+def rounds(text: str) -> int | None:
+    return None if text == "forever" else number(text, 1, 10**9, "forever")
+
+
+def duration(text: str) -> float:
+    """Read a number of seconds."""
+    found = _any_number(text)
+    if not 0 < found <= 1e7:
+        raise argparse.ArgumentTypeError(f"{text} is not a number of seconds above 0")
+    return found
+
+
+def speed(text: str) -> float:
+    found = _any_number(text)
+    if not 0.001 <= found <= 1000:
+        raise argparse.ArgumentTypeError(f"{text} is not a number from 0.001 to 1000")
+    return found
+
+
+def _any_number(text: str) -> float:
+    """Read a number; 0, which no argument takes, for anything else."""
+    try:
+        return float(text)
+    except ValueError:
+        return 0.0
+
+
+def named_value(text: str) -> tuple[str, str]:
+    name, sign, value = text.partition("=")
+    if not sign or not name:
+        raise argparse.ArgumentTypeError(f"{text} is not NAME=VALUE")
+    return name, value
+
+
+def role_url(text: str) -> tuple[str, str]:
+    name, url = named_value(text)
+    if not (name.replace("-", "").replace("_", "").isalnum() and name.isascii()):
+        raise argparse.ArgumentTypeError(f"{name} is not a name of letters, digits, - and _")
+    return name, url
+
+
+def key_and_values(text: str) -> tuple[str, str]:
+    key, sign, values = text.partition("=")
+    if not (sign and key.strip()):
+        raise argparse.ArgumentTypeError(f"{text} is not KEY=VALUES")
+    return key.strip(), values
+
+
+def allowed(text: str) -> str:
+    if not text:
+        raise argparse.ArgumentTypeError("an empty path would allow the current folder; name the path")
+    return text
+
+
+def function_key(text: str) -> str:
+    key = text.upper()
+    if key not in KEYS:
+        raise argparse.ArgumentTypeError(f"no key {text}; valid: F2 to F12")
+    return key
+
+
+def address(text: str) -> tuple[str, int]:
+    """Read `[HOST:]PORT`."""
+    from multidrop.dialects.text import whole
+
+    host, _, port = text.rpartition(":")
+    found = whole(port, 0, 65535)
+    if found is None:
+        raise argparse.ArgumentTypeError(f"no port {text!r}; valid: PORT or HOST:PORT")
+    return host.removeprefix("[").removesuffix("]") or HOST, found
+
+
+# Arguments
+
+
+def language() -> Mapping[str, Any]:
+    """Declare the language of program files."""
+    from multidrop.dialects.families import DEFAULT, program_languages
+
+    known = program_languages()
+    named = (f"{name} for {', '.join(each.endings)}" for name, each in known.items() if name != DEFAULT)
+    endings = f"default: {'; '.join(named)}; else {DEFAULT}"
+    return typed(endings, choices=list(known))
+
+
+def titles() -> str:
+    """The languages of program files, with the endings of their names."""
+    from multidrop.dialects.families import program_languages
+
+    return " or ".join(f"{each.title} ({', '.join(each.endings)})" for each in program_languages().values())
+
+
+class _Checked:
+    """The personalities on which a check of a program depends; a family is imported only to look for one of them."""
+
+    def __contains__(self, personality: object) -> bool:
+        return any(personality == each for each in self)
+
+    def __iter__(self) -> Iterator[str]:
+        from multidrop.simulator.families import PROGRAMS, TABLE
+
+        return (
+            personality
+            for name, programs in PROGRAMS.items()
+            if programs.refusals is not None
+            for personality in TABLE[name].personalities
+        )
+
+
+def personality(about: str) -> Mapping[str, Any]:
+    """Declare the drive that programs are checked for."""
+    from multidrop.simulator.cell.spec import DriveSpec
+
+    default = DriveSpec().personality
+    about = f"{about} (default: {default})"
+    return typed(about, type=str.upper, choices=_Checked(), default=default)
+
+
+def checked_personality() -> Mapping[str, Any]:
+    return personality("the drive that the program is for")
+
+
+def edited_personality() -> Mapping[str, Any]:
+    return personality("the drive that programs are for, unless the editor names one")
+
+
+def tested_personality() -> Mapping[str, Any]:
+    """Declare the simulated drive of a program test."""
+    from multidrop.simulator.cell.spec import DriveSpec
+    from multidrop.simulator.families import PROGRAMS, TABLE
+
+    tested = tuple(personality for name in PROGRAMS for personality in TABLE[name].personalities)
+    about = f"%(choices)s (default: the cell's, or {DriveSpec().personality})"
+    return typed(about, type=str.upper, choices=tested)
+
+
+def dialect() -> Mapping[str, Any]:
+    """Declare the language of the drives that are searched."""
+    from multidrop.dialects.families import FAMILIES
+
+    languages = [name for name, family in FAMILIES.items() if family.scan is not None]
+    return typed("this language only", choices=languages)

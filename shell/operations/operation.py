@@ -1,0 +1,138 @@
+"""The declaration of an operation: one record gives its verb with help and completion, and its command with `--help`.
+
+This module and the declarations are imported for every `--help`, so they import nothing that costs time.
+"""
+
+from __future__ import annotations
+
+import argparse
+import re
+from collections.abc import Callable, Mapping, Sequence
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from multidrop.dialects.on_demand import imported
+
+if TYPE_CHECKING:
+    from multidrop.dialects import Diagnostic
+    from multidrop.shell.workspace import Workspace
+
+NOTHING: Mapping[str, Any] = MappingProxyType({})
+Arguments = Mapping[str, Any]
+"""The arguments of a command by their notation; each has its help, a `typed` one, or a function that returns either.
+
+`FILE` is one word, `[FILE]` may be left out, `FILE ...` is one or more, `[FILE ...]` any number; `--json` is a flag,
+`--to URL` an option with a value, `--vary KEY=VALUES ...` one that may be repeated. A word is kept under its metavar in
+small letters, several with an s, or under the NAME of `NAME=FILE`. `--a | --b` has a mapping of the arguments of which
+a line has one; in brackets none is needed. Functions read the tables of families, whose import takes time.
+"""
+
+
+class Operation(NamedTuple):
+    """What a person can ask for: by a verb in a session, by a command, or by both."""
+
+    usage: str = ""
+    """Name and arguments of the verb, in the notation of `multidrop.shell.operations.usage`; empty: no verb."""
+    help: str = ""
+    """The help on the verb; its first line is the meaning."""
+    work: str = ""
+    """`FILE:FUNCTION` in `multidrop.shell.verbs`; it takes the Call."""
+    words: Mapping[str, str] = NOTHING
+    """The meanings of the literal words of the usage."""
+    recorded: str = ""
+    """`FILE:FUNCTION` of the line that a macro records; `typed`: the line as typed; empty: none."""
+    checked: str = ""
+    """`FILE:FUNCTION`, which raises Diagnostic for arguments that are wrong whatever is open: scripts are checked."""
+    rows: str = ""
+    """`MODULE:FUNCTION` for more lines of its help, from the table that the verb uses."""
+    fits: Callable[[Workspace], bool] | None = None
+    """The condition under which the verb is offered."""
+    immediate: bool = False
+    """The verb is done at once, so a stop has nothing to end."""
+    concurrent: bool = False
+    """The verb runs beside the lines typed at a prompt."""
+    command: str = ""
+    """The words of the command: `program check`; empty: no command."""
+    meaning: str = ""
+    """The meaning of the command."""
+    run: str = ""
+    """`FILE.FUNCTION` in `multidrop.commands`, from the parsed arguments to the exit code; empty: a group."""
+    examples: Sequence[str] = ()
+    arguments: Arguments = NOTHING
+    urls: bool = False
+    """The help on the command explains URLs."""
+
+    @property
+    def name(self) -> str:
+        """The name of the verb, with its slash."""
+        return self.usage.partition(" ")[0]
+
+    @property
+    def lines(self) -> list[str]:
+        """The help on the verb; the first line is its meaning."""
+        return [line.strip() for line in self.help.strip().splitlines()]
+
+    def meaning_of(self, typed: Sequence[str]) -> str:
+        """The meaning of the first word if that is a literal; else the meaning of the verb."""
+        return self.words.get(typed[0], self.lines[0]) if typed else self.lines[0]
+
+    def described(self) -> list[str]:
+        """The usage, the help, and the rows of its table."""
+        return [self.usage, *self.lines, *(imported(self.rows)() if self.rows else ())]
+
+    def check(self, rest: str) -> None:
+        """Raise Diagnostic for arguments that are wrong whatever is open."""
+        if self.checked:
+            self.imported(self.checked)(self, rest)
+
+    def imported(self, place: str) -> Any:
+        """Import a function of the verb's work."""
+        return imported(f"multidrop.shell.verbs.{place}")
+
+    def wrong(self, message: str = "") -> Diagnostic:
+        """A Diagnostic with the usage, and with the error if it is known."""
+        from multidrop.dialects import Diagnostic
+
+        usage = f"usage: {self.usage}"
+        return Diagnostic(message, self.name, usage) if message else Diagnostic(usage, self.name)
+
+
+def typed(help: str | None, **options: Any) -> Mapping[str, Any]:
+    """Declare the help on an argument and what else argparse takes for it."""
+    return {"help": help, **options}
+
+
+def add_arguments(parser: argparse._ActionsContainer, arguments: Arguments) -> None:
+    """Add the arguments to a parser."""
+    for notation, about in arguments.items():
+        if " | " in notation:
+            group = parser.add_mutually_exclusive_group(required=not notation.startswith("["))
+            add_arguments(group, about)
+            continue
+        about = about() if callable(about) else about
+        options: dict[str, Any] = dict(about) if isinstance(about, Mapping) else {"help": about}
+        name, _, metavar = notation.partition(" ")
+        if notation.startswith("-"):
+            if metavar.endswith(" ..."):
+                options = {"action": "append", "default": []} | options
+            elif not metavar and "choices" not in options:
+                options["action"] = "store_true"
+            elif not {"type", "choices", "required"} & options.keys():
+                options.setdefault("default", "")
+            names = name.split("|")
+        else:
+            given, _, metavar = notation.rpartition("=")
+            optional, several = metavar.startswith("["), "..." in metavar
+            metavar = metavar.strip("[]").removesuffix(" ...")
+            if optional or several:
+                options["nargs"] = ("*" if several else "?") if optional else "+"
+            if optional and not several:
+                options.setdefault("default", "")
+            word = re.match(r"\w+", metavar)
+            names = [given or (word[0].lower() if word else "") + "s" * several]
+            if "choices" in options:
+                metavar = ""
+        metavar = metavar.removesuffix(" ...")
+        if metavar:
+            options["metavar"] = metavar
+        parser.add_argument(*names, **options)

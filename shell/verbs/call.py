@@ -1,0 +1,106 @@
+"""One use of a verb."""
+
+from __future__ import annotations
+
+from collections.abc import Coroutine, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from multidrop.dialects import Diagnostic
+from multidrop.shell.events import By
+from multidrop.shell.lines import split_target
+from multidrop.shell.operations.operation import Operation
+from multidrop.shell.operations.usage import limits, split
+
+if TYPE_CHECKING:
+    from multidrop.drives.drive import Drive
+    from multidrop.shell.session import Session
+
+
+def words(verb: Operation, rest: str) -> list[str]:
+    """The words after the name, without quotes. Raises Diagnostic for a number that no form of the usage has."""
+    found = split(rest, verb.name)
+    low, high = limits(verb.usage)
+    if not low <= len(found) <= high:
+        raise verb.wrong()
+    return found
+
+
+@dataclass(frozen=True)
+class Call:
+    """One use of a verb: where it works, the text after its name, and its origin."""
+
+    session: Session
+    verb: Operation
+    rest: str
+    by: By = By.OPERATOR
+
+    def work(self) -> Coroutine[Any, Any, None]:
+        """What the verb does."""
+        work: Coroutine[Any, Any, None] = self.verb.imported(self.verb.work)(self)
+        return work
+
+    def recorded(self) -> str:
+        """The line that a macro records; empty: none."""
+        if self.verb.recorded == "typed":
+            return f"{self.verb.name} {self.rest}".strip()
+        return str(self.verb.imported(self.verb.recorded)(self)) if self.verb.recorded else ""
+
+    def words(self) -> list[str]:
+        """The words after the name, without quotes. Raises Diagnostic for a number that no form of the usage has."""
+        return words(self.verb, self.rest)
+
+    def word(self) -> str:
+        """The only word; empty where there is none."""
+        return "".join(self.words()[:1])
+
+    def split(self) -> list[str]:
+        """The words after the name, without quotes, however many there are."""
+        return split(self.rest, self.verb.name)
+
+    def sort(
+        self, flags: Sequence[str], values: Mapping[str, str], *, once: bool = False, listed: bool = False
+    ) -> tuple[list[str], list[tuple[str, str]]]:
+        """Sort the words into places and options, which are in any order. Raises Diagnostic.
+
+        `values` names the value that an option needs. `once`: no option twice; `listed`: an error names the valid ones.
+        """
+        places: list[str] = []
+        options: list[tuple[str, str]] = []
+        left = iter(self.split())
+        for word in left:
+            if once and any(word == name for name, _ in options):
+                raise self.wrong(f"{word} is given twice")
+            value = next(left, "") if word in values else ""
+            if word in values and not value:
+                raise self.wrong(f"{word} needs {values[word]}")
+            if word in flags or word in values:
+                options.append((word, value))
+            elif not word.startswith("--"):
+                places.append(word)
+            elif listed:
+                valid = f"valid: {', '.join((*flags, *values))}"
+                raise Diagnostic(f"no option {word}", self.verb.name, valid)
+            else:
+                raise self.wrong(f"no option {word}")
+        return places, options
+
+    def output_file(self, name: str) -> str:
+        """Return the path of a file to write. Raises Diagnostic for a macro's that leaves the current folder.
+
+        A macro may be another person's file: it must not overwrite files elsewhere.
+        """
+        if self.by is By.MACRO and not Path(name).resolve().is_relative_to(Path.cwd().resolve()):
+            hint = "name a file inside it, or type the line"
+            raise Diagnostic(f"{name} leaves the current folder, in which a macro writes", self.verb.name, hint)
+        return name
+
+    def wrong(self, message: str = "") -> Diagnostic:
+        """A Diagnostic with the usage, and with the error if it is known."""
+        return self.verb.wrong(message)
+
+    def drive(self, target: str = "") -> Drive:
+        """Find the drive of `ADDR` or `BUS:ADDR`; the selected drive for an empty target."""
+        bus, address = split_target(target)
+        return self.session.drive(bus, address or None)

@@ -1,0 +1,270 @@
+"""The work of the verbs on what is in drives: settings, registers, plots, snapshots, twins."""
+
+from __future__ import annotations
+
+import re
+import shlex
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+from multidrop.dialects import Diagnostic, Inexpressible, Procedure
+from multidrop.dialects.families import FAMILIES, TABLE
+from multidrop.dialects.family import Registers
+from multidrop.dialects.text import whole
+from multidrop.drives.drive import Drive
+from multidrop.shell.events import By
+from multidrop.shell.params import work
+from multidrop.shell.params.restore import Options
+from multidrop.shell.plots.feed import begin
+from multidrop.shell.plots.rate import DEFAULT, parse_rate
+from multidrop.shell.plots.series import parse_series, read_first
+from multidrop.shell.plots.target import parse_target
+from multidrop.shell.verbs.call import Call
+
+if TYPE_CHECKING:
+    pass
+
+
+FLAGS = ("--dry-run", "--save", "--communication", "--other-product", "--defaults")
+VALUES = {"--with": "a value", "--against": "a value"}
+MOST = 1_000_000_000
+"""The largest limit of twins, steps."""
+
+
+def _parsed(call: Call) -> tuple[str, list[str], dict[str, str], list[str]]:
+    """What to do, the flags, the options with values, and the other words. Raises Diagnostic."""
+    if "".join(call.split()[:1]) not in ("read", "save", "backup", "diff", "restore"):
+        raise call.wrong()
+    (what, *words), options = call.sort(FLAGS, VALUES, listed=True)
+    values = {name: value for name, value in options if value}
+    if what in ("backup", "restore") and not 1 <= len(words) <= 2:
+        raise call.wrong()
+    return what, [name for name, value in options if not value], values, words
+
+
+def params_recorded(call: Call) -> str:
+    """The line, with the address of the drive that is selected now."""
+    what, flags, values, words = _parsed(call)
+    aside = what in ("read", "save") or what == "diff" and ("--defaults" in flags or "--against" in values)
+    names, targets = words[: not aside], words[not aside :]
+    target = targets[0] if targets else call.session.qualified_address(call.drive())
+    given = [word for pair in values.items() for word in pair]
+    return " ".join(("/params", what, *map(shlex.quote, (*names, *filter(None, [target]), *flags, *given))))
+
+
+async def params(call: Call) -> None:
+    what, flags, values, words = _parsed(call)
+    if what in ("read", "save"):
+        if len(words) > 1 or flags or values:
+            raise call.wrong()
+        await (work.read if what == "read" else work.save)(call.session, "".join(words))
+    elif what == "backup":
+        work.check_new(call.output_file(words[0]), "".join(words[1:]))
+        await work.backup(call.session, words[0], "".join(words[1:]))
+    elif what == "restore":
+        options = Options(
+            named=frozenset(name.strip().upper() for name in values.get("--with", "").split(",") if name.strip()),
+            communication="--communication" in flags,
+            save="--save" in flags,
+            dry_run="--dry-run" in flags,
+            other_product="--other-product" in flags,
+        )
+        await work.restore_each(call.session, words[0], "".join(words[1:]), options)
+    else:
+        aside = ("--defaults" in flags) + ("--against" in values)
+        if len(words) > 2 - aside or not aside and not words or aside == 2:
+            raise call.wrong()
+        name, target = ("", words) if aside else (words[0], words[1:])
+        other = call.drive(values["--against"]) if "--against" in values else None
+        await work.diff(call.session, "".join(target), name=name, other=other)
+
+
+async def plot(call: Call) -> None:
+    workspace = call.session
+    match call.split():
+        case []:
+            for each in workspace.plots:
+                workspace.output(f"plotting to {each.where}, {each.rate}")
+            if workspace.plotted:
+                workspace.output(f"plotting on the screen: {' '.join(each.text for each in workspace.plotted)}")
+            elif not workspace.plots:
+                workspace.output("plotting: nothing")
+        case ["off"]:
+            if not workspace.plots and not workspace.plotted:
+                raise Diagnostic("no plot is running", "/plot")
+            if workspace.plotted:
+                workspace.plotted = ()
+                workspace.changed()
+            for each in list(workspace.plots):
+                workspace.notify(await each.end())
+        case words:
+            options, texts = _plotted(call, words)
+            if options:
+                await _plot_to(call, options, texts)
+            else:
+                await _plot_on_screen(call, texts)
+
+
+async def _plot_to(call: Call, options: Mapping[str, str], texts: list[str]) -> None:
+    workspace = call.session
+    target = parse_target(options.get("--to"), options.get("--serve"))
+    if target.file is not None:
+        call.output_file(str(target.file))
+    period = parse_rate(options.get("--rate", DEFAULT))
+    series = parse_series(workspace, texts)
+    await read_first(workspace, series)
+    begun = await begin(workspace, target, series, period)
+    workspace.notify(f"plotting to {begun.where}, {begun.rate}")
+    if begun.desk:
+        workspace.notify(f"at your desk: {begun.desk}, then rerun {begun.where}")
+
+
+async def _plot_on_screen(call: Call, texts: list[str]) -> None:
+    """Show a plot on the screen; other plots go on."""
+    workspace = call.session
+    if workspace.screen is None:
+        raise Diagnostic("no screen to plot on", "/plot", "valid here: --to FILE.rrd or --serve [HOST:]PORT")
+    series = parse_series(workspace, texts)
+    await read_first(workspace, series)
+    workspace.plotted = series
+    workspace.changed()
+    if call.by is By.OPERATOR:  # a page that a macro or a script opens would take the keys of a person who types
+        await workspace.screen("plot")
+
+
+def _plotted(call: Call, words: list[str]) -> tuple[dict[str, str], list[str]]:
+    """The options, and what to plot; a bare word that can only be a target counts as `--to`."""
+    options: dict[str, str] = {}
+    addresses: list[str] = []
+    left = iter(words)
+    for word in left:
+        option = word
+        if word in ("--to", "--serve", "--rate", "--drive"):
+            value = next(left, "")
+        elif word.endswith(".rrd") or "://" in word:
+            option, value = "--to", word
+        else:
+            option, value = "--drive", word
+        if not value or option in options:
+            raise call.wrong(f"{option} is given twice" if value else f"{option} needs a value")
+        if option == "--drive":
+            addresses.append(value)
+        else:
+            options[option] = value
+    if options.keys() == {"--rate"}:
+        raise call.wrong("no target for the plot")
+    return options, addresses
+
+
+def _registered(call: Call) -> tuple[Drive, Registers[Any]]:
+    """The selected drive and its registers. Raises Inexpressible if its family has none."""
+    drive = call.drive()
+    if (registers := drive.family.registers) is None:
+        having = {name: TABLE[name].scheme for name, family in FAMILIES.items() if family.registers is not None}
+        opened = " or ".join(f"{scheme}://HOST" if scheme else f"dialect={name}" for name, scheme in having.items())
+        where = call.session.display_name(drive)
+        raise Inexpressible(f"{where}: no registers; {call.verb.name} is valid on a bus opened with {opened}")
+    return drive, registers
+
+
+async def _show(call: Call, drive: Drive, talk: Procedure[tuple[str, ...]], *, writes: bool = False) -> None:
+    if writes:
+        call.session.starting(drive)
+    for line in await drive.run(talk):
+        call.session.output(line)
+
+
+def _number(call: Call, text: str) -> int:
+    """Parse a decimal or hexadecimal number."""
+    if not re.fullmatch(r"[+-]?(0[xX][0-9A-Fa-f]{1,16}|\d{1,20})", text, re.ASCII):
+        raise call.wrong(f"no number {text}; valid: as 87 or 0x57")
+    return int(text, 16 if "x" in text.lower() else 10)
+
+
+async def register(call: Call) -> None:
+    drive, registers = _registered(call)
+    found = re.fullmatch(r"(\S+?)(?:\s*=\s*(.+)|\s+(\S+))?", call.rest.strip())
+    if found is None:
+        raise call.wrong()
+    address = _number(call, found[1])
+    if not 0 <= address <= 0xFFFF:
+        raise call.wrong(f"no register {found[1]}; valid: 0 to 0xFFFF")
+    if found[2] is None:
+        count = _number(call, found[3]) if found[3] else None
+        await _show(call, drive, registers.read(drive.state, address, count))
+        return
+    values = [_number(call, text.strip()) for text in found[2].split(",")]
+    for line in registers.lines(address, values):
+        await call.session.guard(drive, line, call.by)
+    await _show(call, drive, registers.write(drive.state, address, values), writes=True)
+
+
+async def coil(call: Call) -> None:
+    drive, registers = _registered(call)
+    words = call.words()
+    number = _number(call, words[0])
+    if not 1 <= number <= 0x10000:
+        raise call.wrong(f"no output {words[0]}; valid: from 1")
+    if len(words) == 1:
+        await _show(call, drive, registers.read_coil(drive.state, number))
+    elif words[1] in ("0", "1"):
+        await _show(call, drive, registers.write_coil(drive.state, number, words[1] == "1"), writes=True)
+    else:
+        raise call.wrong()
+
+
+async def device(call: Call) -> None:
+    drive, registers = _registered(call)
+    call.words()
+    await _show(call, drive, registers.device(drive.state))
+
+
+async def snapshot(call: Call) -> None:
+    from multidrop.shell import snapshots  # and with it the simulator, which no other verb needs
+
+    (file,) = call.words()
+    await snapshots.save(call.session, call.output_file(file))
+
+
+async def twin(call: Call) -> None:
+    twins, workspace = call.session.twins, call.session
+    match call.split():
+        case []:
+            rows = list(twins.rows())
+            for row in rows:
+                workspace.output(row, columns=True)
+            workspace.output(f"limit at rest: {twins.limit} steps" if rows else "no twin runs; /twin on begins one")
+        case ["on"]:
+            bus = workspace.bus()
+            if not bus.drives:
+                raise Diagnostic(f"no drive has replied on {bus.name}", call.verb.name)
+            await twins.start(bus)
+        case ["on", *targets]:
+            drives = list(dict.fromkeys(call.drive(each) for each in targets))
+            for drive in drives:
+                bus = workspace.buses[drive.link.name]
+                if bus.drives.get(drive.address) is not drive:
+                    what = f"no drive {drive.address} on {bus.name}"
+                    raise Diagnostic(what, call.verb.name, f"valid: {', '.join(bus.drives)}")
+            for drive in drives:
+                await twins.start(workspace.buses[drive.link.name], [drive.address])
+        case ["off"]:
+            if not twins.off():
+                raise Diagnostic("no twin runs", call.verb.name)
+            workspace.notify("all twins have ended")
+        case ["limit", text]:
+            if (steps := whole(text, 1, MOST)) is None:
+                raise call.wrong(f"no limit {text!r}: steps from 1 to {MOST}")
+            twins.limit = steps
+            workspace.notify(f"twins: the limit at rest is {twins.limit} steps")
+        case _:
+            raise call.wrong()
+
+
+async def sim(call: Call) -> None:
+    cell = call.session.cell
+    if cell is None:
+        raise Diagnostic("no simulated bus is selected", "/sim", "/open sim: opens the demo cell")
+    remark = cell.command(f"/sim {call.rest}")
+    if remark:
+        call.session.notify(remark)
