@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import signal
-import subprocess
 import sys
 from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING
@@ -122,6 +121,8 @@ def edit(chosen: argparse.Namespace) -> int:
 
 def _run(command: list[str], otherwise: str) -> None:
     """Run an editor to its end; Ctrl+C is its own. Raises Diagnostic where it cannot run or fails."""
+    import subprocess
+
     before = signal.getsignal(signal.SIGINT)
     try:
         with subprocess.Popen(command) as process:
