@@ -263,6 +263,10 @@ class TmclState(DriveState):
         self.lost_commands.add(command)
         self.reply_outstanding()
 
+    def late_again(self, command: int) -> None:
+        """Two replies to this command came, sent after all others: only its own and a stop's may still be late."""
+        self.lost_commands &= STOPS | {command}
+
     def proved(self) -> None:
         """The reply to a mark came: all earlier replies are over."""
         self.lost_commands.clear()

@@ -82,18 +82,39 @@ def _lost(state: TmclState, request: Request) -> None:
 
 
 def _mark(state: TmclState, request: Request, sent: bool) -> Procedure[tuple[str, ...] | None]:
-    """Send a mark; its reply may be another's where all commands of marks have lost replies."""
+    """Send a mark; where the commands of all marks have lost replies, the first one twice before it.
+
+    That one is sent again only once all have lost replies. So the second of two replies to it follows those to the
+    others, and only its own and a stop's may still be late.
+    """
+    lines: list[str] = []
+    if state.lost_commands.issuperset(each.command for each in MARKS):
+        for _ in range(2):
+            reply = yield from _asked(state, MARKS[0], request.priority)
+            if reply is None:
+                return None
+            lines += reply.lines[:-1]
+        state.late_again(MARKS[0].command)
     own = call_of(request.body)[1].command
     taken = state.lost_commands | ({own} if sent else set())
     call = next((each for each in MARKS if each.command not in taken), MARKS[0])
-    asked = replace(state.codec.request(state.address, str(call), call), priority=request.priority)
-    reply = yield from _replied(state, replace(asked, expect=ANY_VALUE, gather=True))
-    if reply.end is not End.DONE or (call.command in taken and reply.doubtful):
+    reply = yield from _asked(state, call, request.priority)
+    if reply is None or (call.command in taken and reply.doubtful):
         state.reply_lost(call.command)
         return None
     state.proved()
     name = f"{who(state)}: {late_reply_to(own)}"
-    return tuple(line for line in reply.lines[:-1] if not sent or name in line)
+    return tuple(line for line in (*lines, *reply.lines[:-1]) if not sent or name in line)
+
+
+def _asked(state: TmclState, call: Call, priority: Priority) -> Procedure[Reply | None]:
+    """Send a reading command, and gather what comes before its reply; None without a reply."""
+    asked = replace(state.codec.request(state.address, str(call), call), priority=priority)
+    reply = yield from _replied(state, replace(asked, expect=ANY_VALUE, gather=True))
+    if reply.end is not End.DONE:
+        state.reply_lost(call.command)
+        return None
+    return reply
 
 
 _EXCHANGE = Exchange(who, _mark, _lost, refusal, _replied)

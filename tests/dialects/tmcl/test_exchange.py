@@ -427,3 +427,40 @@ def test_a_module_without_parameter_127_counts_from_a_place_that_is_not_known(mo
     (state,) = shop.open()
     assert state.motors == 1
     assert "not known" in TMCL.controls(state, "")[BY].about
+
+
+def interrupted(shop, state, procedure, delay):
+    """Run a procedure into a stop that comes after its first request; the reply to that comes `delay` seconds late."""
+    sent = len(shop.written)
+    shop.delays = [delay]
+
+    def stop(_):
+        if len(shop.written) > sent and not shop.line.waiting:
+            shop.line.stop(shop.now)
+
+    with pytest.raises(Stopped):
+        shop.run(procedure, at=stop)
+    state.stopped()
+
+
+@for_each("stops", range(1, 9))
+def test_a_resting_module_is_known_after_stops_that_wore_out_every_mark(stops):
+    shop = Shop()
+    (state,) = shop.open()
+    for _ in range(stops):
+        interrupted(shop, state, TMCL.moving(state), 0.05)
+    assert shop.run(TMCL.moving(state)) is False
+
+
+@settings(max_examples=25)
+@given(st.lists(st.sampled_from([0.02, 0.3, 1.1, 2.5]), min_size=3, max_size=9), st.integers(0, 3))
+def test_after_any_stops_a_value_is_right_or_not_given(delays, start):
+    shop = Shop()
+    (state,) = shop.open()
+    asked = [("GGP 66, 0", "1"), ("GAP 4, 0", "51200"), ("GGP 76, 0", "2"), ("GAP 140, 0", "8")]
+    for delay in delays:
+        interrupted(shop, state, TMCL.perform(state, asked[start][0]), delay)
+    for number in range(8):
+        text, value = asked[(start + number) % 4]
+        with contextlib.suppress(NoAnswer):
+            assert shop.type(state, text) == (value,)
