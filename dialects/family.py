@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from multidrop.dialects.parameters import Parameters
     from multidrop.dialects.program_files import Difference, Held
     from multidrop.dialects.scanning import Scan
-    from multidrop.dialects.values import Controls, PolledValues, Reader, TakeSnapshot
+    from multidrop.dialects.values import Controls, PolledValues, Reader, Snapshot
 
 
 EVERYONE = "*"
@@ -93,7 +93,6 @@ Printed = Procedure[tuple[str, ...]]
 Progress = Callable[[int, int], None]
 """Called with lines done and lines in all."""
 S = TypeVar("S", bound=DriveState)
-S_contra = TypeVar("S_contra", bound=DriveState, contravariant=True)
 
 
 class Language(Protocol):
@@ -121,27 +120,6 @@ class Language(Protocol):
         """The word at the end of a line that may be completed; empty where none may."""
 
 
-class Download(Protocol[S_contra]):
-    """Sends a program file, and verifies that the drive took every line."""
-
-    def __call__(
-        self, state: S_contra, lines: Sequence[SourceLine], held: Held | None, progress: Progress
-    ) -> Procedure[Sequence[SourceLine]]:
-        """Return the lines sent: lines that the drive held and that stay (number 0), and the file's.
-
-        `held`: what was just read from the drive, so that the host need not read it again.
-        """
-
-
-class Compare(Protocol[S_contra]):
-    """Compares the programs of a file with those that a drive holds."""
-
-    def __call__(
-        self, state: S_contra, lines: Sequence[SourceLine], held: Held, before: Held | None = None
-    ) -> Sequence[Difference]:
-        """Return the lines that differ. `before`: what the drive held before the file was sent to it."""
-
-
 @dataclass(frozen=True)
 class Programs(Generic[S]):
     """Programs in the drives of a family."""
@@ -162,8 +140,14 @@ class Programs(Generic[S]):
     """Count the lines of a file that the drive stores."""
     end: Callable[[S], Procedure[bool]]
     """Begin to end running programs and their motion; whether one ran. Raises Refused where it moves without one."""
-    download: Download[S]
-    differences: Compare[S]
+    download: Callable[[S, Sequence[SourceLine], Held | None, Progress], Procedure[Sequence[SourceLine]]]
+    """Send a program file, and verify that the drive took every line. Return the lines sent.
+
+    They are lines that the drive held and that stay (number 0), and the file's. The third: what was just read from the
+    drive, so that the host need not read it again.
+    """
+    differences: Callable[[S, Sequence[SourceLine], Held, Held | None], Sequence[Difference]]
+    """Compare the lines of a file with what a drive holds. The last: what it held before the file was sent to it."""
     to_send: Callable[[S, Sequence[SourceLine], Held], Procedure[str]]
     """Return why a file must be sent; empty where the drive holds all of it."""
     start: Callable[[Sequence[SourceLine], str], str]
@@ -219,18 +203,6 @@ class Guards(Generic[S]):
 
 
 @dataclass(frozen=True)
-class Sentences:
-    """Lines that a program needs in the language of every family. An axis is as in `Motion.axis`; empty: the first."""
-
-    move: Callable[[str, int], tuple[str, ...]]
-    """Move an axis by a distance."""
-    move_to: Callable[[str, int], tuple[str, ...]]
-    """Move an axis to a position."""
-    assign: Callable[[str, str], str | None]
-    """Give a word a value; None: its values are not assigned by a word."""
-
-
-@dataclass(frozen=True)
 class Family(Generic[S]):
     """One family of drives. Every conversation raises Refused, NoAnswer, Stopped or Inexpressible."""
 
@@ -265,8 +237,12 @@ class Family(Generic[S]):
     """At rest the position, too, is the same in both readings: in motion the velocity may read 0."""
     question: Callable[[str], str | None]
     """The line that prints the value of a word; None: the word has no value to read."""
-    sentences: Sentences
-    """Moves and assignments."""
+    move: Callable[[str, int], tuple[str, ...]]
+    """The lines that move an axis by a distance. An axis is as in `Motion.axis`; empty: the first."""
+    move_to: Callable[[str, int], tuple[str, ...]]
+    """The lines that move an axis to a position."""
+    assign: Callable[[str, str], str | None]
+    """The line that gives a word a value; None: its values are not assigned by a word."""
     status: Callable[[S], Printed] | None = None
     """The drive's state in words, one line for each part; None: its drives do not report it."""
     programs_at: str = ""
@@ -276,7 +252,7 @@ class Family(Generic[S]):
     parameters_at: str = ""
     """The place of its `Parameters`."""
     snapshot_at: str = ""
-    """The place of its `TakeSnapshot`."""
+    """The place of the conversation that reads a `Snapshot`. It raises Refused or NoAnswer."""
     debugging_at: str = ""
     """The place of its `Debugging`."""
     scan_at: str = ""
@@ -314,9 +290,9 @@ class Family(Generic[S]):
         return found
 
     @property
-    def snapshot(self) -> TakeSnapshot[S] | None:
+    def snapshot(self) -> Callable[[S, Progress], Procedure[Snapshot]] | None:
         """Reads everything of a drive that a cell file needs, and moves and clears nothing; None: it cannot."""
-        found: TakeSnapshot[S] | None = imported_if(self.snapshot_at)
+        found: Callable[[S, Progress], Procedure[Snapshot]] | None = imported_if(self.snapshot_at)
         return found
 
     @property

@@ -11,10 +11,10 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from types import MappingProxyType
-from typing import Generic, Protocol, TypeVar
+from typing import Generic, TypeVar
 
 from multidrop.dialects.codec import Priority, Procedure
-from multidrop.dialects.parameters import Progress, Readings, Value
+from multidrop.dialects.parameters import Readings, Value
 from multidrop.dialects.state import DriveState
 
 UNREAD = -1
@@ -124,16 +124,6 @@ def printed_number(who: str, word: str, text: str) -> float:
         return float(text)
     except ValueError:
         raise ValueError(f"{who}: {word} is not a number: {text.strip() or 'nothing'}") from None
-
-
-S_contra = TypeVar("S_contra", bound=DriveState, contravariant=True)
-
-
-class TakeSnapshot(Protocol[S_contra]):
-    """The conversation that reads a drive."""
-
-    def __call__(self, state: S_contra, progress: Progress, /) -> Procedure[Snapshot]:
-        """Read everything of a drive that a cell file needs. Raises Refused or NoAnswer."""
 
 
 @dataclass(frozen=True)

@@ -58,7 +58,7 @@ def _is_of(drive: Drive, source: sources.Source, held: Held) -> bool:
     except Diagnostic:
         return False
     programs = drive.programs
-    return not programs.differences(drive.state, lines, held) and programs.size(lines) == len(held.lines)
+    return not programs.differences(drive.state, lines, held, None) and programs.size(lines) == len(held.lines)
 
 
 async def read(workspace: Workspace, drive: Drive, what: str, lines: Sequence[SourceLine] = ()) -> Held:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from functools import partial
 
 from multidrop.dialects.codec import Procedure
-from multidrop.dialects.family import Family, Guard, Guards, Sentences
+from multidrop.dialects.family import Family, Guard, Guards
 from multidrop.dialects.mcode.host import classify, operations
 from multidrop.dialects.mcode.host.codec import STOP_BYTES, MCode
 from multidrop.dialects.mcode.host.identify import identify, remember
@@ -40,7 +40,9 @@ MCODE = Family(
     language=help,
     rests_in_place=False,
     question="PR {}".format,
-    sentences=Sentences(sentences.move, sentences.move_to, sentences.assign),
+    move=sentences.move,
+    move_to=sentences.move_to,
+    assign=sentences.assign,
     programs_at="multidrop.dialects.mcode.host.programs:PROGRAMS",
     parameters_at="multidrop.dialects.mcode.host.parameters:PARAMETERS",
     snapshot_at="multidrop.dialects.mcode.host.readings:take",

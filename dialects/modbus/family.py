@@ -5,7 +5,7 @@ from __future__ import annotations
 from functools import partial
 
 from multidrop.dialects.codec import Procedure
-from multidrop.dialects.family import Family, Guard, Guards, Registers, Sentences
+from multidrop.dialects.family import Family, Guard, Guards, Registers
 from multidrop.dialects.mcode.host.classify import referencing
 from multidrop.dialects.mcode.manual import guards, help, sentences
 from multidrop.dialects.modbus.host import operations
@@ -43,7 +43,9 @@ MODBUS = Family(
     language=help,
     rests_in_place=False,
     question="PR {}".format,
-    sentences=Sentences(sentences.move, sentences.move_to, sentences.assign),
+    move=sentences.move,
+    move_to=sentences.move_to,
+    assign=sentences.assign,
     no_programs=f"programs are neither listed nor written over Modbus; {ALTERNATIVE} does both with the same drive",
     parameters_at="multidrop.dialects.modbus.host.values:PARAMETERS",
     snapshot_at="multidrop.dialects.modbus.host.values:take",

@@ -10,7 +10,7 @@ import re
 from collections.abc import Mapping
 from types import MappingProxyType
 
-from multidrop.dialects.family import ADDRESSES, EVERYONE, Family, Guard, Guards, Sentences, to_all
+from multidrop.dialects.family import ADDRESSES, EVERYONE, Family, Guard, Guards, to_all
 from multidrop.dialects.pmx.host import operations
 from multidrop.dialects.pmx.host.codec import STOP_BYTES, Pmx, PmxState
 from multidrop.dialects.pmx.host.identify import identify
@@ -27,10 +27,6 @@ def move(axis: str, steps: int) -> tuple[str, ...]:
 
 def move_to(axis: str, position: int) -> tuple[str, ...]:
     return "ABS", f"{axis.upper() or FIRST}{position}"
-
-
-def assign(word: str, value: str) -> str:
-    return f"{word}={value}"
 
 
 GUARDS: Mapping[str, str] = MappingProxyType(
@@ -87,7 +83,9 @@ PMX = Family(
     language=help,
     rests_in_place=False,
     question=lambda word: word if reads(word) else None,
-    sentences=Sentences(move, move_to, assign),
+    move=move,
+    move_to=move_to,
+    assign="{}={}".format,
     programs_at="multidrop.dialects.pmx.host.programs:PROGRAM_FILES",
     parameters_at="multidrop.dialects.pmx.host.parameters:PARAMETERS",
     snapshot_at="multidrop.dialects.pmx.host.values:take",

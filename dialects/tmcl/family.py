@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from types import MappingProxyType
 
-from multidrop.dialects.family import ADDRESSES, EVERYONE, Family, Guard, Guards, Sentences, to_all
+from multidrop.dialects.family import ADDRESSES, EVERYONE, Family, Guard, Guards, to_all
 from multidrop.dialects.tmcl.host import codec, operations
 from multidrop.dialects.tmcl.host.codec import STOP_BYTES, Tmcl, TmclState
 from multidrop.dialects.tmcl.host.operations import identify
@@ -113,7 +113,9 @@ TMCL = Family(
     language=help,
     rests_in_place=True,
     question=lambda word: None,
-    sentences=Sentences(move, move_to, lambda word, value: None),
+    move=move,
+    move_to=move_to,
+    assign=lambda word, value: None,
     guards=Guards(GUARDS, lambda state, text: guarded(text, state.address), word_of, only_ends),
     parameters_at="multidrop.dialects.tmcl.host.values:PARAMETERS",
     snapshot_at="multidrop.dialects.tmcl.host.values:take",

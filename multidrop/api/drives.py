@@ -213,7 +213,7 @@ class AsyncDrive(DriveFacts):
 
     async def write(self, name: str, value: Value) -> None:
         """Give a word of the drive a value. Raises Refused; Diagnostic where its language has no such form."""
-        line = self.drive.family.sentences.assign(name, written(value)) if _WORD.fullmatch(name) else None
+        line = self.drive.family.assign(name, written(value)) if _WORD.fullmatch(name) else None
         if line is None:
             raise Diagnostic(f"no line gives {name!r} a value", self.name, "send() takes any line of the drive")
         self._check_executes()
@@ -223,11 +223,11 @@ class AsyncDrive(DriveFacts):
 
     async def move(self, steps: int) -> None:
         """Begin to move by a distance. Raises Refused."""
-        await self._move(self.drive.family.sentences.move(self.axis, operator.index(steps)))
+        await self._move(self.drive.family.move(self.axis, operator.index(steps)))
 
     async def move_to(self, position: int) -> None:
         """Begin to move to a position. Raises Refused."""
-        await self._move(self.drive.family.sentences.move_to(self.axis, operator.index(position)))
+        await self._move(self.drive.family.move_to(self.axis, operator.index(position)))
 
     async def _move(self, lines: tuple[str, ...]) -> None:
         self._check_executes()

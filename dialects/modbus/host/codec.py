@@ -44,12 +44,19 @@ class Modbus(Codec):
         return pdu_codec().message(request.tag % NUMBERS, request.body, self.unit)
 
     def decode(self, request: Request, buffer: bytes) -> Decoded | None:
-        """Find the reply with the request's number and function; skip late replies."""
+        """Find the reply with the request's number and function; skip late replies.
+
+        A server that cannot parse a request may omit its function in the exception.
+        """
         asked, number, at = request.body, request.tag % NUMBERS, 0
         try:
             while (found := framing.first(buffer, at)) is not None:
                 at = found.end
-                if found.transaction == number and found.pdu[0] in (asked[0], *_exceptions(asked)):
+                if found.transaction == number and found.pdu[0] in (
+                    asked[0],
+                    asked[0] | framing.EXCEPTION,
+                    framing.EXCEPTION,
+                ):
                     return Decoded(_reply(asked, found.pdu), at)
         except framing.NotModbus:
             return Decoded(Reply(end=End.DAMAGED, detail=_foreign(buffer[at:])), len(buffer))
@@ -87,14 +94,6 @@ class Modbus(Codec):
     def starts_motion(self, text: str) -> bool:
         """Whether a line is a write, each of which may start motion; a print only reads."""
         return text.strip()[:2].upper() != "PR"
-
-    def invalidate(self) -> bytes:
-        return b""
-
-
-def _exceptions(asked: bytes) -> tuple[int, int]:
-    """Function codes of a refusal; a server that cannot parse a request may omit its function."""
-    return asked[0] | framing.EXCEPTION, framing.EXCEPTION
 
 
 def _reply(asked: bytes, answer: bytes) -> Reply:

@@ -9,7 +9,7 @@ read and reported first. The host never repeats a request.
 from __future__ import annotations
 
 from multidrop.dialects.codec import End, Kind, Priority, Procedure, Reply, Request
-from multidrop.dialects.errors import Refused
+from multidrop.dialects.errors import NoAnswer, Refused
 from multidrop.dialects.exchange import unanswered
 from multidrop.dialects.mcode.host.state import described, who
 from multidrop.dialects.modbus.host import framing, mapping
@@ -48,6 +48,27 @@ def sure(state: ModbusState, asked: Request, reply: Reply) -> bytes:
     return reply.body
 
 
+def value(state: ModbusState, name: str, priority: Priority = Priority.OPERATOR) -> Procedure[int]:
+    """Read a register without a look at the drive's error, which would clear it. Raises Refused or NoAnswer."""
+    register = REGISTERS[name]
+    asked = request(state, f"PR {name}", mapping.read(register), priority)
+    return mapping.value_of(register, pdu_codec().registers(sure(state, asked, (yield asked))))
+
+
+def printed(state: ModbusState, word: str, priority: Priority = Priority.OPERATOR) -> Procedure[str]:
+    """Read what PR prints of a word, as `value` does."""
+    reading = mapping.reading(word)
+    asked = request(state, f"PR {word}", reading.pdu, priority)
+    return shown(state, word, reading, sure(state, asked, (yield asked)))
+
+
+def shown(state: ModbusState, word: str, reading: mapping.Reading, answer: bytes) -> str:
+    try:
+        return reading.shown(answer)
+    except framing.NotModbus:
+        raise NoAnswer(f"{who(state)}: the reply to 'PR {word}' is damaged") from None
+
+
 def refusal(state: ModbusState, asked: Request, reply: Reply, code: int | None) -> Refused:
     """Describe an exception: its number and name, its place, and the drive's own error."""
     number = reply.body[1]
@@ -56,9 +77,7 @@ def refusal(state: ModbusState, asked: Request, reply: Reply, code: int | None) 
     row = AT.get(int.from_bytes(asked.body[1:3])) if asked.body[0] == framing.WRITE_REGISTERS else None
     if row is not None and row.limits and number == ILLEGAL_VALUE:
         text += f", which takes {row.limits.replace('int32', '32 bits')}"
-    if code:
-        text += f"; {described(code, state)}"
-    return Refused(text, code)
+    return Refused(f"{text}; {described(code, state)}" if code else text, code)
 
 
 def error_number(state: ModbusState) -> Procedure[int | None]:
@@ -79,17 +98,14 @@ def _quietly(state: ModbusState, name: str) -> Procedure[int | None]:
     return mapping.value_of(register, pdu_codec().registers(reply.body)) if reply.end is End.DONE else None
 
 
-def settle(state: ModbusState) -> Procedure[None]:
-    """Read and report an earlier error, so that the next command is not blamed for it."""
+def carried_out(state: ModbusState, text: str, pdu: bytes) -> Procedure[bytes]:
+    """Send a command and verify that the drive executed it. Raises Refused or NoAnswer.
+
+    An earlier error is read and reported first, so that the command is not blamed for it.
+    """
     if state.error and (code := (yield from error_number(state))):
         state.note(f"{who(state)}: an old error, now cleared: {described(code, state)}")
-
-
-def carried_out(state: ModbusState, text: str, pdu: bytes) -> Procedure[bytes]:
-    """Send a command and verify that the drive executed it. Raises Refused or NoAnswer."""
-    yield from settle(state)
-    asked = request(state, text, pdu)
-    answer = yield from answered(state, asked)
+    answer = yield from answered(state, request(state, text, pdu))
     if code := (yield from error_number(state)):
         raise Refused(f"{who(state)} refused '{text}': {described(code, state)}", code)
     return answer

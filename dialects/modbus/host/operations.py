@@ -16,7 +16,7 @@ from multidrop.dialects.mcode.manual import grammar
 from multidrop.dialects.mcode.manual.points import STATUS, in_words
 from multidrop.dialects.modbus.host import framing, mapping
 from multidrop.dialects.modbus.host.codec import Modbus, ModbusState, pdu_codec
-from multidrop.dialects.modbus.host.exchange import answered, carried_out, flagged, request, sure
+from multidrop.dialects.modbus.host.exchange import answered, carried_out, flagged, printed, request, shown, sure, value
 from multidrop.dialects.modbus.host.mapping import Reading
 from multidrop.dialects.modbus.manual.registers import AT, REGISTERS, ROWS, Register
 
@@ -61,7 +61,7 @@ def _printed(state: ModbusState, statement: grammar.Statement) -> Procedure[tupl
             continue
         word, reading = item
         answer = yield from answered(state, request(state, f"PR {word}", reading.pdu))
-        pieces.append(_shown(state, word, reading, answer))
+        pieces.append(shown(state, word, reading, answer))
         if word == "ER":
             state.error_flag_read(False)
         elif word == "EF":
@@ -85,13 +85,6 @@ def _items(statement: grammar.Statement) -> Iterator[str | tuple[str, Reading]]:
             raise Inexpressible(f"expressions are not evaluated over Modbus; {mapping.ALTERNATIVE} prints them")
 
 
-def _shown(state: ModbusState, word: str, reading: Reading, answer: bytes) -> str:
-    try:
-        return reading.shown(answer)
-    except framing.NotModbus:
-        raise NoAnswer(f"{who(state)}: the reply to 'PR {word}' is damaged") from None
-
-
 def every_register(state: ModbusState) -> Procedure[tuple[str, ...]]:
     """Print every readable register of this drive and the set-ups, in alphabetical order (PR AL).
 
@@ -103,36 +96,25 @@ def every_register(state: ModbusState) -> Procedure[tuple[str, ...]]:
         state.note(f"{who(state)}: ER is left out, as reading it clears it; its error flag is set (EF=1)")
     plain = state.product.startswith("LMDO")
     rows = [row for row in ROWS if row.readable and row.name not in USER and not (plain and row.only)]
-    printed: list[str] = []
+    lines: list[str] = []
     for word in sorted({row.name for row in rows} | {"IS", "OS"}):
         if word == "ER" and state.error:
             continue
-        reading = mapping.reading(word)
-        asked = request(state, f"PR {word}", reading.pdu)
-        reply = yield asked
         try:
-            shown = _shown(state, word, reading, sure(state, asked, reply))
+            text = yield from printed(state, word)
         except Refused:
             continue  # this drive lacks the register
-        printed += _listed(word, shown)
-    return tuple(printed)
-
-
-def _listed(word: str, shown: str) -> list[str]:
-    if word not in mapping.SETUPS - REGISTERS.keys():
-        return [f"{word} = {shown}"]
-    return [line for line in shown.replace("\r", "").split("\n") if line]
+        if word in mapping.SETUPS - REGISTERS.keys():  # a set-up has lines of its own
+            lines += [line for line in text.replace("\r", "").split("\n") if line]
+        else:
+            lines.append(f"{word} = {text}")
+    return tuple(lines)
 
 
 def motion(state: ModbusState, priority: Priority) -> Procedure[tuple[Motion, ...]]:
     """Read position and velocity in two requests, since one carries two registers at most."""
-    values = []
-    for name in ("P", "V"):
-        register = REGISTERS[name]
-        asked = request(state, f"PR {name}", mapping.read(register), priority)
-        reply = yield asked
-        values.append(mapping.value_of(register, pdu_codec().registers(sure(state, asked, reply))))
-    return (Motion(values[0], values[1]),)
+    position = yield from value(state, "P", priority)
+    return (Motion(position, (yield from value(state, "V", priority))),)
 
 
 def flag(state: ModbusState, name: str) -> Procedure[bool]:
@@ -150,8 +132,8 @@ def status(state: ModbusState) -> Procedure[tuple[str, ...]]:
     state.error_flag_read(bool(values[STATUS.index("EF")]))
     asked = request(state, "O1 to O3", pdu_codec().read(framing.READ_COILS, 0, OUTPUTS))
     outputs = pdu_codec().bits((yield from answered(state, asked)), OUTPUTS)
-    shown = ", ".join(f"{n} {'active' if on else 'inactive'}" for n, on in enumerate(outputs, 1))
-    return (*in_words(*values), f"outputs: {shown}")
+    states = ", ".join(f"{n} {'active' if on else 'inactive'}" for n, on in enumerate(outputs, 1))
+    return (*in_words(*values), f"outputs: {states}")
 
 
 # Raw registers, outputs and identification
@@ -168,10 +150,10 @@ def read_registers(state: ModbusState, address: int, count: int | None) -> Proce
         state, f"/register 0x{address:04X} {count}", pdu_codec().read(framing.READ_REGISTERS, address, count)
     )
     found = pdu_codec().registers((yield from answered(state, asked)))
-    printed = [f"0x{address + at:04X} = {word} (0x{word:04X})" for at, word in enumerate(found)]
+    lines = [f"0x{address + at:04X} = {word} (0x{word:04X})" for at, word in enumerate(found)]
     if row is not None and (row.address, row.count) == (address, count):
-        printed.append(f"{row.name} = {mapping.value_of(row, found)}")
-    return tuple(printed)
+        lines.append(f"{row.name} = {mapping.value_of(row, found)}")
+    return tuple(lines)
 
 
 def write_registers(state: ModbusState, address: int, values: Sequence[int]) -> Procedure[tuple[str, ...]]:
@@ -232,7 +214,13 @@ PART, VERSION = 1, 6
 
 def identify(hints: Hints) -> Procedure[list[ModbusState]]:
     state = ModbusState(Modbus())
-    found = yield from _objects(state)
+    found: dict[int, str] = {}
+    for code in (mapping.EVERY_OBJECT, BASIC):  # as far as the drive supports it
+        try:
+            found = yield from identification(state, code)
+            break
+        except Refused:
+            continue
     text = " ".join(found.get(number, "") for number in (VERSION, PART))
     product = PRODUCT.search(text)
     part = found.get(PART, "")
@@ -242,15 +230,3 @@ def identify(hints: Hints) -> Procedure[list[ModbusState]]:
     if (yield from flagged(state)):
         state.note(f"{who(state)}: its error flag is set (EF=1); PR ER shows and clears the error")
     return [state]
-
-
-def _objects(state: ModbusState) -> Procedure[dict[int, str]]:
-    """Read the identification as far as the drive supports it."""
-    try:
-        return (yield from identification(state))
-    except Refused:
-        pass
-    try:
-        return (yield from identification(state, BASIC))
-    except Refused:
-        return {}

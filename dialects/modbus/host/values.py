@@ -22,11 +22,10 @@ from multidrop.dialects.mcode.manual.parameters import reading_of
 from multidrop.dialects.mcode.manual.table import words
 from multidrop.dialects.modbus.host import framing, mapping
 from multidrop.dialects.modbus.host.codec import ModbusState, pdu_codec
-from multidrop.dialects.modbus.host.exchange import request, sure
+from multidrop.dialects.modbus.host.exchange import printed, request, sure, value
 from multidrop.dialects.modbus.host.operations import OUTPUTS, flag, identification, perform
 from multidrop.dialects.modbus.manual.registers import REGISTERS
 from multidrop.dialects.parameters import (
-    Change,
     Parameters,
     Permission,
     Plan,
@@ -55,32 +54,19 @@ def read_settings(state: ModbusState, progress: Progress) -> Procedure[Readings]
     for done, name in enumerate(names):
         progress(done, len(names) + len(lists))
         try:
-            found[name] = yield from _setting(state, name)
+            text = yield from printed(state, name)
+            if not re.fullmatch(r"-?\d+", text):
+                raise NoAnswer(f"{who(state)}: the reply to 'PR {name}' is damaged")
+            found[name] = int(text)
         except Refused as refusal:
             unread.append((name, str(refusal)))
     for done, (word, numbers) in enumerate(lists.items(), len(names)):
         progress(done, len(names) + len(lists))
-        shown = yield from _text(state, word)
-        found |= rows_of_list(word, numbers, shown.replace("\r", "").split("\n"))
+        found |= _rows(word, numbers, (yield from printed(state, word)))
     progress(1, 1)
     counts, table = manual.counting(found), words(state.product)
     rows = [reading_of(name, value, table.get(name), counts) for name, value in found.items()]
     return Readings(tuple(rows), tuple(unread))
-
-
-def _text(state: ModbusState, word: str) -> Procedure[str]:
-    """Print a word without a look at the drive's error, which would clear it."""
-    asked = mapping.reading(word)
-    wanted = request(state, f"PR {word}", asked.pdu)
-    reply = yield wanted
-    return asked.shown(sure(state, wanted, reply))
-
-
-def _setting(state: ModbusState, name: str) -> Procedure[Value]:
-    text = yield from _text(state, name)
-    if not re.fullmatch(r"-?\d+", text):
-        raise NoAnswer(f"{who(state)}: the reply to 'PR {name}' is damaged")
-    return int(text)
 
 
 def plan(state: ModbusState, present: Readings, wanted: Mapping[str, Value], allowed: Permission) -> Plan:
@@ -112,21 +98,18 @@ def ready(state: ModbusState) -> Procedure[str]:
         return f"{who(state)} moves: stop it first"
     if (yield from flag(state, "BY")):
         return f"{who(state)} runs a program: E ends it"
-    asked = request(state, "PR TE", mapping.read(REGISTERS["TE"]))
-    reply = yield asked
-    armed = pdu_codec().registers(sure(state, asked, reply))[0]
+    armed = yield from value(state, "TE")
     return f"{who(state)} has armed trips (TE={armed}): TE=0 disarms them" if armed else ""
 
 
-def write(state: ModbusState, change: Change) -> Procedure[None]:
-    yield from perform(state, change.text)
-
-
-def save(state: ModbusState) -> Procedure[None]:
-    yield from perform(state, "S")
-
-
-PARAMETERS = Parameters(read=read_settings, plan=plan, ready=ready, write=write, save=save, language="MCode")
+PARAMETERS = Parameters(
+    read=read_settings,
+    plan=plan,
+    ready=ready,
+    write=lambda state, change: perform(state, change.text),
+    save=lambda state: perform(state, "S"),
+    language="MCode",
+)
 
 
 FLAGS = ("EF", "BY", "MV", "DE")
@@ -147,10 +130,7 @@ def parts(state: ModbusState, facts: Facts) -> Sequence[Part[ModbusState]]:
 def _registers(state: ModbusState, names: Sequence[str]) -> Procedure[Facts]:
     found = {}
     for name in names:
-        register = REGISTERS[name]
-        asked = request(state, f"PR {name}", mapping.read(register), Priority.POLL)
-        answer = sure(state, asked, (yield asked))
-        found[name] = mapping.value_of(register, pdu_codec().registers(answer))
+        found[name] = yield from value(state, name, Priority.POLL)
     if "EF" in found:
         state.error_flag_read(bool(found["EF"]))
     return found
@@ -167,10 +147,11 @@ def _points(state: ModbusState) -> Procedure[Facts]:
 
 
 def _setups(state: ModbusState, word: str) -> Procedure[Facts]:
-    reading = mapping.reading(word)
-    asked = request(state, f"PR {word}", reading.pdu, Priority.POLL)
-    shown = reading.shown(sure(state, asked, (yield asked)))
-    return rows_of_list(word, manual.LISTS[word], shown.replace("\r", "").split("\n"))
+    return _rows(word, manual.LISTS[word], (yield from printed(state, word, Priority.POLL)))
+
+
+def _rows(word: str, numbers: Sequence[int], text: str) -> Mapping[str, Value]:
+    return rows_of_list(word, numbers, text.replace("\r", "").split("\n"))
 
 
 def fold(state: ModbusState, facts: Facts) -> tuple[Conditions, ...]:
@@ -197,13 +178,8 @@ def check(state: ModbusState, word: str) -> str:
 
 
 def again(state: ModbusState, word: str, priority: Priority) -> Procedure[float]:
-    reading = mapping.reading(word)
-    asked = request(state, f"PR {word}", reading.pdu, priority)
-    reply = yield asked
     try:
-        return printed_number(who(state), word, reading.shown(sure(state, asked, reply)))
-    except framing.NotModbus:
-        raise NoAnswer(f"{who(state)}: the reply to 'PR {word}' is damaged") from None
+        return printed_number(who(state), word, (yield from printed(state, word, priority)))
     except ValueError as wrong:
         raise Refused(str(wrong)) from None
 
@@ -226,15 +202,7 @@ def take(state: ModbusState, progress: Progress) -> Procedure[Snapshot]:
     known, now = words(state.product), {}
     for word in SNAPSHOT_WORDS:
         if word in known and state.product in known[word].products:
-            now[word] = yield from _count(state, word)
+            now[word] = int((yield from printed(state, word)))
     if "I5" in now:
         now["I5"] *= DIVIDED
     return snapshot_of(state, replace(readings, unread=(*readings.unread, NO_PROGRAM)), now)
-
-
-def _count(state: ModbusState, word: str) -> Procedure[int]:
-    """Read a register without a look at the drive's error, which would clear it."""
-    reading = mapping.reading(word)
-    asked = request(state, f"PR {word}", reading.pdu)
-    reply = yield asked
-    return int(reading.shown(sure(state, asked, reply)))

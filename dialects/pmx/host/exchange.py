@@ -53,7 +53,7 @@ def refusal(state: PmxState, request: Request, reply: Reply) -> Refused:
     received, text = reply.text, request.text
     head = f"{who(state)} refused '{text}'"
     if (found := status.meaning(received)) is not None:
-        return Refused(f"{head}: {received}: {found.text} ({found.advice})")
+        return Refused(f"{head}: {received}: {found[0]} ({found[1]})")
     if received != f"?{text}" and not text.startswith(received[1:]):
         return Refused(f"{head}: it received {received[1:]!r}, or does not accept it so (was the line disturbed?)")
     advice = _advice(text)

@@ -33,7 +33,7 @@ def describe(word: str, product: str = "") -> list[str]:
     """Describe a command or a refusal, line by line; there is one product. Raises Diagnostic with similar words."""
     refusal = meaning(word)
     if refusal is not None:
-        return [f"{word}: {refusal.text}", f"  do         {refusal.advice}"]
+        return [f"{word}: {refusal[0]}", f"  do         {refusal[1]}"]
     row = lookup(word)
     if row is None:
         raise Diagnostic(f"no command {word.strip()!r}", "", suggestion(word))

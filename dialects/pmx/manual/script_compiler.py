@@ -13,7 +13,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
 
 from multidrop.dialects.pmx.manual.script_parser import Statement, Value
 from multidrop.dialects.pmx.manual.script_words import (
@@ -68,14 +67,6 @@ _SHAPE = re.compile(
 )
 
 
-@dataclass
-class Code:
-    """Compiled lines, and the source line of each."""
-
-    lines: list[str] = field(default_factory=list)
-    source: list[int] = field(default_factory=list)
-
-
 def looks_compiled(text: str) -> bool:
     """Whether a line has the form of a compiled line, known or not. No line of A-SCRIPT has it."""
     return _SHAPE.fullmatch(text) is not None
@@ -107,28 +98,31 @@ def _names(name: str, value: int) -> bool:
 
 def compile_(statements: Sequence[Statement]) -> Code:
     """Compile a program whose blocks `script_checker` has approved."""
-    maker = _Maker()
+    code = Code()
     for each in statements:
-        maker.take(each)
-    return maker.code
+        code.take(each)
+    return code
 
 
-class _Maker:
+class Code:
+    """Compiled lines, and the source line of each."""
+
     def __init__(self) -> None:
-        self.code = Code()
+        self.lines: list[str] = []
+        self.source: list[int] = []
         self.loops: list[int] = []  # the JW of each open WHILE
         self.skips: list[int | None] = []  # the JR of the open branch, of each open IF
         self.overs: list[list[int]] = []  # the JO lines of each open IF
         self.enders: list[int] = []
 
     def put(self, token: str) -> int:
-        self.code.lines.append(token)
-        self.code.source.append(self.line)
-        return len(self.code.lines) - 1
+        self.lines.append(token)
+        self.source.append(self.line)
+        return len(self.lines) - 1
 
     def here(self, at: int) -> None:
         """Let the jump of line `at` go to the next line."""
-        self.code.lines[at] += str(len(self.code.lines) - at)
+        self.lines[at] += str(len(self.lines) - at)
 
     def take(self, each: Statement) -> None:
         self.line = each.line
@@ -181,7 +175,7 @@ class _Maker:
             self.loops.append(self.enders[-1] - 1)
         elif word == "ENDWHILE":
             at = self.put("JM-")
-            self.code.lines[at] += str(at - self.loops.pop())
+            self.lines[at] += str(at - self.loops.pop())
             self.here(self.enders.pop())
         elif word == "ENDIF":
             for jump in [self.skips.pop(), *self.overs.pop()]:
