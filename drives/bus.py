@@ -46,6 +46,7 @@ class Bus:
         self.roster = Roster(self._conversations, assumed)
         self.telemetry = Telemetry(self.roster)
         self._stopping = Stopping(self.roster)
+        self.stop_ahead, self.halt, self.halted = self._stopping.ahead, self._stopping.halt, self._stopping.halted
         self._search = Search(self.roster, self._conversations, keeper)
 
     @property
@@ -175,21 +176,6 @@ class Bus:
     def last_stop(self) -> Halt | None:
         """The last stop of the whole line."""
         return self._stopping.last
-
-    def stop_ahead(self) -> None:
-        """Write the stop of the whole line from any thread, whatever the loop is doing; `halt` must follow in the loop.
-
-        From then until that `halt` the loop writes nothing. Does nothing on a transport that cannot be preempted.
-        """
-        self._stopping.ahead()
-
-    def halt(self, only: Iterable[Drive] | None = None) -> Halt:
-        """Write a stop of all drives or some, and nothing else: no watcher hears of it before `halted`."""
-        return self._stopping.halt(only)
-
-    def halted(self, halt: Halt, confirm: bool = True) -> None:
-        """Publish a stop that was written, fail what waited, and confirm that it works."""
-        self._stopping.halted(halt, confirm)
 
     def stop(self, only: Iterable[Drive] | None = None) -> Halt:
         """Stop every drive at once, or some: both phases, for a caller with one bus."""

@@ -1,6 +1,6 @@
 """One half-duplex wire as a state machine: bytes and times in, events out. It has no clock and no event loop.
 
-Theory of operation. The line is in one of three states: `Free` (nothing in flight), `Flight` (a request in flight), or
+Theory of operation. The line is in one of three states: None (nothing in flight), `Flight` (a request in flight), or
 `Recovering` (after a timeout, a damaged reply or a stop). One request is in flight at a time; the rest wait in a queue.
 A reply ends when the codec of the request finds it whole. A reply without an end of its own ends when the wire has been
 quiet long enough. A request that is not answered in time ends as a timeout; the line never sends it again.
@@ -25,9 +25,6 @@ from multidrop.dialects import Codec, Decoded, End, Kind, Priority, Reply, Reque
 from multidrop.drives.events import Transaction, Unsolicited
 from multidrop.drives.inbox import NEVER_QUIET, TAIL, Inbox
 from multidrop.drives.late_replies import Doubt
-
-# A request in flight: written, and neither answered nor given up.
-
 
 CHATTER = 4.0
 """Longest wait for a reply, in timeouts, while a running program keeps the wire busy."""
@@ -63,57 +60,35 @@ class Flight:
     received_at: float
     """When the last byte came; before the first, when the request was written."""
     sent: bool = True
-    _judged_length: int = -1
+    judged_length: int = -1
+    """Length of the bytes about which quiet was consulted last."""
 
-    def may_end_by_quiet(self, buffer: bytes) -> bool:
-        """Quiet can end the reply: it has not been consulted about these bytes before."""
-        return self._judged_length != len(buffer)
+    def times(self, buffer: bytes, default: float) -> tuple[float, float]:
+        """Times at which quiet ends a reply without an end of its own, and at which the request times out.
 
-    def judged_quiet(self, buffer: bytes) -> None:
-        """Note that quiet was consulted about these bytes."""
-        self._judged_length = len(buffer)
-
-    def deadline(self, buffer: bytes, default: float, by_quiet: bool) -> float:
-        """Time at which it times out, or at which quiet may end it. `default`: the line's timeout, s."""
+        `default`: the line's timeout, s.
+        """
         patience = self.request.codec.quiet_time(self.request, buffer)
-        timeout = self._timeout_at(patience, buffer, default)
-        if not by_quiet or self._judged_length == len(buffer):
-            return timeout
-        return min(timeout, self._quiet_at(patience))
-
-    def quiet_at(self, buffer: bytes) -> float:
-        """Time at which a reply without an end of its own is complete."""
-        return self._quiet_at(self.request.codec.quiet_time(self.request, buffer))
-
-    def timeout_at(self, buffer: bytes, default: float) -> float:
-        """Time at which the request times out. `default`: the line's timeout, s."""
-        return self._timeout_at(self.request.codec.quiet_time(self.request, buffer), buffer, default)
-
-    def _quiet_at(self, patience: float) -> float:
-        quiet = self._last_activity + patience
-        if self.request.kind is not Kind.COMMAND:
-            return quiet
-        # A command prints nothing, so a program that prints without a pause does not delay it.
-        return min(quiet, self.transmitted_at + max(2 * patience, NEVER_QUIET))
-
-    def _timeout_at(self, patience: float, buffer: bytes, default: float) -> float:
+        since = max(self.received_at, self.transmitted_at)
+        quiet = since + patience
+        if self.request.kind is Kind.COMMAND:
+            # A command prints nothing, so a program that prints without a pause does not delay it.
+            quiet = min(quiet, self.transmitted_at + max(2 * patience, NEVER_QUIET))
         timeout = max(default if self.request.timeout is None else self.request.timeout, patience)
         longest = self.transmitted_at + (LONGEST_LIST if self.request.kind is Kind.LIST else CHATTER * timeout)
         if not buffer.endswith(b"\n"):  # not in the middle of a program's line
             longest = max(longest, min(self.received_at + TAIL, longest + NEVER_QUIET))
-        return min(self._last_activity + timeout, longest)
+        return quiet, min(since + timeout, longest)
+
+    def deadline(self, buffer: bytes, default: float, by_quiet: bool) -> float:
+        """Time at which it times out, or at which quiet may end it."""
+        quiet, timeout = self.times(buffer, default)
+        return timeout if not by_quiet or self.judged_length == len(buffer) else min(timeout, quiet)
 
     def finished(self, reply: Reply, now: float) -> Finished:
         """The end of this request with a reply."""
         ended = Transaction(self.request, reply, self.sent_at, now, self.transmitted_at, self.sent)
         return Finished(self.ticket, ended)
-
-    @property
-    def _last_activity(self) -> float:
-        return max(self.received_at, self.transmitted_at)
-
-
-# Requests that wait for the wire: by priority, then in order; a poll is passed over only once.
 
 
 class Waiting(NamedTuple):
@@ -122,55 +97,6 @@ class Waiting(NamedTuple):
     priority: Priority
     ticket: int
     request: Request
-
-    @property
-    def is_poll(self) -> bool:
-        """A poll yields to everything else, but only once."""
-        return self.priority is Priority.POLL
-
-
-class RequestQueue:
-    """Issues tickets and chooses what is written next."""
-
-    def __init__(self) -> None:
-        self._waiting: list[Waiting] = []
-        self._tickets = 0
-        self._poll_passed_over = False
-
-    def __bool__(self) -> bool:
-        return bool(self._waiting)
-
-    def add(self, request: Request) -> int:
-        """Queue a request; return its ticket."""
-        self._tickets += 1
-        insort(self._waiting, Waiting(request.priority, self._tickets, request))
-        return self._tickets
-
-    def withdraw(self, ticket: int) -> None:
-        """Remove a request that has not been written."""
-        if self._waiting:
-            self._waiting = [each for each in self._waiting if each.ticket != ticket]
-
-    def take(self) -> Waiting:
-        """Remove and return the next request. A poll passed over once goes next, or typing would blind a plot."""
-        poll_waits = self._waiting[-1].is_poll
-        at = 0
-        if poll_waits and self._poll_passed_over:
-            at = next(at for at, each in enumerate(self._waiting) if each.is_poll)
-        chosen = self._waiting.pop(at)
-        self._poll_passed_over = poll_waits and not chosen.is_poll
-        return chosen
-
-    def drop(self, only: Container[str] | None) -> list[Waiting]:
-        """Remove and return all requests, or those for `only` these addresses."""
-        dropped = [each for each in self._waiting if only is None or each.request.address in only]
-        self._waiting = [each for each in self._waiting if each not in dropped]
-        return dropped
-
-    @property
-    def requests(self) -> Sequence[Request]:
-        """The queued requests, next first."""
-        return [each.request for each in self._waiting]
 
 
 QUIET = 0.1
@@ -190,11 +116,6 @@ LineEvent = Write | Finished | Unsolicited
 
 
 @dataclass(frozen=True)
-class Free:
-    """Nothing is in flight; the next request may be written."""
-
-
-@dataclass(frozen=True)
 class Recovering:
     """Trouble at this time: nothing is written until the wire has been quiet."""
 
@@ -207,7 +128,8 @@ class Recovering:
         return Recovering(now, min(self.held_up_since, self.since))
 
 
-State = Free | Flight | Recovering
+State = Flight | Recovering | None
+"""None: nothing is in flight, and the next request may be written."""
 
 
 class Line:
@@ -224,8 +146,11 @@ class Line:
         """The time of a byte on the wire, s; 0: it takes none."""
         self.printed_at = float("-inf")
         """Time of the last bytes that no request asked for."""
-        self._queue = RequestQueue()
-        self._state: State = Free()
+        self._queue: list[Waiting] = []
+        """What waits for the wire: by priority, then in order."""
+        self._tickets = 0
+        self._poll_passed_over = False
+        self._state: State = None
         self._doubt = Doubt()
         self._repeats: list[StopPiece] = []
         """Pieces of the last stop that are still to be repeated."""
@@ -237,16 +162,19 @@ class Line:
 
     def ask(self, request: Request) -> int:
         """Queue a request; return the ticket under which its end is reported."""
-        return self._queue.add(request)
+        self._tickets += 1
+        insort(self._queue, Waiting(request.priority, self._tickets, request))
+        return self._tickets
 
     def withdraw(self, ticket: int) -> None:
         """Remove a request that has not been written."""
-        self._queue.withdraw(ticket)
+        if self._queue:
+            self._queue = [each for each in self._queue if each.ticket != ticket]
 
     @property
     def waiting(self) -> Sequence[Request]:
         """The queued requests, next first."""
-        return self._queue.requests
+        return [each.request for each in self._queue]
 
     # Bytes
 
@@ -286,7 +214,11 @@ class Line:
         flight = self._state if isinstance(self._state, Flight) else None
         if flight is not None:
             self._finish(flight, Decoded(Reply(end=End.STOPPED), 0), now)
-        for each in self._queue.drop(only):
+        dropped, self._queue = self._queue, []
+        if only is not None:
+            self._queue = [each for each in dropped if each.request.address not in only]
+            dropped = [each for each in dropped if each.request.address in only]
+        for each in dropped:
             ended = Transaction(each.request, Reply(end=End.STOPPED), now, now, now, sent=False)
             self._events.append(Finished(each.ticket, ended))
         self.inbox.stop(flight.request if flight is not None else None)
@@ -307,7 +239,7 @@ class Line:
             self._doubt.weigh(flight.request, Reply(end=End.STOPPED), now)
             self.inbox.forget()
         self.inbox.cut_off(now)
-        self._queue.drop(None)
+        self._queue = []
         self._repeats = []
         self._partial_until = float("inf") if begun else float("-inf")
         self._state = Recovering(now)
@@ -332,12 +264,13 @@ class Line:
         if isinstance(self._state, Flight):
             return self._answer(self._state, now)
         self.inbox.sort(now)
-        if not self._has_output:
+        if not (self._queue or self._repeats):
             return False
         if isinstance(self._state, Recovering):
             if now < self._quiet_at(self._state):
                 return False
-            self._resume()
+            self.inbox.resume()
+            self._state = None
         if self._repeats:
             self._repeat_stop(now)
             return False
@@ -346,9 +279,18 @@ class Line:
         self._launch(now)
         return bool(self.inbox.buffer)
 
+    def _take(self) -> Waiting:
+        """Remove and return the next request. A poll passed over once goes next, or typing would blind a plot."""
+        poll_waits, at = self._queue[-1].priority is Priority.POLL, 0
+        if poll_waits and self._poll_passed_over:
+            at = next(at for at, each in enumerate(self._queue) if each.priority is Priority.POLL)
+        chosen = self._queue.pop(at)
+        self._poll_passed_over = poll_waits and chosen.priority is not Priority.POLL
+        return chosen
+
     def _launch(self, now: float) -> None:
-        """Free to Flight: write the next request. Nothing can follow before there is a reply."""
-        chosen = self._queue.take()
+        """None to Flight: write the next request. Nothing can follow before there is a reply."""
+        chosen = self._take()
         request = chosen.request.numbered(chosen.ticket)
         data = request.codec.encode(request)
         self.wrote(data, now, whole=True)
@@ -356,7 +298,7 @@ class Line:
         self._events.append(Write(data, request))
 
     def _answer(self, flight: Flight, now: float) -> bool:
-        """Flight to Free or Recovering, if the reply is whole or time is up."""
+        """Flight to None or Recovering, if the reply is whole or time is up."""
         found = self._without_echo(flight, now) if self.inbox.awaits_echo else self._decoded(flight, now)
         if found is None:
             return False
@@ -373,15 +315,10 @@ class Line:
         self.inbox.consume(found.used, now)
         # A mark that ends the wait for another reply recovers too: an ACK may follow it.
         troubled = weight.ends_wait or reply.end in (End.TIMEOUT, End.DAMAGED)
-        self._state = Recovering(now) if troubled else Free()
-
-    def _resume(self) -> None:
-        """Recovering to Free."""
-        self.inbox.resume()
-        self._state = Free()
+        self._state = Recovering(now) if troubled else None
 
     def _repeat_stop(self, now: float) -> None:
-        """Free to Recovering: write one piece of the stop again."""
+        """None to Recovering: write one piece of the stop again."""
         data = self._repeats.pop(0).data
         self._state = Recovering(now)
         self.wrote(data, now)
@@ -395,17 +332,18 @@ class Line:
         found = codec.decode(request, buffer) if buffer else None
         if found is not None or now < flight.deadline(buffer, self.timeout, by_quiet=True):
             return found
-        if flight.may_end_by_quiet(buffer) and now >= flight.quiet_at(buffer):
-            flight.judged_quiet(buffer)
+        quiet, timeout = flight.times(buffer, self.timeout)
+        if flight.judged_length != len(buffer) and now >= quiet:
+            flight.judged_length = len(buffer)
             found = codec.on_quiet(request, buffer)
-        if found is None and now >= flight.timeout_at(buffer, self.timeout):
+        if found is None and now >= timeout:
             return codec.on_timeout(request, buffer)
         return found
 
     def _without_echo(self, flight: Flight, now: float) -> Decoded | None:
         """The end of a request whose bytes were not repeated unchanged: no reply can be trusted."""
         echo = self.inbox.echo
-        if echo is None or now < flight.timeout_at(self.inbox.buffer, self.timeout):
+        if echo is None or now < flight.times(self.inbox.buffer, self.timeout)[1]:
             return None
         held = echo.forget().decode("latin-1")
         if not held:
@@ -428,14 +366,10 @@ class Line:
         if isinstance(self._state, Flight):
             return self._state.deadline(self.inbox.buffer, self.timeout, by_quiet=not self.inbox.awaits_echo)
         tail = self.inbox.tail_at()
-        if not (isinstance(self._state, Recovering) and self._has_output):
+        if not (isinstance(self._state, Recovering) and (self._queue or self._repeats)):
             return tail
         quiet = self._quiet_at(self._state)
         return quiet if tail is None else min(tail, quiet)
-
-    @property
-    def _has_output(self) -> bool:
-        return bool(self._queue or self._repeats)
 
     def _quiet_at(self, trouble: Recovering) -> float:
         """Time at which the wire has been quiet long enough, or is given up on."""

@@ -6,28 +6,17 @@ It writes what the line says, hands it what is received, and publishes everythin
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Callable, Container, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
 
-from multidrop.dialects import End, Kind, Priority, Request, StopPiece
+from multidrop.dialects import End, Kind, Priority, Request
 from multidrop.drives.events import Changed, Ended, Lost, News, Notice, Sent, Traffic, Transaction, Unsolicited, apart
 from multidrop.drives.keeping import GLOBAL, Departure, Keeper
 from multidrop.drives.late_replies import Debris, Leftovers
 from multidrop.drives.line import Finished, Line, Write
-from multidrop.transports import Preemptible, Transport, TransportLost
+from multidrop.transports import Transport, TransportLost
 
 OnAnswer = Callable[[Transaction | TransportLost], None]
 """Called with the end of a request that was queued, in the turn of the event loop in which it ends."""
-
-
-@dataclass(frozen=True)
-class WrittenStop:
-    """The bytes of a stop. `invalidates`: they make a half-sent line harmless, as long as they leave whole."""
-
-    data: bytes
-    invalidates: bool
-    repeats: tuple[StopPiece, ...]
-    """The same stop, to be repeated piece by piece once it is quiet."""
 
 
 TERMINATORS = (b"\r", b"\n")
@@ -44,7 +33,7 @@ class Reserved(TransportLost):
 
 
 class Link:
-    """An open line. All methods but `preempt` are called from the event loop's thread.
+    """An open line. Its methods are called from the event loop's thread.
 
     A link whose transport broke is `lost`. `resume` gives it another transport; from then until `resumed` it passes
     the requests of those who look for its drives, and no others.
@@ -67,7 +56,7 @@ class Link:
         self.departure = Departure(keeper)
         """The note on the command that is on its way."""
         self._keeper = keeper
-        self._debris = Debris()
+        self.debris = Debris()
         self.leftovers = Leftovers()
         self._orderly = False
         """The port was still open when it was shut."""
@@ -168,48 +157,19 @@ class Link:
         now = self.now()
         if not self.transport.write(data):
             return False
-        self.departure.begins(text := data.decode("latin-1"))
+        text = data.decode("latin-1")
+
+        def left() -> None:  # unless others were written since or the port broke
+            if self.departure.under_way == text and not self.lost:
+                self.departure.arrived()
+
+        self.departure.begins(text)
         self.line.wrote(data, now, whole=True)
         if data.endswith(TERMINATORS):
-            self._loop.call_at(self.line.transmitted, self._left, text)
+            self._loop.call_at(self.line.transmitted, left)
         self.publish(Traffic(now, True, data))
         self.advance()
         return True
-
-    def _left(self, text: str) -> None:
-        """Note that bytes have left, unless others were written since or the port broke."""
-        if self.departure.under_way == text and not self.lost:
-            self.departure.arrived()
-
-    # Stops
-
-    def preempt(self, framed: bool, stop: Callable[[bool], bytes]) -> None:
-        """Write a stop from any thread; the loop writes nothing from then until `take_over`.
-
-        `stop` is called with whether a line may have been cut in two. Does nothing on a transport that cannot do it.
-        """
-        if self.lost or not isinstance(self.transport, Preemptible):
-            return
-        now = self.now()
-        self.transport.preempt(framed, lambda dropped: stop(bool(dropped or self.line.half_sent(now))))
-
-    def take_over(self) -> None:
-        """Note in the loop what another thread has written; the loop may write again."""
-        if isinstance(self.transport, Preemptible):
-            self.transport.yielded()
-
-    def write_stop(self, framed: bool, stop: Callable[[bool], bytes], trouble: list[str]) -> None:
-        """Drop what is unsent and write a stop, whatever fails. `stop`: as for `preempt`."""
-        dropped = 1
-        with apart(f"taking back what {self.name} has not sent", trouble):
-            dropped = self.transport.discard(whole=framed)
-        self.transport.write(stop(bool(dropped or self.line.half_sent(self.now()))))
-
-    def stopped(self, stop: WrittenStop, at: float, only: Container[str] | None) -> None:
-        """Note a stop that was written: fail what is queued (for `only` these addresses) and in flight."""
-        self.line.stop(at, *stop.repeats, only=only)
-        self.line.wrote(stop.data, at, whole=stop.invalidates)
-        self._debris.stop_written(stop.data, self.line.transmitted)
 
     # The wire
 
@@ -226,8 +186,17 @@ class Link:
         self._advancing = self._news.held = True
         try:
             while self._further:
-                self._further = False
-                self._do_events()
+                self._further, stops, now = False, self.stops, self.now()
+                for event in self.line.events(now):
+                    if isinstance(event, Write):
+                        if event.request is not None and event.request.priority is not Priority.POLL:
+                            self._news.tell()
+                        if stops == self.stops or event.request is None:  # else a watcher has stopped it meanwhile
+                            self._write(event, now)
+                    elif isinstance(event, Finished):
+                        self._finished(event)
+                    else:
+                        self._unsolicited(event, now)
         finally:
             self._advancing = self._news.held = False
         if (deadline := self.line.deadline) is not None and not self.lost:
@@ -250,19 +219,6 @@ class Link:
             self._timer.cancel()
             self._timer = None
 
-    def _do_events(self) -> None:
-        stops, now = self.stops, self.now()
-        for event in self.line.events(now):
-            if isinstance(event, Write):
-                if event.request is not None and event.request.priority is not Priority.POLL:
-                    self._news.tell()
-                if stops == self.stops or event.request is None:  # else a watcher has stopped it meanwhile
-                    self._write(event, now)
-            elif isinstance(event, Finished):
-                self._finished(event)
-            else:
-                self._unsolicited(event, now)
-
     def _received(self, data: bytes) -> None:
         now = self.now()
         self._news.collect(Traffic(now, False, data))
@@ -275,13 +231,13 @@ class Link:
             self.line.not_written(now)
             return
         if request is None:
-            self._debris.stop_repeated(self.line.transmitted)
+            self.debris.stop_repeated(self.line.transmitted)
             self.publish(Traffic(now, True, data))
             return
         # A program's lines are stored and do nothing; a part of a setting or of a question moves nothing.
         if request.kind is Kind.COMMAND or request.address in GLOBAL:
             self.departure.begins(f"{request.address}{request.text}")
-        self._debris.request_written(data, request, now)
+        self.debris.request_written(data, request, now)
         if request.address:  # the trace of a lone drive repeats lines that were sent to be stored
             self.leftovers.request_written(data, now)
         self.publish(Sent(now, request))
@@ -304,7 +260,7 @@ class Link:
 
     def _unsolicited(self, event: Unsolicited, now: float) -> None:
         self.on_unsolicited(event.lines)
-        if lines := self._debris.removed(event.lines, self.line.inbox.codec.stop_debris, now):
+        if lines := self.debris.removed(event.lines, self.line.inbox.codec.stop_debris, now):
             codec = self.line.inbox.codec
             if damaged := [each for each in lines if codec.damaged(each)]:
                 self.notify(f"a printed line was damaged on the line (received {_short(damaged)})", warning=True)

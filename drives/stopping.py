@@ -1,162 +1,38 @@
-"""Stops of a link, in two phases: write the bytes, then tell of it and confirm that it works.
+"""Stops of a link, in two phases: write the bytes, then publish it and confirm that it works.
 
-The bytes go first, past the queue and past every watcher; then the line fails what waits. A session writes the stops of
-all links before it does anything else, so that no link delays the stop of another.
+1. The thread that reads the keys calls `Stopping.ahead` for each link: `stop_forms` makes the bytes, and the transport
+   writes them past every queue, whatever the event loop does.
+2. In the loop `Stopping.halt` takes that over, or writes the stop now. Then the line fails what waits, and notes what
+   the drives may hold of a line. A session does this for all links before anything else: none delays another's stop.
+3. `Stopping.halted` publishes the stop. The line repeats it in pieces once it is quiet.
+4. The drives are read. A stop is believed only when two readings show the drive at rest and no program runs that can
+   move it: screen and log must not lie. A drive that still moves and does not slow down is stopped again, and so is one
+   whose program runs, unless a command has started it since.
 """
 
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from enum import Enum
 from typing import NamedTuple
 
-from multidrop.dialects import Codec, DriveError, Motion, Priority, Stopped, StopPiece
+from multidrop.dialects import Codec, DriveError, DriveState, Priority, Stopped, StopPiece
 from multidrop.drives.drive import Drive
 from multidrop.drives.events import Sample, Traffic, Transaction, apart
 from multidrop.drives.keeping import GLOBAL
-from multidrop.drives.link import Link, WrittenStop
+from multidrop.drives.link import Link
 from multidrop.drives.roster import Roster
-from multidrop.transports import TransportLost
-
-# Confirmation of a stop: read velocities and programs, and stop again what moves or runs on.
-#
-# A stop is believed only when two readings show the drive at rest and no program runs that can move it: screen and log
-# must not lie. So each drive is read once the wire is quiet and the stop was repeated. A drive that still moves and
-# does not slow down is stopped again, and so is one whose program runs, unless a command has started it since.
-
+from multidrop.transports import Preemptible, TransportLost
 
 TRIES = 3
 BETWEEN = 0.1
 """Time between two readings of a drive that may be slowing down, s."""
 RAMP = 30.0
 """How long a drive is read that slows down, or was stopped in vain, s."""
-
-
-class Activity(NamedTuple):
-    """What a drive did when it was read; nothing, where that is not known."""
-
-    speed: int = 0
-    """Unsigned, of its fastest axis."""
-    runs: bool = False
-    """A program runs."""
-    places: str = ""
-    """The positions of its axes; empty: not read."""
-
-    @property
-    def none(self) -> bool:
-        """Whether it neither moves nor runs a program, or nothing is known."""
-        return not self.speed and not self.runs
-
-    def lessens(self, before: Activity | None) -> bool:
-        """Whether it slows down, as far as two readings show, and no program runs that can move it again."""
-        return not self.runs and (before is None or self.speed < before.speed)
-
-
-NOTHING = Activity()
-ENDLESS = Activity(1 << 40)
-"""Of a drive that another stop kept from being read: faster than any."""
-
-
-async def confirm_stop(halt: Halt, repeat: Callable[[Halt], None], superseded: Callable[[Halt], bool]) -> None:
-    """Read the drives of a stop and publish what was found; `repeat` it for what goes on and does not slow down."""
-    link = halt.link
-    unconfirmed = list(halt.affected)
-    if not unconfirmed:
-        link.notify("stop sent; no drive is known here, so no velocity could be read", warning=True)
-    before: dict[Drive, Activity] = {}
-    active: dict[Drive, Activity] = {}
-    tries, until = 0, link.now() + RAMP
-    while unconfirmed and link.now() < until:
-        found = {drive: await _read(drive, halt) for drive in unconfirmed if not halt.started_since(drive)}
-        _announce(halt, found)
-        if superseded(halt) and not link.lost:
-            return
-        active = {drive: each for drive, each in found.items() if not each.none and not halt.started_since(drive)}
-        slow_down = all(each.lessens(before.get(drive)) for drive, each in active.items())
-        before = found
-        if active and not slow_down and tries < TRIES:
-            tries += 1
-            _once_more(halt, active, tries, repeat)
-        # The line of an operator that may start a drive may also be refused, and then nothing has started it.
-        undecided = [drive for drive in unconfirmed if halt.started_since(drive) and drive.starting]
-        once = [drive for drive, each in found.items() if each.none and halt.fate(drive) is Fate.SENT]
-        unconfirmed = [*active, *undecided, *once]
-        if unconfirmed:
-            await asyncio.sleep(BETWEEN)
-    if active and tries < TRIES:
-        names = ", ".join(drive.shown for drive in active)
-        link.notify(f"{names}: slows down for more than {RAMP:g} s", warning=True)
-
-
-def _announce(halt: Halt, found: Mapping[Drive, Activity]) -> None:
-    """Say which drives stand, whether this reading or a poll after it has confirmed that."""
-    for drive, each in found.items():
-        if each.places and each.none and halt.fate(drive) is Fate.STANDING:
-            halt.link.notify(f"{drive.shown}: stopped, velocity 0 at {each.places}")
-
-
-def _once_more(halt: Halt, active: Mapping[Drive, Activity], tries: int, repeat: Callable[[Halt], None]) -> None:
-    """Stop again what goes on, or give up and say so."""
-    link = halt.link
-    if tries == TRIES:
-        halt.vain = True
-        for goes_on, moves in (("MOVING", True), ("RUNNING", False)):
-            if names := ", ".join(drive.shown for drive, each in active.items() if bool(each.speed) is moves):
-                link.notify(f"STILL {goes_on} after {TRIES} stops: {names}; cut the power", warning=True)
-        return
-    for drive, each in active.items():
-        does = f"still moves at {each.speed} a second" if each.speed else "its program still runs"
-        link.notify(f"{drive.shown}: {does}; stop sent again", warning=True)
-    repeat(halt)
-
-
-async def _read(drive: Drive, halt: Halt) -> Activity:
-    """Read and publish what a drive does; NOTHING also where that cannot be read, which is a doubt of the stop."""
-    if drive.programming and not drive.engaged:
-        return _not_known(drive, halt, "its velocity cannot be read in program mode")
-    ended: list[Transaction] = []
-    try:
-        axes = await drive.motion(Priority.OPERATOR, ended.append)
-        runs, why = await _program(drive, axes)
-    except Stopped:
-        return ENDLESS
-    except (TimeoutError, DriveError, TransportLost) as error:
-        return _not_known(drive, halt, f"its velocity could not be read: {error}")
-    at = ended[-1].transmitted_at
-    for each in axes:
-        drive.link.publish(Sample(at, drive.address, each.position, each.velocity, each.axis, each.trouble, runs))
-    if why:
-        return _not_known(drive, halt, why)
-    halt.doubts.pop(drive, None)
-    speed = abs(drive.seen.velocity) if drive.seen is not None else 0
-    return Activity(speed, bool(runs), ", ".join(str(each.position) for each in axes))
-
-
-async def _program(drive: Drive, axes: Sequence[Motion]) -> tuple[bool | None, str]:
-    """Whether a program runs, None where that is not asked: a drive that moves is stopped again; or why not known."""
-    runs = axes[0].program
-    if runs is not None or any(axis.velocity for axis in axes):
-        return runs, ""
-    try:
-        return await drive.busy(), ""
-    except Stopped:
-        raise
-    except (TimeoutError, DriveError, TransportLost) as error:
-        return None, f"velocity 0 was read, and whether a program runs was not: {error}"
-
-
-def _not_known(drive: Drive, halt: Halt, why: str) -> Activity:
-    halt.doubts[drive] = why
-    drive.link.notify(f"{drive.shown}: stop sent, but {why}", warning=True)
-    return NOTHING
-
-
-# One stop of a link, and what is known of each drive since.
-#
-# Nothing known of a drive is stored twice: it follows from the stop, from what was read since, and from what was sent
-# since.
+AGAIN = 3
+"""How often a stop is written again for a drive that stored it."""
 
 
 class Fate(Enum):
@@ -173,7 +49,10 @@ class Fate(Enum):
 
 @dataclass(eq=False)
 class Halt:
-    """A stop of one link. `drives` are those that it is for, `others` those that its bytes stop as well."""
+    """A stop of one link. What is known of a drive follows from the stop, and from what was read and sent since.
+
+    `drives` are those that it is for, `others` those that its bytes stop as well.
+    """
 
     link: Link
     at: float
@@ -227,9 +106,6 @@ class Halt:
         return Fate.NOT_KNOWN if self.link.lost or drive in self.doubts else Fate.SENT
 
 
-# The bytes of a stop: for every language and setting on a link, each form once.
-
-
 @dataclass(frozen=True)
 class StopForms:
     """The forms of a stop, of which the state of the wire selects one."""
@@ -246,81 +122,50 @@ class StopForms:
     missed: tuple[Drive, ...] = ()
     """Drives whose dialect failed to make a stop."""
 
-    def written(self, cut: bool) -> WrittenStop:
-        """The stop to write. `cut`: a line may have been cut in two."""
+    def written(self, cut: bool) -> tuple[bytes, bool]:
+        """The bytes to write, and whether they make a half-sent line harmless if they leave whole.
+
+        `cut`: a line may have been cut in two.
+        """
         if cut and self.invalidate:
-            return WrittenStop(self.unterminated + self.invalidate + self.immediate, True, self.repeats)
-        return WrittenStop(self.immediate, False, self.repeats)
-
-
-@dataclass(frozen=True)
-class _Target:
-    """A name to stop, and its drive if one is known."""
-
-    name: str
-    drive: Drive | None = None
-
-
-_Groups = dict[tuple[Codec, bool], list[_Target]]
-"""Targets by language, and whether that is certain."""
-
-
-class _Collected:
-    """The forms of several groups, each once."""
-
-    def __init__(self) -> None:
-        self.immediate: list[bytes] = []
-        self.unterminated: list[bytes] = []
-        self.repeats: list[StopPiece] = []
-        self.invalidate: list[bytes] = []
-
-    def add(self, codec: Codec, names: list[str], sure: bool) -> None:
-        stop, unfinished = codec.stop(names, sure), codec.stop(names, sure, half_sent=True)
-        pieces, invalidate = codec.stop_again(names, sure), codec.invalidate()
-        if stop not in self.immediate:
-            # Written at once, the reply to a second answered stop would collide with the reply to the first.
-            collides = bool(self.immediate) and codec.stop_replies
-            if collides:
-                self.repeats.append(StopPiece(stop, pieces[0].quiet))
-            else:
-                self.immediate.append(stop)
-                self.unterminated.append(unfinished)
-            self.repeats += pieces
-        if invalidate not in self.invalidate:
-            self.invalidate.append(invalidate)
+            return self.unterminated + self.invalidate + self.immediate, True
+        return self.immediate, False
 
 
 def stop_forms(roster: Roster, only: Iterable[Drive] | None = None) -> StopForms:
-    """Make the bytes that stop these drives; by default all of the link, unlisted and probed ones included."""
-    groups, forms = _groups(roster, only), _Collected()
-    missed: list[Drive] = []
-    for (codec, sure), members in groups.items():
-        names, failed = [each.name for each in members], list[str]()
-        with apart(f"the stop of {', '.join(names)} on {roster.link.name}", failed):
-            forms.add(codec, names, sure)
-        missed += [each.drive for each in members if each.drive is not None and failed]
-    return StopForms(
-        b"".join(forms.immediate),
-        b"".join(forms.unterminated),
-        tuple(forms.repeats),
-        b"".join(forms.invalidate),
-        any(codec.framed for codec, _ in groups),
-        tuple(missed),
-    )
+    """Make the bytes that stop these drives; by default all of the link, unlisted and probed ones included.
 
-
-def _groups(roster: Roster, only: Iterable[Drive] | None) -> _Groups:
-    groups: _Groups = {}
+    Each form of each language and setting is in it once.
+    """
+    groups: dict[tuple[Codec, bool], tuple[list[str], list[Drive]]] = {}
     for drive in roster.all_drives if only is None else only:
-        members = groups.setdefault((drive.codec, not drive.state.settings_unknown), [])
-        members.append(_Target(drive.address or drive.state.name, drive))
+        state = drive.state
+        names, drives = groups.setdefault((state.codec, not state.settings_unknown), ([], []))
+        names.append(state.address or state.name)
+        drives.append(drive)
     if only is None and (roster.probing or not groups):
-        groups.setdefault((roster.family.codec, False), []).extend(_Target(name) for name in roster.probing)
-    return groups
-
-
-AGAIN = 3
-"""How often a stop is written again for a drive that stored it."""
+        groups.setdefault((roster.family.codec, False), ([], []))[0].extend(roster.probing)
+    immediate, unterminated, invalidate = list[bytes](), list[bytes](), list[bytes]()
+    repeats, missed, framed = list[StopPiece](), list[Drive](), False
+    for (codec, sure), (names, drives) in groups.items():
+        framed, failed = framed or codec.framed, list[str]()
+        with apart(f"the stop of {', '.join(names)} on {roster.link.name}", failed):
+            stop, unfinished = codec.stop(names, sure), codec.stop(names, sure, half_sent=True)
+            pieces, harmless = codec.stop_again(names, sure), codec.invalidate()
+            if stop not in immediate:
+                # Written at once, the reply to a second answered stop would collide with the reply to the first.
+                if immediate and codec.stop_replies:
+                    repeats.append(StopPiece(stop, pieces[0].quiet))
+                else:
+                    immediate.append(stop)
+                    unterminated.append(unfinished)
+                repeats += pieces
+            if harmless not in invalidate:
+                invalidate.append(harmless)
+        if failed:
+            missed += drives
+    joined = b"".join
+    return StopForms(joined(immediate), joined(unterminated), tuple(repeats), joined(invalidate), framed, tuple(missed))
 
 
 class Stopping:
@@ -331,7 +176,7 @@ class Stopping:
         """The last stop of the whole link."""
         self._roster = roster
         self._link = roster.link
-        self._ahead: tuple[WrittenStop, StopForms] | None = None
+        self._ahead: tuple[StopForms, bytes, bool] | None = None
         """The stop that another thread has written and the loop has not yet taken over."""
         self._unconfirmed: list[Halt] = []
         """Stops that are not confirmed yet, or that a loss kept from the drives or from being confirmed."""
@@ -343,22 +188,31 @@ class Stopping:
         """The stops that are being confirmed."""
         return set(self._tasks)
 
+    # The bytes
+
     def ahead(self) -> None:
         """Write the stop of the whole link from any thread, whatever the loop is doing; `halt` must follow in the loop.
 
         From then until that `halt` the loop writes nothing. Does nothing on a transport that cannot be preempted.
         """
+        link = self._link
+        if link.lost or not isinstance(link.transport, Preemptible):
+            return
         forms = stop_forms(self._roster)
+        now = link.now()
 
-        def stop(cut: bool) -> bytes:
-            written = forms.written(cut)
-            self._ahead = written, forms
-            return written.data
+        def stop(dropped: int) -> bytes:
+            data, whole = forms.written(bool(dropped or link.line.half_sent(now)))
+            self._ahead = forms, data, whole
+            return data
 
-        self._link.preempt(forms.framed, stop)
+        link.transport.preempt(forms.framed, stop)
 
-    def halt(self, only: Iterable[Drive] | None) -> Halt:
-        """Write a stop, and nothing else: no watcher hears of it before `halted`. Failures go to `Halt.trouble`."""
+    def halt(self, only: Iterable[Drive] | None = None) -> Halt:
+        """Write a stop of all drives or some, and nothing else: no watcher hears of it before `halted`.
+
+        Failures go to `Halt.trouble`.
+        """
         drives = tuple(self._roster.all_drives if only is None else only)
         halt = Halt(self._link, self._link.now(), self._link.stops, only is None, drives)
         if halt.whole:
@@ -367,6 +221,52 @@ class Stopping:
         self._unconfirmed.append(halt)
         self._write(halt)
         return halt
+
+    def _write(self, halt: Halt) -> None:
+        """Write the bytes first; then tell the line."""
+        link, conversations = self._link, self._roster.conversations
+        link.stops += 1
+        if halt.whole:
+            conversations.stop(None)
+        if link.lost:
+            self._ahead = None
+            halt.trouble.append("lost")
+            return
+        with apart(f"the stop of {link.name}", halt.trouble):
+            at, ahead = link.now(), self._ahead
+            if halt.whole:  # only a stop of the whole link takes over what another thread has written
+                self._ahead = None
+                if isinstance(link.transport, Preemptible):
+                    link.transport.yielded()
+            forms, halt.data, whole = ahead or self._write_now(halt)
+            halt.missed.update(forms.missed)
+            if not halt.whole:
+                halt.others = self._also_stopped(halt)
+            only = None if halt.whole else {*GLOBAL, *(drive.address for drive in halt.affected)}
+            link.line.stop(at, *forms.repeats, only=only)
+            link.line.wrote(halt.data, at, whole=whole)
+            link.debris.stop_written(halt.data, link.line.transmitted)
+            for drive in halt.affected:
+                drive.state.stopped()
+        if not halt.whole:
+            conversations.stop(drive.state for drive in halt.affected)
+
+    def _write_now(self, halt: Halt) -> tuple[StopForms, bytes, bool]:
+        """Drop what is unsent and write a stop, whatever fails."""
+        link, forms = self._link, stop_forms(self._roster, None if halt.whole else halt.drives)
+        dropped = 1
+        with apart(f"taking back what {link.name} has not sent", halt.trouble):
+            dropped = link.transport.discard(whole=forms.framed)
+        data, whole = forms.written(bool(dropped or link.line.half_sent(link.now())))
+        link.transport.write(data)
+        return forms, data, whole
+
+    def _also_stopped(self, halt: Halt) -> tuple[Drive, ...]:
+        """The other drives that the bytes of a stop of some drives stop as well."""
+        others = [drive for drive in self._roster.all_drives if drive not in halt.drives]
+        return tuple(drive for drive in others if _hears(drive.state, halt.data))
+
+    # What follows
 
     def halted(self, halt: Halt, confirm: bool = True) -> None:
         """Publish a stop that was written, fail what waited, and confirm that it works."""
@@ -411,12 +311,10 @@ class Stopping:
         self._tasks.add(task)
         task.add_done_callback(self._tasks.discard)
 
-    async def _confirm(self, halt: Halt) -> None:
-        await confirm_stop(halt, self._repeat, self._superseded)
-        if not self._link.away and halt in self._unconfirmed:
-            self._unconfirmed.remove(halt)
-
-    # Writing
+    def _publish(self, halt: Halt) -> None:
+        if halt.data:
+            self._link.publish(Traffic(self._link.now(), True, halt.data))
+        self._link.advance()
 
     def _repeat(self, halt: Halt) -> None:
         """Write a stop once more."""
@@ -438,65 +336,119 @@ class Stopping:
             self._link.notify(text, warning=True)
             self._repeat(Halt(halt.link, halt.at, halt.number, False, (drive,), trouble=halt.trouble))
 
-    def _superseded(self, halt: Halt) -> bool:
-        """Whether a later stop of the whole link confirms it."""
-        return self.last is not None and self.last.number > halt.number
+    # Confirmation
 
-    def _write(self, halt: Halt) -> None:
-        self._link.stops += 1
-        if halt.whole:
-            self._roster.conversations.stop(None)
-        if self._link.lost:
-            self._ahead = None
-            halt.trouble.append("lost")
+    async def _confirm(self, halt: Halt) -> None:
+        await self._read_drives(halt)
+        if not self._link.away and halt in self._unconfirmed:
+            self._unconfirmed.remove(halt)
+
+    async def _read_drives(self, halt: Halt) -> None:
+        """Read the drives of a stop and publish what was found; repeat it for what goes on and does not slow down."""
+        link = halt.link
+        unconfirmed = list(halt.affected)
+        if not unconfirmed:
+            link.notify("stop sent; no drive is known here, so no velocity could be read", warning=True)
+        before: dict[Drive, Activity] = {}
+        active: dict[Drive, Activity] = {}
+        tries, until = 0, link.now() + RAMP
+        while unconfirmed and link.now() < until:
+            found = {drive: await _read(drive, halt) for drive in unconfirmed if not halt.started_since(drive)}
+            for drive, each in found.items():  # whether this reading or a poll after it has confirmed that
+                if each.places and each.none and halt.fate(drive) is Fate.STANDING:
+                    link.notify(f"{drive.shown}: stopped, velocity 0 at {each.places}")
+            if self.last is not None and self.last.number > halt.number and not link.lost:
+                return  # a later stop of the whole link confirms it
+            active = {drive: each for drive, each in found.items() if not each.none and not halt.started_since(drive)}
+            slow_down = all(each.lessens(before.get(drive)) for drive, each in active.items())
+            before = found
+            if active and not slow_down and tries < TRIES:
+                tries += 1
+                self._once_more(halt, active, tries)
+            # The line of an operator that may start a drive may also be refused, and then nothing has started it.
+            undecided = [drive for drive in unconfirmed if halt.started_since(drive) and drive.starting]
+            once = [drive for drive, each in found.items() if each.none and halt.fate(drive) is Fate.SENT]
+            unconfirmed = [*active, *undecided, *once]
+            if unconfirmed:
+                await asyncio.sleep(BETWEEN)
+        if active and tries < TRIES:
+            names = ", ".join(drive.shown for drive in active)
+            link.notify(f"{names}: slows down for more than {RAMP:g} s", warning=True)
+
+    def _once_more(self, halt: Halt, active: Mapping[Drive, Activity], tries: int) -> None:
+        """Stop again what goes on, or give up and say so."""
+        if tries == TRIES:
+            halt.vain = True
+            for goes_on, moves in (("MOVING", True), ("RUNNING", False)):
+                if names := ", ".join(drive.shown for drive, each in active.items() if bool(each.speed) is moves):
+                    text = f"STILL {goes_on} after {TRIES} stops: {names}; cut the power"
+                    halt.link.notify(text, warning=True)
             return
-        with apart(f"the stop of {halt.link.name}", halt.trouble):
-            self._cut(halt)
-        if not halt.whole:
-            self._roster.conversations.stop(drive.state for drive in halt.affected)
-
-    def _cut(self, halt: Halt) -> None:
-        """Write the bytes first; then tell the line."""
-        at = self._link.now()
-        stop, forms = self._take_over(halt) or self._write_now(halt)
-        halt.data = stop.data
-        halt.missed.update(forms.missed)
-        if not halt.whole:
-            halt.others = self._also_stopped(halt)
-        self._link.stopped(stop, at, None if halt.whole else {*GLOBAL, *(drive.address for drive in halt.affected)})
-        for drive in halt.affected:
-            drive.state.stopped()
-
-    def _take_over(self, halt: Halt) -> tuple[WrittenStop, StopForms] | None:
-        """Return what another thread has written already; only a stop of the whole link takes it over."""
-        ahead = self._ahead
-        if halt.whole:
-            self._ahead = None
-            self._link.take_over()
-        return ahead
-
-    def _write_now(self, halt: Halt) -> tuple[WrittenStop, StopForms]:
-        forms = stop_forms(self._roster, None if halt.whole else halt.drives)
-        written: list[WrittenStop] = []
-
-        def stop(cut: bool) -> bytes:
-            written.append(forms.written(cut))
-            return written[-1].data
-
-        self._link.write_stop(forms.framed, stop, halt.trouble)
-        return written[-1], forms
-
-    def _also_stopped(self, halt: Halt) -> tuple[Drive, ...]:
-        others = [drive for drive in self._roster.all_drives if drive not in halt.drives]
-        return tuple(drive for drive in others if _hears(drive, halt.data))
-
-    def _publish(self, halt: Halt) -> None:
-        if halt.data:
-            self._link.publish(Traffic(self._link.now(), True, halt.data))
-        self._link.advance()
+        for drive, each in active.items():
+            does = f"still moves at {each.speed} a second" if each.speed else "its program still runs"
+            halt.link.notify(f"{drive.shown}: {does}; stop sent again", warning=True)
+        self._repeat(halt)
 
 
-def _hears(drive: Drive, data: bytes) -> bool:
-    """Whether the bytes of a stop of other drives stop this one, too."""
-    state = drive.state
-    return drive.codec.hears_stop(data, drive.address or state.name, not state.settings_unknown)
+def _hears(state: DriveState, data: bytes) -> bool:
+    return state.codec.hears_stop(data, state.address or state.name, not state.settings_unknown)
+
+
+class Activity(NamedTuple):
+    """What a drive did when it was read; nothing, where that is not known."""
+
+    speed: int = 0
+    """Unsigned, of its fastest axis."""
+    runs: bool = False
+    """A program runs."""
+    places: str = ""
+    """The positions of its axes; empty: not read."""
+
+    @property
+    def none(self) -> bool:
+        """Whether it neither moves nor runs a program, or nothing is known."""
+        return not self.speed and not self.runs
+
+    def lessens(self, before: Activity | None) -> bool:
+        """Whether it slows down, as far as two readings show, and no program runs that can move it again."""
+        return not self.runs and (before is None or self.speed < before.speed)
+
+
+NOTHING = Activity()
+ENDLESS = Activity(1 << 40)
+"""Of a drive that another stop kept from being read: faster than any."""
+
+
+async def _read(drive: Drive, halt: Halt) -> Activity:
+    """Read and publish what a drive does; NOTHING also where that cannot be read, which is a doubt of the stop."""
+    if drive.programming and not drive.engaged:
+        return _not_known(drive, halt, "its velocity cannot be read in program mode")
+    ended: list[Transaction] = []
+    try:
+        axes = await drive.motion(Priority.OPERATOR, ended.append)
+        runs, why = axes[0].program, ""
+        if runs is None and not any(axis.velocity for axis in axes):  # a drive that moves is stopped again
+            try:
+                runs = await drive.busy()
+            except Stopped:
+                raise
+            except (TimeoutError, DriveError, TransportLost) as error:
+                why = f"velocity 0 was read, and whether a program runs was not: {error}"
+    except Stopped:
+        return ENDLESS
+    except (TimeoutError, DriveError, TransportLost) as error:
+        return _not_known(drive, halt, f"its velocity could not be read: {error}")
+    at = ended[-1].transmitted_at
+    for each in axes:
+        drive.link.publish(Sample(at, drive.address, each.position, each.velocity, each.axis, each.trouble, runs))
+    if why:
+        return _not_known(drive, halt, why)
+    halt.doubts.pop(drive, None)
+    speed = abs(drive.seen.velocity) if drive.seen is not None else 0
+    return Activity(speed, bool(runs), ", ".join(str(each.position) for each in axes))
+
+
+def _not_known(drive: Drive, halt: Halt, why: str) -> Activity:
+    halt.doubts[drive] = why
+    drive.link.notify(f"{drive.shown}: stop sent, but {why}", warning=True)
+    return NOTHING

@@ -78,6 +78,8 @@ class FakeBus:
     def away(self):
         return self.lost
 
+    loss = away
+
     def watch(self, watcher):
         self.watchers.append(watcher)
         return lambda: self.watchers.remove(watcher)
