@@ -24,7 +24,7 @@ from multidrop.drives.events import Sample, Traffic, Transaction, apart
 from multidrop.drives.keeping import GLOBAL
 from multidrop.drives.link import Link
 from multidrop.drives.roster import Roster
-from multidrop.transports import Preemptible, TransportLost
+from multidrop.transports import TransportLost
 
 TRIES = 3
 BETWEEN = 0.1
@@ -196,7 +196,7 @@ class Stopping:
         From then until that `halt` the loop writes nothing. Does nothing on a transport that cannot be preempted.
         """
         link = self._link
-        if link.lost or not isinstance(link.transport, Preemptible):
+        if link.lost:
             return
         forms = stop_forms(self._roster)
         now = link.now()
@@ -236,8 +236,7 @@ class Stopping:
             at, ahead = link.now(), self._ahead
             if halt.whole:  # only a stop of the whole link takes over what another thread has written
                 self._ahead = None
-                if isinstance(link.transport, Preemptible):
-                    link.transport.yielded()
+                link.transport.yielded()
             forms, halt.data, whole = ahead or self._write_now(halt)
             halt.missed.update(forms.missed)
             if not halt.whole:

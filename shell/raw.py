@@ -184,14 +184,11 @@ class RawLine(ByteView):
 
     def control(self) -> PortControl:
         """The settings of the port. Raises Diagnostic where it is not a serial port."""
-        from multidrop.transports import Controllable
-
         transport = self.bus.link.transport
-        found = transport.control if isinstance(transport, Controllable) else None
-        if found is None:
+        if transport.control is None:
             hint = "valid on a serial port, on rfc2217:// and on ssh:// with multidrop there"
             raise Diagnostic("has no baud rate, DTR, RTS or break", transport.name, hint)
-        return found
+        return transport.control
 
 
 def parse_bytes(items: str) -> bytes:

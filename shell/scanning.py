@@ -22,7 +22,7 @@ from multidrop.shell.connect.opening import BAUDED, port_name
 from multidrop.shell.connect.port_state import memory_of
 from multidrop.shell.connect.urls import Connection
 from multidrop.shell.found import FoundDrive, port_of
-from multidrop.transports import Remote, Transport, TransportLost
+from multidrop.transports import Transport, TransportLost
 
 if TYPE_CHECKING:
     from multidrop.drives.bus import Bus
@@ -398,6 +398,6 @@ def listed(stages: Iterable[Stage]) -> str:
 
 def _distance(transport: Transport, scheme: str, took: float) -> float:
     """The time that a network takes to a drive and back, s; `took`: the time of the opening, s."""
-    if isinstance(transport, Remote):
+    if transport.round_trip is not None:
         return SPREAD * transport.round_trip + JITTER
     return min(took * TURNS.get(scheme, 0.0), SLOWEST)

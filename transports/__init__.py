@@ -8,8 +8,9 @@ from __future__ import annotations
 
 import struct
 import sys
+from abc import ABC, abstractmethod
 from collections.abc import Callable
-from typing import Protocol, runtime_checkable
+from typing import Protocol
 
 
 class Endpoint(Protocol):
@@ -62,103 +63,84 @@ Received = Callable[[bytes], None]
 Lost = Callable[[TransportLost], None]
 
 
-class Transport(Protocol):
-    """An open byte pipe. All of its methods are called from the event loop's thread."""
+class PortControl(ABC):
+    """The settings of a serial port that change while it is open.
 
-    @property
-    def name(self) -> str:
-        """The name for a person: `/dev/ttyUSB0`, `tcp://10.0.0.5:503`."""
+    A call may block, so it is made in a thread. It raises OSError for a setting that the port does not have or refuses.
+    """
 
+    baud: int
+    """The baud rate, bits/s, also of a port that is closed by now."""
+
+    @abstractmethod
+    def set_baud(self, baud: int) -> None:
+        """Change the baud rate, bits/s; a refused one leaves the present one."""
+
+    @abstractmethod
+    def _switch(self, line: str, on: bool) -> None:
+        """Switch `DTR`, `RTS` or the `break`."""
+
+    def set_dtr(self, on: bool) -> None:
+        self._switch("DTR", on)
+
+    def set_rts(self, on: bool) -> None:
+        self._switch("RTS", on)
+
+    def set_break(self, on: bool) -> None:
+        """Begin or end a break."""
+        self._switch("break", on)
+
+
+class Transport(ABC):
+    """An open byte pipe. All of its methods but `preempt` are called from the event loop's thread."""
+
+    name: str
+    """The name for a person: `/dev/ttyUSB0`, `tcp://10.0.0.5:503`."""
+    control: PortControl | None = None
+    """The settings of the port; None: it is not a serial port."""
+    limits = ""
+    """The promises of others that it cannot keep, for a person who opens it."""
+    round_trip: float | None = None
+    """The time to the far side and back, s; None: not measured."""
+
+    @abstractmethod
     def start(self, received: Received, lost: Lost) -> None:
         """Begin to deliver bytes. The pipe calls `lost` once, and delivers nothing after that."""
 
+    @abstractmethod
     def write(self, data: bytes) -> bool:
         """Queue bytes without blocking; return False where they were dropped.
 
-        A broken pipe drops them and calls `lost`; a preempted one (see `Preemptible`) drops them silently.
+        A broken pipe drops them and calls `lost`; a preempted one drops them silently.
         """
 
+    @property
+    def pending(self) -> int:
+        """Number of bytes that were written and wait in this program."""
+        return 0
+
+    @abstractmethod
     def discard(self, whole: bool = False) -> int:
         """Drop what has not left this machine yet; return the number of bytes that are known of.
 
         With `whole`, a write that has begun to leave continues to its end, and the system keeps what it holds.
         """
 
-    async def close(self) -> None:
-        """Close the pipe without a call of `lost`. A second close has no effect."""
-
-
-@runtime_checkable
-class Preemptible(Protocol):
-    """A transport to which another thread may write a stop, ahead of the event loop."""
-
     def preempt(self, whole: bool, make: Callable[[int], bytes]) -> bool:
-        """Drop what is unsent and write `make(bytes dropped)` at once, from any thread; False on a broken pipe.
+        """Drop what is unsent and write `make(bytes dropped)` at once, from any thread.
 
-        `write` drops everything until `yielded` is called. `make` must not call the pipe.
+        `write` drops everything until `yielded` is called. `make` must not call the pipe. The result is False, and
+        `make` is not called, where the pipe is broken or cannot do this.
         """
+        return False
 
     def yielded(self) -> None:
         """Let the loop write again, once it has taken note of what preempted it."""
+        return
 
-
-@runtime_checkable
-class Queueing(Protocol):
-    """A transport that says how much waits in it."""
-
-    @property
-    def pending(self) -> int:
-        """Number of bytes that were written and wait in this program."""
-
-
-class PortControl(Protocol):
-    """The settings of a serial port that change while it is open.
-
-    A call may block, so it is made in a thread. It raises OSError for a setting that the port does not have.
-    """
-
-    @property
-    def baud(self) -> int:
-        """The baud rate, bits/s, also of a port that is closed by now."""
-
-    def set_baud(self, baud: int) -> None:
-        """Change the baud rate, bits/s; a refused one leaves the present one."""
-
-    def set_dtr(self, on: bool) -> None:
-        """Switch the DTR line."""
-
-    def set_rts(self, on: bool) -> None:
-        """Switch the RTS line."""
-
-    def set_break(self, on: bool) -> None:
-        """Begin or end a break."""
-
-
-@runtime_checkable
-class Controllable(Protocol):
-    """A transport that may have the settings of a serial port."""
-
-    @property
-    def control(self) -> PortControl | None:
-        """Its settings; None: it is not a serial port."""
-
-
-@runtime_checkable
-class Limited(Protocol):
-    """A transport that cannot keep a promise that others keep."""
-
-    @property
-    def limits(self) -> str:
-        """The promises it cannot keep, for a person who opens it."""
-
-
-@runtime_checkable
-class Remote(Protocol):
-    """A transport that has measured how far its port is."""
-
-    @property
-    def round_trip(self) -> float:
-        """The time to the far side and back, s."""
+    @abstractmethod
+    async def close(self) -> None:
+        """Close the pipe without a call of `lost`. A second close has no effect."""
 
 
 if sys.platform != "win32":

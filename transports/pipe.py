@@ -10,12 +10,12 @@ from __future__ import annotations
 
 import asyncio
 import threading
-from abc import ABC, abstractmethod
+from abc import abstractmethod
 from collections import deque
 from collections.abc import Callable
 from typing import Any, Protocol, TypeVar
 
-from multidrop.transports import Endpoint, Lost, PortControl, Received, TransportLost
+from multidrop.transports import Endpoint, Lost, PortControl, Received, Transport, TransportLost
 
 LINGER = 1.0
 """Seconds that closing waits for bytes that were written and have not left: 960 bytes at 9600 baud."""
@@ -24,11 +24,11 @@ _LOOK = 0.005
 T = TypeVar("T")
 
 
-class Pipe(ABC):
+class Pipe(Transport):
     """The common half of a transport. Created and used in the loop's thread."""
 
     def __init__(self, name: str, control: PortControl | None = None) -> None:
-        self._name = name
+        self.name = name
         self.control = control
         self._loop = asyncio.get_running_loop()
         self._received: Received | None = None
@@ -38,15 +38,10 @@ class Pipe(ABC):
         self._closing: asyncio.Task[None] | None = None
         self._released: asyncio.Future[None] | None = None
 
-    @property
-    def name(self) -> str:
-        """The name for a person."""
-        return self._name
-
     def start(self, received: Received, lost: Lost) -> None:
         """Begin to deliver bytes. A pipe that is already broken reports it now."""
         if self._received is not None:
-            raise RuntimeError(f"{self._name} was started before")
+            raise RuntimeError(f"{self.name} was started before")
         self._received, self._lost = received, lost
         if self._broken is not None:
             self._loop.call_soon(self._tell)
@@ -71,7 +66,7 @@ class Pipe(ABC):
         """Mark the pipe as broken by `error`, or (None) as closed by the other end. May be called repeatedly."""
         self._halt()
         if self._broken is None:
-            self._broken = TransportLost(f"{self._name} was lost: {self._explain(error)}")
+            self._broken = TransportLost(f"{self.name} was lost: {self._explain(error)}")
             self._loop.call_soon(self._tell)
 
     def _tell(self) -> None:
@@ -200,10 +195,6 @@ class DescriptorPipe(Pipe):
         return dropped + (0 if whole else self._endpoint.drop())
 
     def preempt(self, whole: bool, make: Callable[[int], bytes]) -> bool:
-        """Drop what is unsent and write `make(bytes dropped)` at once, from any thread; False on a broken pipe.
-
-        `write` drops everything until `yielded` is called. `make` must not call the pipe.
-        """
         with self._guard:
             if not self._usable:
                 return False
@@ -214,7 +205,6 @@ class DescriptorPipe(Pipe):
         return True
 
     def yielded(self) -> None:
-        """Let the loop write again, once it has taken note of what preempted it."""
         with self._guard:
             self._preempted = False
 
@@ -392,7 +382,7 @@ class ThreadedPipe(Pipe):
         return dropped + (0 if whole else self._device.abort())
 
     def _spawn(self, work: Callable[[], None], what: str) -> None:
-        thread = threading.Thread(target=work, name=f"{self._name} {what}", daemon=True)
+        thread = threading.Thread(target=work, name=f"{self.name} {what}", daemon=True)
         self._threads.append(thread)
         thread.start()
 

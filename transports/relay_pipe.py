@@ -11,6 +11,7 @@ import threading
 from collections.abc import Callable
 from typing import Protocol
 
+from multidrop.transports import PortControl
 from multidrop.transports.pipe import DescriptorPipe
 from multidrop.transports.relay import BEAT, CREDIT, MISSED, MOST, Frames, Garbled, Kind, Setting, frame
 
@@ -184,7 +185,6 @@ class RelayPipe(DescriptorPipe):
     def __init__(self, connection: Connection, baud: int, early: bytes = b"", round_trip: float = 0.0) -> None:
         """`early`: bytes that arrived after the greeting."""
         self.round_trip = round_trip
-        """The time to the far side and back, s."""
         self._relay = RelayEndpoint(connection, early)
         super().__init__(self._relay, RelayControl(self._relay, self._send_frame, baud))
         self._answered = self._missed = 0
@@ -260,36 +260,21 @@ class RelayPipe(DescriptorPipe):
         self._relay.end()
 
 
-class RelayControl:
+class RelayControl(PortControl):
     """The settings of the far port. Each call waits for the far side, so it is made in a thread."""
 
     def __init__(self, relay: RelayEndpoint, send: Callable[[bytes], None], baud: int) -> None:
         self._relay, self._send = relay, send
-        self._baud = baud
+        self.baud = baud
         self._turn = threading.Lock()
         self._number = 0
 
-    @property
-    def baud(self) -> int:
-        """The baud rate, bits/s."""
-        return self._baud
-
     def set_baud(self, baud: int) -> None:
-        """Change the baud rate; a refused one leaves the present one."""
         self._set(Setting.BAUD, baud)
-        self._baud = baud
+        self.baud = baud
 
-    def set_dtr(self, on: bool) -> None:
-        """Switch the DTR line."""
-        self._set(Setting.DTR, on)
-
-    def set_rts(self, on: bool) -> None:
-        """Switch the RTS line."""
-        self._set(Setting.RTS, on)
-
-    def set_break(self, on: bool) -> None:
-        """Begin or end a break."""
-        self._set(Setting.BREAK, on)
+    def _switch(self, line: str, on: bool) -> None:
+        self._set(Setting[line.upper()], on)
 
     def _set(self, setting: Setting, value: int) -> None:
         with self._turn:

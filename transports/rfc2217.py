@@ -9,7 +9,7 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Callable, Iterable
 
-from multidrop.transports import Lost, Preemptible, Queueing, Received, Transport, TransportLost, Unreachable, telnet
+from multidrop.transports import Lost, PortControl, Received, Transport, TransportLost, Unreachable, telnet
 from multidrop.transports.sockets import open_tcp
 from multidrop.transports.telnet import (
     BREAK,
@@ -47,6 +47,11 @@ _HELLO = b"".join(
 )
 _OURS = (OPTION, telnet.BINARY, telnet.SGA)
 _THEIRS = (telnet.BINARY, telnet.SGA)
+_LINES = {
+    "DTR": (Control.DTR_ON, Control.DTR_OFF),
+    "RTS": (Control.RTS_ON, Control.RTS_OFF),
+    BREAK: (Control.BREAK_ON, Control.BREAK_OFF),
+}
 _WISHES = {
     FLOW: (Setting.CONTROL, Control.NO_FLOW),
     "DTR": (Setting.CONTROL, Control.DTR_ON),
@@ -75,11 +80,11 @@ async def negotiated(inner: Transport, baud: int) -> Rfc2217Pipe:
     return pipe
 
 
-class Rfc2217Pipe:
+class Rfc2217Pipe(Transport):
     """One port of a device server."""
 
     def __init__(self, inner: Transport) -> None:
-        self._inner = inner
+        self._inner, self.name = inner, inner.name
         self._loop = asyncio.get_running_loop()
         self._decoder = telnet.Decoder()
         self._received: Received | None = None
@@ -93,14 +98,9 @@ class Rfc2217Pipe:
         """The server supports RFC 2217, or the pipe is lost."""
         self._asked: dict[str, tuple[int, asyncio.Future[int]]] = {}
         """The settings to be confirmed, each with the value asked for."""
-        self.control = Rfc2217Control(self, self._loop)
+        self.control: Rfc2217Control = Rfc2217Control(self, self._loop)
         self.limits = ""
         """The wishes that the server did not confirm, for a person."""
-
-    @property
-    def name(self) -> str:
-        """The URL."""
-        return self._inner.name
 
     # Opening
 
@@ -122,7 +122,7 @@ class Rfc2217Pipe:
         wrong = [what for what, (_, value) in needed.items() if _answer(answers[what]) != value]
         if wrong:
             raise self._refused(_refusal(wrong, baud, _answer(answers[NAMES[Setting.BAUD]])))
-        self.control.note(baud)
+        self.control.baud = baud
         await self._settled((answers[what] for what in _WISHES), GRACE)
         if ignored := [what for what in _WISHES if _answer(answers[what]) is None]:
             self.limits = f"the server does not confirm {', '.join(ignored)}; a party line does not need it"
@@ -225,7 +225,7 @@ class Rfc2217Pipe:
     @property
     def pending(self) -> int:
         """Number of bytes that wait in this program."""
-        return self._inner.pending if isinstance(self._inner, Queueing) else 0
+        return self._inner.pending
 
     def discard(self, whole: bool = False) -> int:
         """Drop unsent bytes, and unless `whole` ask the server to purge its own. No message is cut in two."""
@@ -235,15 +235,11 @@ class Rfc2217Pipe:
         return dropped
 
     def preempt(self, whole: bool, make: Callable[[int], bytes]) -> bool:
-        """Drop what is unsent and write `make(bytes dropped)` at once, from any thread; False on a broken pipe."""
         purge = b"" if whole else _PURGE
-        inner = self._inner
-        return isinstance(inner, Preemptible) and inner.preempt(True, lambda n: purge + telnet.escaped(make(n)))
+        return self._inner.preempt(True, lambda dropped: purge + telnet.escaped(make(dropped)))
 
     def yielded(self) -> None:
-        """Let the loop write again."""
-        if isinstance(self._inner, Preemptible):
-            self._inner.yielded()
+        self._inner.yielded()
 
     async def close(self) -> None:
         """Close the pipe."""
@@ -266,7 +262,7 @@ def _refusal(wrong: list[str], baud: int, found: int | None) -> str:
     return f"the server does not accept {named}; check the settings of its port"
 
 
-class Rfc2217Control:
+class Rfc2217Control(PortControl):
     """The settings of the port at the server. Each call waits for its confirmation, in a thread that is not the loop's.
 
     Each raises OSError where the server refuses the value or does not reply.
@@ -274,35 +270,16 @@ class Rfc2217Control:
 
     def __init__(self, pipe: Rfc2217Pipe, loop: asyncio.AbstractEventLoop) -> None:
         self._pipe, self._loop = pipe, loop
-        self._baud = 0
-
-    def note(self, baud: int) -> None:
-        """Note the baud rate of the opening."""
-        self._baud = baud
-
-    @property
-    def baud(self) -> int:
-        """The baud rate, bits/s, also of a port that is closed by now."""
-        return self._baud
+        self.baud = 0
 
     def set_baud(self, baud: int) -> None:
-        """Change the baud rate; a refused one leaves the present one."""
         found = self._ask(NAMES[Setting.BAUD], Setting.BAUD, baud)
         if found != baud:
             raise OSError(f"the server does not accept {baud} baud (it has {found})")
-        self._baud = baud
+        self.baud = baud
 
-    def set_dtr(self, on: bool) -> None:
-        """Switch the DTR line."""
-        self._ask("DTR", Setting.CONTROL, Control.DTR_ON if on else Control.DTR_OFF)
-
-    def set_rts(self, on: bool) -> None:
-        """Switch the RTS line."""
-        self._ask("RTS", Setting.CONTROL, Control.RTS_ON if on else Control.RTS_OFF)
-
-    def set_break(self, on: bool) -> None:
-        """Begin or end a break."""
-        self._ask(BREAK, Setting.CONTROL, Control.BREAK_ON if on else Control.BREAK_OFF)
+    def _switch(self, line: str, on: bool) -> None:
+        self._ask(line, Setting.CONTROL, _LINES[line][not on])
 
     def _ask(self, what: str, setting: int, value: int) -> int:
         return asyncio.run_coroutine_threadsafe(self._pipe.ask(what, setting, value), self._loop).result()

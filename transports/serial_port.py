@@ -17,7 +17,7 @@ from typing import TypeVar
 
 import serial
 
-from multidrop.transports import Transport, Unreachable
+from multidrop.transports import PortControl, Transport, Unreachable
 from multidrop.transports.serial_ports import holder
 
 if sys.platform != "win32":
@@ -101,19 +101,14 @@ def _group(port: str) -> str:
     return "dialout"
 
 
-class SerialControl:
-    """The settings of one open port."""
+class SerialControl(PortControl):
+    """The settings of one open port, through pyserial."""
 
     def __init__(self, port: serial.SerialBase) -> None:
         self._port = port
-
-    @property
-    def baud(self) -> int:
-        """The baud rate, bits/s, also of a port that is closed by now."""
-        return int(self._port.baudrate)
+        self.baud = int(port.baudrate)
 
     def set_baud(self, baud: int) -> None:
-        """Change the baud rate; a refused one leaves the present one."""
         before = self._port.baudrate
         try:
             self._set("baudrate", baud)
@@ -121,18 +116,10 @@ class SerialControl:
             with contextlib.suppress(OSError):
                 self._set("baudrate", before)
             raise
+        self.baud = int(self._port.baudrate)
 
-    def set_dtr(self, on: bool) -> None:
-        """Switch the DTR line."""
-        self._set("dtr", on)
-
-    def set_rts(self, on: bool) -> None:
-        """Switch the RTS line."""
-        self._set("rts", on)
-
-    def set_break(self, on: bool) -> None:
-        """Begin or end a break."""
-        self._set("break_condition", on)
+    def _switch(self, line: str, on: bool) -> None:
+        self._set({"DTR": "dtr", "RTS": "rts", "break": "break_condition"}[line], on)
 
     def _set(self, name: str, value: int) -> None:
         try:

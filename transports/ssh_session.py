@@ -274,14 +274,6 @@ class SocatEndpoint:
         self._session.close(self._lost)
 
 
-class SocatPipe(DescriptorPipe):
-    """A transport that keeps fewer promises than others; `limits` names the others."""
-
-    def __init__(self, endpoint: SocatEndpoint, limits: str) -> None:
-        super().__init__(endpoint)
-        self.limits = limits
-
-
 async def greeted(session: SshSession, far: FarPort, baud: int, way: str) -> Transport:
     """Wait for the greeting, and make the transport that it asks for. Raises Unreachable."""
     line, early = await _greeting(session, far, way)
@@ -291,7 +283,9 @@ async def greeted(session: SshSession, far: FarPort, baud: int, way: str) -> Tra
     if (status := await asyncio.to_thread(session.status, _SETTLE)) is not None:
         raise _failure(far, status, session.last_words(), way)
     session.mark()
-    return SocatPipe(SocatEndpoint(session), LIMITS.format(host=far.host))
+    pipe = DescriptorPipe(SocatEndpoint(session))
+    pipe.limits = LIMITS.format(host=far.host)
+    return pipe
 
 
 async def _measured(session: SshSession, early: bytes) -> tuple[bytes, float]:

@@ -18,7 +18,7 @@ from multidrop.shell.connect import settings
 from multidrop.shell.connect.port_state import PortState
 from multidrop.shell.connect.reconnect import HostAgain, LoginAgain, Reopen, SerialAgain, simulated, timed
 from multidrop.shell.connect.urls import Connection
-from multidrop.transports import Limited, Unreachable
+from multidrop.transports import Unreachable
 from multidrop.transports.ssh import FarPort
 
 if TYPE_CHECKING:
@@ -62,7 +62,7 @@ async def open_buses(connection: Connection, naming: Naming, state: Path | None 
         await asyncio.to_thread(family.prepare)  # a stop of another bus must not wait for it
     transport, took = await timed(_transport(connection))
     reopen = _reopen(connection, took)
-    limits = transport.limits if isinstance(transport, Limited) else ""
+    limits = transport.limits
     hints, name = connection.hints, naming(connection.short)
     if state is None or not family.repairs:
         return [Opened(_bus(name, transport, connection, hints.family), hints, limits=limits, reopen=reopen)]

@@ -17,7 +17,7 @@ from multidrop.dialects import DriveError, Hints, Stopped
 from multidrop.drives.drive import confirmed_motion
 from multidrop.drives.events import Changed, apart
 from multidrop.shell.stop_report import E_STOP, UNCONFIRMED, last_seen
-from multidrop.transports import Controllable, Transport, TransportLost, Unreachable
+from multidrop.transports import Transport, TransportLost, Unreachable
 
 if TYPE_CHECKING:
     from multidrop.drives.bus import Bus
@@ -111,15 +111,14 @@ class LoginAgain:
         await old.close()
         await asyncio.sleep(self._pause)
         self._pause = min(2 * self._pause + FIRST_PAUSE, LONGEST_PAUSE)
-        control = old.control if isinstance(old, Controllable) else None
-        opened = await self._open(self._within, control.baud if control else None)
+        opened = await self._open(self._within, old.control.baud if old.control else None)
         self._pause = 0.0
         return opened
 
 
 async def _at_the_same_baud(opened: Transport, old: Transport) -> Transport:
     """Set the baud rate that a person had changed on the old transport of a serial port."""
-    before, now = (each.control if isinstance(each, Controllable) else None for each in (old, opened))
+    before, now = old.control, opened.control
     if before is not None and now is not None and before.baud != now.baud:
         with contextlib.suppress(OSError):  # then drives are searched for at the rate of the URL
             await asyncio.to_thread(now.set_baud, before.baud)

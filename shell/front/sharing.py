@@ -19,7 +19,7 @@ from multidrop.shell.output import exit_code, finish, nonblocking, report, write
 from multidrop.shell.sharing.actions import Say
 from multidrop.shell.sharing.server import SharedPort
 from multidrop.shell.sharing.stop_bytes import stop_bytes
-from multidrop.transports import Limited, TransportLost
+from multidrop.transports import TransportLost
 from multidrop.transports.sockets import explain, exposed
 
 AGAIN = 10.0
@@ -60,7 +60,7 @@ async def _share(url: str, address: str, as_json: bool, over: asyncio.Event) -> 
     try:
         endpoint = await _listen(shared, host, port)
         narrator.ready(opened.name, endpoint)
-        if isinstance(opened.transport, Limited) and opened.transport.limits:
+        if opened.transport.limits:
             narrator.note(f"{opened.transport.name}: {opened.transport.limits}")
         if exposed(host):
             narrator.note(EXPOSED.format(endpoint))

@@ -14,7 +14,7 @@ from multidrop.shell.connect.reconnect import FIRST, GLANCE, LONGEST, Absent
 from multidrop.shell.sharing.actions import Action, Close, Purge, Say, Send, Set, Stop, Write
 from multidrop.shell.sharing.exchange import NEVER, NOT_REACHED, Exchange
 from multidrop.shell.sharing.stop_bytes import StopBytes
-from multidrop.transports import Controllable, PortControl, Queueing, Transport, TransportLost
+from multidrop.transports import PortControl, TransportLost
 from multidrop.transports.sockets import host_port, set_socket_options
 from multidrop.transports.telnet import Control, Setting
 
@@ -43,7 +43,7 @@ class SharedPort:
         self._transport = port.transport
         self._narrate = narrate
         self._loop = asyncio.get_running_loop()
-        control = _control_of(self._transport)
+        control = self._transport.control
         self._own = stops.own
         self._exchange = Exchange(stops, control.baud if control else port.baud)
         self._connections: dict[int, Connection] = {}
@@ -170,7 +170,7 @@ class SharedPort:
             connection.abort()
 
     def _write(self, action: Write) -> None:
-        if isinstance(self._transport, Queueing) and self._transport.pending > AHEAD:
+        if self._transport.pending > AHEAD:
             ahead = f"it wrote {AHEAD} bytes more than the line has taken; {len(action.data)} bytes were dropped"
             self._do(self._exchange.close(action.client, "dropped", ahead))
             return
@@ -192,7 +192,7 @@ class SharedPort:
         """Change a setting, in a thread, for the call may block. A port without settings takes any."""
         async with self._turns:
             trouble = ""
-            if (control := _control_of(self._transport)) is not None:
+            if (control := self._transport.control) is not None:
                 try:
                     await asyncio.to_thread(_change(control, action))
                 except OSError as error:
@@ -248,10 +248,6 @@ def _change(control: PortControl, action: Set) -> Callable[[], None]:
     }
     on = action.value in lines
     return partial(lines[action.value if on else action.value - 1], on)
-
-
-def _control_of(transport: Transport) -> PortControl | None:
-    return transport.control if isinstance(transport, Controllable) else None
 
 
 class Connection(asyncio.BufferedProtocol):

@@ -129,11 +129,11 @@ def _dialect(bus: BusSpec) -> str:
     return chosen.name if chosen else DEFAULT
 
 
-class SimPipe:
+class SimPipe(Transport):
     """A transport to a bus of a running floor. Bytes are delivered in the loop's next turn."""
 
     def __init__(self, name: str, floor: RunningFloor, bus: str, closed: Callable[[], None]) -> None:
-        self._name, self._floor, self._bus, self._closed = name, floor, bus, closed
+        self.name, self._floor, self._bus, self._closed = name, floor, bus, closed
         self._source = floor.source()
         self._received: Received | None = None
         self._lost: Lost | None = None
@@ -141,11 +141,6 @@ class SimPipe:
         self._why = "" if floor.floor.connectable(bus) else "no power"
         self._open = True
         self._detach = floor.attach(bus, self)
-
-    @property
-    def name(self) -> str:
-        """The URL."""
-        return self._name
 
     def start(self, received: Received, lost: Lost) -> None:
         """Begin to deliver; what came before is dropped."""
@@ -216,4 +211,4 @@ class SimPipe:
         self._deliver()
         if self._open and self._lost is not None:
             lost, self._lost = self._lost, None
-            lost(TransportLost(f"{self._name} was lost: {self._why}"))
+            lost(TransportLost(f"{self.name} was lost: {self._why}"))

@@ -12,14 +12,14 @@ from multidrop.drives.events import Sent
 from multidrop.drives.keeping import Keeper
 from multidrop.drives.line import Line
 from multidrop.drives.link import Link
-from multidrop.transports import TransportLost
+from multidrop.transports import Transport, TransportLost
 from tests.support.virtual import in_virtual_time
 
 CODEC = MCode(em=1)
 REPLY_AFTER = 0.01
 
 
-class Pipe:
+class Pipe(Transport):
     """A drive that prints 5 some time after each line."""
 
     name = "pipe"

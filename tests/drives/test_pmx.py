@@ -11,12 +11,13 @@ from multidrop.drives.bus import Bus
 from multidrop.drives.events import Unsolicited
 from multidrop.drives.line import QUIET, Finished, Line, Write
 from multidrop.drives.stopping import Fate, stop_forms
+from multidrop.transports import Transport
 from tests.support.virtual import in_virtual_time
 
 BYTE = 10 / 9600
 
 
-class Wire:
+class Wire(Transport):
     """A transport to controllers that answer after a while, as text by command; it notices what talks at once."""
 
     def __init__(self, loop, *numbers, latency=0.006, **answers):

@@ -19,7 +19,7 @@ from multidrop.shell.connect.urls import Connection, parse
 from multidrop.shell.events import Notified
 from multidrop.shell.scanning import NothingFound, Scanning
 from multidrop.shell.session import Session
-from multidrop.transports import Lost, Received, Unreachable
+from multidrop.transports import Lost, Received, Transport, Unreachable
 
 pytestmark = pytest.mark.virtual
 LIMITS = "on pc socat passes the bytes on: a stop waits there"
@@ -31,7 +31,7 @@ class Control:
 
 
 @dataclass
-class FakeSsh:
+class FakeSsh(Transport):
     """A port on which nobody replies."""
 
     control: Control | None = None

@@ -15,9 +15,10 @@ from multidrop.simulator.cells import read
 from multidrop.simulator.floor import Floor
 from multidrop.simulator.serving.running import RunningFloor
 from multidrop.simulator.wire.baud import resample
+from multidrop.transports import Transport
 
 
-class TunedPipe:
+class TunedPipe(Transport):
     """A transport to a bus at a baud rate; `repeats`: the adapter gives back what it sends."""
 
     def __init__(self, floor: RunningFloor, bus: str, baud: int, repeats: bool) -> None:

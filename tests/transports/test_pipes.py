@@ -14,7 +14,6 @@ import time
 
 import pytest
 
-from multidrop.transports import Controllable
 from multidrop.transports.rfc2217 import PIECE
 from tests.support.pipes import KINDS, PATIENCE, STREAMS, rig
 
@@ -284,7 +283,7 @@ async def test_discard_on_rfc2217_has_the_server_drop_its_part() -> None:
 async def test_rfc2217_sets_the_rate_of_the_far_port() -> None:
     async with rig("rfc2217") as each:
         assert termios.tcgetattr(each.far.descriptor)[4:6] == [termios.B19200] * 2
-        assert isinstance(each.transport, Controllable) and each.transport.control is not None
+        assert each.transport.control is not None
         await asyncio.to_thread(each.transport.control.set_baud, 38400)  # in a thread: the server confirms it
         assert termios.tcgetattr(each.far.descriptor)[4:6] == [termios.B38400] * 2
         await asyncio.to_thread(each.transport.control.set_break, True)
@@ -294,7 +293,7 @@ async def test_rfc2217_sets_the_rate_of_the_far_port() -> None:
 async def test_a_relay_sets_the_rate_of_the_far_port_and_names_a_refusal() -> None:
     async with rig("relay") as each:
         each.start()
-        assert isinstance(each.transport, Controllable) and (control := each.transport.control) is not None
+        assert (control := each.transport.control) is not None
         await asyncio.to_thread(control.set_baud, 38400)
         assert termios.tcgetattr(each.far.descriptor)[4:6] == [termios.B38400] * 2
         assert control.baud == 38400
@@ -307,4 +306,4 @@ async def test_a_relay_sets_the_rate_of_the_far_port_and_names_a_refusal() -> No
 
 async def test_a_socket_has_no_settings_of_a_serial_port() -> None:
     async with rig("tcp") as each:
-        assert isinstance(each.transport, Controllable) and each.transport.control is None
+        assert each.transport.control is None

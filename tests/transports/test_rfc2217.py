@@ -7,7 +7,7 @@ from collections.abc import Callable
 
 import pytest
 
-from multidrop.transports import Lost, Received, TransportLost, Unreachable, telnet
+from multidrop.transports import Lost, Received, Transport, TransportLost, Unreachable, telnet
 from multidrop.transports.rfc2217 import Rfc2217Pipe, negotiated
 from multidrop.transports.telnet import OPTION, REPLY, Control, Setting, message, parsed
 from tests.support.virtual import in_virtual_time
@@ -16,7 +16,7 @@ DTR = (Setting.CONTROL, Control.DTR_ON)
 RTS = (Setting.CONTROL, Control.RTS_ON)
 
 
-class Server:
+class Server(Transport):
     """A server at the other end of a pipe in memory. `late`: replies wait until there are so many, last one first."""
 
     name = "rfc2217://gateway:2217"

@@ -14,7 +14,7 @@ from pathlib import Path
 import pytest
 import serial
 
-from multidrop.transports import Controllable, Unreachable
+from multidrop.transports import Unreachable
 from multidrop.transports.pipe import in_thread
 from multidrop.transports.serial_port import open_error, open_serial
 from tests.support.until import PATIENCE
@@ -210,7 +210,7 @@ async def test_the_baud_rate_changes_while_the_port_is_open_and_a_refused_one_ch
     pty: tuple[int, str],
 ) -> None:
     transport = await open_serial(pty[1], 9600)
-    assert isinstance(transport, Controllable) and transport.control is not None
+    assert transport.control is not None
     control = transport.control
     descriptor = os.open(pty[1], os.O_RDWR | os.O_NOCTTY)
     try:
@@ -232,7 +232,7 @@ async def test_the_baud_rate_changes_while_the_port_is_open_and_a_refused_one_ch
 
 async def test_a_port_without_control_lines_refuses_them(pty: tuple[int, str]) -> None:
     transport = await open_serial(pty[1])
-    assert isinstance(transport, Controllable) and transport.control is not None
+    assert transport.control is not None
     for change in (transport.control.set_dtr, transport.control.set_rts):
         with pytest.raises(OSError):
             change(True)
