@@ -316,25 +316,24 @@ class Debugger:
 @contextmanager
 def _annotating(workspace: Workspace, bus: str, annotate: Callable[[str], str]) -> Iterator[None]:
     """Pass the unsolicited lines of a bus through `annotate`."""
-    callbacks = workspace.annotators.setdefault(bus, [])
+    callbacks = workspace.of(workspace.buses[bus]).annotators
     callbacks.append(annotate)
     try:
         yield
     finally:
         callbacks.remove(annotate)
-        if not callbacks:
-            del workspace.annotators[bus]
 
 
 def of(session: Session, drive: Drive) -> Debugger:
     """Find the debugger of a drive, or make it. Raises Inexpressible where its family has none."""
-    found = session.debuggers.get(drive)
+    debuggers = session.of(session.buses[drive.link.name]).debuggers
+    found = debuggers.get(drive)
     if isinstance(found, Debugger):
         return found
     debugging = drive.family.debugging
     if debugging is None:
         raise Inexpressible(f"{session.display_name(drive)}: programs of its family cannot be observed")
-    made = session.debuggers[drive] = Debugger(session, drive, debugging)
+    made = debuggers[drive] = Debugger(session, drive, debugging)
     return made
 
 

@@ -75,10 +75,6 @@ class Openings:
         self._workspace = workspace
         self._lazy, self._raw = lazy, raw
         self._tried = [split_target(each) for each in tried]
-        self._opened: dict[Bus, tuple[Opened, Connection]] = {}
-        """What was opened, by its bus."""
-        self._in_cell: dict[Bus, str] = {}
-        """The names that simulated buses have in their cells."""
         self._opener = opener
         self._reserved: set[str] = set()
         """The names of buses that are being opened."""
@@ -136,11 +132,12 @@ class Openings:
 
     def url_of(self, bus: Bus) -> str:
         """The URL of an open bus, without the name of a saved connection, and with the stable name of its port."""
-        _, connection = self._opened[bus]
+        connection = self._workspace.of(bus).connection
+        assert connection is not None, bus.name  # only a search has none, and keeps its bus for itself
         saved = self._workspace.settings.connections.get(connection.name)
         text = saved.url if saved is not None else connection.text
         if connection.scheme == SIMULATED and not connection.bus:
-            return f"{text.partition('?')[0]}#{self._in_cell[bus]}"
+            return f"{text.partition('?')[0]}#{self._workspace.of(bus).in_cell}"
         if connection.scheme == "serial":
             return text.replace(connection.target, port_name(connection), 1)
         return text
@@ -154,20 +151,21 @@ class Openings:
 
     async def raw_off(self, bus: Bus) -> None:
         """Find the drives of a bus in raw mode. Raises NoAnswer where none replies, and it stays raw."""
-        opened, connection = self._opened[bus]
-        raw = self._workspace.raw.pop(bus.name)
+        record = self._workspace.of(bus)
+        raw, record.raw = record.raw, None
+        assert raw is not None and record.connection is not None, bus.name
         raw.close()
         known = bool(bus.drives)
         try:
-            await bus.find_again(opened.hints, release=True)
+            await bus.find_again(record.opened.hints, release=True)
         except (DriveError, TransportLost, asyncio.CancelledError):
             if bus.name in self._workspace.buses:
-                self._workspace.raw[bus.name] = raw
+                record.raw = raw
                 raw.open()
                 self._workspace.notify(f"{bus.name} stays raw", bus=bus.name)
             raise
         if not known:  # else the drives keep their names, and one of them is selected
-            label(bus, connection)
+            label(bus, record.connection)
             self._workspace.identified(bus)
         self._workspace.notify(described(bus), bus=bus.name)
 
@@ -187,8 +185,6 @@ class Openings:
                 replace(each, hints=replace(each.hints, lazy=lazy, tried=self._tried_on(each.bus, opening, connection)))
                 for each in found
             ]
-            self._opened |= {each.bus: (each, connection) for each in hinted}
-            self._in_cell |= {each.bus: opening.bases.get(each.bus.name, each.bus.name) for each in hinted}
             return await opening.identify(hinted, connection, raw)
         finally:
             self._reserved -= opening.names
@@ -241,12 +237,13 @@ class _Opening:
             for each in found:
                 failing.push_async_callback(workspace.forget, each.bus)
             for each in found:
-                workspace.adopt(replace(each, warnings=()) if raw else each, self.place)
+                in_cell = self.bases.get(each.bus.name, each.bus.name)
+                workspace.adopt(replace(each, warnings=()) if raw else each, self.place, connection, in_cell)
                 if each.limits:
                     workspace.notify(f"{each.bus.name}: {each.limits}", bus=each.bus.name, warning=True)
             late = [self._stop(each.bus) for each in found if self._stops != workspace.stops]
             for each in found:
-                port = self._workspace.ports[each.bus.name] = port_name(connection)
+                port = workspace.of(each.bus).port = port_name(connection)
                 await (self._begin_raw(each) if raw else self._identify(each, connection))
                 self._workspace.reconnections.add(each.bus, each.hints, each.reopen, port)
             for each, halt in zip(found, late, strict=False):
@@ -273,7 +270,7 @@ class _Opening:
         label(opened.bus, connection)
         self._workspace.identified(opened.bus)
         self._workspace.notify(described(opened.bus), bus=opened.bus.name)
-        for text in unfinished.left(self._workspace.settings.state, self._workspace.ports[opened.bus.name]):
+        for text in unfinished.left(self._workspace.settings.state, self._workspace.of(opened.bus).port):
             self._workspace.notify(f"{opened.bus.name}: {text}", bus=opened.bus.name, warning=True)
 
 
@@ -287,9 +284,11 @@ def label(bus: Bus, connection: Connection) -> None:
 
 def begin_raw(workspace: Workspace, bus: Bus) -> None:
     """Show every byte of a reserved bus from now on."""
-    if shown := workspace.byte_views.pop(bus.name, None):
-        shown.close()
-    workspace.raw[bus.name] = raw = RawLine(bus, workspace.publish, workspace.wall)
+    record = workspace.of(bus)
+    if record.bytes_shown is not None:
+        record.bytes_shown.close()
+        record.bytes_shown = None
+    record.raw = raw = RawLine(bus, workspace.publish, workspace.wall)
     raw.open()
     text = f"{bus.name} is raw: text goes to {bus.link.transport.name} with CR; /help /raw"
     workspace.notify(text, bus=bus.name)

@@ -170,7 +170,7 @@ class Session(Workspace):
 
         `starts`: they can start motion or a program.
         """
-        raw = self.raw.get(bus.name)
+        raw = self.of(bus).raw
         if raw is None:
             raise Diagnostic(f"{bus.name} is not in raw mode; nothing was sent", "", "/raw on begins it")
         self._allow(by)
@@ -197,7 +197,7 @@ class Session(Workspace):
 
     async def _run_text(self, parsed: DriveLine, by: By) -> None:
         bus = self.bus(parsed.bus)
-        if (raw := self.raw.get(bus.name)) is not None:
+        if (raw := self.of(bus).raw) is not None:
             return await self._run_raw(raw, parsed, by)
         drive = self.drive(bus.name, parsed.address)
         self.publish(Entered(self.now(), parsed.typed.strip(), by, bus.name, drive.address))

@@ -123,7 +123,7 @@ class _Download:
             await self._use_held(start)
             return
         backup = await self._back_up(lines, held)
-        port = self._session.ports.get(self._drive.link.name, "")
+        port = self._session.of(self._session.buses[self._drive.link.name]).port
         try:
             with marked(self._session.settings.state, port, self._drive.address, self._file, backup):
                 if ends_program:

@@ -1,7 +1,6 @@
 """What is open: buses and their drives, the selection, macros, log, plots; and the stop of all of it.
 
-Verbs, plots, log, transfers and waits work on a `Workspace`. They reach the session that runs them through
-`shell.roles.Commands`.
+An open bus is one record, `OpenBus`: it has all that is known of the bus, and goes as one when that is closed.
 
 The stop has two phases. First its bytes go onto every wire, each wire by itself. Then the latch falls, running tasks
 are cancelled, and the stop is published. A step that fails holds back none of the others.
@@ -10,175 +9,34 @@ are cancelled, and the stop is published. A step that fails holds back none of t
 from __future__ import annotations
 
 import asyncio
-import contextlib
-from collections import deque
-from collections.abc import Awaitable, Callable, Mapping, Sequence
-from contextvars import ContextVar
-from dataclasses import dataclass
+import re
+from collections.abc import Awaitable, Callable, Mapping
+from dataclasses import dataclass, field
 from functools import partial
 from typing import TYPE_CHECKING
-from weakref import WeakKeyDictionary
 
-from multidrop.dialects import Diagnostic, DriveError, NoAnswer, Priority
-from multidrop.dialects.codec import at_priority
-from multidrop.drives.events import BusEvent, Changed, Conditioned, Lost, Notice, Sample, Unsolicited, apart
+from multidrop.dialects import Diagnostic, NoAnswer
+from multidrop.drives.events import BusEvent, Changed, Lost, Notice, Unsolicited, apart
 from multidrop.macros import MacroStore, Recorder
 from multidrop.shell import stop_report
 from multidrop.shell.channel import Asking, Tasks
 from multidrop.shell.connect.reconnect import Reconnections
 from multidrop.shell.connect.settings import Settings
-from multidrop.shell.events import Failed, Notified, OnBus, Printed, SessionEvent, StateChanged
+from multidrop.shell.events import Failed, Notified, OnBus, StateChanged
 from multidrop.shell.lines import EVERYONE, join_target
 from multidrop.shell.playing import Playing, played_by
-from multidrop.transports import TransportLost
+from multidrop.shell.remembered import KnownNames, Lately, Observing
 
 if TYPE_CHECKING:
-    from multidrop.dialects.program_files import Held
     from multidrop.drives.bus import Bus
     from multidrop.drives.drive import Drive
     from multidrop.drives.stopping import Halt
     from multidrop.shell.connect.opening import Opened
+    from multidrop.shell.connect.urls import Connection
     from multidrop.shell.raw import RawLine, Watched
     from multidrop.shell.roles import Observer, OpenLog, RunningPlot, RunningTwins, Series
     from multidrop.shell.transcripts import Transcripts
     from multidrop.simulator.serving.running import RunningFloor
-
-
-class KnownNames:
-    """The names last read of each drive, with the number of commands sent to it by then."""
-
-    def __init__(self) -> None:
-        self._held: WeakKeyDictionary[Drive, tuple[Held, int]] = WeakKeyDictionary()
-        self._asking: WeakKeyDictionary[Drive, asyncio.Task[None]] = WeakKeyDictionary()
-
-    def learn(self, drive: Drive, held: Held) -> None:
-        """Note what was read of a drive."""
-        self._held[drive] = held, drive.commands
-
-    def offered(self, drive: Drive, line: str) -> Sequence[tuple[str, str]]:
-        """The names that may end a line being typed, each with its meaning."""
-        known = self._held.get(drive)
-        programs = drive.family.programs
-        return programs.offered(known[0], line) if known is not None and programs is not None else ()
-
-    def ask(self, drive: Drive, done: Callable[[], None] = lambda: None) -> asyncio.Task[None] | None:
-        """Read the names of a drive at the priority of polls, where they are not known as they are now.
-
-        `done` is called once they are read. A drive that stores lines, or takes a file, is not asked.
-        """
-        programs = drive.family.programs
-        if programs is None or programs.names is None or drive.programming or drive.transferring:
-            return None
-        known = self._held.get(drive)
-        if known is not None and known[1] == drive.commands:
-            return None
-        task = self._asking.get(drive)
-        if task is None or task.done():
-            task = self._asking[drive] = asyncio.get_running_loop().create_task(self._read(drive))
-        task.add_done_callback(lambda ended: None if ended.cancelled() else done())
-        return task
-
-    async def _read(self, drive: Drive) -> None:
-        programs = drive.family.programs
-        assert programs is not None and programs.names is not None
-        with contextlib.suppress(DriveError, TransportLost):  # completion goes without
-            self.learn(drive, await drive.run(at_priority(programs.names(drive.state), Priority.POLL)))
-
-
-KEPT = 1000
-"""The number of lines kept."""
-_begun: ContextVar[int | None] = ContextVar("begun", default=None)
-"""The number of lines before the last line that this macro, script or front end sent to a drive."""
-
-
-class Lately:
-    """The last lines that drives printed, replies and others, each with its number."""
-
-    def __init__(self) -> None:
-        self._lines: deque[tuple[int, str]] = deque(maxlen=KEPT)
-        self._count = 0
-        self._typed = 0
-        """The number of lines before the last line that was sent to a drive."""
-        self._changed = asyncio.Event()
-
-    def take(self, event: SessionEvent) -> None:
-        """Take a session's event."""
-        if isinstance(event, Printed):
-            self._add(event.text)
-        elif isinstance(event, OnBus) and isinstance(event.event, Unsolicited):
-            for line in event.event.lines:
-                self._add(line)
-
-    def begin(self) -> None:
-        """Note that a line is sent to a drive: the next wait of its sender looks from here on."""
-        self._typed = self._count
-        _begun.set(self._count)
-
-    async def finds(self, text: str, seconds: float) -> bool:
-        """Whether a line contains the text: since the sender's last line, or within a time, s."""
-        begun = _begun.get()
-        since = self._typed if begun is None else begun
-        with contextlib.suppress(TimeoutError):
-            async with asyncio.timeout(seconds):
-                while not self._has(text, since):
-                    self._changed.clear()
-                    await self._changed.wait()
-        return self._has(text, since)
-
-    def last(self, most: int) -> list[str]:
-        """The last lines."""
-        return [line for _, line in self._lines][-most:]
-
-    def _has(self, text: str, since: int) -> bool:
-        return any(text in line for number, line in self._lines if number >= since)
-
-    def _add(self, line: str) -> None:
-        self._lines.append((self._count, line))
-        self._count += 1
-        self._changed.set()
-
-
-class Observing:
-    """Notes the texts, motions and changes of inputs while a recorder records."""
-
-    def __init__(self, recorder: Recorder, buses: Callable[[], Mapping[str, Bus]]) -> None:
-        self._recorder, self._buses = recorder, buses
-        self._inputs: dict[tuple[str, str, str], bool] = {}
-        """The last state of each input, by bus, address and word."""
-
-    def take(self, event: SessionEvent) -> None:
-        """Take a session's event."""
-        if not isinstance(event, OnBus):
-            return
-        found, observed = event.event, self._recorder.observed
-        if isinstance(found, Conditioned):
-            self._inputs_of(event.bus, found)
-        elif not self._recorder.name:
-            return
-        elif isinstance(found, Unsolicited):
-            observed.texts.extend((found.at, line) for line in found.lines)
-        elif isinstance(found, Sample):
-            observed.moving.append((found.at, found.velocity != 0))
-
-    def _inputs_of(self, bus: str, found: Conditioned) -> None:
-        """Note each input that has changed and that can be asked for."""
-        for conditions in found.conditions:
-            for lamp in conditions.lamps:
-                key = (bus, found.address, f"I{lamp.name}")
-                if lamp.output or lamp.on is None:
-                    continue
-                before, self._inputs[key] = self._inputs.get(key), lamp.on
-                if self._recorder.name and before not in (None, lamp.on) and self._has(*key):
-                    target = join_target(bus if len(self._buses()) > 1 else "", found.address)
-                    condition = f"{key[2]}={int(lamp.on)}"
-                    text = f"@{target} {condition}" if target else condition
-                    self._recorder.observed.inputs.append((found.at, text))
-
-    def _has(self, bus: str, address: str, word: str) -> bool:
-        """Whether a drive can be asked for a word."""
-        found = self._buses().get(bus)
-        drive = found.drives.get(address) if found is not None else None
-        return drive is not None and drive.family.question(word) is not None
 
 
 LATCHED = "stopped; /resume lets macros and scripts run again"
@@ -193,6 +51,33 @@ class BeingOpened:
     stops: int
 
 
+@dataclass(eq=False)
+class OpenBus:
+    """An open bus, and what a session holds of it."""
+
+    bus: Bus
+    opened: Opened
+    connection: Connection | None
+    """Its URL; None: a search opened it."""
+    in_cell: str
+    """The name that a simulated bus has in its cell."""
+    place: float
+    """Its place among the others."""
+    unwatch: Callable[[], None]
+    port: str = ""
+    """The name of its port, the same in every session; empty for a simulated one."""
+    selected: Drive | None = None
+    """The drive selected on it; None: none has replied there."""
+    raw: RawLine | None = None
+    """Its raw mode; None: it is not raw."""
+    bytes_shown: Watched | None = None
+    """The view of its bytes while it is not raw."""
+    annotators: list[Callable[[str], str]] = field(default_factory=list)
+    """Functions that add to its unsolicited lines, such as the remark of a traced line."""
+    debuggers: dict[Drive, Observer] = field(default_factory=dict)
+    """The observation of a drive's program, for the verbs that do that."""
+
+
 class Workspace(Asking):
     """What is open. Needs a running event loop, and belongs to its thread."""
 
@@ -204,7 +89,8 @@ class Workspace(Asking):
         super().__init__()
         self.settings = settings
         self.buses: dict[str, Bus] = {}
-        """By name, in the order of opening."""
+        """By name, in their order."""
+        self._open: dict[Bus, OpenBus] = {}
         self.selected_bus = ""
         """The name of the selected bus; empty while nothing is open."""
         self.latched = False
@@ -230,12 +116,6 @@ class Workspace(Asking):
         self.plots: list[RunningPlot] = []
         self.plotted: tuple[Series, ...] = ()
         """What the screen plots; empty: the selected drive."""
-        self.raw: dict[str, RawLine] = {}
-        """The buses in raw mode, by name."""
-        self.byte_views: dict[str, Watched] = {}
-        """The buses that are not in raw mode, and whose bytes are shown."""
-        self.cells: dict[str, RunningFloor] = {}
-        """The running cells of simulated buses, by bus."""
         self.playing: list[Playing] = []
         """The macros that play; a macro follows the one that plays it."""
         self.dropped: list[str] = []
@@ -254,58 +134,61 @@ class Workspace(Asking):
         """Shows a page of the screen by its name, or `tour`, or raises Diagnostic; None: there is no screen."""
         self.transcripts: Transcripts | None = None
         """The transcripts on a screen; None: there is no screen."""
-        self.ports: dict[str, str] = {}
-        """The name of each bus's port, the same in every session; empty for a simulated one."""
-        self.places: dict[Bus, float] = {}
-        """The place of each bus among the others."""
         self.reconnections = Reconnections(lambda bus, text: self.notify(text, bus=bus, warning=True), reconnect)
         """The buses that are tried again when they are lost."""
-        self._selected: dict[Bus, Drive | None] = {}
-        """The drive selected on each bus; None: none has replied there."""
-        self._unwatch: dict[Bus, Callable[[], None]] = {}
-        self.annotators: dict[str, list[Callable[[str], str]]] = {}
-        """By bus: functions that add to its unsolicited lines, such as the remark of a traced line."""
-        self.debuggers: dict[Drive, Observer] = {}
-        """The observation of a drive's program, for the verbs that do that."""
         self._closing: set[asyncio.Future[None]] = set()
 
     # Buses
 
-    def adopt(self, opened: Opened, place: int) -> None:
+    def adopt(self, opened: Opened, place: int, connection: Connection | None = None, in_cell: str = "") -> OpenBus:
         """Add a bus and begin to read it; from here on a stop reaches it. Buses keep the order of their places."""
         bus = opened.bus
-        self.places[bus] = place
-        self.buses = dict(sorted([*self.buses.items(), (bus.name, bus)], key=lambda each: self.places[each[1]]))
-        if opened.floor is not None:
-            self.cells[bus.name] = opened.floor
-        self._unwatch[bus] = bus.watch(partial(self._on_bus, bus))
+        unwatch = bus.watch(partial(self._on_bus, bus))
+        record = self._open[bus] = OpenBus(bus, opened, connection, in_cell or bus.name, place, unwatch)
+        self._in_order()
         for text in opened.warnings:
             self.notify(f"{bus.name}: {text}", bus=bus.name, warning=True)
         bus.start()
+        return record
+
+    def _in_order(self) -> None:
+        self._open = dict(sorted(self._open.items(), key=lambda each: each[1].place))
+        self.buses = {bus.name: bus for bus in self._open}
 
     async def forget(self, bus: Bus) -> None:
         """Close a bus and drop everything known of it. A stop that ends the caller does not leave the port open."""
-        for drive in bus.all_drives:
-            if observer := self.debuggers.pop(drive, None):
-                observer.close()
+        record = self._open.get(bus)
+        for observer in record.debuggers.values() if record is not None else ():
+            observer.close()
         self.twins.stop(bus)
+        self._open.pop(bus, None)
         self.buses.pop(bus.name, None)
-        self.cells.pop(bus.name, None)
-        self._selected.pop(bus, None)
-        self.places.pop(bus, None)
-        self.ports.pop(bus.name, None)
         self.addressed = {key for key in self.addressed if key[0] != bus.name}
-        if unwatch := self._unwatch.pop(bus, None):
-            unwatch()
-        for shown in (self.raw.pop(bus.name, None), self.byte_views.pop(bus.name, None)):
-            if shown is not None:
-                shown.close()
+        if record is not None:
+            record.unwatch()
+            for shown in (record.raw, record.bytes_shown):
+                if shown is not None:
+                    shown.close()
         if self.selected_bus == bus.name:
             self.selected_bus = next(iter(self.buses), "")
         closing = asyncio.ensure_future(_close(bus, self.reconnections))
         self._closing.add(closing)
         closing.add_done_callback(self._closing.discard)
         await asyncio.shield(closing)
+
+    def of(self, bus: Bus) -> OpenBus:
+        """The record of an open bus."""
+        return self._open[bus]
+
+    @property
+    def raw(self) -> dict[str, RawLine]:
+        """The buses in raw mode, by name."""
+        return {bus.name: each.raw for bus, each in self._open.items() if each.raw is not None}
+
+    @property
+    def cells(self) -> dict[str, RunningFloor]:
+        """The running cells of simulated buses, by bus."""
+        return {bus.name: each.opened.floor for bus, each in self._open.items() if each.opened.floor is not None}
 
     def bus(self, name: str = "") -> Bus:
         """Find an open bus by name or role; the selected one where no name is given. Raises Diagnostic."""
@@ -322,14 +205,62 @@ class Workspace(Asking):
     @property
     def cell(self) -> RunningFloor | None:
         """The simulated cell of the selected bus, or the only one that is open."""
-        if self.selected_bus in self.cells:
-            return self.cells[self.selected_bus]
-        different = {id(cell): cell for cell in self.cells.values()}
+        cells = self.cells
+        if self.selected_bus in cells:
+            return cells[self.selected_bus]
+        different = {id(cell): cell for cell in cells.values()}
         return next(iter(different.values())) if len(different) == 1 else None
 
     def of_demo(self, bus: str) -> str:
         """The name under which a bus of the demo cell is open; empty: it is not."""
         return next((name for name, each in self.buses.items() if each.link.transport.name == f"sim:#{bus}"), "")
+
+    def move_bus(self, bus: Bus, by: int) -> None:
+        """Put a bus before or after its neighbour; at an end nothing happens."""
+        order = list(self._open.values())
+        at = order.index(self._open[bus])
+        if not 0 <= at + by < len(order):
+            return
+        order[at], order[at + by] = order[at + by], order[at]
+        for number, each in enumerate(order):
+            each.place = number / len(order)  # below 1, and so before what opens later
+        self._in_order()
+        self.changed()
+
+    def rename_bus(self, bus: Bus, name: str) -> None:
+        """Give an open bus another name. Raises Diagnostic, also while anything runs that knows it by its name."""
+        before = bus.name
+        if not re.fullmatch(r"[A-Za-z0-9_.-]{1,32}", name):
+            raise Diagnostic(f"{name!r} is not a name", "/rename", "valid: letters, digits, -, _ and . (32 at most)")
+        if name in self.buses:
+            raise Diagnostic(f"a bus {name} is open already", "/rename", "give another name")
+        if holds := self._holder(bus):
+            raise Diagnostic(f"{before} keeps its name while {holds}", "/rename", "rename it after that")
+        bus.link.name = name
+        self._in_order()
+        self.addressed = {(name if each == before else each, address) for each, address in self.addressed}
+        self.plotted = tuple(each._replace(bus=name) if each.bus == before else each for each in self.plotted)
+        self.reconnections.rename(before, name)
+        if self.selected_bus == before:
+            self.selected_bus = name
+        if self.renamed is not None:
+            self.renamed(before, name)
+        self.notify(f"{before} is {name} now", bus=name)
+        self.changed()
+
+    def _holder(self, bus: Bus) -> str:
+        """The reason for which a bus keeps its name now; empty: it may change."""
+        if bus.lost is not None:
+            return "it is lost"
+        if self._open[bus].raw is not None:
+            return "it is raw"
+        if self.busy or self.playing:
+            return "a macro, a wait or a transfer runs"
+        if self.plots:
+            return "a plot runs"
+        if self._open[bus].debuggers:
+            return "its program is watched"
+        return "a macro is recorded" if self.recording else ""
 
     # Selection and addresses
 
@@ -337,7 +268,7 @@ class Workspace(Asking):
     def selected(self) -> Drive | None:
         """The drive that plain text goes to."""
         bus = self.buses.get(self.selected_bus)
-        return _present(bus, self._selected.get(bus)) if bus is not None else None
+        return _present(bus, self._open[bus].selected) if bus is not None else None
 
     @property
     def place(self) -> tuple[str, str]:
@@ -355,13 +286,14 @@ class Workspace(Asking):
             found = _find(chosen, address)
             if found is None:
                 raise Diagnostic(f"no drive {address} on {chosen.name}", hint=_valid(chosen.drives))
-            self._selected[chosen] = found
+            self._open[chosen].selected = found
         self.selected_bus = chosen.name
         self.changed()
 
     def identified(self, bus: Bus) -> None:
         """Note that the drives of a bus are found; its first one is selected there."""
-        self._selected[bus] = next(iter(bus.drives.values()), None)
+        if record := self._open.get(bus):
+            record.selected = next(iter(bus.drives.values()), None)
         self.changed()
         self.twins.identified(bus)
 
@@ -373,7 +305,7 @@ class Workspace(Asking):
         """Find the drive at an address (or label) of a bus, known or not; by default the selected one."""
         chosen = self.bus(bus)
         if address is None:
-            selected = _present(chosen, self._selected.get(chosen))
+            selected = _present(chosen, self._open[chosen].selected)
             if selected is None:
                 raise NoAnswer(f"{chosen.name}: no drive has replied; @ADDR TEXT sends to one all the same")
             return selected
@@ -473,11 +405,13 @@ class Workspace(Asking):
         return self.recorder.name
 
     def _on_bus(self, bus: Bus, event: BusEvent) -> None:
-        name = bus.name
-        if self.annotators and isinstance(event, Unsolicited):
-            for annotate in self.annotators.get(name, ()):
+        name, record = bus.name, self._open.get(bus)
+        if record is not None and record.annotators and isinstance(event, Unsolicited):
+            for annotate in record.annotators:
                 event = event._replace(lines=tuple(map(annotate, event.lines)))
-        if not (name in self.raw and isinstance(event, Unsolicited)):  # its bytes are shown
+        if not (
+            record is not None and record.raw is not None and isinstance(event, Unsolicited)
+        ):  # its bytes are shown
             self.publish(OnBus(name, event))
         if isinstance(event, Lost):
             self._lost(name, event)

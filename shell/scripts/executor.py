@@ -136,7 +136,7 @@ async def play(
     roles = bind(session, macro, roles)
     name, begun = macro.name, session.now()
     own = macro_claims(session, played, roles)
-    state, ports = session.settings.state, {link.name: session.ports.get(link.name, "") for link, _ in own}
+    state, ports = session.settings.state, {link.name: session.of(session.buses[link.name]).port for link, _ in own}
     with hearing(session.subscribe) as heard, unfinished.playing(state, ports.values(), name, session.wall(begun)):
         execution = Execution(session, heard, watcher.executed)
         async with (

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from multidrop.dialects import Diagnostic, Inexpressible
 from multidrop.dialects.text import whole
-from multidrop.shell import scanning, tabs
+from multidrop.shell import scanning
 from multidrop.shell.connect import settings
 from multidrop.shell.lines import split_target
 from multidrop.shell.openings import model
@@ -99,14 +99,14 @@ async def status(call: Call) -> None:
 
 async def rename(call: Call) -> None:
     name, *bus = call.words()
-    tabs.rename(call.session, call.session.bus("".join(bus)), name)
+    call.session.rename_bus(call.session.bus("".join(bus)), name)
 
 
 async def tab(call: Call) -> None:
     where, *bus = call.words()
     if where not in ("left", "right"):
         raise call.wrong()
-    tabs.move(call.session, call.session.bus("".join(bus)), 1 if where == "right" else -1)
+    call.session.move_bus(call.session.bus("".join(bus)), 1 if where == "right" else -1)
 
 
 async def keep(call: Call) -> None:
@@ -205,18 +205,20 @@ async def hex_(call: Call) -> None:
     bus = workspace.bus()
     if bus.name in workspace.raw:
         raise Diagnostic(f"{bus.name} is raw: its bytes are shown", call.verb.name, "/raw show text|hex|both")
-    shown = workspace.byte_views.get(bus.name)
+    record = workspace.of(bus)
+    shown = record.bytes_shown
     word = words[0] if words else "off" if shown else "on"
     form = FORMS.get("both" if word == "on" else word)
     if form is None and word != "off":
         raise call.wrong()
     if form is None:
         if shown is not None:
-            workspace.byte_views.pop(bus.name).close()
+            shown.close()
+            record.bytes_shown = None
         workspace.notify(f"{bus.name}: bytes are not shown")
         return
     if shown is None:
-        shown = workspace.byte_views[bus.name] = Watched(bus, workspace.publish, workspace.wall)
+        shown = record.bytes_shown = Watched(bus, workspace.publish, workspace.wall)
         shown.open()
     shown.form = form
     workspace.notify(f"{bus.name}: bytes are shown as {form.value[0]}, without polls; /hex off ends it")

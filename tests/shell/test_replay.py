@@ -1,6 +1,7 @@
 """`log replay`: what of a log is sent again, how answers are compared, and that nothing is left moving."""
 
 from contextlib import suppress
+from dataclasses import replace
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -156,8 +157,8 @@ async def asked(tmp_path, answer, *entries):
     """What is asked and announced before a real drive, and the lines that were run."""
     async with Cell(tmp_path, PRESS) as cell:
         cell.session.agreed = False
-        floors = dict(cell.session.cells)
-        cell.session.cells.clear()
+        record = cell.session.of(cell.session.bus())
+        opened, record.opened = record.opened, replace(record.opened, floor=None)
         questions = []
 
         async def ask(question):
@@ -169,7 +170,7 @@ async def asked(tmp_path, answer, *entries):
             await taken(cell, tmp_path, *entries)
         except Diagnostic as problem:
             questions.append(str(problem))
-        cell.session.cells.update(floors)
+        record.opened = opened
         return questions, cell.told(), cell.lines()
 
 

@@ -1,0 +1,161 @@
+"""What a session remembers of drives: names in their programs, lines that they printed, actions while it records."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+from collections import deque
+from collections.abc import Callable, Mapping, Sequence
+from contextvars import ContextVar
+from typing import TYPE_CHECKING
+from weakref import WeakKeyDictionary
+
+from multidrop.dialects import DriveError, Priority
+from multidrop.dialects.codec import at_priority
+from multidrop.drives.events import Conditioned, Sample, Unsolicited
+from multidrop.macros import Recorder
+from multidrop.shell.events import OnBus, Printed, SessionEvent
+from multidrop.shell.lines import join_target
+from multidrop.transports import TransportLost
+
+if TYPE_CHECKING:
+    from multidrop.dialects.program_files import Held
+    from multidrop.drives.bus import Bus
+    from multidrop.drives.drive import Drive
+
+
+class KnownNames:
+    """The names last read of each drive, with the number of commands sent to it by then."""
+
+    def __init__(self) -> None:
+        self._held: WeakKeyDictionary[Drive, tuple[Held, int]] = WeakKeyDictionary()
+        self._asking: WeakKeyDictionary[Drive, asyncio.Task[None]] = WeakKeyDictionary()
+
+    def learn(self, drive: Drive, held: Held) -> None:
+        """Note what was read of a drive."""
+        self._held[drive] = held, drive.commands
+
+    def offered(self, drive: Drive, line: str) -> Sequence[tuple[str, str]]:
+        """The names that may end a line being typed, each with its meaning."""
+        known = self._held.get(drive)
+        programs = drive.family.programs
+        return programs.offered(known[0], line) if known is not None and programs is not None else ()
+
+    def ask(self, drive: Drive, done: Callable[[], None] = lambda: None) -> asyncio.Task[None] | None:
+        """Read the names of a drive at the priority of polls, where they are not known as they are now.
+
+        `done` is called once they are read. A drive that stores lines, or takes a file, is not asked.
+        """
+        programs = drive.family.programs
+        if programs is None or programs.names is None or drive.programming or drive.transferring:
+            return None
+        known = self._held.get(drive)
+        if known is not None and known[1] == drive.commands:
+            return None
+        task = self._asking.get(drive)
+        if task is None or task.done():
+            task = self._asking[drive] = asyncio.get_running_loop().create_task(self._read(drive))
+        task.add_done_callback(lambda ended: None if ended.cancelled() else done())
+        return task
+
+    async def _read(self, drive: Drive) -> None:
+        programs = drive.family.programs
+        assert programs is not None and programs.names is not None
+        with contextlib.suppress(DriveError, TransportLost):  # completion goes without
+            self.learn(drive, await drive.run(at_priority(programs.names(drive.state), Priority.POLL)))
+
+
+KEPT = 1000
+"""The number of lines kept."""
+_begun: ContextVar[int | None] = ContextVar("begun", default=None)
+"""The number of lines before the last line that this macro, script or front end sent to a drive."""
+
+
+class Lately:
+    """The last lines that drives printed, replies and others, each with its number."""
+
+    def __init__(self) -> None:
+        self._lines: deque[tuple[int, str]] = deque(maxlen=KEPT)
+        self._count = 0
+        self._typed = 0
+        """The number of lines before the last line that was sent to a drive."""
+        self._changed = asyncio.Event()
+
+    def take(self, event: SessionEvent) -> None:
+        """Take a session's event."""
+        if isinstance(event, Printed):
+            self._add(event.text)
+        elif isinstance(event, OnBus) and isinstance(event.event, Unsolicited):
+            for line in event.event.lines:
+                self._add(line)
+
+    def begin(self) -> None:
+        """Note that a line is sent to a drive: the next wait of its sender looks from here on."""
+        self._typed = self._count
+        _begun.set(self._count)
+
+    async def finds(self, text: str, seconds: float) -> bool:
+        """Whether a line contains the text: since the sender's last line, or within a time, s."""
+        begun = _begun.get()
+        since = self._typed if begun is None else begun
+        with contextlib.suppress(TimeoutError):
+            async with asyncio.timeout(seconds):
+                while not self._has(text, since):
+                    self._changed.clear()
+                    await self._changed.wait()
+        return self._has(text, since)
+
+    def last(self, most: int) -> list[str]:
+        """The last lines."""
+        return [line for _, line in self._lines][-most:]
+
+    def _has(self, text: str, since: int) -> bool:
+        return any(text in line for number, line in self._lines if number >= since)
+
+    def _add(self, line: str) -> None:
+        self._lines.append((self._count, line))
+        self._count += 1
+        self._changed.set()
+
+
+class Observing:
+    """Notes the texts, motions and changes of inputs while a recorder records."""
+
+    def __init__(self, recorder: Recorder, buses: Callable[[], Mapping[str, Bus]]) -> None:
+        self._recorder, self._buses = recorder, buses
+        self._inputs: dict[tuple[str, str, str], bool] = {}
+        """The last state of each input, by bus, address and word."""
+
+    def take(self, event: SessionEvent) -> None:
+        """Take a session's event."""
+        if not isinstance(event, OnBus):
+            return
+        found, observed = event.event, self._recorder.observed
+        if isinstance(found, Conditioned):
+            self._inputs_of(event.bus, found)
+        elif not self._recorder.name:
+            return
+        elif isinstance(found, Unsolicited):
+            observed.texts.extend((found.at, line) for line in found.lines)
+        elif isinstance(found, Sample):
+            observed.moving.append((found.at, found.velocity != 0))
+
+    def _inputs_of(self, bus: str, found: Conditioned) -> None:
+        """Note each input that has changed and that can be asked for."""
+        for conditions in found.conditions:
+            for lamp in conditions.lamps:
+                key = (bus, found.address, f"I{lamp.name}")
+                if lamp.output or lamp.on is None:
+                    continue
+                before, self._inputs[key] = self._inputs.get(key), lamp.on
+                if self._recorder.name and before not in (None, lamp.on) and self._has(*key):
+                    target = join_target(bus if len(self._buses()) > 1 else "", found.address)
+                    condition = f"{key[2]}={int(lamp.on)}"
+                    text = f"@{target} {condition}" if target else condition
+                    self._recorder.observed.inputs.append((found.at, text))
+
+    def _has(self, bus: str, address: str, word: str) -> bool:
+        """Whether a drive can be asked for a word."""
+        found = self._buses().get(bus)
+        drive = found.drives.get(address) if found is not None else None
+        return drive is not None and drive.family.question(word) is not None
