@@ -15,7 +15,7 @@ from multidrop.dialects.tmcl.host import codec, operations
 from multidrop.dialects.tmcl.host.codec import STOP_BYTES, Tmcl, TmclState
 from multidrop.dialects.tmcl.host.operations import identify
 from multidrop.dialects.tmcl.manual import commands, help
-from multidrop.dialects.tmcl.manual.commands import Call, Command
+from multidrop.dialects.tmcl.manual.commands import Command
 from multidrop.dialects.tmcl.manual.parameters import Global
 
 FIRST = "0"
@@ -67,34 +67,28 @@ def guarded(text: str, address: str) -> Guard | None:
         call = commands.parse(text)
     except commands.LineError:
         return None
-    if name := _guard_name(call):
+    name = _COMMANDS.get(call.command, "")
+    if call.command == Command.SGP and call.type == Global.AUTOSTART and call.value:
+        name = "AUTOSTART"
+    elif call.command in (Command.SGP, Command.RSGP):
+        name = _PARAMETERS.get(call.type, "")
+    if name:
         return Guard(name, f"'{line}' {GUARDS[name]}")
-    return to_all(line) if address in ADDRESSES and call.moves and not _is_rest(call) else None
+    return to_all(line) if address in ADDRESSES and call.moves and not only_ends(text) else None
 
 
 def only_ends(text: str) -> bool:
     """Whether a line is a command of motion that can only end it: a velocity of 0."""
     try:
-        return _is_rest(commands.parse(text))
+        call = commands.parse(text)
     except commands.LineError:
         return False
-
-
-def _is_rest(call: Call) -> bool:
     return call.command in (Command.ROR, Command.ROL) and call.value == 0
 
 
 def word_of(text: str) -> str:
     """The word at the head of a line, in capitals; the number of a command without a word."""
     return text.strip().partition(" ")[0].upper()
-
-
-def _guard_name(call: Call) -> str:
-    if call.command == Command.SGP and call.type == Global.AUTOSTART and call.value:
-        return "AUTOSTART"
-    if call.command in (Command.SGP, Command.RSGP):
-        return _PARAMETERS.get(call.type, "")
-    return _COMMANDS.get(call.command, "")
 
 
 TMCL = Family(

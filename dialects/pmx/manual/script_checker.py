@@ -58,7 +58,10 @@ def _checked(text: str) -> tuple[list[Statement], list[Problem]]:
         problems += _check_flow(statements)
     problems += checker.problems + _calls(statements)
     if not errors(problems):
-        problems += _size(statements)
+        code = script_compiler.compile_(statements)
+        if len(code.lines) > LINES:
+            what = f"the program is too long: {len(code.lines)} lines compiled, and the controller holds {LINES}"
+            problems.append(Problem(code.source[LINES], 1, what, "the memory ends at this line"))
     return statements, in_order(problems)
 
 
@@ -205,28 +208,10 @@ def _calls(statements: Sequence[Statement]) -> list[Problem]:
             problems.append(Problem(each.line, at, f"SUB {each.number} is not defined", "write it, or call another"))
         elif each.word == "GOSUB" and inside is not None:
             calls.setdefault(inside, set()).add(each.number)
-            if inside in _reached(calls, each.number):
+            if inside in walk([each.number], lambda number: calls.get(number, ())):
                 what = f"SUB {inside} calls itself" + (f" by SUB {each.number}" if each.number != inside else "")
                 problems.append(Problem(each.line, each.column, what, "only so many calls are kept", warning=True))
     return problems
-
-
-def _reached(calls: dict[int, set[int]], start: int) -> set[int]:
-    found, more = set[int](), [start]
-    while more:
-        at = more.pop()
-        if at not in found:
-            found.add(at)
-            more += calls.get(at, ())
-    return found
-
-
-def _size(statements: Sequence[Statement]) -> list[Problem]:
-    code = script_compiler.compile_(statements)
-    if len(code.lines) <= LINES:
-        return []
-    what = f"the program is too long: {len(code.lines)} lines compiled, and the controller holds {LINES}"
-    return [Problem(code.source[LINES], 1, what, "the memory ends at this line")]
 
 
 FARTHEST = 500
@@ -241,33 +226,29 @@ _COMPARED = {">": int.__gt__, "<": int.__lt__, "=": int.__eq__, ">=": int.__ge__
 
 
 def _check_flow(statements: Sequence[Statement]) -> Iterator[Problem]:
-    """Report what the paths through correct blocks show; a statement with an error is passed over."""
+    """Report what the paths through correct blocks show; a statement with an error is passed over.
+
+    These are the first statement of each part that no path reaches, and moves that another statement does not wait for.
+    """
     flow = _Flow(statements)
-    yield from _unreachable(flow)
-    for at, each in enumerate(statements):
-        axes = _moved(each)
-        if axes and (found := _disturbed(flow, at, axes)) is not None:
-            yield _unawaited(each, statements[found], axes)
-
-
-def _unreachable(flow: _Flow) -> Iterator[Problem]:
     reached = walk(flow.beginnings, flow.ways)
     dead = False
-    for at, each in enumerate(flow.statements):
+    for at, each in enumerate(statements):
         if at in reached or each.wrong:
             dead = False
         elif not dead and each.word not in _MARKS:
             dead = True
             hint = "an endless loop or a condition of constants precedes it"
             yield Problem(each.line, each.column, f"{each} is never executed", hint, warning=True)
-
-
-def _unawaited(move: Statement, other: Statement, axes: str) -> Problem:
-    if other is move:
-        what = f"the next {move} begins before this one has ended"
-    else:
+    for at, move in enumerate(statements):
+        axes = _moved(move)
+        if not axes or (found := _disturbed(flow, at, axes)) is None:
+            continue
+        other = statements[found]
         what = f"{other} in line {other.line} does not wait for the end of this move"
-    return Problem(move.line, move.column, what, f"WAIT{axes[0]} is missing after it", warning=True)
+        if other is move:
+            what = f"the next {move} begins before this one has ended"
+        yield Problem(move.line, move.column, what, f"WAIT{axes[0]} is missing after it", warning=True)
 
 
 class _Flow:
@@ -297,14 +278,11 @@ class _Flow:
                 self._partner[opened[-1][-1]] = at
                 opened[-1].append(at)
                 if each.word in ("ENDIF", "ENDWHILE"):
-                    self._close(opened.pop())
-
-    def _close(self, parts: Sequence[int]) -> None:
-        first, *inner, last = parts
-        if self.statements[last].word == "ENDWHILE":
-            self._partner[first] = last + 1
-            self._partner[last] = first
-        self._end.update(dict.fromkeys(inner, last))
+                    first, *inner, last = opened.pop()
+                    if each.word == "ENDWHILE":
+                        self._partner[first] = last + 1
+                        self._partner[last] = first
+                    self._end.update(dict.fromkeys(inner, last))
 
     def ways(self, at: int) -> Iterator[int]:
         """The statements that may be executed next, those of a called subroutine left out."""
@@ -366,11 +344,13 @@ def _waits(flow: _Flow, at: int, move: int, axes: str) -> bool:
     begin = flow.subroutines.get(each.number)
     if begin is None:
         return True
-    return nearest([begin], flow.ways, lambda place: _is_busy(flow.statements[place]), FARTHEST) is not None
 
+    def may_wait(place: int) -> bool:
+        """Whether a subroutine with this statement waits, moves, halts, loops, or calls another."""
+        each = flow.statements[place]
+        if each.wrong or each.kind in ("delay", "wait", "move") or each.word in ("WHILE", "GOSUB"):
+            return True
+        motion = any(_MOTION.fullmatch(value.text) for value in each.values)
+        return motion or bool(_HALT.fullmatch(each.word)) or bool(_moved(each))
 
-def _is_busy(each: Statement) -> bool:
-    """Whether a subroutine with this statement may wait: it waits, moves, halts, loops, or calls another."""
-    motion = any(_MOTION.fullmatch(value.text) for value in each.values)
-    waits = each.wrong or each.kind in ("delay", "wait", "move") or each.word in ("WHILE", "GOSUB")
-    return motion or waits or bool(_HALT.fullmatch(each.word)) or bool(_moved(each))
+    return nearest([begin], flow.ways, may_wait, FARTHEST) is not None

@@ -10,7 +10,7 @@ modules drop an unfinished message. A stop is repeated after it too.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from struct import Struct
 from typing import ClassVar, NamedTuple
@@ -107,10 +107,11 @@ class Tmcl(Codec):
 
     def _reply_in(self, request: Request, buffer: bytes) -> Decoded | None:
         address, call = call_of(request.body)
+        as_text = call.command == Command.VERSION and call.type == Version.TEXT
         strays: list[str] = []
         for at in range(0, len(buffer) - LENGTH + 1, LENGTH):
             frame, end = buffer[at : at + LENGTH], at + LENGTH
-            if _is_version(call, frame):
+            if as_text and all(0x20 <= byte < 0x7F for byte in frame[1:]):  # it has no checksum
                 return Decoded(Reply((frame[1:].decode("ascii"),), acknowledged=True, body=frame), end, tuple(strays))
             fields = parse_reply(frame)
             if fields is None:
@@ -118,7 +119,14 @@ class Tmcl(Codec):
             if (fields.module, fields.command) != (address, call.command) or fields.status == Status.TARGET_REACHED:
                 strays.append(_described(fields))
                 continue
-            return _found(request, fields, frame, end, strays)
+            if request.gather:  # a refusal proves as much as a value
+                reply = Reply((*strays, str(fields.value)), acknowledged=True, body=frame)
+            elif not accepted(fields.status):
+                reply = Reply((str(fields.status),), End.REFUSED, body=frame)
+            else:
+                lines = (str(fields.value),) if request.kind is Kind.PRINT else ()
+                reply = Reply(lines, acknowledged=True, body=frame)
+            return Decoded(reply, end, tuple(strays))
         return None
 
     def on_timeout(self, request: Request, buffer: bytes) -> Decoded:
@@ -137,7 +145,17 @@ class Tmcl(Codec):
     def parse_unsolicited(self, buffer: bytes) -> tuple[tuple[str, ...], int]:
         """Late replies and reached targets, a line each; replies to a stop give none."""
         used = len(buffer) - len(buffer) % LENGTH
-        return tuple(_unsolicited(buffer[:used])), used
+        lines = []
+        for at in range(0, used, LENGTH):
+            frame = buffer[at : at + LENGTH]
+            fields = parse_reply(frame)
+            if fields is None:
+                lines.append(f"heard {frame.hex(' ')}")
+            elif fields.command not in STOPS:
+                lines.append(_described(fields))
+            elif fields.status == Status.STORED:
+                lines.append(f"module {fields.module}: in download mode: the stop was stored as a line of its program")
+        return tuple(lines), used
 
     def stop(self, addresses: Sequence[str], sure: bool = True, half_sent: bool = False) -> bytes:
         """The first frame: MST for the first motor of the first module, or the end of its download."""
@@ -194,44 +212,13 @@ class Tmcl(Codec):
 
 def number_of(address: str) -> int:
     """The number in an address. Raises Inexpressible."""
-    if not is_address(address):
+    if address not in ADDRESSES:
         raise Inexpressible(f"no module address '{address}'; valid: 1 to 255")
     return int(address)
 
 
 def _modules(addresses: Sequence[str]) -> list[str]:
-    return [name for name in addresses if is_address(name)] or [FACTORY]
-
-
-def is_address(text: str) -> bool:
-    return text in ADDRESSES
-
-
-def _found(request: Request, fields: Frame, frame: bytes, end: int, strays: list[str]) -> Decoded:
-    if request.gather:  # a refusal proves as much as a value
-        return Decoded(Reply((*strays, str(fields.value)), acknowledged=True, body=frame), end, tuple(strays))
-    if not accepted(fields.status):
-        return Decoded(Reply((str(fields.status),), End.REFUSED, body=frame), end, tuple(strays))
-    lines = (str(fields.value),) if request.kind is Kind.PRINT else ()
-    return Decoded(Reply(lines, acknowledged=True, body=frame), end, tuple(strays))
-
-
-def _is_version(call: Call, frame: bytes) -> bool:
-    """Whether a frame without a checksum is the version as text (command 136, type 0)."""
-    asked = call.command == Command.VERSION and call.type == Version.TEXT
-    return asked and all(0x20 <= byte < 0x7F for byte in frame[1:])
-
-
-def _unsolicited(frames: bytes) -> Iterator[str]:
-    for at in range(0, len(frames), LENGTH):
-        frame = frames[at : at + LENGTH]
-        fields = parse_reply(frame)
-        if fields is None:
-            yield f"heard {frame.hex(' ')}"
-        elif fields.command not in STOPS:
-            yield _described(fields)
-        elif fields.status == Status.STORED:
-            yield f"module {fields.module}: in download mode: the stop was stored as a line of its program"
+    return [name for name in addresses if name in ADDRESSES] or [FACTORY]
 
 
 def _described(fields: Frame) -> str:

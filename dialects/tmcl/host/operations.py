@@ -102,16 +102,12 @@ def moving(state: TmclState) -> Procedure[bool]:
     for motor in range((yield from motors(state))):
         if (yield from read(state, Call(Command.GAP, Axis.ACTUAL_VELOCITY, motor))):
             return True
-        if (yield from _searching(state, motor)):
-            return True
+        try:
+            if (yield from read(state, Call(Command.RFS, Search.STATUS, motor))):
+                return True
+        except Refused:  # a module without reference search
+            pass
     return False
-
-
-def _searching(state: TmclState, motor: int) -> Procedure[bool]:
-    try:
-        return bool((yield from read(state, Call(Command.RFS, Search.STATUS, motor))))
-    except Refused:  # a module without reference search
-        return False
 
 
 def busy(state: TmclState) -> Procedure[bool]:
@@ -209,17 +205,13 @@ def _found(state: TmclState) -> Procedure[bool]:
         state.identified(f"TMCM-{number >> 16}", f"{number >> 8 & 0xFF}.{number & 0xFF:02}")
     else:
         state.identified("TMCL module", "")
-    yield from _count_motors(state)
+    try:
+        yield from motors(state)
+    except NoAnswer as error:
+        state.note(f"{who(state)}: its motors are not counted; a stop is for {MOST_MOTORS} ({error})")
     return True
 
 
 def _end_download(state: TmclState, why: str) -> Procedure[None]:
     yield state.codec.request(state.address, END, Call(Command.END_DOWNLOAD))
     state.note(f"{who(state)}: {why}; it was ended with 133: check the program in the module")
-
-
-def _count_motors(state: TmclState) -> Procedure[None]:
-    try:
-        yield from motors(state)
-    except NoAnswer as error:
-        state.note(f"{who(state)}: its motors are not counted; a stop is for {MOST_MOTORS} ({error})")

@@ -177,7 +177,13 @@ class Call:
     @property
     def moves(self) -> bool:
         """Whether it can start motion; a command without a word may."""
-        return _starts(self)
+        if self.command in NEVER_MOVE:
+            return False
+        if self.command in (Command.SAP, Command.RSAP):
+            return self.type in STARTING_PARAMETERS
+        if self.command == Command.RFS:
+            return self.type == Search.START
+        return self.row is None or self.row.moves
 
 
 STARTING_PARAMETERS = frozenset({0, 1, 2, 4})
@@ -199,16 +205,6 @@ NEVER_MOVE = frozenset(
     }
 )
 """Commands without a word that start neither a motion nor a program; 129 and 130 do."""
-
-
-def _starts(call: Call) -> bool:
-    if call.command in NEVER_MOVE:
-        return False
-    if call.command in (Command.SAP, Command.RSAP):
-        return call.type in STARTING_PARAMETERS
-    if call.command == Command.RFS:
-        return call.type == Search.START
-    return call.row is None or call.row.moves
 
 
 BYTE = range(256)
@@ -241,31 +237,26 @@ def _parsed(text: str) -> Call:
     word, _, rest = text.strip().partition(" ")
     fields = [field.strip() for field in rest.split(",")] if rest.strip() else []
     if word.isascii() and word.isdigit():
-        return _by_number(word, fields)
+        if int(word) not in BYTE:
+            raise LineError(f"no command {word}; valid: 0 to 255")
+        if len(fields) != len(BY_NUMBER):
+            raise LineError(f"a command by its number takes 3 fields: {word} {', '.join(BY_NUMBER)}")
+        return Call(int(word), *(_number(name, field) for name, field in zip(BY_NUMBER, fields, strict=True)))
     row = WORDS.get(word.upper())
     if row is None:
-        raise LineError(f"no command {word!r}{_suggestion(word)}")
+        near = difflib.get_close_matches(word.upper(), list(WORDS), 3, 0.6)
+        hint = f"did you mean {' or '.join(near)}?" if near else f"valid: {', '.join(WORDS)}"
+        raise LineError(f"no command {word!r}; {hint}")
     if len(fields) != len(row.fields):
-        raise LineError(f"{row.word} takes {_count(len(row.fields))}: {row.syntax}")
-    values = {name: _value(row, name, field) for name, field in zip(row.fields, fields, strict=True)}
+        count = "1 field" if len(row.fields) == 1 else f"{len(row.fields)} fields"
+        raise LineError(f"{row.word} takes {count}: {row.syntax}")
+    values = {}
+    for name, given in zip(row.fields, fields, strict=True):
+        known = row.types.get(given.upper()) if name == TYPE else None
+        if known is None and name == TYPE and row.types and not NUMBER.fullmatch(given):
+            raise LineError(f"{row.word} has no type {given!r}; valid: {', '.join(row.types)}")
+        values[name] = _number(name, given) if known is None else known
     return Call(row.command, values.get(TYPE, 0), values.get(MOTOR, values.get(BANK, 0)), values.get(VALUE, 0))
-
-
-def _by_number(word: str, fields: list[str]) -> Call:
-    if int(word) not in BYTE:
-        raise LineError(f"no command {word}; valid: 0 to 255")
-    if len(fields) != len(BY_NUMBER):
-        raise LineError(f"a command by its number takes {_count(len(BY_NUMBER))}: {word} {', '.join(BY_NUMBER)}")
-    kind, motor, value = (_number(name, field) for name, field in zip(BY_NUMBER, fields, strict=True))
-    return Call(int(word), kind, motor, value)
-
-
-def _value(row: Row, name: str, field: str) -> int:
-    if name == TYPE and field.upper() in row.types:
-        return row.types[field.upper()]
-    if name == TYPE and row.types and not NUMBER.fullmatch(field):
-        raise LineError(f"{row.word} has no type {field!r}; valid: {', '.join(row.types)}")
-    return _number(name, field)
 
 
 def _number(name: str, field: str) -> int:
@@ -273,15 +264,6 @@ def _number(name: str, field: str) -> int:
     if not NUMBER.fullmatch(field) or int(field) not in valid:
         raise LineError(f"{name} cannot be {field!r}; valid: {valid[0]} to {valid[-1]}")
     return int(field)
-
-
-def _count(fields: int) -> str:
-    return "1 field" if fields == 1 else f"{fields} fields"
-
-
-def _suggestion(word: str) -> str:
-    near = difflib.get_close_matches(word.upper(), list(WORDS), 3, 0.6)
-    return f"; did you mean {' or '.join(near)}?" if near else f"; valid: {', '.join(WORDS)}"
 
 
 class Status(IntEnum):

@@ -31,7 +31,13 @@ def describe(word: str, product: str = "") -> list[str]:
     if row.command == Command.MVP:
         values = ", ".join(f"{value} {meaning}" for value, meaning in RELATIVE_FROM.items())
         lines.append(f"  REL        axis parameter 127: {values}; not known where a module lacks it")
-    return lines + [f"  {line}" for line in _parameters(row)]
+    setting = row.command in (Command.SAP, Command.SGP)
+    for number, each in _table(row).items():
+        if each.writable or not setting:
+            unit = f", {each.unit}" if each.unit else ""
+            limits = f", {each.limits[0]} to {each.limits[-1]}" if each.writable else ""
+            lines.append(f"  {number:>3}  {each.title}{unit}{limits}")
+    return lines
 
 
 def describe_error(code: int, product: str = "") -> list[str]:
@@ -70,14 +76,3 @@ def _table(row: Row) -> Mapping[int, Parameter]:
     if row.command in ON_AXIS:
         return AXIS
     return GLOBAL if row.command in ON_MODULE else {}
-
-
-def _parameters(row: Row) -> list[str]:
-    setting = row.command in (Command.SAP, Command.SGP)
-    rows = [(number, each) for number, each in _table(row).items() if each.writable or not setting]
-    return [f"{number:>3}  {each.title}{_unit(each)}" for number, each in rows]
-
-
-def _unit(parameter: Parameter) -> str:
-    limits = f", {parameter.limits[0]} to {parameter.limits[-1]}" if parameter.writable else ""
-    return (f", {parameter.unit}" if parameter.unit else "") + limits
