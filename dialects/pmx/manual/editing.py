@@ -42,7 +42,8 @@ def names(text: str) -> list[UserName]:
             place = Span(number, start, stop)
             kinds[word] = kind
             places.setdefault(word, []).append(place)
-            if _declares(code, kind, start):
+            sets = _SETS.match(code)
+            if (sets is not None and sets.start(1) == start) if kind == "variable" else "GOSUB" not in code:
                 declared.setdefault(word, place)
 
     def named(word: str) -> UserName:
@@ -66,13 +67,6 @@ def _found(code: str) -> Iterator[tuple[str, str, int, int]]:
     yield from ((text, "variable", start, start + len(text)) for text, start in found if text in VARIABLE_NAMES)
 
 
-def _declares(code: str, kind: str, start: int) -> bool:
-    if kind == "variable":
-        found = _SETS.match(code)
-        return found is not None and found.start(1) == start
-    return "GOSUB" not in code
-
-
 def fixed(name: UserName) -> str:
     """Return why a name cannot be another one; empty if it can."""
     if name.kind == "program":
@@ -90,17 +84,12 @@ def renamed(text: str, name: UserName, new: str, product: str) -> str:  # noqa: 
     taken = next((each for each in names(text) if each.word == word and each.word != name.word), None)
     if taken is not None:
         raise Diagnostic(f"{word} is in use already, in line {taken.places[0].line + 1}", "", "choose another number")
-    _compare(text, name, word)
-    return word.removeprefix("SUB ")
-
-
-def _compare(text: str, name: UserName, word: str) -> None:
-    """Raise Diagnostic unless a rename changes that word alone in the statements of the text."""
     after = replaced(split_lines(text), name.places, word.removeprefix("SUB "))
     wanted = [_renamed(each, name.word, word) for each in parse(text)[0]]
     for one, other in zip(wanted, parse("\n".join(after))[0], strict=True):
-        if one != other:
+        if one != other:  # more than that word would change
             raise Diagnostic(f"line {other.line} would mean something else with {word}", "", "choose another number")
+    return word.removeprefix("SUB ")
 
 
 def _renamed(statement: Statement, old: str, new: str) -> Statement:

@@ -26,7 +26,7 @@ from multidrop.dialects.pmx.manual.script_compiler import (
 )
 from multidrop.dialects.pmx.manual.script_parser import parse
 from multidrop.dialects.pmx.manual.script_words import AXES, WORDS
-from multidrop.dialects.program_files import Problem, refuse, respelled
+from multidrop.dialects.program_files import Problem, errors, refuse, respelled
 
 _OPERATIONS = {code: op for op, code in OPERATION.items()}
 _COMPARISONS = {code: op for op, code in COMPARISON.items()}
@@ -50,19 +50,14 @@ def decompile(lines: Sequence[str]) -> list[str]:
         end -= 1
     text = _Reader(lines[:end]).program()
     if text:
-        _verify("\n".join(text), lines[:end])
+        code = compile_(parse("\n".join(text))[0])
+        for at, token in enumerate(lines[:end]):
+            if at >= len(code.lines) or token != code.lines[at]:
+                raise Undecodable(at, token)
+        if wrong := errors(script_checker.check("\n".join(text))):
+            at = code.source.index(wrong[0].line)
+            raise Undecodable(at, lines[at])
     return text
-
-
-def _verify(text: str, lines: Sequence[str]) -> None:
-    """Raise Undecodable unless the program is correct and compiles to these lines."""
-    code = compile_(parse(text)[0])
-    for at, token in enumerate(lines):
-        if at >= len(code.lines) or token != code.lines[at]:
-            raise Undecodable(at, token)
-    if wrong := [each for each in script_checker.check(text) if not each.warning]:
-        at = code.source.index(wrong[0].line)
-        raise Undecodable(at, lines[at])
 
 
 class _Reader:
@@ -320,8 +315,14 @@ def _stored(lines: Sequence[SourceLine]) -> list[tuple[int, int, str]]:
 
 
 def _check_raw(lines: Sequence[SourceLine]) -> list[Problem]:
-    problems = _check_places(lines) if _placed(lines) else _check_bare(lines)
-    if any(not each.warning for each in problems):
+    if _placed(lines):
+        problems = _check_places(lines)
+    else:
+        problems = [_stray(line, "a compiled line must be alone") for line in lines if not looks_compiled(line.text)]
+        if len(lines) > LINES:
+            what = f"there are {len(lines)} compiled lines, and the controller holds {LINES}"
+            problems.append(Problem(lines[LINES].number, 1, what, "the memory ends at this line"))
+    if errors(problems):
         return problems
     stored = _stored(lines)
     for number, at, token in stored:
@@ -351,14 +352,6 @@ def _check_places(lines: Sequence[SourceLine]) -> list[Problem]:
         elif at in seen:
             problems.append(Problem(line.number, 3, f"SA{at} is already in line {seen[at]}"))
         seen.setdefault(at, line.number)
-    return problems
-
-
-def _check_bare(lines: Sequence[SourceLine]) -> list[Problem]:
-    problems = [_stray(line, "a compiled line must be alone") for line in lines if not looks_compiled(line.text)]
-    if len(lines) > LINES:
-        what = f"there are {len(lines)} compiled lines, and the controller holds {LINES}"
-        problems.append(Problem(lines[LINES].number, 1, what, "the memory ends at this line"))
     return problems
 
 

@@ -46,7 +46,7 @@ class Register:
         return not (self.readable or self.settable)
 
 
-def _register_words() -> dict[str, Register]:
+def _words() -> dict[str, Register]:
     found: dict[str, Register] = {}
     for name in ("HSPD", "LSPD", "ACC", "DEC"):
         found[name] = Register(name, True, True, 1)
@@ -69,22 +69,13 @@ def _register_words() -> dict[str, Register]:
         found |= {f"{name}{n}": Register(f"{name}{n}", True, True, 0, 1) for n in range(1, bits + 1)}
     found |= {f"SR{n}": Register(f"SR{n}", False, True, 0, 3) for n in range(PROGRAMS)}
     found |= {f"V{n}": Register(f"V{n}", True, True) for n in range(VARIABLES)}
-    return found | _joystick_words()
-
-
-def _joystick_words() -> dict[str, Register]:
-    found = {"JOYENA": Register("JOYENA", False, True, 0, 3)}
+    found["JOYENA"] = Register("JOYENA", False, True, 0, 3)
     for index, axis in enumerate(AXES):
         for number, name in ((1, "JOYHS"), (3, "JOYDEL"), (5, "JOYTOL")):
-            low, high = (0, 5000) if name == "JOYTOL" else (0, INT32[1])
-            found[name + axis] = Register(f"JV{number + index}", False, True, low, high)
+            found[name + axis] = Register(f"JV{number + index}", False, True, 0, 5000 if name == "JOYTOL" else INT32[1])
         for number, name in enumerate(("JOYNO", "JOYNI", "JOYPI", "JOYPO"), 1):
             found[name + axis] = Register(f"JL{number + 4 * index}", False, True)
-    return found
-
-
-def _command_words() -> dict[str, Register]:
-    found = {name: Register(name) for name in ("ABORT", "ABS", "INC", "STOP", "STORE")}
+    found |= {name: Register(name) for name in ("ABORT", "ABS", "INC", "STOP", "STORE")}
     for axis in AXES:
         found |= {f"ABORT{axis}": Register(f"ABORT{axis}"), f"STOP{axis}": Register(f"STOP{axis}")}
         found[f"ECLEAR{axis}"] = Register(f"CLR{axis}")
@@ -94,7 +85,7 @@ def _command_words() -> dict[str, Register]:
     return found
 
 
-WORDS: Mapping[str, Register] = _register_words() | _command_words()
+WORDS: Mapping[str, Register] = _words()
 
 
 KEYWORDS: Mapping[str, tuple[str, str]] = {
@@ -135,10 +126,11 @@ def describe(word: str) -> list[str]:
     row = lookup(found.ascii) if found is not None else None
     if found is None or row is None:
         return []
+    use = " and ".join(use for use, can in (("read", found.readable), ("set", found.settable)) if can) or "executed"
     facts = (
         ("value", row.takes),
-        ("constants", _constants(found)),
-        ("in programs", _use(found)),
+        ("constants", f"{found.low} to {found.high}" if found.settable and found.high < INT32[1] else ""),
+        ("in programs", use),
         ("as command", found.ascii if found.ascii != word else ""),
         ("note", row.note),
         ("manual", f"PMX-2ED-SA {row.section}"),
@@ -153,16 +145,6 @@ def offered() -> list[tuple[str, Register | None]]:
 
 
 VARIABLE_NAMES = frozenset(f"V{number}" for number in range(VARIABLES))
-
-
-def _constants(word: Register) -> str:
-    return f"{word.low} to {word.high}" if word.settable and word.high < INT32[1] else ""
-
-
-def _use(word: Register) -> str:
-    if word.command:
-        return "executed"
-    return " and ".join(use for use, can in (("read", word.readable), ("set", word.settable)) if can)
 
 
 _WORD = re.compile(r"[A-Za-z]\w*[+-]?", re.ASCII)
