@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from typing import TypeVar
 
 from multidrop.dialects import DriveState, Hints, Procedure
 from multidrop.dialects.families import DEFAULT, FAMILIES
 from multidrop.drives.conversations import Conversations
 from multidrop.drives.drive import Drive
-from multidrop.drives.events import BusEvent, Changed
-from multidrop.drives.keeping import Keeper
+from multidrop.drives.events import Changed
 from multidrop.drives.line import Line
 from multidrop.drives.link import Link, Reserved
+from multidrop.drives.port_journal import Keeper
 from multidrop.drives.roster import Roster, Search
 from multidrop.drives.stopping import Halt, Stopping
 from multidrop.drives.telemetry import Telemetry
@@ -39,11 +39,14 @@ class Bus:
         keeper = keeper or Keeper()
         assumed = FAMILIES[family or DEFAULT]
         self.line = Line(assumed.codec, baud=baud, local_echo=local_echo, timeout=timeout)
-        self.link = Link(name, transport, self.line, keeper)
+        self.link = link = Link(name, transport, self.line, keeper)
+        self.start, self.now, self.watch, self.notify = link.start, link.now, link.watch, link.notify
         self._conversations = Conversations(self.link, keeper)
+        self.run = self._conversations.run
         self.witnesses = self._conversations.witnesses
         """The functions called at the end of every conversation."""
         self.roster = Roster(self._conversations, assumed)
+        self.at = self.roster.at
         self.telemetry = Telemetry(self.roster)
         self._stopping = Stopping(self.roster)
         self.stop_ahead, self.halt, self.halted = self._stopping.ahead, self._stopping.halt, self._stopping.halted
@@ -51,7 +54,6 @@ class Bus:
 
     @property
     def name(self) -> str:
-        """Its name in a session."""
         return self.link.name
 
     @property
@@ -59,37 +61,15 @@ class Bus:
         """The loss of the port, until its drives are found again; None otherwise."""
         return self.link.loss
 
-    def start(self) -> None:
-        """Begin to read."""
-        self.link.start()
-
-    def now(self) -> float:
-        """The clock of its events, s."""
-        return self.link.now()
-
-    def watch(self, watcher: Callable[[BusEvent], None]) -> Callable[[], None]:
-        """Publish everything to `watcher` from now on; the function returned ends that."""
-        return self.link.watch(watcher)
-
-    def notify(self, text: str, address: str = "", warning: bool = False) -> None:
-        """Publish a message for the user."""
-        self.link.notify(text, address, warning)
-
     # Drives
 
     @property
     def drives(self) -> dict[str, Drive]:
-        """The drives found, by address."""
         return self.roster.drives
 
     @property
     def all_drives(self) -> list[Drive]:
-        """Every drive found on the link or addressed by the user."""
         return self.roster.all_drives
-
-    def at(self, address: str) -> Drive:
-        """The drive at an address; an unknown one, or all (`*`, `^`), is taken to be set like the first."""
-        return self.roster.at(address)
 
     async def identify(self, hints: Hints) -> list[Drive]:
         """Find the drives on the line and how they are set. Raises NoAnswer if none answers."""
@@ -166,15 +146,10 @@ class Bus:
         self.telemetry.resume()
         self.link.publish(Changed(self.now()))
 
-    async def run(self, procedure: Procedure[T], state: DriveState) -> T:
-        """Run a conversation with one drive to its end. Cancelling the caller stops it, with its clean-up."""
-        return await self._conversations.run(procedure, state)
-
     # Stops
 
     @property
     def last_stop(self) -> Halt | None:
-        """The last stop of the whole line."""
         return self._stopping.last
 
     def stop(self, only: Iterable[Drive] | None = None) -> Halt:

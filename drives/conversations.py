@@ -17,8 +17,8 @@ from weakref import WeakKeyDictionary
 
 from multidrop.dialects import DriveState, End, Kind, Owed, Procedure, Request, Stopped
 from multidrop.drives.events import Concluded, Outcome, Transaction, Witnesses
-from multidrop.drives.keeping import Keeper
 from multidrop.drives.link import Link, LostInFlight
+from multidrop.drives.port_journal import Keeper
 from multidrop.transports import TransportLost
 
 T = TypeVar("T")
@@ -52,7 +52,6 @@ class Conversations:
         return [each for turns in self._turns.values() for each in turns]
 
     def engaged(self, state: DriveState) -> bool:
-        """Whether a conversation with this drive is under way."""
         return bool(self._turns.get(state))
 
     async def run(self, procedure: Procedure[T], state: DriveState, searching: bool = False) -> T:
@@ -195,7 +194,6 @@ class Conversation(Generic[T]):
     # Steps
 
     def _go_on(self) -> None:
-        """Send the next request."""
         if self._all.owes(self._state):
             self._keep(self._send)
         else:
@@ -238,7 +236,6 @@ class Conversation(Generic[T]):
             self._end(ended)
 
     def _fail(self, error: Exception) -> None:
-        """Throw an error into the procedure, which may clean up."""
         self._cleaning_up = True
         self._step(lambda: self._procedure.throw(error))
 

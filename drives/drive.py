@@ -28,8 +28,8 @@ from multidrop.dialects.parameters import Value
 from multidrop.dialects.program_files import Held, ProgramFiles
 from multidrop.drives.conversations import ASKING, Conversation, Conversations, OnEnded, OnOver, awaited
 from multidrop.drives.events import Changed, Outcome, Transaction
-from multidrop.drives.keeping import GLOBAL
 from multidrop.drives.link import Link
+from multidrop.drives.port_journal import GLOBAL
 from multidrop.transports import TransportLost
 
 T = TypeVar("T")
@@ -146,7 +146,6 @@ class Drive:
 
     @property
     def link(self) -> Link:
-        """The link that it is on."""
         return self._conversations.link
 
     @property
@@ -161,7 +160,6 @@ class Drive:
 
     @property
     def family(self) -> Family[Any]:
-        """Its family: the conversations that it offers."""
         return family_of(self.codec)
 
     @property
@@ -181,17 +179,14 @@ class Drive:
 
     @property
     def product(self) -> str:
-        """The short name of the product, such as LMDCM; empty if unknown."""
         return self.state.product
 
     @property
     def version(self) -> str:
-        """The version that it reports."""
         return self.state.version
 
     @property
     def programming(self) -> bool:
-        """In program mode: every line is stored."""
         return self.state.programming
 
     @property
@@ -201,7 +196,6 @@ class Drive:
 
     @property
     def engaged(self) -> bool:
-        """Whether a conversation with it is under way."""
         return self._conversations.engaged(self.state)
 
     # What is sent
@@ -259,7 +253,6 @@ class Drive:
 
     @property
     def _meant(self) -> list[Drive]:
-        """The drives that its address means."""
         return [self, *self._neighbours.all_drives] if self.address in GLOBAL else [self]
 
     def _to_all(self, procedure: Procedure[T]) -> Procedure[T]:
@@ -297,7 +290,6 @@ class Drive:
     async def motion(
         self, priority: Priority = Priority.OPERATOR, on_ended: OnEnded | None = None
     ) -> tuple[Motion, ...]:
-        """Read position and velocity of each axis."""
         return await awaited(lambda over: self.start_motion(priority, over, on_ended))
 
     def start_motion(
@@ -334,14 +326,12 @@ class Drive:
         return None if any(axis.velocity for axis in axes) else tuple(axis.position for axis in axes)
 
     async def busy(self) -> bool:
-        """Read whether a program runs in it."""
         at = self.link.now()
         runs = await self.run(self.family.busy(self.state))
         self.running = Running(at, runs)
         return runs
 
     async def run(self, procedure: Procedure[T], on_ended: OnEnded | None = None) -> T:
-        """Run a conversation with this drive."""
         return await awaited(lambda over: self.start(procedure, over, on_ended))
 
     def start(self, procedure: Procedure[T], on_over: OnOver[T], on_ended: OnEnded | None = None) -> Conversation[T]:

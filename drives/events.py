@@ -1,6 +1,8 @@
-"""Events of a bus: frozen facts with the time at which they happened (the event loop's clock, s).
+"""Events of a bus, on their way to its watchers: frozen facts with the time at which they happened.
 
-They are named tuples, which take a third of the time of a frozen dataclass to make: each request makes four.
+Times are those of the event loop's clock, s. Events are named tuples, which take a third of the time of a frozen
+dataclass to make: each request makes four. A watcher, or a witness of a conversation's end, that fails affects neither
+the others nor the caller (`isolated`).
 """
 
 from __future__ import annotations
@@ -16,13 +18,10 @@ from multidrop.dialects import DriveState, Reply, Request
 from multidrop.dialects.values import Conditions
 from multidrop.transports import TransportLost
 
-# Steps that must not fail each other: the stop of each line, an event for each watcher.
-
-
 LOG = logging.getLogger("multidrop")
 
 
-class apart:  # noqa: N801
+class isolated:  # noqa: N801
     """Isolate a step: add the text of what it raises to `failed`, and write a defect to the log.
 
     This is the one place that takes any exception: after the step, other drives are still to be stopped. A class, not
@@ -163,13 +162,10 @@ class Changed(NamedTuple):
 BusEvent = Sent | Ended | Unsolicited | Notice | Traffic | Sample | Valued | Conditioned | Silent | Lost | Changed
 
 
-# The events of a link on their way to its watchers.
-
-
 Watcher = Callable[[BusEvent], None]
 
 
-class News:
+class EventQueue:
     """Publishes events in their order. A watcher that fails affects neither the others nor the caller."""
 
     def __init__(self, name: str) -> None:
@@ -178,10 +174,9 @@ class News:
         self._events: deque[BusEvent] = deque()
         self._watchers: tuple[Watcher, ...] = ()
         self._telling = False
-        self._apart = apart(f"a watcher of {name}")
+        self._apart = isolated(f"a watcher of {name}")
 
     def watch(self, watcher: Watcher) -> Callable[[], None]:
-        """Publish everything to `watcher` from now on; the function returned ends that."""
         self._watchers = (*self._watchers, watcher)
         return lambda: self._forget(watcher)
 
@@ -213,9 +208,6 @@ class News:
                         watcher(event)
         finally:
             self._telling = False
-
-
-# The ends of conversations, and their witnesses: functions called with each.
 
 
 T = TypeVar("T")
@@ -254,7 +246,7 @@ class Witnesses:
 
     def __init__(self, name: str) -> None:
         self._all: tuple[Witness, ...] = ()
-        self._apart = apart(f"a witness of {name}")
+        self._apart = isolated(f"a witness of {name}")
 
     def __bool__(self) -> bool:
         return bool(self._all)

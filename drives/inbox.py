@@ -2,6 +2,11 @@
 
 An unsolicited line is published once it is whole, and an unterminated one once the wire has been quiet. Until then it
 may still be arriving, so nothing is written. Times are seconds.
+
+A two-wire adapter repeats our own bytes, which are removed before they can be taken for a reply. The repetition has the
+length of what was written and arrives as a whole. Bytes before it were under way earlier. Without a repetition, or with
+a changed one, the wire was disturbed (or the adapter does not repeat). No byte that came since then can be trusted as a
+reply.
 """
 
 from __future__ import annotations
@@ -10,12 +15,6 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
 from multidrop.dialects import Codec, Kind, Request
-
-# Local echo: a two-wire adapter repeats our own bytes, which are removed before they can be taken for a reply.
-#
-# The repetition has the length of what was written and arrives as a whole. Bytes before it were under way earlier.
-# Without a repetition, or with a changed one, the wire was disturbed (or the adapter does not repeat). No byte that
-# came since then can be trusted as a reply.
 
 
 class LocalEcho:
@@ -28,7 +27,6 @@ class LocalEcho:
 
     @property
     def awaited(self) -> bool:
-        """The repetition is still outstanding."""
         return bool(self._own)
 
     def wrote(self, data: bytes) -> bytes:
@@ -49,7 +47,6 @@ class LocalEcho:
         return before, after
 
     def forget(self) -> bytes:
-        """Stop waiting; return what was held."""
         return self.wrote(b"")
 
 
@@ -98,7 +95,6 @@ class Inbox:
         self.buffer += data
 
     def consume(self, used: int, now: float) -> None:
-        """Remove bytes that were a reply."""
         self.buffer, self._begun_at = self.buffer[used:], now
 
     def resume(self) -> None:
@@ -116,14 +112,12 @@ class Inbox:
         self._publish_rest(rest, now)
 
     def forget(self) -> None:
-        """Drop what was received."""
         self.buffer = b""
 
     # Local echo
 
     @property
     def awaits_echo(self) -> bool:
-        """The repetition of our own bytes is still outstanding."""
         return self.echo is not None and self.echo.awaited
 
     def wrote(self, data: bytes, now: float) -> None:

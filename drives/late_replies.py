@@ -1,7 +1,11 @@
-"""Late replies on a line whose language does not number them, and what may be taken for one.
+"""What is on the wire and is not what it seems: late replies, debris of a stop, and what a session before left.
 
-A drive that timed out may be slow, and its reply be taken for the reply to a later request. So each reply is weighed
-against those that are outstanding, until the slow drive has printed something that is certainly its own.
+On a line whose language does not number replies, a drive that timed out may be slow, and its reply be taken for the
+reply to a later request. So each reply is weighed against those that are outstanding, until the slow drive has printed
+something that is certainly its own.
+
+Debris is pieces of the reply and echo that a stop cut off, and replies to the stop itself. None of it is shown. A
+session that was killed leaves replies to its questions, and echoes. A line that may be program output is shown.
 """
 
 from __future__ import annotations
@@ -129,12 +133,6 @@ def _outstanding(request: Request, reply: Reply, doubtful: bool) -> bool:
     return doubtful or reply.end is End.SILENT
 
 
-# Lines on the wire that no program printed: debris of a stop, and what questions of the host left.
-#
-# Debris is pieces of the reply and echo that a stop cut off, and replies to the stop itself. None of it is shown. A
-# session that was killed leaves replies to its questions, and echoes. A line that may be program output is shown.
-
-
 LASTS = 0.5
 """How long after the last byte of a stop its debris may come, s."""
 GARBLED = re.compile(r"[^\t -~]")
@@ -156,7 +154,6 @@ class Debris:
         self._until = float("-inf")
 
     def request_written(self, data: bytes, request: Request, now: float) -> None:
-        """Note a request that the next stop may cut off. Within the debris of a stop, what was written adds up."""
         text = data.decode("latin-1")
         self._sent = self._sent + text if now <= self._until else text
         self._asked = request
@@ -167,7 +164,6 @@ class Debris:
         self._until = transmitted + LASTS
 
     def stop_repeated(self, transmitted: float) -> None:
-        """Note that the stop was written once more."""
         self._until = transmitted + LASTS
 
     def removed(self, lines: tuple[str, ...], known: re.Pattern[str] | None, now: float) -> tuple[str, ...]:
@@ -213,7 +209,6 @@ class Leftovers:
         self._opened_at = float("-inf")
 
     def request_written(self, data: bytes, now: float) -> None:
-        """Note a request, which a drive may repeat."""
         text = data.decode("latin-1").strip("\r\n")
         self._sent += [each for each in (text, text.rstrip(CHECK_BYTES)) if len(each) > 1]
         self._sent_at = now

@@ -40,12 +40,10 @@ class Finished(NamedTuple):
 
     @property
     def request(self) -> Request:
-        """The request."""
         return self.transaction.request
 
     @property
     def reply(self) -> Reply:
-        """Its reply, with how it ended."""
         return self.transaction.reply
 
 
@@ -86,7 +84,6 @@ class Flight:
         return timeout if not by_quiet or self.judged_length == len(buffer) else min(timeout, quiet)
 
     def finished(self, reply: Reply, now: float) -> Finished:
-        """The end of this request with a reply."""
         ended = Transaction(self.request, reply, self.sent_at, now, self.transmitted_at, self.sent)
         return Finished(self.ticket, ended)
 
@@ -167,13 +164,11 @@ class Line:
         return self._tickets
 
     def withdraw(self, ticket: int) -> None:
-        """Remove a request that has not been written."""
         if self._queue:
             self._queue = [each for each in self._queue if each.ticket != ticket]
 
     @property
     def waiting(self) -> Sequence[Request]:
-        """The queued requests, next first."""
         return [each.request for each in self._queue]
 
     # Bytes

@@ -9,10 +9,21 @@ import asyncio
 from collections.abc import Callable, Sequence
 
 from multidrop.dialects import End, Kind, Priority, Request
-from multidrop.drives.events import Changed, Ended, Lost, News, Notice, Sent, Traffic, Transaction, Unsolicited, apart
-from multidrop.drives.keeping import GLOBAL, Departure, Keeper
+from multidrop.drives.events import (
+    Changed,
+    Ended,
+    EventQueue,
+    Lost,
+    Notice,
+    Sent,
+    Traffic,
+    Transaction,
+    Unsolicited,
+    isolated,
+)
 from multidrop.drives.late_replies import Debris, Leftovers
 from multidrop.drives.line import Finished, Line, Write
+from multidrop.drives.port_journal import GLOBAL, Departure, Keeper
 from multidrop.transports import Transport, TransportLost
 
 OnAnswer = Callable[[Transaction | TransportLost], None]
@@ -63,13 +74,12 @@ class Link:
         self._loop = asyncio.get_running_loop()
         self._waiting: dict[int, OnAnswer] = {}
         self._advancing = self._further = False
-        self._news = News(name)
+        self._news = EventQueue(name)
         self.watch, self.publish = self._news.watch, self._news.publish
         self._timer: asyncio.TimerHandle | None = None
-        self._answering = apart(f"a conversation on {name}")
+        self._answering = isolated(f"a conversation on {name}")
 
     def start(self) -> None:
-        """Begin to read."""
         self.leftovers.opened(self.now())
         self.transport.start(self._received, self._broke)
 
@@ -89,7 +99,6 @@ class Link:
         return self.departure.under_way
 
     def resume(self, transport: Transport) -> None:
-        """Go on with another transport in place of the lost one."""
         self.transport, self.lost = transport, None
         self.start()
 
@@ -100,7 +109,6 @@ class Link:
         self._held = None
 
     def now(self) -> float:
-        """The clock of the events, s."""
         return self._loop.time()
 
     # Events
@@ -298,7 +306,7 @@ class Link:
         """Write the stop that is still to be repeated, and fail what waits, so that every conversation ends."""
         self._orderly = not self.lost
         if self._orderly and (repeats := self.line.take_repeats()):
-            with apart(f"the stop of {self.name}"):
+            with isolated(f"the stop of {self.name}"):
                 self.transport.write(repeats)
         self._lose(self.lost or TransportLost(f"{self.transport.name} is closed"))
 
@@ -321,6 +329,5 @@ def _destroyed(transaction: Transaction) -> str:
 
 
 def _short(lines: Sequence[str]) -> str:
-    """Quote the begin of destroyed lines."""
     text = " ".join(lines)
     return repr(text if len(text) <= LONGEST_HEARD else text[:LONGEST_HEARD] + "...")

@@ -1,4 +1,12 @@
-"""The drives of a link: those found, those only addressed, and those being looked for."""
+"""The drives of a link: those found, addressed only, or being looked for; their search and their restarts.
+
+The search moves nothing. A restart that no drive reports is found by what is read after a silence: a drive that replies
+again after a missing reply, or after a loss of its line, is read once: position, and the settings read before. A
+restart leaves one of these signs: a sign-on; position 0 where the drive rested elsewhere and nothing was sent, and no
+program ran, that can move it; a setting that is another one although nothing was sent that sets it. Without a sign
+nothing is claimed: a drive may only have been slow. After a restart the position counts from wherever the drive was,
+until a homing or a set position is seen as done. Only reads are sent.
+"""
 
 from __future__ import annotations
 
@@ -12,20 +20,10 @@ from multidrop.dialects.families import FAMILIES, family_of
 from multidrop.dialects.parameters import Value
 from multidrop.drives.conversations import Conversations
 from multidrop.drives.drive import Drive, still
-from multidrop.drives.events import apart
-from multidrop.drives.keeping import GLOBAL, Keeper
+from multidrop.drives.events import isolated
 from multidrop.drives.link import Link
+from multidrop.drives.port_journal import GLOBAL, Keeper
 from multidrop.transports import TransportLost
-
-# Restarts of drives that no drive reports: what is read after a silence is compared with what was read before it.
-#
-# Theory of operation. A drive that replies again after a missing reply, or after a loss of its line, is read once:
-# position, and the settings that were read before. A restart leaves one of these signs: a sign-on; position 0 where
-# the drive rested elsewhere and nothing was sent, and no program ran, that can move it; a setting that is another one
-# although nothing was sent that sets it. Without a sign nothing is claimed: a drive may only have been slow. After a
-# restart the position counts from wherever the drive was, until a homing or a set position is seen as done. Only reads
-# are sent.
-
 
 PAUSE = 0.25
 """Seconds between two looks at a line that is away, or at a drive that homes."""
@@ -63,7 +61,6 @@ class Restarts:
             self._tasks[drive] = self._begin(f"looking for a restart of {drive.shown}", self._look(drive, before))
 
     def homes(self, drive: Drive, axis: str) -> None:
-        """Watch a homing of an axis whose position does not count, to its end."""
         if (before := self._homings.pop((drive, axis), None)) is not None:
             before.cancel()
         work = self._to_its_end(drive, axis, (drive.commands, drive.started_at))
@@ -71,14 +68,13 @@ class Restarts:
         self._homings[drive, axis] = task
 
     def close(self) -> None:
-        """End all looking."""
         for task in (*self._tasks.values(), *self._homings.values()):
             task.cancel()
 
     def _begin(self, what: str, work: Coroutine[Any, Any, None]) -> asyncio.Task[None]:
         async def guarded() -> None:
             trouble: list[str] = []
-            with apart(f"{what} on {self._link.name}", trouble):
+            with isolated(f"{what} on {self._link.name}", trouble):
                 await work
             if trouble:
                 self._link.notify(trouble[0], warning=True)
@@ -178,6 +174,7 @@ class Roster:
         self.probing: tuple[str, ...] = ()
         """Addresses of the drives that are being looked for."""
         self.restarts = Restarts(self.link)
+        self.homes = self.restarts.homes
         self.stated: tuple[str, ...] = ()
         """The addresses that the first search was given."""
         self.on_stored_stop: Callable[[Drive], None] = lambda drive: None
@@ -186,12 +183,10 @@ class Roster:
 
     @property
     def link(self) -> Link:
-        """The link that they are on."""
         return self.conversations.link
 
     @property
     def all_drives(self) -> list[Drive]:
-        """Every drive found on the link or addressed by the user."""
         return list({**self.unlisted, **self.drives}.values())
 
     def probes(self, address: str) -> None:
@@ -199,7 +194,6 @@ class Roster:
         self.probing = tuple(dict.fromkeys((*self.probing, address)))
 
     def found(self, state: DriveState) -> None:
-        """List a drive that identification has found."""
         self.drives[state.address] = Drive(self.conversations, self, state)
         self._follow()
 
@@ -248,10 +242,6 @@ class Roster:
         """Look for a restart of a drive after a missing reply."""
         if self.drives.get(drive.address) is drive:
             self.restarts.replied_again(drive)
-
-    def homes(self, drive: Drive, axis: str) -> None:
-        """Watch a homing of an axis whose position does not count."""
-        self.restarts.homes(drive, axis)
 
     def conversation_ended(self, drive: Drive, before: str, commanded: bool) -> None:
         """Update the list. `before`: the address at the start, which DN and PY change."""
@@ -302,9 +292,6 @@ def _compare(before: DriveState, now: DriveState) -> None:
         now.note(f"{who}: another drive replies than before the loss ({'; '.join(differences)})")
     elif now.codec != before.codec or now.address != before.address:
         now.note(f"{who}: its settings are not those of before the loss; they were read again")
-
-
-# The search for the drives of a link: at first, and again after a loss. It moves nothing.
 
 
 class Search:

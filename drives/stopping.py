@@ -20,9 +20,9 @@ from typing import NamedTuple
 
 from multidrop.dialects import Codec, DriveError, DriveState, Priority, Stopped, StopPiece
 from multidrop.drives.drive import Drive
-from multidrop.drives.events import Sample, Traffic, Transaction, apart
-from multidrop.drives.keeping import GLOBAL
+from multidrop.drives.events import Sample, Traffic, Transaction, isolated
 from multidrop.drives.link import Link
+from multidrop.drives.port_journal import GLOBAL
 from multidrop.drives.roster import Roster
 from multidrop.transports import TransportLost
 
@@ -78,7 +78,6 @@ class Halt:
 
     @property
     def affected(self) -> tuple[Drive, ...]:
-        """All drives that it stops."""
         return self.drives + self.others
 
     @property
@@ -149,7 +148,7 @@ def stop_forms(roster: Roster, only: Iterable[Drive] | None = None) -> StopForms
     repeats, missed, framed = list[StopPiece](), list[Drive](), False
     for (codec, sure), (names, drives) in groups.items():
         framed, failed = framed or codec.framed, list[str]()
-        with apart(f"the stop of {', '.join(names)} on {roster.link.name}", failed):
+        with isolated(f"the stop of {', '.join(names)} on {roster.link.name}", failed):
             stop, unfinished = codec.stop(names, sure), codec.stop(names, sure, half_sent=True)
             pieces, harmless = codec.stop_again(names, sure), codec.invalidate()
             if stop not in immediate:
@@ -232,7 +231,7 @@ class Stopping:
             self._ahead = None
             halt.trouble.append("lost")
             return
-        with apart(f"the stop of {link.name}", halt.trouble):
+        with isolated(f"the stop of {link.name}", halt.trouble):
             at, ahead = link.now(), self._ahead
             if halt.whole:  # only a stop of the whole link takes over what another thread has written
                 self._ahead = None
@@ -254,7 +253,7 @@ class Stopping:
         """Drop what is unsent and write a stop, whatever fails."""
         link, forms = self._link, stop_forms(self._roster, None if halt.whole else halt.drives)
         dropped = 1
-        with apart(f"taking back what {link.name} has not sent", halt.trouble):
+        with isolated(f"taking back what {link.name} has not sent", halt.trouble):
             dropped = link.transport.discard(whole=forms.framed)
         data, whole = forms.written(bool(dropped or link.line.half_sent(link.now())))
         link.transport.write(data)
@@ -316,7 +315,6 @@ class Stopping:
         self._link.advance()
 
     def _repeat(self, halt: Halt) -> None:
-        """Write a stop once more."""
         self._write(halt)
         self._publish(halt)
 

@@ -28,7 +28,7 @@ from multidrop.dialects.parameters import Value as Fact
 from multidrop.dialects.values import Part, Reader
 from multidrop.drives.conversations import Conversation, OnEnded, OnOver
 from multidrop.drives.drive import Drive, Running
-from multidrop.drives.events import Conditioned, Outcome, Sample, Silent, Transaction, Valued, apart
+from multidrop.drives.events import Conditioned, Outcome, Sample, Silent, Transaction, Valued, isolated
 from multidrop.drives.roster import Roster
 from multidrop.transports import TransportLost
 
@@ -244,7 +244,7 @@ class _Poller(Generic[Thing]):
     def _isolated(self, thing: Thing, due: _Due, what: str, report: str) -> Iterator[None]:
         """Report a defect and put the thing off; then set the timer."""
         trouble: list[str] = []
-        with apart(what, trouble):
+        with isolated(what, trouble):
             yield
         if trouble:
             due.at = self._link.now() + AFTER_DEFECT
@@ -374,7 +374,6 @@ class _ConditionPoller(_Poller[str]):
             self._task.cancel()
 
     def resume(self) -> None:
-        """Read everything again."""
         self._known.clear()
         self._due.clear()
         self._paused = False
@@ -490,7 +489,6 @@ class Telemetry:
             each.pause()
 
     def resume(self) -> None:
-        """Poll again after a pause, or after one of the link."""
         for each in self._pollers:
             each.resume()
 

@@ -1,4 +1,9 @@
-"""A macro: lines as typed, with the seconds between them; and the rules for its parts."""
+"""A macro: lines as typed, with the seconds between them, the values that they take, and the rules for its parts.
+
+Braces in a line: `{NAME}` takes a value; `{{` and `}}` are literal braces. `{NAME:TYPE=DEFAULT,LOW..HIGH}` also says
+what is valid. TYPE is `int`, `float`, `text` or `choice(A|B)`. Default and limits may be left out; without a default a
+value must be given. A plain `{NAME}` takes the type that another line gives it, else it is a text.
+"""
 
 from __future__ import annotations
 
@@ -10,15 +15,6 @@ from dataclasses import dataclass
 from multidrop.dialects.errors import Diagnostic
 from multidrop.dialects.text import visible
 
-# Parameters of a macro: `{NAME:TYPE=DEFAULT,LOW..HIGH}` in a line.
-#
-# TYPE is `int`, `float`, `text` or `choice(A|B)`. Default and limits may be left out; without a default a value must
-# be given. A plain `{NAME}` takes the type that another line gives it, else it is a text.
-
-
-# Braces in a line: `{NAME}` takes a value; `{{` and `}}` are literal braces.
-
-
 _BRACES = re.compile(r"\{\{|\}\}|\{(?P<name>[A-Za-z0-9_-]+)\}|[{}]")
 
 
@@ -28,7 +24,6 @@ def escape(line: str) -> str:
 
 
 def value_names(line: str) -> set[str]:
-    """The names of the values that a line takes."""
     return {match["name"] for match in _BRACES.finditer(line) if match["name"]}
 
 
@@ -96,7 +91,6 @@ class Parameter:
 
     @property
     def example(self) -> str:
-        """A valid value."""
         if self.kind in ("text", "choice"):
             return self.choices[0] if self.choices else "x"
         return written(self.low if self.low is not None else min(0, self.high or 0))
@@ -275,7 +269,6 @@ class Macro:
 
     @property
     def lines(self) -> tuple[str, ...]:
-        """The lines of its steps, with `{NAME}` for each value."""
         return tuple(plain(step.line) for step in self.steps)
 
     @property
@@ -306,7 +299,6 @@ class Macro:
         return f"macro {self.name}, step {number}"
 
     def _numbered(self) -> Iterator[tuple[str, str]]:
-        """Every line with its place, those for a stop last."""
         yield from ((self.where(number), step.line) for number, step in enumerate(self.steps, 1))
         yield from ((self._on_stop(number), line) for number, line in enumerate(self.on_stop, 1))
 
@@ -343,7 +335,6 @@ def filled(macro: Macro, given: Mapping[str, str]) -> tuple[str, ...]:
 
 
 def missing(macro: Macro, given: Mapping[str, str]) -> list[Parameter]:
-    """The values that have to be given and are not."""
     return [each for each in macro.parameters if each.default is None and each.name not in given]
 
 
@@ -400,7 +391,6 @@ def check(macro: Macro, where: str = "", at: At | None = None) -> None:
 
 
 def is_role(name: str) -> bool:
-    """Whether a name is valid for a role."""
     return _ROLE.fullmatch(name) is not None
 
 

@@ -1,4 +1,8 @@
-"""Recording a macro from lines and the times at which they were typed. Reads no clock."""
+"""Recording a macro from lines and the times at which they were typed. Reads no clock.
+
+A pause of a person says how long it took that day. So a wait may stand in its place, for a text, an input, or the end
+of a motion. It says what was waited for, and it fails in time.
+"""
 
 from __future__ import annotations
 
@@ -12,11 +16,6 @@ from typing import Protocol
 from multidrop.dialects.errors import Diagnostic
 from multidrop.dialects.text import visible
 from multidrop.macros.model import Macro, Step, check_name, escape
-
-# Recorded pauses, and the waits that may stand in their place: for a text, an input, or the end of a motion.
-#
-# A pause of a person says how long it took that day. A wait says what was waited for, and it fails in time.
-
 
 LONG = 1.0
 """The shortest pause in whose place a wait is offered, s."""
@@ -56,7 +55,6 @@ class Offer:
 
     @property
     def text(self) -> str:
-        """The offer in words."""
         return f"before step {self.step}, {self.line} for the pause of {self.pause:.1f} s"
 
 
@@ -73,7 +71,6 @@ class Observed:
 
 
 def offers(lines: Sequence[Line], observed: Observed) -> list[Offer]:
-    """The waits that fit a recording, each in place of one pause."""
     found, moved = [], False
     for number, (before, line) in enumerate(zip(lines, lines[1:], strict=False), 2):
         waited = _is_wait(before)
@@ -134,7 +131,6 @@ class Recorded:
     heard: list[str] = field(default_factory=list)
 
     def came_back(self, texts: Iterable[str]) -> None:
-        """Add what the line was answered with."""
         self.heard += texts
 
     @property
@@ -193,11 +189,9 @@ class Recorder:
 
     @property
     def offers(self) -> list[Offer]:
-        """The waits that may stand in place of its pauses."""
         return offers(self._recorded, self.observed)
 
     def discard(self) -> None:
-        """End the recording."""
         self.name, self.before, self._recorded = "", None, []
 
 

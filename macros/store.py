@@ -2,6 +2,9 @@
 
 A project's macro hides the user's of the same name. Text that a person wrote into a file stays there when the program
 changes a value. A macro replaces another only on request, and only if the file is as it was at that time.
+
+A draft is a copy of a macro's file that a person edits. The macro changes only once the whole text is right. A draft
+that is wrong stays, so that nothing typed is lost; the next edit goes on with it.
 """
 
 from __future__ import annotations
@@ -30,7 +33,6 @@ class MacroStore:
 
     @property
     def folders(self) -> tuple[Path, ...]:
-        """The folders that are searched for macros, in that order."""
         return (self.folder,) if self.project is None else (self.project, self.folder)
 
     def path(self, name: str) -> Path:
@@ -223,7 +225,6 @@ class MacroStore:
             )
 
     def delete(self, name: str) -> Path:
-        """Delete the macro's file; return its path."""
         path = self.path(name)
         _unlink(path)
         return path
@@ -282,9 +283,6 @@ def _unreadable(path: Path, error: OSError) -> Diagnostic:
     return Diagnostic(f"cannot read it ({error.strerror or error})", str(path))
 
 
-# The list of all macros, as a person reads it.
-
-
 class Listing(NamedTuple):
     """A line for each macro, the warnings about them, and the problems of the files that cannot be read."""
 
@@ -304,11 +302,6 @@ def listed(store: MacroStore) -> Listing:
         else:
             lines.append(f"{summary}  [{store.project}]" if store.is_project(name) else summary)
     return Listing(lines, [*store.clashes(), *store.hidden()], broken)
-
-
-# Drafts: copies of macro files that a person edits. A macro changes only once the whole text is right.
-#
-# A draft that is wrong stays, so that nothing typed is lost; the next edit goes on with it.
 
 
 MODE = 0o600
@@ -378,7 +371,6 @@ def finish_draft(store: MacroStore, draft: Draft) -> str:
 
 
 def drop_draft(draft: Draft) -> None:
-    """Delete a draft."""
     for path in (draft.file, draft.file.with_suffix(".base")):
         with contextlib.suppress(OSError):
             path.unlink()

@@ -1,4 +1,7 @@
-"""The text of a macro's file: TOML that a person can read and edit."""
+"""The text of a macro's file: TOML that a person can read and edit.
+
+A changed value leaves all else of a hand-written file byte for byte, comments and line ends included.
+"""
 
 from __future__ import annotations
 
@@ -142,9 +145,6 @@ def _plain(char: str) -> bool:
 
 def _coded(char: str) -> str:
     return f"\\u{ord(char):04x}" if ord(char) < 0x10000 else f"\\U{ord(char):08x}"
-
-
-# Changes of values in a hand-written TOML file: all else stays byte for byte, comments and line ends included.
 
 
 MARK = "\ufeff"

@@ -199,7 +199,6 @@ def exported(macros: Iterable[Macro]) -> str:
 
 
 def is_key_name(name: str) -> bool:
-    """Whether a macro's name is that of a function key."""
     return _NAME.fullmatch(name) is not None
 
 

@@ -16,8 +16,8 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from multidrop.dialects import Diagnostic
-from multidrop.drives.events import apart
-from multidrop.drives.keeping import GLOBAL
+from multidrop.drives.events import isolated
+from multidrop.drives.port_journal import GLOBAL
 from multidrop.drives.stopping import Halt
 from multidrop.shell import stop_report
 
@@ -198,10 +198,10 @@ class Automations:
         if automation.halts or automation.stops != self._workspace.stops:
             return  # a stop of everything came meanwhile
         for link, only in _by_link(automation.started).items():
-            with apart(f"the stop of {link.name}"):
+            with isolated(f"the stop of {link.name}"):
                 automation.halts.append(self._halt(link, only))
         for halt in automation.halts:
-            with apart(f"the stop of {halt.link.name}"):
+            with isolated(f"the stop of {halt.link.name}"):
                 if bus := self._open_bus(halt.link):
                     bus.halted(halt)
 

@@ -10,7 +10,7 @@ from datetime import datetime, timedelta
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from multidrop.dialects import Diagnostic, Procedure, Stopped
-from multidrop.drives.events import apart
+from multidrop.drives.events import isolated
 from multidrop.shell.events import By, Notified, Output, Progressed, SessionEvent, StateChanged
 
 if TYPE_CHECKING:
@@ -85,7 +85,7 @@ class Channel:
 
     def __init__(self) -> None:
         self._callbacks: tuple[Callback, ...] = ()
-        self._apart = apart("a front end")
+        self._apart = isolated("a front end")
 
     def subscribe(self, callback: Callback) -> Callable[[], None]:
         """Call back with every event, from the event loop. The function returned ends the subscription."""

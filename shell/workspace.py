@@ -16,7 +16,7 @@ from functools import partial
 from typing import TYPE_CHECKING
 
 from multidrop.dialects import Diagnostic, NoAnswer
-from multidrop.drives.events import BusEvent, Changed, Lost, Notice, Unsolicited, apart
+from multidrop.drives.events import BusEvent, Changed, Lost, Notice, Unsolicited, isolated
 from multidrop.macros import MacroStore, Recorder
 from multidrop.shell import stop_report
 from multidrop.shell.channel import Asking, Tasks
@@ -340,8 +340,8 @@ class Workspace(Asking):
 
     def stop_ahead(self) -> None:
         """Write the stop onto every wire, from any thread, whatever the loop does; `stop` must follow in the loop."""
-        for bus in list(self.buses.values()):
-            with apart(f"the stop of {bus.name}"):
+        for name, bus in list(self.buses.items()):
+            with isolated(f"the stop of {name}"):
                 bus.stop_ahead()
 
     def stop(self, why: str = "stop") -> None:
@@ -352,9 +352,9 @@ class Workspace(Asking):
         self.tasks.stop()
         self.questions.stop()
         for halt in halts:
-            with apart(f"the stop of {halt.link.name}"):
+            with isolated(f"the stop of {halt.link.name}"):
                 self.buses[halt.link.name].halted(halt)
-        with apart("the notice of a stop"):
+        with isolated("the notice of a stop"):
             self._publish_stop(why, halts)
 
     def _publish_stop(self, why: str, halts: list[Halt]) -> None:
@@ -434,7 +434,7 @@ def _write_stops(buses: list[Bus]) -> list[Halt]:
     """Write the stop onto every wire, each wire by itself."""
     halts: list[Halt] = []
     for bus in buses:
-        with apart(f"the stop of {bus.name}"):
+        with isolated(f"the stop of {bus.name}"):
             halts.append(bus.halt())
     return halts
 

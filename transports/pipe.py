@@ -1,9 +1,18 @@
-"""The common half of all pipes: deliver bytes, break once, close once.
+"""Pipes of the event loop: deliver bytes, break once, close once.
 
 A pipe is open, then broken or closed. A read or a caller's `write` may break it. The pipe calls `lost` in a later turn
 of the event loop, so no caller is re-entered from its own call. It first delivers what arrived before the break.
 Closing lingers over bytes that were written and have not left yet, because the last of them may be a stop. A stuck pipe
 delays closing by no more than that.
+
+`DescriptorPipe` is over a non-blocking descriptor that the loop watches. Bytes that the system does not take at once
+wait in it, not in a stream's buffer, so that they can be taken back. A stop must not wait for the event loop, which may
+be painting or collecting garbage. So another thread may preempt the loop: under the lock it drops what is unsent and
+writes the stop. The loop then writes nothing until it has taken note of the stop (`yielded`).
+
+`ThreadedPipe` is over a blocking device, with one thread that reads and one that writes. It serves what the loop cannot
+watch: every port and socket on Windows. Writes wait in a queue and go out in small pieces, so that most of them can be
+taken back.
 """
 
 from __future__ import annotations
@@ -134,15 +143,6 @@ async def in_thread(make: Callable[[], T], undo: Callable[[T], None]) -> T:
         raise
 
 
-# A pipe over a non-blocking descriptor that the event loop watches.
-#
-# Bytes that the system does not take at once wait here, not in a stream's buffer, so that they can be taken back.
-#
-# A stop must not wait for the event loop, which may be painting or collecting garbage. So another thread may preempt
-# the loop: under the lock it drops what is unsent and writes the stop. The loop then writes nothing until it has taken
-# note of the stop (`yielded`).
-
-
 _READS = 64
 """Greatest number of reads of a broken pipe, for what arrived before the break."""
 
@@ -173,7 +173,6 @@ class DescriptorPipe(Pipe):
 
     @property
     def pending(self) -> int:
-        """Number of bytes that the system has not taken yet."""
         with self._guard:
             return sum(map(len, self._pending))
 
@@ -294,12 +293,6 @@ def _begun(chunk: memoryview) -> bool:
     return chunk.nbytes < memoryview(chunk.obj).nbytes
 
 
-# A pipe over a blocking device, with one thread that reads and one that writes.
-#
-# It serves what the event loop cannot watch: RFC 2217 through pyserial, and every port and socket on Windows. Writes
-# wait in a queue here and go out in small pieces, so that most of them can be taken back.
-
-
 _JOIN = 2.0
 """Seconds that closing waits for a thread that a driver holds up; then the thread is abandoned."""
 
@@ -362,7 +355,6 @@ class ThreadedPipe(Pipe):
 
     @property
     def pending(self) -> int:
-        """Number of bytes that the writing thread has not taken yet."""
         with self._turn:
             return sum(map(len, self._queue))
 

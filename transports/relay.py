@@ -1,13 +1,16 @@
 """The far side of `ssh://`: a port here, lent to one multidrop elsewhere through standard input and output.
 
-Theory of operation. One loop waits for three descriptors, and no write blocks. A relay that blocked on its port would
-never see the end of its input, and would keep the port. The relay reads all input that has arrived before it writes to
-the port. So it obeys a drop ahead of the bytes that came before it.
+The frames. A frame is a kind, the length of the payload (2 bytes, the high one first), and the payload. The far side
+begins with one line of text, `GREETING`, once its port is open; frames follow it in both directions. Bytes on their way
+through ssh cannot be taken back: pipes and windows on the way hold megabytes. So the near side sends no more than
+`CREDIT` bytes ahead of the far port, and at `DROP` the far side drops its queue. The far side reads all that has
+arrived before it writes to its port. Thus a drop reaches it ahead of its queue.
 
-A byte counts as sent when it has left the driver, where the driver reports that. The relay reports it at once, because
-the near side's credit and its knowledge of half-sent lines depend on it. The relay ends with its input, and after a
-silence of `SILENCE` seconds; of what arrives after that it passes on only a stop. It then gives the driver a second to
-send its bytes, because the last may be a stop.
+Theory of operation. One loop waits for three descriptors, and no write blocks. A relay that blocked on its port would
+never see the end of its input, and would keep the port. A byte counts as sent when it has left the driver, where the
+driver reports that. The relay reports it at once, because the near side's credit and its knowledge of half-sent lines
+depend on it. The relay ends with its input, and after a silence of `SILENCE` seconds; of what arrives after that it
+passes on only a stop. It then gives the driver a second to send its bytes, because the last may be a stop.
 """
 
 from __future__ import annotations
@@ -21,16 +24,6 @@ from enum import IntEnum
 from typing import Protocol
 
 from multidrop.transports import Endpoint, PortControl, TransportLost
-
-# The frames between multidrop here and `multidrop relay` on the machine that has the port.
-#
-# A frame is a kind, the length of the payload (2 bytes, the high one first), and the payload. The far side begins with
-# one line of text, `GREETING`, once its port is open; frames follow it in both directions.
-#
-# Bytes on their way through ssh cannot be taken back: pipes and windows on the way hold megabytes. So this side sends
-# no more than `CREDIT` bytes ahead of the far port, and at `DROP` the far side drops its queue. The far side reads all
-# that has arrived before it writes to its port. Thus a drop reaches the far side ahead of its queue.
-
 
 WORD = "multidrop-relay"
 VERSION = 1
@@ -83,12 +76,10 @@ class Garbled(Exception):
 
 
 def frame(kind: Kind, payload: bytes | memoryview = b"") -> bytes:
-    """Make one frame of at most `MOST` bytes payload."""
     return bytes([kind]) + len(payload).to_bytes(2) + payload
 
 
 def data_frames(data: bytes) -> bytes:
-    """Make as many data frames as these bytes need."""
     return b"".join(frame(Kind.DATA, data[at : at + MOST]) for at in range(0, len(data), MOST))
 
 
@@ -193,7 +184,6 @@ class Relay:
         self.report()
 
     def report(self) -> None:
-        """Report what the port has sent since the last report."""
         sent = self._settled - self.port.unsent()
         if sent > self._reported:
             self._reported = sent

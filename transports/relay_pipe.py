@@ -65,7 +65,6 @@ class RelayEndpoint:
         self._reason = ""
 
     def fileno(self) -> int:
-        """The descriptor."""
         return self._connection.fileno()
 
     @property
@@ -128,7 +127,6 @@ class RelayEndpoint:
         return allowed
 
     def send(self, made: bytes) -> None:
-        """Send a frame that needs no credit."""
         self._rest += made
         self.flush()
 
@@ -141,7 +139,6 @@ class RelayEndpoint:
             return
 
     def unsent(self) -> int:
-        """Bytes on the way, and in the far driver."""
         return max(0, self._sent - self._done)
 
     def drop(self) -> int:
@@ -175,7 +172,6 @@ class RelayEndpoint:
             return self.outcomes.pop(number)
 
     def close(self) -> None:
-        """Close the connection."""
         self._connection.close(self._lost)
 
 

@@ -205,7 +205,6 @@ class Rfc2217Pipe(Transport):
     # The pipe
 
     def start(self, received: Received, lost: Lost) -> None:
-        """Begin to deliver bytes, first those that came before."""
         self._received, self._lost = received, lost
         self._loop.call_soon(self._begin)
 
@@ -224,7 +223,6 @@ class Rfc2217Pipe(Transport):
 
     @property
     def pending(self) -> int:
-        """Number of bytes that wait in this program."""
         return self._inner.pending
 
     def discard(self, whole: bool = False) -> int:
@@ -242,7 +240,6 @@ class Rfc2217Pipe(Transport):
         self._inner.yielded()
 
     async def close(self) -> None:
-        """Close the pipe."""
         self._lost = self._received = None
         await self._inner.close()
 

@@ -143,7 +143,6 @@ class SerialDevice:
         return self._port.read(1) + self._port.read(self._port.in_waiting)
 
     def write(self, data: bytes) -> None:
-        """Write all bytes."""
         self._port.write(data)
 
     def purge(self) -> None:
@@ -158,18 +157,15 @@ class SerialDevice:
         return 0
 
     def cancel(self) -> None:
-        """End a `read` and a `write` that wait."""
         with contextlib.suppress(OSError):
             self._port.cancel_read()
             self._port.cancel_write()
 
     def explain(self, error: OSError | None) -> str:
-        """Reason of a break in one line for a person."""
         why = f" ({error})" if error else ""
         return f"the port is gone (unplugged?); plug it in{why}"
 
     def close(self) -> None:
-        """Close the port."""
         with contextlib.suppress(OSError):
             self._port.close()
 
@@ -210,7 +206,6 @@ if sys.platform != "win32":
                 fcntl.ioctl(self._descriptor, request)
 
         def fileno(self) -> int:
-            """The descriptor."""
             return self._descriptor
 
         def read(self) -> bytes | None:
@@ -218,7 +213,6 @@ if sys.platform != "win32":
             return os.read(self._descriptor, _READ) or None
 
         def write(self, data: bytes | memoryview) -> int:
-            """Write, and return how many bytes the driver took."""
             return os.write(self._descriptor, data)
 
         def unsent(self) -> int:
@@ -233,11 +227,9 @@ if sys.platform != "win32":
             return held
 
         def explain(self, error: OSError | None) -> str:
-            """Reason of a break in one line for a person."""
             return _GONE if error is None or error.errno is None else f"{_GONE} ({error.strerror})"
 
         def close(self) -> None:
-            """Close the port, after dropping what is stuck in the driver: the kernel would wait up to 30 s for it."""
             if self.unsent():
                 self.drop()
             self._exclusive(termios.TIOCNXCL)

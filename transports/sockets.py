@@ -14,8 +14,6 @@ from typing import Any
 from multidrop.transports import Transport, Unreachable
 from multidrop.transports.pipe import ThreadedPipe
 
-# Whether other computers can reach an address that this one listens on.
-
 
 def exposed(host: str) -> bool:
     """True unless the host is a loopback address or localhost; an unknown name counts as reachable."""
@@ -76,7 +74,6 @@ async def open_udp(host: str, port: int) -> Transport:
 
 
 def host_port(host: str, port: int) -> str:
-    """Write `host:port` as in a URL."""
     return f"[{host}]:{port}" if ":" in host else f"{host}:{port}"
 
 
@@ -101,7 +98,6 @@ def set_socket_options(connection: socket.socket) -> None:
 
 
 def explain(error: OSError | None) -> str:
-    """Reason why a connection broke or failed, and the remedy; None: the other end closed it."""
     if error is None:
         return "closed by the other end; check its power and the network"
     if isinstance(error, socket.gaierror):
@@ -187,7 +183,6 @@ class _Socket:
         return data or (None if self._stream else b"")
 
     def explain(self, error: OSError | None) -> str:
-        """Reason of a break in one line for a person."""
         return explain(error)
 
     def close(self) -> None:
@@ -203,11 +198,9 @@ class SocketEndpoint(_Socket):
     """A connected, non-blocking socket."""
 
     def fileno(self) -> int:
-        """The descriptor."""
         return self._socket.fileno()
 
     def write(self, data: bytes | memoryview) -> int:
-        """Write, and return how many bytes the system took."""
         return self._socket.send(data)
 
     def unsent(self) -> int:
@@ -218,7 +211,6 @@ class SocketEndpoint(_Socket):
             return output_queue(self._socket.fileno()) if self._stream else 0
 
     def drop(self) -> int:
-        """Return 0: the system gives nothing back."""
         return 0
 
 
@@ -239,7 +231,6 @@ class SocketDevice(_Socket):
             return b""
 
     def write(self, data: bytes) -> None:
-        """Write all bytes, however long the other end takes."""
         while data and not self._cancelled:
             with contextlib.suppress(TimeoutError):
                 data = data[self._socket.send(data) :]
@@ -248,7 +239,6 @@ class SocketDevice(_Socket):
         """Do nothing: the other end has no command for it."""
 
     def abort(self) -> int:
-        """Return 0: the system gives nothing back."""
         return 0
 
     def cancel(self) -> None:

@@ -181,22 +181,18 @@ class SshSession:
         self._socket.setblocking(False)
 
     async def read_some(self) -> bytes:
-        """Wait for bytes; empty at the end."""
         try:
             return await asyncio.get_running_loop().sock_recv(self._socket, _READ)
         except OSError:
             return b""
 
     def fileno(self) -> int:
-        """The descriptor."""
         return self._socket.fileno()
 
     def read(self, most: int) -> bytes:
-        """Read what arrived; empty at the end."""
         return self._socket.recv(most)
 
     def write(self, data: bytes | bytearray | memoryview) -> int:
-        """Write, and return how many bytes were taken."""
         return self._socket.send(data)
 
     def unsent(self) -> int:
@@ -221,7 +217,6 @@ class SshSession:
         return None
 
     def close(self, lost: bool) -> None:
-        """End it: the far side sees the end of its input. What is `lost` gets no time for that."""
         with contextlib.suppress(OSError):
             self._socket.shutdown(socket.SHUT_WR)
         self._drain(time.monotonic() + (0.0 if lost else _ENDING))
@@ -257,20 +252,16 @@ class SocatEndpoint:
         self.fileno, self.write, self.unsent = session.fileno, session.write, session.unsent
 
     def read(self) -> bytes | None:
-        """Bytes that arrived; None: the end."""
         return self._session.read(_READ) or None
 
     def drop(self) -> int:
-        """Return 0: what has left cannot be taken back."""
         return 0
 
     def explain(self, error: OSError | None) -> str:
-        """Reason of a break in one line for a person."""
         self._lost = True
         return self._session.last_words() or "the connection has ended; check the network and the other machine"
 
     def close(self) -> None:
-        """End ssh."""
         self._session.close(self._lost)
 
 

@@ -1,4 +1,4 @@
-"""Telnet as bytes (RFC 854): data, options and subnegotiations, in and out. It has no clock and no socket.
+"""Telnet as bytes (RFC 854), with the messages of its com port option (RFC 2217). It has no clock and no socket.
 
 Both ends of RFC 2217 use it: `transports.rfc2217` and `shell.sharing`.
 """
@@ -54,12 +54,10 @@ def escaped(data: bytes) -> bytes:
 
 
 def option(verb: int, number: int) -> bytes:
-    """The bytes of WILL, WONT, DO or DONT for an option."""
     return bytes((IAC, verb, number))
 
 
 def subnegotiation(body: bytes) -> bytes:
-    """The bytes of a subnegotiation."""
     return bytes((IAC, SB)) + escaped(body) + bytes((IAC, SE))
 
 
@@ -124,9 +122,6 @@ class Decoder:
         if self._plain:
             self._events.append(Data(bytes(self._plain)))
             self._plain.clear()
-
-
-# The messages of the com port option of telnet (RFC 2217): numbers, bytes, and their names for a person.
 
 
 OPTION = 44

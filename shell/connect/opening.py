@@ -22,7 +22,7 @@ from multidrop.transports import Unreachable
 from multidrop.transports.ssh import FarPort
 
 if TYPE_CHECKING:
-    from multidrop.drives.keeping import Keeper
+    from multidrop.drives.port_journal import Keeper
     from multidrop.simulator.serving.running import RunningFloor
     from multidrop.transports import Transport
 

@@ -22,7 +22,7 @@ from urllib.parse import quote
 
 from multidrop.dialects import DriveState, Owed
 from multidrop.dialects.state import Remembered
-from multidrop.drives.keeping import Keeper
+from multidrop.drives.port_journal import Keeper
 from multidrop.macros.atomic import write_atomically
 
 MOST_REPLIED = 64

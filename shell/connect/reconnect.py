@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 
 from multidrop.dialects import DriveError, Hints, Stopped
 from multidrop.drives.drive import confirmed_motion
-from multidrop.drives.events import Changed, apart
+from multidrop.drives.events import Changed, isolated
 from multidrop.shell.stop_report import E_STOP, UNCONFIRMED, last_seen
 from multidrop.transports import Transport, TransportLost, Unreachable
 
@@ -197,7 +197,7 @@ class Reconnections:
     async def _try(self, bus: Bus, hints: Hints, reopen: Reopen) -> None:
         trouble: list[str] = []
         try:
-            with apart(f"the return of {bus.name}", trouble):
+            with isolated(f"the return of {bus.name}", trouble):
                 await _Return(bus, hints, reopen, self._say).run()
         finally:
             if self._tasks.get(bus.name) is asyncio.current_task():

@@ -13,7 +13,7 @@ from multidrop.dialects.values import Snapshot
 from multidrop.drives.bus import Bus
 from multidrop.drives.drive import Drive
 from multidrop.drives.events import BusEvent, Changed, Concluded, Conditioned, Lost, Sample, Sent, Traffic, Valued
-from multidrop.drives.keeping import GLOBAL
+from multidrop.drives.port_journal import GLOBAL
 from multidrop.drives.telemetry import Subscription, Value
 from multidrop.shell.events import TwinEnded, TwinEvent
 from multidrop.shell.twins.beside import Beside

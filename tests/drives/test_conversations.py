@@ -9,9 +9,9 @@ from multidrop.dialects.mcode.host.codec import MCode
 from multidrop.dialects.state import Owed
 from multidrop.drives.conversations import Conversations
 from multidrop.drives.events import Sent
-from multidrop.drives.keeping import Keeper
 from multidrop.drives.line import Line
 from multidrop.drives.link import Link
+from multidrop.drives.port_journal import Keeper
 from multidrop.transports import Transport, TransportLost
 from tests.support.virtual import in_virtual_time
 

@@ -17,7 +17,7 @@ def beside(at: float, position: int, velocity: int, ahead: int, address: str = "
     ]
 
 
-def apart(session: FakeSession, address: str = "a", axis: str = "") -> OnBus:
+def isolated(session: FakeSession, address: str = "a", axis: str = "") -> OnBus:
     """The news that a drive is 8112 steps behind its twin."""
     return OnBus("press", Diverged(session.time, address, -8112, 200, CAUSES, axis))
 
