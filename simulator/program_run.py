@@ -1,4 +1,4 @@
-"""What runs of program files on simulated drives, in virtual time, have in common: their limits and their events."""
+"""The common parts of runs of program files on simulated drives in virtual time: limits, events, the trace."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple, Protocol
 
+from multidrop.dialects import Diagnostic
 from multidrop.dialects.program_files import Problem
 from multidrop.simulator.cell.spec import DriveSpec
 
@@ -45,18 +46,86 @@ class Debugging:
 NO_DEBUGGING = Debugging()
 
 
-class Event(Protocol):
-    """Something that a run reports. The last event is the summary."""
+@dataclass(frozen=True)
+class Event:
+    """Something that a run reports at a time, s. The last event is the summary, which alone may be `failed`."""
+
+    t: float
 
     @property
     def failed(self) -> bool:
-        """Whether the test has failed; only a summary says so."""
+        """Whether the test has failed."""
+        return False
 
     def fact(self, real: float) -> dict[str, Any]:
-        """Give the JSON object; `real` is how many seconds the run has taken."""
+        """Return the JSON object; `real` is how many seconds the run has taken."""
+        raise NotImplementedError
 
     def lines(self, file: str, real: float) -> Iterator[Line]:
         """Yield the lines for a person about a run of this file."""
+        raise NotImplementedError
+
+
+ENDS = {
+    "E": "ended at E",
+    "END": "ended",
+    "error": "ended by an error",
+    "until": "stopped",
+    "break": "stopped at a break point",
+}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Summary(Event):
+    """How a run ended: "E", "END", "error", "break" or "until"; position, motions begun, lines executed, errors.
+
+    `errors` are those that the program has not handled. `lines_at` are the lines of the file at which a program stands
+    or has ended. `given_up`: no time was set, and the program was still running. `stuck`: nothing would ever have
+    happened any more. `counts` says it for a person, `turning` is the remark on a motor that still turns.
+    """
+
+    ended: str
+    position: int | tuple[int, ...]
+    moves: int
+    instructions: int
+    errors: tuple[int | str, ...]
+    lines_at: tuple[int, ...]
+    moving: int
+    given_up: bool
+    stuck: bool
+    ran: bool = True
+    counts: str = ""
+    turning: str = ""
+
+    @property
+    def failed(self) -> bool:
+        return bool(self.errors or self.given_up)
+
+    def fact(self, real: float) -> dict[str, Any]:
+        place = self.position
+        return {
+            "summary": {
+                "position": place if isinstance(place, int) else dict(zip("XY", place, strict=True)),
+                "moves": self.moves,
+                "errors": list(self.errors),
+                "instructions": self.instructions,
+                "virtual_s": round(self.t, 6),
+                "real_s": round(real, 3),
+                "ended": self.ended,
+            }
+        }
+
+    def lines(self, file: str, real: float) -> Iterator[Line]:
+        how = f"{ENDS[self.ended]} after {self.t:.4f} s" if self.ran else "not run"
+        yield Line(f"{how}: {self.counts} ({real:.2f} s real)")
+        remark = self.turning
+        if self.stuck:
+            remark = "the program waits here for ever: no further event is possible"
+        elif self.given_up:
+            remark = "the program still runs; --until SECONDS sets the time limit"
+        for line in self.lines_at or (0,):
+            if remark:
+                yield Line(f"{file}:{line}: {remark}" if line else f"{file}: {remark}", problem=True)
 
 
 class ProgramRun(Protocol):
@@ -83,19 +152,17 @@ class Programs(NamedTuple):
     refusals: Callable[[str, str, str, Sequence[Problem]], list[Problem]] | None = None
 
 
-def remark(*, stuck: bool, given_up: bool, turning: str = "") -> str:
-    """Explain how a run ended where that needs a remark; `turning` is the one for a motor that still turns."""
-    if stuck:
-        return "the program waits here for ever: no further event is possible"
-    if given_up:
-        return "the program still runs; --until SECONDS sets the time limit"
-    return turning
+def counted(number: int, what: str) -> str:
+    return f"{number} {what}{'' if number == 1 else 's'}"
 
 
-# The trace of a program file's run: executed lines, break points, the values of variables.
-#
-# A family names the next line of the file and its variables; `Recorder` makes events of that, `MOST_TRACED` at most.
+def next_look(due: float | None, now: float, limit: float) -> float:
+    """Return the time up to which a run advances at once: `SLICE` beyond the next event of the drive."""
+    return limit if due is None else min(max(due, now) + SLICE, limit)
 
+
+# The trace of a program file's run: a family names the next line of the file and its variables; `Recorder` makes events
+# of that, `MOST_TRACED` at most.
 
 MOST_TRACED = 10_000
 """Traced lines after which a trace ends."""
@@ -106,69 +173,55 @@ Values = Mapping[str, Value]
 
 
 @dataclass(frozen=True)
-class Traced:
+class Traced(Event):
     """A line that was executed: when it began, its number, the program of a controller, and the values it changed."""
 
-    t: float
     line: int
     text: str
     changed: Values
     program: int | None = None
-    failed = False
 
     def fact(self, real: float) -> dict[str, Any]:
-        """See Event."""
         number = {} if self.program is None else {"program": self.program}
         return {"t": round(self.t, 6), **number, "line": self.line, "text": self.text, "changed": dict(self.changed)}
 
     def lines(self, file: str, real: float) -> Iterator[Line]:
-        """See Event."""
         number = "" if self.program is None else f" (program {self.program})"
         yield Line(f"{self.t:10.4f}  {file}:{self.line}: {self.text}{number}{shown(self.changed)}")
 
 
 @dataclass(frozen=True)
-class Broken:
+class Broken(Event):
     """The end of a run before the line of a break point: its name as given, and the values that are watched."""
 
-    t: float
     place: str
     line: int
     text: str
     values: Values
     source: Sequence[str] = field(default=(), repr=False)
-    failed = False
 
     def fact(self, real: float) -> dict[str, Any]:
-        """See Event."""
         place = {"break": self.place, "line": self.line, "text": self.text}
         return {"t": round(self.t, 6), **place, "values": dict(self.values)}
 
     def lines(self, file: str, real: float) -> Iterator[Line]:
-        """Yield the break point, and the lines of the file around it."""
         yield Line(f"{self.t:10.4f}  break point {self.place}: {file}:{self.line}: {self.text}{shown(self.values)}")
-        for row in around(self.source, self.line):
-            yield Line(row)
+        first, last = max(self.line - AROUND, 1), min(self.line + AROUND, len(self.source))
+        width = len(str(last))
+        for n in range(first, last + 1):
+            yield Line(f"{'->' if n == self.line else '  '} {n:{width}}  {self.source[n - 1]}".rstrip())
 
 
 @dataclass(frozen=True)
-class TraceFull:
+class TraceFull(Event):
     """The end of a trace that has become too long. The run goes on."""
 
-    t: float
-    failed = False
-
     def fact(self, real: float) -> dict[str, Any]:
-        """See Event."""
         return {"t": round(self.t, 6), "trace": f"ends after {MOST_TRACED} lines"}
 
     def lines(self, file: str, real: float) -> Iterator[Line]:
-        """See Event."""
         hint = "--until and --break end the run earlier, --watch shows fewer lines"
         yield Line(f"{file}: the trace ends after {MOST_TRACED} lines; {hint}", problem=True)
-
-
-Followed = Traced | Broken | TraceFull
 
 
 def shown(values: Values) -> str:
@@ -176,28 +229,29 @@ def shown(values: Values) -> str:
     return "".join(f"   {name}={value}" for name, value in values.items())
 
 
-def around(source: Sequence[str], line: int) -> list[str]:
-    """The lines of a file around one of them, which an arrow marks."""
-    first, last = max(line - AROUND, 1), min(line + AROUND, len(source))
-    width = len(str(last))
-    return [f"{'->' if n == line else '  '} {n:{width}}  {source[n - 1]}".rstrip() for n in range(first, last + 1)]
-
-
 @dataclass
 class BreakPoint:
-    """A break point: its name, and how many passes are still to come."""
+    """A break point: as it was given, its place, and how many passes are still to come."""
 
+    given: str
     place: str
     passes: int = 1
 
-    def reached(self) -> bool:
-        """Count a pass; return whether it was the last."""
-        self.passes -= 1
-        return self.passes <= 0
+
+def break_point(text: str, file: str, valid: str) -> BreakPoint:
+    """Read `PLACE` or `PLACE,PASSES`. Raises Diagnostic for a wrong number of passes."""
+    place, comma, passes = text.partition(",")
+    number = passes.strip()
+    if comma and not (number.isascii() and number.isdigit() and 1 <= int(number) <= 65535):
+        raise Diagnostic(f"no break point {text}", file, f"valid: {valid} from 1 to 65535")
+    return BreakPoint(text, place.strip(), int(number) if comma else 1)
 
 
 class Recorder:
-    """Makes events of the lines of one run. `values` reads what is watched, `points` are by line of the file."""
+    """Makes events of the lines of one run. `values` reads what is watched, `points` are by line of the file.
+
+    `broken`: a break point has ended the run.
+    """
 
     def __init__(
         self,
@@ -210,7 +264,7 @@ class Recorder:
         self._debugging, self._source, self._points, self._values = debugging, source, points, values
         self._last = dict(values())
         self._traced = 0
-        self._events: list[Followed] = []
+        self._events: list[Event] = []
 
     @property
     def full(self) -> bool:
@@ -225,7 +279,10 @@ class Recorder:
     def reaches(self, line: int) -> bool:
         """Count a pass of the break point at a line, if there is one; return whether it was the last."""
         point = self._points.get(line)
-        return point is not None and point.reached()
+        if point is None:
+            return False
+        point.passes -= 1
+        return point.passes <= 0
 
     def breaks(self, t: float, line: int, text: str) -> None:
         """Record the end of the run before a line."""
@@ -250,17 +307,7 @@ class Recorder:
         self._last = dict(now)
         return changed
 
-    def take(self) -> list[Followed]:
+    def take(self) -> list[Event]:
         """Return the events since the last time."""
         taken, self._events = self._events, []
         return taken
-
-
-def split_break(text: str) -> tuple[str, int] | None:
-    """Split `PLACE` or `PLACE,PASSES`; None for a wrong number of passes."""
-    place, comma, passes = text.partition(",")
-    if not comma:
-        return place.strip(), 1
-    if not (passes.strip().isascii() and passes.strip().isdigit()) or not 1 <= int(passes) <= 65535:
-        return None
-    return place.strip(), int(passes)

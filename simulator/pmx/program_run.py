@@ -25,19 +25,20 @@ from multidrop.simulator.program_run import (
     LONGEST,
     MOST_LINES,
     NO_DEBUGGING,
-    SLICE,
     BreakPoint,
     Debugging,
-    Followed,
+    Event,
     Line,
     Load,
     Programs,
     Recorder,
+    Summary,
     Traced,
     Value,
     Values,
-    remark,
-    split_break,
+    break_point,
+    counted,
+    next_look,
 )
 
 # What a person follows in the run of A-SCRIPT: which statement comes next, what variables and registers hold.
@@ -56,7 +57,7 @@ class Statement:
     changed: dict[str, Value] = field(default_factory=dict)
 
 
-class Watcher:
+class Watcher(Recorder):
     """Looks at each compiled line that a program executes. Raises Diagnostic for a line or a name that is not there.
 
     A statement of the file has several compiled lines, so it is reported when the next one begins. `source` gives the
@@ -66,51 +67,49 @@ class Watcher:
     def __init__(
         self, device: PmxDevice, debugging: Debugging, source: Mapping[int, int], text: Sequence[str], file: str
     ) -> None:
-        self._device, self._source, self._text, self._file = device, source, text, file
+        self._device, self._lines, self._text, self._file = device, source, text, file
         self._now = 0.0
         self._open: dict[int, Statement] = {}
-        self._held: list[Followed] = []
         names = [name.upper() for name in debugging.watch]
         for name in names:
             self._check(name)
-        points = {self._line_of(each): self._point(each) for each in debugging.breaks}
+        valid = "LINE, or LINE,PASSES"
+        points = {self._line_of(point := break_point(each, file, valid)): point for each in debugging.breaks}
         everything = debugging.trace and not names
-        self.recorder = Recorder(debugging, text, points, self._variables if everything else partial(self._read, names))
+        values = self._variables if everything else partial(self._read, names)
+        super().__init__(debugging, text, points, values)
 
-    def before(self, t: float, program: int, line: int) -> bool:
-        """See Observer."""
+    def starts(self, t: float, program: int, line: int) -> bool:
         self._now = t
-        number = self._source.get(line, 0)
-        if line and self._source.get(line - 1) == number and program in self._open:
+        number = self._lines.get(line, 0)
+        if line and self._lines.get(line - 1) == number and program in self._open:
             return False  # within a statement
         self._close(program)
         self._open[program] = Statement(t, number)
-        if not self.recorder.reaches(number):
+        if not self.reaches(number):
             return False
-        self.recorder.breaks(t, number, self._shown(number))
+        self.breaks(t, number, self._shown(number))
         del self._open[program]
         return True
 
-    def after(self, t: float, program: int) -> None:
-        """See Observer."""
-        if not self.recorder.full:
-            self._open[program].changed.update(self.recorder.changed())
+    def ends(self, t: float, program: int) -> None:
+        if not self.full:
+            self._open[program].changed.update(self.changed())
 
     @property
     def open_since(self) -> float:
         """When the first statement under way began; infinite where there is none."""
         return min((each.t for each in self._open.values()), default=inf)
 
-    def take(self, last: bool) -> list[Followed]:
-        """Return what was executed since the last time; statements under way only with the `last`."""
-        for program in sorted(self._open) if last else ():
+    def end(self) -> None:
+        """Record the statements under way: the run is over."""
+        for program in sorted(self._open):
             self._close(program)
-        return self.recorder.take()
 
     def _close(self, program: int) -> None:
         done = self._open.pop(program, None)
         if done is not None:
-            self.recorder.after(done.t, done.line, self._shown(done.line), done.changed, program)
+            self.after(done.t, done.line, self._shown(done.line), done.changed, program)
 
     def _shown(self, number: int) -> str:
         return self._text[number - 1].strip() if 0 < number <= len(self._text) else ""
@@ -140,120 +139,49 @@ class Watcher:
             return False
         return True
 
-    def _point(self, text: str) -> BreakPoint:
-        found = split_break(text)
-        if found is None:
-            raise Diagnostic(f"no break point {text}", self._file, "valid: LINE, or LINE,PASSES from 1 to 65535")
-        return BreakPoint(*found)
-
-    def _line_of(self, text: str) -> int:
-        number = whole(self._point(text).place, 0, LAST_LINE)
-        if number not in self._source.values() or number is None:
-            raise Diagnostic(f"no statement to break at {text}", self._file, "valid: the number of a line of the file")
+    def _line_of(self, point: BreakPoint) -> int:
+        number = whole(point.place, 0, LAST_LINE)
+        if number not in self._lines.values() or number is None:
+            raise Diagnostic(
+                f"no statement to break at {point.given}", self._file, "valid: the number of a line of the file"
+            )
         return number
 
 
 # What the run of a PMX's programs reports: as values, as JSON objects, and as lines for a person.
 
 
-ENDS = {"END": "ended", "error": "ended by an error", "until": "stopped", "break": "stopped at a break point"}
-
-
 @dataclass(frozen=True)
-class Output:
+class Output(Event):
     """A program has switched outputs: the time, the program, all outputs as DO gives them."""
 
-    t: float
     program: int
     outputs: int
-    failed = False
 
     def fact(self, real: float) -> dict[str, Any]:
-        """See Event."""
         return {"t": round(self.t, 6), "program": self.program, "outputs": self.outputs}
 
     def lines(self, file: str, real: float) -> Iterator[Line]:
-        """See Event."""
         yield Line(f"{self.t:10.4f}  DO={self.outputs} (program {self.program})")
 
 
 @dataclass(frozen=True)
-class Failed:
+class Failed(Event):
     """An error in a program: its time, the program, the line of the file, the cause; whether SUB 31 handled it."""
 
-    t: float
     program: int
     line: int
     why: str
     handled: bool
-    failed = False
 
     def fact(self, real: float) -> dict[str, Any]:
-        """See Event."""
         more = {"handled": True} if self.handled else {}
         return {"t": round(self.t, 6), "program": self.program, "error": self.why, "line": self.line, **more}
 
     def lines(self, file: str, real: float) -> Iterator[Line]:
-        """See Event."""
         handled = " (SUB 31 has handled it)" if self.handled else ""
         where = f"{file}:{self.line}: program {self.program} at {self.t:.4f} s"
         yield Line(f"{where}: {self.why}{handled}", problem=True)
-
-
-@dataclass(frozen=True)
-class Summary:
-    """How a run ended: "END", "error", "break" or "until"; positions, motions begun, compiled lines executed, errors.
-
-    `lines_at` are the lines of the file at which programs stand that still run.
-    """
-
-    ended: str
-    t: float
-    position: tuple[int, int]
-    moves: int
-    instructions: int
-    errors: tuple[str, ...]
-    lines_at: tuple[int, ...]
-    moving: bool
-    given_up: bool
-    stuck: bool
-
-    @property
-    def failed(self) -> bool:
-        """See Event."""
-        return bool(self.errors or self.given_up)
-
-    def fact(self, real: float) -> dict[str, Any]:
-        """See Event."""
-        return {
-            "summary": {
-                "position": dict(zip("XY", self.position, strict=True)),
-                "moves": self.moves,
-                "errors": list(self.errors),
-                "instructions": self.instructions,
-                "virtual_s": round(self.t, 6),
-                "real_s": round(real, 3),
-                "ended": self.ended,
-            }
-        }
-
-    def lines(self, file: str, real: float) -> Iterator[Line]:
-        """See Event."""
-        yield Line(f"{ENDS[self.ended]} after {self.t:.4f} s: {self._counts} ({real:.2f} s real)")
-        turns = self.moving and self.ended == "END"
-        turning = "a motor still turns; WAITX or WAITY before END waits for it" if turns else ""
-        text = remark(stuck=self.stuck, given_up=self.given_up, turning=turning)
-        for line in self.lines_at or (0,):
-            if text:
-                yield Line(f"{file}:{line}: {text}" if line else f"{file}: {text}", problem=True)
-
-    @property
-    def _counts(self) -> str:
-        many = len(self.errors)
-        failed = f"{many} error{'s' if many > 1 else ''}" if many else "no errors"
-        motions = f"{self.moves} motion{'' if self.moves == 1 else 's'}"
-        x, y = self.position
-        return f"X {x}, Y {y}, {motions}, {self.instructions} compiled lines, {failed}"
 
 
 _MOTION = re.compile(r"X-?\d+(?:Y-?\d+)?|Y-?\d+|(?:J|HL?|L|ZH?)[XY][+-]", re.ASCII)
@@ -280,13 +208,13 @@ class ProgramRun:
         self._moves = 0
         self._last = self._device.controller.outputs
         self._outputs: list[Output] = []
-        self._later: list[Output | Failed | Followed] = []
+        self._later: list[Event] = []
         self._errors: list[str] = []
         self.now = 0.0
 
     def run(
         self, program: str = "", until: float | None = None, debugging: Debugging = NO_DEBUGGING
-    ) -> Iterator[Output | Failed | Followed | Summary]:
+    ) -> Iterator[Event]:
         """Run program 0 or 1, or all; a Summary is the last event. Raises Diagnostic if there is nothing to run."""
         if debugging.wanted:
             self._watcher = Watcher(self._device, debugging, self._source, self._program_lines, self._name)
@@ -299,11 +227,11 @@ class ProgramRun:
         while self._programs.running and self.now < limit and self._programs.executed < most:
             due = self._programs.deadline
             stuck = due is None
-            self.now = limit if due is None else min(max(due, self.now) + SLICE, limit)
+            self.now = next_look(due, self.now, limit)
             self._device.advance(self.now)
             if self._broken:
                 self.now = self._programs.ended_at
-            if self._watcher is not None and self._watcher.recorder.done:
+            if self._watcher is not None and self._watcher.done:
                 self._programs.observer = None
             yield from self._news()
         yield from self._news(last=True)
@@ -323,14 +251,17 @@ class ProgramRun:
             self._last = self._device.controller.outputs
             self._outputs.append(Output(t, program, self._last))
 
-    def _news(self, last: bool = False) -> Iterator[Output | Failed | Followed]:
+    def _news(self, last: bool = False) -> Iterator[Event]:
         """Yield what was executed, switched and what failed since the last look, in the order of time.
 
         What follows the start of an unfinished statement waits for its end. `last`: the run is over.
         """
-        news, begun = [*self._later, *self._outputs], inf
+        news: list[Event] = [*self._later, *self._outputs]
+        begun = inf
         if self._watcher is not None:
-            news += self._watcher.take(last)
+            if last:
+                self._watcher.end()
+            news += self._watcher.take()
             begun = self._watcher.open_since
         for each in self._programs.failures:
             news.append(Failed(each.t, each.program, self._line(each.line), each.why, each.handled))
@@ -348,28 +279,32 @@ class ProgramRun:
     def _summary(self, until: float | None, stuck: bool) -> Summary:
         running = self._programs.running
         standing = [self._programs.counter(n) for n in range(PROGRAMS) if self._programs.status(n) in (1, 2)]
-        position = [int(self._device.execute(f"P{axis}", self.now)) for axis in "XY"]
+        x, y = (int(self._device.execute(f"P{axis}", self.now)) for axis in "XY")
+        moving, errors, lines = (
+            any(self._device.commanded.moving(axis) for axis in "XY"),
+            tuple(self._errors),
+            self._programs.executed,
+        )
+        ended = "break" if self._broken else "until" if running else "error" if errors else "END"
+        failed = counted(len(errors), "error") if errors else "no errors"
         return Summary(
-            ended=self._ended(running),
+            ended=ended,
             t=self._programs.ended_at if not running else self.now,
-            position=(position[0], position[1]),
+            position=(x, y),
             moves=self._moves,
-            instructions=self._programs.executed,
-            errors=tuple(self._errors),
+            instructions=lines,
+            errors=errors,
             lines_at=tuple(self._line(at) for at in standing),
-            moving=any(self._device.commanded.moving(axis) for axis in "XY"),
+            moving=moving,
             given_up=running and until is None,
             stuck=running and stuck,
+            counts=f"X {x}, Y {y}, {counted(self._moves, 'motion')}, {lines} compiled lines, {failed}",
+            turning="a motor still turns; WAITX or WAITY before END waits for it" if moving and ended == "END" else "",
         )
 
     @property
     def _broken(self) -> bool:
-        return self._watcher is not None and self._watcher.recorder.broken
-
-    def _ended(self, running: bool) -> str:
-        if self._broken:
-            return "break"
-        return "until" if running else "error" if self._errors else "END"
+        return self._watcher is not None and self._watcher.broken
 
 
 def read(text: str, file: str) -> Load:

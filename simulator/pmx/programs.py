@@ -53,10 +53,10 @@ class Controller(Protocol):
 class Observer(Protocol):
     """Somebody who looks at each compiled line in virtual time; a unit has no such thing."""
 
-    def before(self, t: float, program: int, line: int) -> bool:
+    def starts(self, t: float, program: int, line: int) -> bool:
         """Return whether all programs end before this line."""
 
-    def after(self, t: float, program: int) -> None:
+    def ends(self, t: float, program: int) -> None:
         """Take note that the line was executed."""
 
 
@@ -177,7 +177,7 @@ class Programs:
                 self.executed += 1
                 lines.step(thread, due)
                 if self.observer is not None:
-                    self.observer.after(due, thread.number)
+                    self.observer.ends(due, thread.number)
                 if self._changed:  # most lines only calculate, and asking costs more than they do
                     self._changed = False
                     self._controller.settle(due)
@@ -191,7 +191,7 @@ class Programs:
 
     def _ends_before(self, thread: Thread, due: float) -> bool:
         """Whether the observer ends all programs before the next line of this one."""
-        if self.observer is None or not self.observer.before(due, thread.number, thread.at):
+        if self.observer is None or not self.observer.starts(due, thread.number, thread.at):
             return False
         self._controller.settle(due)
         self._now = self.ended_at = due
