@@ -100,7 +100,7 @@ def test_an_error_while_running_names_the_line_of_the_file_and_the_program_goes_
 def test_an_error_that_ends_the_program_is_its_end() -> None:
     events = tried("PG 1\nH 500\nBR Zz\nPR 1\nE\nPG\n")
     assert failures(events) == [(30, 3, False)]
-    assert (end(events).ended, end(events).line, prints(events)) == ("error", 3, [])
+    assert (end(events).ended, end(events).lines_at, prints(events)) == ("error", (3,), [])
 
 
 def test_an_error_that_oe_takes_is_told_as_handled_and_is_no_failure() -> None:

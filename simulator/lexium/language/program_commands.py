@@ -81,19 +81,18 @@ class ProgramCommands:
         if target is None or not is_place(target) or isinstance(condition, Text):
             raise Fault(E.ILLEGAL_DATA)
 
+        holds = None
+        if condition is not None:
+            holds = compile_condition(condition, self._variables.reader, self._memory.model.floating)
+        printer, thread = self._printer, self._thread
+
         def go() -> None:
-            self._check_running()
-            jump(target)
+            if holds is None or holds():
+                if printer.immediate and not thread.running:
+                    raise Fault(E.NO_PROGRAM_RUNNING)
+                jump(target)
 
-        if condition is None:
-            return go
-        holds = compile_condition(condition, self._variables.reader, self._memory.model.floating)
-
-        def go_if() -> None:
-            if holds():
-                go()
-
-        return go_if
+        return go
 
     def _hold(self, statement: Statement) -> Action:
         """H (manual 5.1.50). Where 0 is taken it is for motion."""

@@ -41,11 +41,13 @@ class LinkedProgram:
         self.actions: list[Action] = [finish]
         self.texts: list[str] = [""]
         self.index: dict[int, int] = {}
+        self._places: dict[Argument | None, int] = {}
         self._linked = False
 
     def forget(self) -> None:
         """Compile again when something is started: program memory has changed."""
         self._linked = False
+        self._places.clear()
 
     def entry(self, target: Argument | None) -> int:
         """The line at which a program starts. Raises Fault (24, 30, 34, 42)."""
@@ -56,13 +58,16 @@ class LinkedProgram:
 
     def place(self, target: Argument | None) -> int:
         """Where the program that runs goes on. Raises Fault (30, 34, 42), 42 too for what was stored since it began."""
-        address = self._program.resolve(target)
-        if address not in self.index:
-            raise Fault(E.NO_SUCH_ADDRESS, fatal=True)
-        return self.index[address]
+        place = self._places.get(target)
+        if place is None:
+            address = self._program.resolve(target)
+            if address not in self.index:
+                raise Fault(E.NO_SUCH_ADDRESS, fatal=True)
+            place = self._places[target] = self.index[address]
+        return place
 
     def _link(self) -> None:
-        self.actions, self.texts, self.index = [], [], {}
+        self.actions, self.texts, self.index, self._places = [], [], {}, {}
         program, expected = self._program, None
         for address in program.order:
             line = program.lines[address]
