@@ -1,4 +1,7 @@
-"""The channel between a session and its front ends: events out to all subscribers, on one clock."""
+"""The channel between a session and its front ends: events, progress and questions out, answers in, on one clock.
+
+It also runs the tasks that a stop ends: verbs, scripts, macros, waits, downloads.
+"""
 
 from __future__ import annotations
 

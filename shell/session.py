@@ -22,11 +22,11 @@ from multidrop.shell.connect.opening import open_buses
 from multidrop.shell.connect.settings import Settings
 from multidrop.shell.events import FAILURES, By, Entered, Failed, Printed
 from multidrop.shell.lines import EVERYONE, DriveLine, TypedLine, VerbLine, join_target, parse, split_target
-from multidrop.shell.motion import in_motion
 from multidrop.shell.openings import Openings
 from multidrop.shell.operations.table import find
 from multidrop.shell.playing import played_by
 from multidrop.shell.twins import Twins
+from multidrop.shell.waits import in_motion
 from multidrop.shell.workspace import LATCHED, Workspace
 
 if TYPE_CHECKING:

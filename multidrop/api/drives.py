@@ -1,4 +1,4 @@
-"""The awaited drive: one address, and on it one axis."""
+"""The awaited drive: one address, and on it one axis, with its program and its settings."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Position and velocity of drives as they are read: an iterator of samples."""
+"""Samples of position and velocity: read as they come, as rows, as columns, as a plot, and from files of plots."""
 
 from __future__ import annotations
 

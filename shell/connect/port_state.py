@@ -1,10 +1,13 @@
 """The record of a port in the state folder, for the next session if this one is interrupted.
 
-Theory of operation. A port has two files here (`port_memory` has a third). A session locks `NAME.line` while the port
+Theory of operation. A port has three files. A session locks `NAME.line` while the port
 is open. The file holds a line that may move something, while that line is being sent. A line in an unlocked file was
 interrupted with its session. It is written in place and not synced, which takes microseconds: it survives the process,
 not the machine. `NAME.json` holds the echo modes to restore in drives; it is replaced as a whole and synced before
 such a mode is changed. Without a writable folder a session works all the same, and says so once it matters.
+
+The third, `PortMemory`, holds which drives replied last and how they were set. It saves time and proves nothing: a drive
+confirms it before anything depends on it. So it is neither locked nor synced. The same holds for the URLs opened last.
 """
 
 from __future__ import annotations

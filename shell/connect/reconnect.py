@@ -3,6 +3,9 @@
 A bus keeps its name, its drives and everything that watches it. An attempt opens the port again, writes the stop that
 the loss has left open, and finds the drives and their settings again. Nothing else is sent before that, nothing that
 was sent is sent again, and nothing moves.
+
+A serial port is opened only under a name that follows the adapter: another adapter may have taken the number of the old
+one. The number of a pseudo-terminal does not qualify; a link to it does, once a server has renewed it.
 """
 
 from __future__ import annotations

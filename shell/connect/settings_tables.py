@@ -1,8 +1,31 @@
-"""The lines that need a person's yes: the families' guards, as the configuration changes them.
+"""The tables of the configuration beside its connections.
 
 [guards]
 off = ["BD", "*"]       # guards that ask no more; "*": what can start every drive of a line
 also = ["S", "EX"]      # words that ask, too
+
+[log]
+always = true               # a log of each session, in the state folder
+megabytes = 16              # the size at which a part is full
+files = 8                   # the parts that are kept
+
+[screen]
+theme = "multidrop-light"
+signs = "ascii"             # auto, full, boxes, ascii
+times = "last"              # of the lines in a transcript: off, clock, start, last
+
+[keys]                      # keys by the names of functions
+palette = "^G"
+panel-plot = "F9"
+
+[mqtt]                              # for `multidrop publish`
+username = "shop-7"
+password_file = "broker.password"   # or password = "..."
+ca = "plant-ca.pem"                 # the authority of the broker's certificate, for mqtts://
+cert = "shop-7.pem"                 # our certificate, where the broker requires one
+key = "shop-7.key"
+
+A relative path begins at the folder of the configuration file.
 """
 
 from __future__ import annotations

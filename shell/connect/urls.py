@@ -22,6 +22,7 @@ from multidrop.transports.ssh import WAYS, wrong_path
 if TYPE_CHECKING:
     from multidrop.shell.connect.settings import SavedConnection
 
+
 DEFAULT_PORTS = {scheme: form.port or None for scheme, form in URL_FORMS.items() if form.port is not None}
 SCHEMES = tuple(URL_FORMS)
 DIALECTS = tuple(name for name, row in TABLE.items() if not row.scheme)
@@ -231,3 +232,15 @@ def _with_query(connection: Connection, query: str) -> Connection:
         values["family"] = own
     hints = {name: values.pop(name) for name in list(values) if name in HINTED}
     return replace(connection, hints=Hints(**hints), **values)
+
+
+HOST = "127.0.0.1"
+
+
+def listening(text: str) -> tuple[str, int]:
+    """Host and port (0: a free one). Raises Diagnostic."""
+    host, _, port = text.rpartition(":")
+    number = whole(port, 0, 65535)
+    if number is None:
+        raise Diagnostic(f"no port {url_without_secrets(text)!r} to serve at", hint="valid: PORT or HOST:PORT, as 9876")
+    return host.removeprefix("[").removesuffix("]") or HOST, number

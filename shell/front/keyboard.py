@@ -3,6 +3,8 @@
 A held terminal echoes nothing and passes on every byte: no flow control (Ctrl+S), no line editing, no literal-next. A
 thread looks for Ctrl+X in the bytes as they come, before any parser and any queue. That thread writes the stop itself,
 whatever the event loop does.
+
+Signals and the stop key interrupt automation.
 """
 
 from __future__ import annotations

@@ -33,10 +33,8 @@ from multidrop.shell.connect import settings
 from multidrop.shell.events import FAILURES, Progressed, SessionEvent, StateChanged
 from multidrop.shell.front.collector import collected_at_rest
 from multidrop.shell.front.keyboard import Keyboard, on_signals, terminal
-from multidrop.shell.front.prompt_keys import KeyboardInput
-from multidrop.shell.front.prompt_lines import LinesAbove
-from multidrop.shell.front.prompt_parts import SessionCompleter, SharedHistory, Toolbar
-from multidrop.shell.front.prompt_question import PromptQuestion
+from multidrop.shell.front.prompt_keys import KeyboardInput, PromptQuestion
+from multidrop.shell.front.prompt_lines import LinesAbove, SessionCompleter, SharedHistory, Toolbar
 from multidrop.shell.front.terminal_input import filled
 from multidrop.shell.front.typed_lines import History, LineQueue, shown
 from multidrop.shell.log.writer import begin as begin_log

@@ -3,6 +3,8 @@
 A number that a drive prints while it may move may be another number. A drive may move from a line that can start it
 until a wait or a stop. The replay ends at the first difference in an error, and stops the drives that it moved. Against
 a cell, it also compares the positions in the log with those of the simulated drives at the same times.
+
+Against a cell it runs in virtual time: where nothing is ready, time goes on to the next timer.
 """
 
 from __future__ import annotations

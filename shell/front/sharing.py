@@ -10,9 +10,8 @@ from typing import Any
 
 from multidrop.dialects import Diagnostic
 from multidrop.shell.connect import settings
-from multidrop.shell.connect.listening import listening
 from multidrop.shell.connect.opening import open_port
-from multidrop.shell.connect.urls import parse
+from multidrop.shell.connect.urls import listening, parse
 from multidrop.shell.events import FAILURES
 from multidrop.shell.front.keyboard import on_signals, on_stop_key
 from multidrop.shell.output import exit_code, finish, nonblocking, report, write

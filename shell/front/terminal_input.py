@@ -1,4 +1,7 @@
-"""Lines from the command line, and from standard input as they come."""
+"""What a person or a pipe enters at a terminal without a prompt: lines, the answer to a question, the values of a form.
+
+An answer is one key. Keys that were typed before the question could be read answer nothing.
+"""
 
 from __future__ import annotations
 

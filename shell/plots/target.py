@@ -11,7 +11,7 @@ from pathlib import Path
 from urllib.parse import urlsplit
 
 from multidrop.dialects import Diagnostic
-from multidrop.shell.connect.listening import listening
+from multidrop.shell.connect.urls import listening
 from multidrop.shell.secrets import url_without_secrets
 
 

@@ -1,4 +1,8 @@
-"""Scripts, macros and typed lines from their beginning to their end."""
+"""Scripts, macros and typed lines from their beginning to their end.
+
+The drives that an unfinished macro set in motion are stopped first; its `on_stop` lines follow. After a stop of
+everything no `on_stop` line is executed, then or later.
+"""
 
 from __future__ import annotations
 
@@ -17,13 +21,13 @@ from multidrop.macros import Macro
 from multidrop.shell import unfinished
 from multidrop.shell.automation import outcome, settled
 from multidrop.shell.events import FAILURES, By, OnBus, SessionEvent
-from multidrop.shell.motion import Standing, standings
 from multidrop.shell.playing import NO_ROLES, cast
 from multidrop.shell.scripts.execution import CUT, Execution, Frame, Unfinished
 from multidrop.shell.scripts.hearing import hearing
 from multidrop.shell.scripts.model import Ending, Executed, Result, Script, ScriptLine, Watcher
 from multidrop.shell.scripts.planning import bind, macro_claims, script_claims
 from multidrop.shell.scripts.reading import read_macro
+from multidrop.shell.waits import Standing, standings
 from multidrop.shell.workspace import LATCHED
 from multidrop.transports import TransportLost
 

@@ -1,4 +1,4 @@
-"""A checked script or macro: its steps as a tree."""
+"""A checked script or macro: its steps as a tree, and the result of each executed line."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ from datetime import datetime
 from typing import Any, Protocol
 
 from multidrop.macros import Macro
-from multidrop.shell.motion import Standing
 from multidrop.shell.secrets import without_secrets
+from multidrop.shell.waits import Standing
 
 
 @dataclass(frozen=True)

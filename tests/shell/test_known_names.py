@@ -12,7 +12,7 @@ from multidrop.dialects.program_files import Held
 from multidrop.drives.events import Ended
 from multidrop.shell.events import OnBus
 from multidrop.shell.front.complete import complete, names_of
-from multidrop.shell.front.prompt_parts import SessionCompleter
+from multidrop.shell.front.prompt_lines import SessionCompleter
 from tests.support.cases import for_each
 from tests.support.cell_session import CellSession, bus, party
 from tests.support.virtual import in_virtual_time

@@ -15,7 +15,7 @@ from multidrop.drives.drive import Drive
 from multidrop.drives.events import Sample
 from multidrop.drives.stopping import Fate
 from multidrop.shell.events import OnBus
-from multidrop.shell.motion import standings
+from multidrop.shell.waits import standings
 from tests.support.cell_session import CellSession, bus, party
 from tests.support.virtual import in_virtual_time
 
