@@ -69,7 +69,6 @@ class Sight:
         self._break_point = ""
 
     def read(self, listing: Listing) -> None:
-        """Publish the lines that were read."""
         self._channel.publish(ProgramRead(*self._place(), listing.lines))
 
     def seen(self, line: int | None, phase: Phase = Phase.EXECUTES) -> None:

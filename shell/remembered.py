@@ -106,7 +106,6 @@ class Lately:
         return self._has(text, since)
 
     def last(self, most: int) -> list[str]:
-        """The last lines."""
         return [line for _, line in self._lines][-most:]
 
     def _has(self, text: str, since: int) -> bool:

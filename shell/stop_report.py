@@ -59,7 +59,6 @@ class Tally:
     """A drive still moves, or its program runs, after several stops."""
 
     def of(self, fate: Fate) -> list[Found]:
-        """The drives with one fate."""
         return [each for each in self.found if each.fate is fate]
 
     @property

@@ -177,7 +177,6 @@ class Workspace(Asking):
         await asyncio.shield(closing)
 
     def of(self, bus: Bus) -> OpenBus:
-        """The record of an open bus."""
         return self._open[bus]
 
     @property

@@ -6,8 +6,8 @@ interrupted with its session. It is written in place and not synced, which takes
 not the machine. `NAME.json` holds the echo modes to restore in drives; it is replaced as a whole and synced before
 such a mode is changed. Without a writable folder a session works all the same, and says so once it matters.
 
-The third, `PortMemory`, holds which drives replied last and how they were set. It saves time and proves nothing: a drive
-confirms it before anything depends on it. So it is neither locked nor synced. The same holds for the URLs opened last.
+The third, `PortMemory`, holds which drives replied last and how they were set. It saves time and proves nothing: a
+drive confirms it before anything depends on it. So it is neither locked nor synced, as the URLs opened last are not.
 """
 
 from __future__ import annotations

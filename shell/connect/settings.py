@@ -98,7 +98,6 @@ class Settings:
 
     @property
     def macros(self) -> Path:
-        """The folder of the macros."""
         return self.folder / "macros"
 
     @property

@@ -30,7 +30,6 @@ class Completion:
 
 
 def complete(workspace: Workspace, text: str) -> list[Completion]:
-    """The completions of the last word."""
     head, word = _last_word(text)
     start = len(text) - len(word)
     if not head.strip() and word.startswith("/"):

@@ -1,9 +1,9 @@
 """What the prompt shows: lines above it, the toolbar below it, completions and history.
 
-The lines are collected, bounded in number, and shown at most ten times a second. They replace standard output and standard error while the prompt runs. They are written in chunks, as fast as the
-terminal takes them, and the prompt is drawn again at least every 50 ms. A terminal that is not read loses the oldest
-lines; once it is read again, it shows how many in their place. The prompt is then drawn again, since parts of it were
-lost, too.
+Lines above the prompt are collected, bounded in number, and shown at most ten times a second. They replace standard
+output and standard error while the prompt runs. They are written in chunks, as fast as the terminal takes them, and
+the prompt is drawn again at least every 50 ms. A terminal that is not read loses the oldest lines; once it is read
+again, it shows how many in their place. The prompt is then drawn again, since parts of it were lost, too.
 """
 
 from __future__ import annotations
@@ -64,11 +64,9 @@ class Stream(LineStream):
         return self._lines.app.output.encoding()
 
     def isatty(self) -> bool:
-        """Whether a terminal shows the lines."""
         return self._lines.on_terminal
 
     def writable(self) -> bool:
-        """Return True."""
         return True
 
     def write(self, text: str) -> int:
@@ -232,7 +230,6 @@ class Toolbar:
         """The last progress of the job that runs."""
 
     def __call__(self) -> str:
-        """Return the text."""
         session = self._session
         room = self._prompt.app.output.get_size().columns - len(f"{STOP}  ")
         parts = [
@@ -299,7 +296,6 @@ class SharedHistory(PromptHistory):
         self._file = file
 
     def load_history_strings(self) -> Iterable[str]:
-        """The lines of the file."""
         return reversed(self._file.lines())
 
     def append_string(self, string: str) -> None:

@@ -49,7 +49,6 @@ class Report:
             self._cases.append(Case.of(result))
 
     def ended(self, ending: Ending) -> None:
-        """Take the end of a macro."""
         self._ending = ending
 
     def wrong(self, problems: tuple[Diagnostic, ...]) -> None:

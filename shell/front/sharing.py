@@ -112,7 +112,6 @@ class Narrator:
         write(sys.stderr, f"multidrop: {text}")
 
     def say(self, event: Say) -> None:
-        """Report an event of a client."""
         if self._as_json:
             self._print(at=round(time.time(), 3), client=event.client, event=event.event, detail=event.detail)
         elif not self._repeated(event, time.monotonic()):

@@ -194,7 +194,6 @@ NEEDED = "a value is needed; Ctrl+C gives up"
 
 
 def question(title: str, field: Field) -> str:
-    """The question for one value."""
     default = f" [{field.default}]" if field.default is not None else ""
     return visible(f"{title}: {field.name}, {field.valid}{default}: ")
 

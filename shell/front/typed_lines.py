@@ -141,7 +141,6 @@ class Line:
 
     @classmethod
     def entered(cls, text: str, since: int, place: tuple[str, str] = ("", "")) -> Line:
-        """Parse a line."""
         try:
             return cls(text, since, place, parse(text))
         except Diagnostic:
@@ -241,7 +240,6 @@ class LineQueue:
         self._closed = True
 
     def show_unsent(self, why: str, lines: Sequence[str]) -> None:
-        """Show lines that are not sent."""
         lines = [shown(line) for line in lines if line.strip()]
         for line in lines[:SHOWN]:
             self._session.notify(f"not sent, as {why}: {line}", warning=True)

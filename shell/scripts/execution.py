@@ -71,7 +71,6 @@ class StepProgress:
             self._timer = asyncio.get_running_loop().call_later(late, self.show)
 
     def show(self) -> None:
-        """Publish it now."""
         self._cancel()
         if self._text:
             self._shown_at = self._channel.now()

@@ -245,7 +245,6 @@ class _Aftermath:
     # The lines after it
 
     def _drop(self) -> None:
-        """Say which lines are not executed."""
         for each in self._left:
             if lines := [node.line.text for node in each.played.on_stop]:
                 self._session.dropped.append(each.playing.name)

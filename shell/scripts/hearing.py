@@ -51,7 +51,6 @@ class Hearing:
         self._begun, self.target = self._count, None
 
     def printed(self) -> tuple[str, ...]:
-        """The lines since the beginning."""
         since = min(self._count - self._begun, len(self._lines))
         return tuple(text for text, _ in islice(self._lines, len(self._lines) - since, None))
 

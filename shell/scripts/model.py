@@ -37,7 +37,6 @@ class ScriptLine:
 
     @property
     def word(self) -> str:
-        """The first word."""
         return (self.text.split(maxsplit=1) or [""])[0]
 
 
@@ -157,7 +156,6 @@ class Result:
 
     @property
     def check(self) -> bool:
-        """Whether the line checks something."""
         return bool(self.line.where) and self.line.word in ("/assert", "/expect")
 
     def fact(self) -> dict[str, Any]:

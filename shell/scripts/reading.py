@@ -170,7 +170,6 @@ class _Reader:
         return self._calls > MOST
 
     def macro(self, name: str) -> bool:
-        """Whether a macro has this name."""
         try:
             check_name(name)
         except Diagnostic:

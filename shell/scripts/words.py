@@ -142,7 +142,6 @@ def rounds(text: str, wrong: Callable[[str], Diagnostic]) -> int | None:
 
 
 def repetitions(value: Value) -> int:
-    """The number of repetitions."""
     if isinstance(value, str) or value != int(value) or not 0 <= value <= MOST:
         raise wrong("/repeat", f"no number of repetitions {quoted(value)}; valid: 0 to {MOST}")
     return int(value)
