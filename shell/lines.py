@@ -63,7 +63,10 @@ def each_names_one_drive(lines: Iterable[str]) -> bool:
         parsed = [parse(line) for line in lines]
     except Diagnostic:
         return False
-    return all(_names_one_drive(each) for each in parsed)
+    return all(
+        each.name in WAITS if isinstance(each, VerbLine) else each is None or each.address not in EVERYONE
+        for each in parsed
+    )
 
 
 def targets(lines: Iterable[str]) -> tuple[str, ...]:
@@ -78,12 +81,6 @@ def targets(lines: Iterable[str]) -> tuple[str, ...]:
     if any(each.address is None or each.address in EVERYONE for each in parsed):
         return ()
     return tuple(dict.fromkeys(f"{each.bus}:{each.address}" if each.bus else str(each.address) for each in parsed))
-
-
-def _names_one_drive(parsed: TypedLine | None) -> bool:
-    if isinstance(parsed, VerbLine):
-        return parsed.name in WAITS
-    return parsed is None or parsed.address not in EVERYONE
 
 
 def _addressed(line: str, typed: str) -> DriveLine:

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import replace
 from functools import partial
 
 from multidrop.dialects import Diagnostic
-from multidrop.macros import Macro, Parameter, checked_values, is_role, missing
+from multidrop.macros import Macro, checked_values, is_role, missing
 from multidrop.macros.model import written
 from multidrop.shell.channel import Field
 from multidrop.shell.workspace import Workspace
@@ -31,7 +31,8 @@ async def settled(
             roles[role] = bus
     fields = [_role_field(workspace, macro, role) for role in macro.roles if role not in roles]
     if not fields or workspace.fill is not None:
-        checked_values(macro, {**_examples(missing(macro, values)), **values})  # what is given is right
+        examples = {each.name: each.example for each in missing(macro, values)}
+        checked_values(macro, {**examples, **values})  # what is given is right
     if (fields or missing(macro, values)) and workspace.fill is not None:
         fields += value_fields(macro, values)
         answers = await workspace.fill_in(f"macro {macro.name}", fields)
@@ -61,11 +62,6 @@ def value_fields(macro: Macro, given: Mapping[str, str]) -> list[Field]:
         for each in macro.parameters
         if each.name not in given
     ]
-
-
-def _examples(parameters: Sequence[Parameter]) -> dict[str, str]:
-    """A valid value for each parameter without a default, so that the others can be checked."""
-    return {each.name: each.example for each in parameters}
 
 
 def only_bus(workspace: Workspace, macro: Macro, role: str) -> str:

@@ -224,15 +224,15 @@ async def _standing(workspace: Workspace, drives: Sequence[Drive]) -> list[Stand
                         found[drive] = Standing(name, why="no answer")
                         axes = await confirmed_motion(drive)
                         found[drive] = Standing(
-                            name, axes, unconfirmed=not any(axis.velocity for axis in axes) and not _rests(drive)
+                            name,
+                            axes,
+                            unconfirmed=not (
+                                any(axis.velocity for axis in axes) or (drive.seen and drive.seen.at_rest())
+                            ),
                         )
                 except (DriveError, TransportLost) as failure:
                     found[drive] = Standing(name, why=str(failure).removeprefix(f"{name}: "))
     return [found[drive] for drive in drives]
-
-
-def _rests(drive: Drive) -> bool:
-    return drive.seen is not None and drive.seen.at_rest()
 
 
 def _unconfirmed(drive: Drive) -> bool:

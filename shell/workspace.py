@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import asyncio
 import re
-from collections.abc import Awaitable, Callable, Mapping
+from collections.abc import Awaitable, Callable
 from dataclasses import dataclass, field
 from functools import partial
 from typing import TYPE_CHECKING
@@ -284,7 +284,8 @@ class Workspace(Asking):
         if address:
             found = _find(chosen, address)
             if found is None:
-                raise Diagnostic(f"no drive {address} on {chosen.name}", hint=_valid(chosen.drives))
+                hint = f"valid: {', '.join(chosen.drives)}" if chosen.drives else "no drive has replied there"
+                raise Diagnostic(f"no drive {address} on {chosen.name}", hint=hint)
             self._open[chosen].selected = found
         self.selected_bus = chosen.name
         self.changed()
@@ -413,20 +414,16 @@ class Workspace(Asking):
         ):  # its bytes are shown
             self.publish(OnBus(name, event))
         if isinstance(event, Lost):
-            self._lost(name, event)
+            if self.reconnections.lost(self.buses[name]):  # wanted and possible: tried again
+                self.notify(f"{name}: {event.error}; trying again", bus=name, warning=True)
+            else:
+                self.publish(Failed(event.at, str(event.error), name))
         elif isinstance(event, Notice):
             text = event.text if event.text.startswith(name) else f"{name}: {event.text}"
             self.publish(Notified(event.at, text, name, event.warning))
         elif isinstance(event, Changed):
             self.publish(StateChanged(event.at))
             self.twins.changed(bus)
-
-    def _lost(self, name: str, event: Lost) -> None:
-        """Publish the loss of a bus, and begin to try it again where that is wanted and possible."""
-        if self.reconnections.lost(self.buses[name]):
-            self.notify(f"{name}: {event.error}; trying again", bus=name, warning=True)
-        else:
-            self.publish(Failed(event.at, str(event.error), name))
 
 
 def _write_stops(buses: list[Bus]) -> list[Halt]:
@@ -457,7 +454,3 @@ def _find(bus: Bus, address: str) -> Drive | None:
     if address in bus.drives:
         return bus.drives[address]
     return next((drive for drive in bus.drives.values() if drive.label == address), None)
-
-
-def _valid(names: Mapping[str, object]) -> str:
-    return f"valid: {', '.join(names)}" if names else "no drive has replied there"

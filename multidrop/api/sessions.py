@@ -182,11 +182,8 @@ class AsyncSession:
     async def send(self, line: str) -> list[str]:
         """Run a line as typed at the prompt (`PR P`, `@b MR 100`, `/drives`); return the lines that it prints."""
         printed: list[str] = []
-        await self._calls.run(lambda: self._run(line), printed)
+        await self._calls.run(lambda: self.shell.run(line, By.SCRIPT), printed)
         return printed
-
-    async def _run(self, line: str) -> None:
-        await self.shell.run(line, By.SCRIPT)
 
     async def run(self, file: str, /, **values: object) -> Run:
         """Execute a script of lines. It is checked whole before; `values` are those of `--set`. Raises its failure."""

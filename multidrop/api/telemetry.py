@@ -21,7 +21,6 @@ if TYPE_CHECKING:
     from typing import SupportsIndex
 
     from multidrop.drives.drive import Drive
-    from multidrop.drives.telemetry import Subscription
     from multidrop.shell.session import Session
 
 
@@ -135,11 +134,11 @@ class AsyncTelemetry:
         self._begun = self._shell.now()
         period = 1.0 / rate
         self._leave = self._shell.subscribe(self._take)
-        self._subscriptions = [self._subscribe(bus, period) for bus in dict.fromkeys(bus for bus, _ in self._names)]
+        self._subscriptions = [
+            shell.buses[bus].telemetry.subscribe([own for name, own in self._names if name == bus], period)
+            for bus in dict.fromkeys(bus for bus, _ in self._names)
+        ]
         self._open = True
-
-    def _subscribe(self, bus: str, period: float) -> Subscription[str]:
-        return self._shell.buses[bus].telemetry.subscribe([own for name, own in self._names if name == bus], period)
 
     def _take(self, event: SessionEvent) -> None:
         if not isinstance(event, OnBus):

@@ -72,13 +72,10 @@ async def open_buses(connection: Connection, naming: Naming, state: Path | None 
     bus.link.leftovers.recovering = bool(kept.owed) and not family.codec.framed
     cut = "" if family.codec.framed else kept.cut  # a part of a frame is dropped after a pause
     warnings = (*kept.remarks, *([CUT.format(cut)] if cut else []))
-    found = replace(hints, cut=cut, owed=kept.owed, remembered=kept.memory.drives, first_mark=_first_mark())
+    found = replace(
+        hints, cut=cut, owed=kept.owed, remembered=kept.memory.drives, first_mark=time.time_ns() // 10_000_000 % MARKS
+    )
     return [Opened(bus, found, warnings=warnings, limits=limits, reopen=reopen)]
-
-
-def _first_mark() -> int:
-    """A number that differs from that of the last use of a port; two digits, so that lines stay short."""
-    return time.time_ns() // 10_000_000 % MARKS
 
 
 MARKS = 90

@@ -206,7 +206,8 @@ class PortState(Keeper):
         line = os.open(f"{self._base}.line", os.O_RDWR | os.O_CREAT | getattr(os, "O_CLOEXEC", 0), 0o600)
         try:
             _lock(line)
-            self.cut = _printable(os.read(line, LINE).rstrip(b"\0"))
+            found = os.read(line, LINE).rstrip(b"\0").decode("latin-1")
+            self.cut = "".join(each if each.isprintable() else "?" for each in found)
             if not self.cut:
                 _write_at_start(line, b"\0" * LINE)
         except OSError:
@@ -271,10 +272,6 @@ def _file_name(port: str) -> str:
 
         name = f"{name[:LONGEST_NAME]}-{hashlib.sha256(port.encode()).hexdigest()[:12]}"
     return name
-
-
-def _printable(line: bytes) -> str:
-    return "".join(each if each.isprintable() else "?" for each in line.decode("latin-1"))
 
 
 def _write_at_start(descriptor: int, data: bytes) -> None:

@@ -56,14 +56,11 @@ class _Collector:
         self._timer = self._loop.call_later(FREEZE, self._again)
 
     def _again(self) -> None:
-        if self._full_is_due():
+        waited = self._loop.time() - self._full_at
+        if waited >= LONGEST or (waited >= FULL and self._resting()):
             self._full_at = self._loop.time()
             gc.unfreeze()
             gc.collect()
         else:
             gc.collect(YOUNG)
         self._freeze()
-
-    def _full_is_due(self) -> bool:
-        waited = self._loop.time() - self._full_at
-        return waited >= LONGEST or (waited >= FULL and self._resting())

@@ -16,7 +16,6 @@ import selectors
 import sys
 from collections.abc import AsyncIterator, Callable, Mapping, Sequence
 from concurrent.futures import Executor, ThreadPoolExecutor, wait
-from datetime import datetime
 from typing import TYPE_CHECKING, Any
 
 from multidrop.dialects import Diagnostic, DriveError, Stopped
@@ -30,7 +29,6 @@ from multidrop.shell.output import write
 from multidrop.shell.workspace import LATCHED
 
 if TYPE_CHECKING:
-    from multidrop.drives.bus import Bus
     from multidrop.drives.drive import Drive
     from multidrop.shell.channel import Channel
     from multidrop.shell.session import Session
@@ -200,7 +198,9 @@ class Replay:
             async with _beside(measured, began):
                 for step in self.steps:
                     if not fast:
-                        await waits.sleep(max(0.0, began + _after(self.steps[0].at, step.at) - self._session.now()))
+                        await waits.sleep(
+                            max(0.0, began + (step.at - self.steps[0].at).total_seconds() - self._session.now())
+                        )
                     differences += await self._step(step)
                     done += 1
         finally:
@@ -249,7 +249,10 @@ class Replay:
         if drive is None:
             return False
         if drive.starts(text):
-            self._moving |= {drive, *(_of(self._session, drive).all_drives if drive.address in EVERYONE else ())}
+            self._moving |= {
+                drive,
+                *(self._session.buses[drive.link.name].all_drives if drive.address in EVERYONE else ()),
+            }
         return drive in self._moving
 
     async def _sent(self, step: Step, drive: Drive | None) -> str:
@@ -293,17 +296,9 @@ async def _beside(positions: Positions | None, began: float) -> AsyncIterator[No
         await asyncio.wait([comparing])
 
 
-def _after(first: datetime, at: datetime) -> float:
-    return (at - first).total_seconds()
-
-
 def _name(drive: Drive) -> str:
     """The bus and the address; the bus alone where its drive has none."""
     return join_target(drive.link.name, drive.address) if drive.address else drive.link.name
-
-
-def _of(session: Session, drive: Drive) -> Bus:
-    return session.buses[drive.link.name]
 
 
 def _targets(session: Session, steps: Sequence[Step]) -> Mapping[tuple[str, str], Drive]:

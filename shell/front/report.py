@@ -65,7 +65,8 @@ class Report:
             summary |= self._ending.fact() if self._ending is not None else {}
             write(sys.stdout, json.dumps({"summary": summary}))
         elif self._checks:
-            write(sys.stderr, self._summary(seconds))
+            words = f"{self._lines} lines, {self._checks} checks, {self._failed} failed, {seconds:.1f} s"
+            write(sys.stderr, f"{self._name}: {self._begun.isoformat(' ', 'seconds')}: {words}")
         if not self._junit.wanted:
             return code
         if code and not any(case.error or case.failure for case in self._cases):
@@ -95,7 +96,3 @@ class Report:
         except asyncio.CancelledError:
             self._failure = cut
             raise
-
-    def _summary(self, seconds: float) -> str:
-        words = f"{self._lines} lines, {self._checks} checks, {self._failed} failed"
-        return f"{self._name}: {self._begun.isoformat(' ', 'seconds')}: {words}, {seconds:.1f} s"

@@ -358,7 +358,8 @@ class Execution:
 
         given, roles = await self._own(node.line, frame, values)
         with _noted(node.line):
-            await self.play(node.played, given, node.times, node.fast or _is_fast(frame), roles, frame.place)
+            fast = node.fast or (frame.pace is not None and frame.pace.fast)
+            await self.play(node.played, given, node.times, fast, roles, frame.place)
 
     async def _step(self, line: ScriptLine, frame: Frame) -> None:
         if line.word == "/set":
@@ -484,10 +485,6 @@ def _noted(line: ScriptLine) -> Iterator[None]:
     except FAILURES as failure:
         failure.add_note(line.where)
         raise
-
-
-def _is_fast(frame: Frame) -> bool:
-    return frame.pace is not None and frame.pace.fast
 
 
 def _shown(text: str, frame: Frame) -> str:

@@ -284,15 +284,12 @@ class _Aftermath:
             self._warn(text)
 
 
-def _failure(result: Result) -> str:
-    return f"FAILED: {result.error}" if result.error not in ("", CUT) else result.error
-
-
 def _reported(result: Result) -> str:
     """A line of the report: what was sent, and what came back."""
     line = result.line
     place = f"step {line.step}" if line.step else line.where
     place += f", round {result.round}" if result.round > 1 else ""
     shown = " | ".join(islice(result.printed, SHOWN)) + (" | ..." if len(result.printed) > SHOWN else "")
-    answers = "; ".join(filter(None, (shown, _failure(result))))
+    failure = f"FAILED: {result.error}" if result.error not in ("", CUT) else result.error
+    answers = "; ".join(filter(None, (shown, failure)))
     return f"  {place}: {result.sent}" + (f" -> {answers}" if answers else "")

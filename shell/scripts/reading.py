@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
 from typing import NamedTuple, TypeVar
 
@@ -190,7 +190,7 @@ class _Checker:
         self._lines: Iterator[ScriptLine] = iter(lines)
         self._chain = chain
         self._depth = 0
-        changing = set(_set_names(lines))
+        changing = {name for line in lines if line.word == "/set" for name in line.text.split()[1:2]}
         self._names: dict[str, str | None] = {n: None if n in changing else v for n, v in values.items()}
 
     def script(self) -> list[Node]:
@@ -342,13 +342,6 @@ class _Checker:
 
 def _stood_in(values: Names) -> dict[str, str]:
     return {name: UNKNOWN if value is None else value for name, value in values.items()}
-
-
-def _set_names(lines: Iterable[ScriptLine]) -> Iterator[str]:
-    """The names that `/set` lines set."""
-    for line in lines:
-        if line.word == "/set":
-            yield from line.text.split()[1:2]
 
 
 def _surely(line: ScriptLine) -> bool:
