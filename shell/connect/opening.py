@@ -79,8 +79,7 @@ async def open_buses(connection: Connection, naming: Naming, state: Path | None 
 
 
 MARKS = 90
-
-
+"""A mark differs from that of the last use of a port; it has two digits, so that lines stay short."""
 CUT = (
     "the last session on this port was interrupted while it sent '{}'; a drive may hold a part of it. Every drive is "
     "stopped, and its line buffer is made to overflow (error 20), before anything else is sent"
