@@ -74,7 +74,13 @@ class Pmx(Codec):
                 continue
             if request.gather:
                 return Decoded(Reply((*strays, text), acknowledged=True), at)
-            return Decoded(_reply(text), at, tuple(strays))
+            if any(not " " <= c <= "~" for c in text):
+                reply = Reply(end=End.DAMAGED, detail=f"heard {text[:48]!r}")
+            elif text.startswith("?"):
+                reply = Reply((text,), End.REFUSED)
+            else:
+                reply = Reply((text,), acknowledged=True)
+            return Decoded(reply, at, tuple(strays))
         return None
 
     def on_timeout(self, request: Request, buffer: bytes) -> Decoded:
@@ -145,14 +151,6 @@ def _fits(request: Request, text: str) -> bool:
     if request.expect is None or (text.startswith("?") and not request.gather):
         return True
     return re.fullmatch(request.expect, text) is not None
-
-
-def _reply(text: str) -> Reply:
-    if any(not " " <= c <= "~" for c in text):
-        return Reply(end=End.DAMAGED, detail=f"heard {text[:48]!r}")
-    if text.startswith("?"):
-        return Reply((text,), End.REFUSED)
-    return Reply((text,), acknowledged=True)
 
 
 @dataclass(eq=False)

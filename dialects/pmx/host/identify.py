@@ -7,7 +7,7 @@ the rest of another line. (PMX-2ED-SA manual 6.2.3, 6.3.)
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
 from multidrop.dialects.codec import End, Kind, Procedure
@@ -104,7 +104,7 @@ def search(reach: Reach, found: Found[PmxState], step: Step) -> Procedure[Outcom
     """Search for every controller at one baud rate; report each as soon as it is identified."""
     remarks: list[str] = []
     seen = set(reach.known)
-    states = list(_states(reach))
+    states = [PmxState(Pmx(addressed=bool(number)), number) for number in _numbers(reach)]
     for at, state in enumerate(states):
         if state.address not in seen and not (seen and not state.address):
             heard = yield from _replies(state, reach.window)
@@ -113,6 +113,11 @@ def search(reach: Reach, found: Found[PmxState], step: Step) -> Procedure[Outcom
         step()
     yield from _identified([state for state in states if state.address == NUMBERS[-1]], seen, found)
     return Outcome(tuple(remarks))
+
+
+def _numbers(reach: Reach) -> tuple[str, ...]:
+    """The device numbers to try; the empty one is for a unit that takes none."""
+    return ("",) if reach.alone else (*NUMBERS, FACTORY, "")
 
 
 def _identified(states: Sequence[PmxState], seen: set[str], found: Found[PmxState]) -> Procedure[bool]:
@@ -125,16 +130,6 @@ def _identified(states: Sequence[PmxState], seen: set[str], found: Found[PmxStat
             seen.add(state.address)
             found(state)
     return len(seen) > before
-
-
-def _states(reach: Reach) -> Iterator[PmxState]:
-    numbered = () if reach.alone else (*NUMBERS, FACTORY)
-    yield from (PmxState(Pmx(), number) for number in numbered)
-    yield PmxState(Pmx(addressed=False))
-
-
-def _places(reach: Reach) -> int:
-    return sum(1 for _ in _states(reach))
 
 
 def _replies(state: PmxState, quiet: float) -> Procedure[bytes]:
@@ -151,4 +146,4 @@ def _clear() -> Procedure[None]:
 
 
 CLEARS = "ends half a command in a controller with a word that no controller knows. It moves and erases nothing"
-SCAN = Scan("PMX", (9600, 19200, 38400, 57600, 115200), _places, search, _clear, CLEARS)
+SCAN = Scan("PMX", (9600, 19200, 38400, 57600, 115200), lambda reach: len(_numbers(reach)), search, _clear, CLEARS)

@@ -48,15 +48,13 @@ def describe(word: str, product: str = "") -> list[str]:
 
 
 def syntax(row: Command) -> str:
-    forms = EXAMPLES.get(row.name) or [_form(row, shape) for shape in row.shapes]
+    forms = list(EXAMPLES.get(row.name, ()))
+    for shape in () if forms else row.shapes:
+        words = list(replace(row, shape=shape).words())
+        forms.append(", ".join(words) if len(words) <= 4 else f"{words[0]} to {words[-1]}")
     if row.access == "W":
         forms = [f"{form}=VALUE" for form in forms]
     return ", ".join(forms) + ("; =VALUE sets it" if row.access == "RW" else "")
-
-
-def _form(row: Command, shape: str) -> str:
-    words = [word for word in replace(row, shape=shape).words()]
-    return ", ".join(words) if len(words) <= 4 else f"{words[0]} to {words[-1]}"
 
 
 def complete(prefix: str, product: str = "") -> list[tuple[str, str]]:
