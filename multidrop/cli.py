@@ -82,7 +82,7 @@ class Parser(argparse.ArgumentParser):
         named = given[:1] and given[0] in own
         if self.operation.run and not named:
             add_arguments(self, self.operation.arguments)
-            self.set_defaults(run_by=self.operation.run)
+            self.set_defaults(run_by=self.operation.run, command=self.operation.command)
         if own and (named or not self.operation.run):
             self.add_commands(own, given, "|".join(own), required=True)
 
@@ -140,10 +140,16 @@ def parse(given: Sequence[str]) -> argparse.Namespace:
 
 
 def run(chosen: argparse.Namespace) -> int:
-    """Run a parsed command; return the exit code."""
+    """Run a parsed command; return the exit code. A Diagnostic is one line on standard error."""
     file, _, function = chosen.run_by.partition(".")
     command: Callable[[argparse.Namespace], int] = imported(f"multidrop.commands.{file}:{function}")
-    return command(chosen)
+    from multidrop.commands import fail
+    from multidrop.dialects.errors import Diagnostic
+
+    try:
+        return command(chosen)
+    except Diagnostic as problem:
+        return fail(problem)
 
 
 def version() -> str:
@@ -181,6 +187,6 @@ def _epilog(operation: Operation) -> str:
 
     examples = operation.examples or [each.examples[-1] for each in parts(operation.command).values()]
     lines = ["examples:", *(f"  multidrop {each}" for each in examples)]
-    if operation.urls:
+    if operation.urls or "URL" in str([*operation.arguments.items()]):
         lines += ["", *textwrap.wrap(urls(), WIDTH, break_on_hyphens=False, break_long_words=False)]
     return "\n".join(lines)

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 TIMES: Mapping[str, str] = {
     "off": "no times: more room for the lines",
@@ -15,8 +14,7 @@ TIMES: Mapping[str, str] = {
 """How the times of lines are shown, and what each form means."""
 
 
-@dataclass(frozen=True)
-class Filter:
+class Filter(NamedTuple):
     """A filter. An empty one shows all; each condition hides some lines.
 
     `address`: only the records of a drive. `errors`: only failures and warnings, each with the line that failed.

@@ -7,7 +7,6 @@ from collections.abc import Awaitable, Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from multidrop.commands import fail
 from multidrop.dialects import Diagnostic
 from multidrop.dialects.families import program_language_of, program_languages
 from multidrop.dialects.files import program_text_of
@@ -29,8 +28,6 @@ if TYPE_CHECKING:
 
 
 def list_(chosen: argparse.Namespace) -> int:
-    """Print the program, a line each, in its most readable form."""
-
     async def show(session: Session, drive: Drive) -> None:
         own = f"{session.display_name(drive)}: " if is_several(chosen.drive) else ""
         for line in await listings.readable(session, drive):
@@ -41,10 +38,7 @@ def list_(chosen: argparse.Namespace) -> int:
 
 def upload(chosen: argparse.Namespace) -> int:
     """Save the program to a new file that can be downloaded again; several to a folder."""
-    try:
-        check_new(chosen.file, chosen.drive)
-    except Diagnostic as problem:
-        return fail(problem)
+    check_new(chosen.file, chosen.drive)
 
     async def save(session: Session, drive: Drive) -> None:
         lines = await listings.upload(session, drive, chosen.raw)
@@ -58,8 +52,7 @@ def upload(chosen: argparse.Namespace) -> int:
 
 def download(chosen: argparse.Namespace) -> int:
     """Send a file to the drive; report a wrong file before anything is opened."""
-    if (problem := _wrong(chosen.file)) is not None:
-        return fail(problem)
+    _check(chosen.file)
     wanted = transfers.Wanted(not chosen.no_verify, chosen.save, chosen.only_changed, chosen.run)
 
     async def put(session: Session, drive: Drive) -> None:
@@ -68,16 +61,11 @@ def download(chosen: argparse.Namespace) -> int:
     return _with_drive(chosen, put, agreed=chosen.yes)
 
 
-def _wrong(file: str) -> Diagnostic | None:
-    """Return the error of a file that is correct in no language, found in the language of its name."""
-    own = program_languages()[program_language_of(file)]
-    try:
-        text = program_text_of(file)
-        if all(errors(source.language.check(text)) for source in program_languages().values() if source is not own):
-            own.language.load(file)
-    except Diagnostic as problem:
-        return problem
-    return None
+def _check(file: str) -> None:
+    """Raise Diagnostic for a file that is correct in no language: the error in the language of its name."""
+    own, text = program_languages()[program_language_of(file)], program_text_of(file)
+    if all(errors(source.language.check(text)) for source in program_languages().values() if source is not own):
+        own.language.load(file)
 
 
 def _with_drive(
@@ -97,11 +85,7 @@ DIFFERS = 1
 
 
 def params_backup(chosen: argparse.Namespace) -> int:
-    """Save the settings of a drive to a new file."""
-    try:
-        work.check_new(chosen.file, chosen.drive)
-    except Diagnostic as problem:
-        return fail(problem)
+    work.check_new(chosen.file, chosen.drive)
     return batch.run(
         [chosen.url],
         lambda session: work.backup(session, chosen.file, chosen.drive),
@@ -112,10 +96,7 @@ def params_backup(chosen: argparse.Namespace) -> int:
 
 def params_diff(chosen: argparse.Namespace) -> int:
     """Print what differs; the exit code says whether anything does."""
-    try:
-        _check_comparison(chosen)
-    except Diagnostic as problem:
-        return fail(problem)
+    _check_comparison(chosen)
     differs = False
 
     async def compare(session: Session) -> None:
@@ -150,7 +131,6 @@ async def _other(session: Session, chosen: argparse.Namespace) -> Drive | None:
 
 
 def params_restore(chosen: argparse.Namespace) -> int:
-    """Send what differs from a file, after a question."""
     options = Options(
         named=frozenset(name.strip().upper() for each in chosen.named for name in each.split(",") if name.strip()),
         communication=chosen.communication,
@@ -158,11 +138,8 @@ def params_restore(chosen: argparse.Namespace) -> int:
         dry_run=chosen.dry_run,
         other_product=chosen.other_product,
     )
-    try:
-        if not work.is_several(chosen.drive):
-            files.load(chosen.file)
-    except Diagnostic as problem:
-        return fail(problem)
+    if not work.is_several(chosen.drive):
+        files.load(chosen.file)
 
     async def put(session: Session) -> None:
         await work.restore_each(session, chosen.file, chosen.drive, options)
@@ -171,23 +148,16 @@ def params_restore(chosen: argparse.Namespace) -> int:
 
 
 def snapshot(chosen: argparse.Namespace) -> int:
-    """Read every drive of the URLs into one new file."""
-    try:
-        new_file.check(chosen.output, printed=True)
-    except Diagnostic as problem:
-        return fail(problem)
+    new_file.check(chosen.output, printed=True)
     printed = chosen.output == new_file.STANDARD_OUTPUT
     return batch.run(chosen.urls, lambda session: snapshots.save(session, chosen.output), unsolicited=not printed)
 
 
 def apply(chosen: argparse.Namespace) -> int:
     """Put the state of one drive of a cell file onto a replacement; report a wrong file before anything is opened."""
-    try:
-        if chosen.source and is_several(chosen.drive):
-            raise Diagnostic(f"--from {chosen.source} is for one drive", "snapshot apply", "--drive names one")
-        cell = cells.load(chosen.file, settings.load().allowed)
-    except Diagnostic as problem:
-        return fail(problem)
+    if chosen.source and is_several(chosen.drive):
+        raise Diagnostic(f"--from {chosen.source} is for one drive", "snapshot apply", "--drive names one")
+    cell = cells.load(chosen.file, settings.load().allowed)
     wanted = replacement.Wanted(
         named=frozenset(name.strip().upper() for name in ",".join(chosen.named).split(",") if name.strip()),
         dry=chosen.dry_run,

@@ -18,7 +18,6 @@ if TYPE_CHECKING:
 
 
 def shell(chosen: argparse.Namespace) -> int:
-    """Show the prompt, or run lines from standard input."""
     if sys.stdin.isatty():
         with importing():
             from multidrop.shell.front.prompt import run
@@ -36,7 +35,6 @@ def shell(chosen: argparse.Namespace) -> int:
 
 
 def send(chosen: argparse.Namespace) -> int:
-    """Run lines and print the replies."""
     with importing():
         from multidrop.shell.front import batch
         from multidrop.shell.front.terminal_input import run_lines
@@ -50,7 +48,6 @@ def send(chosen: argparse.Namespace) -> int:
 
 
 def _send_json(chosen: argparse.Namespace, lazy: bool) -> int:
-    """Run lines and print an object for each."""
     from multidrop.shell.front import batch
     from multidrop.shell.front.report import Report
     from multidrop.shell.lines import targets
@@ -67,14 +64,13 @@ def _send_json(chosen: argparse.Namespace, lazy: bool) -> int:
 
 
 def run(chosen: argparse.Namespace) -> int:
-    """Run a script."""
     from multidrop.macros import MacroStore
     from multidrop.shell.connect.settings import Settings
     from multidrop.shell.front.report import Report
     from multidrop.shell.scripts.reading import WrongScript, read_script
 
     if not (chosen.on or chosen.role):
-        return fail(Diagnostic("nothing to open", "multidrop run", "--on URL, or --role NAME=URL"))
+        raise Diagnostic("nothing to open", "multidrop run", "--on URL, or --role NAME=URL")
     report = Report(chosen.script, as_json=chosen.json, junit=chosen.junit)
     try:
         report.begin()
@@ -115,22 +111,17 @@ def start(chosen: argparse.Namespace) -> int:
 
 
 def demo(chosen: argparse.Namespace) -> int:
-    """Show the demo cell."""
     return _screen(["sim:"])
 
 
 def tui(chosen: argparse.Namespace) -> int:
-    """Show what the URLs name."""
-    return _screen(chosen.urls, reconnect=not chosen.no_reconnect, raw=chosen.raw, twin=chosen.twin)
+    return _screen(chosen.urls, not chosen.no_reconnect, chosen.raw, chosen.twin)
 
 
 def _screen(urls: list[str], reconnect: bool = True, raw: bool = False, twin: bool = False) -> int:
     if not (sys.stdin.isatty() and sys.stdout.isatty()):
-        return fail(Diagnostic("the screen needs a terminal", hint="multidrop shell reads lines from anywhere"))
+        raise Diagnostic("the screen needs a terminal", hint="multidrop shell reads lines from anywhere")
     with importing():
         from multidrop.tui.launch import run
 
-    try:
-        return run(urls, reconnect, raw, twin)
-    except Diagnostic as wrong:  # the configuration
-        return fail(wrong)
+    return run(urls, reconnect, raw, twin)

@@ -9,7 +9,6 @@ from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from multidrop.commands import fail
 from multidrop.dialects import Diagnostic
 from multidrop.shell.connect import settings
 from multidrop.shell.log import files, steps
@@ -25,7 +24,6 @@ NOTHING_FOUND = 1
 
 
 def show(chosen: argparse.Namespace) -> int:
-    """Print a log."""
     return _reported(lambda: _print(showing.whole(_path(chosen)), chosen, _wanted(chosen)))
 
 
@@ -34,7 +32,7 @@ def grep(chosen: argparse.Namespace) -> int:
     try:
         pattern = re.compile(chosen.pattern, re.IGNORECASE if chosen.ignore_case else 0)
     except re.error as problem:
-        return fail(Diagnostic(f"{chosen.pattern!r} is not a regular expression: {problem}", "log grep"))
+        raise Diagnostic(f"{chosen.pattern!r} is not a regular expression: {problem}", "log grep") from None
     wanted = _wanted(chosen)
     found = 0
 
@@ -49,7 +47,6 @@ def grep(chosen: argparse.Namespace) -> int:
 
 
 def follow(chosen: argparse.Namespace) -> int:
-    """Print the end of a log and what is added, until interrupted."""
     wanted = _wanted(chosen)
 
     def put(lines: Iterable[Line]) -> None:
@@ -64,12 +61,9 @@ def follow(chosen: argparse.Namespace) -> int:
 
 def replay(chosen: argparse.Namespace) -> int:
     """Take a log again on other drives; report a wrong file before anything is opened."""
-    try:
-        found = steps.read(Path(chosen.file))
-        if not found.steps:
-            raise Diagnostic("no line of the log was sent to a drive", chosen.file, "/log before the lines keeps them")
-    except Diagnostic as problem:
-        return fail(problem)
+    found = steps.read(Path(chosen.file))
+    if not found.steps:
+        raise Diagnostic("no line of the log was sent to a drive", chosen.file, "/log before the lines keeps them")
     from multidrop.shell.front import batch
     from multidrop.shell.front.replay import ReplayReport, VirtualLoop
     from multidrop.shell.front.replay import replay as run
@@ -86,8 +80,6 @@ def _reported(work: Callable[[], None]) -> int:
     """Do the work; return the exit code. A reader that goes away (`| head`) ends it well."""
     try:
         work()
-    except Diagnostic as problem:
-        return fail(problem)
     except (OSError, ValueError) as problem:
         lose(sys.stdout, problem)
     return 0

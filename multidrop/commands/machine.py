@@ -13,7 +13,6 @@ from datetime import date, datetime
 from importlib.metadata import PackageNotFoundError, requires, version
 from pathlib import Path
 
-from multidrop.commands import fail
 from multidrop.dialects import Diagnostic
 from multidrop.dialects.files import bounded, opened, split_lines, toml_of, utf8_of, why
 from multidrop.dialects.text import visible
@@ -30,17 +29,13 @@ WRONG = 2
 
 
 def path(chosen: argparse.Namespace) -> int:
-    """Print the path of the file."""
     write(sys.stdout, str(settings.config_file()))
     return 0
 
 
 def show(chosen: argparse.Namespace) -> int:
     """Print every setting as TOML; a remark marks those that the file does not set."""
-    try:
-        found = settings.load()
-    except Diagnostic as failure:
-        return fail(failure)
+    found = settings.load()
     for line in shown(found, _keys(found), _text(settings.config_file())):
         write(sys.stdout, line)
     return 0
@@ -81,10 +76,7 @@ def shown(found: Settings, keys: dict[str, str], text: str) -> list[str]:
 
 def check(chosen: argparse.Namespace) -> int:
     """Report what is wrong; exit code 0 if nothing is."""
-    try:
-        found = settings.load()
-    except Diagnostic as failure:
-        return fail(failure)
+    found = settings.load()
     text = _text(settings.config_file())
     troubles = _troubles(found)
     for trouble in troubles:
@@ -126,7 +118,6 @@ LONGEST = 200
 
 
 def report(chosen: argparse.Namespace) -> int:
-    """Show the report, and write it to a file if the user agrees."""
     text = report_text()
     for line in text.splitlines():
         write(sys.stdout, line)
@@ -136,10 +127,7 @@ def report(chosen: argparse.Namespace) -> int:
     if not (chosen.output or asked):
         return 0
     path = Path(chosen.output or f"multidrop-report-{date.today().isoformat()}.txt")
-    try:
-        return _keep(path, text, chosen.yes, asked)
-    except Diagnostic as problem:
-        return fail(problem)
+    return _keep(path, text, chosen.yes, asked)
 
 
 def _keep(path: Path, text: str, agreed: bool, asked: bool) -> int:
@@ -187,7 +175,6 @@ def _program() -> Iterator[str]:
 
 
 def _packages() -> Iterator[str]:
-    """The version of every package that multidrop may use."""
     try:
         needed = requires("multidrop") or []
     except PackageNotFoundError:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import signal
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 from multidrop.commands import fail
@@ -21,13 +21,12 @@ if TYPE_CHECKING:
     from multidrop.shell.front.report import Report
     from multidrop.shell.session import Session
 
+INPUT = "standard input"
+
 
 def list_(chosen: argparse.Namespace) -> int:
     """Print a line for each macro; one that cannot be read is reported and does not hide the others."""
-    try:
-        found = listed(_store())
-    except Diagnostic as problem:
-        return fail(problem)
+    found = listed(_store())
     for line in found.lines:
         write(sys.stdout, line)
     code = max(map(fail, found.broken), default=0)
@@ -37,12 +36,8 @@ def list_(chosen: argparse.Namespace) -> int:
 
 
 def show(chosen: argparse.Namespace) -> int:
-    """Print a macro in the form of its file."""
-    try:
-        for line in format_macro(_store().load(chosen.name)).rstrip("\n").split("\n"):
-            write(sys.stdout, line)
-    except Diagnostic as problem:
-        return fail(problem)
+    for line in format_macro(_store().load(chosen.name)).rstrip("\n").split("\n"):
+        write(sys.stdout, line)
     return 0
 
 
@@ -52,7 +47,7 @@ def play(chosen: argparse.Namespace) -> int:
     from multidrop.shell.scripts.reading import WrongScript, read_macro
 
     if not (chosen.on or chosen.role):
-        return fail(Diagnostic("nothing to open", "multidrop macro play", "--on URL, or --role NAME=URL"))
+        raise Diagnostic("nothing to open", "multidrop macro play", "--on URL, or --role NAME=URL")
     report = Report(f"macro {chosen.name}", as_json=chosen.json, junit=chosen.junit)
     try:
         report.begin()
@@ -102,23 +97,6 @@ def _store() -> MacroStore:
     return MacroStore(settings.macros, settings.project_macros)
 
 
-INPUT = "standard input"
-
-
-def edit(chosen: argparse.Namespace) -> int:
-    """Open a copy in the person's editor; put it in place of the macro once it is right."""
-
-    def work(store: MacroStore) -> list[str]:
-        command = macro_changes.editor()
-        draft = begin_draft(store, Settings().macro_drafts, chosen.name)
-        if draft.remark:
-            write(sys.stderr, draft.remark)
-        _run([*command, str(draft.file)], f"{chosen.name} is as it was")
-        return [finish_draft(store, draft)]
-
-    return _told(work)
-
-
 def _run(command: list[str], otherwise: str) -> None:
     """Run an editor to its end; Ctrl+C is its own. Raises Diagnostic where it cannot run or fails."""
     import subprocess
@@ -136,80 +114,57 @@ def _run(command: list[str], otherwise: str) -> None:
         raise Diagnostic(f"the editor ended with {code}", command[0], f"{otherwise}; your text is in {command[-1]}")
 
 
-def describe(chosen: argparse.Namespace) -> int:
-    """Change a macro's note."""
-    return _told(lambda store: macro_changes.describe(store, chosen.name, " ".join(chosen.text)))
+def change(chosen: argparse.Namespace) -> int:
+    """Change the macros, and say what was done on standard error: it is narration."""
+    store = _store()
+    try:
+        for line in _changed(chosen, store):
+            write(sys.stderr, line)
+    except KeyboardInterrupt:
+        return INTERRUPTED
+    return 0
 
 
-def rename(chosen: argparse.Namespace) -> int:
-    """Give a macro another name."""
-    return _told(lambda store: macro_changes.rename(store, chosen.name, chosen.new))
+def _changed(chosen: argparse.Namespace, store: MacroStore) -> list[str]:
+    match chosen.command:
+        case "macro describe":
+            return macro_changes.describe(store, chosen.name, " ".join(chosen.text))
+        case "macro rename":
+            return macro_changes.rename(store, chosen.name, chosen.new)
+        case "macro copy":
+            return macro_changes.copy(store, chosen.name, chosen.new, chosen.project)
+        case "macro key":
+            done, doubtful = macro_changes.set_key(store, chosen.key, chosen.name, chosen.page)
+            return [done, *doubtful]
+        case "macro export":
+            return macro_changes.export(store, chosen.file, chosen.names, lambda line: write(sys.stdout, line))
+        case "macro import" if chosen.file == "-":
+            text = utf8(bounded(sys.stdin.buffer, INPUT), INPUT)
+            return macro_changes.import_text(store, text, INPUT, chosen.force)
+        case "macro import":
+            return macro_changes.import_(store, chosen.file, chosen.force)
+        case "macro delete":
+            what = macro_changes.deletion(store, chosen.name)
+            if not chosen.yes and not _agreed(what):
+                raise Diagnostic(f"{what}; nothing was deleted", "macro delete", "--yes agrees to it")
+            return macro_changes.delete(store, chosen.name)
+        case _:
+            return _edited(chosen.name, store)
 
 
-def copy(chosen: argparse.Namespace) -> int:
-    """Copy a macro."""
-    return _told(lambda store: macro_changes.copy(store, chosen.name, chosen.new, chosen.project))
-
-
-def delete(chosen: argparse.Namespace) -> int:
-    """Delete a macro, after a question."""
-
-    def work(store: MacroStore) -> list[str]:
-        what = macro_changes.deletion(store, chosen.name)
-        if not chosen.yes and not _agreed(what):
-            raise Diagnostic(f"{what}; nothing was deleted", "macro delete", "--yes agrees to it")
-        return macro_changes.delete(store, chosen.name)
-
-    return _told(work)
+def _edited(name: str, store: MacroStore) -> list[str]:
+    """Open a copy in the person's editor; put it in place of the macro once it is right."""
+    command = macro_changes.editor()
+    draft = begin_draft(store, Settings().macro_drafts, name)
+    if draft.remark:
+        write(sys.stderr, draft.remark)
+    _run([*command, str(draft.file)], f"{name} is as it was")
+    return [finish_draft(store, draft)]
 
 
 def _agreed(what: str) -> bool:
-    """Ask at the terminal, if there is one."""
     if not (sys.stdin.isatty() and sys.stderr.isatty()):
         return False
     sys.stderr.write(f"macro delete {what}. Go on? [y/N] ")
     sys.stderr.flush()
     return sys.stdin.readline().strip() in ("y", "Y")
-
-
-def key(chosen: argparse.Namespace) -> int:
-    """Put a macro on a function key, or free the key."""
-
-    def work(store: MacroStore) -> list[str]:
-        done, doubtful = macro_changes.set_key(store, chosen.key, chosen.name, chosen.page)
-        return [done, *doubtful]
-
-    return _told(work)
-
-
-def import_(chosen: argparse.Namespace) -> int:
-    """Make macros of a file of function keys; `-` is standard input."""
-
-    def work(store: MacroStore) -> list[str]:
-        if chosen.file != "-":
-            return macro_changes.import_(store, chosen.file, chosen.force)
-        return macro_changes.import_text(store, utf8(bounded(sys.stdin.buffer, INPUT), INPUT), INPUT, chosen.force)
-
-    return _told(work)
-
-
-def export(chosen: argparse.Namespace) -> int:
-    """Write macros into a new file of function keys; `-` is standard output."""
-
-    def work(store: MacroStore) -> list[str]:
-        return macro_changes.export(store, chosen.file, chosen.names, lambda line: write(sys.stdout, line))
-
-    return _told(work)
-
-
-def _told(work: Callable[[MacroStore], list[str]]) -> int:
-    """Do it, and say what was done on standard error: it is narration."""
-    settings = Settings()
-    try:
-        for line in work(MacroStore(settings.macros, settings.project_macros)):
-            write(sys.stderr, line)
-    except Diagnostic as problem:
-        return fail(problem)
-    except KeyboardInterrupt:
-        return INTERRUPTED
-    return 0

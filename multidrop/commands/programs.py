@@ -60,7 +60,6 @@ def _report(checked: Checked, json: bool) -> None:
 
 
 def _summarize(checked: Checked, chosen: argparse.Namespace) -> None:
-    """Write what the file is, and how many of its lines were rewritten."""
     if chosen.json:
         fact = {"file": checked.file, "errors": len(errors(checked.problems)), "summary": checked.facts}
         _write_fact({**fact, "formatted": checked.respelled} if chosen.format else fact)
@@ -81,10 +80,7 @@ FAILED = 1
 def test(chosen: argparse.Namespace) -> int:
     """Test the files in turn; return the highest exit code."""
     several = len(chosen.files) > 1
-    try:
-        given = None if chosen.cell is None and chosen.personality is None else drive(chosen.cell, chosen.personality)
-    except Diagnostic as problem:
-        return fail(problem)
+    given = None if chosen.cell is None and chosen.personality is None else drive(chosen.cell, chosen.personality)
     return max(_test(file, chosen, given, several) for file in chosen.files)
 
 

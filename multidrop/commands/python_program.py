@@ -116,7 +116,6 @@ class ReportedSession(Session):
 
 
 def _called_at(file: str) -> int:
-    """The line of the program that is being executed."""
     frame: FrameType | None = sys._getframe()
     while frame is not None and frame.f_code.co_filename != file:
         frame = frame.f_back
@@ -130,7 +129,6 @@ def place(end: BaseException, file: str) -> int:
 
 
 def traceback_of(end: BaseException) -> list[str]:
-    """The traceback without the frames of multidrop."""
     found = traceback.TracebackException.from_exception(end)
     each: traceback.TracebackException | None = found
     ours = _ours()
@@ -144,14 +142,12 @@ def traceback_of(end: BaseException) -> list[str]:
 
 
 def _ours() -> set[str]:
-    """The files of multidrop that run."""
     loaded = [module for name, module in sys.modules.items() if name.partition(".")[0] == multidrop.__name__]
     return {getattr(module, "__file__", None) or "" for module in loaded}
 
 
 @contextlib.contextmanager
 def replaced(name: str, stream: object) -> Iterator[None]:
-    """Replace a standard stream while the body runs."""
     before = getattr(sys, name)
     setattr(sys, name, stream)
     try:
@@ -219,7 +215,6 @@ class _Execution:
 
     @contextlib.contextmanager
     def _signals(self) -> Iterator[None]:
-        """Take the signals that end a program."""
         with early_ends():
             for each in SIGNALS:
                 signal.signal(each, self._signalled)

@@ -8,7 +8,6 @@ import shlex
 from dataclasses import replace
 from functools import partial
 
-from multidrop.commands import fail
 from multidrop.dialects import Diagnostic
 from multidrop.shell.connect import settings
 from multidrop.shell.connect.opening import open_buses
@@ -21,12 +20,8 @@ from multidrop.shell.session import Session
 
 
 def run(chosen: argparse.Namespace) -> int:
-    """Print each drive that replies."""
-    try:
-        if chosen.save:
-            settings.check_new(chosen.save)
-    except Diagnostic as problem:
-        return fail(problem)
+    if chosen.save:
+        settings.check_new(chosen.save)
     return batch.run([], partial(_scan, chosen), agreed=chosen.yes, unsolicited=False)
 
 
@@ -67,7 +62,6 @@ def _form(drive: FoundDrive) -> tuple[object, ...]:
 
 
 def rescue(chosen: argparse.Namespace) -> int:
-    """Take one step after the other until a drive replies."""
     return batch.run([], partial(_rescue, chosen), agreed=chosen.yes, unsolicited=False)
 
 

@@ -43,14 +43,12 @@ def sim(chosen: argparse.Namespace) -> int:
 
 
 def share(chosen: argparse.Namespace) -> int:
-    """Lend a port to several clients until interrupted."""
     from multidrop.shell.front import sharing
 
     return sharing.run(chosen.url, chosen.rfc2217, as_json=chosen.json)
 
 
 def plot(chosen: argparse.Namespace) -> int:
-    """Plot until interrupted."""
     from multidrop.shell.front import plotting
 
     return plotting.run(
@@ -64,7 +62,6 @@ def plot(chosen: argparse.Namespace) -> int:
 
 
 def publish(chosen: argparse.Namespace) -> int:
-    """Publish samples, states, errors and transcripts until interrupted."""
     from multidrop.shell.front import publishing
 
     return publishing.run(chosen.urls, to=chosen.to, rate=chosen.rate, reconnect=not chosen.no_reconnect)
@@ -76,7 +73,7 @@ def relay(chosen: argparse.Namespace) -> int:
 
     try:
         return _relay(chosen)
-    except (Diagnostic, TransportLost) as problem:
+    except TransportLost as problem:
         return fail(problem)
 
 
@@ -111,24 +108,19 @@ def _relay(chosen: argparse.Namespace) -> int:
 
 
 def lsp(chosen: argparse.Namespace) -> int:
-    """Serve one editor until it ends the session."""
     try:
-        try:
-            from multidrop.lsp.serving import serve
-        except ModuleNotFoundError as missing:
-            if (missing.name or "").partition(".")[0] not in ("pygls", "lsprotocol"):
-                raise
-            what = "the language server needs pygls, which is not installed"
-            raise Diagnostic(what, hint="pipx install 'multidrop[lsp]'") from None
-        if chosen.tcp is None and sys.stdin.isatty():
-            write(sys.stderr, "multidrop lsp speaks to an editor, which starts it; see docs/editors.md")
-        return serve(chosen.personality, chosen.tcp)
-    except Diagnostic as problem:
-        return fail(problem)
+        from multidrop.lsp.serving import serve
+    except ModuleNotFoundError as missing:
+        if (missing.name or "").partition(".")[0] not in ("pygls", "lsprotocol"):
+            raise
+        what = "the language server needs pygls, which is not installed"
+        raise Diagnostic(what, hint="pipx install 'multidrop[lsp]'") from None
+    if chosen.tcp is None and sys.stdin.isatty():
+        write(sys.stderr, "multidrop lsp speaks to an editor, which starts it; see docs/editors.md")
+    return serve(chosen.personality, chosen.tcp)
 
 
 def ports(chosen: argparse.Namespace) -> int:
-    """Print a line for each serial port of this machine."""
     from multidrop.transports.serial_ports import list_ports
 
     found = list_ports()
@@ -146,7 +138,6 @@ def ports(chosen: argparse.Namespace) -> int:
 
 
 def completion(chosen: argparse.Namespace) -> int:
-    """Print the completion of this command line for a shell."""
     from importlib.resources import files
 
     sys.stdout.write((files("multidrop") / "shipped" / FILES[chosen.shell]).read_text(encoding="utf-8"))

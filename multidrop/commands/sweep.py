@@ -44,11 +44,8 @@ def run(chosen: argparse.Namespace) -> int:
         chosen.random,
         chosen.seed,
     )
-    try:
-        plan = planning.make(asked)
-        report = Report(plan, as_json=chosen.json, junit=chosen.junit)
-    except Diagnostic as problem:
-        return fail(problem)
+    plan = planning.make(asked)
+    report = Report(plan, as_json=chosen.json, junit=chosen.junit)
     with Interruption() as interruption:
         try:
             report.take_all(_results(plan, chosen, interruption))
@@ -152,7 +149,6 @@ class Report:
         self._status.show(f"{done} of {count} cases, {failed} failed, {_time(left)} left")
 
     def erase(self) -> None:
-        """Erase the progress."""
         self._status.erase()
 
     def finish(self, interruption: Interruption, code: int) -> int:
@@ -233,7 +229,6 @@ class Report:
 
 
 def _time(seconds: float) -> str:
-    """A time as a person reads it."""
     whole = round(seconds)
     if whole < 60:
         return f"{whole} s"

@@ -1,17 +1,158 @@
-"""The replies of the server, as types of the protocol."""
+"""The open documents of a client, and the replies of the server about them, as types of the protocol."""
 
 from __future__ import annotations
 
+import asyncio
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from functools import partial
+from math import inf
+from typing import NamedTuple, TypeVar
 
 from lsprotocol import types
 
+from multidrop.dialects.families import program_languages
 from multidrop.dialects.program_editing import Block, Offer, Span
 from multidrop.dialects.program_files import Problem
-from multidrop.lsp.documents import Document
-from multidrop.lsp.positions import Positions
-from multidrop.shell.program_text import Coloured, Edit, Fold
+from multidrop.shell.program_text import Coloured, Edit, Fold, ProgramGrammar, ProgramText
+from multidrop.shell.threads import in_thread
+
+T = TypeVar("T")
+DELAY = 0.25
+"""Seconds without a change after which a text is checked."""
+
+
+class Document(NamedTuple):
+    """One state of an open document."""
+
+    uri: str
+    version: int | None
+    text: ProgramText
+
+
+Publish = Callable[[Document | str, list[Problem]], None]
+
+
+class Documents:
+    """The open documents. `publish` gets the problems of a document; for the URI of a closed one, none.
+
+    One thread at a time checks a text: the loop answers meanwhile, and the process may end. The problems of a text that
+    changed are not published.
+    """
+
+    def __init__(self, publish: Publish, product: str, delay: float = DELAY) -> None:
+        self._publish, self._product, self._delay = publish, product, delay
+        self._open: dict[str, Document] = {}
+        self._grammars: dict[str, ProgramGrammar] = {}
+        self._checks: dict[str, asyncio.Task[None]] = {}
+        self._turn = asyncio.Lock()
+        self._work: set[asyncio.Task[object]] = set()
+
+    def check_for(self, product: str) -> None:
+        self._product = product
+
+    def find(self, uri: str) -> Document | None:
+        return self._open.get(uri)
+
+    def open(self, uri: str, file: str, language_id: str, text: str, version: int | None) -> None:
+        self._grammars[uri] = ProgramGrammar(file, _language(language_id))
+        self._take(uri, text, version, 0.0)
+
+    def change(self, uri: str, text: str, version: int | None) -> None:
+        """Take another text, and check it once it stays for a moment."""
+        if uri in self._grammars:
+            self._take(uri, text, version, self._delay)
+
+    def close(self, uri: str) -> None:
+        self._cancel(uri)
+        self._grammars.pop(uri, None)
+        if self._open.pop(uri, None) is not None:
+            self._publish(uri, [])
+
+    async def beside(self, work: Callable[[], T]) -> T:
+        """Do slow work in a thread, after what was begun before. A caller that goes leaves it to its end."""
+        task: asyncio.Task[T] = asyncio.get_running_loop().create_task(self._in_turn(work))
+        self._work.add(task)
+        task.add_done_callback(self._ended)
+        return await asyncio.shield(task)
+
+    def _ended(self, task: asyncio.Task[T]) -> None:
+        """Forget work that ended; a failure is the caller's, if there still is one."""
+        self._work.discard(task)
+        if not task.cancelled():
+            task.exception()
+
+    async def _in_turn(self, work: Callable[[], T]) -> T:
+        async with self._turn:
+            return await in_thread(work, inf, "check of a text")
+
+    def _take(self, uri: str, text: str, version: int | None, delay: float) -> None:
+        document = Document(uri, version, ProgramText(text, self._grammars[uri], self._product))
+        self._open[uri] = document
+        self._cancel(uri)
+        self._checks[uri] = asyncio.get_running_loop().create_task(self._check(document, delay))
+
+    def _cancel(self, uri: str) -> None:
+        if task := self._checks.pop(uri, None):
+            task.cancel()
+
+    async def _check(self, document: Document, delay: float) -> None:
+        await asyncio.sleep(delay)
+        problems = await self.beside(partial(self._problems, document))
+        if self._open.get(document.uri) is document:
+            self._publish(document, problems)
+
+    def _problems(self, document: Document) -> list[Problem]:
+        """Return the problems of a text; its names are known first, as hover and completion need them soon."""
+        if self._open.get(document.uri) is not document:  # it changed while another text was checked
+            return []
+        _ = document.text.names
+        return list(document.text.problems)
+
+
+def _language(language_id: str) -> str:
+    """Return the family of a language by its name in editors; empty where the name of the file decides."""
+    named = language_id.lower()
+    return next((name for name, files in program_languages().items() if named in files.ids), "")
+
+
+_LIMITS: Mapping[str, tuple[int, ...]] = {
+    types.PositionEncodingKind.Utf8: (0x80, 0x800, 0x10000),
+    types.PositionEncodingKind.Utf16: (0x10000,),
+    types.PositionEncodingKind.Utf32: (),
+}
+"""The characters from which on each takes one code unit more."""
+
+
+class Positions:
+    """Converts columns of lines between characters and code units; UTF-16 unless both agreed on another encoding."""
+
+    def __init__(self, encoding: str | None) -> None:
+        self._limits = _LIMITS[encoding or types.PositionEncodingKind.Utf16]
+
+    def _width(self, character: str) -> int:
+        return 1 + sum(ord(character) >= limit for limit in self._limits)
+
+    def units(self, line: str, column: int) -> int:
+        """Return the code units of the first characters of a line."""
+        part = line[:column]
+        return len(part) if part.isascii() or not self._limits else sum(map(self._width, part))
+
+    def column(self, line: str, units: int) -> int:
+        """Return the characters before a number of code units; a position inside a character is before it."""
+        if line.isascii() or not self._limits:
+            return min(units, len(line))
+        for column, character in enumerate(line):
+            units -= self._width(character)
+            if units < 0:
+                return column
+        return len(line)
+
+    def range(self, lines: Sequence[str], place: Span) -> types.Range:
+        line = lines[place.line] if place.line < len(lines) else ""
+        start, stop = self.units(line, place.start), self.units(line, place.stop)
+        return types.Range(types.Position(place.line, start), types.Position(place.line, stop))
+
 
 SOURCE = "multidrop"
 TOKENS = {
@@ -105,7 +246,6 @@ def symbols(document: Document, positions: Positions, blocks: Iterable[Block]) -
 
 
 def folding(fold: Fold) -> types.FoldingRange:
-    """Return lines that may be folded away."""
     kind = types.FoldingRangeKind.Comment if fold.remarks else types.FoldingRangeKind.Region
     return types.FoldingRange(fold.first, fold.last, kind=kind)
 
@@ -128,7 +268,6 @@ def tokens(document: Document, positions: Positions, parts: Iterable[Coloured]) 
 
 
 def text_edits(document: Document, positions: Positions, edits: Iterable[Edit]) -> list[types.TextEdit]:
-    """Return edits of a document."""
     return [types.TextEdit(positions.range(document.text.lines, each.place), each.text) for each in edits]
 
 

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from functools import partial
-from typing import Protocol
 
 from lsprotocol import types
 from pygls.exceptions import JsonRpcException
@@ -18,8 +17,7 @@ import multidrop
 from multidrop.dialects import Diagnostic
 from multidrop.dialects.program_files import Problem
 from multidrop.lsp import replies
-from multidrop.lsp.documents import DELAY, Document, Documents
-from multidrop.lsp.positions import Positions
+from multidrop.lsp.replies import DELAY, Document, Documents, Positions
 from multidrop.shell.output import shortened
 from multidrop.simulator.families import TABLE
 
@@ -27,14 +25,16 @@ TRIGGERS = (" ", ",", "=")
 Found = list[types.Location]
 
 
-class _At(Protocol):
-    """The part of a request that names a place."""
-
-    @property
-    def text_document(self) -> types.TextDocumentIdentifier: ...
-
-    @property
-    def position(self) -> types.Position: ...
+At = (
+    types.HoverParams
+    | types.CompletionParams
+    | types.DefinitionParams
+    | types.ReferenceParams
+    | types.DocumentHighlightParams
+    | types.PrepareRenameParams
+    | types.RenameParams
+)
+"""The requests that name a place."""
 
 
 class Server:
@@ -45,9 +45,6 @@ class Server:
             "multidrop", multidrop.__version__, text_document_sync_kind=types.TextDocumentSyncKind.Full
         )
         self.documents = Documents(self._publish, product, delay)
-        self._add()
-
-    def _add(self) -> None:
         features: list[tuple[str, Callable[..., object], object | None]] = [
             (types.INITIALIZE, self.initialize, None),
             (types.TEXT_DOCUMENT_DID_OPEN, self.opened, None),
@@ -91,7 +88,7 @@ class Server:
         warning = types.ShowMessageParams(types.MessageType.Warning, f"multidrop: {message}")
         self.protocol_server.window_show_message(warning)
 
-    def _place(self, params: _At) -> tuple[Document, int, int] | None:
+    def _place(self, params: At) -> tuple[Document, int, int] | None:
         """Return the document of a request, with line and column; None for one that is not open."""
         document = self.documents.find(params.text_document.uri)
         if document is None:
@@ -102,7 +99,6 @@ class Server:
     # Documents
 
     def initialize(self, params: types.InitializeParams) -> None:
-        """Take the personality of the client's options."""
         options = params.initialization_options
         product = options.get("personality") if isinstance(options, dict) else None
         if product is None:
@@ -114,25 +110,21 @@ class Server:
             self._show(f"no personality {shortened(str(product))}; valid: {', '.join(known)}")
 
     def opened(self, params: types.DidOpenTextDocumentParams) -> None:
-        """Take a document, and check it."""
         given = params.text_document
         file = self.protocol_server.workspace.get_text_document(given.uri).path
         self.documents.open(given.uri, file, given.language_id, given.text, given.version)
 
     def changed(self, params: types.DidChangeTextDocumentParams) -> None:
-        """Take the text of a document after its changes."""
         uri = params.text_document.uri
         text = self.protocol_server.workspace.get_text_document(uri).source
         self.documents.change(uri, text, params.text_document.version)
 
     def closed(self, params: types.DidCloseTextDocumentParams) -> None:
-        """Forget a document."""
         self.documents.close(params.text_document.uri)
 
     # At a place
 
     def hover(self, params: types.HoverParams) -> types.Hover | None:
-        """Return the help on the word at a place."""
         if (at := self._place(params)) is None or (found := at[0].text.help_at(*at[1:])) is None:
             return None
         wanted = self._client.text_document.hover if self._client.text_document else None
@@ -140,7 +132,6 @@ class Server:
         return types.Hover(shown, self._positions.range(at[0].text.lines, found.place))
 
     def completion(self, params: types.CompletionParams) -> types.CompletionList:
-        """Return what may be typed at a place."""
         items: list[types.CompletionItem] = []
         at = self._place(params)
         if at is not None and not _typed_only(params.context, at[0].text.line(at[1])[: at[2]]):
@@ -155,7 +146,7 @@ class Server:
                 items.append(replies.item(offer, number, span, about))
         return types.CompletionList(is_incomplete=False, items=items)
 
-    def _named(self, params: _At, declared: bool, used: bool) -> Found:
+    def _named(self, params: At, declared: bool, used: bool) -> Found:
         if (at := self._place(params)) is None or (found := at[0].text.name_at(*at[1:])) is None:
             return []
         name, lines = found[0], at[0].text.lines
@@ -163,15 +154,12 @@ class Server:
         return [types.Location(at[0].uri, self._positions.range(lines, each)) for each in places]
 
     def definition(self, params: types.DefinitionParams) -> Found:
-        """Return the place that declares the name at a place."""
         return self._named(params, declared=True, used=False)
 
     def references(self, params: types.ReferenceParams) -> Found:
-        """Return the places of the name at a place."""
         return self._named(params, declared=params.context.include_declaration, used=True)
 
     def highlight(self, params: types.DocumentHighlightParams) -> list[types.DocumentHighlight]:
-        """Return the places of the name at a place, in its own document."""
         declared = [each.range for each in self._named(params, declared=True, used=False)]
         write, read = types.DocumentHighlightKind.Write, types.DocumentHighlightKind.Read
         places = [each.range for each in self._named(params, declared=True, used=True)]
@@ -203,12 +191,10 @@ class Server:
     # All of a document
 
     def symbols(self, params: types.DocumentSymbolParams) -> list[types.DocumentSymbol]:
-        """Return the outline."""
         document = self.documents.find(params.text_document.uri)
         return replies.symbols(document, self._positions, document.text.outline) if document is not None else []
 
     def folding(self, params: types.FoldingRangeParams) -> list[types.FoldingRange]:
-        """Return what may be folded away."""
         document = self.documents.find(params.text_document.uri)
         return [replies.folding(each) for each in document.text.folds()] if document is not None else []
 

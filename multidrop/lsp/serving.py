@@ -13,10 +13,9 @@ import os
 import signal
 import sys
 import threading
-from collections.abc import Awaitable, Callable, Iterator
+from collections.abc import Callable, Iterator
 from json import JSONDecodeError
 from types import FrameType
-from typing import BinaryIO, Protocol
 
 from pygls.exceptions import JsonRpcException
 from pygls.io_ import run_async
@@ -29,18 +28,10 @@ from multidrop.transports.sockets import exposed
 PIECE = 65536
 
 
-class _Stream(Protocol):
-    """The part of a stream that the protocol reads from."""
-
-    def readline(self) -> Awaitable[bytes]: ...
-
-    def readexactly(self, n: int) -> Awaitable[bytes]: ...
-
-
 class _Input:
     """A client's messages. The end of the stream, also within a message, is empty bytes."""
 
-    def __init__(self, stream: _Stream) -> None:
+    def __init__(self, stream: asyncio.StreamReader) -> None:
         self._stream = stream
 
     async def readline(self) -> bytes:
@@ -103,7 +94,7 @@ def serve(product: str, tcp: tuple[str, int] | None) -> int:
     return 1
 
 
-async def _run(server: Server, stream: _Stream, write: Callable[[bytes], object]) -> None:
+async def _run(server: Server, stream: asyncio.StreamReader, write: Callable[[bytes], object]) -> None:
     lines = server.protocol_server
     lines.protocol.set_writer(_Output(write))
     await run_async(
@@ -115,24 +106,17 @@ async def _run(server: Server, stream: _Stream, write: Callable[[bytes], object]
 
 
 async def _stdio(server: Server) -> None:
-    """Serve the client at standard input and output."""
-    with _own_output() as output:
-
-        def write(data: bytes) -> None:
-            output.write(data)
-            output.flush()
-
-        await _run(server, _standard_input(), write)
-
-
-@contextlib.contextmanager
-def _own_output() -> Iterator[BinaryIO]:
-    """Yield standard output; meanwhile other prints go to standard error."""
+    """Serve the client at standard input and output; other prints go to standard error."""
     sys.stdout.flush()
     before = sys.stdout
     sys.stdout = sys.stderr
+
+    def write(data: bytes) -> None:
+        before.buffer.write(data)
+        before.buffer.flush()
+
     try:
-        yield before.buffer
+        await _run(server, _standard_input(), write)
     finally:
         sys.stdout = before
 
@@ -143,23 +127,16 @@ def _standard_input() -> asyncio.StreamReader:
 
     def read() -> None:
         with contextlib.suppress(RuntimeError):  # the loop is closed
-            while data := _piece():
-                loop.call_soon_threadsafe(stream.feed_data, data)
+            with contextlib.suppress(OSError):
+                while data := os.read(0, PIECE):
+                    loop.call_soon_threadsafe(stream.feed_data, data)
             loop.call_soon_threadsafe(stream.feed_eof)
 
     threading.Thread(target=read, daemon=True).start()
     return stream
 
 
-def _piece() -> bytes:
-    try:
-        return os.read(0, PIECE)
-    except OSError:
-        return b""
-
-
 async def serve_port(server: Server, host: str, port: int) -> None:
-    """Serve the first client of a port."""
     client: asyncio.Future[tuple[asyncio.StreamReader, asyncio.StreamWriter]]
     client = asyncio.get_running_loop().create_future()
 

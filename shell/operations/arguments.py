@@ -23,7 +23,6 @@ class Several(argparse.Action):
     """Joins the drives of an option that is repeated: `a,b`."""
 
     def __call__(self, parser: object, chosen: argparse.Namespace, values: object, option: object = None) -> None:
-        """Add a drive to those before it."""
         before = getattr(chosen, self.dest)
         setattr(chosen, self.dest, f"{before},{values}" if before else values)
 
@@ -63,7 +62,6 @@ def rounds(text: str) -> int | None:
 
 
 def duration(text: str) -> float:
-    """Read a number of seconds."""
     found = _any_number(text)
     if not 0 < found <= 1e7:
         raise argparse.ArgumentTypeError(f"{text} is not a number of seconds above 0")
@@ -134,7 +132,6 @@ def address(text: str) -> tuple[str, int]:
 
 
 def language() -> Mapping[str, Any]:
-    """Declare the language of program files."""
     from multidrop.dialects.families import DEFAULT, program_languages
 
     known = program_languages()
@@ -144,7 +141,6 @@ def language() -> Mapping[str, Any]:
 
 
 def titles() -> str:
-    """The languages of program files, with the endings of their names."""
     from multidrop.dialects.families import program_languages
 
     return " or ".join(f"{each.title} ({', '.join(each.endings)})" for each in program_languages().values())
@@ -195,7 +191,6 @@ def tested_personality() -> Mapping[str, Any]:
 
 
 def dialect() -> Mapping[str, Any]:
-    """Declare the language of the drives that are searched."""
     from multidrop.dialects.families import FAMILIES
 
     languages = [name for name, family in FAMILIES.items() if family.scan is not None]

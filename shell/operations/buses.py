@@ -20,6 +20,7 @@ from multidrop.shell.operations.arguments import (
     speed,
 )
 from multidrop.shell.operations.operation import Arguments, Operation, typed
+from multidrop.simulator import sim_words
 
 if TYPE_CHECKING:
     from multidrop.shell.workspace import Workspace
@@ -66,7 +67,6 @@ TUI = Operation(
     arguments={
         **SHOWN,
     },
-    urls=True,
 )
 SHELL = Operation(
     command="shell",
@@ -77,7 +77,6 @@ SHELL = Operation(
         **SHOWN,
         "--yes": YES,
     },
-    urls=True,
 )
 SEND = Operation(
     command="send",
@@ -90,7 +89,6 @@ SEND = Operation(
         "--json": SUMMED,
         "--yes": YES,
     },
-    urls=True,
 )
 RUN = Operation(
     command="run",
@@ -112,7 +110,6 @@ RUN = Operation(
         "--junit FILE": JUNIT,
         "--yes": YES,
     },
-    urls=True,
 )
 OPEN = Operation(
     usage="/open URL [NAME]",
@@ -164,7 +161,6 @@ SCAN = Operation(
         "--yes": YES,
         "--save NAME": "save what was found as a connection of this name",
     },
-    urls=True,
 )
 RESCUE = Operation(
     command="rescue",
@@ -178,7 +174,6 @@ RESCUE = Operation(
         "--erase": "go as far as FD, which erases; it is asked about as well",
         "--yes": YES,
     },
-    urls=True,
 )
 REFERENCED = Operation(
     usage="/referenced [ADDR]",
@@ -275,22 +270,10 @@ KEEP = Operation(
     immediate=True,
 )
 SIM = Operation(
-    usage=(
-        "/sim input DRIVE N 0|1|open | analog DRIVE COUNTS | push DRIVE STEPS | power DRIVE on|off | "
-        "supply DRIVE on|off | lock DRIVE on|off | unplug BUS | plug BUS"
-    ),
+    usage=f"/sim {sim_words.SIM}",
     help="Act on simulated drives from outside: inputs, loads, power, cables.",
     work="drives:sim",
-    words={
-        "input": "wire an input to ground (0), to +V (1), or to neither (open)",
-        "analog": "put that many counts on the analog input",
-        "push": "turn the rotor by motor steps, from outside",
-        "power": "switch the whole drive on or off",
-        "supply": "switch +V, and leave the auxiliary supply on",
-        "lock": "hold the rotor fast, or let go",
-        "unplug": "pull the bus's cable out",
-        "plug": "plug it in again",
-    },
+    words=sim_words.MEANINGS,
     recorded="typed",
     rows="multidrop.simulator.sim_words:table",
     immediate=True,
@@ -320,7 +303,6 @@ SHARE = Operation(
         ),
         "--json": "print the endpoint and the events as JSON objects, a line each",
     },
-    urls=True,
 )
 RELAY = Operation(
     command="relay",

@@ -53,7 +53,6 @@ PARAMS_BACKUP = Operation(
         "--drive ADDR": drives("the drive (default: the first); all or several: FILE is a folder of files"),
         "FILE": "the new file; -: standard output",
     },
-    urls=True,
 )
 PARAMS_DIFF = Operation(
     command="params diff",
@@ -73,7 +72,6 @@ PARAMS_DIFF = Operation(
         "--defaults": "compare with the defaults",
         "--json": JSON,
     },
-    urls=True,
 )
 PARAMS_RESTORE = Operation(
     command="params restore",
@@ -93,7 +91,6 @@ PARAMS_RESTORE = Operation(
         "--other-product": "restore what the drive has of another product's file",
         "--yes": YES,
     },
-    urls=True,
 )
 PLOT = Operation(
     usage=(
@@ -138,7 +135,6 @@ PLOT = Operation(
         },
         "--no-reconnect": NO_RECONNECT,
     },
-    urls=True,
 )
 PUBLISH = Operation(
     command="publish",
@@ -156,7 +152,6 @@ PUBLISH = Operation(
         "--rate N": typed("samples a second of each drive, at most (default: 2)", default="2"),
         "--no-reconnect": NO_RECONNECT,
     },
-    urls=True,
 )
 SNAPSHOT = Operation(
     usage="/snapshot FILE",
@@ -179,7 +174,6 @@ SNAPSHOT = Operation(
         "URL ...": WHAT,
         "-o|--output CELL.toml": typed("the new file; -: standard output", required=True),
     },
-    urls=True,
 )
 SNAPSHOT_APPLY = Operation(
     command="snapshot apply",
@@ -201,7 +195,6 @@ SNAPSHOT_APPLY = Operation(
         "--dry-run": "show what would be done, and do nothing",
         "--yes": YES,
     },
-    urls=True,
 )
 TWIN = Operation(
     usage="/twin [on [ADDR ...] | off | limit STEPS]",

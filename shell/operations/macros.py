@@ -97,12 +97,11 @@ PLAY = Operation(
         "--junit FILE": JUNIT,
         "--yes": YES,
     },
-    urls=True,
 )
 MACRO_EDIT = Operation(
     command="macro edit",
     meaning="open a macro's file in the editor of VISUAL or EDITOR; it changes only once the whole text is right",
-    run="macros.edit",
+    run="macros.change",
     examples=["macro edit shuttle"],
     arguments={
         "NAME": None,
@@ -111,7 +110,7 @@ MACRO_EDIT = Operation(
 MACRO_DESCRIBE = Operation(
     command="macro describe",
     meaning="change a macro's note",
-    run="macros.describe",
+    run="macros.change",
     examples=['macro describe shuttle "ten turns and back"'],
     arguments={
         "NAME": None,
@@ -121,7 +120,7 @@ MACRO_DESCRIBE = Operation(
 MACRO_RENAME = Operation(
     command="macro rename",
     meaning="give a macro another name",
-    run="macros.rename",
+    run="macros.change",
     examples=["macro rename shuttle ten-turns"],
     arguments={
         "NAME": None,
@@ -131,7 +130,7 @@ MACRO_RENAME = Operation(
 MACRO_COPY = Operation(
     command="macro copy",
     meaning="copy a macro; --project: into the folder macros of the current folder",
-    run="macros.copy",
+    run="macros.change",
     examples=["macro copy shuttle shuttle --project"],
     arguments={
         "NAME": None,
@@ -142,7 +141,7 @@ MACRO_COPY = Operation(
 MACRO_DELETE = Operation(
     command="macro delete",
     meaning="delete a macro; asks first",
-    run="macros.delete",
+    run="macros.change",
     examples=["macro delete shuttle"],
     arguments={
         "NAME": None,
@@ -163,7 +162,7 @@ KEY = Operation(
     immediate=True,
     command="macro key",
     meaning="put a macro on a function key, or free the key",
-    run="macros.key",
+    run="macros.change",
     examples=["macro key F3 shuttle", "macro key F3 shuttle --page 2", "macro key F3 off"],
     arguments={
         "key=F2..F12": typed(None, type=function_key),
@@ -174,7 +173,7 @@ KEY = Operation(
 MACRO_IMPORT = Operation(
     command="macro import",
     meaning="make macros of a vendor's function-key strings, one a line: F2 STRING ; comment",
-    run="macros.import_",
+    run="macros.change",
     examples=["macro import keys.txt"],
     arguments={
         "FILE": "function-key strings, one a line: F2 STRING ; comment (-: standard input)",
@@ -184,7 +183,7 @@ MACRO_IMPORT = Operation(
 MACRO_EXPORT = Operation(
     command="macro export",
     meaning="write macros to a new file of a vendor's function-key strings",
-    run="macros.export",
+    run="macros.change",
     examples=["macro export keys.txt", "macro export keys.txt f2 shuttle"],
     arguments={
         "FILE": "the new file (-: standard output)",

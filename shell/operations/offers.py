@@ -32,7 +32,6 @@ def spoken(workspace: Workspace, line: DriveLine) -> tuple[Language, str]:
 
 
 def meant(workspace: Workspace, line: DriveLine) -> Drive | None:
-    """The known drive that a line goes to."""
     bus = workspace.buses.get(line.bus or workspace.selected_bus)
     if not bus or not (line.bus or line.address):
         return workspace.selected
@@ -53,7 +52,6 @@ def targets(workspace: Workspace) -> Found:
 
 
 def verbs(workspace: Workspace) -> Found:
-    """The verbs that apply to the selection."""
     return ((verb.name, verb.lines[0]) for verb in VERBS.values() if verb.fits is None or verb.fits(workspace))
 
 

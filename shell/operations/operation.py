@@ -60,7 +60,7 @@ class Operation(NamedTuple):
     examples: Sequence[str] = ()
     arguments: Arguments = NOTHING
     urls: bool = False
-    """The help on the command explains URLs."""
+    """The help on a group explains URLs, as that on a command with a URL does."""
 
     @property
     def name(self) -> str:

@@ -118,7 +118,6 @@ LIST = Operation(
         "URL": WHAT,
         "--drive ADDR": drives("the drive (default: the first), or all"),
     },
-    urls=True,
 )
 UPLOAD = Operation(
     usage="/upload FILE [ADDR]",
@@ -138,7 +137,6 @@ UPLOAD = Operation(
         "FILE": "the new file; it can be downloaded again; -: standard output",
         "--raw": "save the lines as they are stored, without remarks",
     },
-    urls=True,
 )
 DOWNLOAD = Operation(
     usage="/download FILE [ADDR] [--save] [--only-changed] [--no-verify] [--run NAME]",
@@ -168,7 +166,6 @@ DOWNLOAD = Operation(
         "--no-verify": "do not read the program back",
         "--yes": YES,
     },
-    urls=True,
 )
 TRACE = Operation(
     usage="/trace [ADDR] [LABEL]",

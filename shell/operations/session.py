@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from multidrop.shell import transcripts
 from multidrop.shell.operations.arguments import WHAT, YES, drives
 from multidrop.shell.operations.operation import Arguments, Operation, typed
 
@@ -128,7 +129,6 @@ LOG_REPLAY = Operation(
         "--json": "print one JSON object a difference, and a summary",
         "--yes": YES,
     },
-    urls=True,
 )
 QUIT = Operation(
     usage="/quit",
@@ -147,12 +147,7 @@ TIMES = Operation(
     configuration keeps the form for the next start.
     """,
     work="session:times",
-    words={
-        "off": "no times: more room for the lines",
-        "clock": "the time of day",
-        "start": "seconds since the first line",
-        "last": "seconds since the line above",
-    },
+    words=transcripts.TIMES,
     immediate=True,
     fits=has_transcript,
 )

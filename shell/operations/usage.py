@@ -23,7 +23,6 @@ class Place:
     repeats: bool = False
 
     def takes(self, word: str) -> bool:
-        """Whether a word is valid here."""
         return word in self.words or (not word.startswith("--") and any(map(is_placeholder, self.words)))
 
 
@@ -31,7 +30,6 @@ Form = tuple[Place, ...]
 
 
 def is_placeholder(word: str) -> bool:
-    """Whether a word of a usage is a placeholder."""
     return not word.startswith("--") and word != word.lower()
 
 

@@ -37,7 +37,6 @@ class Call:
     by: By = By.OPERATOR
 
     def work(self) -> Coroutine[Any, Any, None]:
-        """What the verb does."""
         work: Coroutine[Any, Any, None] = self.verb.imported(self.verb.work)(self)
         return work
 
@@ -97,7 +96,6 @@ class Call:
         return name
 
     def wrong(self, message: str = "") -> Diagnostic:
-        """A Diagnostic with the usage, and with the error if it is known."""
         return self.verb.wrong(message)
 
     def drive(self, target: str = "") -> Drive:

@@ -175,7 +175,6 @@ async def _show(call: Call, drive: Drive, talk: Procedure[tuple[str, ...]], *, w
 
 
 def _number(call: Call, text: str) -> int:
-    """Parse a decimal or hexadecimal number."""
     if not re.fullmatch(r"[+-]?(0[xX][0-9A-Fa-f]{1,16}|\d{1,20})", text, re.ASCII):
         raise call.wrong(f"no number {text}; valid: as 87 or 0x57")
     return int(text, 16 if "x" in text.lower() else 10)

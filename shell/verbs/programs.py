@@ -114,7 +114,6 @@ def _at_drive(call: Call) -> tuple[str, list[str]]:
 
 
 def debugger_recorded(call: Call) -> str:
-    """The line with the drive's address."""
     target, words = _at_drive(call)
     return " ".join(filter(None, (call.verb.name, call.session.qualified_address(call.drive(target)), *words)))
 

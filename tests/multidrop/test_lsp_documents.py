@@ -9,7 +9,7 @@ from typing import TypeVar
 import pytest
 
 from multidrop.dialects.program_files import Problem
-from multidrop.lsp.documents import DELAY, Document, Documents
+from multidrop.lsp.replies import DELAY, Document, Documents
 
 T = TypeVar("T")
 URI = "file:///a.mxt"

@@ -16,7 +16,7 @@ from lsprotocol import types
 from pytest_lsp import client_capabilities
 from pytest_lsp.client import make_test_lsp_client
 
-from multidrop.commands import serving
+from multidrop.cli import run
 from multidrop.dialects import Diagnostic
 from multidrop.lsp.server import Server
 from multidrop.lsp.serving import serve_port
@@ -117,8 +117,7 @@ def test_without_its_extra_it_says_what_to_install(
         monkeypatch.delitem(sys.modules, name)
     monkeypatch.setitem(sys.modules, "pygls", None)
     monkeypatch.setitem(sys.modules, "lsprotocol", None)
-    chosen = argparse.Namespace(personality="LMDCM", tcp=None)
-    assert serving.lsp(chosen) == 2
+    assert run(argparse.Namespace(run_by="serving.lsp", personality="LMDCM", tcp=None)) == 2
     line = "the language server needs pygls, which is not installed; pipx install 'multidrop[lsp]'\n"
     assert capsys.readouterr().err == line
 

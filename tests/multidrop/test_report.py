@@ -7,6 +7,7 @@ from datetime import date
 
 import pytest
 
+from multidrop import cli
 from multidrop.commands import machine
 
 
@@ -28,7 +29,7 @@ def run(monkeypatch, output="", yes=False, typed=None):
     printed = Terminal() if typed is not None else io.StringIO()
     monkeypatch.setattr(sys, "stdin", Terminal(typed) if typed is not None else io.StringIO())
     monkeypatch.setattr(sys, "stdout", printed)
-    code = machine.report(argparse.Namespace(output=output, yes=yes))
+    code = cli.run(argparse.Namespace(run_by="machine.report", output=output, yes=yes))
     return code, printed.getvalue()
 
 

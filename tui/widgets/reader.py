@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable
-from dataclasses import replace
 from typing import ClassVar
 
 from textual.app import ComposeResult
@@ -187,7 +186,7 @@ class Reader(Horizontal):
         """Show only the records that hold the text."""
         self.close()
         if text:
-            transcript.choose(replace(transcript.sight.filter, text=text), typed=True)
+            transcript.choose(transcript.sight.filter._replace(text=text), typed=True)
             transcript.look_end(newest=True)
 
     def _copy(self, picked: Picked) -> None:
