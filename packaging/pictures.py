@@ -12,10 +12,9 @@ import contextlib
 import re
 import sys
 import tempfile
-from collections.abc import Awaitable, Callable
+from collections.abc import Sequence
 from datetime import datetime, timedelta
 from pathlib import Path
-from typing import NamedTuple
 from unittest import mock
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -54,114 +53,33 @@ PG
 SMALL, LARGE = (80, 24), (120, 40)
 
 
-class Hand:
-    """A person at the keyboard."""
-
-    def __init__(self, app: MultidropApp, pilot: Pilot[int]) -> None:
-        self.app, self._pilot = app, pilot
-
-    async def line(self, text: str, seconds: float = 0.6) -> None:
-        """Type a line, press Enter, and look for some time."""
-        self.app.main.entry.value = text
-        await self.press("enter")
-        await self.look(seconds)
-
-    async def press(self, *keys: str) -> None:
-        """Press keys one after the other."""
-        await self._pilot.press(*keys)
-
-    async def page(self, name: str) -> None:
-        """Open a page as its key does; a page that a line opens takes no keys for half a second of real time."""
-        await self.app.run_action(f"page('{name}')")
-        await self.look(0.2)
-
-    async def look(self, seconds: float) -> None:
-        """Let virtual time pass."""
-        await asyncio.sleep(seconds)
-
-
-Scene = Callable[[Hand], Awaitable[None]]
-
-
-class Picture(NamedTuple):
-    """A picture: its size in cells, and what is done before it is taken."""
-
-    size: tuple[int, int]
-    scene: Scene
-
-
-async def work(hand: Hand) -> None:
-    """Ask, err, and move two drives of the party line."""
-    await hand.line("VM=180000")
-    await hand.line("PR P")
-    await hand.line("@b PR VX")
-    await hand.line("@b SL 20000")
-    await hand.line("MR 1024000", 1.6)
-
-
-def page(name: str, *keys: str, seconds: float = 1.2) -> Scene:
-    """A page that is opened during the work, and keys typed there."""
-
-    async def scene(hand: Hand) -> None:
-        await work(hand)
-        await hand.page(name)
-        await hand.press(*keys)
-        await hand.look(seconds)
-
-    return scene
-
-
-async def macros(hand: Hand) -> None:
-    """The page of macros, where no drive moves: its words are the same every time."""
-    await hand.page("macros")
-    await hand.look(1.2)
-
-
-async def plays(hand: Hand) -> None:
-    """A macro plays, and its steps show."""
-    await hand.line("VM=180000")
-    await hand.line("/play shuttle steps=900000", 1.2)
-
-
-async def stopped(hand: Hand) -> None:
-    """Everything was stopped."""
-    await work(hand)
-    await hand.press("ctrl+x")
-    await hand.look(1.5)
-
-
-async def program(hand: Hand) -> None:
-    """A program was downloaded, and runs."""
-    await hand.line("/download shuttle.mxt", 6.0)
-    await hand.line("R1=9")
-    await hand.line("EX GO", 2.2)
-    await hand.page("program")
-    await hand.press(*"shuttle.mxt", "enter")
-    await hand.look(1.0)
-
-
-async def twin(hand: Hand) -> None:
-    """A drive is pushed while it moves beside its twin."""
-    await hand.line("EE=1")
-    await hand.line("/twin on a", 6.0)
-    await hand.line("VM=20000")
-    await hand.line("MR 60000", 1.6)
-    await hand.line("/sim push a -20000", 0.9)
-
-
-SCENES: dict[str, Picture] = {
-    "demo-80x24": Picture(SMALL, work),
-    "demo-120x40": Picture(LARGE, work),
-    "macro-80x24": Picture(SMALL, plays),
-    "stopped-80x24": Picture(SMALL, stopped),
-    "drives-80x24": Picture(SMALL, page("drives")),
-    "plot-120x40": Picture(LARGE, page("plot", seconds=3.0)),
-    "parameters-120x40": Picture(LARGE, page("parameters", "r", seconds=8.0)),
-    "controls-80x24": Picture(SMALL, page("controls")),
-    "macros-80x24": Picture(SMALL, macros),
-    "program-120x40": Picture(LARGE, program),
-    "twin-120x40": Picture(LARGE, twin),
+Step = str | tuple[str, float] | list[str] | float
+"""A line, a line and the seconds after it, or a page; keys; seconds."""
+WORK = ("VM=180000", "PR P", "@b PR VX", "@b SL 20000", ("MR 1024000", 1.6))
+"""Ask, err, and move two drives of the party line."""
+SCENES: dict[str, tuple[tuple[int, int], Sequence[Step]]] = {
+    "demo-80x24": (SMALL, WORK),
+    "demo-120x40": (LARGE, WORK),
+    "macro-80x24": (SMALL, ("VM=180000", ("/play shuttle steps=900000", 1.2))),
+    "stopped-80x24": (SMALL, (*WORK, ["ctrl+x"], 1.5)),
+    "drives-80x24": (SMALL, (*WORK, "page drives", [], 1.2)),
+    "plot-120x40": (LARGE, (*WORK, "page plot", [], 3.0)),
+    "parameters-120x40": (LARGE, (*WORK, "page parameters", ["r"], 8.0)),
+    "controls-80x24": (SMALL, (*WORK, "page controls", [], 1.2)),
+    "macros-80x24": (SMALL, ("page macros", 1.2)),
+    "program-120x40": (
+        LARGE,
+        (
+            *(("/download shuttle.mxt", 6.0), "R1=9", ("EX GO", 2.2)),
+            *("page program", [*"shuttle.mxt", "enter"], 1.0),
+        ),
+    ),
+    "twin-120x40": (
+        LARGE,
+        ("EE=1", ("/twin on a", 6.0), "VM=20000", ("MR 60000", 1.6), ("/sim push a -20000", 0.9)),
+    ),
 }
+"""Each picture's size in cells, and what is done before it is taken: lines, pages, keys, seconds."""
 
 
 def taken(name: str) -> str:
@@ -169,10 +87,10 @@ def taken(name: str) -> str:
     with asyncio.Runner(loop_factory=VirtualLoop) as runner:
         loop = runner.get_loop()
         with mock.patch.object(_time, "get_time", loop.time):
-            return runner.run(_take(SCENES[name]))
+            return runner.run(_take(*SCENES[name]))
 
 
-async def _take(picture: Picture) -> str:
+async def _take(size: tuple[int, int], scene: Sequence[Step]) -> str:
     with tempfile.TemporaryDirectory() as name, contextlib.chdir(name):
         settings = _settings(Path(name))
         session = Session(settings)
@@ -180,16 +98,32 @@ async def _take(picture: Picture) -> str:
             with mock.patch.object(Session, "wall", _wall):
                 app = MultidropApp(session, ["sim:"], ShellAssist(session, settings))
                 app.theme = "multidrop-dark"
-                async with app.run_test(size=picture.size) as pilot:
+                async with app.run_test(size=size) as pilot:
                     while len(session.buses) < 3 or not all(bus.drives for bus in session.buses.values()):
                         await asyncio.sleep(0.05)
-                    hand = Hand(app, pilot)
-                    await hand.look(2.0)
-                    await picture.scene(hand)
+                    await asyncio.sleep(2.0)
+                    for step in scene:
+                        await _do(app, pilot, step)
                     await pilot.pause()
                     return _steady(app.export_screenshot(title="multidrop"))
         finally:
             await session.close()
+
+
+async def _do(app: MultidropApp, pilot: Pilot[int], step: Step) -> None:
+    if isinstance(step, list):
+        await pilot.press(*step)
+    elif isinstance(step, float):
+        await asyncio.sleep(step)
+    elif isinstance(step, str) and step.startswith(
+        "page "
+    ):  # as its key does: a page that a line opens takes no keys for half a second
+        await app.run_action(f"page('{step.removeprefix('page ')}')")
+        await asyncio.sleep(0.2)
+    else:
+        app.main.entry.value, seconds = (step, 0.6) if isinstance(step, str) else step
+        await pilot.press("enter")
+        await asyncio.sleep(seconds)
 
 
 def _settings(folder: Path) -> Settings:

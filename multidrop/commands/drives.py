@@ -96,38 +96,26 @@ def params_backup(chosen: argparse.Namespace) -> int:
 
 def params_diff(chosen: argparse.Namespace) -> int:
     """Print what differs; the exit code says whether anything does."""
-    _check_comparison(chosen)
+    if sum((bool(chosen.file), bool(chosen.against or chosen.other), chosen.defaults)) != 1:
+        valid = "FILE, --against URL or --other ADDR, or --defaults"
+        raise Diagnostic("params diff compares with one thing", hint=valid)
+    if chosen.file and not work.is_several(chosen.drive):
+        files.load(chosen.file)
     differs = False
 
     async def compare(session: Session) -> None:
         nonlocal differs
-        other = await _other(session, chosen)
+        other = None
+        if chosen.against or chosen.other:
+            bus, address = split_target(chosen.other)
+            if chosen.against and chosen.against != chosen.url:
+                bus = (await session.open(chosen.against))[0].name
+            other = session.drive(bus, address or None)
         differs = await work.diff(session, chosen.drive, name=chosen.file, other=other, as_json=chosen.json)
 
     tried = [*chosen.drive.split(","), "" if chosen.against else chosen.other]
     code = batch.run([chosen.url], compare, unsolicited=False, tried=tried)
     return code or (DIFFERS if differs else 0)
-
-
-def _check_comparison(chosen: argparse.Namespace) -> None:
-    """Raise Diagnostic unless one thing to compare with is named, and can be read."""
-    given = [bool(chosen.file), bool(chosen.against or chosen.other), chosen.defaults]
-    if sum(given) != 1:
-        raise Diagnostic(
-            "params diff compares with one thing", hint="FILE, --against URL or --other ADDR, or --defaults"
-        )
-    if chosen.file and not work.is_several(chosen.drive):
-        files.load(chosen.file)
-
-
-async def _other(session: Session, chosen: argparse.Namespace) -> Drive | None:
-    """The other drive, of another URL or of this one; None where a file or the defaults are compared."""
-    if not (chosen.against or chosen.other):
-        return None
-    bus, address = split_target(chosen.other)
-    if chosen.against and chosen.against != chosen.url:
-        bus = (await session.open(chosen.against))[0].name
-    return session.drive(bus, address or None)
 
 
 def params_restore(chosen: argparse.Namespace) -> int:
@@ -165,19 +153,14 @@ def apply(chosen: argparse.Namespace) -> int:
     )
 
     async def work(session: Session) -> None:
-        drives = _drives(session, chosen.drive)
+        drives = [drive for each in session.buses.values() for drive in each.drives.values()]
+        if not chosen.drive and len(drives) > 1:
+            names = ", ".join(session.display_name(drive) for drive in drives)
+            raise Diagnostic("several drives have replied", hint=f"--drive names one of {names}")
+        drives = targets(session, chosen.drive)
         several = is_several(chosen.drive)
         # All are found in the file before the first one is written to.
         specs = {drive: replacement.chosen(cell, chosen.file, drive, chosen.source, several) for drive in drives}
         await each(session, drives, lambda drive: replacement.apply(session, drive, chosen.file, specs[drive], wanted))
 
     return batch.run([chosen.url], work, agreed=chosen.yes, tried=chosen.drive.split(","))
-
-
-def _drives(session: Session, target: str) -> list[Drive]:
-    """Find the replacements. Raises Diagnostic where one of several drives can be meant."""
-    drives = [drive for each in session.buses.values() for drive in each.drives.values()]
-    if not target and len(drives) > 1:
-        names = ", ".join(session.display_name(drive) for drive in drives)
-        raise Diagnostic("several drives have replied", hint=f"--drive names one of {names}")
-    return targets(session, target)

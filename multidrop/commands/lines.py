@@ -12,8 +12,6 @@ from multidrop.dialects import Diagnostic
 from multidrop.dialects.on_demand import importing
 
 if TYPE_CHECKING:
-    from multidrop.shell.front.report import Report
-    from multidrop.shell.scripts.model import Script
     from multidrop.shell.session import Session
 
 
@@ -40,17 +38,11 @@ def send(chosen: argparse.Namespace) -> int:
         from multidrop.shell.front.terminal_input import run_lines
         from multidrop.shell.lines import each_names_one_drive, targets
 
-    lazy = each_names_one_drive(chosen.lines)
-    if chosen.json:
-        return _send_json(chosen, lazy)
-    lines = partial(run_lines, lines=chosen.lines)
-    return batch.run([chosen.url], lines, lazy=lazy, agreed=chosen.yes, asks=False, tried=targets(chosen.lines))
-
-
-def _send_json(chosen: argparse.Namespace, lazy: bool) -> int:
-    from multidrop.shell.front import batch
+    lazy, tried = each_names_one_drive(chosen.lines), targets(chosen.lines)
+    if not chosen.json:
+        lines = partial(run_lines, lines=chosen.lines)
+        return batch.run([chosen.url], lines, lazy=lazy, agreed=chosen.yes, asks=False, tried=tried)
     from multidrop.shell.front.report import Report
-    from multidrop.shell.lines import targets
     from multidrop.shell.scripts.executor import run_typed
 
     report = Report("send", as_json=True)
@@ -58,7 +50,6 @@ def _send_json(chosen: argparse.Namespace, lazy: bool) -> int:
     async def body(session: Session) -> None:
         await run_typed(session, chosen.lines, report.executed)
 
-    tried = targets(chosen.lines)
     code = batch.run([chosen.url], body, lazy=lazy, agreed=chosen.yes, asks=False, replies=False, tried=tried)
     return report.finish(code)
 
@@ -87,10 +78,6 @@ def run(chosen: argparse.Namespace) -> int:
     except Diagnostic as problem:
         report.wrong((problem,))
         return fail(problem)
-    return report.finish(_execute(chosen, script, report))
-
-
-def _execute(chosen: argparse.Namespace, script: Script, report: Report) -> int:
     from multidrop.shell.front import batch
     from multidrop.shell.lines import targets
     from multidrop.shell.scripts.executor import run_script
@@ -102,7 +89,7 @@ def _execute(chosen: argparse.Namespace, script: Script, report: Report) -> int:
             await run_script(session, script, report.executed)
 
     tried = targets(each.text for each in lines_of(script.body))
-    return batch.run([], body, agreed=chosen.yes, asks=False, replies=not chosen.json, tried=tried)
+    return report.finish(batch.run([], body, agreed=chosen.yes, asks=False, replies=not chosen.json, tried=tried))
 
 
 def start(chosen: argparse.Namespace) -> int:

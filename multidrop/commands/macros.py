@@ -18,7 +18,6 @@ from multidrop.shell.connect.settings import Settings
 from multidrop.shell.output import INTERRUPTED, write
 
 if TYPE_CHECKING:
-    from multidrop.shell.front.report import Report
     from multidrop.shell.session import Session
 
 INPUT = "standard input"
@@ -65,7 +64,15 @@ def play(chosen: argparse.Namespace) -> int:
         return fail(problem)
     except KeyboardInterrupt:
         return INTERRUPTED
-    return report.finish(_play(chosen, macro, values, report))
+    from multidrop.shell.front import batch
+    from multidrop.shell.scripts.executor import play as play_macro
+
+    async def body(session: Session) -> None:
+        await report.watched(session, chosen.on, chosen.role)
+        with report.noting():
+            await play_macro(session, macro, values, times=chosen.times, fast=chosen.fast, watcher=report)
+
+    return report.finish(batch.run([], body, agreed=chosen.yes, asks=False, replies=not chosen.json))
 
 
 def _asked(macro: Macro, values: Mapping[str, str]) -> dict[str, str]:
@@ -78,18 +85,6 @@ def _asked(macro: Macro, values: Mapping[str, str]) -> dict[str, str]:
     if not terminal_input.can_ask():
         return {}
     return terminal_input.at_terminal(f"macro {macro.name}", value_fields(macro, values)) or {}
-
-
-def _play(chosen: argparse.Namespace, macro: Macro, values: Mapping[str, str], report: Report) -> int:
-    from multidrop.shell.front import batch
-    from multidrop.shell.scripts.executor import play
-
-    async def body(session: Session) -> None:
-        await report.watched(session, chosen.on, chosen.role)
-        with report.noting():
-            await play(session, macro, values, times=chosen.times, fast=chosen.fast, watcher=report)
-
-    return batch.run([], body, agreed=chosen.yes, asks=False, replies=not chosen.json)
 
 
 def _store() -> MacroStore:

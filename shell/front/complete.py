@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from multidrop.dialects import Diagnostic
 from multidrop.shell.lines import EVERYONE, DriveLine, VerbLine, parse
-from multidrop.shell.operations.offers import PLACEHOLDERS, Found, meant, spoken, targets, verbs
+from multidrop.shell.operations.offers import PLACEHOLDERS, Found, meant, offered, spoken, targets, verbs
 from multidrop.shell.operations.table import VERBS
 from multidrop.shell.operations.usage import following, narrowed
 
@@ -103,6 +103,6 @@ def _arguments(workspace: Workspace, typed: list[str], word: str) -> Found:
     verb = VERBS.get(typed[0])
     for each in following(verb.usage, typed[1:]) if verb else ():
         if each in PLACEHOLDERS:
-            yield from PLACEHOLDERS[each](workspace, word)
+            yield from offered(workspace, each, word)
         elif each == each.lower():
             yield each, verb.words.get(each, "") if verb else ""

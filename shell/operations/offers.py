@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
 from multidrop.dialects import Diagnostic
@@ -55,48 +56,47 @@ def verbs(workspace: Workspace) -> Found:
     return ((verb.name, verb.lines[0]) for verb in VERBS.values() if verb.fits is None or verb.fits(workspace))
 
 
-def _drives(workspace: Workspace, word: str) -> Found:
-    return (pair for pair in targets(workspace) if not pair[0].endswith("*"))
+PLACEHOLDERS = (
+    *("ADDR", "@ADDR", "BUS", "BUS[:ADDR]", "DRIVE", "F2..F12", "FILE", "FILE.rrd", "MACRO", "PAGE"),
+    *("PERSONALITY", "URL", "WORD"),
+)
+"""The words of a usage for which values are known; only a person knows the value of any other placeholder."""
 
 
-def _at(workspace: Workspace, word: str) -> Found:
-    return ((f"@{name}", meaning) for name, meaning in _drives(workspace, word))
+def offered(workspace: Workspace, placeholder: str, word: str) -> Found:
+    """The values of a placeholder; `word`: what is typed of it."""
+    drives = [pair for pair in targets(workspace) if not pair[0].endswith("*")]
+    match placeholder:
+        case "ADDR" | "BUS[:ADDR]":
+            yield from drives
+        case "@ADDR":
+            yield from ((f"@{name}", meaning) for name, meaning in drives)
+        case "DRIVE":
+            for each in workspace.cell.floor.drives if workspace.cell else ():
+                name = each.spec.name if each.bus == workspace.selected_bus else f"{each.bus}:{each.spec.name}"
+                yield name, each.spec.personality
+        case "F2..F12":
+            yield from ((key, "") for key in KEYS)
+        case "MACRO" | "PAGE" as what:
+            with contextlib.suppress(Diagnostic):
+                found = workspace.macros.names() if what == "MACRO" else workspace.macros.pages()
+                yield from [(name, "macro" if what == "MACRO" else "page of keys") for name in found]
+        case "PERSONALITY":
+            yield from ((name, family) for family in PROGRAMS for name in TABLE[family].personalities)
+        case "URL":
+            yield from ((name, each.url) for name, each in workspace.settings.connections.items())
+            yield from ((form.prefix, form.meaning) for form in URL_FORMS.values())
+        case "WORD":
+            yield from ((verb.name, verb.lines[0]) for verb in VERBS.values())
+            language, product = spoken(workspace, DriveLine(""))
+            yield from language.complete("", product)
+    if placeholder in ("BUS", "BUS[:ADDR]"):
+        yield from ((bus.name, ", ".join(bus.drives)) for bus in workspace.buses.values())
+    if placeholder in ("FILE", "FILE.rrd", "URL"):
+        yield from _files(word)
 
 
-def _buses(workspace: Workspace, word: str) -> Found:
-    return ((bus.name, ", ".join(bus.drives)) for bus in workspace.buses.values())
-
-
-def _either(workspace: Workspace, word: str) -> Found:
-    yield from _drives(workspace, word)
-    yield from _buses(workspace, word)
-
-
-def _macros(workspace: Workspace, word: str) -> Found:
-    try:
-        return [(name, "macro") for name in workspace.macros.names()]
-    except Diagnostic:
-        return []
-
-
-def _words(workspace: Workspace, word: str) -> Found:
-    yield from ((verb.name, verb.lines[0]) for verb in VERBS.values())
-    language, product = spoken(workspace, DriveLine(""))
-    yield from language.complete("", product)
-
-
-def _keys(workspace: Workspace, word: str) -> Found:
-    return ((key, "") for key in KEYS)
-
-
-def _pages(workspace: Workspace, word: str) -> Found:
-    try:
-        return [(page, "page of keys") for page in workspace.macros.pages()]
-    except Diagnostic:
-        return []
-
-
-def _files(workspace: Workspace, word: str) -> Found:
+def _files(word: str) -> Found:
     folder, _, _ = word.rpartition("/")
     base = folder + "/" if "/" in word else ""
     try:
@@ -105,38 +105,3 @@ def _files(workspace: Workspace, word: str) -> Found:
     except OSError:
         return []
     return [(f"{base}{name}/" if is_dir else f"{base}{name}", "") for name, is_dir in found]
-
-
-def _urls(workspace: Workspace, word: str) -> Found:
-    yield from ((name, each.url) for name, each in workspace.settings.connections.items())
-    yield from ((form.prefix, form.meaning) for form in URL_FORMS.values())
-    yield from _files(workspace, word)
-
-
-def _personalities(workspace: Workspace, word: str) -> Found:
-    for family in PROGRAMS:
-        yield from ((name, family) for name in TABLE[family].personalities)
-
-
-def _simulated(workspace: Workspace, word: str) -> Found:
-    for each in workspace.cell.floor.drives if workspace.cell else ():
-        place = each.spec.name if each.bus == workspace.selected_bus else f"{each.bus}:{each.spec.name}"
-        yield place, each.spec.personality
-
-
-PLACEHOLDERS: Mapping[str, Callable[[Workspace, str], Found]] = {
-    "ADDR": _drives,
-    "@ADDR": _at,
-    "BUS": _buses,
-    "BUS[:ADDR]": _either,
-    "DRIVE": _simulated,
-    "F2..F12": _keys,
-    "FILE": _files,
-    "FILE.rrd": _files,
-    "MACRO": _macros,
-    "PAGE": _pages,
-    "PERSONALITY": _personalities,
-    "URL": _urls,
-    "WORD": _words,
-}
-"""By the word of a usage; only a person knows the value of any other placeholder."""

@@ -43,7 +43,9 @@ def following(usage: str, typed: Sequence[str]) -> list[str]:
     """The literals and placeholders that may follow these words, each once."""
     at = {(form, 0) for form in forms(usage)}
     for word in typed:
-        at = _stepped(at, word)
+        here = {(form, n) for form, n in at if n < len(form) and form[n].takes(word)}
+        here = {(form, n) for form, n in here if word in form[n].words} or here  # a literal takes precedence
+        at = {(form, n + 1) for form, n in here} | {(form, n) for form, n in here if form[n].repeats}
     return list(
         dict.fromkeys(
             word for form in forms(usage) for n in range(len(form)) if (form, n) in at for word in form[n].words
@@ -51,19 +53,13 @@ def following(usage: str, typed: Sequence[str]) -> list[str]:
     )
 
 
-def _stepped(at: set[tuple[Form, int]], word: str) -> set[tuple[Form, int]]:
-    """The places after one more word; a literal takes precedence."""
-    here = {(form, n) for form, n in at if n < len(form) and form[n].takes(word)}
-    here = {(form, n) for form, n in here if word in form[n].words} or here
-    return {(form, n + 1) for form, n in here} | {(form, n) for form, n in here if form[n].repeats}
-
-
 def narrowed(usage: str, typed: Sequence[str]) -> str:
     """The usage with only the forms that begin with these words (the last one may be unfinished); else all of it."""
     name, _, rest = usage.partition(" ")
     fitting = [part for part in _parts(rest) if any(_fits(form, typed) for form in _sequence(_items(part)))]
-    literal = [part for part in fitting if any(_is_literal(form, typed) for form in _sequence(_items(part)))]
-    fitting = literal or fitting
+    if typed and not is_placeholder(typed[0]):
+        begun = [[form[0].words for form in _sequence(_items(part)) if form] for part in fitting]
+        fitting = [part for part, first in zip(fitting, begun, strict=True) if typed[0] in sum(first, ())] or fitting
     return f"{name} {' | '.join(fitting)}" if fitting else usage
 
 
@@ -74,11 +70,6 @@ def _fits(form: Form, typed: Sequence[str]) -> bool:
     place = form[len(whole)]
     begun = place.takes(last) or any(word.startswith(last) for word in place.words)
     return begun and all(before.takes(word) for before, word in zip(form, whole, strict=False))
-
-
-def _is_literal(form: Form, typed: Sequence[str]) -> bool:
-    """Whether the first word is a literal of a form."""
-    return bool(typed and form) and not is_placeholder(typed[0]) and typed[0] in form[0].words
 
 
 def _alternatives(text: str) -> Iterator[Form]:

@@ -165,17 +165,13 @@ async def times(call: Call) -> None:
     if form not in TIMES:
         raise call.wrong(f"no form {form}")
     transcripts.set_times(form)
-    kept = await _kept(form) if call.by is By.OPERATOR else ""
+    kept = ""
+    if call.by is By.OPERATOR:
+        try:
+            await asyncio.to_thread(settings.keep, "screen", "times", form)
+        except Diagnostic as problem:
+            kept = f"; not kept for the next start ({problem})"
     call.session.notify(f"times: {form}, {TIMES[form]}{kept}", warning=bool(kept))
-
-
-async def _kept(form: str) -> str:
-    """Keep the form in the configuration; return why that failed."""
-    try:
-        await asyncio.to_thread(settings.keep, "screen", "times", form)
-    except Diagnostic as problem:
-        return f"; not kept for the next start ({problem})"
-    return ""
 
 
 async def filter_(call: Call) -> None:
