@@ -14,7 +14,6 @@ from multidrop.dialects.mcode.manual import guards, help, sentences
 
 
 def guarded(state: MCodeState, text: str) -> Guard | None:
-    """Find the guard of a typed line for a drive."""
     party, product, starts = state.codec.party, state.product, classify.starts_motion
     return guards.find(text, address=state.address, party=party, product=product, starts=starts)
 

@@ -13,12 +13,11 @@ from multidrop.dialects.codec import End, Kind, Procedure, Request
 from multidrop.dialects.errors import Inexpressible, NoAnswer
 from multidrop.dialects.mcode.host import classify
 from multidrop.dialects.mcode.host.codec import MCode
-from multidrop.dialects.mcode.host.exchange import question, read_error, refused, synchronise, value
+from multidrop.dialects.mcode.host.exchange import answered, question, read_error, refused, synchronise, value
 from multidrop.dialects.mcode.host.framing import NAK
 from multidrop.dialects.mcode.host.identity import find, find_in_text, pinged
 from multidrop.dialects.mcode.host.resync import activate_party, asked, look_in
 from multidrop.dialects.mcode.host.state import MCodeState, Place, described, unknown, who
-from multidrop.dialects.state import Remembered
 
 
 def before_request(state: MCodeState, request: Request) -> Procedure[Request]:
@@ -42,6 +41,13 @@ def before_request(state: MCodeState, request: Request) -> Procedure[Request]:
     return replace(renewed, kind=request.kind, priority=request.priority)
 
 
+def value_of(state: MCodeState, items: str, form: str) -> Procedure[str]:
+    """Print values for the host's own use; `form` is a regular expression for them."""
+    yield from before_request(state, question(state, items, form))
+    reply = yield from answered(state, question(state, items, form))
+    return value(state, reply)
+
+
 def confirm_drive(state: MCodeState, text: str, fate: str) -> Procedure[None]:
     """Read what an expected drive is and how it is set, and report differences. Raises NoAnswer where it is silent.
 
@@ -55,7 +61,23 @@ def confirm_drive(state: MCodeState, text: str, fate: str) -> Procedure[None]:
         state.settings_may_have_changed()
         raise NoAnswer(f"{who(state)} does not reply: '{text}' {fate}")
     if expected.last is not None:
-        _compare(state, expected.last)
+        # Report another drive than last time's, or other settings.
+        both = (
+            ("serial number", expected.last.serial, state.serial),
+            ("product", expected.last.product, state.product),
+            ("version", expected.last.version, state.version),
+        )
+        changed = [f"{word} {then} then, {now} now" for word, then, now in both if then and now and then != now]
+        codec = state.codec
+        settings = (codec.party, codec.checksum, codec.em) != (
+            expected.last.party,
+            expected.last.checksum,
+            expected.last.em,
+        )
+        if changed:
+            state.note(f"{who(state)}: another drive replies than last time ({'; '.join(changed)})")
+        elif settings or state.name != expected.last.name:
+            state.note(f"{who(state)}: its settings are not those of last time ({codec.shown}); they were read again")
 
 
 def _find_anywhere(state: MCodeState, place: Place) -> Procedure[bool]:
@@ -68,22 +90,6 @@ def _find_anywhere(state: MCodeState, place: Place) -> Procedure[bool]:
         return True
     yield from activate_party(state.codec)
     return bool(name) and (yield from find(state, Place(True, name)))
-
-
-def _compare(state: MCodeState, last: Remembered) -> None:
-    """Report another drive than last time's, or other settings."""
-    both = (
-        ("serial number", last.serial, state.serial),
-        ("product", last.product, state.product),
-        ("version", last.version, state.version),
-    )
-    changed = [f"{word} {then} then, {now} now" for word, then, now in both if then and now and then != now]
-    codec = state.codec
-    settings = (codec.party, codec.checksum, codec.em) != (last.party, last.checksum, last.em)
-    if changed:
-        state.note(f"{who(state)}: another drive replies than last time ({'; '.join(changed)})")
-    elif settings or state.name != last.name:
-        state.note(f"{who(state)}: its settings are not those of last time ({codec.shown}); they were read again")
 
 
 def _old_error(state: MCodeState, request: Request) -> Procedure[None]:
@@ -158,7 +164,7 @@ def first_print(state: MCodeState, request: Request) -> Procedure[tuple[str, ...
         state.expected(expected)
         return (said,)
     yield from confirm_drive(state, request.text, "was sent once, and it is not known whether it was executed")
-    if not _may_have_taken(state.codec, form):
+    if not (state.codec.party == form.party and (state.codec.checksum > 0) == (form.checksum > 0)):
         return None
     if state.error:
         yield from refused(state, request)
@@ -188,14 +194,8 @@ def _form(state: MCodeState, place: Place, checksum: int) -> MCode:
 
 
 def _fits(state: MCodeState, request: Request) -> bool:
-    """Whether the line has room for a mark and a check byte."""
     try:
         replace(state.codec, checksum=1).request(state.address, f"{request.text},{LONGEST_MARK}")
     except Inexpressible:
         return False
     return True
-
-
-def _may_have_taken(codec: MCode, form: MCode) -> bool:
-    """Whether a drive with these settings may have executed a line in this form."""
-    return codec.party == form.party and (codec.checksum > 0) == (form.checksum > 0)

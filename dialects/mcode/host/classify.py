@@ -8,7 +8,17 @@ from functools import lru_cache
 
 from multidrop.dialects.codec import Kind
 from multidrop.dialects.family import Referencing
-from multidrop.dialects.mcode.manual.grammar import Argument, LineError, Name, Number, Statement, Text, parse, tokens
+from multidrop.dialects.mcode.manual.grammar import (
+    Argument,
+    LineError,
+    Name,
+    Number,
+    Statement,
+    Text,
+    parse,
+    parsed,
+    tokens,
+)
 from multidrop.dialects.mcode.manual.mnemonic import Mnemonic
 from multidrop.dialects.mcode.manual.statements import device_name
 from multidrop.dialects.mcode.manual.table import PRINTS_LINES, lookup
@@ -45,13 +55,6 @@ def word_of(text: str) -> tuple[str, str]:
     return (found.group(1).upper(), found.group(2).strip()) if found else ("", text.strip())
 
 
-def _statement(text: str) -> Statement | None:
-    try:
-        return parse(text)
-    except LineError:
-        return None
-
-
 def referencing(state: DriveState, text: str) -> Referencing | None:
     """Find out whether a line homes the axis or sets its position; the same over Modbus."""
     word, rest = word_of(text)
@@ -62,7 +65,7 @@ def referencing(state: DriveState, text: str) -> Referencing | None:
 
 def setting_of(text: str) -> Setting | None:
     """Find the communication setting that a line makes; None for any other line and for a value that drives refuse."""
-    statement = _statement(text)
+    statement = parsed(text)
     if statement is None:  # a drive may find a setting in a line that this grammar does not parse
         word, rest = word_of(text)
         return Setting(word) if word in WHOLE or (word in WIRE and rest) else None
@@ -86,7 +89,6 @@ def _literal(word: str, argument: Argument | None) -> str | None:
 
 
 def kind_of(text: str) -> Kind:
-    """Predict the reply of a line."""
     word, rest = word_of(text)
     if word[:2] == "PR":
         words = {token.text.upper() for token in tokens(word[2:] + " " + rest) if token.kind == "word"}
@@ -116,7 +118,7 @@ def leaves_program(text: str) -> bool:
 
 def acts_on_program(text: str) -> bool:
     """Whether a line may start or end a program, or its single step: anything but a value that is set, or a print."""
-    statement = _statement(text)
+    statement = parsed(text)
     if statement is None or kind_of(text) in (Kind.PRINT, Kind.LIST):
         return statement is None
     row = lookup(statement.word)
@@ -141,7 +143,7 @@ def may_displace(text: str) -> bool:
 
 def target_of(text: str, rest: int | None) -> int | None:
     """The end of the move that a line starts from a position at rest; None where that is not known."""
-    statement = _statement(text)
+    statement = parsed(text)
     first = statement.arguments[0] if statement is not None and statement.arguments else None
     if statement is None or not isinstance(first, Number) or not isinstance(first.value, int):
         return None
@@ -187,7 +189,18 @@ def print_form(text: str) -> str | None:
         if isinstance(item, Name) and item.word in OPTIONED and arguments and isinstance(arguments[0], Number):
             arguments.pop(0)
         pieces.append(_item_form(item))
-    return _joined_forms(pieces)
+    # Join the parts so that no two can match the same characters: a long line then matches fast.
+    if FREE in pieces:
+        first, last = pieces.index(FREE), len(pieces) - 1 - pieces[::-1].index(FREE)
+        pieces = [*pieces[:first], FREE, *pieces[last + 1 :]]
+    out = [""]
+    for piece in pieces:
+        digits = piece == INTEGER or re.fullmatch(r"(?:\d|\\-)+", piece) is not None
+        if out[-1] in (INTEGER, INTEGERS) and (digits or piece == FREE):
+            out[-1] = INTEGERS if digits else FREE
+        elif out[-1] != FREE or piece != INTEGER:
+            out.append(piece)
+    return "".join(out)
 
 
 def with_item(text: str, item: str) -> str | None:
@@ -214,10 +227,7 @@ def plain_form(text: str) -> str | None:
 
 
 def _printing(text: str) -> Statement | None:
-    try:
-        statement = parse(text)
-    except LineError:
-        return None
+    statement = parsed(text)
     if statement is None or statement.word != "PR" or not statement.arguments:
         return None
     texts = [each.value for each in statement.arguments if isinstance(each, Text)]
@@ -228,7 +238,13 @@ def _printing(text: str) -> Statement | None:
 
 def _item_form(item: object) -> str:
     if isinstance(item, Text):
-        return _text_form(item.value)
+        # Match a text in quotation marks; units either execute a control code or print it.
+        out, at = [], 0
+        for found in _ESCAPE.finditer(item.value):
+            code = _CODES.get(found[1], re.escape(found[1]))
+            out += [re.escape(item.value[at : found.start()]), f"(?:{code}|{re.escape(found[0])})"]
+            at = found.end()
+        return "".join((*out, re.escape(item.value[at:])))
     if isinstance(item, Number):
         return re.escape(str(item.value))
     if isinstance(item, Name):
@@ -238,31 +254,5 @@ def _item_form(item: object) -> str:
 
 
 def _is_whole_number(row: Mnemonic) -> bool:
-    """Whether a word prints one whole number."""
     number = isinstance(row.low, int) and not isinstance(row.default, (float, str))
     return row.kind in ("variable", "flag") and number and row.name not in SEVERAL
-
-
-def _text_form(text: str) -> str:
-    """Match a text in quotation marks; units either execute a control code or print it."""
-    out, at = [], 0
-    for found in _ESCAPE.finditer(text):
-        code = _CODES.get(found[1], re.escape(found[1]))
-        out += [re.escape(text[at : found.start()]), f"(?:{code}|{re.escape(found[0])})"]
-        at = found.end()
-    return "".join((*out, re.escape(text[at:])))
-
-
-def _joined_forms(pieces: list[str]) -> str:
-    """Join the parts so that no two can match the same characters: a long line then matches fast."""
-    if FREE in pieces:
-        first, last = pieces.index(FREE), len(pieces) - 1 - pieces[::-1].index(FREE)
-        pieces = [*pieces[:first], FREE, *pieces[last + 1 :]]
-    out = [""]
-    for piece in pieces:
-        digits = piece == INTEGER or re.fullmatch(r"(?:\d|\\-)+", piece) is not None
-        if out[-1] in (INTEGER, INTEGERS) and (digits or piece == FREE):
-            out[-1] = INTEGERS if digits else FREE
-        elif out[-1] != FREE or piece != INTEGER:
-            out.append(piece)
-    return "".join(out)

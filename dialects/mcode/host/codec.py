@@ -131,19 +131,17 @@ class MCode(Codec):
         """
         if request.body:
             return request.body
-        wake = NOBODY.encode() + self.terminator if request.kind is Kind.COMMAND and self._silent_on_success else b""
+        wake = (
+            NOBODY.encode() + self.terminator
+            if request.kind is Kind.COMMAND and (self.party and (self.em == 2 or (self.em == 1 and self.checksum == 2)))
+            else b""
+        )
         return wake + self._frame(request) + self.terminator
-
-    @property
-    def _silent_on_success(self) -> bool:
-        """Whether a drive on a party line may execute a command without any sign of it."""
-        return self.party and (self.em == 2 or (self.em == 1 and self.checksum == 2))
 
     def _reading(self, request: Request, buffer: bytes) -> ReplyParser:
         return ReplyParser(request, self.em, self.checksum, self._body(request), buffer)
 
     def decode(self, request: Request, buffer: bytes) -> Decoded | None:
-        """Return the reply, once it is complete beyond doubt."""
         if not self.checksum and self.em in (1, 2):
             if (found := short_reply(request, buffer)) is not None:
                 return found
@@ -154,7 +152,6 @@ class MCode(Codec):
         return self._reading(request, buffer).whole()
 
     def on_quiet(self, request: Request, buffer: bytes) -> Decoded | None:
-        """Return a reply that has no end of its own, after a quiet time."""
         return self._reading(request, buffer).on_quiet()
 
     def on_timeout(self, request: Request, buffer: bytes) -> Decoded:
@@ -185,11 +182,9 @@ class MCode(Codec):
         return strays, (*got.collided, *own)
 
     def quiet_time(self, request: Request, buffer: bytes) -> float:
-        """Seconds of quiet after which the line calls `on_quiet`."""
         return quiet_time(request, buffer, self.em, self.checksum)
 
     def parse_unsolicited(self, buffer: bytes) -> tuple[tuple[str, ...], int]:
-        """Lines received while no request is open."""
         return unasked(buffer, self.em, self.checksum)
 
     def stop(self, addresses: Sequence[str], sure: bool = True, half_sent: bool = False) -> bytes:
@@ -211,7 +206,6 @@ class MCode(Codec):
         return named + end if self.party else key + named
 
     def stop_again(self, addresses: Sequence[str], sure: bool = True) -> Sequence[StopPiece]:
-        """Return the same bytes in one piece: a drive does not reply to them."""
         return (StopPiece(self.stop(addresses, sure)),)
 
     def hears_stop(self, data: bytes, address: str, sure: bool = True) -> bool:
@@ -226,7 +220,6 @@ class MCode(Codec):
         return classify.starts_motion(text)
 
     def damaged(self, line: str) -> bool:
-        """Whether the check byte is still there, because it does not fit."""
         return self.checksum > 0 and UNPRINTED.search(line) is not None and not self.restarted(line)
 
     def answers_host(self, line: str) -> bool:
@@ -234,7 +227,6 @@ class MCode(Codec):
         return ANSWER.search(line) is not None
 
     def answers(self, request: Request, line: str) -> bool:
-        """Whether the line has the values that were asked for, with their signature."""
         return request.signed and request.expect is not None and re.fullmatch(request.expect, line) is not None
 
     def restarted(self, line: str) -> bool:

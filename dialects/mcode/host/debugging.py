@@ -23,7 +23,7 @@ from multidrop.dialects.mcode.host.exchange import answered, question, value
 from multidrop.dialects.mcode.host.framing import printable
 from multidrop.dialects.mcode.host.operations import flag, listing, perform
 from multidrop.dialects.mcode.host.state import MCodeState, who
-from multidrop.dialects.mcode.manual.grammar import LineError, Name, Number, Statement, parse
+from multidrop.dialects.mcode.manual.grammar import Name, Number, parsed
 from multidrop.dialects.mcode.manual.mnemonic import MDRIVE_PLUS
 from multidrop.dialects.mcode.manual.table import lookup
 from multidrop.dialects.program_files import Held
@@ -83,7 +83,6 @@ class StepKey(MCode):
 
 
 def key(state: MCodeState, data: bytes) -> Request:
-    """Build the request that sends one key."""
     codec = state.codec
     own = StepKey(codec.em, codec.party, codec.checksum, codec.escape)
     step = data == SPACE
@@ -110,7 +109,6 @@ def rows(state: MCodeState) -> Procedure[tuple[Row, ...]]:
 
 
 def rows_of(held: Held) -> tuple[Row, ...]:
-    """Return the lines of what was read from a drive."""
     return tuple(Row(*line) for line in held.lines)
 
 
@@ -154,7 +152,6 @@ def idle(state: MCodeState, place: str, neighbours: Neighbours | None) -> Proced
 
 
 def trace(state: MCodeState, place: str) -> Procedure[None]:
-    """Start a program in EX mode 1."""
     yield from perform(state, f"EX {_checked(place)},1")
 
 
@@ -229,7 +226,7 @@ def _hold(state: MCodeState, text: str) -> Procedure[float | None]:
     """Seconds for which a line holds; a variable is read."""
     if (seconds := hold(text)) is not None:
         return seconds
-    statement = _parsed(text)
+    statement = parsed(text)
     argument = statement.arguments[0] if statement is not None else None
     read = (yield from values(state, [argument.word])) if isinstance(argument, Name) else {}
     figure = "".join(read.values())
@@ -237,7 +234,6 @@ def _hold(state: MCodeState, text: str) -> Procedure[float | None]:
 
 
 def go_on(state: MCodeState, place: str) -> Procedure[None]:
-    """Press Enter once: the program runs on at normal speed."""
     _check_steps(state)
     state.may_not_step()
     yield key(state, ENTER)
@@ -253,7 +249,6 @@ def break_at(state: MCodeState, place: str, passes: int) -> Procedure[None]:
 
 
 def break_off(state: MCodeState) -> Procedure[None]:
-    """Remove the break point."""
     yield from perform(state, "BP=0")
 
 
@@ -284,7 +279,7 @@ def broken(state: MCodeState, program: Sequence[Row], last: Row, place: str) -> 
 def may_follow(program: Sequence[Row], last: Row, place: str) -> bool:
     """Whether the line at `place` can be the next one after `last`."""
     wanted = address_of(program, place)
-    statement = _parsed(last.text)
+    statement = parsed(last.text)
     if wanted is None or statement is None or statement.word in ("E", "LK"):  # a lock ends the trace
         return False
     if statement.word == "RT":  # a trip's may return to a hold
@@ -301,7 +296,7 @@ def _places(program: Sequence[Row]) -> Mapping[str, int]:
     """The addresses by label, and by themselves."""
     found = {str(row.address): row.address for row in program}
     for row in program:
-        statement = _parsed(row.text)
+        statement = parsed(row.text)
         if statement is not None and statement.word == "LB" and statement.arguments:
             label = statement.arguments[0]
             if isinstance(label, Name):
@@ -317,20 +312,13 @@ def _code_at(program: Sequence[Row], address: int) -> int | None:
 
 
 def _is(text: str, word: str) -> bool:
-    statement = _parsed(text)
+    statement = parsed(text)
     return statement is not None and statement.word == word
-
-
-def _parsed(text: str) -> Statement | None:
-    try:
-        return parse(text)
-    except LineError:
-        return None
 
 
 def hold(text: str) -> float | None:
     """Seconds for which a line holds its program; 0 where it holds for motion or not at all."""
-    statement = _parsed(text)
+    statement = parsed(text)
     if statement is None or statement.word != "H" or not statement.arguments:
         return 0.0
     argument = statement.arguments[0]

@@ -67,7 +67,6 @@ class Plan:
 
     @property
     def clears(self) -> bool:
-        """Whether CP is needed."""
         return bool(self.in_the_way or self.replaced)
 
     def after_clearing(self, product: str) -> list[Line]:
@@ -91,7 +90,13 @@ def prepare(state: MCodeState, lines: Sequence[SourceLine], held: Held) -> Proce
     made = plan(lines, held, who(state), state.product)
     if not made.clears:
         return made.lines
-    yield from _clear(state, made, held, lines)
+    # Send CP and report what it deletes. A file with an error is refused first.
+    names = names_of(held)
+    variables = [name for name, called in names.items() if called.kind == GLOBAL]
+    for slip in slips([line for line in lines if isinstance(line, ProgramLine)], variables):
+        raise Refused(f"line {slip.line}: {slip.what} (nothing was sent)")
+    yield from immediate(state, state.codec.request(state.address, "CP"))
+    state.note(f"{who(state)}: {_cleared(made, [name for name in names if names[name].kind == LABEL], lines)}")
     return made.after_clearing(state.product)
 
 
@@ -150,46 +155,24 @@ def _named_lines(lines: Sequence[SourceLine], held: Held, drive: str, product: s
             made.in_the_way.append(name)
         if word == "VA" and not inside:
             if is_a == GLOBAL:
-                made.lines[-1] = Line(line.number, _assignment(line.text, name))
+                _, equals, given = line.text.partition("=")
+                made.lines[-1] = Line(line.number, f"{name}={given.strip() if equals else 0}")
             known[name] = GLOBAL
         if name:
             own.add(name)
         inside = classify.enters_program(line.text) or (inside and not classify.leaves_program(line.text))
         if not inside:
-            _forget(line.text, known, product)
+            # Forget the names that a line of the file deletes; a CP with an address is left to its author. The
+            # parameter 1, which deletes global variables, is an address on an MDrivePlus.
+            word, rest = classify.word_of(line.text)
+            parameter = "" if product.startswith("MD") else rest.partition(",")[0].strip()
+            everything = word == "FD" or (word == "CP" and parameter == "1")
+            for name in [each for each, is_a in known.items() if everything or (word == "CP" and is_a != GLOBAL)]:
+                del known[name]
     return made
 
 
-def _forget(text: str, known: dict[str, str], product: str) -> None:
-    """Forget the names that a line of the file deletes; a CP with an address is left to its author.
-
-    The parameter 1, which deletes global variables, is an address on an MDrivePlus.
-    """
-    word, rest = classify.word_of(text)
-    parameter = "" if product.startswith("MD") else rest.partition(",")[0].strip()
-    everything = word == "FD" or (word == "CP" and parameter == "1")
-    for name in [each for each, is_a in known.items() if everything or (word == "CP" and is_a != GLOBAL)]:
-        del known[name]
-
-
-def _assignment(text: str, name: str) -> str:
-    """Return `Q1=25` for `VA Q1=25`, and `Q1=0` for `VA Q1`."""
-    _, equals, given = text.partition("=")
-    return f"{name}={given.strip() if equals else 0}"
-
-
-def _clear(state: MCodeState, made: Plan, held: Held, lines: Sequence[SourceLine]) -> Procedure[None]:
-    """Send CP and report what it deletes. A file with an error is refused first."""
-    names = names_of(held)
-    variables = [name for name, called in names.items() if called.kind == GLOBAL]
-    for slip in slips([line for line in lines if isinstance(line, ProgramLine)], variables):
-        raise Refused(f"line {slip.line}: {slip.what} (nothing was sent)")
-    yield from immediate(state, state.codec.request(state.address, "CP"))
-    state.note(f"{who(state)}: {_cleared(made, [name for name in names if names[name].kind == LABEL], lines)}")
-
-
 def _cleared(made: Plan, labels: Iterable[str], lines: Sequence[SourceLine]) -> str:
-    """Describe what CP has cleared."""
     mine = {found[1] for line in lines if (found := declared(line.text))}
     stay = {name for program in made.kept for name in program.declared("LB")}
     gone = ", ".join(name for name in labels if name not in mine | stay)
@@ -224,7 +207,6 @@ class _Memory:
     ended: int = 0
 
     def put(self, line: SourceLine, at: int, following: int) -> None:
-        """Record a line of the file that was stored from one address up to another."""
         if not line.number:
             return
         word, rest = classify.word_of(line.text)
@@ -284,27 +266,23 @@ def download(
     finally:
         if fate == "cut off":
             _note_cut_off(state, memory)
-        yield from _left_as_found(state, done_all=fate == "done")
+        # Leave program mode and restore the echo mode.
+        done_all = fate == "done"
+        try:
+            if state.programming:
+                yield from take_out(state, "taken out of program mode; the program in it is incomplete")
+            yield from restore_echo(state) if done_all else put_back(state)
+        except DriveError as error:
+            if done_all:
+                raise
+            state.note(str(error))  # the download's own failure is the one to raise
 
 
 def _note_cut_off(state: MCodeState, memory: _Memory) -> None:
     state.note(f"{who(state)}: the download was cut off: {memory.told(state)}")
 
 
-def _left_as_found(state: MCodeState, done_all: bool) -> Procedure[None]:
-    """Leave program mode and restore the echo mode."""
-    try:
-        if state.programming:
-            yield from take_out(state, "taken out of program mode; the program in it is incomplete")
-        yield from restore_echo(state) if done_all else put_back(state)
-    except DriveError as error:
-        if done_all:
-            raise
-        state.note(str(error))  # the download's own failure is the one to raise
-
-
 def _where(line: SourceLine) -> str:
-    """Name a line for a person."""
     return f"line {line.number}" if line.number else f"the program that stays: '{line.text}'"
 
 
@@ -318,24 +296,26 @@ def _one(state: MCodeState, line: SourceLine, memory: _Memory) -> Procedure[None
         else:
             memory.ended += 1
         return
-    yield from _choose_echo(state, text, memory)
+    # Use EM=0 for the next line, or restore the echo mode before a line that saves, sets or starts anything.
+    if _needs_own_echo(text):
+        yield from restore_echo(state)
+    elif state.codec.em != 0 and memory.programs > memory.ended:
+        yield from echo_everything(state)
     request = state.codec.request(state.address, text)
     if classify.enters_program(text):
         state.may_be_in_program_mode()  # until the reply shows it: an interruption must leave program mode
         reply = yield request
         if not ends_in_program_mode(reply):
-            yield from _not_entered(state, request, reply)
+            # Raise the reason for a PG n without a program prompt.
+            if reply.end in (End.REFUSED, End.NAK) or reply.prompt == ">":
+                state.left_program_mode()
+                code = yield from read_error(state)
+                why = described(code, state) if code else "it did not go into program mode"
+                raise Refused(f"{who(state)} refused '{request.text}': {why}", code)
+            raise NoAnswer(f"{who(state)}: no reply to '{request.text}' ({reply.end.value})")
         state.entered_program_mode(_address(reply))
     else:
         yield from immediate(state, request)
-
-
-def _choose_echo(state: MCodeState, text: str, memory: _Memory) -> Procedure[None]:
-    """Use EM=0 for the next line, or restore the echo mode before a line that saves, sets or starts anything."""
-    if _needs_own_echo(text):
-        yield from restore_echo(state)
-    elif state.codec.em != 0 and memory.programs > memory.ended:
-        yield from echo_everything(state)
 
 
 def _needs_own_echo(text: str) -> bool:
@@ -348,16 +328,6 @@ def _needs_own_echo(text: str) -> bool:
 
 def _address(reply: Reply) -> int:
     return int(reply.prompt.strip())
-
-
-def _not_entered(state: MCodeState, request: Request, reply: Reply) -> Procedure[None]:
-    """Raise the reason for a PG n without a program prompt."""
-    if reply.end in (End.REFUSED, End.NAK) or reply.prompt == ">":
-        state.left_program_mode()
-        code = yield from read_error(state)
-        why = described(code, state) if code else "it did not go into program mode"
-        raise Refused(f"{who(state)} refused '{request.text}': {why}", code)
-    raise NoAnswer(f"{who(state)}: no reply to '{request.text}' ({reply.end.value})")
 
 
 def _stored(state: MCodeState, request: Request) -> Procedure[None]:

@@ -34,7 +34,6 @@ class Sign:
 
 
 def sign(state: MCodeState) -> Sign:
-    """Return the signature of a drive."""
     return _sign(state.address, state.signs and state.codec.party)
 
 
@@ -72,7 +71,6 @@ def question(state: MCodeState, items: str, answer: str) -> Request:
 
 
 def value(state: MCodeState, reply: Reply) -> str:
-    """Return the values of such a reply."""
     return reply.text.removesuffix(sign(state).shown)
 
 
@@ -123,8 +121,27 @@ def answered(state: MCodeState, request: Request) -> Procedure[Reply]:
             continue
         if reply.end is End.REFUSED:
             yield from refused(state, request)
-        _raise_unless_answered(state, request, reply)
-        return _beyond_doubt(state, request, reply)
+        if reply.end in (End.TIMEOUT, End.NAK):  # the NAK may be another drive's
+            state.reply_lost()
+            raise NoAnswer(unknown(state, request))
+        if reply.end is End.DAMAGED:
+            _raise_damaged(state, request, reply)
+        if ends_in_program_mode(reply) and request.kind is not Kind.PROGRAM:
+            state.may_be_in_program_mode()
+            raise Refused(
+                f"{who(state)} is in program mode: '{request.text}' was stored before {reply.prompt.strip()} and not "
+                "executed; leave program mode with PG"
+            )
+        # Discard a sign of acceptance, and refuse a print, where another drive's reply is outstanding.
+        if not reply.doubtful or request.signed:
+            return reply
+        if request.kind in (Kind.PRINT, Kind.LIST) and reply.lines:
+            state.reply_lost()
+            raise NoAnswer(
+                f"{who(state)}: '{reply.text}' came for '{request.text}', or late from another drive that did not "
+                "reply; it counts for neither; ask again later"
+            )
+        return replace(reply, acknowledged=False)
     raise NoAnswer(
         f"{who(state)}: '{request.text}' arrived damaged {1 + REPEATS} times and was not executed; check the cabling"
     )
@@ -136,18 +153,15 @@ def note_error(state: MCodeState, reply: Reply) -> None:
         state.error_flag_read(reply.flagged or reply.prompt == "?")
 
 
-def _raise_unless_answered(state: MCodeState, request: Request, reply: Reply) -> None:
-    if reply.end in (End.TIMEOUT, End.NAK):  # the NAK may be another drive's
-        state.reply_lost()
-        raise NoAnswer(unknown(state, request))
-    if reply.end is End.DAMAGED:
-        _raise_damaged(state, request, reply)
-    if ends_in_program_mode(reply) and request.kind is not Kind.PROGRAM:
-        state.may_be_in_program_mode()
-        raise Refused(
-            f"{who(state)} is in program mode: '{request.text}' was stored before {reply.prompt.strip()} and not "
-            "executed; leave program mode with PG"
-        )
+def check_printed(state: MCodeState, reply: Reply, refusal: str = "") -> None:
+    """Raise NoAnswer unless the drive printed, or Refused with the reason, where one is given."""
+    note_error(state, reply)
+    if refusal and reply.end is End.REFUSED and not reply.doubtful:
+        raise Refused(f"{who(state)} {refusal}")
+    if reply.end is not End.DONE:
+        if reply.end is not End.NAK:
+            state.reply_lost()
+        raise NoAnswer(f"{who(state)} does not reply ({reply.end.value})")
 
 
 def _raise_damaged(state: MCodeState, request: Request, reply: Reply) -> NoReturn:
@@ -156,19 +170,6 @@ def _raise_damaged(state: MCodeState, request: Request, reply: Reply) -> NoRetur
         f"{who(state)}: the reply to '{request.text}' is damaged ({reply.detail}); it may have been executed "
         "and was not sent again"
     )
-
-
-def _beyond_doubt(state: MCodeState, request: Request, reply: Reply) -> Reply:
-    """Discard a sign of acceptance, and refuse a print, where another drive's reply is outstanding."""
-    if not reply.doubtful or request.signed:
-        return reply
-    if request.kind in (Kind.PRINT, Kind.LIST) and reply.lines:
-        state.reply_lost()
-        raise NoAnswer(
-            f"{who(state)}: '{reply.text}' came for '{request.text}', or late from another drive that did not reply; "
-            "it counts for neither; ask again later"
-        )
-    return replace(reply, acknowledged=False)
 
 
 def _refused_unless_damaged(state: MCodeState, request: Request, stood: bool) -> Procedure[None]:
@@ -216,7 +217,6 @@ def refused(state: MCodeState, request: Request) -> Procedure[None]:
 
 
 def _runs(state: MCodeState) -> Procedure[bool]:
-    """Whether a program runs, as far as the drive reports it."""
     reply = yield question(state, "BY", "[01]")
     if reply.end is not End.DONE:
         state.reply_lost()
@@ -346,7 +346,6 @@ def leave_program(state: MCodeState) -> Procedure[int]:
 
 
 def take_out(state: MCodeState, remark: str) -> Procedure[None]:
-    """Leave program mode and report it, with the error that was set."""
     code = yield from leave_program(state)
     error = f"; {described(code, state)}, now cleared" if code else ""
     state.note(f"{who(state)}: {remark}{error}")

@@ -106,7 +106,17 @@ def printable(data: bytes) -> str:
 def unasked(buffer: bytes, echo: int, checksum: int) -> tuple[tuple[str, ...], int]:
     """Whole lines received while no request was open, without prompts, and how many bytes they took."""
     if checksum == 0:
-        return _unasked_plain(buffer, echo)
+        # Whole lines without checksum, all at once: a program may print a thousand at a time.
+        used = buffer.rfind(LF) + 1
+        if buffer.isascii():
+            lines = printable(buffer[:used]).split("\n")
+        else:
+            lines = [printable(stripped(line.replace(CR, b""))) for line in buffer[:used].split(LF)]
+        if echo == 0:
+            lines = [line[1:] if line.startswith((">", "?")) else line for line in lines]
+            if buffer[used:].replace(CR, b"") in (b">", b"?"):
+                used = len(buffer)
+        return tuple(filter(None, lines)), used
     used, lines = 0, []
     for piece in pieces(buffer, 0, checksum != 0):
         prompt = echo == 0 and piece.shown[:1] in (b">", b"?")
@@ -122,20 +132,6 @@ def unasked(buffer: bytes, echo: int, checksum: int) -> tuple[tuple[str, ...], i
     return tuple(lines), used
 
 
-def _unasked_plain(buffer: bytes, echo: int) -> tuple[tuple[str, ...], int]:
-    """Whole lines without checksum, all at once: a program may print a thousand at a time."""
-    used = buffer.rfind(LF) + 1
-    if buffer.isascii():
-        lines = printable(buffer[:used]).split("\n")
-    else:
-        lines = [printable(stripped(line.replace(CR, b""))) for line in buffer[:used].split(LF)]
-    if echo == 0:
-        lines = [line[1:] if line.startswith((">", "?")) else line for line in lines]
-        if buffer[used:].replace(CR, b"") in (b">", b"?"):
-            used = len(buffer)
-    return tuple(filter(None, lines)), used
-
-
 # The checksum of MCode frames and printed lines.
 #
 # Theory of operation. The checksum covers all characters before the terminator, the drive's name (or `*`) included.
@@ -149,7 +145,6 @@ def checksum(data: bytes) -> int:
 
 
 def sealed(data: bytes) -> bytes:
-    """Append the check byte to the characters."""
     return data + bytes([checksum(data)])
 
 

@@ -45,7 +45,9 @@ def identify(hints: Hints) -> Procedure[list[MCodeState]]:
         if len(name) != 1:
             raise Inexpressible(f"no drive name '{name}'; valid: one letter or digit each, as in drives=a,b")
     if hints.lazy and not (hints.cut or hints.owed) and (expected := _expected(hints)):
-        return (yield from _not_yet(expected, hints))
+        if expected[0].place.party:
+            yield from _wake(NOBODY.encode() if expected[0].stated else TEXT)
+        return [_expected_state(each, hints) for each in expected]
     if not hints.cut:
         return (yield from _look_around(hints))
     yield from overflow(hints.drives or (UNNAMED,))
@@ -66,13 +68,6 @@ def _expected(hints: Hints) -> list[Unconfirmed]:
     if (party and hints.drives) or (names and names[0] in last):
         return [Unconfirmed(Place(True, name, checks), last.get(name), party is True) for name in names]
     return []
-
-
-def _not_yet(expected: list[Unconfirmed], hints: Hints) -> Procedure[list[MCodeState]]:
-    """Make half a line harmless, and leave each drive to the first line for it."""
-    if expected[0].place.party:
-        yield from _wake(NOBODY.encode() if expected[0].stated else TEXT)
-    return [_expected_state(each, hints) for each in expected]
 
 
 def _expected_state(expected: Unconfirmed, hints: Hints) -> MCodeState:
@@ -98,7 +93,6 @@ def remember(state: MCodeState) -> Remembered | None:
 
 
 def _party(hints: Hints) -> bool | None:
-    """Return whether the line is in party mode, as far as the user states it."""
     if hints.party is None and (len(hints.drives) > 1 or hints.drives == ("P",)):
         return True
     return hints.party
@@ -171,7 +165,6 @@ def _likely(names: Sequence[str], hints: Hints) -> Procedure[list[MCodeState]]:
 
 
 def _no_reply(hints: Hints, party: bool | None) -> str:
-    """Say what was tried, and what to do."""
     names = ", ".join(hints.drives)
     tried = f"none of the drives {names} replies" if names else "no drive replies"
     forms = [] if party else ["outside of party mode"]
@@ -218,7 +211,6 @@ def _new_state(place: Place, hints: Hints) -> MCodeState:
 
 
 def _checks(hints: Hints) -> tuple[int, ...]:
-    """The checksums to try, in this order."""
     return (0, 1) if hints.checksum is None else (int(hints.checksum > 0),)
 
 

@@ -40,7 +40,6 @@ def overflow(names: Sequence[str]) -> Procedure[None]:
 
 
 def write_stop(data: bytes) -> Procedure[None]:
-    """Write a stop past the codec."""
     yield Request(NOBODY, "stop", Kind.QUIET, MCode(party=True), settle=0.2, timeout=BRIEF, body=data)
 
 
@@ -89,7 +88,10 @@ def find(state: MCodeState, place: Place) -> Procedure[bool]:
         yield from _name_and_serial(state)
     if state.product == MDRIVE:
         state.identified(mdrive(state.part), version)
-    _note(state)
+    if state.error:
+        state.note(f"{who(state)}: its error flag is set (EF=1); PR ER shows and clears the error")
+    if state.codec.em == 2:
+        state.note(f"{who(state)}: EM=2 cannot distinguish a lost command from an executed one; EM=1 can")
     return True
 
 
@@ -188,13 +190,6 @@ def _record(state: MCodeState, name: str, serial: str) -> None:
     state.named(state.address or name.strip('"'))
     state.signature_seen(name == as_printed(name.strip('"')))
     state.serial_read(serial)
-
-
-def _note(state: MCodeState) -> None:
-    if state.error:
-        state.note(f"{who(state)}: its error flag is set (EF=1); PR ER shows and clears the error")
-    if state.codec.em == 2:
-        state.note(f"{who(state)}: EM=2 cannot distinguish a lost command from an executed one; EM=1 can")
 
 
 def mdrive(part: str) -> str:

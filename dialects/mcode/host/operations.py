@@ -7,19 +7,19 @@ from dataclasses import replace
 from functools import lru_cache
 from typing import NamedTuple
 
-from multidrop.dialects.codec import End, Kind, Priority, Procedure, Reply, Request
+from multidrop.dialects.codec import End, Kind, Priority, Procedure, Request
 from multidrop.dialects.errors import Inexpressible, NoAnswer, Refused
 from multidrop.dialects.family import Motion
 from multidrop.dialects.mcode.host import classify
-from multidrop.dialects.mcode.host.before_request import before_request, first_print
+from multidrop.dialects.mcode.host.before_request import before_request, first_print, value_of
 from multidrop.dialects.mcode.host.classify import INTEGER
 from multidrop.dialects.mcode.host.codec import EVERY_DRIVE, MCode
 from multidrop.dialects.mcode.host.exchange import (
     Sign,
     answered,
     check_error_flag,
+    check_printed,
     mark,
-    note_error,
     print_mark,
     question,
     sign,
@@ -28,9 +28,9 @@ from multidrop.dialects.mcode.host.exchange import (
 )
 from multidrop.dialects.mcode.host.program_mode import enter_program, program_line, put_back
 from multidrop.dialects.mcode.host.resync import set_wire
-from multidrop.dialects.mcode.host.state import MCodeState, who
+from multidrop.dialects.mcode.host.state import MCodeState, refuse_in_program, who
 from multidrop.dialects.mcode.manual import grammar
-from multidrop.dialects.mcode.manual.grammar import LineError, Number, Unary, parse
+from multidrop.dialects.mcode.manual.grammar import Number, Unary, parsed
 from multidrop.dialects.mcode.manual.mnemonic import EXPANDED
 from multidrop.dialects.mcode.manual.points import EXPANDED_INPUTS, INPUTS, STATUS, in_words
 from multidrop.dialects.mcode.manual.table import lookup
@@ -93,10 +93,7 @@ def confirm_effect(state: MCodeState, request: Request, before: Rest | None) -> 
 
 def written(text: str) -> tuple[str, int] | None:
     """Find the word that a line sets to a whole number, where the drive prints that number back; else None."""
-    try:
-        statement = parse(text)
-    except LineError:
-        return None
+    statement = parsed(text)
     if statement is None or len(statement.arguments) != 1:
         return None
     [argument] = statement.arguments
@@ -126,7 +123,6 @@ def _rest(state: MCodeState) -> Procedure[Rest | None]:
 
 
 def _numbers(state: MCodeState, items: str, form: str) -> Procedure[list[int]]:
-    """Read numbers; none where the drive does not print them."""
     try:
         reply = yield from answered(state, question(state, items, form))
     except (NoAnswer, Refused):
@@ -152,7 +148,15 @@ def perform(state: MCodeState, text: str) -> Procedure[tuple[str, ...]]:
     check(state, text)
     request = state.codec.request(state.address, text)
     if state.address in EVERY_DRIVE:
-        yield from _broadcast(state, request)
+        # Send to all drives. No drive replies, so lines that need a proof are refused.
+        if classify.word_of(request.text)[0] == "PG":
+            raise Refused(
+                f"'{request.text}' to all drives would make each of them store the next lines; name one drive"
+            )
+        if classify.setting_of(request.text) is not None:
+            state.settings_may_have_changed()
+        yield request
+        state.remark(f"{state.address}: no drive replies to a command to all; it is not known whether it was executed")
         return ()
     if state.programming:
         return (yield from program_line(state, request))
@@ -194,7 +198,17 @@ def immediate(state: MCodeState, request: Request) -> Procedure[tuple[str, ...]]
         state.heads_for(None)
     reply = yield from answered(state, request)
     if request.kind is Kind.LIST:
-        return (yield from _rest_of_list(state, request, reply))
+        # Print a mark after a list: EM 1 to 3 give a list no end.
+        lines = reply.lines
+        if state.codec.em != 0:
+            rest = yield from print_mark(state, request.priority)
+            if rest is None:
+                state.reply_lost()
+                raise NoAnswer(f"{who(state)}: the list may be incomplete: its end was not seen; ask again")
+            lines += rest[:-1]
+            if not lines:
+                yield from check_error_flag(state, request)
+        return tuple(line for line in lines if line)
     if not reply.acknowledged:
         late = yield from check_error_flag(state, request, silent=reply.end is End.SILENT)
         if reply.doubtful or (reply.end is End.SILENT and not late):
@@ -209,54 +223,19 @@ def _print(state: MCodeState, request: Request) -> Procedure[tuple[str, ...]]:
     request = signed(state, request)
     reply = yield from answered(state, request)
     if reply.end is End.SILENT:
-        yield from _printed_nothing(state, request)
+        # Find the reason for an empty print: a refusal, or a loss (with EM=2, where not even a line feed is sent).
+        if state.codec.em == 2:
+            state.reply_outstanding()
+            yield from mark(state, request)
+        yield from check_error_flag(state, request)
+        if not classify.may_be_blank(request.text, request.expect):
+            raise NoAnswer(f"{who(state)} printed nothing for '{request.text}', and has no error")
     own = sign(state).shown if request.signed else ""
     return tuple(line.removesuffix(own) for line in reply.lines)
 
 
-def _printed_nothing(state: MCodeState, request: Request) -> Procedure[None]:
-    """Find the reason for an empty print: a refusal, or a loss (with EM=2, where not even a line feed is sent)."""
-    if state.codec.em == 2:
-        state.reply_outstanding()
-        yield from mark(state, request)
-    yield from check_error_flag(state, request)
-    if not classify.may_be_blank(request.text, request.expect):
-        raise NoAnswer(f"{who(state)} printed nothing for '{request.text}', and has no error")
-
-
-def _rest_of_list(state: MCodeState, request: Request, reply: Reply) -> Procedure[tuple[str, ...]]:
-    """Print a mark after a list: EM 1 to 3 give a list no end."""
-    lines = reply.lines
-    if state.codec.em != 0:
-        rest = yield from print_mark(state, request.priority)
-        if rest is None:
-            state.reply_lost()
-            raise NoAnswer(f"{who(state)}: the list may be incomplete: its end was not seen; ask again")
-        lines += rest[:-1]
-        if not lines:
-            yield from check_error_flag(state, request)
-    return tuple(line for line in lines if line)
-
-
-def _broadcast(state: MCodeState, request: Request) -> Procedure[None]:
-    """Send to all drives. No drive replies, so lines that need a proof are refused."""
-    if classify.word_of(request.text)[0] == "PG":
-        raise Refused(f"'{request.text}' to all drives would make each of them store the next lines; name one drive")
-    if classify.setting_of(request.text) is not None:
-        state.settings_may_have_changed()
-    yield request
-    state.remark(f"{state.address}: no drive replies to a command to all; it is not known whether it was executed")
-
-
-def _not_in_program(state: MCodeState, what: str) -> None:
-    """Raise Refused where the drive would store the request."""
-    if state.programming:
-        raise Refused(f"{who(state)} is in program mode and would store it: PG ends that, then {what}")
-
-
 def listing(state: MCodeState, start: str) -> Procedure[tuple[str, ...]]:
-    """List the program from a label or an address, or all of it."""
-    _not_in_program(state, "list it")
+    refuse_in_program(state, "list it")
     return (yield from perform(state, f"L {start}".rstrip()))
 
 
@@ -266,15 +245,11 @@ def motion(state: MCodeState, priority: Priority) -> Procedure[tuple[Motion, ...
     The drive's signature is between them, so another drive's reply does not match. Only a poll leaves out BY, which is
     read before the velocity: after BY=0 no program sets a new one.
     """
-    _not_in_program(state, "ask again")
+    refuse_in_program(state, "ask again")
     yield from before_request(state, _motion(state.codec, state.address, sign(state), priority))
     request = _motion(state.codec, state.address, sign(state), priority)
     reply = yield request
-    note_error(state, reply)
-    if reply.end is not End.DONE:
-        if reply.end is not End.NAK:
-            state.reply_lost()
-        raise NoAnswer(f"{who(state)} does not reply ({reply.end.value})")
+    check_printed(state, reply)
     found = re.fullmatch(request.expect or "", reply.text)
     assert found is not None
     return (Motion(int(found[2]), int(found[3]), program=found[1] == "1" if found[1] else None),)
@@ -289,9 +264,8 @@ def status(state: MCodeState) -> Procedure[tuple[str, ...]]:
         return ("program mode: lines are stored, not executed; PG ends it",)
     asked = '" ",'.join(f"{word}," for word in STATUS).rstrip(",")
     pattern = " ".join((INTEGER, INTEGER, "[01]", "[01]", "[01]", r"\d{1,4}"))
-    yield from before_request(state, question(state, asked, pattern))
-    reply = yield from answered(state, question(state, asked, pattern))
-    position, velocity, moving, busy, error, inputs = (int(each) for each in value(state, reply).split())
+    found = (yield from value_of(state, asked, pattern)).split()
+    position, velocity, moving, busy, error, inputs = map(int, found)
     state.error_flag_read(error == 1)
     points = EXPANDED_INPUTS if state.product in EXPANDED else INPUTS
     return in_words(position, velocity, moving, busy, error, inputs, points=points)
@@ -307,8 +281,5 @@ def _motion(codec: MCode, address: str, own: Sign, priority: Priority) -> Reques
 
 
 def flag(state: MCodeState, name: str) -> Procedure[bool]:
-    """Read a flag as the drive prints it."""
-    _not_in_program(state, "ask again")
-    yield from before_request(state, question(state, name, "[01]"))
-    reply = yield from answered(state, question(state, name, "[01]"))
-    return value(state, reply) == "1"
+    refuse_in_program(state, "ask again")
+    return (yield from value_of(state, name, "[01]")) == "1"

@@ -11,18 +11,19 @@ from __future__ import annotations
 
 import re
 from collections.abc import Collection, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 
-from multidrop.dialects.codec import End, Kind, Priority, Procedure, Reply
+from multidrop.dialects.codec import End, Kind, Priority, Procedure, Request
 from multidrop.dialects.errors import NoAnswer, Refused
 from multidrop.dialects.mcode.host.before_request import before_request
 from multidrop.dialects.mcode.host.codec import EVERY_DRIVE
 from multidrop.dialects.mcode.host.exchange import REPEATS, answered, note_error, print_mark, question, sign, value
 from multidrop.dialects.mcode.host.operations import perform
-from multidrop.dialects.mcode.host.state import MCodeState, who
+from multidrop.dialects.mcode.host.state import MCodeState, refuse_in_program, who
 from multidrop.dialects.mcode.manual import parameter_plan
 from multidrop.dialects.mcode.manual import parameters as manual
-from multidrop.dialects.mcode.manual.parameters import Form, Setting
+from multidrop.dialects.mcode.manual.mnemonic import Mnemonic
+from multidrop.dialects.mcode.manual.parameters import Form, form_of
 from multidrop.dialects.mcode.manual.program_file import LONGEST
 from multidrop.dialects.mcode.manual.table import words
 from multidrop.dialects.parameters import (
@@ -46,92 +47,94 @@ USER = re.compile(r"([A-Z][A-Z0-9]{0,2}) *= *(?:([GL]) +)?(-?\d+(?:\.\d+)?)", re
 """A line of PR UV: a variable with its scope, or a label with its address."""
 
 
-@dataclass
-class Found:
-    """What was read so far, and what could not be read."""
-
-    values: dict[str, Value] = field(default_factory=dict)
-    unread: list[tuple[str, str]] = field(default_factory=list)
-
-
 def read(state: MCodeState, progress: Progress) -> Procedure[Readings]:
     """Read every setting that the drive prints. Raises Refused where it would store the questions, or NoAnswer."""
     if state.address in EVERY_DRIVE:
         raise Refused(f"'{state.address}' is every drive; name one")
-    if state.programming:
-        raise Refused(f"{who(state)} is in program mode and would store it: PG ends that")
-    yield from _error_flag(state)
+    refuse_in_program(state)
+    flag = yield from _print(state, "EF", [Form.DIGIT.value])
+    state.error_flag_read(flag != ["0"])
     if not state.serial:
-        state.serial_read((yield from _serial(state)))
+        prints_it = (
+            state.product.startswith("LM") or state.codec.party or state.codec.checksum
+        )  # no such product refuses
+        serial = (yield from _print(state, "SN", ["[!-~][ -~]*"])) if prints_it else None
+        state.serial_read(serial[0] if serial else "")
     batches = list(_batches(state, manual.settings(state.product, state.version, state.part)))
     lists = manual.lists(state.product, state.version)
-    total, found = len(batches) + len(lists) + 1, Found(unread=[*manual.unread(state.product)])
+    total, values, unread = len(batches) + len(lists) + 1, dict[str, Value](), [*manual.unread(state.product)]
     if state.name and state.product not in ETHERNET:
-        found.values["DN"] = state.name
+        values["DN"] = state.name
     for done, batch in enumerate(batches):
         progress(done, total)
-        yield from _read_batch(state, batch, found)
-    for done, word in enumerate(lists, len(batches)):
+        texts = yield from _print(state, *items_and_forms(batch))
+        if texts is None:
+            unread += [(row.name, NOT_PRINTED) for row in batch]
+        else:
+            values |= {row.name: _value(form_of(row), text) for row, text in zip(batch, texts, strict=True)}
+    for done, (word, numbers) in enumerate(lists.items(), len(batches)):
         progress(done, total)
-        yield from _read_list(state, word, lists[word], found)
+        rows = rows_of_list(word, numbers, (yield from _numbered(state, word, numbers)))
+        values |= rows
+        unread += [(f"{word}{n}", "the drive does not print it") for n in numbers if f"{word}{n}" not in rows]
     users = yield from listed(state, "PR UV")
     progress(total, total)
-    return _readings(state, found, users)
+    return _readings(state, values, unread, users)
 
 
-def _read_batch(state: MCodeState, batch: Sequence[Setting], found: Found) -> Procedure[None]:
-    values = yield from _print(state, *asked(batch))
-    if values is None:
-        found.unread += [(each.name, NOT_PRINTED) for each in batch]
-        return
-    found.values |= {each.name: _value(each.form, text) for each, text in zip(batch, values, strict=True)}
+def _readings(
+    state: MCodeState, values: Mapping[str, Value], unread: Sequence[tuple[str, str]], users: Sequence[str]
+) -> Readings:
+    """Put units, defaults and the user's names to the values."""
+    counts, table = manual.counting(values), words(state.product)
 
+    def in_order(name: str) -> tuple[str, int]:  # S2 before S13
+        letters = name.rstrip("0123456789")
+        return letters, int(name[len(letters) :] or 0)
 
-def _read_list(state: MCodeState, word: str, numbers: Sequence[int], found: Found) -> Procedure[None]:
-    rows = rows_of_list(word, numbers, (yield from _numbered(state, word, numbers)))
-    found.values |= rows
-    found.unread += [(f"{word}{n}", "the drive does not print it") for n in numbers if f"{word}{n}" not in rows]
+    rows = [manual.reading_of(name, values[name], table.get(name), counts) for name in sorted(values, key=in_order)]
+    named = [row for line in users if (row := USER.fullmatch(line.strip())) is not None]
+    for row in named:
+        if (row[2] or "").upper() == "G":
+            rows.append(Reading(row[1].upper(), float(row[3]) if "." in row[3] else int(row[3]), VARIABLES))
+    if manual.has_encoder(state.product):
+        *names, last = sorted(manual.COUNTED if manual.locks_resolution(state.product) else manual.COUNTED - {"MS"})
+        here, other = ("encoder counts", "steps") if counts else ("steps", "encoder counts")
+        why = f"the drive moves in {here} now, and prints only the values for these"
+        unread = [*unread, (f"{', '.join(names)} and {last} for {other}", why)]
+    return Readings(tuple(rows), tuple(unread), tuple(row[1].upper() for row in named if not row[2]))
 
 
 # Lines of settings
 
 
-def _batches(state: MCodeState, wanted: Sequence[Setting]) -> Iterator[list[Setting]]:
-    """Divide the settings into lines that the drive's buffer holds."""
-    mode = state.codec
+def _batches(state: MCodeState, wanted: Sequence[Mnemonic]) -> Iterator[list[Mnemonic]]:
+    """Divide the settings into lines that the drive's buffer holds.
+
+    One whose form is uncertain takes no other with it.
+    """
+    mode, plain = state.codec, {Form.DIGIT, Form.WHOLE}
     room = LONGEST - len(f"PR ,{sign(state).item}") - (len(state.address) if mode.party else 0) - bool(mode.checksum)
-    batch: list[Setting] = []
-    for each in wanted:
-        if batch and (len(_items([*batch, each])) > room or _apart(batch[-1], each)):
+    batch: list[Mnemonic] = []
+    for row in wanted:
+        forms = {form_of(each) for each in (*batch[-1:], row)}
+        if batch and (len(items_and_forms([*batch, row])[0]) > room or (len(forms) > 1 and not forms <= plain)):
             yield batch
             batch = []
-        batch.append(each)
+        batch.append(row)
     if batch:
         yield batch
 
 
-def _apart(one: Setting, other: Setting) -> bool:
-    """Whether two settings go into lines of their own: one whose form is uncertain takes no other with it."""
-    plain = (Form.DIGIT, Form.WHOLE)
-    return one.form is not other.form and not (one.form in plain and other.form in plain)
-
-
-def _items(batch: Sequence[Setting]) -> str:
-    """The items of PR for a batch."""
-    out = ""
-    for before, each in zip([None, *batch], batch, strict=False):
-        alone = before is None or (before.form is Form.DIGIT and each.form is Form.DIGIT)
-        out += each.name if before is None else f",{each.name}" if alone else f',"{BETWEEN}",{each.name}'
-    return out
-
-
-def asked(batch: Sequence[Setting]) -> tuple[str, list[str]]:
+def items_and_forms(batch: Sequence[Mnemonic]) -> tuple[str, list[str]]:
     """The items of PR for a batch, and the form of each value with the separator before it."""
-    forms = []
-    for before, each in zip([None, *batch], batch, strict=False):
-        alone = before is None or (before.form is Form.DIGIT and each.form is Form.DIGIT)
-        forms.append(f"{'' if alone else BETWEEN}{each.form.value}")
-    return _items(batch), forms
+    items, forms = "", list[str]()
+    for before, row in zip([None, *batch], batch, strict=False):
+        form = form_of(row)
+        alone = before is None or (form_of(before) is Form.DIGIT and form is Form.DIGIT)
+        items += ("" if before is None else "," if alone else f',"{BETWEEN}",') + row.name
+        forms.append(f"{'' if alone else BETWEEN}{form.value}")
+    return items, forms
 
 
 def _print(state: MCodeState, items: str, forms: Sequence[str]) -> Procedure[list[str] | None]:
@@ -165,19 +168,6 @@ def _value(form: Form, text: str) -> Value:
     return numbers if len(numbers) > 1 else numbers[0]
 
 
-def _error_flag(state: MCodeState) -> Procedure[None]:
-    values = yield from _print(state, "EF", [Form.DIGIT.value])
-    state.error_flag_read(values != ["0"])
-
-
-def _serial(state: MCodeState) -> Procedure[str]:
-    """Read the serial number, where no product refuses that."""
-    if not (state.product.startswith("LM") or state.codec.party or state.codec.checksum):
-        return ""
-    values = yield from _print(state, "SN", ["[!-~][ -~]*"])
-    return values[0] if values else ""
-
-
 # Lists
 
 
@@ -189,13 +179,17 @@ def _numbered(state: MCodeState, word: str, numbers: Sequence[int]) -> Procedure
     if numbers[-1] != manual.LISTS[word][-1]:
         return (yield from listed(state, f"PR {word}"))
     yield from before_request(state, question(state, "EF", "[01]"))
-    asked = state.codec.request(state.address, f"PR {word}")
-    last = rf" *{word} *= *{numbers[-1]} *(?:, *-?\d+ *)+"
-    reply = yield replace(asked, kind=Kind.PRINT, expect=last, gather=True, rows=rf" *{word} *=.*")
+    reply = yield list_request(state, word, numbers)
     if reply.end is End.DONE and not reply.doubtful and len(rows_of_list(word, numbers, reply.lines)) == len(numbers):
         return reply.lines
     state.reply_lost()
     return (yield from listed(state, f"PR {word}"))
+
+
+def list_request(state: MCodeState, word: str, numbers: Sequence[int]) -> Request:
+    last = rf" *{word} *= *{numbers[-1]} *(?:, *-?\d+ *)+"
+    asked = state.codec.request(state.address, f"PR {word}")
+    return replace(asked, kind=Kind.PRINT, expect=last, gather=True, rows=rf" *{word} *=.*")
 
 
 def listed(state: MCodeState, text: str) -> Procedure[tuple[str, ...]]:
@@ -211,16 +205,12 @@ def listed(state: MCodeState, text: str) -> Procedure[tuple[str, ...]]:
                 continue
             state.synchronised()
             lines += rest[:-1]
-        if _is_whole(state, reply):
+        whole = reply.end in (End.DONE, End.SILENT)
+        if reply.end in (End.REFUSED, End.NAK):  # an earlier error looks like the refusal of an empty list
+            whole = state.error or (reply.end is End.NAK and bool(reply.lines))
+        if whole:
             return tuple(line for line in lines if line)
     raise NoAnswer(f"{who(state)}: the list of '{text}' may be incomplete ({reply.end.value}); ask again")
-
-
-def _is_whole(state: MCodeState, reply: Reply) -> bool:
-    """Whether a list is complete, after its mark. An earlier error looks like the refusal of an empty list."""
-    if reply.end in (End.REFUSED, End.NAK):
-        return state.error or (reply.end is End.NAK and bool(reply.lines))
-    return reply.end in (End.DONE, End.SILENT)
 
 
 def rows_of_list(word: str, numbers: Sequence[int], lines: Sequence[str]) -> dict[str, Value]:
@@ -231,34 +221,6 @@ def rows_of_list(word: str, numbers: Sequence[int], lines: Sequence[str]) -> dic
         if row is not None and int(row[1]) in numbers:
             found[f"{word}{int(row[1])}"] = tuple(int(each) for each in row[2].split(",")[1:])
     return found
-
-
-# What was read
-
-
-def _readings(state: MCodeState, found: Found, users: Sequence[str]) -> Readings:
-    """Put units, defaults and the user's names to the values."""
-    values, unread = found.values, found.unread
-    counts, table = manual.counting(values), words(state.product)
-    rows = [manual.reading_of(name, values[name], table.get(name), counts) for name in sorted(values, key=_natural)]
-    named = [row for line in users if (row := USER.fullmatch(line.strip())) is not None]
-    rows += [Reading(row[1].upper(), _number(row[3]), VARIABLES) for row in named if (row[2] or "").upper() == "G"]
-    if manual.has_encoder(state.product):
-        *names, last = sorted(manual.COUNTED if manual.locks_resolution(state.product) else manual.COUNTED - {"MS"})
-        here, other = ("encoder counts", "steps") if counts else ("steps", "encoder counts")
-        why = f"the drive moves in {here} now, and prints only the values for these"
-        unread = [*unread, (f"{', '.join(names)} and {last} for {other}", why)]
-    return Readings(tuple(rows), tuple(unread), tuple(row[1].upper() for row in named if not row[2]))
-
-
-def _natural(name: str) -> tuple[str, int]:
-    """The order of names in which S2 comes before S13."""
-    letters = name.rstrip("0123456789")
-    return letters, int(name[len(letters) :] or 0)
-
-
-def _number(text: str) -> int | float:
-    return float(text) if "." in text else int(text)
 
 
 # Writing settings of an MCode drive: the moment for it, one step, and S.
@@ -298,12 +260,10 @@ def ready(state: MCodeState) -> Procedure[str]:
 
 
 def write(state: MCodeState, change: Change) -> Procedure[None]:
-    """Send one step, and make sure of it."""
     yield from perform(state, change.text)
 
 
 def save(state: MCodeState) -> Procedure[None]:
-    """Send S."""
     if state.programming:
         raise Refused(f"{who(state)} is in program mode and would store S: PG ends that")
     yield from perform(state, "S")

@@ -19,7 +19,7 @@ from multidrop.dialects.mcode.host.operations import flag, immediate, listing, p
 from multidrop.dialects.mcode.host.parameters import listed
 from multidrop.dialects.mcode.host.state import MCodeState, who
 from multidrop.dialects.mcode.manual import editing, help, program_file
-from multidrop.dialects.mcode.manual.grammar import Compare, LineError, Name, Statement, parse
+from multidrop.dialects.mcode.manual.grammar import Compare, Name, parsed
 from multidrop.dialects.mcode.manual.statements import size_of
 from multidrop.dialects.program_files import Held, Stored
 
@@ -63,7 +63,6 @@ class Program:
         return self.lines[0].at
 
     def declared(self, word: str) -> set[str]:
-        """The names that its VA or LB lines declare."""
         found = [declared(line.text) for line in self.lines]
         return {each[1] for each in found if each is not None and each[0] == word}
 
@@ -85,13 +84,11 @@ class FileProgram:
 
 
 def stored(listed: Sequence[str]) -> tuple[Stored, ...]:
-    """Return the lines of a listing as the drive printed it."""
     found = [row for line in listed if (row := _LISTED.fullmatch(line.strip()))]
     return tuple(Stored(int(row[1]), row[2]) for row in found)
 
 
 def names_of(held: Held) -> dict[str, Called]:
-    """Return the user's names in a drive, in capitals."""
     found = [row for line in held.names if (row := _NAMED.fullmatch(line.strip()))]
     return {row[1].upper(): Called(row[2] or LABEL, row[3]) for row in found}
 
@@ -118,12 +115,11 @@ def _begins(before: Stored, at: int, end: int, fine: bool) -> bool:
 @lru_cache(maxsize=4096)
 def size(text: str, product: str) -> int:
     """Return the bytes that a line takes; 0 for a line that this grammar does not parse."""
-    statement = _statement(text)
+    statement = parsed(text)
     return size_of(statement, product) if statement is not None else 0
 
 
 def programs_of(lines: Sequence[SourceLine]) -> list[FileProgram]:
-    """Return the programs of a file, each from PG to PG."""
     found: list[FileProgram] = []
     place, inside = "", list[SourceLine]()
     for line in lines:
@@ -138,7 +134,6 @@ def programs_of(lines: Sequence[SourceLine]) -> list[FileProgram]:
 
 
 def size_of_file(lines: Sequence[SourceLine]) -> int:
-    """Count the lines in the programs of a file."""
     return sum(len(program.lines) for program in programs_of(lines))
 
 
@@ -154,17 +149,9 @@ def immediate_lines(lines: Sequence[SourceLine]) -> list[SourceLine]:
     return found
 
 
-def _statement(text: str) -> Statement | None:
-    try:
-        return parse(text)
-    except LineError:
-        return None
-
-
 @lru_cache(maxsize=4096)
 def declared(text: str) -> tuple[str, str] | None:
-    """Return `VA` or `LB` and the name that the line declares; None for any other line."""
-    statement = _statement(text)
+    statement = parsed(text)
     if statement is None or statement.word not in ("VA", "LB") or not statement.arguments:
         return None
     first = statement.arguments[0]
@@ -247,7 +234,6 @@ def file_of(state: MCodeState, held: Held, raw: bool) -> tuple[str, ...]:  # noq
 
 
 def readable(held: Held) -> tuple[str, ...]:
-    """List the program as the drive does."""
     return tuple(f"{line.at}  {line.text}" for line in held.lines)
 
 
@@ -291,7 +277,6 @@ def annotated(text: str, held: Held) -> tuple[str, ...]:
 
 
 def _sent_lines(text: str) -> Iterator[tuple[str, program_file.ProgramLine | None]]:
-    """Yield each line of a file, with what of it is sent."""
     sent: Sequence[program_file.ProgramLine] = program_file.scan(text)[0]
     by_number = {line.number: line for line in sent}
     for number, line in enumerate(split_lines(text.removesuffix("\x1a").removesuffix("\n")), 1):
@@ -319,14 +304,8 @@ def offered(held: Held, line: str) -> list[tuple[str, str]]:
         return []
     names = names_of(held)
     return [
-        (name, _meaning(called))
+        (name, f"label at {called.value}" if called.kind == LABEL else f"variable, {called.value} when it was read")
         for labels in editing.LABELS_AT[editing.expected(head)]
         for name, called in names.items()
         if (called.kind == LABEL) is labels and name.startswith(word.upper())
     ]
-
-
-def _meaning(called: Called) -> str:
-    if called.kind == LABEL:
-        return f"label at {called.value}"
-    return f"variable, {called.value} when it was read"

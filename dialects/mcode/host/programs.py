@@ -163,7 +163,6 @@ def _statement(text: str, names: set[str]) -> Statement | None:
 
 
 def _initial(statement: Statement) -> float | None:
-    """Return the value that a VA gives."""
     first = statement.arguments[0]
     return _literal(first.right) if isinstance(first, Compare) else 0.0
 

@@ -76,49 +76,43 @@ def quiet_time(request: Request, buffer: bytes, em: int, checksum: int) -> float
     if request.settle is not None:
         return request.settle
     if request.kind is Kind.QUIET:
-        return _collecting_time(request, buffer, checksum)
+        # The time that ends a collection: none once it holds the expected print and the end that belongs to it.
+        found = request.expect and re.search(request.expect.encode("latin-1"), buffer)
+        if found:
+            return 0.0 if _is_whole(request, found, buffer, checksum) else SHORT
+        if buffer:
+            return 0.0 if is_pong(request, buffer) else BETWEEN
+        return max(FIRST, len(request.text) / SLOWEST) if request.text else PONG
     if request.kind is Kind.LIST:
-        return _list_time(request, buffer, em, checksum)
+        # The time after a list. With EM=0 its prompt ends it.
+        if em == 0:
+            return LIST_QUIET
+        if classify.word_of(request.text)[0] == "L":
+            return SHORT if LAST_LINE.search(buffer[-16:]) else LIST_QUIET
+        return EXECUTED if _ends_in_empty_line(buffer, em, checksum) else LIST_QUIET
     if em == 0 and buffer[-1:] == b"?":
         return SHORT
     if checksum and NAK in buffer:
         return PATIENT
     if request.kind in SILENT:
-        return _command_time(request, em)
+        if classify.word_of(request.text)[0] in classify.SLOW:
+            return FLASH
+        return SHORT if em == 2 else PATIENT
     if request.kind is Kind.SETTING and _is_echo_mode(request.text):
-        return _echo_mode_time(buffer, em, checksum)
+        # The time after `EM=`. The next question shows the mode and ignores what is left of this reply.
+        if em == 2 and not buffer:
+            return EXECUTING
+        executed = ACK in buffer if checksum else b"\n" in buffer
+        if not executed:
+            return PATIENT
+        return 0.0 if buffer[-1:] == b">" else EXECUTED
     return SHORT if checksum == 2 and buffer[-1:] == b"\n" else PATIENT
-
-
-def _command_time(request: Request, em: int) -> float:
-    if classify.word_of(request.text)[0] in classify.SLOW:
-        return FLASH
-    return SHORT if em == 2 else PATIENT
 
 
 @lru_cache(maxsize=64)
 def _is_echo_mode(text: str) -> bool:
     setting = classify.setting_of(text)
     return setting is not None and setting.name == "EM"
-
-
-def _echo_mode_time(buffer: bytes, em: int, checksum: int) -> float:
-    """The time after `EM=`. The next question shows the mode and ignores what is left of this reply."""
-    if em == 2 and not buffer:
-        return EXECUTING
-    executed = ACK in buffer if checksum else b"\n" in buffer
-    if not executed:
-        return PATIENT
-    return 0.0 if buffer[-1:] == b">" else EXECUTED
-
-
-def _list_time(request: Request, buffer: bytes, em: int, checksum: int) -> float:
-    """The time after a list. With EM=0 its prompt ends it."""
-    if em == 0:
-        return LIST_QUIET
-    if classify.word_of(request.text)[0] == "L":
-        return SHORT if LAST_LINE.search(buffer[-16:]) else LIST_QUIET
-    return EXECUTED if _ends_in_empty_line(buffer, em, checksum) else LIST_QUIET
 
 
 def _ends_in_empty_line(buffer: bytes, em: int, checksum: int) -> bool:
@@ -128,16 +122,6 @@ def _ends_in_empty_line(buffer: bytes, em: int, checksum: int) -> bool:
         return False
     before = buffer[: -len(own)]
     return before[-1:] in (b"\n", ACK) or (not before and (em == 2 or checksum > 0))
-
-
-def _collecting_time(request: Request, buffer: bytes, checksum: int) -> float:
-    """The time that ends a collection: none once it holds the expected print and the end that belongs to it."""
-    found = request.expect and re.search(request.expect.encode("latin-1"), buffer)
-    if found:
-        return 0.0 if _is_whole(request, found, buffer, checksum) else SHORT
-    if buffer:
-        return 0.0 if is_pong(request, buffer) else BETWEEN
-    return max(FIRST, len(request.text) / SLOWEST) if request.text else PONG
 
 
 def _is_whole(request: Request, found: re.Match[bytes], buffer: bytes, checksum: int) -> bool:

@@ -7,23 +7,23 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 
-from multidrop.dialects.codec import End, Kind, Priority, Procedure, Reply, Request
+from multidrop.dialects.codec import End, Priority, Procedure
 from multidrop.dialects.errors import Diagnostic, NoAnswer, Refused
 from multidrop.dialects.mcode.host import parameters
-from multidrop.dialects.mcode.host.before_request import before_request
+from multidrop.dialects.mcode.host.before_request import before_request, value_of
 from multidrop.dialects.mcode.host.codec import EVERY_DRIVE
 from multidrop.dialects.mcode.host.debugging import check_names, values
-from multidrop.dialects.mcode.host.exchange import answered, note_error, question, value
-from multidrop.dialects.mcode.host.parameters import BETWEEN, asked, rows_of_list
-from multidrop.dialects.mcode.host.state import MCodeState, who
+from multidrop.dialects.mcode.host.exchange import check_printed, note_error, question, value
+from multidrop.dialects.mcode.host.parameters import BETWEEN, items_and_forms, list_request, rows_of_list
+from multidrop.dialects.mcode.host.state import MCodeState, refuse_in_program, who
 from multidrop.dialects.mcode.manual import parameters as manual
 from multidrop.dialects.mcode.manual import points
 from multidrop.dialects.mcode.manual.mnemonic import EXPANDED
-from multidrop.dialects.mcode.manual.parameters import Form, Setting, exact
+from multidrop.dialects.mcode.manual.parameters import Form, exact, form_of
 from multidrop.dialects.mcode.manual.points import EXPANDED_INPUTS, INPUTS
 from multidrop.dialects.mcode.manual.statements import UNNAMED
 from multidrop.dialects.mcode.manual.table import lookup, words
-from multidrop.dialects.parameters import Progress, Readings
+from multidrop.dialects.parameters import Progress, Readings, Value
 from multidrop.dialects.program_files import LOCKED
 from multidrop.dialects.state import DriveState
 from multidrop.dialects.values import Conditions, Facts, Levels, Part, Reader, Snapshot, printed_number
@@ -45,6 +45,7 @@ SETTLED = "IS1"
 """Among the facts once the set-ups were read."""
 UNSURE = frozenset({"EE", "AS", "AF", "I5"})
 """Words that not every Lexium has."""
+REFUSAL = "refuses to print its conditions"
 
 
 def parts(state: MCodeState, facts: Facts) -> Sequence[Part[MCodeState]]:
@@ -68,46 +69,32 @@ def _state(state: MCodeState) -> Procedure[Facts]:
     return facts
 
 
-def _has(state: MCodeState, names: Sequence[str]) -> list[str]:
-    """The words that the product has; of an unknown product, those that every Lexium has."""
-    table = words(state.product)
-    known = manual.exact(state.product)
-    return [name for name in names if (state.product in table[name].products if known else name not in UNSURE)]
-
-
 def _values(state: MCodeState, names: Sequence[str]) -> Procedure[Facts]:
-    """Print values in one line. Raises Refused or NoAnswer, and reads no error."""
-    table = words(state.product)
-    batch = [
-        Setting(table[name], manual.form_of(table[name])) for name in _has(state, [n for n in names if n in table])
-    ]
-    items, forms = asked(batch)
+    """Print values in one line. Raises Refused or NoAnswer, and reads no error.
+
+    Asks the words that the product has; of an unknown product, those that every Lexium has.
+    """
+    table, known = words(state.product), exact(state.product)
+    batch = [table[name] for name in names if name in table]
+    batch = [row for row in batch if (state.product in row.products if known else row.name not in UNSURE)]
+    items, forms = items_and_forms(batch)
     answer = "".join(f"(?:{form})" for form in forms)
-    yield from _attended(state, question(state, items, answer))
+    yield from before_request(state, replace(question(state, items, answer), priority=Priority.POLL))
     reply = yield replace(question(state, items, answer), priority=Priority.POLL)
-    _check_printed(state, reply)
+    check_printed(state, reply, REFUSAL)
     found = re.fullmatch("".join(f"({form})" for form in forms), value(state, reply))
     assert found is not None
-    texts = [each.removeprefix(BETWEEN) for each in found.groups()]
-    return {each.name: _fact(each, text) for each, text in zip(batch, texts, strict=True)}
-
-
-def _fact(setting: Setting, text: str) -> int | tuple[int, ...]:
-    if setting.form is Form.FIELDS:
-        return tuple(int(each) for each in text.split(","))
-    return int(text)
+    facts: dict[str, Value] = {}
+    for row, text in zip(batch, found.groups(), strict=True):
+        fields = tuple(int(each) for each in text.removeprefix(BETWEEN).split(","))
+        facts[row.name] = fields if form_of(row) is Form.FIELDS else fields[0]
+    return facts
 
 
 def _list(state: MCodeState, word: str, numbers: Sequence[int]) -> Procedure[Facts]:
-    """Print set-ups, up to the last number."""
-    yield from _attended(state, question(state, "EF", "[01]"))
-    last = rf" *{word} *= *{numbers[-1]} *(?:, *-?\d+ *)+"
-    row = rf" *{word} *=.*"
-    wanted = replace(
-        state.codec.request(state.address, f"PR {word}"), kind=Kind.PRINT, expect=last, gather=True, rows=row
-    )
-    reply = yield replace(wanted, priority=Priority.POLL)
-    _check_printed(state, reply)
+    yield from before_request(state, replace(question(state, "EF", "[01]"), priority=Priority.POLL))
+    reply = yield replace(list_request(state, word, numbers), priority=Priority.POLL)
+    check_printed(state, reply, REFUSAL)
     rows = rows_of_list(word, numbers, reply.lines)
     if reply.doubtful or len(rows) < len(numbers):
         state.reply_lost()
@@ -115,24 +102,7 @@ def _list(state: MCodeState, word: str, numbers: Sequence[int]) -> Procedure[Fac
     return rows
 
 
-def _attended(state: MCodeState, wanted: Request) -> Procedure[None]:
-    """Clear what earlier requests left, at the priority of polls."""
-    yield from before_request(state, replace(wanted, priority=Priority.POLL))
-
-
-def _check_printed(state: MCodeState, reply: Reply) -> None:
-    """Raise Refused or NoAnswer unless the drive printed."""
-    note_error(state, reply)
-    if reply.end is End.REFUSED and not reply.doubtful:
-        raise Refused(f"{who(state)} refuses to print its conditions")
-    if reply.end is not End.DONE:
-        if reply.end is not End.NAK:
-            state.reply_lost()
-        raise NoAnswer(f"{who(state)} does not reply ({reply.end.value})")
-
-
 def fold(state: MCodeState, facts: Facts) -> tuple[Conditions, ...]:
-    """The conditions of its only axis."""
     modes = f"EM{state.codec.em} CK{state.codec.checksum}"
     return (replace(points.conditions(state.product, facts, state.heading), modes=modes),)
 
@@ -157,7 +127,7 @@ def check(state: MCodeState, word: str) -> str:
 
 def first(state: MCodeState, word: str) -> Procedure[float]:
     """Read a value; a name with VA is looked up first, since asking for one that is not there is an error."""
-    _not_in_program(state)
+    refuse_in_program(state)
     found = yield from values(state, [word])
     if word not in found:
         raise Refused(f"{who(state)} has no variable {word}")
@@ -169,26 +139,17 @@ def first(state: MCodeState, word: str) -> Procedure[float]:
 
 def again(state: MCodeState, word: str, priority: Priority) -> Procedure[float]:
     """Read a value. The error flag is noted and not cleared."""
-    _not_in_program(state)
+    refuse_in_program(state)
     yield from before_request(state, replace(question(state, word, NUMBER), priority=priority))
     reply = yield replace(question(state, word, NUMBER), priority=priority)
-    note_error(state, reply)
     if reply.end is End.REFUSED:
+        note_error(state, reply)
         raise Refused(f"{who(state)} refused 'PR {word}'")
-    if reply.end is not End.DONE:
-        if reply.end is not End.NAK:
-            state.reply_lost()
-        raise NoAnswer(f"{who(state)} does not reply ({reply.end.value})")
+    check_printed(state, reply)
     return float(value(state, reply))
 
 
-def _not_in_program(state: MCodeState) -> None:
-    if state.programming:
-        raise Refused(f"{who(state)} is in program mode and would store it: PG ends that")
-
-
 def own(state: MCodeState, word: str) -> bool:
-    """Whether a word is a mnemonic, and no name with VA."""
     return lookup(word.upper(), state.product) is not None
 
 
@@ -212,7 +173,10 @@ _LISTED = re.compile(r"(\d+)\s+(\S.*)")
 def take(state: MCodeState, progress: Progress) -> Procedure[Snapshot]:
     """Read a drive. Raises Refused where it would store the questions, or NoAnswer."""
     readings = yield from parameters.read(state, progress)
-    now = yield from _now(state)
+    known, whole = words(state.product), exact(state.product)
+    asked = [word for word in SNAPSHOT_WORDS if word in known and (state.product in known[word].products or not whole)]
+    items, pattern = '," ",'.join(asked), " ".join(r"-?\d{1,10}" for _ in asked)
+    now = dict(zip(asked, map(int, (yield from value_of(state, items, pattern)).split()), strict=True))
     program, remarks = yield from _program(state, readings, running=bool(now["BY"]))
     found = snapshot_of(state, readings, now)
     return replace(
@@ -232,7 +196,12 @@ def snapshot_of(state: DriveState, readings: Readings, now: Mapping[str, int]) -
         remarks.append(f"moving at V={now['V']} while it was read: its position is one of that moment")
     if now["BY"]:
         remarks.append("a program ran while it was read")
-    levels = _levels(state.product, readings)
+    points = EXPANDED_INPUTS if state.product in EXPANDED else INPUTS
+    types = {name: held for name, held in readings.values.items() if isinstance(held, tuple)}
+    outputs = {n for n in points if types.get(f"S{n}", (0,))[0] in OUTPUT_TYPES}
+    levels = Levels("IN", tuple((n, bit) for bit, n in enumerate(points) if n not in outputs))
+    counts = _whole(readings, "EE") and not _whole(readings, "AS")
+    other = "C1" if counts else "C2"
     return Snapshot(
         kind="mcode",
         product=state.product,
@@ -241,23 +210,13 @@ def snapshot_of(state: DriveState, readings: Readings, now: Mapping[str, int]) -
         serial=state.serial,
         name=UNNAMED,
         readings=readings,
-        counters=_counters(readings, now),
+        counters=({"position": (now["P"],)} | ({other: (now[other],)} if other in now else {})),
         inputs=levels.of(now["IN"]),
         levels=levels,
         active=bool(now["V"] or now["BY"]),
         analog=(now["I5"],) if "I5" in now else (),
         remarks=tuple(remarks),
     )
-
-
-def _now(state: MCodeState) -> Procedure[dict[str, int]]:
-    """Read counters, motion and inputs in one print, so that they belong together."""
-    known, whole = words(state.product), exact(state.product)
-    asked = [word for word in SNAPSHOT_WORDS if word in known and (state.product in known[word].products or not whole)]
-    items, pattern = '," ",'.join(asked), " ".join(r"-?\d{1,10}" for _ in asked)
-    yield from before_request(state, question(state, items, pattern))
-    reply = yield from answered(state, question(state, items, pattern))
-    return dict(zip(asked, map(int, value(state, reply).split()), strict=True))
 
 
 def _program(
@@ -273,20 +232,6 @@ def _program(
     lost = [line for line, row in zip(first, found, strict=True) if row is None]
     doubts = [f"its listing has a line that is not a program line: {line!r}" for line in lost]
     return tuple((int(row[1]), row[2]) for row in found if row is not None), doubts
-
-
-def _counters(readings: Readings, now: Mapping[str, int]) -> Mapping[str, tuple[int, ...]]:
-    """P, and the counter that P is not."""
-    counts = _whole(readings, "EE") and not _whole(readings, "AS")
-    other = "C1" if counts else "C2"
-    return {"position": (now["P"],)} | ({other: (now[other],)} if other in now else {})
-
-
-def _levels(product: str, readings: Readings) -> Levels:
-    points = EXPANDED_INPUTS if product in EXPANDED else INPUTS
-    types = {name: held for name, held in readings.values.items() if isinstance(held, tuple)}
-    outputs = {n for n in points if types.get(f"S{n}", (0,))[0] in OUTPUT_TYPES}
-    return Levels("IN", tuple((n, bit) for bit, n in enumerate(points) if n not in outputs))
 
 
 def _whole(readings: Readings, name: str) -> int:

@@ -73,7 +73,6 @@ class ReplyLines:
             self._add_stray(printable(plain))
 
     def _add_stray(self, line: str) -> None:
-        """Add a line that is not the expected one."""
         request = self.request
         if UNPRINTED.search(line):
             self.collided.append(line)
@@ -112,7 +111,12 @@ class ReplyLines:
             self.repeated, data = True, plain[size:]
             if not data:
                 return
-        self._sealed_line(data)
+        found = unsealed(data) if self.sealed else stripped(data)
+        if found is None:
+            self.damaged = f"checksum of {printable(data)!r} is wrong"
+            self.collided.append(printable(data))
+            return
+        self._sort(printable(found))
 
     def add_unended(self, data: bytes) -> None:
         """Add a print that ends in a semicolon: it has neither line end nor check byte."""
@@ -130,14 +134,6 @@ class ReplyLines:
         self.add_earlier(before)
         return rest
 
-    def _sealed_line(self, data: bytes) -> None:
-        found = unsealed(data) if self.sealed else stripped(data)
-        if found is None:
-            self.damaged = f"checksum of {printable(data)!r} is wrong"
-            self.collided.append(printable(data))
-            return
-        self._sort(printable(found))
-
     def repetition(self, data: bytes) -> int:
         """Length of the request that EM=3 repeats at the head of a line; 0 for any other text.
 
@@ -151,7 +147,6 @@ class ReplyLines:
         return len(data) if data in whole else 0
 
     def _sort(self, line: str) -> None:
-        """Sort a printed line: part of the reply, or a stray."""
         kind, expect = self.request.kind, self.request.expect
         matches = re.fullmatch(expect, line) is not None if expect is not None else not self.naks
         if kind is Kind.LIST and not self.announced:
@@ -165,7 +160,6 @@ class ReplyLines:
             self.answer(line)
 
     def answer(self, line: str) -> None:
-        """Add the line that the request asks for."""
         self.lines.append(line)
         self.answered = True
 
@@ -183,7 +177,6 @@ class ReplyLines:
 
     @property
     def signed_off(self) -> bool:
-        """Whether ACK or NAK was received."""
         return self.acks + self.naks > 0
 
     @property
@@ -192,7 +185,6 @@ class ReplyLines:
         return self.echo == 3 and not self.repeated
 
     def complete(self) -> bool:
-        """Whether a reply without a prompt is complete."""
         kind = self.request.kind
         if kind in ENDLESS or self.echo == 0:
             return False
@@ -226,17 +218,13 @@ class ReplyLines:
         """
         if self.answered and self.request.kind is Kind.PRINT:
             return End.DONE
-        if self._nak_is_all(unfinished):
+        other_signs = self.acks or self.mixed or self.damaged or self.answered or self.repetition_missing
+        if self.naks == 1 and not other_signs and not (unfinished and self.echo != 0):
             if followed and self.echo != 0:
                 self.damaged = "prints follow the NAK"
             return End.NAK
         self.damaged = self.damaged or "NAK among other characters"
         return End.DAMAGED
-
-    def _nak_is_all(self, unfinished: bool) -> bool:
-        """Whether one NAK is the whole reply."""
-        other_signs = self.acks or self.mixed or self.damaged or self.answered or self.repetition_missing
-        return self.naks == 1 and not other_signs and not (unfinished and self.echo != 0)
 
     def decoded(self, end: End, used: int, prompt: str = "") -> Decoded:
         """Return the reply as collected, with its end after a last check."""
@@ -348,7 +336,6 @@ class ReplyParser:
         """Whole lines received since a NAK, such a prompt or the reply: anything that follows it would have arrived."""
 
     def whole(self) -> Decoded | None:
-        """Parse to the end of the reply; None while it is incomplete."""
         start = 0
         if self.echo == 0 and self.request.kind is not Kind.QUIET:
             found = after_echo(self.frame, self.got.check_byte(self.frame), self.buffer)
@@ -380,26 +367,22 @@ class ReplyParser:
             self.after += bool(self.got.naks or self.candidate or self.got.answered)
             self.got.add_line(piece.data)
             if self.after == WAITED:
-                return self._believed(piece.end)
+                # Accept a doubtful sign after other lines, with nothing against it, as after a quiet time.
+                if self.request.kind in ENDLESS:
+                    return None
+                if self.echo == 0:
+                    return self._at_candidate()
+                if self.got.naks:
+                    return self.got.decoded(self._after_nak(), piece.end)
+                if self.got.answered and self.sealed == 2:  # with CK=1 the ACK still follows
+                    return self.got.decoded(End.DONE, piece.end)
+                return None
         return self.got.decoded(End.DONE, piece.end) if self.got.complete() else None
-
-    def _believed(self, used: int) -> Decoded | None:
-        """Accept a doubtful sign after other lines, with nothing against it, as after a quiet time."""
-        if self.request.kind in ENDLESS:
-            return None
-        if self.echo == 0:
-            return self._at_candidate()
-        if self.got.naks:
-            return self.got.decoded(self._after_nak(), used)
-        if self.got.answered and self.sealed == 2:  # with CK=1 the ACK still follows
-            return self.got.decoded(End.DONE, used)
-        return None
 
     # Prompts (EM=0)
 
     @property
     def _at_end(self) -> bool:
-        """Whether a prompt can come now."""
         if self.echo != 0 or self.request.kind in (Kind.SETTING, Kind.QUIET):
             return False
         return (
@@ -474,40 +457,51 @@ class ReplyParser:
             return done
         kind, used = self.request.kind, len(self.buffer)
         if kind in ENDLESS:
-            return self._settled_list(used)
+            # End a list, a setting or a collection when the wire is quiet.
+            if self.echo == 3 and self.request.kind is Kind.LIST and not self.got.repeated:
+                return None
+            prompt = printable(self.rest) if self.echo == 0 and self._is_prompt(self.rest) else ""
+            if prompt not in ("", ">", "?") and self.got.lines:
+                prompt = ""  # the address of the next listed line
+            if (
+                self.request.kind is Kind.LIST
+                and not prompt
+                and (self.echo == 0 or bool(self.rest and not self.request.text.endswith(";")))
+            ):
+                return None
+            stored = self.request.rows is not None and ADDRESS_PROMPT.fullmatch(self.rest)  # the prompt of program mode
+            if self.rest and not prompt and not stored:
+                self.got.add_line(self.rest)
+            end = End.REFUSED if prompt == "?" and not self.got.lines and not self.got.acks else End.DONE
+            if self.got.naks:
+                end = End.NAK if self.request.kind is Kind.QUIET else self._after_nak()
+            elif end is End.DONE and not self.buffer:
+                end = End.SILENT
+            return self.got.decoded(end, used, prompt)
         if self.echo == 0:
             return self._settled_prompt(used) if self.began else None
         if kind is Kind.PRINT:
-            return self._settled_print(used)
+            # Decide with EM 1 to 3: a reply without ACK, without a line end, damaged, or none.
+            if not self.got.answered and self.rest and (not self.request.expect or self.request.text.endswith(";")):
+                self.got.add_unended(self.rest)
+            if self.got.naks:
+                return self.got.decoded(self._after_nak(), used)
+            if not self.got.answered and self.got.blanks and self.echo in (2, 3) and not self.request.expect:
+                self.got.answer("")
+            if self.got.answered:
+                return self.got.decoded(End.DONE, used)
+            if self.got.damaged:
+                return self.got.decoded(End.DAMAGED, used)
+            if self.got.blanks or self.got.acks or self.got.repeated:
+                heard = " ".join((*self.got.collided, *self.got.glued))
+                self.got.damaged = f"heard {heard[:48]!r}" if self.got.collided else ""
+                return self.got.decoded(End.DAMAGED if self.got.collided else End.SILENT, used)
+            return None
         if self.got.naks:
             return self.got.decoded(self._after_nak(), used)
         if self.rest and self.echo != 3:
             used = self.rest_at  # half a line of another drive or a program, still to be completed
         return self.got.decoded(End.SILENT, used) if self.got.silence_is_success(self.rest) else None
-
-    def _settled_list(self, used: int) -> Decoded | None:
-        """End a list, a setting or a collection when the wire is quiet."""
-        if self.echo == 3 and self.request.kind is Kind.LIST and not self.got.repeated:
-            return None
-        prompt = printable(self.rest) if self.echo == 0 and self._is_prompt(self.rest) else ""
-        if prompt not in ("", ">", "?") and self.got.lines:
-            prompt = ""  # the address of the next listed line
-        if self.request.kind is Kind.LIST and not prompt and self._list_goes_on:
-            return None
-        stored = self.request.rows is not None and ADDRESS_PROMPT.fullmatch(self.rest)  # the prompt of program mode
-        if self.rest and not prompt and not stored:
-            self.got.add_line(self.rest)
-        end = End.REFUSED if prompt == "?" and not self.got.lines and not self.got.acks else End.DONE
-        if self.got.naks:
-            end = End.NAK if self.request.kind is Kind.QUIET else self._after_nak()
-        elif end is End.DONE and not self.buffer:
-            end = End.SILENT
-        return self.got.decoded(end, used, prompt)
-
-    @property
-    def _list_goes_on(self) -> bool:
-        """Whether a list cannot have ended here: with EM=0 its prompt is missing, otherwise the end of a line."""
-        return self.echo == 0 or bool(self.rest and not self.request.text.endswith(";"))
 
     @staticmethod
     def _is_prompt(rest: bytes) -> bool:
@@ -522,21 +516,3 @@ class ReplyParser:
             self.got.add_unended(self.rest[:-1])
             return self.got.decoded(End.DONE, used, printable(self.rest[-1:]))
         return self._at_candidate()
-
-    def _settled_print(self, used: int) -> Decoded | None:
-        """Decide with EM 1 to 3: a reply without ACK, without a line end, damaged, or none."""
-        if not self.got.answered and self.rest and (not self.request.expect or self.request.text.endswith(";")):
-            self.got.add_unended(self.rest)
-        if self.got.naks:
-            return self.got.decoded(self._after_nak(), used)
-        if not self.got.answered and self.got.blanks and self.echo in (2, 3) and not self.request.expect:
-            self.got.answer("")
-        if self.got.answered:
-            return self.got.decoded(End.DONE, used)
-        if self.got.damaged:
-            return self.got.decoded(End.DAMAGED, used)
-        if self.got.blanks or self.got.acks or self.got.repeated:
-            heard = " ".join((*self.got.collided, *self.got.glued))
-            self.got.damaged = f"heard {heard[:48]!r}" if self.got.collided else ""
-            return self.got.decoded(End.DAMAGED if self.got.collided else End.SILENT, used)
-        return None

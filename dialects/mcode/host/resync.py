@@ -59,7 +59,11 @@ def look_in(state: MCodeState, places: Sequence[Place], priority: Priority = Pri
     for place in places:
         if place.party and not party:
             yield from activate_party(state.codec, priority)
-        if (yield from _look(state, place, priority)):
+        found = yield from look(state, place, settings_asked, priority)
+        if found is not None:
+            form, said = found
+            take_over(state, place.address, form, said[:3], said[7:])
+        if found is not None:
             return True
         party = place.party
     if not party and any(place.party for place in places):  # the last text must not stay in other drives' buffers
@@ -72,15 +76,6 @@ def activate_party(codec: MCode, priority: Priority = Priority.OPERATOR) -> Proc
     form = replace(codec, party=True, checksum=0)
     for _ in range(2):
         yield Request("", "", Kind.QUIET, form, priority, settle=0.05, timeout=BRIEF)
-
-
-def _look(state: MCodeState, place: Place, priority: Priority) -> Procedure[bool]:
-    """Read the settings of the drive at a place; False where it is silent."""
-    found = yield from look(state, place, settings_asked, priority)
-    if found is not None:
-        form, said = found
-        take_over(state, place.address, form, said[:3], said[7:])
-    return found is not None
 
 
 def settings_asked(form: MCode) -> tuple[str, str]:
@@ -105,7 +100,10 @@ def look(
         tried += 1
         form = replace(state.codec, em=2, party=place.party, checksum=checks[0], escape=None)
         text, reply = yield from asked(state, place.address, form, *what(form), priority)
-        stored, naks = stored + _stores(reply), naks + (NAK in reply.raw)
+        stored, naks = (
+            stored + (bool(reply.raw) and not REPETITION.sub(b"", reply.raw).strip(b"\r\n\x06")),
+            naks + (NAK in reply.raw),
+        )
         if text:
             return form, text
         prompt = PROGRAM_PROMPT.search(reply.raw) is not None
@@ -139,11 +137,6 @@ def asked(
         ):
             return found[1], reply
     return "", reply
-
-
-def _stores(reply: Reply) -> bool:
-    """Whether the drive took a line and printed nothing: a sign, perhaps the line's repetition, and nothing else."""
-    return bool(reply.raw) and not REPETITION.sub(b"", reply.raw).strip(b"\r\n\x06")
 
 
 def take_over(state: MCodeState, address: str, form: MCode, settings: str, checksum: str | None) -> None:

@@ -148,7 +148,6 @@ class _Search:
         return self.talk >= TALKS
 
     def asked(self, request: bytes, what: str, quiet: float, name: str = "") -> Procedure[bytes]:
-        """Send bytes; return what was received until it was quiet."""
         timeout = BRIEF if self.talks else max(quiet, BUSY * self.reach.window)
         form = MCode(party=bool(name))
         reply = yield Request(name, what, Kind.QUIET, form, settle=quiet, timeout=timeout, body=request)
@@ -180,25 +179,21 @@ def _unnamed(own: _Search) -> Procedure[tuple[bool, bool]]:
     for _ in range(ALONE_TRIES):
         question = _question(own, checksum)
         heard = yield from _parts_asked(own, question, own.reach.window)
-        if _may_be_unnamed(question, heard):
+        if not VERSION.search(b"".join(heard)) and heard != question and any(map(_ambiguous, heard)):
             heard = yield from _parts_asked(own, question, own.certain)
         if _is_unnamed(question, heard):
-            return (yield from _sole(own, question, heard))
+            # Identify the drive; one that repeats nothing by itself shows that the adapter does.
+            state = yield from _identified(own, Place(False, ""))
+            echo = state is not None and state.codec.em != 0 and heard[:-1] == question[:-1] != []
+            if state is not None and not echo:
+                own.found(state)
+            return True, echo
         tried, repeated = tried + 1, repeated + (heard == question)
         if FOREIGN in heard[-1]:
             own.remarks["PMX"] = "something replies as a PMX does; --dialect pmx searches for one"
         if not any(heard) or NAK in heard[-1] or tried == ALONE_TRIES // 2:
             checksum, tried = 1 - checksum, 0
     return False, repeated == ALONE_TRIES
-
-
-def _sole(own: _Search, question: list[bytes], heard: list[bytes]) -> Procedure[tuple[bool, bool]]:
-    """Identify the drive; one that repeats nothing by itself shows that the adapter does."""
-    state = yield from _identified(own, Place(False, ""))
-    echo = state is not None and state.codec.em != 0 and heard[:-1] == question[:-1] != []
-    if state is not None and not echo:
-        own.found(state)
-    return True, echo
 
 
 def _question(own: _Search, checksum: int) -> list[bytes]:
@@ -210,7 +205,6 @@ def _question(own: _Search, checksum: int) -> list[bytes]:
 
 
 def _parts_asked(own: _Search, question: list[bytes], quiet: float) -> Procedure[list[bytes]]:
-    """Send the parts in turn; return what was received after each."""
     heard = []
     for part in question:
         heard.append((yield from own.asked(part, QUESTION.decode(), quiet)))
@@ -228,11 +222,6 @@ def _is_unnamed(question: list[bytes], heard: list[bytes]) -> bool:
     return not any(heard[:-1]) and _ambiguous(heard[-1])
 
 
-def _may_be_unnamed(question: list[bytes], heard: list[bytes]) -> bool:
-    """Whether this looks so, but may be late replies to the pings: it is asked again with time between the parts."""
-    return not VERSION.search(b"".join(heard)) and heard != question and any(map(_ambiguous, heard))
-
-
 def _ambiguous(heard: bytes) -> bool:
     return NAK in heard or PROGRAM_PROMPT.search(heard) is not None or heard == b"\r\n"
 
@@ -248,23 +237,20 @@ def _named(own: _Search) -> Procedure[None]:
                 own.remarks["talk"] = "a program prints all the time, and the search for names ended there"
                 return
             if name not in own.names and not (own.talks and number == 0):
-                yield from _tried(own, number, NAMES[max(0, at - LATE) : at + 1])
+                # Try the last of these names in one form; the names before it may reply late.
+                names = NAMES[max(0, at - LATE) : at + 1]
+                name = names[-1]
+                if number == 0:
+                    heard = yield from _pinged(own, name, PING * own.reach.window)
+                    sure = heard in NAMED_PONGS[name]
+                else:
+                    heard = yield from _name_asked(own, name, number - 1, PRINT * own.reach.window)
+                    sure = _prints(name, heard)
+                if heard and not (sure and (yield from _reported(own, name, _checks(name, heard)))) and not own.talks:
+                    yield from _late(own, names)
             own.step()
         if (yield from own.asked(b"\n", "", own.rest, NAMES[-1])) and not own.talks:
             yield from _late(own, NAMES[-LATE:])
-
-
-def _tried(own: _Search, number: int, names: Sequence[str]) -> Procedure[None]:
-    """Try the last of these names in one form; the names before it may reply late."""
-    name = names[-1]
-    if number == 0:
-        heard = yield from _pinged(own, name, PING * own.reach.window)
-        sure = heard in NAMED_PONGS[name]
-    else:
-        heard = yield from _name_asked(own, name, number - 1, PRINT * own.reach.window)
-        sure = _prints(name, heard)
-    if heard and not (sure and (yield from _reported(own, name, _checks(name, heard)))) and not own.talks:
-        yield from _late(own, names)
 
 
 def _late(own: _Search, names: Sequence[str]) -> Procedure[None]:
@@ -284,7 +270,8 @@ def _late(own: _Search, names: Sequence[str]) -> Procedure[None]:
 
 def _pongs_late(own: _Search, name: str) -> Procedure[bool]:
     """Whether a drive replies to a ping of this name, with time for its reply."""
-    return _pongs(name, (yield from _pinged(own, name, own.certain)))
+    heard = yield from _pinged(own, name, own.certain)
+    return heard in (*pongs(name, True), *pongs(name, False)) or PROGRAM_PROMPT.search(heard) is not None
 
 
 def _prints_late(own: _Search, name: str) -> Procedure[bool]:
@@ -303,11 +290,6 @@ def _name_asked(own: _Search, name: str, checksum: int, quiet: float) -> Procedu
     frame = f"{name}PR DN".encode()
     line = (sealed(frame) if checksum else frame) + b"\n"
     return (yield from own.asked(line, "PR DN", quiet, name))
-
-
-def _pongs(name: str, heard: bytes) -> bool:
-    """Whether this is the reply to a ping, or a prompt of program mode."""
-    return heard in (*pongs(name, True), *pongs(name, False)) or PROGRAM_PROMPT.search(heard) is not None
 
 
 def _prints(name: str, heard: bytes) -> bool:

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 from multidrop.dialects.codec import Request
+from multidrop.dialects.errors import Refused
 from multidrop.dialects.mcode.host.codec import MCode
 from multidrop.dialects.mcode.manual import errors
 from multidrop.dialects.state import DriveState, Remembered
@@ -96,7 +97,6 @@ class MCodeState(DriveState):
     # Identity
 
     def signature_seen(self, signs: bool) -> None:
-        """Record whether the drive prints its own name."""
         self.signs = signs
 
     # Replies, errors, programs
@@ -110,7 +110,6 @@ class MCodeState(DriveState):
         self.running, self.stepping = True, False
 
     def program_read(self, *, error: bool, running: bool) -> None:
-        """Record the error flag, and whether a program runs."""
         self.error, self.running = error, running
 
     # Motion
@@ -128,11 +127,9 @@ class MCodeState(DriveState):
     # Single step
 
     def steps(self) -> None:
-        """Record that the drive was seen to wait for a key."""
         self.running = self.stepping = True
 
     def may_not_step(self) -> None:
-        """Record that it is not known whether the drive waits for a key."""
         self.stepping = False
 
     # Program mode
@@ -146,11 +143,9 @@ class MCodeState(DriveState):
         self.address, self.codec, self.programming = address, codec, True
 
     def entered_program_mode(self, at: int) -> None:
-        """Record the address of the next line, from a program prompt."""
         self.programming, self.next_address = True, at
 
     def left_program_mode(self) -> None:
-        """Record that the drive executes lines again."""
         self.programming, self.next_address = False, 0
 
 
@@ -158,16 +153,20 @@ class MCodeState(DriveState):
 
 
 def who(state: DriveState) -> str:
-    """Name a drive in a message."""
     return state.address or "the drive"
 
 
+def refuse_in_program(state: MCodeState, then: str = "") -> None:
+    """Raise Refused where the drive would store a request."""
+    if state.programming:
+        more = f", then {then}" if then else ""
+        raise Refused(f"{who(state)} is in program mode and would store it: PG ends that{more}")
+
+
 def unknown(state: DriveState, request: Request) -> str:
-    """Report a command that had no reply."""
     return f"{who(state)} does not reply: it is not known whether '{request.text}' was executed; it was sent once"
 
 
 def described(code: int, state: DriveState) -> str:
-    """Number, meaning and remedy of an error."""
     advice = errors.hint(code, state.product)
     return f"error {code}: {errors.text(code, state.product)}" + (f" ({advice})" if advice else "")

@@ -67,7 +67,6 @@ def _read(source: str) -> _Line:
 
 
 def names(text: str) -> list[UserName]:
-    """Return the labels and variables of a file."""
     sources = split_lines(text)
     lines = [_read(source) for source in sources]
     words = _declared_names(lines)
@@ -129,29 +128,24 @@ def renamed(text: str, name: UserName, new: str, product: str) -> str:
     for number, source in enumerate(sources, 1):
         if any(_uses(_read(source), (word,))):
             raise Diagnostic(f"{word} is in use already, in line {number}", "", "choose another name")
-    _compare(sources, replaced(sources, name.places, new), name.word, word)
+    # Raise Diagnostic for a line that a rename makes too long, or that the drive would divide differently.
+    lines = [_read(source) for source in sources]
+    words = _declared_names(lines)
+    others = words - {name.word} | {word}
+    for number, (line, other) in enumerate(zip(lines, map(_read, replaced(sources, name.places, new)), strict=True), 1):
+        if len(other.text) > LONGEST >= len(line.text):
+            what = f"line {number} would have {len(other.text)} characters; a drive takes {LONGEST}"
+            raise Diagnostic(what, "", "choose a shorter name, or split the line")
+        if _tokens(line, words, {name.word: word}) != _tokens(other, others, {}):
+            raise Diagnostic(f"line {number} would mean something else with {word}", "", "choose another name")
     return new
 
 
 def _taken(word: str, product: str) -> str:
-    """Name the owner of a word in use: the drive, or the program."""
     row = lookup(word, product)
     if row is not None:
         return f"{word} is a word of the drive: {row.title}"
     return f"{word} is a word of {', '.join(sorted(each for each in EVERY if lookup(word, each)))}"
-
-
-def _compare(before: Sequence[str], after: Sequence[str], old: str, new: str) -> None:
-    """Raise Diagnostic for a line that a rename makes too long, or that the drive would divide differently."""
-    lines = [_read(source) for source in before]
-    words = _declared_names(lines)
-    others = words - {old} | {new}
-    for number, (line, other) in enumerate(zip(lines, map(_read, after), strict=True), 1):
-        if len(other.text) > LONGEST >= len(line.text):
-            what = f"line {number} would have {len(other.text)} characters; a drive takes {LONGEST}"
-            raise Diagnostic(what, "", "choose a shorter name, or split the line")
-        if _tokens(line, words, {old: new}) != _tokens(other, others, {}):
-            raise Diagnostic(f"line {number} would mean something else with {new}", "", "choose another name")
 
 
 def _tokens(line: _Line, words: frozenset[str], new: Mapping[str, str]) -> list[str]:
@@ -171,13 +165,11 @@ _ACCESS = {"RW", "RO", "RC"}
 
 
 def words(line: str, names: Container[str]) -> list[Word]:
-    """Return the words of a line that may have help, operators included."""
     found = statement_tokens(line[: remark_at(line)], names)
     return [Word(each.start, each.stop, each.text.upper()) for each in found if each.kind in ("word", "op")]
 
 
 def describe(word: str, product: str) -> list[str]:
-    """Return the help on a mnemonic or operator; empty where there is none."""
     try:
         return help.describe(word, product)
     except Diagnostic:
@@ -208,7 +200,6 @@ def offers(before: str, names: Iterable[UserName], product: str) -> list[Offer]:
 
 
 def _fits(row: Mnemonic, place: str) -> bool:
-    """Whether a word of the drive may be typed at a place."""
     if place == STATEMENT:
         return row.kind != "math" and (row.kind == "instruction" or row.access in ("RW", "WO"))
     if place == PRINTED:
@@ -236,12 +227,16 @@ def outline(text: str) -> list[Block]:
 
 
 def _program(lines: Sequence[ProgramLine], sources: Sequence[str]) -> Block:
-    """Return a program, from its PG to the last of its lines."""
     first, last = lines[0], lines[-1].number - 1
     end = last - 1 if lines[-1].mark == "" and len(lines) > 1 else last
     parts = tuple(_declared(lines, sources, end))
     return Block(
-        "program", first.text.upper(), remark(sources[first.number - 1]), _place(first, len(first.text)), last, parts
+        "program",
+        first.text.upper(),
+        remark(sources[first.number - 1]),
+        Span(first.number - 1, first.column - 1, first.column - 1 + len(first.text)),
+        last,
+        parts,
     )
 
 
@@ -268,7 +263,3 @@ def _declared(lines: Sequence[ProgramLine], sources: Sequence[str], end: int) ->
 
 def _is_label(line: ProgramLine) -> bool:
     return line.text[:2].upper() == "LB"
-
-
-def _place(line: ProgramLine, width: int) -> Span:
-    return Span(line.number - 1, line.column - 1, line.column - 1 + width)

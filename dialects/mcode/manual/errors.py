@@ -363,7 +363,6 @@ def text(code: int, family: str = "LMD") -> str:
 
 
 def hint(code: int, family: str = "LMD") -> str:
-    """Return the remedy of an error; empty where there is no general one."""
     if _family(family) == "MDI":
         return _MDRIVE_HINTS.get(code, _HINTS.get(code, "") if code in TEXTS["MDI"] else "")
     return _HINTS.get(code, "")

@@ -67,12 +67,10 @@ class Token(NamedTuple):
 
     @property
     def stop(self) -> int:
-        """The column after its last character."""
         return self.start + len(self.text)
 
     @property
     def unclosed(self) -> bool:
-        """Whether it is a text without its closing quotation mark."""
         return self.kind == "text" and (len(self.text) < 2 or not self.text.endswith('"'))
 
 
@@ -171,7 +169,6 @@ def _tokens(line: str) -> list[Token]:
 
 
 def words(line: str) -> set[str]:
-    """Return the words of a line in capitals, without splitting its head."""
     return {token.text.upper() for token in tokens(line) if token.kind == "word"}
 
 
@@ -210,6 +207,14 @@ def _read(line: str, names: Container[str] = ()) -> Statement | LineError | None
         return _Parser(found, len(line), names).statement()
     except LineError as error:
         return error
+
+
+def parsed(line: str, names: Container[str] = ()) -> Statement | None:
+    """Parse a line; None also for one that no drive accepts."""
+    try:
+        return parse(line, names)
+    except LineError:
+        return None
 
 
 def check_groups(line: str, names: Container[str] = ()) -> None:
@@ -315,7 +320,6 @@ class _Parser:
         return Text(token.text, quoted=False)
 
     def prints(self) -> tuple[tuple[Argument | None, ...], bool]:
-        """Parse PR's list: commas may be missing; a semicolon may end it."""
         items: list[Argument | None] = []
         while (token := self.peek()) is not None and token.kind != "end":
             if items and token.kind == "comma":
@@ -339,7 +343,10 @@ class _Parser:
         items: list[Argument | None] = []
         while self.peek() is not None:
             token = self.found[self.at]
-            items.append(None if token.kind == "comma" else self.argument())
+            if token.kind == "comma":
+                items.append(None)
+            else:
+                items.append(self.text() if token.kind == "text" else self.condition())
             token_after = self.peek()
             if token_after is None:
                 break
@@ -354,9 +361,6 @@ class _Parser:
             self.at += 1
         return tuple(items)
 
-    def argument(self) -> Argument:
-        return self.text() if self.found[self.at].kind == "text" else self.condition()
-
     def condition(self) -> Expression:
         """Parse a value, or comparisons and logic from left to right."""
         value = self.expression(OPERATORS)
@@ -365,32 +369,41 @@ class _Parser:
             if op not in COMPARISONS | OPERATORS:
                 break
             self.at += 1
-            value = Compare(op, value, self.expression(self.side)) if op in COMPARISONS else self.operation(op, value)
+            if op in COMPARISONS:
+                value = Compare(op, value, self.expression(self.side))
+            else:
+                value = Binary(op, value, self.operand())
         return value
 
     def expression(self, operators: Container[str]) -> Expression:
         value = self.operand()
         while (token := self.peek()) is not None and token.text in operators:
             self.at += 1
-            value = self.operation(token.text, value)
+            value = Binary(token.text, value, self.operand())
         return value
-
-    def operation(self, op: str, left: Expression) -> Binary:
-        return Binary(op, left, self.operand())
 
     def operand(self) -> Expression:
         token = self.advance()
         if token is None:
             raise LineError(ErrorNumber.ILLEGAL_DATA, self.width, "something is missing at the end")
         if token.kind == "number":
-            return Number(_number(token))
+            digits = token.text
+            value = int(digits) if digits.isdigit() and len(digits) < 20 else float(digits)
+            if value == inf:
+                raise LineError(ErrorNumber.ILLEGAL_DATA, token.start, f"{digits} is beyond any range")
+            return Number(value)
         if token.kind == "word":
             word = token.text.upper()
             if word in FUNCTIONS and word not in self.names and self.at_operand():
                 return Unary(word, self.operand())
             return Name(word, token.start)
         if token.text in ("-", "+", "!"):
-            return _signed(token.text, self.operand())
+            operand = self.operand()
+            if token.text == "+":
+                return operand
+            if token.text == "-" and isinstance(operand, Number):
+                return Number(-operand.value)
+            return Unary(token.text, operand)
         raise LineError(ErrorNumber.ILLEGAL_DATA, token.start, _misplaced(token))
 
     def at_operand(self) -> bool:
@@ -423,22 +436,6 @@ class _Parser:
         token = self.peek()
         self.at += 1
         return token
-
-
-def _number(token: Token) -> int | float:
-    digits = token.text
-    value = int(digits) if digits.isdigit() and len(digits) < 20 else float(digits)
-    if value == inf:
-        raise LineError(ErrorNumber.ILLEGAL_DATA, token.start, f"{digits} is beyond any range")
-    return value
-
-
-def _signed(op: str, operand: Expression) -> Expression:
-    if op == "+":
-        return operand
-    if op == "-" and isinstance(operand, Number):
-        return Number(-operand.value)
-    return Unary(op, operand)
 
 
 def _misplaced(token: Token) -> str:

@@ -94,7 +94,6 @@ def acts(text: str) -> bool:
 
 
 def word_of(text: str, product: str = "") -> str:
-    """The word at the head of a line, in capitals."""
     return _head(bare(text), product).word
 
 
@@ -120,7 +119,6 @@ def _head(line: str, product: str) -> _Head:
 
 
 def _read(line: str, product: str) -> tuple[str, int | str] | None:
-    """The word and the value of a line; None where it begins with no known word."""
     try:
         statement = parse(line)
     except LineError:

@@ -10,7 +10,7 @@ import re
 from multidrop.dialects.errors import Diagnostic
 from multidrop.dialects.mcode.manual import errors
 from multidrop.dialects.mcode.manual.errors import ErrorNumber
-from multidrop.dialects.mcode.manual.grammar import LineError, Number, Statement, parse, tokens
+from multidrop.dialects.mcode.manual.grammar import LineError, Number, Statement, parse, parsed, tokens
 from multidrop.dialects.mcode.manual.statements import condition_of, condition_reading, is_mixed, words_of
 from multidrop.dialects.mcode.manual.table import EVERY, LEXIUM, MDRIVE, MDRIVE_PLUS, MNEMONICS, Mnemonic, lookup, words
 
@@ -28,31 +28,39 @@ _SPLIT = re.compile(r"([A-Za-z]+)-?\d", re.ASCII)
 
 
 def names() -> list[str]:
-    """The words that have help."""
     return sorted({*MNEMONICS, *MDRIVE})
 
 
 def knows(word: str) -> bool:
-    """Whether a word has help."""
     return lookup(word) is not None
 
 
 def describe(word: str, product: str = "") -> list[str]:
     """Describe a mnemonic or operator, line by line. Raises Diagnostic with similar words."""
-    row = _row(word, product)
+    row = words(product).get(word.strip().upper()) or lookup(word)
     if row is None:
         near = _near(word.strip(), product)
         raise Diagnostic(f"no mnemonic {word.strip()!r}", "", f"perhaps {', '.join(near)}" if near else "")
+    older = row.reserved_on <= MDRIVE_PLUS
+    default = "" if row.default is None else str(row.default)
+    if row.default is not None and row.default_encoder is not None:
+        default += f" (EE=0), {row.default_encoder} (EE=1)"
+    use = "immediate only" if row.immediate else "in programs only"
+    if row.immediate and row.program:
+        use = "immediate and in programs"
+    here = ""
+    if product in EVERY and product not in row.products:
+        here = f"not in an {product}: error 37" if product in row.reserved_on else f"a free name in an {product}"
     facts = (
         ("syntax", row.syntax),
         ("range", _range(row)),
-        ("default", _default(row)),
+        ("default", default),
         ("access", ACCESS[row.access] if row.kind in ("variable", "flag", "keyword") else ""),
-        ("use", _use(row)),
+        ("use", use if row.kind not in ("math", "reserved") else ""),
         ("products", _products(row.name)),
-        ("here", _here(row, product)),
+        ("here", here),
         ("note", row.note),
-        ("manual", _manual(row)),
+        ("manual", (f"MCode reference of 2012, page {row.section}" if older else f"MCode reference {row.section}")),
     )
     lines = [f"  {label:<10} {fact}" for label, fact in facts if fact]
     return [f"{row.name}: {row.title} ({row.kind})", f"  {row.meaning}", *lines]
@@ -101,8 +109,10 @@ def hint(text: str, product: str = "") -> str:
     first = _WORD.match(plain)
     if first is None:
         return ""
-    if read := _reading(text):
-        return read
+    statement = parsed(text)
+    condition = condition_of(statement) if statement is not None else None
+    if condition is not None and is_mixed(condition):
+        return f"read as {condition_reading(condition)}"
     row = _row_of(first.group(), product)
     if row is not None and row.name == "PR":
         printed = [found for word in _WORD.findall(plain[first.end() :]) if (found := _row_of(word, product))]
@@ -112,24 +122,8 @@ def hint(text: str, product: str = "") -> str:
 
 
 def _told(row: Mnemonic) -> str:
-    """Meaning and place in the manual, in one line."""
     older = row.reserved_on <= MDRIVE_PLUS
     return f"{row.meaning}; manual {'page ' if older else ''}{row.section}" if row.section else row.meaning
-
-
-def _reading(text: str) -> str:
-    """Show how a condition that mixes comparison and logic is read; empty for any other line."""
-    try:
-        statement = parse(text)
-    except LineError:
-        return ""
-    condition = condition_of(statement) if statement is not None else None
-    return f"read as {condition_reading(condition)}" if condition is not None and is_mixed(condition) else ""
-
-
-def _row(word: str, product: str) -> Mnemonic | None:
-    """The row of the product, otherwise of any product."""
-    return words(product).get(word.strip().upper()) or lookup(word)
 
 
 def _row_of(word: str, product: str) -> Mnemonic | None:
@@ -172,21 +166,6 @@ def _span(row: Mnemonic, encoder: bool) -> str:
     return f"{low:g} to {high:g} {unit}".strip() if isinstance(high, float) else f"{low} to {high} {unit}".strip()
 
 
-def _default(row: Mnemonic) -> str:
-    if row.default is None:
-        return ""
-    if row.default_encoder is not None:
-        return f"{row.default} (EE=0), {row.default_encoder} (EE=1)"
-    return str(row.default)
-
-
-def _use(row: Mnemonic) -> str:
-    if row.kind in ("math", "reserved"):
-        return ""
-    both = "immediate and in programs"
-    return both if row.immediate and row.program else "immediate only" if row.immediate else "in programs only"
-
-
 def _products(name: str) -> str:
     """The products that have a word, from all tables."""
     found = frozenset().union(*(table[name].products for table in (MNEMONICS, MDRIVE) if name in table))
@@ -196,19 +175,6 @@ def _products(name: str) -> str:
     for everyone, family in ((LEXIUM, "Lexium MDrive and Motion Module"), (MDRIVE_PLUS, "MDrivePlus")):
         parts += [family] if everyone <= found else sorted(found & everyone)
     return ", ".join(parts)
-
-
-def _manual(row: Mnemonic) -> str:
-    """The place in the manual: sections of the Lexium's reference, pages of the older one."""
-    older = row.reserved_on <= MDRIVE_PLUS
-    return f"MCode reference of 2012, page {row.section}" if older else f"MCode reference {row.section}"
-
-
-def _here(row: Mnemonic, product: str) -> str:
-    """The fate of the word on the product."""
-    if product not in EVERY or product in row.products:
-        return ""
-    return f"not in an {product}: error 37" if product in row.reserved_on else f"a free name in an {product}"
 
 
 # What to do about a line that a drive refuses: the word's range, its form or its products, else the error's remedy.

@@ -82,17 +82,6 @@ def dependents(now: Mapping[str, Value], wanted: Mapping[str, Value], withheld: 
     goal = {name: value for name, value in wanted.items() if name not in withheld}
     final = {**now, **goal}
     changed = {name: value for name, value in goal.items() if not same(value, now.get(name))}
-    found = {**_without_motion(now, final, changed, withheld), **_without_points(now, changed, withheld)}
-    if manual.counting(final) != manual.counting({**now, **wanted}):
-        found |= dict.fromkeys(IN_UNITS | {"MS"}, "it is in the other unit of motion (EE, AS)")
-    if manual.counting(now) and not manual.counting(final) and "MS" not in goal:
-        found["VM"] = "the MS that comes into force is not known, and the file has none"
-    return {name: reason for name, reason in found.items() if name in goal}
-
-
-def _without_motion(
-    now: Mapping[str, Value], final: Mapping[str, Value], changed: Mapping[str, Value], withheld: Collection[str]
-) -> dict[str, str]:
     found: dict[str, str] = {}
     if changed.get("AS") and 0 in (now.get("DE"), final.get("DE")):
         found["AS"] = "hMT needs DE=1"
@@ -104,7 +93,12 @@ def _without_motion(
         found |= dict.fromkeys(("MF", "TS"), "it can be set in steps only (EE=0)")
     if changed.get("FL") and _kind(final.get("IS3")) not in CLOCKS:
         found["FL"] = "inputs 3 and 4 are no clock"
-    return found
+    found = {**found, **_without_points(now, changed, withheld)}
+    if manual.counting(final) != manual.counting({**now, **wanted}):
+        found |= dict.fromkeys(IN_UNITS | {"MS"}, "it is in the other unit of motion (EE, AS)")
+    if manual.counting(now) and not manual.counting(final) and "MS" not in goal:
+        found["VM"] = "the MS that comes into force is not known, and the file has none"
+    return {name: reason for name, reason in found.items() if name in goal}
 
 
 def _without_points(
@@ -140,8 +134,34 @@ def check_together(product: str, final: Mapping[str, Value], counts: bool, goal:
         if number(final["VM"]) > fastest:
             raise Diagnostic(f"VM = {final['VM']}: with MS = {final['MS']} at most {fastest:g}")
     _check_resolution(product, final, counts, goal)
-    _check_limits(final, goal)
-    _check_points(product, final, goal)
+    low, high = final.get("LS0"), final.get("LS1")
+    for name in ("LS0", "LS1"):
+        value = final.get(name)
+        if name in goal and not (isinstance(value, tuple) and len(value) == 2 and value[1] in (0, 1)):
+            raise Diagnostic(f"{name} = {value}: takes a position and 0 or 1")
+    if ("LS0" in goal or "LS1" in goal) and crossed(low, high):
+        raise Diagnostic(f"LS0 = {low} and LS1 = {high}: the minus limit must be below the plus limit")
+    points = {name: value for name, value in final.items() if types(name, product) and isinstance(value, tuple)}
+    for name, value in points.items():
+        if name in goal:
+            valid = types(name, product)
+            if value[0] not in valid:
+                raise Diagnostic(
+                    f"{name} = {list(value)}: type {value[0]}; valid: {', '.join(map(str, sorted(valid)))}"
+                )
+            sources = product in EXPANDED or value[0] not in _OUTPUT
+            if any(each not in (0, 1) for each in value[1:]) or (len(value) > 2 and value[2] and not sources):
+                raise Diagnostic(
+                    f"{name} = {list(value)}: fields after the type must be 0 or 1, as the product has them"
+                )
+            other = points.get(PAIRS.get(name, ""))
+            follows = name.startswith("S") and PAIRS.get(name) not in goal
+            if other is not None and not follows and CLOCKS & {value[0], other[0]} and value[0] != other[0]:
+                raise Diagnostic(f"{name} and {PAIRS[name]}: a clock takes both, with one type")
+    for (one, first), (two, second) in combinations(points.items(), 2):
+        grouped = group(one) == group(two) and first[0] == second[0]
+        if grouped and first[0] not in SHARED and (one in goal or two in goal):
+            raise Diagnostic(f"{one} and {two}: only one of them can have type {first[0]}")
 
 
 def _check_resolution(product: str, final: Mapping[str, Value], counts: bool, goal: Collection[str]) -> None:
@@ -157,45 +177,11 @@ def _check_resolution(product: str, final: Mapping[str, Value], counts: bool, go
         raise Diagnostic(f"MS = {final['MS']}: too coarse for EL = {final['EL']} with SA = {final['SA']}")
 
 
-def _check_limits(final: Mapping[str, Value], goal: Collection[str]) -> None:
-    low, high = final.get("LS0"), final.get("LS1")
-    for name in ("LS0", "LS1"):
-        value = final.get(name)
-        if name in goal and not (isinstance(value, tuple) and len(value) == 2 and value[1] in (0, 1)):
-            raise Diagnostic(f"{name} = {value}: takes a position and 0 or 1")
-    if ("LS0" in goal or "LS1" in goal) and crossed(low, high):
-        raise Diagnostic(f"LS0 = {low} and LS1 = {high}: the minus limit must be below the plus limit")
-
-
 def crossed(low: Value | None, high: Value | None) -> bool:
     """Whether two enabled software limits leave no way between them."""
     if not (isinstance(low, tuple) and isinstance(high, tuple)):
         return False
     return bool(low[1] and high[1]) and number(low[0]) >= number(high[0])
-
-
-def _check_points(product: str, final: Mapping[str, Value], goal: Collection[str]) -> None:
-    points = {name: value for name, value in final.items() if types(name, product) and isinstance(value, tuple)}
-    for name, value in points.items():
-        if name in goal:
-            _check_point(name, value, product)
-            other = points.get(PAIRS.get(name, ""))
-            follows = name.startswith("S") and PAIRS.get(name) not in goal
-            if other is not None and not follows and CLOCKS & {value[0], other[0]} and value[0] != other[0]:
-                raise Diagnostic(f"{name} and {PAIRS[name]}: a clock takes both, with one type")
-    for (one, first), (two, second) in combinations(points.items(), 2):
-        grouped = group(one) == group(two) and first[0] == second[0]
-        if grouped and first[0] not in SHARED and (one in goal or two in goal):
-            raise Diagnostic(f"{one} and {two}: only one of them can have type {first[0]}")
-
-
-def _check_point(name: str, value: tuple[object, ...], product: str) -> None:
-    valid = types(name, product)
-    if value[0] not in valid:
-        raise Diagnostic(f"{name} = {list(value)}: type {value[0]}; valid: {', '.join(map(str, sorted(valid)))}")
-    sources = product in EXPANDED or value[0] not in _OUTPUT
-    if any(each not in (0, 1) for each in value[1:]) or (len(value) > 2 and value[2] and not sources):
-        raise Diagnostic(f"{name} = {list(value)}: fields after the type must be 0 or 1, as the product has them")
 
 
 def group(name: str) -> str:
@@ -226,7 +212,6 @@ class Steps:
         self.changes: list[Change] = []
 
     def differs(self, name: str) -> bool:
-        """Whether the drive's value is not the goal's."""
         return name in self.goal and not same(self.goal[name], self.now.get(name))
 
     def reach(self, *names: str) -> None:
@@ -236,7 +221,6 @@ class Steps:
                 self.send(name, self.goal[name])
 
     def send(self, name: str, value: Value, temporary: bool = False) -> None:
-        """Add a step, and follow what it does to other settings."""
         new = name not in self.now and rules.row_of(name, self.product) is None
         before, counted = self.now.get(name), self.counting
         self.changes.append(Change(name, before, value, rules.line(name, value, new), temporary))
@@ -244,7 +228,11 @@ class Steps:
         if name == "MS":
             self.forget(COUNTED - {"MS"})
         if self.counting != counted:
-            self._exchange()
+            # Follow a change of the unit of motion: the other values come into force.
+            locked = manual.locks_resolution(self.product)
+            self.forget(COUNTED if locked else COUNTED - {"MS"})
+            if locked and self.counting:
+                self.now["MS"] = FINEST
         if name == "AS" and before == TORQUE:
             self.forget(["CB"])  # torque mode shows another
         if name == "DE" and not value and self.now.get("AS") in (1, 2):
@@ -258,12 +246,10 @@ class Steps:
         return manual.counting(self.now)
 
     def number(self, name: str) -> float | None:
-        """A value as a number; None where it is not known."""
         value = self.now.get(name)
         return value if isinstance(value, (int, float)) else None
 
     def forget(self, names: Iterable[str]) -> None:
-        """Make values unknown."""
         for name in names:
             if name in self.now:
                 self.now[name] = None
@@ -273,13 +259,6 @@ class Steps:
         held = [(name, self.now.get(name)) for name in names if name in self.now and name not in self.goal]
         self.goal.update({name: value for name, value in held if value is not None})
         return all(value is not None for _, value in held)
-
-    def _exchange(self) -> None:
-        """Follow a change of the unit of motion: the other values come into force."""
-        locked = manual.locks_resolution(self.product)
-        self.forget(COUNTED if locked else COUNTED - {"MS"})
-        if locked and self.counting:
-            self.now["MS"] = FINEST
 
     def _pair(self, name: str, value: tuple[object, ...], before: Value | None) -> None:
         """Follow the other point of a clock: both have one type."""
@@ -428,13 +407,11 @@ def _resolution(steps: Steps) -> None:
 
 
 def _finer(steps: Steps, name: str) -> bool:
-    """Whether a step makes microsteps finer for the encoder."""
     goal, now = number(steps.goal[name]), steps.number(name)
     return now is None or (goal > now) == (name == "MS")
 
 
 def _velocities(steps: Steps) -> None:
-    """Reach A and D, then VI and VM, of which VI is below VM after each step."""
     steps.reach("A", "D")
     if steps.differs("VI") and steps.differs("VM"):
         slowest, fastest = steps.number("VI"), number(steps.goal["VM"])
@@ -475,6 +452,5 @@ def _points(steps: Steps) -> None:
 
 
 def _claimed(steps: Steps, name: str, kind: object, names: list[str]) -> bool:
-    """Whether another point is to have a type."""
     others = [each for each in names if each != name and group(each) == group(name)]
     return any(isinstance(goal := steps.goal[each], tuple) and goal[0] == kind for each in others)

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Collection, Mapping
-from dataclasses import dataclass
 from enum import Enum
 from functools import lru_cache
 from math import isfinite
@@ -63,30 +62,19 @@ class Form(Enum):
     TRIP = r"-?[A-Z0-9]+(?: *, *-?[A-Z0-9]+)*"
 
 
-@dataclass(frozen=True)
-class Setting:
-    """A setting that PR prints beside others on one line."""
-
-    row: Mnemonic
-    form: Form
-
-    @property
-    def name(self) -> str:
-        """The word."""
-        return self.row.name
-
-
 def exact(product: str) -> bool:
     """Whether a product has a table of its own; others get the words of every Lexium."""
     return product in EVERY
 
 
 @lru_cache(maxsize=64)
-def settings(product: str, version: str = "", part: str = "") -> tuple[Setting, ...]:
+def settings(product: str, version: str = "", part: str = "") -> tuple[Mnemonic, ...]:
     """The settings that a drive prints beside others, in the order of their forms."""
-    lacks, forms = _lacking(version, part), list(Form)
-    rows = [row for row in words(product).values() if _settable(row, product) and row.name not in lacks]
-    return tuple(sorted((Setting(row, form_of(row)) for row in rows), key=lambda each: forms.index(each.form)))
+    lacks, forms, known = _lacking(version, part) | STATES | {"DN"}, list(Form), exact(product)
+    rows = [row for row in words(product).values() if row.access == "RW" and row.kind in ("variable", "flag")]
+    rows = [row for row in rows if (product in row.products if known else row.products >= LEXIUM)]
+    rows = [row for row in rows if not row.lines and row.name not in lacks]
+    return tuple(sorted(rows, key=lambda row: forms.index(form_of(row))))
 
 
 def lists(product: str, version: str = "") -> dict[str, tuple[int, ...]]:
@@ -102,14 +90,12 @@ def lists(product: str, version: str = "") -> dict[str, tuple[int, ...]]:
 
 
 def unread(product: str) -> tuple[tuple[str, str], ...]:
-    """The settings of a product that it does not print."""
     if not exact(product):
         return (HANDLER_UNREAD, ("other words", f"the product '{product}' is not known: every Lexium has these words"))
     return (HANDLER_UNREAD, *((ANALOG_UNREAD,) if product in LEXIUM - {"LMM"} else ()))
 
 
 def has_encoder(product: str) -> bool:
-    """Whether EE is a word of a product."""
     return product in ENCODER | MDRIVE_ENCODER
 
 
@@ -144,7 +130,6 @@ def section(name: str) -> str:
 
 
 def fixed(name: str) -> bool:
-    """Whether a word is only written when a person names it."""
     return name in WIRE or name in UNIT
 
 
@@ -156,12 +141,6 @@ def reading_of(name: str, value: Value, row: Mnemonic | None, counts: bool) -> R
         if default is None:
             default = row.default_encoder if counts and row.default_encoder is not None else row.default
     return Reading(name, value, section(name), unit, default, fixed(name))
-
-
-def _settable(row: Mnemonic, product: str) -> bool:
-    has = product in row.products if exact(product) else row.products >= LEXIUM
-    kept = row.access == "RW" and row.kind in ("variable", "flag")
-    return has and kept and not row.lines and row.name not in STATES | {"DN"}
 
 
 def _lacking(version: str, part: str) -> frozenset[str]:
@@ -248,13 +227,35 @@ def checked(name: str, value: Value, product: str, counts: bool, labels: Collect
     if isinstance(value, float) and value.is_integer() and not (row is not None and isinstance(row.default, float)):
         value = int(value)
     if row is None:
-        return _user(name, value, labels)
+        if not is_name(name):
+            raise Diagnostic(f"{name}: is neither a word of the drive nor a name for a variable")
+        if name in labels:
+            raise Diagnostic(f"{name}: is a label of the program in the drive, so no variable can have that name")
+        if not (isinstance(value, int) and INT_LOW <= value <= INT_HIGH):
+            raise Diagnostic(f"{name} = {value}: a variable takes a whole number from {INT_LOW} to {INT_HIGH}")
+        return value
     if exact(product) and product not in row.products:
         raise Diagnostic(f"{name}: an {product} lacks it")
     if name in TRIPS:
-        return _trip(name, value, row)
+        # A trip: a target alone, or a number, a target, and for TR the repeats.
+        fields = value if isinstance(value, tuple) else (value,)
+        alone, most = name in ("TC", "TM"), 3 if name == "TR" else 2
+        target = fields[0 if alone else 1 : 1 if alone else 2]
+        valid = len(fields) == 1 if alone else 2 <= len(fields) <= most or value == 0
+        valid = valid and all(isinstance(each, int) or (each in target and isinstance(each, str)) for each in fields)
+        first = fields[0]
+        if valid and not alone and value != 0:
+            valid = isinstance(first, int) and row.accepts(first) and not (name == "TR" and first == 0)
+        if not valid or any(not 0 <= number(each) <= MOST_REPEATS for each in fields[2:]):
+            raise Diagnostic(f"{name} = {value}: takes {row.syntax.partition(', PR')[0]}")
+        return value
     if (count := _fields_of(name)) is not None:
-        return _setup(name, value, count)
+        if not (isinstance(value, tuple) and len(value) == count and all(isinstance(each, int) for each in value)):
+            raise Diagnostic(f"{name} = {value}: takes {count} whole numbers, as in {name} = {[0] * count}")
+        for each, most in zip(value, PRINT_FORMAT if name == "PF" else (), strict=False):
+            if not 0 <= number(each) <= most:
+                raise Diagnostic(f"{name} = {list(value)}: valid: up to {list(PRINT_FORMAT)}")
+        return value
     if row.access != "RW" or row.kind not in ("variable", "flag"):
         raise Diagnostic(f"{name}: is not a setting ({row.title})")
     if name == "DN":
@@ -265,47 +266,12 @@ def checked(name: str, value: Value, product: str, counts: bool, labels: Collect
     return value
 
 
-def _user(name: str, value: Value, labels: Collection[str]) -> Value:
-    if not is_name(name):
-        raise Diagnostic(f"{name}: is neither a word of the drive nor a name for a variable")
-    if name in labels:
-        raise Diagnostic(f"{name}: is a label of the program in the drive, so no variable can have that name")
-    if not (isinstance(value, int) and INT_LOW <= value <= INT_HIGH):
-        raise Diagnostic(f"{name} = {value}: a variable takes a whole number from {INT_LOW} to {INT_HIGH}")
-    return value
-
-
 def _fields_of(name: str) -> int | None:
-    """The number of fields of a set-up; None for a setting of one value."""
     if _SETUP.fullmatch(name):
         return 2
     if name in FIELDS:
         return FIELDS[name]
     return (2 if name in PAIRED else 3) if _POINT.fullmatch(name) else None
-
-
-def _setup(name: str, value: Value, count: int) -> Value:
-    if not (isinstance(value, tuple) and len(value) == count and all(isinstance(each, int) for each in value)):
-        raise Diagnostic(f"{name} = {value}: takes {count} whole numbers, as in {name} = {[0] * count}")
-    for each, most in zip(value, PRINT_FORMAT if name == "PF" else (), strict=False):
-        if not 0 <= number(each) <= most:
-            raise Diagnostic(f"{name} = {list(value)}: valid: up to {list(PRINT_FORMAT)}")
-    return value
-
-
-def _trip(name: str, value: Value, row: Mnemonic) -> Value:
-    """A trip: a target alone, or a number, a target, and for TR the repeats."""
-    fields = value if isinstance(value, tuple) else (value,)
-    alone, most = name in ("TC", "TM"), 3 if name == "TR" else 2
-    target = fields[0 if alone else 1 : 1 if alone else 2]
-    valid = len(fields) == 1 if alone else 2 <= len(fields) <= most or value == 0
-    valid = valid and all(isinstance(each, int) or (each in target and isinstance(each, str)) for each in fields)
-    first = fields[0]
-    if valid and not alone and value != 0:
-        valid = isinstance(first, int) and row.accepts(first) and not (name == "TR" and first == 0)
-    if not valid or any(not 0 <= number(each) <= MOST_REPEATS for each in fields[2:]):
-        raise Diagnostic(f"{name} = {value}: takes {row.syntax.partition(', PR')[0]}")
-    return value
 
 
 def _out_of_range(name: str, value: Value, row: Mnemonic, counts: bool) -> Diagnostic:
@@ -344,10 +310,6 @@ def risk(name: str, value: Value, now: Mapping[str, Value | None]) -> str:
         return "the drive may make up lost steps at once"
     if name == "EE" and now.get("PM"):
         return SWITCHES["PM"]
-    return _risk_of_setup(name, value, now)
-
-
-def _risk_of_setup(name: str, value: Value, now: Mapping[str, Value | None]) -> str:
     if name in TRIPS and isinstance(value, tuple) and isinstance(value[1], int) and value[1]:
         return "it calls an address, which may hold another program's line"
     point = name.startswith(tuple(LISTS)) or _POINT.fullmatch(name) is not None

@@ -59,10 +59,13 @@ SET = "PR ER shows and clears it"
 
 
 def conditions(product: str, facts: Facts, target: int | None) -> Conditions:
-    """Fold what was read of a drive."""
-    limits = _limits(facts)
+    rows = [facts.get(name) for name in ("LS0", "LS1")]
+    found = [int(number(row[0])) for row in rows if isinstance(row, tuple) and len(row) == 2 and row[1]]
+    limits = (found[0], found[1]) if len(found) == 2 and found[0] < found[1] else None
+    pace = [number(facts[name]) for name in ("VI", "VM", "A", "D") if name in facts]
+    analog = (Lamp("ai", str(facts["I5"])),) if "I5" in facts else ()  # neither on nor off
     return Conditions(
-        lamps=(*_inputs(product, facts), *_analog(facts), *_outputs(facts)),
+        lamps=(*_inputs(product, facts), *analog, *_outputs(facts)),
         error=UNREAD if facts.get("EF") else 0,
         error_text=SET if facts.get("EF") else "",
         program="running" if facts.get("BY") else "",
@@ -75,19 +78,12 @@ def conditions(product: str, facts: Facts, target: int | None) -> Conditions:
         hold_current=_whole(facts, "HC"),
         more=tuple(_more(facts)),
         unit="counts" if counting(facts) else "steps",
-        pace=_pace(facts),
+        pace=Pace(*pace) if len(pace) == 4 else None,
     )
 
 
 def _whole(facts: Facts, name: str) -> int | None:
     return int(number(facts[name])) if name in facts else None
-
-
-def _pace(facts: Facts) -> Pace | None:
-    names = ("VI", "VM", "A", "D")
-    if any(name not in facts for name in names):
-        return None
-    return Pace(*(number(facts[name]) for name in names))
 
 
 def _disabled(facts: Facts) -> str:
@@ -98,15 +94,7 @@ def _disabled(facts: Facts) -> str:
     return "locked rotor; CF clears it" if locked else ""
 
 
-def _limits(facts: Facts) -> tuple[int, int] | None:
-    """The travel between both software limits, where both are enabled."""
-    rows = [facts.get(name) for name in ("LS0", "LS1")]
-    found = [int(number(row[0])) for row in rows if isinstance(row, tuple) and len(row) == 2 and row[1]]
-    return (found[0], found[1]) if len(found) == 2 and found[0] < found[1] else None
-
-
 def _setup(facts: Facts, words: tuple[str, str]) -> tuple[int, int] | None:
-    """Type and active level of a point."""
     row = next((facts[word] for word in words if word in facts), None)
     return (int(number(row[0])), int(number(row[1]))) if isinstance(row, tuple) and len(row) > 1 else None
 
@@ -123,12 +111,6 @@ def _inputs(product: str, facts: Facts) -> Iterator[Lamp]:
         elif "IN" in facts:
             on = (int(number(facts["IN"])) >> bit & 1) == active
         yield Lamp(str(n), FUNCTIONS.get(kind, f"type {kind}"), on)
-
-
-def _analog(facts: Facts) -> Iterator[Lamp]:
-    """The reading of the analog input; it is neither on nor off."""
-    if "I5" in facts:
-        yield Lamp("ai", str(facts["I5"]))
 
 
 def _outputs(facts: Facts) -> Iterator[Lamp]:

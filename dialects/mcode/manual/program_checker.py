@@ -55,7 +55,6 @@ def check_products(read: Read, names: frozenset[str], product: str) -> Iterator[
 
 
 def _lacks(product: str, word: str) -> bool:
-    """Whether a product does not execute a word."""
     row = lookup(word, product)
     return row is None or product not in row.products
 
@@ -95,7 +94,17 @@ def check_trips(read: _Read, mentioned: Container[str]) -> Iterator[Problem]:
                 hint = f"TE={bit} enables it, after each trip again"
                 yield Problem(line.number, line.column + statement.column, what, hint, warning=True)
     missing = {word: bit for word, bit in BITS.items() if word not in first and word not in mentioned}
-    yield from _undefined(read, missing)
+    # Report the first TE for each set of trips that nothing sets up.
+    reported = set[str]()
+    for line, statement in read:
+        bits = _bits(statement) if statement.word == "TE" and statement.arguments else None
+        words = [word for word, bit in missing.items() if (bits or 0) & bit and word not in reported]
+        if words:
+            reported.update(words)
+            what = f"TE enables {', '.join(words)}, which nothing in this file sets up"
+            yield Problem(
+                line.number, line.column + statement.column, what, "a drive refuses it: error 27", warning=True
+            )
 
 
 def _bits(statement: Statement) -> int | None:
@@ -114,20 +123,6 @@ def _enabled(read: _Read) -> int | None:
                 return None
             found |= bits
     return found
-
-
-def _undefined(read: _Read, missing: Mapping[str, int]) -> Iterator[Problem]:
-    """Report the first TE for each set of trips that nothing sets up."""
-    reported = set[str]()
-    for line, statement in read:
-        bits = _bits(statement) if statement.word == "TE" and statement.arguments else None
-        words = [word for word, bit in missing.items() if (bits or 0) & bit and word not in reported]
-        if words:
-            reported.update(words)
-            what = f"TE enables {', '.join(words)}, which nothing in this file sets up"
-            yield Problem(
-                line.number, line.column + statement.column, what, "a drive refuses it: error 27", warning=True
-            )
 
 
 TARGETS = {"BR": 0, "CL": 0, "OE": 0, "TA": 1}
@@ -203,7 +198,6 @@ def _out_of_range(read: Sequence[tuple[ProgramLine, Statement]], product: str) -
 
 
 def slips(lines: Sequence[ProgramLine], variables: Iterable[str]) -> list[Problem]:
-    """Report what a drive with only these variables would refuse of a file."""
     reader = _Reader(lines, variables)
     return [each for line in lines for each in reader.read(line) if not each.warning]
 
@@ -225,7 +219,6 @@ class _Reader:
         """By the number of the line, also where it names what there is not."""
 
     def read(self, line: ProgramLine) -> Iterator[Problem]:
-        """Report the problems of one line."""
         try:
             statement = parse(line.text, self.names)
         except LineError as wrong:
@@ -242,10 +235,17 @@ class _Reader:
             return
         yield from self.label(line, statement)
         yield from self.places(line, statement)
-        yield from _condition(line, statement)
+        # Warn of a condition that exceeds the manual's form.
+        condition = condition_of(statement)
+        if condition is None or not is_mixed(condition):
+            return
+        first = next(names_in(condition), None)
+        column = first.column if first else statement.column
+        hint = "the manual allows one comparison; split it into two lines to be sure"
+        what = f"more than one comparison is read as {condition_reading(condition)}"
+        yield Problem(line.number, line.column + column, what, hint, warning=True)
 
     def label(self, line: ProgramLine, statement: Statement) -> Iterator[Problem]:
-        """Report a label that exists already."""
         first = statement.arguments[0] if statement.arguments else None
         if statement.word != "LB" or not isinstance(first, Name):
             return
@@ -255,7 +255,6 @@ class _Reader:
         self.labels.setdefault(first.word, line.number)
 
     def places(self, line: ProgramLine, statement: Statement) -> Iterator[Problem]:
-        """Report names that nothing in the file declares."""
         at = TARGETS.get(statement.word)
         for place, argument in enumerate(statement.arguments):
             for name in names_in(argument):
@@ -272,15 +271,3 @@ def _elsewhere(word: str) -> str:
     if lookup(word) is None:
         return ""
     return "other drives have it (--personality says which this is for); as a name it needs VA"
-
-
-def _condition(line: ProgramLine, statement: Statement) -> Iterator[Problem]:
-    """Warn of a condition that exceeds the manual's form."""
-    condition = condition_of(statement)
-    if condition is None or not is_mixed(condition):
-        return
-    first = next(names_in(condition), None)
-    column = first.column if first else statement.column
-    hint = "the manual allows one comparison; split it into two lines to be sure"
-    what = f"more than one comparison is read as {condition_reading(condition)}"
-    yield Problem(line.number, line.column + column, what, hint, warning=True)

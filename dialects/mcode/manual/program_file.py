@@ -11,7 +11,7 @@ execute a program whose PG was forgotten.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from math import inf
 from typing import TYPE_CHECKING
@@ -159,28 +159,20 @@ def _sections(lines: list[ProgramLine]) -> tuple[list[str], list[Problem]]:
         inside.append(opened is not None or line.mark is not None)
         if line.mark is None:
             continue
-        problems += _unpaired(line, opened)
-        opens = bool(line.mark) or (opened is None and _ends_next(lines[at + 1 :]))
+        if opened is None and not line.mark:
+            what, hint = "PG without an address, and no program to end", "begin with PG 1"
+            problems.append(Problem(line.number, line.column, what, hint))
+        if opened is not None and line.mark:
+            what = f"{line.text} inside the program of line {opened.number}"
+            problems.append(Problem(line.number, line.column, what, "end that with PG first"))
+        following = next((each.mark for each in lines[at + 1 :] if each.mark is not None), None)
+        opens = bool(line.mark) or (opened is None and following == "")  # where the next PG ends a program
         opened, ended = (line if opens else None), line.number
     if opened is not None:
         hint = "the program's last line is PG alone"
         problems.append(Problem(opened.number, opened.column, "PG is never ended", hint))
     around = ["save" if line.number > ended else "variables" for line in lines]
     return ["program" if within else other for within, other in zip(inside, around, strict=True)], problems
-
-
-def _unpaired(line: ProgramLine, opened: ProgramLine | None) -> Iterator[Problem]:
-    """Report a PG where the other kind of PG was due."""
-    if opened is None and not line.mark:
-        yield Problem(line.number, line.column, "PG without an address, and no program to end", "begin with PG 1")
-    if opened is not None and line.mark:
-        what = f"{line.text} inside the program of line {opened.number}"
-        yield Problem(line.number, line.column, what, "end that with PG first")
-
-
-def _ends_next(lines: Sequence[ProgramLine]) -> bool:
-    """Whether the next PG ends a program."""
-    return next((line.mark for line in lines if line.mark is not None), None) == ""
 
 
 def _without_program(lines: list[ProgramLine]) -> Iterator[Problem]:
@@ -246,7 +238,6 @@ def _kind(token: Token, number: int, declares: bool) -> str:
 
 
 def entries(text: str) -> list[Entry]:
-    """Return the labels of the programs in a file, in order."""
     return [
         Entry(line.declares, line.number, f"EX {line.declares}")
         for line in scan(text)[0]

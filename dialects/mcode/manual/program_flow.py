@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Container, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
-from multidrop.dialects.mcode.manual.grammar import Name, Number, Statement, words
+from multidrop.dialects.mcode.manual.grammar import Argument, Name, Number, Statement, words
 from multidrop.dialects.mcode.manual.program_file import ProgramLine
 from multidrop.dialects.mcode.manual.statements import CONDITIONAL
 from multidrop.dialects.program_files import Problem
@@ -36,7 +36,6 @@ class Step:
 
     @property
     def unconditional(self) -> bool:
-        """Whether it is a BR without a condition."""
         return self.word == "BR" and self.statement is not None and len(self.statement.arguments) == 1
 
     @property
@@ -51,7 +50,6 @@ class Flow:
     def __init__(
         self, lines: Sequence[ProgramLine], statements: Mapping[int, Statement], names: Container[str]
     ) -> None:
-        self._naming = [each for each in statements.values() if each.word in PLACES and each.word not in names]
         self.steps: list[Step] = []
         self.labels: dict[str, int] = {}
         self._starts: dict[str, int] = {}
@@ -70,23 +68,32 @@ class Flow:
                 self.labels.setdefault(step.label, len(self.steps))
             self.steps.append(step)
             follows = True
+        self.hidden = False
+        """Some line goes to an address whose line the text does not show."""
+        self.called, self.branched = set[int](), set[int]()
+        """The beginnings of the subroutines that CL, OE or a trip names; the places that some BR goes to."""
+        for each in statements.values():
+            if each.word not in PLACES or each.word in names:
+                continue
+            if (place := self.place(each)) is not None:
+                (self.branched if each.word == "BR" else self.called).add(place)
+            elif each.word in ("BR", "CL") or self._target(each) not in (None, Number(0)):  # 0 takes a trip away
+                self.hidden = True
+
+    @staticmethod
+    def _target(statement: Statement) -> Argument | None:
+        at = PLACES[statement.word]
+        return statement.arguments[at] if len(statement.arguments) > at else None
 
     def place(self, statement: Statement) -> int | None:
         """The step that a statement goes to or names; None where the text does not show it."""
-        at = PLACES[statement.word]
-        target = statement.arguments[at] if len(statement.arguments) > at else None
+        target = self._target(statement)
         if isinstance(target, Name):
             return self.labels.get(target.word)
         found = self._starts.get(str(target.value)) if isinstance(target, Number) else None
         return found if found is not None and found < len(self.steps) else None
 
-    @property
-    def hidden(self) -> bool:
-        """Whether some line goes to an address whose line the text does not show."""
-        return any(self.place(each) is None and not _names_nothing(each) for each in self._naming)
-
     def next(self, at: int) -> int | None:
-        """The next line of the same program; None after its last."""
         following = at + 1
         return following if following < len(self.steps) and self.steps[following].follows else None
 
@@ -99,23 +106,6 @@ class Flow:
             yield place
         if not step.ends and (following := self.next(at)) is not None:
             yield following
-
-    def called(self) -> frozenset[int]:
-        """The beginnings of the subroutines that CL, OE or a trip names."""
-        places = (self.place(each) for each in self._naming if each.word != "BR")
-        return frozenset(place for place in places if place is not None)
-
-    def branched(self) -> frozenset[int]:
-        """The places that some BR goes to."""
-        places = (self.place(each) for each in self._naming if each.word == "BR")
-        return frozenset(place for place in places if place is not None)
-
-
-def _names_nothing(statement: Statement) -> bool:
-    """Whether it names no place: OE and the trips without one, or with 0, which takes it away."""
-    at = PLACES[statement.word]
-    target = statement.arguments[at] if len(statement.arguments) > at else None
-    return statement.word not in ("BR", "CL") and target in (None, Number(0))
 
 
 # Warnings of lines that are never executed, of programs without an end, and of RT without a call.
@@ -136,8 +126,25 @@ def check_paths(flow: Flow, mentioned: Container[str]) -> Iterator[Problem]:
         if flow.next(at) is None and step.statement is not None and not step.ends and at not in dead:
             yield _warn(step, "the program runs on past this line, its last one", "end it with E")
     if not flow.hidden:
-        yield from _unreachable(flow, dead)
-        yield from _uncalled(flow, mentioned)
+        # Report the first line of each part that no path reaches.
+        reported: Step | None = None
+        for at, away in dead.items():
+            step = flow.steps[at]
+            if away is not reported and step.word not in ("E", "RT"):
+                reported = away
+                what = f"never executed: {away.line.text} in line {away.line.number} leads elsewhere"
+                yield _warn(step, what, "give it a label, or delete it")
+        # Report paths on which RT is reached without a call, each place once.
+        before = walk(_beginnings(flow), flow.ways)
+        seen = set[int]()
+        for end in (place for place in before if flow.steps[place].word == "RT"):
+            way = list(way_to(end, before))[::-1]
+            begin = way[0][0] if way else end
+            source, place = next(((source, place) for source, place in way if place in flow.called), (begin, None))
+            if source in seen or (place is None and flow.steps[begin].label in mentioned):
+                continue
+            seen.add(source)
+            yield _without_call(flow, begin, end) if place is None else _into(flow, source, place, end)
 
 
 def _warn(step: Step, what: str, hint: str) -> Problem:
@@ -158,45 +165,18 @@ def _dead(flow: Flow) -> dict[int, Step]:
     return dead
 
 
-def _unreachable(flow: Flow, dead: Mapping[int, Step]) -> Iterator[Problem]:
-    """Report the first line of each part that no path reaches."""
-    reported: Step | None = None
-    for at, away in dead.items():
-        step = flow.steps[at]
-        if away is not reported and step.word not in ("E", "RT"):
-            reported = away
-            what = f"never executed: {away.line.text} in line {away.line.number} leads elsewhere"
-            yield _warn(step, what, "give it a label, or delete it")
-
-
-def _uncalled(flow: Flow, mentioned: Container[str]) -> Iterator[Problem]:
-    """Report paths on which RT is reached without a call, each place once."""
-    called = flow.called()
-    before = walk(_beginnings(flow, called), flow.ways)
-    reported = set[int]()
-    for end in (place for place in before if flow.steps[place].word == "RT"):
-        way = list(way_to(end, before))[::-1]
-        begin = way[0][0] if way else end
-        source, place = next(((source, place) for source, place in way if place in called), (begin, None))
-        if source in reported or (place is None and flow.steps[begin].label in mentioned):
-            continue
-        reported.add(source)
-        yield _without_call(flow, begin, end) if place is None else _into(flow, source, place, end)
-
-
-def _beginnings(flow: Flow, called: frozenset[int]) -> Iterator[int]:
+def _beginnings(flow: Flow) -> Iterator[int]:
     """The lines at which a program may be started, other than by a call."""
-    inner = called | flow.branched()
+    inner = flow.called | flow.branched
     for at, step in enumerate(flow.steps):
         previous = flow.steps[at - 1] if step.follows else None
         alone = previous is None or (previous.statement is not None and previous.ends)
-        first = previous is None and at not in called
+        first = previous is None and at not in flow.called
         if step.label == AT_POWER_UP or first or (step.label and alone and at not in inner):
             yield at
 
 
 def _into(flow: Flow, source: int, place: int, end: int) -> Problem:
-    """Report a path into a subroutine: by running on, or by BR."""
     step, subroutine = flow.steps[source], flow.steps[place]
     rt = f"RT in line {flow.steps[end].line.number} then has nothing to return to"
     if step.word == "BR" and place != flow.next(source):
@@ -241,7 +221,6 @@ FARTHEST = 500
 
 
 def check_moves(flow: Flow) -> Iterator[Problem]:
-    """Report each move that a later line does not wait for."""
     for at, step in enumerate(flow.steps):
         if not _has_an_end(step):
             continue
@@ -255,16 +234,12 @@ def check_moves(flow: Flow) -> Iterator[Problem]:
 
         found = nearest(flow.ways(at), ways, disturbs, FARTHEST)
         if found is not None:
-            yield _unawaited(step, flow.steps[found])
-
-
-def _unawaited(move: Step, other: Step) -> Problem:
-    """Report a move that another line does not wait for."""
-    if other is move:
-        what = f"the next {move.line.text} begins before this one has ended"
-    else:
-        what = f"{other.line.text} in line {other.line.number} does not wait for the end of this move"
-    return Problem(move.line.number, move.line.column, what, "H is missing after it", warning=True)
+            other = flow.steps[found]
+            if other is step:
+                what = f"the next {step.line.text} begins before this one has ended"
+            else:
+                what = f"{other.line.text} in line {other.line.number} does not wait for the end of this move"
+            yield Problem(step.line.number, step.line.column, what, "H is missing after it", warning=True)
 
 
 def _has_an_end(step: Step) -> bool:
@@ -276,7 +251,6 @@ def _has_an_end(step: Step) -> bool:
 
 
 def _disturbs(step: Step) -> bool:
-    """Whether a line must not be executed during a move."""
     if step.statement is None:
         return False
     if step.word in REFUSED or not step.statement.word:

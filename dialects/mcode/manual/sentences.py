@@ -7,17 +7,14 @@ from multidrop.dialects.values import BY, DISABLE, ENABLE, HOME_MINUS, HOME_PLUS
 
 
 def move(axis: str, steps: int) -> tuple[str, ...]:
-    """Move by a distance."""
     return (f"MR {steps}",)
 
 
 def move_to(axis: str, position: int) -> tuple[str, ...]:
-    """Move to a position."""
     return (f"MA {position}",)
 
 
 def assign(word: str, value: str) -> str:
-    """Give a word a value."""
     return f"{word}={value}"
 
 
@@ -36,5 +33,4 @@ CONTROLS: Controls = {
 
 
 def controls(state: DriveState, axis: str) -> Controls:
-    """The controls of its only axis."""
     return CONTROLS

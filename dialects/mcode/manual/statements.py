@@ -45,7 +45,6 @@ def canonical(text: str, names: Container[str] = ()) -> str:
 
 
 def spelled(statement: Statement, names: Container[str] = ()) -> str:
-    """Write a statement in canonical spelling."""
     arguments = ",".join(_spelled(each) for each in statement.arguments)
     end = ";" if statement.quiet else ""
     between = "=" if _takes_equals(statement, names) else " " if statement.word and arguments else ""
@@ -89,7 +88,6 @@ CONDITIONAL = frozenset({"BR", "CL"})
 
 
 def condition_of(statement: Statement) -> Expression | None:
-    """Return the condition of a BR or CL; None for any other statement."""
     if statement.word not in CONDITIONAL or len(statement.arguments) != 2:
         return None
     argument = statement.arguments[1]
@@ -97,7 +95,6 @@ def condition_of(statement: Statement) -> Expression | None:
 
 
 def compares(expression: Argument) -> bool:
-    """Whether it contains a comparison."""
     return any(isinstance(each, Compare) for each in _within(expression))
 
 
@@ -128,7 +125,6 @@ def _inner(part: Expression) -> str:
 
 
 def _within(expression: Argument) -> Iterator[Argument]:
-    """Yield a condition and all its parts."""
     yield expression
     if isinstance(expression, Unary):
         yield from _within(expression.operand)
@@ -196,7 +192,6 @@ def device_name(argument: Argument | None, quoted_only: bool) -> str:
 
 
 def names_in(part: Argument | None) -> Iterator[Name]:
-    """Yield the names in an argument, from left to right."""
     match part:
         case Name():
             yield part
@@ -217,7 +212,6 @@ def words_of(statement: Statement) -> Iterator[str]:
 
 
 def _functions(part: Argument | None) -> Iterator[str]:
-    """Yield the function words in an argument."""
     match part:
         case Unary(op, operand):
             yield from (op,) if op in FUNCTIONS else ()

@@ -327,13 +327,6 @@ def _trip(name: str, title: str, meaning: str, section: str, form: str, **more: 
     return Mnemonic(name, title, meaning, section, **merged)
 
 
-def _input(n: int) -> Mnemonic:
-    return status(
-        f"I{n}", f"Input {n}", "1 while the input is active, filtered, as IS sets it", "5.1.56",
-        kind="variable",
-    )  # fmt: skip
-
-
 INPUTS: tuple[Mnemonic, ...] = (
     *(
         number(
@@ -359,7 +352,10 @@ INPUTS: tuple[Mnemonic, ...] = (
         kind="flag", low=0, high=1, default=0, syntax="FL=<0/1>, PR FL", starts=True,
         note="firmware 6; inputs 3 and 4 must be of types 13 to 15",
     ),
-    *(_input(n) for n in range(1, 5)),
+    *((status(
+        f"I{n}", f"Input {n}", "1 while the input is active, filtered, as IS sets it", "5.1.56",
+        kind="variable",
+    )) for n in range(1, 5)),
     number(
         "I5", "Analog input", "reading of the 12-bit analog input", "5.1.57", access="RO", step=READ_ONLY,
         low=0, high=4095, unit="counts", syntax="PR I5, BR <label/address>,I5><value>",
