@@ -15,7 +15,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 
-from multidrop.dialects.codec import End, Kind, Procedure, Reply, Request
+from multidrop.dialects.codec import End, Kind, Procedure, Request
 from multidrop.dialects.errors import DriveError, Inexpressible, NoAnswer, Refused, Stopped
 from multidrop.dialects.family import Progress
 from multidrop.dialects.files import SourceLine
@@ -47,19 +47,11 @@ WHOLE = {"", "0", "1", "S"}
 """The parameters with which CP clears all programs."""
 
 
-@dataclass(frozen=True)
-class Line:
-    """A line to send: its number in the file, from 1, and its text. Number 0: it is not in the file."""
-
-    number: int
-    text: str
-
-
 @dataclass
 class Plan:
     """The lines to send for a file, and the programs that CP removes: they go, or are stored again."""
 
-    lines: list[Line] = field(default_factory=list)
+    lines: list[ProgramLine] = field(default_factory=list)
     in_the_way: list[str] = field(default_factory=list)
     """Names of programs in the drive that the file gives again."""
     replaced: list[Program] = field(default_factory=list)
@@ -69,18 +61,13 @@ class Plan:
     def clears(self) -> bool:
         return bool(self.in_the_way or self.replaced)
 
-    def after_clearing(self, product: str) -> list[Line]:
+    def after_clearing(self, product: str) -> list[ProgramLine]:
         """Return the lines to send after CP: the programs that stay, each line at its address, then the file."""
-        again: list[Line] = []
+        again: list[ProgramLine] = []
         for program in programs([line for each in self.kept for line in each.lines], product, fine=True):
-            inside = [Line(0, line.text) for line in program.lines]
-            again += [Line(0, f"PG {program.start}"), *inside, Line(0, "PG")]
+            inside = [ProgramLine(0, line.text, "") for line in program.lines]
+            again += [ProgramLine(0, f"PG {program.start}", ""), *inside, ProgramLine(0, "PG", "")]
         return again + self.lines
-
-
-def concerns_programs(lines: Sequence[SourceLine]) -> bool:
-    """Whether a file declares names or stores programs, so that what the drive holds matters."""
-    return any(declared(line.text) or classify.enters_program(line.text) for line in lines)
 
 
 def prepare(state: MCodeState, lines: Sequence[SourceLine], held: Held) -> Procedure[Sequence[SourceLine]]:
@@ -144,7 +131,7 @@ def _named_lines(lines: Sequence[SourceLine], held: Held, drive: str, product: s
     for line in lines:
         word, name = declared(line.text) or ("", "")
         is_a = known.get(name, "")
-        made.lines.append(Line(line.number, line.text))
+        made.lines.append(ProgramLine(line.number, line.text, ""))
         if inside and is_a == GLOBAL and name not in own:
             raise Refused(
                 f"line {line.number}: '{line.text}': {drive} has a global variable {name} already; CP 1 or FD deletes "
@@ -156,7 +143,7 @@ def _named_lines(lines: Sequence[SourceLine], held: Held, drive: str, product: s
         if word == "VA" and not inside:
             if is_a == GLOBAL:
                 _, equals, given = line.text.partition("=")
-                made.lines[-1] = Line(line.number, f"{name}={given.strip() if equals else 0}")
+                made.lines[-1] = ProgramLine(line.number, f"{name}={given.strip() if equals else 0}", "")
             known[name] = GLOBAL
         if name:
             own.add(name)
@@ -246,7 +233,8 @@ def download(
         return ()
     yield from before_request(state, state.codec.request(state.address, lines[0].text))
     if held is None:
-        held = (yield from read(state, lines, progress)) if concerns_programs(lines) else Held()
+        concerned = any(declared(line.text) or classify.enters_program(line.text) for line in lines)
+        held = (yield from read(state, lines, progress)) if concerned else Held()
     lines = yield from prepare(state, lines, held)
     memory, fate = _Memory(sum(classify.enters_program(line.text) for line in lines)), ""
     try:
@@ -313,7 +301,7 @@ def _one(state: MCodeState, line: SourceLine, memory: _Memory) -> Procedure[None
                 why = described(code, state) if code else "it did not go into program mode"
                 raise Refused(f"{who(state)} refused '{request.text}': {why}", code)
             raise NoAnswer(f"{who(state)}: no reply to '{request.text}' ({reply.end.value})")
-        state.entered_program_mode(_address(reply))
+        state.entered_program_mode(int(reply.prompt))
     else:
         yield from immediate(state, request)
 
@@ -324,10 +312,6 @@ def _needs_own_echo(text: str) -> bool:
         return False
     slow = classify.word_of(text)[0] in classify.SLOW
     return slow or classify.kind_of(text) is Kind.SETTING or classify.starts_motion(text)
-
-
-def _address(reply: Reply) -> int:
-    return int(reply.prompt.strip())
 
 
 def _stored(state: MCodeState, request: Request) -> Procedure[None]:
@@ -342,22 +326,19 @@ def _stored(state: MCodeState, request: Request) -> Procedure[None]:
             if leaving:
                 state.left_program_mode()
             else:
-                state.entered_program_mode(_address(reply))
+                state.entered_program_mode(int(reply.prompt))
             return
         if leaving and reply.prompt == "?":
             state.left_program_mode()
             code = yield from read_error(state)
             raise Refused(f"{who(state)} ended program mode with {described(code or 0, state)}", code)
         if reply.end is End.REFUSED:
-            raise Refused(f"{who(state)} refused '{request.text}': {(yield from _why(state))}")
+            # Its error can be read only outside of program mode.
+            code = (yield from leave_program(state)) or (yield from read_error(state))
+            why = described(code, state) if code else "its error register gives no reason"
+            raise Refused(f"{who(state)} refused '{request.text}': {why}")
         raise NoAnswer(f"{who(state)}: it is not known whether '{request.text}' was stored ({reply.end.value})")
     raise NoAnswer(f"{who(state)}: '{request.text}' arrived damaged {1 + REPEATS} times; check the cabling")
-
-
-def _why(state: MCodeState) -> Procedure[str]:
-    """Read the reason for a refusal in program mode, which is possible only outside of it."""
-    code = (yield from leave_program(state)) or (yield from read_error(state))
-    return described(code, state) if code else "its error register gives no reason"
 
 
 def _again_at(state: MCodeState, request: Request) -> Procedure[None]:

@@ -22,7 +22,7 @@ from multidrop.dialects.mcode.host.operations import perform
 from multidrop.dialects.mcode.host.state import MCodeState, refuse_in_program, who
 from multidrop.dialects.mcode.manual import parameter_plan
 from multidrop.dialects.mcode.manual import parameters as manual
-from multidrop.dialects.mcode.manual.mnemonic import Mnemonic
+from multidrop.dialects.mcode.manual.mnemonic import ENCODER, MDRIVE_ENCODER, Mnemonic
 from multidrop.dialects.mcode.manual.parameters import Form, form_of
 from multidrop.dialects.mcode.manual.program_file import LONGEST
 from multidrop.dialects.mcode.manual.table import words
@@ -97,7 +97,7 @@ def _readings(
     for row in named:
         if (row[2] or "").upper() == "G":
             rows.append(Reading(row[1].upper(), float(row[3]) if "." in row[3] else int(row[3]), VARIABLES))
-    if manual.has_encoder(state.product):
+    if state.product in ENCODER | MDRIVE_ENCODER:
         *names, last = sorted(manual.COUNTED if manual.locks_resolution(state.product) else manual.COUNTED - {"MS"})
         here, other = ("encoder counts", "steps") if counts else ("steps", "encoder counts")
         why = f"the drive moves in {here} now, and prints only the values for these"

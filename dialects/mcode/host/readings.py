@@ -18,8 +18,8 @@ from multidrop.dialects.mcode.host.parameters import BETWEEN, items_and_forms, l
 from multidrop.dialects.mcode.host.state import MCodeState, refuse_in_program, who
 from multidrop.dialects.mcode.manual import parameters as manual
 from multidrop.dialects.mcode.manual import points
-from multidrop.dialects.mcode.manual.mnemonic import EXPANDED
-from multidrop.dialects.mcode.manual.parameters import Form, exact, form_of
+from multidrop.dialects.mcode.manual.mnemonic import EVERY, EXPANDED
+from multidrop.dialects.mcode.manual.parameters import Form, form_of
 from multidrop.dialects.mcode.manual.points import EXPANDED_INPUTS, INPUTS
 from multidrop.dialects.mcode.manual.statements import UNNAMED
 from multidrop.dialects.mcode.manual.table import lookup, words
@@ -74,7 +74,7 @@ def _values(state: MCodeState, names: Sequence[str]) -> Procedure[Facts]:
 
     Asks the words that the product has; of an unknown product, those that every Lexium has.
     """
-    table, known = words(state.product), exact(state.product)
+    table, known = words(state.product), state.product in EVERY
     batch = [table[name] for name in names if name in table]
     batch = [row for row in batch if (state.product in row.products if known else row.name not in UNSURE)]
     items, forms = items_and_forms(batch)
@@ -173,7 +173,7 @@ _LISTED = re.compile(r"(\d+)\s+(\S.*)")
 def take(state: MCodeState, progress: Progress) -> Procedure[Snapshot]:
     """Read a drive. Raises Refused where it would store the questions, or NoAnswer."""
     readings = yield from parameters.read(state, progress)
-    known, whole = words(state.product), exact(state.product)
+    known, whole = words(state.product), state.product in EVERY
     asked = [word for word in SNAPSHOT_WORDS if word in known and (state.product in known[word].products or not whole)]
     items, pattern = '," ",'.join(asked), " ".join(r"-?\d{1,10}" for _ in asked)
     now = dict(zip(asked, map(int, (yield from value_of(state, items, pattern)).split()), strict=True))

@@ -53,6 +53,8 @@ class ReplyLines:
 
     def __init__(self, request: Request, echo: int, sealed: int, frame: bytes) -> None:
         self.request, self.echo, self.sealed, self.frame = request, echo, sealed, frame
+        self.signs_off = sealed > 0 and echo != 2
+        """The drive sends ACK or NAK with its reply."""
         self.lines: list[str] = []
         self.strays: list[str] = []
         self.collided: list[str] = []
@@ -100,7 +102,11 @@ class ReplyLines:
             if self.request.kind is Kind.PRINT and self.blanks == 2 and not self.request.expect:
                 self.answer("")
             return
-        data = self._after_lost_end(data)
+        before, _, rest = data.rpartition(b"\r")
+        own = self.request.kind is Kind.PRINT and r"\r" not in self.request.text
+        if own and before.strip(b"\r") and rest:  # the line feed of an earlier, unrelated line was lost
+            self.add_earlier(before)
+            data = rest
         plain = data.replace(b"\r", b"")
         line = printable(data).lstrip(">?")  # a prompt may precede it
         if SIGN_ON.match(line) and "opyright" not in self.request.text:
@@ -124,15 +130,6 @@ class ReplyLines:
             self._sort(printable(data))
         else:
             self.add_line(data)
-
-    def _after_lost_end(self, data: bytes) -> bytes:
-        """Return the part of a line after a CR: the line feed of an earlier, unrelated line was lost."""
-        before, _, rest = data.rpartition(b"\r")
-        own = self.request.kind is Kind.PRINT and r"\r" not in self.request.text
-        if not (own and before.strip(b"\r") and rest):
-            return data
-        self.add_earlier(before)
-        return rest
 
     def repetition(self, data: bytes) -> int:
         """Length of the request that EM=3 repeats at the head of a line; 0 for any other text.
@@ -169,11 +166,6 @@ class ReplyLines:
     def announced(self) -> bool:
         """Whether the reply can have begun: with CK=1 it follows ACK or NAK."""
         return self.sealed != 1 or self.echo == 2 or self.signed_off
-
-    @property
-    def signs_off(self) -> bool:
-        """Whether the drive sends ACK or NAK with its reply."""
-        return self.sealed > 0 and self.echo != 2
 
     @property
     def signed_off(self) -> bool:
@@ -273,20 +265,15 @@ class ReplyLines:
             return End.DAMAGED
         if end is not End.DONE:
             return end
-        if self.damaged and self._damage_counts:
+        # A damaged line may belong to the reply; one with its expected print is complete without it.
+        doubtful = not (self.answered and self.request.expect) if kind is Kind.PRINT else kind in ENDLESS
+        if self.damaged and doubtful:
             return End.DAMAGED
-        missing = self.request.kind is Kind.PRINT and not self.answered
+        missing = kind is Kind.PRINT and not self.answered
         if missing and not classify.may_be_blank(self.request.text, self.request.expect):
             self.damaged = "nothing was printed that was asked for"
             return End.DAMAGED
         return end
-
-    @property
-    def _damage_counts(self) -> bool:
-        """Whether a damaged line can belong to the reply; a reply with its expected print is complete without it."""
-        if self.request.kind is Kind.PRINT:
-            return not (self.answered and self.request.expect)
-        return self.request.kind in ENDLESS
 
     def check_byte(self, frame: bytes) -> bytes:
         """The check byte of a frame; empty where the drive uses none."""

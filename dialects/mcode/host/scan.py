@@ -133,16 +133,6 @@ class _Search:
     """Questions after which something came that no drive was found by: a program prints."""
 
     @property
-    def certain(self) -> float:
-        """The silence after a question to which a late reply may come."""
-        return CERTAIN * self.reach.window
-
-    @property
-    def rest(self) -> float:
-        """The silence after which no late reply is outstanding."""
-        return REST * self.reach.window
-
-    @property
     def talks(self) -> bool:
         """Whether a program prints all the time: only what a drive prints of itself counts then."""
         return self.talk >= TALKS
@@ -180,7 +170,7 @@ def _unnamed(own: _Search) -> Procedure[tuple[bool, bool]]:
         question = _question(own, checksum)
         heard = yield from _parts_asked(own, question, own.reach.window)
         if not VERSION.search(b"".join(heard)) and heard != question and any(map(_ambiguous, heard)):
-            heard = yield from _parts_asked(own, question, own.certain)
+            heard = yield from _parts_asked(own, question, CERTAIN * own.reach.window)
         if _is_unnamed(question, heard):
             # Identify the drive; one that repeats nothing by itself shows that the adapter does.
             state = yield from _identified(own, Place(False, ""))
@@ -249,13 +239,13 @@ def _named(own: _Search) -> Procedure[None]:
                 if heard and not (sure and (yield from _reported(own, name, _checks(name, heard)))) and not own.talks:
                     yield from _late(own, names)
             own.step()
-        if (yield from own.asked(b"\n", "", own.rest, NAMES[-1])) and not own.talks:
+        if (yield from own.asked(b"\n", "", REST * own.reach.window, NAMES[-1])) and not own.talks:
             yield from _late(own, NAMES[-LATE:])
 
 
 def _late(own: _Search, names: Sequence[str]) -> Procedure[None]:
     """Look for the drives whose replies came: the last of these names, or those before it."""
-    several = yield from own.asked(b"\n", "", own.rest, names[-1])
+    several = yield from own.asked(b"\n", "", REST * own.reach.window, names[-1])
     found = False
     for there in (_pongs_late, _prints_late):
         for each in reversed(names):
@@ -270,14 +260,14 @@ def _late(own: _Search, names: Sequence[str]) -> Procedure[None]:
 
 def _pongs_late(own: _Search, name: str) -> Procedure[bool]:
     """Whether a drive replies to a ping of this name, with time for its reply."""
-    heard = yield from _pinged(own, name, own.certain)
+    heard = yield from _pinged(own, name, CERTAIN * own.reach.window)
     return heard in (*pongs(name, True), *pongs(name, False)) or PROGRAM_PROMPT.search(heard) is not None
 
 
 def _prints_late(own: _Search, name: str) -> Procedure[bool]:
     """Whether a drive prints this name, with time for its reply; what a program prints is not such a reply."""
     for checksum in (0, 1):
-        if _prints(name, (yield from _name_asked(own, name, checksum, own.certain))):
+        if _prints(name, (yield from _name_asked(own, name, checksum, CERTAIN * own.reach.window))):
             return True
     return False
 

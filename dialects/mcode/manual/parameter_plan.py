@@ -288,29 +288,20 @@ def plan(product: str, present: Readings, wanted: Mapping[str, Value], allowed: 
     """Plan the steps. Raises Diagnostic for values that the drive refuses."""
     given = {name.upper(): value for name, value in wanted.items()}
     changed = {name: value for name, value in given.items() if not same(value, present.values.get(name))}
-    impossible = _impossible(changed, present)
-    withheld = _withheld({name: changed[name] for name in changed if name not in impossible}, present, allowed)
-    goal = _goal(product, present, given, withheld, impossible)
+    now: Mapping[str, Value | None] = {**present.values}
+    reasons = {name: impossible(name, value, now, present.labels) for name, value in changed.items()}
+    cannot = {name: reason for name, reason in reasons.items() if reason}
+    asked = {name: value for name, value in changed.items() if name not in cannot and name not in allowed.named}
+    reasons = {name: rules.risk(name, value, now) for name, value in asked.items()}
+    withheld = {name: why for name, why in reasons.items() if why and not (name in WIRE and allowed.communication)}
+    goal = _goal(product, present, given, withheld, cannot)
     steps = Steps(product, present.values, goal)
-    for order in (_leave_counts, _speeds, _resolution, _enter_counts, _velocities, _software_limits, _delays, _points):
+    for order in (_leave_counts, _speeds, _resolution, _enter_counts, _velocities, _pairs, _points):
         order(steps)
     steps.reach(*(name for name in goal if name not in (*LAST, *WIRE_ORDER)))
     steps.reach(*LAST, *WIRE_ORDER)
     remarks = reference_lost(steps.changes, SCALE)
-    return Plan(tuple(steps.changes), tuple(withheld.items()), tuple(impossible.items()), remarks)
-
-
-def _impossible(changed: Mapping[str, Value], present: Readings) -> dict[str, str]:
-    now: Mapping[str, Value | None] = {**present.values}
-    found = {name: impossible(name, value, now, present.labels) for name, value in changed.items()}
-    return {name: reason for name, reason in found.items() if reason}
-
-
-def _withheld(changed: Mapping[str, Value], present: Readings, allowed: Permission) -> dict[str, str]:
-    """The settings that a person has to name, with the reasons."""
-    now: Mapping[str, Value | None] = {**present.values}
-    found = {name: rules.risk(name, value, now) for name, value in changed.items() if name not in allowed.named}
-    return {name: reason for name, reason in found.items() if reason and not (name in WIRE and allowed.communication)}
+    return Plan(tuple(steps.changes), tuple(withheld.items()), tuple(cannot.items()), remarks)
 
 
 def _goal(
@@ -328,16 +319,14 @@ def _goal(
     counts = manual.counting({**now, **goal})
     changed = {name: value for name, value in goal.items() if not same(value, now.get(name))}
     goal |= {name: rules.checked(name, value, product, counts, present.labels) for name, value in changed.items()}
-    check_together(product, {**_carried_over(now, goal, counts), **goal}, counts, changed)
+    # Settings that are not wanted keep their values: but MS scales some, and a change of the unit hides them.
+    kept: Mapping[str, Value] = {name: value for name, value in now.items() if name not in COUNTED}
+    if counts == manual.counting(now):
+        ratio = number(goal.get("MS", now.get("MS"))) / (number(now.get("MS")) or 1)
+        scaled = {name: round(number(value) * ratio) for name, value in now.items() if name in COUNTED - {"MS"}}
+        kept = {**now, **scaled}
+    check_together(product, {**kept, **goal}, counts, changed)
     return goal
-
-
-def _carried_over(now: Mapping[str, Value], goal: Mapping[str, Value], counts: bool) -> dict[str, Value]:
-    """The values of settings that are not wanted: MS scales some, and a change of the unit hides them."""
-    if counts != manual.counting(now):
-        return {name: value for name, value in now.items() if name not in COUNTED}
-    ratio = number(goal.get("MS", now.get("MS"))) / (number(now.get("MS")) or 1)
-    return {name: round(number(value) * ratio) if name in COUNTED - {"MS"} else value for name, value in now.items()}
 
 
 # The unit of motion
@@ -402,13 +391,12 @@ def _resolution(steps: Steps) -> None:
     if manual.counting({**steps.now, **steps.goal}) and manual.locks_resolution(steps.product):
         return
     names = [name for name in ("MS", "SA", "EL") if steps.differs(name)]
-    finer = [name for name in names if _finer(steps, name)]
+    finer = []
+    for name in names:
+        goal, now = number(steps.goal[name]), steps.number(name)
+        if now is None or (goal > now) == (name == "MS"):
+            finer.append(name)
     steps.reach(*finer, *names)
-
-
-def _finer(steps: Steps, name: str) -> bool:
-    goal, now = number(steps.goal[name]), steps.number(name)
-    return now is None or (goal > now) == (name == "MS")
 
 
 def _velocities(steps: Steps) -> None:
@@ -425,17 +413,15 @@ def _velocities(steps: Steps) -> None:
 # Pairs and points
 
 
-def _software_limits(steps: Steps) -> None:
-    """Reach LS, of which the minus limit is below the plus limit while both are enabled."""
+def _pairs(steps: Steps) -> None:
+    """Reach LS, of which the minus limit is below the plus limit while both are enabled, then HT and MT.
+
+    Of these the one that falls goes first: their sum has a bound.
+    """
     crosses = crossed(steps.goal.get("LS0"), steps.now.get("LS1"))
     steps.reach(*(("LS1", "LS0") if crosses else ("LS0", "LS1")))
-
-
-def _delays(steps: Steps) -> None:
-    """Reach HT and MT, the one that falls first: their sum has a bound."""
-    falling = [
-        name for name in ("HT", "MT") if steps.differs(name) and number(steps.goal[name]) < (steps.number(name) or 0)
-    ]
+    differ = [name for name in ("HT", "MT") if steps.differs(name)]
+    falling = [name for name in differ if number(steps.goal[name]) < (steps.number(name) or 0)]
     steps.reach(*falling, "HT", "MT")
 
 
@@ -444,13 +430,10 @@ def _points(steps: Steps) -> None:
     names = [name for name in steps.goal if types(name, steps.product) and steps.differs(name)]
     for name in names:
         held = steps.now.get(name)
-        if isinstance(held, tuple) and held[0] not in SHARED and _claimed(steps, name, held[0], names):
+        others = [steps.goal[each] for each in names if each != name and group(each) == group(name)]
+        kinds = [each[0] for each in others if isinstance(each, tuple)]
+        if isinstance(held, tuple) and held[0] not in SHARED and held[0] in kinds:
             free = 16 if name.startswith("OS") else 0
             steps.send(name, (free, *held[1:]), temporary=True)
     for name in names:
         steps.reach(name, PAIRS.get(name, name))
-
-
-def _claimed(steps: Steps, name: str, kind: object, names: list[str]) -> bool:
-    others = [each for each in names if each != name and group(each) == group(name)]
-    return any(isinstance(goal := steps.goal[each], tuple) and goal[0] == kind for each in others)

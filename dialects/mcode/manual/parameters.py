@@ -62,15 +62,10 @@ class Form(Enum):
     TRIP = r"-?[A-Z0-9]+(?: *, *-?[A-Z0-9]+)*"
 
 
-def exact(product: str) -> bool:
-    """Whether a product has a table of its own; others get the words of every Lexium."""
-    return product in EVERY
-
-
 @lru_cache(maxsize=64)
 def settings(product: str, version: str = "", part: str = "") -> tuple[Mnemonic, ...]:
     """The settings that a drive prints beside others, in the order of their forms."""
-    lacks, forms, known = _lacking(version, part) | STATES | {"DN"}, list(Form), exact(product)
+    lacks, forms, known = _lacking(version, part) | STATES | {"DN"}, list(Form), product in EVERY
     rows = [row for row in words(product).values() if row.access == "RW" and row.kind in ("variable", "flag")]
     rows = [row for row in rows if (product in row.products if known else row.products >= LEXIUM)]
     rows = [row for row in rows if not row.lines and row.name not in lacks]
@@ -79,7 +74,7 @@ def settings(product: str, version: str = "", part: str = "") -> tuple[Mnemonic,
 
 def lists(product: str, version: str = "") -> dict[str, tuple[int, ...]]:
     """The words of a drive that print a line for each number; input 6 is the index mark of an encoder."""
-    if product not in LEXIUM and exact(product):
+    if product not in LEXIUM and product in EVERY:
         return {}
     lacks = _lacking(version, "")
     return {
@@ -90,13 +85,9 @@ def lists(product: str, version: str = "") -> dict[str, tuple[int, ...]]:
 
 
 def unread(product: str) -> tuple[tuple[str, str], ...]:
-    if not exact(product):
+    if product not in EVERY:
         return (HANDLER_UNREAD, ("other words", f"the product '{product}' is not known: every Lexium has these words"))
     return (HANDLER_UNREAD, *((ANALOG_UNREAD,) if product in LEXIUM - {"LMM"} else ()))
-
-
-def has_encoder(product: str) -> bool:
-    return product in ENCODER | MDRIVE_ENCODER
 
 
 def counting(values: Mapping[str, Value | None]) -> bool:
@@ -129,10 +120,6 @@ def section(name: str) -> str:
     return IO if name in TRIPS or re.fullmatch(r"(?:IS|OS|S)\d+", name) else PARAMETERS
 
 
-def fixed(name: str) -> bool:
-    return name in WIRE or name in UNIT
-
-
 def reading_of(name: str, value: Value, row: Mnemonic | None, counts: bool) -> Reading:
     """Put section, unit and default to a value. `counts`: the unit of motion is the encoder count."""
     default, unit = fresh(name), ""
@@ -140,7 +127,7 @@ def reading_of(name: str, value: Value, row: Mnemonic | None, counts: bool) -> R
         unit = (counts and row.unit_encoder) or row.unit
         if default is None:
             default = row.default_encoder if counts and row.default_encoder is not None else row.default
-    return Reading(name, value, section(name), unit, default, fixed(name))
+    return Reading(name, value, section(name), unit, default, name in WIRE | UNIT)
 
 
 def _lacking(version: str, part: str) -> frozenset[str]:
@@ -197,7 +184,7 @@ _POINT = re.compile(r"S\d+")
 def row_of(name: str, product: str) -> Mnemonic | None:
     """The row of a setting's word; `IS1` is a setting of IS. None for a user's variable."""
     found = _SETUP.fullmatch(name)
-    return lookup(found[1] if found else name, product if exact(product) else "")
+    return lookup(found[1] if found else name, product if product in EVERY else "")
 
 
 def line(name: str, value: Value, new: bool = False) -> str:
@@ -234,7 +221,7 @@ def checked(name: str, value: Value, product: str, counts: bool, labels: Collect
         if not (isinstance(value, int) and INT_LOW <= value <= INT_HIGH):
             raise Diagnostic(f"{name} = {value}: a variable takes a whole number from {INT_LOW} to {INT_HIGH}")
         return value
-    if exact(product) and product not in row.products:
+    if product in EVERY and product not in row.products:
         raise Diagnostic(f"{name}: an {product} lacks it")
     if name in TRIPS:
         # A trip: a target alone, or a number, a target, and for TR the repeats.

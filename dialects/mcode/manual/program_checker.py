@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
+from functools import reduce
+from operator import or_
 
 from multidrop.dialects.mcode.manual import guards, program_file, program_flow
 from multidrop.dialects.mcode.manual.grammar import (
@@ -39,38 +41,29 @@ def check_products(read: Read, names: frozenset[str], product: str) -> Iterator[
         for word in words_of(statement):
             if lookup(word) is not None:
                 used.setdefault(word, line)
-    own, drives = [word for word in used if word in names], [word for word in used if word not in names]
-    missing = [word for word in drives if _lacks(product, word)]
-    taken = [word for word in own if _takes(product, word)]
+
+    def unfit(each: str) -> tuple[list[str], list[str]]:
+        """Words that a product does not execute, and its own words that are a user's names."""
+        rows = {word: lookup(word, each) for word in used}
+        missing = [
+            word for word, row in rows.items() if word not in names and (row is None or each not in row.products)
+        ]
+        return missing, [word for word, row in rows.items() if word in names - {AT_POWER_UP} and row is not None]
+
+    def some(found: Sequence[str]) -> str:
+        return ", ".join(found[:LISTED]) + (" and others" if len(found) > LISTED else "")
+
+    missing, taken = unfit(product)
     kin = sorted(EVERY, key=lambda each: (each[:2] != product[:2], each))
-    fit = [each for each in kin if not any(_lacks(each, word) for word in drives)]
-    fit = [each for each in fit if not any(_takes(each, word) for word in own)]
+    fit = [each for each in kin if unfit(each) == ([], [])]
     if not fit or not (missing or taken):
         return
-    reasons = [f"no {product} has {_some(missing)}"] if missing else []
-    reasons += [f"{product} has {_some(taken)} as its own"] if taken else []
+    reasons = [f"no {product} has {some(missing)}"] if missing else []
+    reasons += [f"{product} has {some(taken)} as its own"] if taken else []
     line = used[(missing or taken)[0]]
-    what = f"this is a program for {_choice(fit)}: {', and '.join(reasons)}"
+    choice = f"{', '.join(fit[:-1])} or {fit[-1]}" if fit[1:] else fit[0]
+    what = f"this is a program for {choice}: {', and '.join(reasons)}"
     yield Problem(line.number, line.column, what, f"check it with --personality {fit[0]}", warning=True)
-
-
-def _lacks(product: str, word: str) -> bool:
-    row = lookup(word, product)
-    return row is None or product not in row.products
-
-
-def _takes(product: str, name: str) -> bool:
-    """Whether a product has a word of its own where a user has a name."""
-    return name != AT_POWER_UP and lookup(name, product) is not None
-
-
-def _some(words: Sequence[str]) -> str:
-    return ", ".join(words[:LISTED]) + (" and others" if len(words) > LISTED else "")
-
-
-def _choice(products: Sequence[str]) -> str:
-    *others, last = products
-    return f"{', '.join(others)} or {last}" if others else last
 
 
 # Warnings of trips that are set up and never enabled, and the reverse (MCode reference 5.1.125 to 5.1.132).
@@ -78,15 +71,20 @@ def _choice(products: Sequence[str]) -> str:
 
 BITS: Mapping[str, int] = {"TI": 1, "TP": 2, "TC": 4, "TT": 8, "TR": 16, "TA": 32, "TM": 64}
 """The trips, each with the number by which TE enables it."""
-_Read = Sequence[tuple[ProgramLine, Statement]]
-"""The lines of a file without an error, each with its statement."""
 
 
-def check_trips(read: _Read, mentioned: Container[str]) -> Iterator[Problem]:
+def check_trips(read: Read, mentioned: Container[str]) -> Iterator[Problem]:
     """Report trips without TE, and TE without trips. `mentioned` are words that lines with an error have."""
     first = {statement.word: (line, statement) for line, statement in reversed(read) if statement.arguments}
-    enabled = _enabled(read)
-    if enabled is not None and "TE" not in mentioned:
+    enables = list[tuple[ProgramLine, Statement, int | None]]()
+    """The lines that give TE a number; None for one that the text does not show."""
+    for line, statement in read:
+        if statement.word == "TE" and statement.arguments:
+            number = statement.arguments[0]
+            shown = isinstance(number, Number) and isinstance(number.value, int)
+            enables.append((line, statement, int(number.value) if isinstance(number, Number) and shown else None))
+    if all(bits is not None for *_, bits in enables) and "TE" not in mentioned:
+        enabled = reduce(or_, (bits or 0 for *_, bits in enables), 0)
         for word, bit in BITS.items():
             if word in first and not enabled & bit:
                 line, statement = first[word]
@@ -96,8 +94,7 @@ def check_trips(read: _Read, mentioned: Container[str]) -> Iterator[Problem]:
     missing = {word: bit for word, bit in BITS.items() if word not in first and word not in mentioned}
     # Report the first TE for each set of trips that nothing sets up.
     reported = set[str]()
-    for line, statement in read:
-        bits = _bits(statement) if statement.word == "TE" and statement.arguments else None
+    for line, statement, bits in enables:
         words = [word for word, bit in missing.items() if (bits or 0) & bit and word not in reported]
         if words:
             reported.update(words)
@@ -105,24 +102,6 @@ def check_trips(read: _Read, mentioned: Container[str]) -> Iterator[Problem]:
             yield Problem(
                 line.number, line.column + statement.column, what, "a drive refuses it: error 27", warning=True
             )
-
-
-def _bits(statement: Statement) -> int | None:
-    """The number that a line gives TE; None for a number that the text does not show."""
-    value = statement.arguments[0]
-    return value.value if isinstance(value, Number) and isinstance(value.value, int) else None
-
-
-def _enabled(read: _Read) -> int | None:
-    """All trips that some line enables; None if the text does not show it."""
-    found = 0
-    for _, statement in read:
-        if statement.word == "TE" and statement.arguments:
-            bits = _bits(statement)
-            if bits is None:
-                return None
-            found |= bits
-    return found
 
 
 TARGETS = {"BR": 0, "CL": 0, "OE": 0, "TA": 1}
@@ -160,41 +139,33 @@ def _forgotten(lines: Sequence[ProgramLine], reader: _Reader, wrong: Container[i
     yield from program_flow.check_moves(flow)
     words_of_drives = [each for each in read if each[1].word not in reader.names]
     yield from check_trips(words_of_drives, doubtful)
-    yield from _unused(read, doubtful)
-    yield from _at_once(words_of_drives, reader.product)
-    if reader.product in EVERY:
-        yield from _out_of_range(words_of_drives, reader.product)
-        parsed = [(line, reader.statements[line.number]) for line in lines if line.number in reader.statements]
-        yield from check_products(parsed, reader.names, reader.product)
-
-
-def _at_once(read: Sequence[tuple[ProgramLine, Statement]], product: str) -> Iterator[Problem]:
-    """Warn of lines outside of a program that a download executes, and that act."""
-    programs = any(line.section == "program" for line, _ in read)  # else an instruction is an error
-    for line, statement in read:
-        guard = guards.find(line.text, address="", party=True, product=product, starts=lambda _: False)
-        if line.section != "program" and (guard is not None or (programs and guards.acts(line.text))):
-            what = f"{line.text} is outside of PG: a download executes it at once, and asks before"
-            yield Problem(line.number, line.column + statement.column, what, "move it into the program", warning=True)
-
-
-def _unused(read: Sequence[tuple[ProgramLine, Statement]], doubtful: Container[str]) -> Iterator[Problem]:
-    """Warn of variables of a program that no other line has; a global variable may be the host's."""
+    # A variable of a program that no other line has; a global variable may be the host's.
     used = set[str]().union(*({*words_of(statement)} - {line.declares} for line, statement in read))
     for line, statement in read:
         name = line.declares if statement.word == "VA" and line.section == "program" else ""
         if name and name not in used and name not in doubtful:
             hint = "delete it, or declare it before PG for a host to use"
             yield Problem(line.number, line.column, f"the variable {name} is never used", hint, warning=True)
+    yield from _when_executed(words_of_drives, reader.product)
+    if reader.product in EVERY:
+        parsed = [(line, reader.statements[line.number]) for line in lines if line.number in reader.statements]
+        yield from check_products(parsed, reader.names, reader.product)
 
 
-def _out_of_range(read: Sequence[tuple[ProgramLine, Statement]], product: str) -> Iterator[Problem]:
-    """Warn of numbers that a drive stores, and refuses when it executes the line."""
+def _when_executed(read: Read, product: str) -> Iterator[Problem]:
+    """Warn of lines outside of a program that act at a download, and of numbers that a drive refuses later."""
+    programs = any(line.section == "program" for line, _ in read)  # else an instruction is an error
     for line, statement in read:
-        valid = out_of_range(statement, product)
-        if valid and line.section == "program":
-            what = f"{line.text} is out of range: a drive refuses it when it executes it (error 21)"
-            yield Problem(line.number, line.column, what, valid, warning=True)
+        column = line.column + statement.column
+        if line.section == "program":
+            if product in EVERY and (valid := out_of_range(statement, product)):
+                what = f"{line.text} is out of range: a drive refuses it when it executes it (error 21)"
+                yield Problem(line.number, line.column, what, valid, warning=True)
+            continue
+        guard = guards.find(line.text, address="", party=True, product=product, starts=lambda _: False)
+        if guard is not None or (programs and guards.acts(line.text)):
+            what = f"{line.text} is outside of PG: a download executes it at once, and asks before"
+            yield Problem(line.number, column, what, "move it into the program", warning=True)
 
 
 def slips(lines: Sequence[ProgramLine], variables: Iterable[str]) -> list[Problem]:

@@ -19,7 +19,7 @@ from multidrop.dialects.mcode.host.state import who
 from multidrop.dialects.mcode.manual import parameter_plan, points
 from multidrop.dialects.mcode.manual import parameters as manual
 from multidrop.dialects.mcode.manual.parameters import reading_of
-from multidrop.dialects.mcode.manual.table import words
+from multidrop.dialects.mcode.manual.table import EVERY, words
 from multidrop.dialects.modbus.host import framing, mapping
 from multidrop.dialects.modbus.host.codec import ModbusState, pdu_codec
 from multidrop.dialects.modbus.host.exchange import printed, request, sure, value
@@ -120,7 +120,7 @@ INPUTS = 4
 def parts(state: ModbusState, facts: Facts) -> Sequence[Part[ModbusState]]:
     found = [Part("flags", partial(_registers, names=FLAGS)), Part("points", _points)]
     table = words(state.product)
-    has = [n for n in SETTINGS if not manual.exact(state.product) or state.product in table[n].products]
+    has = [n for n in SETTINGS if state.product not in EVERY or state.product in table[n].products]
     found += [Part(name, partial(_registers, names=(name,)), slow=True) for name in has]
     lists = manual.lists(state.product, state.version)
     found += [Part(word, partial(_setups, word=word), slow=True) for word in ("IS", "OS") if word in lists]
