@@ -28,7 +28,6 @@ from multidrop.dialects.mcode.host.program_readout import (
     GLOBAL,
     LABEL,
     LOCAL,
-    FileProgram,
     Program,
     declared,
     immediate_lines,
@@ -61,14 +60,6 @@ class Plan:
     def clears(self) -> bool:
         return bool(self.in_the_way or self.replaced)
 
-    def after_clearing(self, product: str) -> list[ProgramLine]:
-        """Return the lines to send after CP: the programs that stay, each line at its address, then the file."""
-        again: list[ProgramLine] = []
-        for program in programs([line for each in self.kept for line in each.lines], product, fine=True):
-            inside = [ProgramLine(0, line.text, "") for line in program.lines]
-            again += [ProgramLine(0, f"PG {program.start}", ""), *inside, ProgramLine(0, "PG", "")]
-        return again + self.lines
-
 
 def prepare(state: MCodeState, lines: Sequence[SourceLine], held: Held) -> Procedure[Sequence[SourceLine]]:
     """Return the lines to send, after clearing the drive's programs if needed. Raises Refused before that."""
@@ -84,7 +75,11 @@ def prepare(state: MCodeState, lines: Sequence[SourceLine], held: Held) -> Proce
         raise Refused(f"line {slip.line}: {slip.what} (nothing was sent)")
     yield from immediate(state, state.codec.request(state.address, "CP"))
     state.note(f"{who(state)}: {_cleared(made, [name for name in names if names[name].kind == LABEL], lines)}")
-    return made.after_clearing(state.product)
+    again: list[ProgramLine] = []  # the programs that stay, each line at its address
+    for program in programs([line for each in made.kept for line in each.lines], state.product, fine=True):
+        inside = [ProgramLine(0, line.text, "") for line in program.lines]
+        again += [ProgramLine(0, f"PG {program.start}", ""), *inside, ProgramLine(0, "PG", "")]
+    return again + made.lines
 
 
 def plan(lines: Sequence[SourceLine], held: Held, drive: str, product: str = "") -> Plan:
@@ -93,10 +88,17 @@ def plan(lines: Sequence[SourceLine], held: Held, drive: str, product: str = "")
     if clears_itself(lines):
         return made
     names = names_of(held)
-    own = programs_of(lines)
+    starts = [(each.start(names), each.lines) for each in programs_of(lines)]
+    spans = [(at, at + sum(size(line.text, product) for line in inside)) for at, inside in starts if at is not None]
+    found = [each for line in lines if (each := declared(line.text)) is not None]
+    outside = [each for line in immediate_lines(lines) if (each := declared(line.text)) is not None]
+    no_local = {name for word, name in found if word == "LB"} | {name for _, name in outside}
     for program in programs(held.lines, product):
-        gone = any(_overlap(each, each.start(names), program, product) for each in own)
-        (made.replaced if gone or _share_names(program, lines) else made.kept).append(program)
+        over = [(at, end) for at, end in spans if at < program.end and program.start < end]
+        gone = any(not (program.start < at and end <= program.end) for at, end in over)  # a part of it replaces nothing
+        # A name is given again: as a label in one of both, or a local name as a global.
+        shared = program.declared("LB") & {name for _, name in found} or program.declared("VA") & no_local
+        (made.replaced if gone or shared else made.kept).append(program)
     return made
 
 
@@ -105,23 +107,6 @@ def clears_itself(lines: Sequence[SourceLine]) -> bool:
     entered = next((line.number for line in lines if classify.enters_program(line.text)), 0)
     before = (classify.word_of(line.text) for line in immediate_lines(lines) if line.number < entered)
     return any(word == "FD" or (word == "CP" and rest.upper() in WHOLE) for word, rest in before)
-
-
-def _overlap(own: FileProgram, start: int | None, program: Program, product: str) -> bool:
-    """Whether a program of the file takes the place of one in the drive; not where it is a part of that."""
-    if start is None:
-        return False
-    end = start + sum(size(line.text, product) for line in own.lines)
-    part = program.start < start and end <= program.end
-    return start < program.end and program.start < end and not part
-
-
-def _share_names(program: Program, lines: Sequence[SourceLine]) -> bool:
-    """Whether a file gives names again that a program has: as a label in one of both, or a local name as a global."""
-    found = [each for line in lines if (each := declared(line.text)) is not None]
-    outside = [each for line in immediate_lines(lines) if (each := declared(line.text)) is not None]
-    no_local = {name for word, name in found if word == "LB"} | {name for _, name in outside}
-    return bool(program.declared("LB") & {name for _, name in found} or program.declared("VA") & no_local)
 
 
 def _named_lines(lines: Sequence[SourceLine], held: Held, drive: str, product: str) -> Plan:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import re
 from dataclasses import replace
 from functools import lru_cache
-from typing import NamedTuple
 
 from multidrop.dialects.codec import End, Kind, Priority, Procedure, Request
 from multidrop.dialects.errors import Inexpressible, NoAnswer, Refused
@@ -50,45 +49,39 @@ READ_BACK = {
 """Words that print the number that was written, until something writes another one."""
 ROUNDED = {"A": 100, "D": 100}
 """Greatest difference between the number written and the number read, where a drive rounds."""
+ACTIVITY = 'BY," ",MV," ",P', f"[01] [01] {INTEGER}"
+"""Items of PR and their form: whether a program runs, whether the drive moves, its position."""
 
 
-class Rest(NamedTuple):
-    """The activity of a drive: whether a program runs, whether it moves, its position."""
-
-    busy: bool
-    moving: bool
-    position: int
-
-    @property
-    def resting(self) -> bool:
-        """Whether nothing that happens next happens by itself."""
-        return not self.busy and not self.moving
-
-
-def rest_before(state: MCodeState, request: Request) -> Procedure[Rest | None]:
-    """Read what the drive does before a command that can start motion, where only that can confirm it."""
+def rest_before(state: MCodeState, request: Request) -> Procedure[list[int]]:
+    """Read `ACTIVITY` before a command that can start motion, where only that can confirm it; else nothing."""
     silent = state.codec.em == 2 and request.kind is Kind.COMMAND
     if not silent or written(request.text) is not None or not state.codec.starts_motion(request.text):
-        return None
-    before = yield from _rest(state)
-    if before is None:
+        return []
+    before = yield from _numbers(state, *ACTIVITY)
+    if not before:
         raise NoAnswer(f"{who(state)} does not reply: '{request.text}' was not sent")
     return before
 
 
-def confirm_effect(state: MCodeState, request: Request, before: Rest | None) -> Procedure[None]:
+def confirm_effect(state: MCodeState, request: Request, before: list[int]) -> Procedure[None]:
     """Read the effect of a command that no sign of the drive confirms; note where that proves nothing.
 
     Raises NoAnswer if the setting that it wrote reads as another number.
     """
     if (setting := written(request.text)) is not None:
-        yield from _read_back(state, request, *setting)
-    elif before is None or not before.resting:
-        _not_confirmed(state, request)
-    else:
-        after = yield from _rest(state)
-        if after is None or (after.resting and after.position == before.position):
-            _not_confirmed(state, request)
+        word, number = setting
+        found = yield from _numbers(state, f'{word}," ",BY', f"{INTEGER} [01]")
+        if found and abs(found[0] - number) <= ROUNDED.get(word, 0):
+            return
+        if found and not found[1]:  # a running program may have written another number meanwhile
+            fate = "it is not known whether it was executed; it was sent once"
+            raise NoAnswer(f"{who(state)}: {word} reads {found[0]} after '{request.text}': {fate}")
+    elif before[:2] == [0, 0]:  # at rest: nothing that happens next happens by itself
+        after = yield from _numbers(state, *ACTIVITY)
+        if after and after != before:
+            return
+    state.note(f"{who(state)}: '{request.text}' was sent once and not refused; its execution is not confirmed")
 
 
 def written(text: str) -> tuple[str, int] | None:
@@ -106,22 +99,6 @@ def written(text: str) -> tuple[str, int] | None:
     return row.name, sign * int(argument.value)
 
 
-def _read_back(state: MCodeState, request: Request, word: str, number: int) -> Procedure[None]:
-    """Read a setting. A running program may have written another number meanwhile."""
-    found = yield from _numbers(state, f'{word}," ",BY', f"{INTEGER} [01]")
-    if found and abs(found[0] - number) <= ROUNDED.get(word, 0):
-        return
-    if not found or found[1]:
-        return _not_confirmed(state, request)
-    fate = "it is not known whether it was executed; it was sent once"
-    raise NoAnswer(f"{who(state)}: {word} reads {found[0]} after '{request.text}': {fate}")
-
-
-def _rest(state: MCodeState) -> Procedure[Rest | None]:
-    found = yield from _numbers(state, 'BY," ",MV," ",P', f"[01] [01] {INTEGER}")
-    return Rest(found[0] == 1, found[1] == 1, found[2]) if found else None
-
-
 def _numbers(state: MCodeState, items: str, form: str) -> Procedure[list[int]]:
     try:
         reply = yield from answered(state, question(state, items, form))
@@ -131,10 +108,6 @@ def _numbers(state: MCodeState, items: str, form: str) -> Procedure[list[int]]:
         state.reply_lost()
         return []
     return [int(each) for each in value(state, reply).split()]
-
-
-def _not_confirmed(state: MCodeState, request: Request) -> None:
-    state.note(f"{who(state)}: '{request.text}' was sent once and not refused; its execution is not confirmed")
 
 
 # Conversations with an MCode drive: typed lines, lists, motion, flags. `exchange` has the single request.

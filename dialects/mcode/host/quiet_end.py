@@ -13,13 +13,6 @@ _PROMPTS = (">", "?")
 _ACK = "\x06"
 
 
-def is_pong(request: Request, buffer: bytes) -> bool:
-    """Whether this is the whole reply to a ping, from a drive that wants a checksum or none."""
-    if request.body or request.text or not request.address:
-        return False
-    return any(buffer in pongs(request.address, each) for each in (False, True))
-
-
 def pongs(address: str, checksum: bool) -> tuple[bytes, ...]:
     """The whole replies to a ping in EM=1 and EM=0."""
     name, sign = address.encode("latin-1"), b"\x15" if checksum else b"\r\n"
@@ -81,7 +74,8 @@ def quiet_time(request: Request, buffer: bytes, em: int, checksum: int) -> float
         if found:
             return 0.0 if _is_whole(request, found, buffer, checksum) else SHORT
         if buffer:
-            return 0.0 if is_pong(request, buffer) else BETWEEN
+            pinged = request.address and not (request.body or request.text)
+        return 0.0 if pinged and any(buffer in pongs(request.address, each) for each in (False, True)) else BETWEEN
         return max(FIRST, len(request.text) / SLOWEST) if request.text else PONG
     if request.kind is Kind.LIST:
         # The time after a list. With EM=0 its prompt ends it.

@@ -194,30 +194,6 @@ class ReplyLines:
             return self.sealed == 2 and (self.repeated or 0 < len(rest) == self.repetition(rest))
         return self.echo == 2 or self.sealed != 1
 
-    def without_ack(self) -> End:
-        """Decide a prompt without ACK: with a checksum it does not prove execution, since it also follows a NAK."""
-        if self.request.kind is Kind.COMMAND and self.sealed == 2:
-            return End.SILENT  # a program may be running
-        if self.request.kind in (Kind.COMMAND, Kind.PROGRAM):
-            self.damaged = self.damaged or "neither ACK nor NAK came"
-            return End.DAMAGED
-        return End.DONE
-
-    def after_nak(self, unfinished: bool, followed: bool) -> End:
-        """Decide a reply with NAK: NAK only if it is the whole reply, not before the requested value.
-
-        `unfinished`: half a line follows it; `followed`: whole lines do.
-        """
-        if self.answered and self.request.kind is Kind.PRINT:
-            return End.DONE
-        other_signs = self.acks or self.mixed or self.damaged or self.answered or self.repetition_missing
-        if self.naks == 1 and not other_signs and not (unfinished and self.echo != 0):
-            if followed and self.echo != 0:
-                self.damaged = "prints follow the NAK"
-            return End.NAK
-        self.damaged = self.damaged or "NAK among other characters"
-        return End.DAMAGED
-
     def decoded(self, end: End, used: int, prompt: str = "") -> Decoded:
         """Return the reply as collected, with its end after a last check."""
         kind = self.request.kind
@@ -418,7 +394,11 @@ class ReplyParser:
         if prompt == b"?" and not printed and not self.got.acks and end is End.DONE:
             end = End.REFUSED  # after an ACK the error is an earlier one
         elif end is End.DONE and self.sealed and not self.got.acks:
-            end = self.got.without_ack()
+            # With a checksum a prompt does not prove execution, since it also follows a NAK.
+            if self.request.kind is Kind.COMMAND and self.sealed == 2:
+                end = End.SILENT  # a program may be running
+            elif self.request.kind in (Kind.COMMAND, Kind.PROGRAM):
+                end, self.got.damaged = End.DAMAGED, self.got.damaged or "neither ACK nor NAK came"
         return self.got.decoded(end, start + len(prompt), printable(prompt))
 
     def _at_candidate(self) -> Decoded | None:
@@ -434,7 +414,17 @@ class ReplyParser:
         return replace(found, reply=replace(found.reply, prompt="", acknowledged=self.got.acks > 0))
 
     def _after_nak(self) -> End:
-        return self.got.after_nak(unfinished=bool(self.rest), followed=self.after > 0)
+        """Decide a reply with NAK: NAK only if it is the whole reply, not before the requested value."""
+        got = self.got
+        if got.answered and self.request.kind is Kind.PRINT:
+            return End.DONE
+        other_signs = got.acks or got.mixed or got.damaged or got.answered or got.repetition_missing
+        if got.naks == 1 and not other_signs and not (self.rest and self.echo != 0):
+            if self.after > 0 and self.echo != 0:
+                got.damaged = "prints follow the NAK"
+            return End.NAK
+        got.damaged = got.damaged or "NAK among other characters"
+        return End.DAMAGED
 
     # Quiet
 

@@ -9,7 +9,6 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Mapping
 from types import MappingProxyType
-from typing import NamedTuple
 
 from multidrop.dialects.family import ADDRESSES, EVERYONE, Guard, to_all
 from multidrop.dialects.mcode.manual.grammar import LineError, Number, Statement, parse
@@ -50,17 +49,6 @@ _ANY = re.compile("|".join((*AT_ONCE, *SETTINGS)), re.IGNORECASE)
 _NAMED = re.compile(r"([!-~])(?=[A-Za-z])")
 
 
-class _Head(NamedTuple):
-    """The head of a line: a drive's name where one is typed, the word, and the value.
-
-    The value is a whole number, other text, or nothing.
-    """
-
-    name: str
-    word: str
-    value: int | str
-
-
 def find(text: str, *, address: str, party: bool, product: str, starts: Callable[[str], bool]) -> Guard | None:
     """Find the guard of a line for a drive; None: the line needs no agreement.
 
@@ -73,7 +61,10 @@ def find(text: str, *, address: str, party: bool, product: str, starts: Callable
     if word == "PY" and not (party or name):
         return None
     if word in AT_ONCE or (word in SETTINGS and value != "" and value not in HARMLESS.get(word, ())):
-        return Guard(word, f"'{line}' {_meaning(word, value)}")
+        meaning = AT_ONCE.get(word) or SETTINGS[word]
+        if word == "CP" and value == 1:
+            meaning = "erases the program and every user variable"
+        return Guard(word, f"'{line}' {meaning}")
     if name in ADDRESSES or address in ADDRESSES:
         stops = word in STOPS_AT_0 and value == 0
         sent = line.removeprefix(name) if name in ADDRESSES else line
@@ -94,7 +85,7 @@ def acts(text: str) -> bool:
 
 
 def word_of(text: str, product: str = "") -> str:
-    return _head(bare(text), product).word
+    return _head(bare(text), product)[1]
 
 
 def only_ends(text: str) -> bool:
@@ -103,19 +94,16 @@ def only_ends(text: str) -> bool:
     return word in VELOCITIES and value == 0
 
 
-def _meaning(word: str, value: int | str) -> str:
-    if word == "CP" and value == 1:
-        return "erases the program and every user variable"
-    return AT_ONCE.get(word) or SETTINGS[word]
+def _head(line: str, product: str) -> tuple[str, str, int | str]:
+    """Read the head of a line: a drive's name where one is typed, the word, and the value.
 
-
-def _head(line: str, product: str) -> _Head:
-    """Read the head of a line: with a drive's name before it, unless it has a meaning by itself."""
+    The value is a whole number, other text, or nothing. A head that has a meaning by itself begins with no name.
+    """
     if (found := _read(line, product)) is not None:
-        return _Head("", *found)
+        return "", *found
     if (named := _NAMED.match(line)) is not None:
-        return _Head(named[1], *(_read(line[1:], product) or ("", "")))
-    return _Head("", "", "")
+        return named[1], *(_read(line[1:], product) or ("", ""))
+    return "", "", ""
 
 
 def _read(line: str, product: str) -> tuple[str, int | str] | None:

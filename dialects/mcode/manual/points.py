@@ -64,6 +64,11 @@ def conditions(product: str, facts: Facts, target: int | None) -> Conditions:
     limits = (found[0], found[1]) if len(found) == 2 and found[0] < found[1] else None
     pace = [number(facts[name]) for name in ("VI", "VM", "A", "D") if name in facts]
     analog = (Lamp("ai", str(facts["I5"])),) if "I5" in facts else ()  # neither on nor off
+    locked = facts.get("AS") and int(number(facts.get("AF", 0))) & LOCKED  # (MCode reference 5.1.20, 5.1.30)
+    more: tuple[tuple[str, str], ...] = ()
+    if "AF" in facts and facts.get("AS"):
+        words = [word for bit, word in HMT if int(number(facts["AF"])) & bit]
+        more = (("hMT", ", ".join(words) or "ready"),)
     return Conditions(
         lamps=(*_inputs(product, facts), *analog, *_outputs(facts)),
         error=UNREAD if facts.get("EF") else 0,
@@ -72,11 +77,11 @@ def conditions(product: str, facts: Facts, target: int | None) -> Conditions:
         runs=bool(facts["BY"]) if "BY" in facts else None,
         target=target if facts.get("MV") else None,
         limits=limits,
-        disabled=_disabled(facts),
+        disabled="DE=0" if facts.get("DE") == 0 else "locked rotor; CF clears it" if locked else "",
         released="HC=0" if facts.get("HC") == 0 and not facts.get("AS") else "",
         run_current=_whole(facts, "RC"),
         hold_current=_whole(facts, "HC"),
-        more=tuple(_more(facts)),
+        more=more,
         unit="counts" if counting(facts) else "steps",
         pace=Pace(*pace) if len(pace) == 4 else None,
     )
@@ -84,14 +89,6 @@ def conditions(product: str, facts: Facts, target: int | None) -> Conditions:
 
 def _whole(facts: Facts, name: str) -> int | None:
     return int(number(facts[name])) if name in facts else None
-
-
-def _disabled(facts: Facts) -> str:
-    """The reason for which the output bridges are off. (MCode reference 5.1.20, 5.1.30.)"""
-    if facts.get("DE") == 0:
-        return "DE=0"
-    locked = facts.get("AS") and int(number(facts.get("AF", 0))) & LOCKED
-    return "locked rotor; CF clears it" if locked else ""
 
 
 def _setup(facts: Facts, words: tuple[str, str]) -> tuple[int, int] | None:
@@ -121,10 +118,3 @@ def _outputs(facts: Facts) -> Iterator[Lamp]:
         fact = f"O{n}" if f"O{n}" in facts else FOLLOWS.get(setup[0], "")
         on = bool(facts[fact]) if fact in facts else None
         yield Lamp(str(n), FUNCTIONS.get(setup[0], f"type {setup[0]}"), on, output=True)
-
-
-def _more(facts: Facts) -> Iterator[tuple[str, str]]:
-    if "AF" in facts and facts.get("AS"):
-        bits = int(number(facts["AF"]))
-        words = [word for bit, word in HMT if bits & bit]
-        yield "hMT", ", ".join(words) or "ready"
