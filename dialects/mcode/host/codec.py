@@ -80,10 +80,7 @@ class MCode(Codec):
     checksum: int = 0
     escape: int | None = None
     family: ClassVar[str] = "mcode"
-    framed: ClassVar[bool] = False
-    numbered: ClassVar[bool] = False
     broadcasts: ClassVar[bool] = True
-    stop_replies: ClassVar[bool] = False
     stop_debris: ClassVar[re.Pattern[str]] = re.compile(r".*#")
 
     @property
@@ -131,12 +128,11 @@ class MCode(Codec):
         """
         if request.body:
             return request.body
-        wake = (
-            NOBODY.encode() + self.terminator
-            if request.kind is Kind.COMMAND and (self.party and (self.em == 2 or (self.em == 1 and self.checksum == 2)))
-            else b""
-        )
-        return wake + self._frame(request) + self.terminator
+        frame = self._frame(request) + self.terminator
+        silent_on_success = self.party and (self.em == 2 or (self.em == 1 and self.checksum == 2))
+        if request.kind is Kind.COMMAND and silent_on_success:
+            return NOBODY.encode() + self.terminator + frame
+        return frame
 
     def _reading(self, request: Request, buffer: bytes) -> ReplyParser:
         return ReplyParser(request, self.em, self.checksum, self._body(request), buffer)
@@ -232,10 +228,6 @@ class MCode(Codec):
     def restarted(self, line: str) -> bool:
         """Whether a line is the sign-on, which a drive in party mode does not send (3.4.4)."""
         return SIGN_ON.match(line) is not None
-
-    def stored_stop(self, line: str) -> str:
-        """Never: no drive of the family replies so to a stop."""
-        return ""
 
     def invalidate(self) -> bytes:
         """Return a full buffer of tildes: the half-sent line overflows, which every drive refuses (5.1.102)."""
