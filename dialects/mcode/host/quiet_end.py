@@ -75,7 +75,7 @@ def quiet_time(request: Request, buffer: bytes, em: int, checksum: int) -> float
             return 0.0 if _is_whole(request, found, buffer, checksum) else SHORT
         if buffer:
             pinged = request.address and not (request.body or request.text)
-        return 0.0 if pinged and any(buffer in pongs(request.address, each) for each in (False, True)) else BETWEEN
+            return 0.0 if pinged and any(buffer in pongs(request.address, each) for each in (False, True)) else BETWEEN
         return max(FIRST, len(request.text) / SLOWEST) if request.text else PONG
     if request.kind is Kind.LIST:
         # The time after a list. With EM=0 its prompt ends it.
