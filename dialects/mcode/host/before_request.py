@@ -60,24 +60,21 @@ def confirm_drive(state: MCodeState, text: str, fate: str) -> Procedure[None]:
     if not found:
         state.settings_may_have_changed()
         raise NoAnswer(f"{who(state)} does not reply: '{text}' {fate}")
-    if expected.last is not None:
-        # Report another drive than last time's, or other settings.
-        both = (
-            ("serial number", expected.last.serial, state.serial),
-            ("product", expected.last.product, state.product),
-            ("version", expected.last.version, state.version),
-        )
-        changed = [f"{word} {then} then, {now} now" for word, then, now in both if then and now and then != now]
-        codec = state.codec
-        settings = (codec.party, codec.checksum, codec.em) != (
-            expected.last.party,
-            expected.last.checksum,
-            expected.last.em,
-        )
-        if changed:
-            state.note(f"{who(state)}: another drive replies than last time ({'; '.join(changed)})")
-        elif settings or state.name != expected.last.name:
-            state.note(f"{who(state)}: its settings are not those of last time ({codec.shown}); they were read again")
+    last, codec = expected.last, state.codec
+    if last is None:
+        return
+    # Report another drive than last time's, or other settings.
+    both = (
+        ("serial number", last.serial, state.serial),
+        ("product", last.product, state.product),
+        ("version", last.version, state.version),
+    )
+    changed = [f"{word} {then} then, {now} now" for word, then, now in both if then and now and then != now]
+    settings = (codec.party, codec.checksum, codec.em) != (last.party, last.checksum, last.em)
+    if changed:
+        state.note(f"{who(state)}: another drive replies than last time ({'; '.join(changed)})")
+    elif settings or state.name != last.name:
+        state.note(f"{who(state)}: its settings are not those of last time ({codec.shown}); they were read again")
 
 
 def _find_anywhere(state: MCodeState, place: Place) -> Procedure[bool]:

@@ -432,53 +432,50 @@ class ReplyParser:
         """Return the outcome after a quiet time; None: wait for the timeout."""
         if (done := self.whole()) is not None:
             return done
-        kind, used = self.request.kind, len(self.buffer)
+        got, kind, used = self.got, self.request.kind, len(self.buffer)
         if kind in ENDLESS:
             # End a list, a setting or a collection when the wire is quiet.
-            if self.echo == 3 and self.request.kind is Kind.LIST and not self.got.repeated:
+            if self.echo == 3 and kind is Kind.LIST and not got.repeated:
                 return None
             prompt = printable(self.rest) if self.echo == 0 and self._is_prompt(self.rest) else ""
-            if prompt not in ("", ">", "?") and self.got.lines:
+            if prompt not in ("", ">", "?") and got.lines:
                 prompt = ""  # the address of the next listed line
-            if (
-                self.request.kind is Kind.LIST
-                and not prompt
-                and (self.echo == 0 or bool(self.rest and not self.request.text.endswith(";")))
-            ):
+            unended = self.echo == 0 or bool(self.rest and not self.request.text.endswith(";"))
+            if kind is Kind.LIST and not prompt and unended:  # its prompt is missing, or the end of a line
                 return None
             stored = self.request.rows is not None and ADDRESS_PROMPT.fullmatch(self.rest)  # the prompt of program mode
             if self.rest and not prompt and not stored:
-                self.got.add_line(self.rest)
-            end = End.REFUSED if prompt == "?" and not self.got.lines and not self.got.acks else End.DONE
-            if self.got.naks:
-                end = End.NAK if self.request.kind is Kind.QUIET else self._after_nak()
+                got.add_line(self.rest)
+            end = End.REFUSED if prompt == "?" and not got.lines and not got.acks else End.DONE
+            if got.naks:
+                end = End.NAK if kind is Kind.QUIET else self._after_nak()
             elif end is End.DONE and not self.buffer:
                 end = End.SILENT
-            return self.got.decoded(end, used, prompt)
+            return got.decoded(end, used, prompt)
         if self.echo == 0:
             return self._settled_prompt(used) if self.began else None
         if kind is Kind.PRINT:
             # Decide with EM 1 to 3: a reply without ACK, without a line end, damaged, or none.
-            if not self.got.answered and self.rest and (not self.request.expect or self.request.text.endswith(";")):
-                self.got.add_unended(self.rest)
-            if self.got.naks:
-                return self.got.decoded(self._after_nak(), used)
-            if not self.got.answered and self.got.blanks and self.echo in (2, 3) and not self.request.expect:
-                self.got.answer("")
-            if self.got.answered:
-                return self.got.decoded(End.DONE, used)
-            if self.got.damaged:
-                return self.got.decoded(End.DAMAGED, used)
-            if self.got.blanks or self.got.acks or self.got.repeated:
-                heard = " ".join((*self.got.collided, *self.got.glued))
-                self.got.damaged = f"heard {heard[:48]!r}" if self.got.collided else ""
-                return self.got.decoded(End.DAMAGED if self.got.collided else End.SILENT, used)
+            if not got.answered and self.rest and (not self.request.expect or self.request.text.endswith(";")):
+                got.add_unended(self.rest)
+            if got.naks:
+                return got.decoded(self._after_nak(), used)
+            if not got.answered and got.blanks and self.echo in (2, 3) and not self.request.expect:
+                got.answer("")
+            if got.answered:
+                return got.decoded(End.DONE, used)
+            if got.damaged:
+                return got.decoded(End.DAMAGED, used)
+            if got.blanks or got.acks or got.repeated:
+                heard = " ".join((*got.collided, *got.glued))
+                got.damaged = f"heard {heard[:48]!r}" if got.collided else ""
+                return got.decoded(End.DAMAGED if got.collided else End.SILENT, used)
             return None
-        if self.got.naks:
-            return self.got.decoded(self._after_nak(), used)
+        if got.naks:
+            return got.decoded(self._after_nak(), used)
         if self.rest and self.echo != 3:
             used = self.rest_at  # half a line of another drive or a program, still to be completed
-        return self.got.decoded(End.SILENT, used) if self.got.silence_is_success(self.rest) else None
+        return got.decoded(End.SILENT, used) if got.silence_is_success(self.rest) else None
 
     @staticmethod
     def _is_prompt(rest: bytes) -> bool:
