@@ -123,7 +123,7 @@ def test_a_slow_line_behind_a_gateway_is_opened_though_its_baud_rate_is_not_know
     desk.line = Line(MCode())
     [state] = desk.run(identify.identify(Hints(drives=("a",), party=True) if name else Hints()))
     assert (state.product, state.codec.em, state.codec.checksum) == ("LMDCM", em, check)
-    assert not next(iter(desk.devices.values())).error_flag
+    assert not next(iter(desk.devices.values())).memory.error_flag
 
 
 # --- bad wires
