@@ -66,8 +66,11 @@ def after_echo(frame: bytes, check: bytes, buffer: bytes) -> tuple[int, bytes] |
 
 def _echoed(frame: bytes, buffer: bytes, follows: tuple[bytes, ...] = ()) -> tuple[int, bytes] | None:
     """Match a frame. `follows`: the bytes allowed after an echo that prints interrupted; empty: any."""
-    if not _in_order(frame, buffer):
-        return None
+    found = 0
+    for character in frame:  # a cheap test that a damaged echo fails: the characters of the frame in their order
+        found = buffer.find(character, found) + 1
+        if not found:
+            return None
     seen: set[tuple[int, int]] = set()
     todo = [(0, 0, b"")]
     if buffer[:1] in (b">", b"?"):  # the end of the previous reply
@@ -86,16 +89,6 @@ def _echoed(frame: bytes, buffer: bytes, follows: tuple[bytes, ...] = ()) -> tup
             ends = [line, line + 1] if buffer[line : line + 1] in (b">", b"?") else [line]
             todo += [(matched + kept, to, strays + buffer[at + kept : to]) for kept in range(same + 1) for to in ends]
     return None
-
-
-def _in_order(frame: bytes, buffer: bytes) -> bool:
-    """Whether the characters of a frame are there in their order: a cheap test that a damaged echo fails."""
-    at = 0
-    for character in frame:
-        at = buffer.find(character, at) + 1
-        if not at:
-            return False
-    return True
 
 
 def printable(data: bytes) -> str:

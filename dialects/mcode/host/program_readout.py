@@ -98,18 +98,13 @@ def programs(lines: Sequence[Stored], product: str = "", fine: bool = False) -> 
     found: list[list[Stored]] = []
     end = -1
     for line in lines:
-        if not found or _begins(found[-1][-1], line.at, end, fine):
+        before = found[-1][-1] if found else None
+        ends = before is not None and (fine or classify.word_of(before.text)[0] in ENDS)
+        if before is None or line.at - before.at > GAP or (line.at > end and ends):
             found.append([])
         found[-1].append(line)
         end = line.at + size(line.text, product)
     return [Program(tuple(each), each[-1].at + size(each[-1].text, product)) for each in found]
-
-
-def _begins(before: Stored, at: int, end: int, fine: bool) -> bool:
-    """Whether a program begins at an address. `end`: where the line before it ends, as far as sizes are known."""
-    if at - before.at > GAP:
-        return True
-    return at > end and (fine or classify.word_of(before.text)[0] in ENDS)
 
 
 @lru_cache(maxsize=4096)
@@ -246,16 +241,12 @@ def refreshed(text: str, held: Held) -> tuple[str, ...]:
         if sent is not None and sent.section == "program":
             at = len(made) if at is None else at
         elif sent is not None and (found := declared(sent.text)) is not None and found[1] in missing:
-            line = _with_value(line, sent.text, found[1], missing.pop(found[1]))
+            value = missing.pop(found[1])
+            if (sent.text.partition("=")[2].strip() or "0") != value:
+                line = line.replace(sent.text, f"VA {found[1]}={value}", 1)
         made.append(line)
     more = [f"VA {name}={value}" for name, value in missing.items()]
     return (*made[:at], *more, *made[at:]) if at is not None else (*made, *more)
-
-
-def _with_value(line: str, sent: str, name: str, value: str) -> str:
-    """Write the value of a declaration; the line stays as it is where the value is the same."""
-    same = (sent.partition("=")[2].strip() or "0") == value
-    return line if same else line.replace(sent, f"VA {name}={value}", 1)
 
 
 def annotated(text: str, held: Held) -> tuple[str, ...]:

@@ -135,7 +135,11 @@ def _unlike(state: MCodeState, line: SourceLine, held: Held) -> Procedure[str]:
         return ""
     named = declared(line.text)
     name = named[1] if named is not None else statement.word
-    values = [_initial(statement)] if named is not None else (yield from _values(state, statement))
+    if named is not None:
+        first = statement.arguments[0]
+        values = [_literal(first.right) if isinstance(first, Compare) else 0.0]
+    else:
+        values = yield from _values(state, statement)
     if name in names:
         present = [_as_number(names[name].value)]
     elif named is not None or (row := lookup(name, state.product)) is None:
@@ -160,11 +164,6 @@ def _statement(text: str, names: set[str]) -> Statement | None:
         return parse(text, names)
     except LineError:
         return Statement(classify.word_of(text)[0], ())
-
-
-def _initial(statement: Statement) -> float | None:
-    first = statement.arguments[0]
-    return _literal(first.right) if isinstance(first, Compare) else 0.0
 
 
 def _literal(argument: Argument | None) -> float | None:

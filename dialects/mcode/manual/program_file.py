@@ -213,15 +213,11 @@ MOVES = frozenset(row.name for row in MOTION if row.starts and row.kind == "inst
 def parts(line: str) -> list[Part]:
     """Return the parts of a line that differ from plain text. Never fails."""
     end = remark_at(line)
-    found = list(_statement_parts(tokens(line[:end])))
-    return [*found, Part(end, len(line), "remark")] if end < len(line) else found
-
-
-def _statement_parts(found: list[Token]) -> Iterator[Part]:
+    found = tokens(line[:end])
     declares = bool(found) and found[0].text.upper() in _DECLARE
-    for number, token in enumerate(found):
-        if kind := _kind(token, number, declares):
-            yield Part(token.start, token.stop, kind)
+    kinds = [(token, _kind(token, number, declares)) for number, token in enumerate(found)]
+    shown = [Part(token.start, token.stop, kind) for token, kind in kinds if kind]
+    return [*shown, Part(end, len(line), "remark")] if end < len(line) else shown
 
 
 def _kind(token: Token, number: int, declares: bool) -> str:
