@@ -156,7 +156,7 @@ def target_of(text: str, rest: int | None) -> int | None:
 #
 # A line that does not match comes from a running program or another drive. Some lines match by chance: the reply to
 # `PR P` looks like any number that a program prints. The host then appends an item: the drive's own name, or a mark
-# (`signatures.Sign`). (MCode reference 5.1.102.)
+# (`exchange.Sign`). (MCode reference 5.1.102.)
 
 
 NOTHING = r"(?!)"

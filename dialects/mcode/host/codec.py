@@ -66,7 +66,7 @@ NOBODY = "~"
 """A character that no drive has as its name."""
 
 ANSWER = re.compile(r'(?:[^\s"]"[!-~]"|~\w?\d{0,4}(?:"[!-~]")?|PR [^\r\n]*,(?:DN|"~\w*"))[\x80-\xff]?\Z')
-"""The end of a signed print: a name after a value, or a mark (`signatures`); of its repetition."""
+"""The end of a signed print: a name after a value, or a mark (`exchange`); of its repetition."""
 STOP_BYTES = re.compile(rb"(?<![ -~])(?:[!-~][\x05\x1b])+\n?|[\x03\x05\x1b]|~{%d}[\r\n]" % (LONGEST + 1))
 """Any key that stops, alone or after names, Ctrl+C, which resets, and what makes a half-sent line overflow."""
 

@@ -159,7 +159,7 @@ def _cleared(made: Plan, labels: Iterable[str], lines: Sequence[SourceLine]) -> 
 
 # The download of a program: the host verifies every line, and restores the drive's echo mode in every case.
 #
-# Theory of operation. What the drive holds already comes first (`replacing`). Only EM=0 shows by its prompt whether a
+# Theory of operation. What the drive holds already comes first (`prepare`). Only EM=0 shows by its prompt whether a
 # line was stored, or executed without a refusal. So a download of a program switches to EM=0. S would save that, and a
 # file may set EM itself. So the host restores the echo mode before a line that saves, sets or starts anything. In
 # program mode the drive stores every line, so ER cannot be read. A NAK in program mode means that the line was not

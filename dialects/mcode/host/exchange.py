@@ -100,7 +100,7 @@ def signed(state: MCodeState, request: Request) -> Request:
 # before a command. Where the flag may have been set since, a NAK does not tell whether the command was executed. A
 # running program may set the flag at any time.
 #
-# Values are signed (`signatures`): a running program prints numbers too, and another drive's reply may be late. (MCode
+# Values are signed (see above): a running program prints numbers too, and another drive's reply may be late. (MCode
 # reference 5.1.37, 5.1.39, 5.1.40, 7.1; facts of real units.)
 
 

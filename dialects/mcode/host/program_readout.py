@@ -27,9 +27,9 @@ from multidrop.dialects.program_files import Held, Stored
 #
 # Theory of operation. A listing shows lines with their addresses and no ends of programs. A line ends where the next
 # one begins, unless a program ends there. So a gap larger than the line is the end of a program. The sizes of lines
-# are known from few units (`line_size`). A file is divided at every such gap: a PG too many changes nothing in the
-# drive. What counts as one program is divided at a gap only after an instruction that ends a program, or at a large
-# gap.
+# are known from few units (`statements.size_of`). A file is divided at every such gap: a PG too many changes nothing
+# in the drive. What counts as one program is divided at a gap only after an instruction that ends a program, or at a
+# large gap.
 
 
 GAP = 64

@@ -5,7 +5,7 @@ nothing where the head has one reading (`MR512`, `VAQ1=25`). Commas separate arg
 An argument is a text in quotation marks, an expression, or a condition. Operators have no precedence: they apply from
 left to right (the manual, 5.2, chains one operator only). So does a condition, with two exceptions. `+ - * /` after a
 comparison belong to its right side (`P<R1+100`). `& | ^` and a second comparison take its result, 0 or 1 (see
-`conditions`). Words are not case-sensitive. A remark begins with an apostrophe or a back-quote outside quotation marks
+`statements`). Words are not case-sensitive. A remark begins with an apostrophe or a back-quote outside quotation marks
 and runs to the end.
 
 The grammar gives words no meaning, except that it asks for the known words where a head may have to be split.

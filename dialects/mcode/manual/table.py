@@ -282,9 +282,7 @@ MATH_WORDS: tuple[Mnemonic, ...] = (
 WORDS: tuple[Mnemonic, ...] = MOTION_WORDS + POINT_WORDS + TRIP_WORDS + SYSTEM_WORDS + PROGRAM_WORDS + MATH_WORDS
 
 
-# Every mnemonic and operator of MCode, in one table for each firmware, and the lookup.
-#
-# Lexium: MCode reference, section 5. MDrivePlus: `table_mdrive`. A word that a product's table lacks is a free name.
+# Lexium: MCode reference, section 5. MDrivePlus: above. A word that a product's table lacks is a free name.
 
 
 __all__ = [
