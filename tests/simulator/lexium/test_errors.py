@@ -123,7 +123,7 @@ def test_it_is_the_last_line_that_is_wrong(code):
     lines = script.split(";")
     while lines[-1] in ("PG",) or lines[-1].startswith("@"):
         lines.pop()
-    assert not run(";".join(lines[:-1]), **more).error_flag
+    assert not run(";".join(lines[:-1]), **more).memory.error_flag
 
 
 def test_no_code_has_been_forgotten():

@@ -42,7 +42,7 @@ def test_a_program_that_prints_a_drives_name_commands_it(baud):
     heard = talk(wire, b"\naEX G1\n", 0.0, 2.0)
     assert (b.position(2.0), c.position(2.0), a.position(2.0)) == (1000, 0, 0)
     assert heard == b"\r\nbMR 1000\r\n\r\nbPR P\r\n\r\n1000\r\n"
-    assert not any(each.error_flag for each in (a, b, c))
+    assert not any(each.memory.error_flag for each in (a, b, c))
 
 
 def test_all_and_the_queued_ones_can_be_commanded_too():
@@ -74,7 +74,7 @@ def test_answers_are_not_heard_by_other_drives():
     a, b = device("a"), device("7")
     wire = line(a, b)
     assert talk(wire, b"\naP=7186\naPR P\n", 0.0, 1.0) == b"\r\n\r\n7186\r\n"
-    assert not b.error_flag
+    assert not b.memory.error_flag
 
 
 def test_a_print_while_the_host_speaks_is_not_heard_by_the_drives():
