@@ -24,9 +24,8 @@ from textual.app import App, ComposeResult
 from multidrop.drives.events import Sample
 from multidrop.shell.events import OnBus
 from multidrop.shell.roles import Series
-from multidrop.tui.panels.glance import glances_of
 from multidrop.tui.panels.plot import plot_rows
-from multidrop.tui.panels.view import View
+from multidrop.tui.panels.view import View, glances_of
 from multidrop.tui.screen_model import ScreenModel
 from multidrop.tui.widgets.lines import Lines, Roles
 from multidrop.tui.widgets.theme import DARK, DEFAULTS

@@ -1,45 +1,50 @@
-"""The actions of the app: what keys and the palette run. Each is named in a binding or in `tui.palette`."""
+"""The actions of the app: what keys and the palette run. Each is named in a binding or in `tui.palette`.
+
+They are two action targets beside Textual's own: `act` sends lines and selects, `view` changes what is shown.
+"""
 
 from __future__ import annotations
 
 import asyncio
+from dataclasses import dataclass, field
 from functools import partial
 from typing import TYPE_CHECKING
 
-from multidrop.dialects import Diagnostic, DriveError
-from multidrop.transports import TransportLost
-from multidrop.tui.palette import PADDING, PALETTE, Command, Recent, Switches, all_commands, commands_like
-from multidrop.tui.panels.glance import glances_of
+from textual.app import App
+from textual.widgets import Input, TextArea
+
+from multidrop.tui.outbox import selected_place
+from multidrop.tui.palette import PADDING, PALETTE, Command, Recent, Switches, all_commands, commands_like, entries
+from multidrop.tui.palette import found as help_on
+from multidrop.tui.panels.view import glances_of
 from multidrop.tui.screens.dialogs import Search
-from multidrop.tui.screens.page import Page
-from multidrop.tui.screens.table import page_entry
-from multidrop.tui.view_actions import ViewActions
+from multidrop.tui.screens.page import Framed, Host, Page, page_entry
+from multidrop.tui.widgets.theme import SignFilter, Signs, ink_of
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
+    from multidrop.shell.session import Session
     from multidrop.tui.assist import Assist
-    from multidrop.tui.editor.texts import Texts
-    from multidrop.tui.frames import Frames
-    from multidrop.tui.function_keys import FunctionKeys
-    from multidrop.tui.keymap import Keymap
-    from multidrop.tui.opening import Opener
+    from multidrop.tui.keymap import FunctionKeys, Keymap
     from multidrop.tui.outbox import Outbox
     from multidrop.tui.polling import Polling
-    from multidrop.tui.screen_model import Record, ScreenModel
+    from multidrop.tui.screen_model import ScreenModel
     from multidrop.tui.screens.main_screen import MainScreen
     from multidrop.tui.screens.questions import Questions
-    from multidrop.tui.selection import Selection
-    from multidrop.tui.session_view import SessionView
-    from multidrop.tui.terminal.keyboard import Keyboard
-
-FAILURES = (DriveError, Diagnostic, TransportLost)
+    from multidrop.tui.screens.start import Opener
+    from multidrop.tui.tour import Tour
+    from multidrop.tui.typist import Selection
 
 
-class Actions(ViewActions):
-    """The actions; `tui.app.MultidropApp` makes the parts that they work on."""
+CTRL_C = "Ctrl+Q quits, Ctrl+X stops all drives"
 
-    session: SessionView
+
+@dataclass
+class Parts:
+    """The parts of one app that its actions work on."""
+
+    app: App[int]
+    host: Host
+    session: Session
     model: ScreenModel
     main: MainScreen
     assist: Assist
@@ -49,36 +54,123 @@ class Actions(ViewActions):
     selection: Selection
     questions: Questions
     keymap: Keymap
-    recent: Recent
     opener: Opener
-    texts: Texts
-    frames: Frames
-    keyboard: Keyboard
+    tour: Tour
+    signs: SignFilter
+    recent: Recent = field(default_factory=Recent)
+    mouse_on: bool = True
 
-    def last_records(self, number: int) -> Sequence[Record]:
-        """The last records of the transcript that is shown."""
-        raise NotImplementedError
 
-    def show_line(self, text: str, mark: str = ".") -> None:
-        """Append a line of the app's own to the transcript that is shown."""
-        raise NotImplementedError
+class Target:
+    """A target of actions. Textual asks it whether an action is possible."""
 
-    def stop_all(self) -> None:
-        """Stop everything, now."""
-        raise NotImplementedError
+    def __init__(self, parts: Parts) -> None:
+        self._parts = parts
 
-    def action_stop_all(self) -> None:
-        """Stop everything."""
-        self.stop_all()
+    def check_action(self, action: str, parameters: tuple[object, ...]) -> bool:
+        """Whether an action is possible: Escape ends the tour unless it closes something."""
+        entry = self._parts.main.entry
+        if action == "end_tour":
+            return self._parts.tour.on and self._parts.app.focused is entry and not entry.listing.open
+        return True
+
+
+class ViewActions(Target):
+    """The actions that change what is shown, and send nothing."""
+
+    def action_panel(self, name: str) -> None:
+        self._parts.main.toggle_panel(name)
+        self._parts.model.changed = True
+
+    def action_polling(self) -> None:
+        self._parts.polling.on = not self._parts.polling.on
+        self._parts.model.changed = True
+
+    def action_clear(self) -> None:
+        self._parts.main.transcript.clear()
+
+    def action_copy_view(self) -> None:
+        """Copy the transcript in view to the clipboard."""
+        self._parts.app.copy_to_clipboard(self._parts.main.transcript.plain)
+        self._parts.app.notify("Sent to the terminal's clipboard", timeout=4)
+
+    def action_mouse(self) -> None:
+        """Take the mouse, or leave it to the terminal."""
+        self._parts.mouse_on = not self._parts.mouse_on
+        switch = getattr(self._parts.app._driver, "mouse", None)
+        if switch is not None:
+            switch(self._parts.mouse_on)
+
+    def action_repaint(self) -> None:
+        """Paint everything, whatever the terminal shows."""
+        repaint = getattr(self._parts.app._driver, "repaint", None)
+        if repaint is not None:
+            repaint()
+
+    async def action_choose_theme(self) -> None:
+        await self._parts.questions.theme()
+
+    async def action_choose_signs(self) -> None:
+        """Choose the signs that the terminal's font holds."""
+        await self._parts.questions.signs(self.show_signs)
+
+    def show_signs(self, signs: Signs) -> None:
+        """Show only these signs from now on."""
+        parts = self._parts
+        parts.signs.font = signs
+        parts.model.look.ink = ink_of(signs)
+        parts.app.refresh_css()
+        parts.app.refresh(layout=True)  # an equal style sheet paints nothing
+
+    async def action_help(self) -> None:
+        """Search the help for the screen that is shown."""
+        parts = self._parts
+        shown = [each for each in parts.app.screen_stack if isinstance(each, Framed)]
+        found = entries(shown[-1], parts.keymap, parts.macros.bound)
+        width = min(PALETTE, parts.app.size.width) - PADDING
+        await parts.questions.help(lambda typed: help_on(found, typed, width))
+
+    def action_explain(self) -> None:
+        """Copy the selected text on Ctrl+C, else name the keys that end and stop."""
+        app, focused = self._parts.app, self._parts.app.focused
+        selected = focused.selected_text if isinstance(focused, Input | TextArea) else app.screen.get_selected_text()
+        if selected:
+            app.copy_to_clipboard(selected)
+        app.notify("Copied" if selected else CTRL_C, timeout=4)
+
+    def action_end_tour(self) -> None:
+        self._parts.tour.end()
+        self._parts.model.changed = True
+
+    async def action_split(self) -> None:
+        """Split the screen: choose what the other half shows; once it is split, type to the other half."""
+        parts, beside = self._parts, self._parts.main.beside
+        if not beside.display:
+            await parts.questions.half(partial(glances_of, parts.session, parts.model), self._show_half)
+            return
+        place, (bus, address) = selected_place(parts.session), (beside.bus, beside.address)
+        self._show_half(place.address, place.bus)
+        parts.selection.select(address, bus)
+
+    def _show_half(self, address: str, bus: str) -> None:
+        self._parts.main.beside.show(bus, address, self._parts.main.page(bus))
+        self._parts.model.changed = True
+
+    def action_unsplit(self) -> None:
+        self._parts.main.beside.hide()
+
+
+class Actions(Target):
+    """The actions that send lines, select, and open pages and dialogs."""
 
     async def action_run_line(self, line: str) -> None:
         """Run a line in the background. Its event reports a failure; a bug ends the app.
 
         When this returns the line has taken its first step and has its drive.
         """
-        self.run_worker(self._end_of(self.session.start(line)))
+        self._parts.app.run_worker(self._end_of(self._parts.session.start(line)))
         await asyncio.sleep(0)
-        self.selection.follow()
+        self._parts.selection.follow()
 
     @staticmethod
     async def _end_of(task: asyncio.Task[bool]) -> None:
@@ -88,118 +180,118 @@ class Actions(ViewActions):
 
     def action_begin_line(self, text: str) -> None:
         """Put the beginning of a line into the input line."""
-        self.main.entry.put(text)
-        self.main.set_focus(self.main.entry)
+        self._parts.main.entry.put(text)
+        self._parts.main.take_keys()
 
     def action_select(self, address: str, bus: str = "") -> None:
-        """Select a drive or a bus."""
-        try:
-            self.session.select(address, bus)
-        except FAILURES as failure:
-            self.show_line(str(failure), "x")
-        self.selection.follow()
-        self.model.changed = True
+        self._parts.selection.select(address, bus)
 
     def action_bus(self, step: int) -> None:
         """Show the next bus, or the one before."""
-        names = list(self.session.buses)
+        names, selected = list(self._parts.session.buses), self._parts.session.selected_bus
         if names:
-            at = names.index(self.session.selected_bus) if self.session.selected_bus in names else 0
-            self.action_select("", names[(at + step) % len(names)])
+            at = names.index(selected) if selected in names else 0
+            self._parts.selection.select("", names[(at + step) % len(names)])
 
     def action_bus_number(self, number: int) -> None:
-        """Show the bus with a number."""
-        names = list(self.session.buses)
+        names = list(self._parts.session.buses)
         if number <= len(names):
-            self.action_select("", names[number - 1])
+            self._parts.selection.select("", names[number - 1])
 
     async def action_play(self, key: str) -> None:
         """Play the macro on a key, once a press."""
-        if self.macros.held(key, self.session.now()):
+        macros, host = self._parts.macros, self._parts.host
+        if macros.held(key, self._parts.session.now()):
             return
-        self.macros.read(self.session.macros)
-        if self.macros.trouble:
-            self.show_line(self.macros.trouble, "x")
-        name = self.macros.keys.get(key)
-        if clash := self.macros.clash(key):
-            self.show_line(clash, "x")
+        macros.read(self._parts.session.macros)
+        if macros.trouble:
+            host.show_line(macros.trouble, "x")
+        name = macros.keys.get(key)
+        if clash := macros.clash(key):
+            host.show_line(clash, "x")
         elif name is not None:
             await self.action_run_line(f"/play {name}")
         else:
-            page = f" --page {self.macros.page}" if self.macros.place else ""
-            self.show_line(f"{key} plays nothing; /key {key} NAME{page} puts a macro on it")
+            page = f" --page {macros.page}" if macros.place else ""
+            host.show_line(f"{key} plays nothing; /key {key} NAME{page} puts a macro on it")
 
     def action_macro_page(self) -> None:
         """Use the next page of function keys."""
-        self.macros.read(self.session.macros)
-        if len(self.macros.pages) > 1:
-            self.macros.turn()
+        macros = self._parts.macros
+        macros.read(self._parts.session.macros)
+        if len(macros.pages) > 1:
+            macros.turn()
         else:
-            self.show_line("the macros are on one page of keys; /key F3 NAME --page 2 begins another")
-        self.model.changed = True
+            self._parts.host.show_line("the macros are on one page of keys; /key F3 NAME --page 2 begins another")
+        self._parts.model.changed = True
 
     async def action_record(self) -> None:
         """Begin a recording, or end the current one."""
-        if self.session.recording:
+        if self._parts.session.recording:
             await self.action_run_line("/record stop")
         else:
-            await self.questions.macro_name(lambda name: self.action_run_line(f"/record {name}"))
+            await self._parts.questions.macro_name(lambda name: self.action_run_line(f"/record {name}"))
 
     def action_twin(self) -> None:
         """Type the line that runs a twin beside each drive of the selected bus, or ends the twins."""
-        self.outbox.type("/twin off" if self.model.bus("").twinned else "/twin on")
+        self._parts.outbox.type("/twin off" if self._parts.model.bus("").twinned else "/twin on")
 
     async def action_log(self) -> None:
         """Begin the session log, or end it."""
-        await self.action_run_line("/log off" if self.session.log is not None else "/log on")
+        await self.action_run_line("/log off" if self._parts.session.log is not None else "/log on")
 
     async def action_search_history(self) -> None:
         """Search the lines typed before; the one that is taken goes into the line and is not sent."""
-        await self.questions.history(self.assist.history(), self.action_begin_line)
+        await self._parts.questions.history(self._parts.assist.history(), self.action_begin_line)
 
     def commands(self) -> list[Command]:
         """The commands of the palette."""
-        switches = Switches(self.polling.on, self.mouse_on, self.model.bus("").twinned)
-        found = list(all_commands(self.session, self.macros, self.assist.verbs(), self.keymap, switches))
-        return self.recent.first(found)
+        parts = self._parts
+        switches = Switches(parts.polling.on, parts.mouse_on, parts.model.bus("").twinned)
+        return parts.recent.first(
+            list(all_commands(parts.session, parts.macros, parts.assist.verbs(), parts.keymap, switches))
+        )
 
     async def action_palette(self) -> None:
         """Search everything by name."""
-        if isinstance(self.screen, Search):
+        parts = self._parts
+        if isinstance(parts.app.screen, Search):
             return
         found = self.commands()
 
         async def run(number: int) -> None:
-            self.recent.used(found[number])
-            await self.run_action(found[number].action, self.main)
+            parts.recent.used(found[number])
+            await parts.app.run_action(found[number].action, parts.main)
 
-        width = min(PALETTE, self.size.width) - PADDING
-        await self.questions.palette(lambda typed: commands_like(found, typed, width), run)
+        width = min(PALETTE, parts.app.size.width) - PADDING
+        await parts.questions.palette(lambda typed: commands_like(found, typed, width), run)
 
     async def action_choose_drive(self) -> None:
         """Choose the drive that plain text goes to."""
-        glances = partial(glances_of, self.session, self.model)
-        await self.questions.drive(glances, self.action_select)
+        glances = partial(glances_of, self._parts.session, self._parts.model)
+        await self._parts.questions.drive(glances, self._parts.selection.select)
 
     async def action_page_key(self, name: str) -> None:
         """Show a page on its key; Ctrl+A within a line goes to its start first."""
-        entry = self.main.entry
-        if self.focused is entry and entry.cursor_position and self.keymap.keys[f"page-{name}"] == "ctrl+a":
+        entry = self._parts.main.entry
+        on_key = self._parts.keymap.keys[f"page-{name}"] == "ctrl+a"
+        if self._parts.app.focused is entry and entry.cursor_position and on_key:
             entry.action_home()
             return
         await self.action_page(name)
 
     async def action_page(self, name: str) -> None:
         """Show a page in front of the main screen; one page at a time. Raises Diagnostic."""
+        parts, app = self._parts, self._parts.app
         page = page_entry(name).page()
-        shown = next((each for each in self.screen_stack if isinstance(each, Page)), None)
+        shown = next((each for each in app.screen_stack if isinstance(each, Page)), None)
         if shown is None:
-            await self.push_screen(page(self))
-        elif shown is self.screen and type(shown) is not page:
-            await self.switch_screen(page(self))
-        self.model.changed = True
-        self.frames.wake()
+            await app.push_screen(page(parts.host))
+        elif shown is app.screen and type(shown) is not page:
+            await app.switch_screen(page(parts.host))
+        parts.model.changed = True
+        parts.host.frames.wake()
 
     async def action_open(self) -> None:
         """Show what can be opened."""
-        await self.opener.ask()
+        await self._parts.opener.ask()

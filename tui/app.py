@@ -14,13 +14,15 @@ from __future__ import annotations
 import asyncio
 import os
 from collections.abc import Sequence
-from typing import Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 from rich.console import RenderableType
 from textual import events
 from textual._compositor import ChopsUpdate, LayoutUpdate
+from textual.app import App
 from textual.binding import Binding, BindingType
 from textual.driver import Driver
+from textual.filter import LineFilter
 from textual.geometry import Size
 from textual.message import Message
 from textual.screen import Screen
@@ -28,38 +30,30 @@ from textual.screen import Screen
 from multidrop.drives.events import Unsolicited
 from multidrop.shell.connect.settings_tables import DEFAULT_LOOK, Look
 from multidrop.shell.events import Failed, OnBus, Printed, SessionEvent, StateChanged
-from multidrop.tui.actions import Actions
+from multidrop.tui.actions import Actions, Parts, ViewActions
 from multidrop.tui.assist import Assist
-from multidrop.tui.editor.texts import Texts
-from multidrop.tui.frames import AGEING, Frames
-from multidrop.tui.function_keys import FunctionKeys
-from multidrop.tui.hooks import Hooks
-from multidrop.tui.keymap import keymap, named_key
-from multidrop.tui.opening import Opener
+from multidrop.tui.frame_scheduler import AGEING, Frames
+from multidrop.tui.keymap import FunctionKeys, keymap, named_key
 from multidrop.tui.outbox import Outbox
-from multidrop.tui.palette import Recent
 from multidrop.tui.polling import Polling
 from multidrop.tui.presenter import Presenter
 from multidrop.tui.screen_model import Record, ScreenModel
 from multidrop.tui.screens.dialogs import LEAST, Over, TooSmall
-from multidrop.tui.screens.framed import Framed
-from multidrop.tui.screens.main_screen import MainScreen
-from multidrop.tui.screens.page import Page
+from multidrop.tui.screens.main_screen import MainScreen, Reading
+from multidrop.tui.screens.page import PAGES, Framed, Page
 from multidrop.tui.screens.questions import Questions
-from multidrop.tui.screens.reading import Reading
-from multidrop.tui.screens.start import Start
-from multidrop.tui.screens.table import PAGES
-from multidrop.tui.selection import Selection
-from multidrop.tui.session_view import SessionView
+from multidrop.tui.screens.start import Opener, Start
+from multidrop.tui.session_hooks import Hooks, Transcripts
 from multidrop.tui.terminal.keyboard import Keyboard
+from multidrop.tui.texts import Texts
 from multidrop.tui.tour import Tour
-from multidrop.tui.transcripts import Transcripts
-from multidrop.tui.typist import Typist
-from multidrop.tui.unsent import Unsent
-from multidrop.tui.widgets.banner import Banner
+from multidrop.tui.typist import Selection, Typist, Unsent
+from multidrop.tui.widgets.bars import Banner, Footer
 from multidrop.tui.widgets.entry import Entry
-from multidrop.tui.widgets.footer import Footer
-from multidrop.tui.widgets.theme import wrong_theme
+from multidrop.tui.widgets.theme import DEFAULTS, SignFilter, Signs, dress, ink_of, signs_for, wrong_theme
+
+if TYPE_CHECKING:
+    from multidrop.shell.session import Session
 
 INTERRUPTED = 130
 """The exit code after a signal."""
@@ -73,26 +67,27 @@ def is_stop(message: Message) -> bool:
     return key == "x" and "ctrl" in modifiers
 
 
-class MultidropApp(Actions):
+class MultidropApp(App[int]):
     """The screen of one Session."""
 
     typist: Typist
+
     CSS_PATH = "multidrop.tcss"
     TITLE = "multidrop"
     ENABLE_COMMAND_PALETTE = False
     """Textual's own palette; ours is a `Search`, in which keys keep their order."""
     BINDINGS: ClassVar[list[BindingType]] = [
         named_key("quit", "ctrl+q", "quit", "quit; asks if something moves"),
-        Binding("ctrl+c", "explain", show=False, priority=True),
+        Binding("ctrl+c", "view.explain", show=False, priority=True),
         *(
-            named_key(f"page-{page.name}", page.key, f"page_key('{page.name}')", f"page: {page.about}")
+            named_key(f"page-{page.name}", page.key, f"act.page_key('{page.name}')", f"page: {page.about}")
             for page in PAGES
         ),
     ]
 
     def __init__(
         self,
-        session: SessionView,
+        session: Session,
         urls: Sequence[str],
         assist: Assist | None = None,
         driver: type[Driver] | None = None,
@@ -115,7 +110,9 @@ class MultidropApp(Actions):
         self.main.times = look.times
         self.keyboard = Keyboard(self, self._warn)
         self.outbox = Outbox(session, self._warn, self.run_worker)
-        self.selection = Selection(session, self.model, self.main, self.presenter.label, self.keyboard.turn_deaf)
+        self.selection = Selection(
+            session, self.model, self.main, self.presenter.label, self.keyboard.turn_deaf, self.show_line
+        )
         self.unsent = Unsent(self.main, self.model, session.now, self.assist.keep, self._warn)
         self.questions = Questions(self, session)
         session.transcripts = Transcripts(
@@ -134,25 +131,38 @@ class MultidropApp(Actions):
             self.questions,
         )
         self.texts = Texts(self.assist.drafts())
-        self.mouse_on, self.recent = True, Recent()
         self._inbox: list[SessionEvent] = []
         self._unsubscribe = session.subscribe(self._receive)
         self._stops = session.stops
         self._own_task: asyncio.Task[Any] | None = None
-        Hooks(self, self.keyboard, self.presenter, lambda: self._check_size(self.size))
         self._is_composed = False
         """The main screen has its parts: they can be painted."""
         self.frames = Frames(self._paint, self.call_later, lambda: self.presenter.behind)
-        self.dress(look)
+        self._signs = SignFilter(signs_for(look.signs, os.environ))
+        dress(self, look)
+        self.model.look.ink = ink_of(self._signs.font)
+        parts = Parts(
+            self,
+            self,
+            session,
+            self.model,
+            self.main,
+            self.assist,
+            self.outbox,
+            self.polling,
+            self.macros,
+            self.selection,
+            self.questions,
+            self.keymap,
+            self.opener,
+            self.tour,
+            self._signs,
+        )
+        self.act, self.view = Actions(parts), ViewActions(parts)
+        self._action_targets |= {"act", "view"}
+        Hooks(parts, self.act, self.presenter, lambda: self._check_size(self.size))
         self.set_keymap(self.keymap.changed)
         self._troubles = [f"{look.where}: {trouble}" for trouble in [*self.keymap.troubles, *wrong_theme(look.theme)]]
-
-    def check_action(self, action: str, parameters: tuple[object, ...]) -> bool | None:
-        """Whether an action is possible: Escape ends the tour unless it closes something."""
-        entry = self.main.entry
-        if action == "end_tour":
-            return self.tour.on and self.focused is entry and not entry.listing.open
-        return True
 
     def get_default_screen(self) -> Screen[Any]:
         """The main screen, below all others."""
@@ -267,6 +277,22 @@ class MultidropApp(Actions):
 
     # Frames
 
+    def get_line_filters(self) -> Sequence[LineFilter]:
+        """The filters of Textual, and the one that replaces signs; it comes last."""
+        filters = super().get_line_filters()
+        return filters if self._signs.font is Signs.FULL else [*filters, self._signs]
+
+    def get_theme_variable_defaults(self) -> dict[str, str]:
+        """Colours for themes that are not ours."""
+        return DEFAULTS
+
+    def refresh_css(self, animate: bool = True) -> None:
+        """Read the style sheet again, for other colours; at the start Textual reads it by itself."""
+        if self.main.is_attached:
+            super().refresh_css(animate)
+        else:
+            self.stylesheet.set_variables(self.get_css_variables())
+
     def _display(self, screen: Screen[Any], renderable: RenderableType | None) -> None:
         """Write a picture as the terminal's driver has it: only the cells that differ."""
         show = getattr(self._driver, "show", None)
@@ -367,6 +393,10 @@ class MultidropApp(Actions):
         records = self.main.page(self.main.current).records
         return [records[each] for each in range(max(records.first, records.taken - number), records.taken)]
 
+    def select(self, address: str, bus: str = "") -> None:
+        """Select a drive or a bus."""
+        self.selection.select(address, bus)
+
     def show_line(self, text: str, mark: str = ".") -> None:
         """Append a line of the app's own to the transcript that is shown."""
         self.model.page("").append(Record(self.session.now(), "", mark, text))
@@ -379,6 +409,10 @@ class MultidropApp(Actions):
         """Show the meaning of the typed text, once no more keys wait."""
         if self.keyboard.idle:
             self.typist.edited()
+
+    def action_stop_all(self) -> None:
+        """Stop everything."""
+        self.stop_all()
 
     async def action_quit(self) -> None:
         """Quit; ask if that would leave something unfinished."""

@@ -16,11 +16,27 @@ import asyncio
 from collections import deque
 from collections.abc import Callable, Coroutine, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from multidrop.shell.front.typed_lines import BURST, Line
 from multidrop.shell.lines import pinned
-from multidrop.tui.session_view import Place, SessionView, selected_place
+
+if TYPE_CHECKING:
+    from multidrop.shell.session import Session
+
+
+class Place(NamedTuple):
+    """A drive on a bus, as selected."""
+
+    bus: str
+    address: str
+
+
+def selected_place(session: Session) -> Place:
+    """The selected drive; an empty address if no drive is selected."""
+    selected = session.selected
+    return Place(session.selected_bus, selected.address if selected is not None else "")
+
 
 NAMED = 4
 """Number of lines that a report of unsent lines quotes."""
@@ -43,7 +59,7 @@ class Outbox:
     """The lanes. `warn` shows a line to a person; `watch` awaits a coroutine, and lets its bugs be seen."""
 
     def __init__(
-        self, session: SessionView, warn: Callable[[str], None], watch: Callable[[Coroutine[Any, Any, None]], object]
+        self, session: Session, warn: Callable[[str], None], watch: Callable[[Coroutine[Any, Any, None]], object]
     ) -> None:
         self._session, self._warn, self._watch = session, warn, watch
         self._lanes: list[Lane] = []

@@ -1,20 +1,21 @@
-"""The palette: each function of the app by name, with its meaning, the action that runs it, and its key."""
+"""The palette, each function of the app by name with its action and its key, and help for where you are."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 from rich.text import Text
 from textual.fuzzy import Matcher
 
-from multidrop.tui.function_keys import FunctionKeys
-from multidrop.tui.keymap import Keymap
+from multidrop.tui.keymap import FunctionKeys, Keymap
 from multidrop.tui.panels.table import PANELS
 from multidrop.tui.screens.dialogs import Match
-from multidrop.tui.screens.table import PAGES
-from multidrop.tui.session_view import SessionView
-from multidrop.tui.text import fit, visible
+from multidrop.tui.screens.page import PAGES, Framed, Page
+from multidrop.tui.text import at_words, fit, visible
+
+if TYPE_CHECKING:
+    from multidrop.shell.session import Session
 
 PALETTE, PADDING = 90, 7
 """Greatest width of the palette in cells, and what border, padding and scroll bar take of it."""
@@ -62,7 +63,7 @@ class Recent:
 
 
 def all_commands(
-    session: SessionView,
+    session: Session,
     macros: FunctionKeys,
     verbs: Iterable[tuple[str, str, str]],
     keys: Keymap,
@@ -73,45 +74,45 @@ def all_commands(
     if session.latched:
         yield Command("Resume", "let macros and scripts run again", _line("/resume"), "/resume", urgent=True)
     if session.recording:
-        yield Command("End recording", f"keep {session.recording}", "app.record", "/record stop")
+        yield Command("End recording", f"keep {session.recording}", "act.record", "/record stop")
     else:
-        yield Command("Record a macro", "what is typed from now on", "app.record", "/record NAME")
+        yield Command("Record a macro", "what is typed from now on", "act.record", "/record NAME")
     log = "End the log" if session.log is not None else "Begin a log"
     about = (
         f"of this session: {session.log.path}" if session.log is not None else "of this session, in the state folder"
     )
-    yield Command(log, about, "app.log", keys.shown("log") or "/log")
+    yield Command(log, about, "act.log", keys.shown("log") or "/log")
     yield from _pages_and_panels(keys)
     yield from _choices(session, macros, keys)
     about = "simulated drives that run beside those of this line; every difference shows"
-    yield Command(f"Twin {_other(switches.twin)}", about, "app.twin", keys.shown("twin"))
-    yield Command("Search history", "the lines typed before", "app.search_history", keys.shown("history"))
+    yield Command(f"Twin {_other(switches.twin)}", about, "act.twin", keys.shown("twin"))
+    yield Command("Search history", "the lines typed before", "act.search_history", keys.shown("history"))
     yield from _view(keys, switches)
     for name, _, meaning in verbs:
-        yield Command(name, meaning, _call("begin_line", f"{name} "))
+        yield Command(name, meaning, _call("act.begin_line", f"{name} "))
 
 
 def _pages_and_panels(keys: Keymap) -> Iterator[Command]:
     for page in PAGES:
-        yield Command(page.title, page.about, _call("page", page.name), keys.shown(f"page-{page.name}"))
+        yield Command(page.title, page.about, _call("act.page", page.name), keys.shown(f"page-{page.name}"))
     for panel in PANELS:
         title = f"Panel {panel.name} on or off"
-        yield Command(title, panel.about, _call("panel", panel.name), keys.shown(f"panel-{panel.name}"))
+        yield Command(title, panel.about, _call("view.panel", panel.name), keys.shown(f"panel-{panel.name}"))
 
 
 def _view(keys: Keymap, switches: Switches) -> Iterator[Command]:
     """The commands of the screen itself."""
-    yield Command(f"Polling {_other(switches.polling)}", "reading of position and velocity", "app.polling")
-    yield Command("Open a connection", "saved ones, serial ports, the demo cell, a URL", "app.open", "/open URL")
-    yield Command("Split the screen", "a second transcript; again: type to it", "app.split", keys.shown("split"))
-    yield Command("One half", "end the split of the screen", "app.unsplit")
+    yield Command(f"Polling {_other(switches.polling)}", "reading of position and velocity", "view.polling")
+    yield Command("Open a connection", "saved ones, serial ports, the demo cell, a URL", "act.open", "/open URL")
+    yield Command("Split the screen", "a second transcript; again: type to it", "view.split", keys.shown("split"))
+    yield Command("One half", "end the split of the screen", "view.unsplit")
     yield Command("Tour", "two minutes through the product, on a demo cell", _line("/tour"), "/tour")
     yield from _transcript(keys)
-    yield Command(f"Mouse {_other(switches.mouse)}", "off: the terminal's own selection works", "app.mouse")
-    yield Command("Repaint", "the whole screen, where another program wrote on it", "app.repaint")
-    yield Command("Theme", "colours; multidrop-ansi uses the terminal's own", "app.choose_theme")
-    yield Command("Signs", "all, boxes without braille, or ASCII alone", "app.choose_signs")
-    yield Command("Help", "keys and signs, for where you are", "app.help", keys.shown("help"))
+    yield Command(f"Mouse {_other(switches.mouse)}", "off: the terminal's own selection works", "view.mouse")
+    yield Command("Repaint", "the whole screen, where another program wrote on it", "view.repaint")
+    yield Command("Theme", "colours; multidrop-ansi uses the terminal's own", "view.choose_theme")
+    yield Command("Signs", "all, boxes without braille, or ASCII alone", "view.choose_signs")
+    yield Command("Help", "keys and signs, for where you are", "view.help", keys.shown("help"))
     yield Command("Quit", "drives go on as they are", "app.quit", keys.shown("quit"))
 
 
@@ -120,19 +121,19 @@ def _transcript(keys: Keymap) -> Iterator[Command]:
     yield Command("Search the transcript", "as you type; Tab shows only what is found", "find", keys.shown("find"))
     yield Command("Pause the scrolling", "or let it go on", "pause", keys.shown("pause"))
     yield Command("Copy lines", "pick lines of the transcript, and copy them", "pick(0)", keys.shown("pick"))
-    yield Command("Copy the view", "the transcript in view, to the terminal's clipboard", "app.copy_view")
+    yield Command("Copy the view", "the transcript in view, to the terminal's clipboard", "view.copy_view")
     yield Command("Only my lines", "with their replies, and warnings", _line("/filter mine"), "/filter mine")
     yield Command("Only errors", "failures and warnings, with the lines that failed", _line("/filter errors"))
     yield Command("All lines", "end the filter", _line("/filter off"), "/filter off")
     yield Command("Times", "of day, since the start, since the line above, off", _line("/times"), "/times")
     yield Command("Bytes", "of the selected line, both ways, beside its lines", _line("/hex"), "/hex")
-    yield Command("Save the transcript", "to a new file", _call("begin_line", "/save "), "/save FILE")
+    yield Command("Save the transcript", "to a new file", _call("act.begin_line", "/save "), "/save FILE")
     yield Command("Newest line", "follow the transcript again", "look_end(True)", keys.shown("newest"))
     yield Command("Oldest line", "the beginning of the transcript", "look_end(False)", keys.shown("oldest"))
-    yield Command("Clear the transcript", "of the bus that is shown", "app.clear")
+    yield Command("Clear the transcript", "of the bus that is shown", "view.clear")
 
 
-def _choices(session: SessionView, macros: FunctionKeys, keymap: Keymap) -> Iterator[Command]:
+def _choices(session: Session, macros: FunctionKeys, keymap: Keymap) -> Iterator[Command]:
     """Macros, drives and buses, each by its own name."""
     keys = {name: key for key, name in macros.bound}
     for name, note in macros.names:
@@ -140,21 +141,23 @@ def _choices(session: SessionView, macros: FunctionKeys, keymap: Keymap) -> Iter
         yield Command(f"Play {name}", note or "macro", _line(f"/play {name}"), key or f"/play {name}")
     if macros.place:
         yield Command(
-            "Next page of keys", f"F2 to F12; now page {macros.page}", "app.macro_page", keymap.shown("macro-page")
+            "Next page of keys", f"F2 to F12; now page {macros.page}", "act.macro_page", keymap.shown("macro-page")
         )
-    yield Command("Choose a drive", "the one that plain text goes to", "app.choose_drive", keymap.shown("drive"))
+    yield Command("Choose a drive", "the one that plain text goes to", "act.choose_drive", keymap.shown("drive"))
     for number, bus in enumerate(session.buses.values(), 1):
         if len(session.buses) > 1:
             key = keymap.shown(f"tab-{number}")
-            yield Command(f"Show bus {bus.name}", "its transcript and drives", _call("select", "", bus.name), key)
+            yield Command(f"Show bus {bus.name}", "its transcript and drives", _call("act.select", "", bus.name), key)
         for drive in bus.drives.values():
             title = f"Drive {bus.name} {drive.address} {drive.label}".rstrip()
-            yield Command(title, f"select it   {drive.product}", _call("select", drive.address, bus.name))
+            yield Command(title, f"select it   {drive.product}", _call("act.select", drive.address, bus.name))
         if bus.name == session.selected_bus:
             yield Command(
-                f"Rename {bus.name}", "another name in its tab", _call("begin_line", "/rename "), "/rename NAME"
+                f"Rename {bus.name}", "another name in its tab", _call("act.begin_line", "/rename "), "/rename NAME"
             )
-            yield Command(f"Keep {bus.name}", "save it as a connection", _call("begin_line", "/keep "), "/keep NAME")
+            yield Command(
+                f"Keep {bus.name}", "save it as a connection", _call("act.begin_line", "/keep "), "/keep NAME"
+            )
             yield Command("Tab to the left", "one place", _line("/tab left"), keymap.shown("tab-left"))
             yield Command("Tab to the right", "one place", _line("/tab right"), keymap.shown("tab-right"))
         yield Command(f"Close bus {bus.name}", "moves nothing, stops nothing", _line(f"/close {bus.name}"))
@@ -166,11 +169,11 @@ def _other(on: bool) -> str:
 
 def _line(line: str) -> str:
     """The action that runs a line."""
-    return _call("run_line", line)
+    return _call("act.run_line", line)
 
 
 def _call(name: str, *arguments: str) -> str:
-    return f"app.{name}({', '.join(map(repr, arguments))})"
+    return f"{name}({', '.join(map(repr, arguments))})"
 
 
 def commands_like(commands: Sequence[Command], typed: str, width: int) -> list[Match]:
@@ -195,3 +198,65 @@ def _shown(command: Command, width: int) -> Text:
     room = width - len(title) - len(command.key) - (4 if command.key else 2)
     key = f"  {command.key}" if command.key else ""
     return Text.assemble(f"{title}  ", (fit(visible(command.about), room), "dim"), key)
+
+
+Entry = tuple[str, str]
+"""A key, a line or a sign, and its meaning; a heading has an empty meaning."""
+KEY = 15
+"""Width of keys, lines and signs."""
+STOP: Sequence[Entry] = (
+    ("^X", "STOP ALL: drives, macros, scripts; from anywhere"),
+    ("/resume", "after a stop: macros and scripts may run again"),
+)
+TYPING: Sequence[Entry] = (
+    ("Lines", ""),
+    ("MR 51200", "goes to the selected drive, in its own language"),
+    ("@b PR P", "to drive b; @* to all; @press:b on another bus"),
+    ("/help MR", "the meaning of a word; /help alone lists the verbs"),
+    ("Tab", "completions of what is typed"),
+    ("Up Down", "lines typed before that begin with what is typed"),
+)
+SIGNS: Sequence[Entry] = (
+    ("Signs", ""),
+    ("› »", "typed by a person; sent by a macro or a script"),
+    ("«", "printed by a drive without a request"),
+    ("↑ ↓", "bytes sent, bytes received (/hex)"),
+    ("✗", "refused, no reply, lost"),
+    ("· !", "progress; warning"),
+    ("▶ ■", "velocity last read: not 0; 0"),
+    ("□", "at rest without current: nothing holds the load"),
+    ("~", "the position does not count since a restart: home it, set it, or /referenced"),
+    ("? ·", "does not reply; not read lately"),
+    ("≠", "the position differs from that of the drive's twin by more than the limit"),
+    ("◆", "program mode: lines are stored, not executed"),
+)
+
+
+def entries(screen: Framed, keys: Keymap, macros: Iterable[Entry]) -> list[Entry]:
+    """All help for a screen: its own keys first."""
+    page = [("This page", ""), ("Esc", "go back"), *screen.KEYS] if isinstance(screen, Page) else []
+    named = [(keys.shown(name), keys.about[name]) for name in keys.keys if not name.startswith(("play-", "tab-"))]
+    jumps = [(f"{keys.shown('tab-before')} {keys.shown('tab-after')}", "the other lines; also Alt+1 .. Alt+9")]
+    played = [(key, f"plays {name}") for key, name in macros] or [("F2 .. F12", "play the macro that is on the key")]
+    everywhere = [("Keys", ""), *STOP, *((key, what) for key, what in named if key), *jumps, *played]
+    return [*page, *everywhere, *TYPING, *SIGNS]
+
+
+def found(entries: Sequence[Entry], typed: str, width: int) -> list[Match]:
+    """The entries that contain every typed word, each wrapped between words."""
+    wanted = typed.casefold().split()
+    matches = []
+    for number, (key, what) in enumerate(entries):
+        if (what or not wanted) and all(word in f"{key} {what}".casefold() for word in wanted):
+            matches.append(Match(str(number), _wrapped(visible(key), visible(what), width)))
+    return matches
+
+
+def _wrapped(key: str, what: str, width: int) -> Text:
+    if not what:
+        return Text(key, "bold underline")
+    first, *more = at_words(what, max(20, width - KEY))
+    text = Text.assemble((f"{key:<{KEY - 1}} ", "bold"), first)
+    for row in more:
+        text.append(f"\n{'':<{KEY}}{row}")
+    return text

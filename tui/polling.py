@@ -9,12 +9,17 @@ from __future__ import annotations
 
 from collections.abc import Callable, Container, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from multidrop.drives.telemetry import Value
 from multidrop.shell.roles import Series
 from multidrop.tui.screen_model import ScreenModel
-from multidrop.tui.session_view import BusView, Closable, SessionView, TelemetryView
+
+if TYPE_CHECKING:
+    from multidrop.drives.bus import Bus
+    from multidrop.drives.subscriptions import Subscription
+    from multidrop.drives.telemetry import Telemetry
+    from multidrop.shell.session import Session
 
 PLOT = 0.02
 """Seconds between the samples of a plotted drive; a slow wire gives fewer."""
@@ -40,7 +45,7 @@ Wanted = dict[tuple[str, int, tuple[T, ...]], float]
 @dataclass
 class _Held:
     period: float
-    subscription: Closable
+    subscription: Subscription[Any]
 
 
 class Polling:
@@ -52,7 +57,7 @@ class Polling:
         self._watched: dict[object, _Held] = {}
         self._read: dict[object, _Held] = {}
 
-    def update(self, session: SessionView, model: ScreenModel, wants: Container[str]) -> None:
+    def update(self, session: Session, model: ScreenModel, wants: Container[str]) -> None:
         """Subscribe to what is shown, and end all other subscriptions. `wants`: as panels name it."""
         chosen = plotted(session) if "plot" in wants else []
         drives = _drives(session, model, chosen, PLOT if "samples" in wants else REST) if self.on else {}
@@ -77,10 +82,10 @@ class Polling:
 
 
 def _hold(
-    session: SessionView,
+    session: Session,
     held: dict[object, _Held],
     wanted: Mapping[tuple[str, int, tuple[T, ...]], float],
-    begin: Callable[[TelemetryView], Callable[[Sequence[T], float], Closable]],
+    begin: Callable[[Telemetry], Callable[[Sequence[T], float], Subscription[Any]]],
 ) -> None:
     """Begin what is wanted, and end what is not, or no longer with this period."""
     periods: dict[object, float] = dict(wanted.items())
@@ -93,7 +98,7 @@ def _hold(
             held[place] = _Held(period, begin(session.buses[place[0]].telemetry)(place[2], period))
 
 
-def plotted(session: SessionView) -> Sequence[Series]:
+def plotted(session: Session) -> Sequence[Series]:
     """The plotted series: those that were named, as far as they are open; else the selected drive."""
     named = [each for each in session.plotted if each.bus in session.buses]
     named = [each for each in named if each.address in session.buses[each.bus].drives]
@@ -102,11 +107,11 @@ def plotted(session: SessionView) -> Sequence[Series]:
     return [Series(session.selected_bus, session.selected.address)]
 
 
-def _open(session: SessionView) -> list[BusView]:
+def _open(session: Session) -> list[Bus]:
     return [bus for bus in session.buses.values() if bus.lost is None]
 
 
-def _drives(session: SessionView, model: ScreenModel, plotted: Sequence[Series], rest: float) -> Wanted[str]:
+def _drives(session: Session, model: ScreenModel, plotted: Sequence[Series], rest: float) -> Wanted[str]:
     """The periods of drives; `rest` is that of plotted drives that stand still."""
     wanted: Wanted[str] = {}
     for bus in _open(session):
@@ -124,7 +129,7 @@ def _drives(session: SessionView, model: ScreenModel, plotted: Sequence[Series],
     return wanted
 
 
-def _watches(session: SessionView) -> Wanted[str]:
+def _watches(session: Session) -> Wanted[str]:
     """The periods at which conditions are read: of the selected drive, the others of its line, other lines."""
     wanted: Wanted[str] = {}
     for name, bus in session.buses.items():
@@ -140,7 +145,7 @@ def _watches(session: SessionView) -> Wanted[str]:
     return wanted
 
 
-def _values(session: SessionView, plotted: Sequence[Series]) -> Wanted[Value]:
+def _values(session: Session, plotted: Sequence[Series]) -> Wanted[Value]:
     """The periods of values."""
     wanted: Wanted[Value] = {}
     for bus in _open(session):

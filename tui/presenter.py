@@ -3,25 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
-from multidrop.tui.function_keys import FunctionKeys
-from multidrop.tui.keymap import Keymap
-from multidrop.tui.panels.column import column_rows
-from multidrop.tui.panels.glance import glances_of
-from multidrop.tui.panels.lamps import trouble_of
-from multidrop.tui.panels.status import narrow_rows
-from multidrop.tui.panels.view import View
+from multidrop.tui.keymap import FunctionKeys, Keymap
+from multidrop.tui.panels.drive import trouble_of
+from multidrop.tui.panels.drives import narrow_rows
+from multidrop.tui.panels.table import column_rows
+from multidrop.tui.panels.view import View, glances_of
 from multidrop.tui.polling import Polling
 from multidrop.tui.readout import State
 from multidrop.tui.screen_model import BusFacts, ScreenModel, bus_old, bus_state
-from multidrop.tui.screens.framed import Framed
 from multidrop.tui.screens.main_screen import MainScreen
-from multidrop.tui.screens.page import Page
-from multidrop.tui.session_view import BusView, SessionView
-from multidrop.tui.widgets.banner import banner_row
-from multidrop.tui.widgets.footer import footer_row
+from multidrop.tui.screens.page import Framed, Page
+from multidrop.tui.widgets.bars import Tab, banner_row, footer_row, top_row
 from multidrop.tui.widgets.lines import Row
-from multidrop.tui.widgets.topline import Tab, top_row
+
+if TYPE_CHECKING:
+    from multidrop.drives.bus import Bus
+    from multidrop.shell.session import Session
 
 FLOOD = 3
 """The number of lines in one frame that are too many to read."""
@@ -33,7 +32,7 @@ class Presenter:
     """Computes the rows of the main screen, and puts them there."""
 
     def __init__(
-        self, session: SessionView, model: ScreenModel, polling: Polling, macros: FunctionKeys, keys: Keymap
+        self, session: Session, model: ScreenModel, polling: Polling, macros: FunctionKeys, keys: Keymap
     ) -> None:
         self.session, self.model, self.polling, self.macros, self.keymap = session, model, polling, macros, keys
         self._shown_at = float("-inf")
@@ -107,7 +106,7 @@ class Presenter:
             lost = next(filter(None, map(self._loss, self.session.buses.values())), "")
         return banner_row(self.session.tally() if self.session.latched else None, lost, width)
 
-    def _loss(self, bus: BusView) -> str:
+    def _loss(self, bus: Bus) -> str:
         """The reason of a loss, and whether the bus is being tried again; empty while it is not lost."""
         if bus.lost is None:
             return ""

@@ -7,13 +7,15 @@ time with Escape.
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 from multidrop.shell.events import By, Entered, SessionEvent
 from multidrop.tui.keymap import Keymap
-from multidrop.tui.session_view import SessionView
 from multidrop.tui.text import at_words
 from multidrop.tui.widgets.lines import Row
+
+if TYPE_CHECKING:
+    from multidrop.shell.session import Session
 
 LINE = "press"
 """The line of the demo cell that it is on."""
@@ -68,7 +70,7 @@ END = "That was the tour. The demo cell stays open; /close closes a line. Escape
 class Tour:
     """The tour of one app. `front` names the screen in front."""
 
-    def __init__(self, session: SessionView, keys: Keymap, front: Callable[[], str]) -> None:
+    def __init__(self, session: Session, keys: Keymap, front: Callable[[], str]) -> None:
         self._session, self._keys, self._front = session, keys, front
         self.bus = ""
         """The simulated line that it is on; empty while there is no tour."""

@@ -1,22 +1,184 @@
-"""Typed lines on their way into the outbox, and the meaning of what is being typed.
+"""Typed lines on their way into the outbox: the drive that they are for, and what becomes of those that are not sent.
 
-A line is for the drive that was shown when it was typed. `/stop` waits for nothing.
+A line is for the drive that was shown when it was typed. If the selection changes by itself, the half-typed line stays
+with the page of the drive before, and keys do not count until the person pauses. If a typed `/use` changed it, the line
+was typed for the new drive and goes with it. `/stop` waits for nothing. What was typed and never sent is kept for the
+history, and reported, so that a stop loses nothing silently.
 """
 
 from __future__ import annotations
 
 import asyncio
+import re
 from collections.abc import Callable
+from typing import TYPE_CHECKING
 
+from multidrop.dialects.files import split_lines
+from multidrop.shell.events import FAILURES
 from multidrop.tui.assist import Assist
-from multidrop.tui.outbox import Outbox
+from multidrop.tui.outbox import Outbox, Place, not_sent, selected_place
+from multidrop.tui.screen_model import Record, ScreenModel
 from multidrop.tui.screens.main_screen import MainScreen
 from multidrop.tui.screens.questions import Questions
-from multidrop.tui.selection import Selection
-from multidrop.tui.session_view import SessionView
 from multidrop.tui.terminal.keyboard import Keyboard
-from multidrop.tui.unsent import Unsent
 from multidrop.tui.widgets.entry import LONGEST
+from multidrop.tui.widgets.lines import Row
+
+if TYPE_CHECKING:
+    from multidrop.shell.session import Session
+
+
+class Selection:
+    """Makes the main screen follow the session's selection.
+
+    `label` returns the row before the input line, `turn_deaf` discards keys until a pause, `show_line` shows a line.
+    """
+
+    def __init__(
+        self,
+        session: Session,
+        model: ScreenModel,
+        main: MainScreen,
+        label: Callable[[], Row],
+        turn_deaf: Callable[[], None],
+        show_line: Callable[[str, str], None],
+    ) -> None:
+        self._session, self._model, self._main = session, model, main
+        self._label, self._turn_deaf, self._show_line = label, turn_deaf, show_line
+        self.shown = Place("", "")
+        """The drive that the screen shows."""
+        self._meant = False
+        """A typed `/use` selected another drive than the one that is shown."""
+
+    def select(self, address: str, bus: str = "") -> None:
+        """Select a drive or a bus; show why that is not possible."""
+        try:
+            self._session.select(address, bus)
+        except FAILURES as failure:
+            self._show_line(str(failure), "x")
+        self.follow()
+        self._model.changed = True
+
+    @property
+    def changed(self) -> bool:
+        """True if another drive is selected than the one that is shown."""
+        return self.shown != selected_place(self._session)
+
+    @property
+    def unexpected(self) -> bool:
+        """True if the selection changed by itself, and the screen does not show it yet."""
+        return bool(self.shown.bus) and self.changed and not self._meant
+
+    def expect(self, by_use: bool) -> None:
+        """Note that the selection changed, and whether a typed `/use` did it."""
+        self._meant = self._meant or by_use
+
+    def rename(self, before: str, now: str) -> None:
+        """Know the drive that is shown by the new name of its bus."""
+        self._model.rename(before, now)
+        self._main.rename_page(before, now)
+        if self.shown.bus == before:
+            self.shown = self.shown._replace(bus=now)
+
+    def follow(self) -> None:
+        """Show the page of the selected bus with its line, and the label of the selected drive."""
+        main, current = self._main, self._session.selected_bus
+        self.shown = selected_place(self._session)
+        if current != main.current or current not in main.pages:
+            if main.current == "" and "" in main.pages and current:
+                self._model.bus(current).fresh.extendleft(reversed(main.pages[""].records))
+                main.adopt_page(current)
+            main.show_page(current)
+        main.set_label(self._label())
+
+    def catch_up(self) -> None:
+        """Follow a selection that changed; see the module for what becomes of the half-typed line."""
+        meant, self._meant = self._meant, False
+        if not self.changed:
+            return
+        if meant:
+            draft = self._main.entry.exchange()
+            self.follow()
+            self._main.entry.take_in(draft)
+            return
+        if self.shown.bus and self._main.entry.unsent:
+            self._turn_deaf()
+        self.follow()
+
+
+KEPT = 20
+"""Greatest number of lines that go into the history of those that a stop dropped before their Enter counted."""
+NOT_TEXT = r"[^\t\r\n -~\xa0-\U0010ffff]"
+"""A key that is not text."""
+
+
+class Unsent:
+    """The lines of one main screen that a stop drops. `keep` stores a line in the history, `warn` shows one."""
+
+    def __init__(
+        self,
+        main: MainScreen,
+        model: ScreenModel,
+        clock: Callable[[], float],
+        keep: Callable[[str], None],
+        warn: Callable[[str], None],
+    ) -> None:
+        self._main, self._model, self._clock = main, model, clock
+        self._keep, self._warn = keep, warn
+        self._half: str | None = None
+        """The text of the line when the last stop came, until it is reported; None while a dialog was open."""
+        self._cut: list[str] = [""]
+        """Text that was typed after it and dropped, by stop; it arrives in pieces."""
+        self._gathering = False
+        """A stop came, and the lines are not emptied yet: more pieces may come."""
+
+    def stopped(self, half: str | None) -> None:
+        """Note the half-typed line when a stop comes; None if a dialog had the keys."""
+        if self._gathering:
+            self._cut.append("")
+        else:
+            self._half = half
+
+    def gather(self) -> None:
+        """Report the pieces as one, when the lines are emptied."""
+        self._gathering = True
+
+    def dropped(self, text: str) -> None:
+        """Take a text that was typed before the stop, after the half-typed line."""
+        self._cut[-1] += text
+        if not self._gathering:
+            self._report()
+
+    def empty(self) -> None:
+        """Empty the lines that are being edited, and keep those that were not reported yet."""
+        self._gathering = False
+        reported = self._report()
+        for bus, text in self._main.take_lines():
+            if bus != self._main.current or not reported:
+                self.keep(text, bus)
+        self._half = "" if self._half is not None else None
+
+    def _report(self) -> bool:
+        """Report the half-typed line and the text that followed it; return whether there was any such text.
+
+        Text typed into a dialog is not a line, and text after a key that is not text has an unknown meaning.
+        """
+        cut, self._cut = self._cut, [""]
+        if self._half is None or not any(cut):
+            return False
+        plain = [re.split(NOT_TEXT, text)[0] for text in [self._half + cut[0], *cut[1:]]]
+        lines = [line.strip() for text in plain for line in split_lines(text) if line.strip()]
+        self._half = ""
+        for line in lines[-KEPT:]:
+            self._keep(line)
+        if lines:
+            self._warn(f"stopped; {not_sent(lines)}")
+        return True
+
+    def keep(self, text: str, bus: str) -> None:
+        """Keep a line in the history and show on the page of its bus that it was not sent."""
+        self._keep(text)
+        self._model.page(bus).append(Record(self._clock(), "", "!", f"not sent: {text}"))
 
 
 class Typist:
@@ -24,7 +186,7 @@ class Typist:
 
     def __init__(
         self,
-        session: SessionView,
+        session: Session,
         main: MainScreen,
         assist: Assist,
         outbox: Outbox,

@@ -30,7 +30,7 @@ from multidrop.shell.transcripts import Transcripts
 from multidrop.transports import TransportLost, Unreachable
 from multidrop.tui.app import MultidropApp
 from multidrop.tui.assist import Assist, StartEntry
-from multidrop.tui.widgets.signs import Signs
+from multidrop.tui.widgets.theme import Signs
 
 
 @dataclass
@@ -412,7 +412,7 @@ def make_app(session: FakeSession | None = None, *urls: str, theme: str = "multi
     """The app on a session; an empty theme lets the app choose."""
     app = MultidropApp(session or demo_session(), urls, FakeAssist())
     app.theme = theme or app.theme
-    app.show_signs(Signs.FULL)
+    app.view.show_signs(Signs.FULL)
     return app
 
 

@@ -260,7 +260,7 @@ async def test_everything_is_in_the_palette() -> None:
     app = make_app(session)
     async with app.run_test(size=(80, 24)) as pilot:
         await settle(pilot)
-        titles = {command.title for command in app.commands()}
+        titles = {command.title for command in app.act.commands()}
     assert titles >= {
         "Stop all",
         "Record a macro",
@@ -287,10 +287,10 @@ async def test_only_what_is_shown_is_polled_and_only_while_it_is() -> None:
         await pilot.press("ctrl+t")
         await settle(pilot)
         assert press.polled["a"] == STATUS
-        app.action_polling()
+        app.view.action_polling()
         await settle(pilot)
         assert press.polled == eth.polled == {}
-        app.action_polling()
+        app.view.action_polling()
     assert press.polled == eth.polled == {}, "nothing is polled for a screen that is gone"
 
 

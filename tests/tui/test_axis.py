@@ -10,16 +10,13 @@ from hypothesis import strategies as st
 
 from multidrop.dialects.values import UNREAD, Conditions, Lamp, Pace
 from multidrop.drives.events import Sample
-from multidrop.tui.panels.axis import drive_rows
-from multidrop.tui.panels.glance import Glance
-from multidrop.tui.panels.spark import spark
-from multidrop.tui.panels.status import kept, narrow_rows
-from multidrop.tui.panels.travel import LEARNT, LIMITS, SEEN, bar, phase, seconds_to_go, travel_of
-from multidrop.tui.panels.view import View
+from multidrop.tui.panels.drive import LEARNT, SEEN, SOFTWARE, bar, drive_rows, phase, seconds_to_go, travel_of
+from multidrop.tui.panels.drives import kept, narrow_rows, spark
+from multidrop.tui.panels.view import Glance, View
 from multidrop.tui.readout import Readout
 from multidrop.tui.screen_model import ScreenModel
 from multidrop.tui.widgets.lines import Row, width_of
-from multidrop.tui.widgets.signs import Signs, shown_as
+from multidrop.tui.widgets.theme import Signs, shown_as
 from tests.support.fake_session import demo_session
 
 PACE = Pace(1000, 100_000, 1e6, 1e6)
@@ -51,7 +48,7 @@ CRUISE = [(n / 10, 10_000 + n * 5000, 50_000) for n in range(5)]
 
 def test_a_travel_is_that_of_software_limits_else_of_switches_else_what_was_seen() -> None:
     made = readout((0.0, 0, 0), (1.0, 500, 0))
-    assert travel_of(made) == (0, 100_000, LIMITS)
+    assert travel_of(made) == (0, 100_000, SOFTWARE)
     free = replace(FACTS, limits=None, lamps=(), target=None)
     made = readout((0.0, -50, 0), (1.0, 500, 0), conditions=free)
     assert travel_of(made) == (-50, 500, SEEN)

@@ -6,8 +6,7 @@ from textual._compositor import ChopsUpdate, Compositor
 from textual.geometry import Region
 
 from multidrop.tui.app import MultidropApp
-from multidrop.tui.terminal.canvas import pieces_of
-from multidrop.tui.widgets.compositor import FrontCompositor
+from multidrop.tui.terminal.canvas import FrontCompositor, pieces_of
 from multidrop.tui.widgets.transcript import Transcript
 from tests.support.fake_session import demo_session, make_app, settle
 

@@ -15,9 +15,8 @@ from multidrop.dialects.families import FAMILIES
 from multidrop.dialects.values import BY, NAMES, TO, Conditions
 from multidrop.drives.events import Conditioned, Sample, Silent
 from multidrop.shell.events import OnBus
-from multidrop.tui.jog import Jog
 from multidrop.tui.readout import Readout, State
-from multidrop.tui.screens.controls import ControlsPage
+from multidrop.tui.screens.controls import ControlsPage, Jog
 from tests.support.fake_session import FakeSession, demo_session, make_app, settle
 
 at_screen = pytest.mark.tui

@@ -6,14 +6,26 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from multidrop.tui.curves.chart import Chart
-from multidrop.tui.curves.columns import Columns
-from multidrop.tui.curves.ink import ASCII, BLOCK, BRAILLE, INKS, Ink
-from multidrop.tui.curves.look import SPANS, Look
-from multidrop.tui.curves.raster import CURSOR, Curve, Frame, Raster, with_cursor
-from multidrop.tui.curves.scale import Scale, magnified, nice_scale, row_of, steady, ticks
-from multidrop.tui.curves.trace import KEPT, MOST, Quantity, Trace, Traces
-from multidrop.tui.curves.window import Window
+from multidrop.tui.curves.chart import SPANS, Chart, Look, Window
+from multidrop.tui.curves.raster import (
+    ASCII,
+    BLOCK,
+    BRAILLE,
+    CURSOR,
+    INKS,
+    Curve,
+    Frame,
+    Ink,
+    Raster,
+    Scale,
+    magnified,
+    nice_scale,
+    row_of,
+    steady,
+    ticks,
+    with_cursor,
+)
+from multidrop.tui.curves.samples import KEPT, MOST, Columns, Quantity, Trace, Traces
 
 values = st.floats(-2.2e9, 2.2e9, allow_nan=False)
 times = st.floats(0, 30)

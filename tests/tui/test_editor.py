@@ -14,11 +14,11 @@ from multidrop.dialects.families import program_languages
 from multidrop.dialects.program_files import Part
 from multidrop.shell.drafts import Drafts
 from multidrop.shell.program_text import ProgramGrammar
-from multidrop.tui.editor.grammar import MacroGrammar, grammar_of
-from multidrop.tui.editor.texts import Texts
+from multidrop.tui.editor import MacroGrammar, grammar_of
 from multidrop.tui.screens.dialogs import Match
 from multidrop.tui.screens.edit import aligned
-from multidrop.tui.screens.program_choices import UPLOAD, Finder, files_in
+from multidrop.tui.screens.program_rows import UPLOAD, Finder, files_in
+from multidrop.tui.texts import Texts
 
 LINES = st.text(st.characters(min_codepoint=9, max_codepoint=0x17F, exclude_characters="\n\r"), max_size=40)
 MCODE = [

@@ -6,7 +6,7 @@ import sys
 import pytest
 from textual.css.stylesheet import Stylesheet
 
-from multidrop.tui.screens.table import PAGES
+from multidrop.tui.screens.page import PAGES
 from tests.support.fake_session import demo_session, make_app
 from tests.support.processes import environment
 from tests.support.until import PATIENCE
@@ -20,7 +20,7 @@ from multidrop.shell.connect.settings import load
 from multidrop.shell.front.collector import collected_at_rest
 from multidrop.shell.log.writer import begin
 from multidrop.shell.session import Session
-from multidrop.tui.opening import Opener
+from multidrop.tui.screens.start import Opener
 
 driver()
 displayed = []
@@ -55,7 +55,7 @@ asyncio.run(main())
 LATER = {
     *(f"multidrop.tui.screens.{page.place.partition(':')[0]}" for page in PAGES),
     *(
-        "multidrop.tui.editor.widget",
+        "multidrop.tui.editor",
         "multidrop.shell.params.page",
         "multidrop.shell.operations.offers",
         "multidrop.shell.front.complete",

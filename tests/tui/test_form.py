@@ -13,7 +13,7 @@ from textual.widgets import Static
 
 from multidrop.macros import Macro, Step
 from multidrop.shell.macro_arguments import value_fields
-from multidrop.tui.screens.form import Form
+from multidrop.tui.screens.dialogs import Form
 from tests.support.fake_session import demo_session, make_app, settle
 
 pytestmark = pytest.mark.tui

@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from multidrop.shell.events import Printed
-from multidrop.tui.frames import FRAMES, Frames
+from multidrop.tui.frame_scheduler import FRAMES, Frames
 from multidrop.tui.presenter import FLOOD, FLOOD_PERIOD, Presenter
 from tests.support.fake_session import demo_session, make_app
 

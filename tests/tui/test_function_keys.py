@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from multidrop.tui.function_keys import FunctionKeys
+from multidrop.tui.keymap import FunctionKeys
 from tests.support.fake_session import FakeMacro, FakeMacros
 
 

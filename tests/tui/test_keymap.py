@@ -10,9 +10,8 @@ from multidrop.tui.app import MultidropApp, bindings
 from multidrop.tui.keymap import keymap, read_key
 from multidrop.tui.screens.all_drives import AllDrives
 from multidrop.tui.screens.dialogs import Search
-from multidrop.tui.screens.page import Page
-from multidrop.tui.screens.table import PAGES, PageEntry
-from multidrop.tui.widgets.signs import Signs
+from multidrop.tui.screens.page import PAGES, Page, PageEntry
+from multidrop.tui.widgets.theme import Signs
 from tests.support.fake_session import FakeAssist, demo_session, settle
 
 

@@ -12,7 +12,7 @@ from textual.pilot import Pilot
 
 from multidrop.drives.events import Traffic
 from multidrop.shell.events import OnBus
-from multidrop.tui.frames import Frames
+from multidrop.tui.frame_scheduler import Frames
 from multidrop.tui.screens.macros import Listed, MacrosPage, macro_row, step_rows
 from multidrop.tui.screens.program import ProgramPage
 from multidrop.tui.screens.traffic import TrafficPage
@@ -51,7 +51,7 @@ async def test_what_was_read_is_painted_though_nothing_else_happens(monkeypatch:
     monkeypatch.setattr(Frames, "age", lambda self: None)
     app = make_app(demo_session())
     async with app.run_test(size=(80, 24)) as pilot:
-        await app.run_action("app.page('macros')")
+        await app.run_action("act.page('macros')")
         assert "no macro yet" not in app.screen.lines("macros").plain  # type: ignore[attr-defined]
         async with asyncio.timeout(PATIENCE):
             while "shuttle" not in app.screen.lines("macros").plain:  # type: ignore[attr-defined]
@@ -64,7 +64,7 @@ async def test_macros_are_played_put_on_a_key_deleted_and_edited_by_keys(tmp_pat
     session.macros.path = lambda name: tmp_path / f"{name}.toml"  # type: ignore[attr-defined]
     app = make_app(session)
     async with app.run_test(size=(80, 24)) as pilot:
-        await app.run_action("app.page('macros')")
+        await app.run_action("act.page('macros')")
         await until(pilot, lambda: "shuttle" in app.screen.lines("macros").plain)  # type: ignore[attr-defined]
         await pilot.press("down", "enter")
         await until(pilot, lambda: [line for line, _ in session.lines] == ["/play shuttle"])
@@ -82,7 +82,7 @@ async def test_a_name_that_is_typed_on_the_page_plays_no_other_macro() -> None:
     session = demo_session()
     app = make_app(session)
     async with app.run_test(size=(80, 24)) as pilot:
-        await app.run_action("app.page('macros')")
+        await app.run_action("act.page('macros')")
         await until(pilot, lambda: "shuttle" in app.screen.lines("macros").plain)  # type: ignore[attr-defined]
         await pilot.press(*"go", "enter")
         await settle(pilot)
@@ -97,7 +97,7 @@ async def test_a_held_enter_plays_once_and_the_end_of_a_macro_waits_for_no_line_
     session.gate = asyncio.Event()
     app = make_app(session)
     async with app.run_test(size=(80, 24)) as pilot:
-        await app.run_action("app.page('macros')")
+        await app.run_action("act.page('macros')")
         await until(pilot, lambda: "shuttle" in app.screen.lines("macros").plain)  # type: ignore[attr-defined]
         await pilot.press("down", *["enter"] * 20, "s")
         await until(pilot, lambda: [line for line, _ in session.lines] == ["/play shuttle", "/play stop shuttle"])
@@ -113,7 +113,7 @@ async def test_traffic_can_be_paused_looked_back_and_shown_with_polls() -> None:
     async with app.run_test(size=(80, 24)) as pilot:
         for number in range(60):
             session.emit(OnBus("press", Traffic(session.time, True, f"aPR {number}\n".encode())))
-        await app.run_action("app.page('traffic')")
+        await app.run_action("act.page('traffic')")
         await settle(pilot)
         page = app.screen
         assert isinstance(page, TrafficPage)

@@ -2,7 +2,7 @@
 
 import pytest
 
-from multidrop.tui.terminal.pace import PATIENCE, TRIES, Pace
+from multidrop.tui.frame_scheduler import PATIENCE, TRIES, Pace
 
 
 class Screen:

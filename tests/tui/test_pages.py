@@ -5,7 +5,7 @@ import pytest
 from multidrop.drives.events import Sample, Silent
 from multidrop.shell.events import By, OnBus
 from multidrop.tui.app import MultidropApp
-from multidrop.tui.panels.glance import Glance
+from multidrop.tui.panels.view import Glance
 from multidrop.tui.readout import Readout
 from multidrop.tui.screens.all_drives import AllDrives, Place, drive_row
 from multidrop.tui.widgets.lines import width_of

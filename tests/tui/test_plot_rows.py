@@ -13,11 +13,9 @@ from multidrop.drives.events import Lost, Sample, Valued
 from multidrop.shell.events import By, OnBus
 from multidrop.shell.roles import Series
 from multidrop.transports import TransportLost
-from multidrop.tui.curves.ink import ASCII
-from multidrop.tui.panels.chart_rows import cursor_row
-from multidrop.tui.panels.glance import glances_of
-from multidrop.tui.panels.plot import plot_rows, plot_title
-from multidrop.tui.panels.view import View
+from multidrop.tui.curves.raster import ASCII
+from multidrop.tui.panels.plot import cursor_row, plot_rows, plot_title
+from multidrop.tui.panels.view import View, glances_of
 from multidrop.tui.screen_model import ScreenModel
 from multidrop.tui.screens.plot_page import PlotPage
 from multidrop.tui.widgets.lines import Row, width_of

@@ -9,7 +9,7 @@ from textual.pilot import Pilot
 from multidrop.drives.events import Sample, Valued
 from multidrop.shell.events import OnBus
 from multidrop.shell.roles import Series
-from multidrop.tui.widgets.signs import Signs
+from multidrop.tui.widgets.theme import Signs
 from tests.support.fake_session import FakeSession, a_move, demo_session, make_app, settle
 
 pytestmark = pytest.mark.tui
@@ -45,7 +45,7 @@ def drawn(compare: Compare, size: str, *keys: str, theme: str = "multidrop-dark"
 
     async def act(pilot: Pilot[int]) -> None:
         await pilot.pause()
-        app.show_signs(signs)
+        app.view.show_signs(signs)
         several(session)
         await settle(pilot)
         await pilot.press("ctrl+g", *keys)

@@ -11,14 +11,12 @@ import pytest
 from multidrop.dialects.values import Conditions
 from multidrop.drives.events import Traffic
 from multidrop.shell.events import Phase
-from multidrop.tui.panels.glance import Glance
-from multidrop.tui.panels.log import log_rows, log_title, size_words
 from multidrop.tui.panels.program import listing_rows, program_rows, program_title, state_words
+from multidrop.tui.panels.table import log_rows, log_title, size_words
 from multidrop.tui.panels.traffic import piece_rows, traffic_rows
-from multidrop.tui.panels.view import View
+from multidrop.tui.panels.view import Glance, View
 from multidrop.tui.readout import ProgramFacts, Readout
-from multidrop.tui.screen_model import ScreenModel
-from multidrop.tui.traffic import Piece
+from multidrop.tui.screen_model import Piece, ScreenModel
 from tests.support.fake_session import demo_session
 
 LINES = tuple((1 + 5 * number, f"MR {number}") for number in range(30))

@@ -63,7 +63,7 @@ async def checked(pilot: Pilot[int], file: str) -> ProgramPage:
     """Open a file, and wait for its check."""
     app = pilot.app
     app.texts.open(file)  # type: ignore[attr-defined]
-    await app.run_action("app.page('program')")
+    await app.run_action("act.page('program')")
     async with asyncio.timeout(PATIENCE):
         while not isinstance(app.screen, ProgramPage) or app.screen.findings.pending:
             await pilot.pause(0.01)
@@ -86,7 +86,7 @@ async def traced(pilot: Pilot[int], session: FakeSession) -> None:
 
 
 async def macros(pilot: Pilot[int], session: FakeSession) -> None:
-    await pilot.app.run_action("app.page('macros')")
+    await pilot.app.run_action("act.page('macros')")
     for _ in range(3):
         await settle(pilot)
 
@@ -94,7 +94,7 @@ async def macros(pilot: Pilot[int], session: FakeSession) -> None:
 async def traffic(pilot: Pilot[int], session: FakeSession) -> None:
     for number, data in enumerate((b"aPR P\n", b"384112\r\n", b"aMR 512000\n", b"\x06", b"bPR VX\n", b"?\r\n")):
         session.emit(OnBus("press", Traffic(session.time + number / 10, number % 2 == 0, data)))
-    await pilot.app.run_action("app.page('traffic')")
+    await pilot.app.run_action("act.page('traffic')")
 
 
 @pytest.mark.wide

@@ -14,7 +14,7 @@ from multidrop.tui.app import MultidropApp
 from multidrop.tui.outbox import BURST
 from multidrop.tui.screens.dialogs import LEAST, Confirm
 from multidrop.tui.terminal.keyboard import PAUSE
-from multidrop.tui.widgets.reader import MOST_COPIED
+from multidrop.tui.widgets.search_bar import MOST_COPIED
 from tests.support.fake_session import FakeSession, a_talk, demo_session, make_app, settle
 
 pytestmark = pytest.mark.tui

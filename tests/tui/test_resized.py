@@ -9,7 +9,7 @@ import pyte
 import pytest
 
 from multidrop.tui.app import MultidropApp
-from multidrop.tui.widgets.signs import Signs
+from multidrop.tui.widgets.theme import Signs
 from tests.support.fake_session import FakeAssist, demo_session
 from tests.support.pty_screen import PtyScreen, on_a_pty
 from tests.support.until import PATIENCE
@@ -74,6 +74,6 @@ async def test_other_signs_are_painted_at_once() -> None:
     async with on_a_pty(lambda driver: MultidropApp(session, [], FakeAssist(), driver)) as screen:
         shown = Shown(screen)
         for signs in (Signs.ASCII, Signs.FULL, Signs.BOXES):
-            screen.app.show_signs(signs)
+            screen.app.view.show_signs(signs)
             await screen.rest()
             await shown.agrees()

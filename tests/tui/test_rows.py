@@ -12,15 +12,12 @@ from multidrop.drives.events import Sample
 from multidrop.drives.stopping import Fate
 from multidrop.shell.events import OnBus, StateChanged
 from multidrop.shell.stop_report import Found, Tally
-from multidrop.tui.panels.column import column_rows
-from multidrop.tui.panels.glance import Glance, firmware_of
-from multidrop.tui.panels.status import narrow_rows
-from multidrop.tui.panels.table import PANELS, Panel
-from multidrop.tui.panels.view import View
+from multidrop.tui.panels.drives import narrow_rows
+from multidrop.tui.panels.table import PANELS, Panel, column_rows
+from multidrop.tui.panels.view import Glance, View, firmware_of
 from multidrop.tui.readout import Readout, State
 from multidrop.tui.screen_model import ScreenModel
-from multidrop.tui.widgets.banner import banner_row
-from multidrop.tui.widgets.footer import STOP, Footer, footer_row
+from multidrop.tui.widgets.bars import STOP, Footer, banner_row, footer_row
 from multidrop.tui.widgets.lines import Lines, Row, width_of
 from tests.support.fake_session import FakeDrive, demo_session, make_app, settle
 

@@ -18,7 +18,7 @@ from multidrop.shell.events import (
     Progressed,
     TwinEnded,
 )
-from multidrop.tui.panels.lamps import program_words
+from multidrop.tui.panels.drive import program_words
 from multidrop.tui.readout import Readout, State
 from multidrop.tui.screen_model import BusFacts, ScreenModel, bus_old, bus_state
 

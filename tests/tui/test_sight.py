@@ -7,9 +7,7 @@ from hypothesis import strategies as st
 
 from multidrop.shell.transcripts import EVERYTHING, Filter
 from multidrop.tui.screen_model import Record
-from multidrop.tui.widgets.finding import Index, Shown
-from multidrop.tui.widgets.records import Records
-from multidrop.tui.widgets.sight import Picked, Search, Sight
+from multidrop.tui.widgets.viewport import Index, Picked, Records, Search, Shown, Sight
 from tests.support.cases import for_each
 
 TALK = [

@@ -5,7 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from rich.cells import cell_len
 
-from multidrop.tui.widgets.signs import BRAILLE, TABLES, Signs, shown_as, signs_for
+from multidrop.tui.widgets.theme import BRAILLE, TABLES, Signs, shown_as, signs_for
 from tests.support.fake_session import a_move, a_talk, demo_session, make_app, settle
 from tests.support.paths import ROOT
 
@@ -52,7 +52,7 @@ def test_the_signs_are_those_set_or_those_of_the_terminal(
 async def test_nothing_but_ascii_reaches_a_terminal_of_ascii(keys: tuple[str, ...]) -> None:
     session = demo_session()
     app = make_app(session)
-    app.show_signs(Signs.ASCII)
+    app.view.show_signs(Signs.ASCII)
     async with app.run_test(size=(120, 40)) as pilot:
         session.emit(*a_talk(session), *a_move(session))
         await pilot.press(*keys)

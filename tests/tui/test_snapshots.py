@@ -11,7 +11,7 @@ from multidrop.drives.stopping import Fate
 from multidrop.shell.events import OnBus
 from multidrop.transports import TransportLost
 from multidrop.tui.app import MultidropApp
-from multidrop.tui.widgets.signs import Signs
+from multidrop.tui.widgets.theme import Signs
 from tests.support.fake_session import FakeBus, FakeDrive, FakeSession, a_move, a_talk, demo_session, make_app, settle
 
 pytestmark = pytest.mark.tui
@@ -128,5 +128,5 @@ def test_snapshot_of_many_lines_in_ascii(snap_compare: Compare) -> None:
     buses[19].lost = TransportLost("unplugged")
     session = FakeSession(*buses)
     app = make_app(session)
-    app.show_signs(Signs.ASCII)
+    app.view.show_signs(Signs.ASCII)
     assert snap_compare(app, terminal_size=(80, 24), run_before=acting(session, "ctrl+t"))

@@ -11,8 +11,8 @@ from multidrop.drives.stopping import Fate
 from multidrop.shell import stop_report
 from multidrop.shell.events import By
 from multidrop.tui.app import MultidropApp, is_stop
-from multidrop.tui.panels.glance import glances_of
-from multidrop.tui.panels.lamps import program_words
+from multidrop.tui.panels.drive import program_words
+from multidrop.tui.panels.view import glances_of
 from multidrop.tui.polling import LIVELY, STATUS
 from multidrop.tui.readout import State
 from multidrop.tui.screen_model import ScreenModel, bus_state

@@ -6,8 +6,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from multidrop.tui.readout import State
+from multidrop.tui.widgets.bars import TROUBLE, Tab, rule_row, tab_at, top_row
 from multidrop.tui.widgets.lines import Row, width_of
-from multidrop.tui.widgets.topline import TROUBLE, Tab, rule_row, tab_at, top_row
 
 states = st.sampled_from(list(State))
 

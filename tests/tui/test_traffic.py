@@ -7,7 +7,7 @@ from dataclasses import replace
 from multidrop.dialects import End, Priority, Reply
 from multidrop.dialects.mcode.host.codec import MCode
 from multidrop.drives.events import Ended, Sample, Sent, Traffic, Transaction
-from multidrop.tui.traffic import MOST, MOST_BYTES, TrafficStore
+from multidrop.tui.screen_model import MOST, MOST_BYTES, TrafficStore
 
 
 def exchange(store: TrafficStore, out: bytes, back: bytes, priority: Priority) -> None:

@@ -8,8 +8,7 @@ from textual.app import App, ComposeResult
 from textual.pilot import Pilot
 
 from multidrop.tui.screen_model import KEPT, Record
-from multidrop.tui.widgets.gutter import Clocks
-from multidrop.tui.widgets.transcript import Transcript
+from multidrop.tui.widgets.transcript import Clocks, Transcript
 
 pytestmark = pytest.mark.tui
 GUTTER = Clocks("clock", str).gutter

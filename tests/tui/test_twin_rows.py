@@ -11,19 +11,18 @@ from hypothesis import strategies as st
 from multidrop.drives.events import Conditioned, Sample
 from multidrop.shell.events import Agreed, By, OnBus, Predicted, SessionEvent, TwinEnded
 from multidrop.shell.roles import DIFFERENCE, Series
-from multidrop.tui.curves.ink import ASCII, BLOCK, BRAILLE, TWINS, Ink
-from multidrop.tui.panels.axis import drive_rows
-from multidrop.tui.panels.glance import glances_of
+from multidrop.tui.curves.raster import ASCII, BLOCK, BRAILLE, TWINS, Ink
+from multidrop.tui.panels.drive import drive_rows
+from multidrop.tui.panels.drives import drives_rows, kept, narrow_rows
 from multidrop.tui.panels.plot import plot_rows, plot_title
-from multidrop.tui.panels.status import drives_rows, kept, narrow_rows
-from multidrop.tui.panels.view import View
+from multidrop.tui.panels.view import View, glances_of
 from multidrop.tui.polling import Polling
 from multidrop.tui.presenter import trouble_mark
 from multidrop.tui.readout import State
 from multidrop.tui.screen_model import ScreenModel, bus_state
 from multidrop.tui.screens.all_drives import drive_row, summary, worst_first
 from multidrop.tui.widgets.lines import Row, width_of
-from multidrop.tui.widgets.signs import Signs, shown_as
+from multidrop.tui.widgets.theme import Signs, shown_as
 from tests.support.fake_session import AT_LIMIT, FakeSession, demo_session, make_app, settle
 from tests.support.fake_twin import apart, beside
 
@@ -250,13 +249,13 @@ async def test_a_key_begins_and_ends_the_twins_of_the_line_as_typed_lines_do() -
         await settle(pilot)
         assert "≠" in app.main.lines("side").plain + app.main.lines("far").plain
         assert "≠ twin" in app.main.lines("top").plain and "^F2 twin" in app.main.lines("footer").plain
-        assert "Twin off" in {each.title for each in app.commands()}
+        assert "Twin off" in {each.title for each in app.act.commands()}
         await pilot.press("ctrl+f2")
         session.emit(OnBus("press", TwinEnded(session.time, "a")))
         await pilot.press("ctrl+pagedown", "ctrl+f2")
         await settle(pilot)
         assert session.sent == ["press:a /twin on", "press:a /twin off", "eth: /twin on"]
-        assert "≠" not in app.main.lines("top").plain and "Twin on" in {each.title for each in app.commands()}
+        assert "≠" not in app.main.lines("top").plain and "Twin on" in {each.title for each in app.act.commands()}
 
 
 @pytest.mark.tui

@@ -5,7 +5,7 @@ from collections.abc import Callable
 import pytest
 from textual.pilot import Pilot
 
-from multidrop.tui.widgets.signs import Signs
+from multidrop.tui.widgets.theme import Signs
 from tests.support.fake_session import demo_session, make_app, settle
 from tests.support.fake_twin import a_stall
 
@@ -26,7 +26,7 @@ def drawn(compare: Compare, size: str, *keys: str, theme: str = "multidrop-dark"
 
     async def act(pilot: Pilot[int]) -> None:
         await pilot.pause()
-        app.show_signs(signs)
+        app.view.show_signs(signs)
         session.emit(*a_stall(session))
         await settle(pilot)
         await pilot.press(*keys)

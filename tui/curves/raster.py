@@ -1,20 +1,154 @@
 """The picture of some curves with one scale, kept from frame to frame: only columns with new samples are drawn.
 
 Theory of operation. The time axis moves in whole cells, counted from time 0, so a drawn column of cells stays true
-while the picture scrolls. A column is drawn again when a sample falls into it, or when the scale changes.
+while the picture scrolls. A column is drawn again when a sample falls into it, or when the scale changes. Scales have
+round ends and ticks, and do not jump without need. Curves are braille, half blocks, or ASCII, for terminals that lack
+the others.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import groupby
 from math import isnan
 from typing import NamedTuple
 
-from multidrop.tui.curves.columns import Column, Columns
-from multidrop.tui.curves.ink import Ink
-from multidrop.tui.curves.scale import Scale
+from multidrop.tui.curves.samples import Column, Columns
+
+MARKS = "*+ox#%"
+"""The ASCII mark of each series."""
+PATTERNS = ((1, 1), (2, 1), (4, 2), (4, 1), (6, 4), (8, 6))
+"""For each series, the period of its dashes in columns of dots, and the length of a dash."""
+
+TWINS = len(PATTERNS)
+"""The number of a series and this is that of its twin, whose line is of single dots."""
+TWIN_MARKS = ".,:;'~"
+"""The ASCII mark of each twin."""
+SPARSE = 5
+"""Dots of a line of which a twin shows one or two, in whatever direction the line goes."""
+
+
+@dataclass(frozen=True)
+class Ink:
+    """Cells of `wide` by `tall` dots. The bits of a dot pattern: the left column from its top, then the right one."""
+
+    name: str
+    wide: int
+    tall: int
+    glyphs: tuple[str, ...]
+    """The sign of each dot pattern; none: the mark of the series."""
+    shown: tuple[int, ...] = (0,)
+    """The dots of a twin that are shown, of `SPARSE`."""
+
+    def glyph(self, dots: int, series: int) -> str:
+        """The sign of a dot pattern."""
+        return self.glyphs[dots] if self.glyphs else _mark(series)
+
+    def dots(self, series: int, x: int, top: int, bottom: int) -> Sequence[int]:
+        """The dots that a series shows in column `x` of dots, of those from `top` to `bottom`.
+
+        Flat parts are dashed, unless the series has marks of its own.
+        """
+        if series >= TWINS and self.glyphs:
+            return [y for y in range(top, bottom + 1) if (x + 2 * y) % SPARSE in self.shown]
+        period, length = PATTERNS[series % len(PATTERNS)]
+        shown = not self.glyphs or x % period < length or bottom - top >= self.tall
+        return range(top, bottom + 1) if shown else range(0)
+
+    def sample(self, series: int) -> str:
+        """A piece of the line of a series, for a legend."""
+        if not self.glyphs:
+            return _mark(series) * 2
+        middle = self.tall // 2
+        if series >= TWINS:
+            ends = (0, 3 * self.wide - 1)
+            shown = [1 << middle if x in ends else 0 for x in range(3 * self.wide)]
+        else:
+            shown = [1 << middle if self.dots(series, x, middle, middle) else 0 for x in range(2 * self.wide)]
+        cells = (shown[n : n + self.wide] for n in range(0, len(shown), self.wide))
+        return "".join(self.glyphs[sum(dots << (self.tall * n) for n, dots in enumerate(cell))] for cell in cells)
+
+
+def _mark(series: int) -> str:
+    marks = TWIN_MARKS if series >= TWINS else MARKS
+    return marks[series % len(marks)]
+
+
+def _braille(dots: int) -> str:
+    order = (0x01, 0x02, 0x04, 0x40, 0x08, 0x10, 0x20, 0x80)
+    code = sum(bit for n, bit in enumerate(order) if dots >> n & 1)
+    return chr(0x2800 + code) if code else " "
+
+
+BRAILLE = Ink("full", 2, 4, tuple(_braille(dots) for dots in range(256)))
+BLOCK = Ink("boxes", 1, 2, (" ", "▀", "▄", "█"), (0, 2))
+ASCII = Ink("ascii", 1, 1, ())
+INKS = {ink.name: ink for ink in (BRAILLE, BLOCK, ASCII)}
+"""By the value of `tui.widgets.theme.Signs`."""
+
+
+def nice_step(span: float, ticks: int) -> float:
+    """The step (1, 2 or 5 times a power of ten) that gives at most `ticks` steps over a span."""
+    raw = span / max(ticks, 1)
+    power = 10.0 ** math.floor(math.log10(raw))
+    for factor in (1.0, 2.0, 5.0, 10.0):
+        if factor * power >= raw * (1 - 1e-9):
+            return factor * power
+    raise AssertionError
+
+
+class Scale(NamedTuple):
+    """The span of an axis; both ends are multiples of `step`."""
+
+    low: float
+    high: float
+    step: float
+
+    def dot(self, value: float, dots: int) -> int:
+        """The dot of a value, counted from the top; outside of 0 to `dots` - 1 for a value beyond the ends."""
+        return round((self.high - value) / (self.high - self.low) * (dots - 1))
+
+
+def nice_scale(low: float, high: float, least: float = 1.0) -> Scale:
+    """A scale around the values that ends on round numbers, so that it seldom changes; at least `least` wide."""
+    if high - low < least:
+        middle = (low + high) / 2
+        low, high = min(low, middle - least / 2), max(high, middle + least / 2)
+    step = nice_step(high - low, 6)
+    return Scale(math.floor(low / step + 1e-9) * step, math.ceil(high / step - 1e-9) * step, step)
+
+
+def steady(before: Scale | None, low: float, high: float, least: float) -> Scale:
+    """The scale before while it fits: it grows at once, and shrinks when the values fill less than a third of it."""
+    fitting = nice_scale(low, high, least)
+    if before is None or low < before.low or high > before.high:
+        return fitting
+    return fitting if fitting.high - fitting.low < (before.high - before.low) / 2.5 else before
+
+
+def magnified(scale: Scale, factor: int, centre: float) -> Scale:
+    """A part of a scale around a value, `factor` times as large; its ends are round."""
+    if factor <= 1:
+        return scale
+    half = (scale.high - scale.low) / factor / 2
+    return nice_scale(centre - half, centre + half, 2 * half)
+
+
+def ticks(scale: Scale, rows: int) -> dict[int, float]:
+    """Row (0 is the top) and value of each tick: both ends, and as many even steps between as fit."""
+    steps = max(1, round((scale.high - scale.low) / scale.step))
+    room = max(1, min(4, (rows - 1) // 2))
+    stride = next(each for each in range(1, steps + 1) if steps % each == 0 and steps // each <= room)
+    found = [scale.low + scale.step * n for n in range(0, steps + 1, stride)]
+    return {row_of(value, scale, rows): value for value in found}
+
+
+def row_of(value: float, scale: Scale, rows: int) -> int:
+    """The row of cells that shows a value."""
+    return min(rows - 1, max(0, scale.dot(value, rows * 4) // 4))
+
 
 EMPTY, CURSOR = -1, -2
 """Owners of a cell beside the numbers of the series."""

@@ -6,8 +6,7 @@ import math
 from typing import NamedTuple
 
 from multidrop.shell.events import Phase
-from multidrop.tui.panels.glance import Glance
-from multidrop.tui.panels.view import View
+from multidrop.tui.panels.view import Glance, View
 from multidrop.tui.readout import Readout
 from multidrop.tui.text import age, fit
 from multidrop.tui.widgets.lines import Row

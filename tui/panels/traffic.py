@@ -7,8 +7,8 @@ from datetime import datetime
 
 from multidrop.shell.raw import text_of
 from multidrop.tui.panels.view import View
+from multidrop.tui.screen_model import Piece
 from multidrop.tui.text import fit
-from multidrop.tui.traffic import Piece
 from multidrop.tui.widgets.lines import Row
 
 OUT, IN = "↑", "↓"

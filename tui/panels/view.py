@@ -1,20 +1,108 @@
-"""The facts and the time, of which a panel makes rows. It sends nothing."""
+"""The facts and the time, of which a panel makes rows, and those of one drive: names, state with a sign, values."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
-from multidrop.tui.panels.glance import Glance
+from multidrop.tui.readout import READ, Readout, State
 from multidrop.tui.screen_model import ScreenModel
-from multidrop.tui.session_view import SessionView
+from multidrop.tui.text import digits, fit
+from multidrop.tui.widgets.lines import Span
+
+if TYPE_CHECKING:
+    from multidrop.drives.bus import Bus
+    from multidrop.shell.session import Session
+
+STATE = 17
+"""Width of a sign and its words: `■ stood 0.9 s ago`."""
+
+
+UNREFERENCED = "~"
+"""The sign of a position that has lost its reference."""
+NOT_REFERENCED = "not referenced"
+
+
+@dataclass(frozen=True)
+class Glance:
+    """The facts that are shown of one drive."""
+
+    address: str
+    label: str
+    product: str
+    version: str
+    readout: Readout
+    selected: bool = False
+    storing: bool = False
+    lost: bool = False
+    unit: str = "steps"
+    unreferenced: frozenset[str] = frozenset()
+    """The axes whose position does not count since a restart."""
+
+    def counts(self, axis: Readout) -> bool:
+        """Whether the position of an axis is not known to have lost its reference."""
+        return not self.unreferenced & {axis.axis, ""}
+
+    def state(self) -> State:
+        """The state as last read; LOST on a lost bus, where nothing else is known."""
+        return State.LOST if self.lost else self.readout.state(storing=self.storing)
+
+    def sign(self, now: float, width: int = STATE) -> Span:
+        """Sign and words of the state in a fixed width."""
+        state = self.state()
+        words = state.word if self.lost else self.readout.words(now, storing=self.storing)
+        aged = state in READ and self.readout.old(now)
+        if state is State.NO_CURRENT and self.readout.touched > self.readout.conditioned_at:
+            aged = True  # a line was sent since, which may have switched it on
+        aged = aged or (state is State.DWELL and self.readout.program_aged(now))
+        return fit(f"{state.sign} {words}", width), "dim" if aged else state.role
+
+    def values(self, now: float, axis: Readout | None = None) -> tuple[str, str, str]:
+        """Position, velocity, and their role: dim unless they are known to be current."""
+        last = (axis or self.readout).last
+        dim = self.lost or self.readout.silent_since is not None or self.readout.old(now) or self.storing
+        sign = "" if last is None or self.counts(axis or self.readout) else UNREFERENCED
+        position = sign + digits(None if last is None else last.position)
+        velocity = digits(None if last is None else last.velocity)
+        return position, velocity, "dim" if dim else "strong"
+
+
+def name_of(glance: Glance) -> str:
+    """`a gantry`, or the address alone; `drive` for a drive without an address."""
+    return f"{glance.address or 'drive'} {glance.label}".strip()
+
+
+def firmware_of(glance: Glance) -> str:
+    """The firmware's number alone; drives report `LMDCM 6.002, Hw: 3.2`."""
+    return glance.version.removeprefix(glance.product).partition(",")[0].strip()
+
+
+def glances_of(session: Session, model: ScreenModel, bus: Bus) -> list[Glance]:
+    """The drives of a bus, as they are shown."""
+    facts = model.bus(bus.name)
+    chosen = session.selected if bus.name == session.selected_bus else None
+    return [
+        Glance(
+            address=drive.address,
+            label=drive.label,
+            product=drive.product,
+            version=drive.version,
+            readout=facts.readout(address),
+            selected=chosen is not None and drive.address == chosen.address,
+            storing=drive.programming,
+            lost=bus.lost is not None,
+            unreferenced=drive.state.unreferenced,
+        )
+        for address, drive in bus.drives.items()
+    ]
 
 
 @dataclass(frozen=True)
 class View:
     """The facts at one time."""
 
-    session: SessionView
+    session: Session
     model: ScreenModel
     glances: Sequence[Glance]
     """The drives of the selected bus."""

@@ -11,12 +11,9 @@ from textual.app import ComposeResult
 from textual.binding import Binding, BindingType
 
 from multidrop.dialects.text import visible
-from multidrop.tui.panels.glance import NOT_REFERENCED, Glance, glances_of
-from multidrop.tui.panels.lamps import program_words, trouble_of
-from multidrop.tui.panels.spark import spark
-from multidrop.tui.panels.status import STATE, short_words
-from multidrop.tui.panels.twin import SIGN, alarm_words
-from multidrop.tui.panels.view import View
+from multidrop.tui.panels.drive import SIGN, alarm_words, program_words, trouble_of
+from multidrop.tui.panels.drives import STATE, short_words, spark
+from multidrop.tui.panels.view import NOT_REFERENCED, Glance, View, glances_of
 from multidrop.tui.readout import State
 from multidrop.tui.screens.dialogs import Field
 from multidrop.tui.screens.page import Host, Page
@@ -228,7 +225,7 @@ class AllDrives(Page):
         if self._places:
             place = self._places[self._at()]
             self.dismiss(None)
-            self.host.action_select(place.glance.address, place.bus)
+            self.host.select(place.glance.address, place.bus)
 
 
 _NOTHING: Row = ((" no drive", "dim"),)

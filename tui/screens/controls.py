@@ -1,12 +1,18 @@
 """The page of controls: jog by steps, move, home, stop, enable. Each control shows the lines that it sends.
 
-A jog is one bounded move a press (`tui.jog`). Everything is sent as if it were typed, so guards ask and the transcript
-shows it. To leave the page stops nothing: a move ends by itself.
+Everything is sent as if it were typed, so guards ask and the transcript shows it. To leave the page stops nothing: a
+move ends by itself.
+
+A jog is one bounded move a press. A terminal sends no key-up, and repeats a held key. So a press counts only while the
+axis is known to rest: a reading that is newer than the last line says so, and no line runs or waits. A press right
+after another one is the keyboard's repetition. What does not count is dropped and counted, and nothing of it is kept.
 """
 
 from __future__ import annotations
 
+import math
 import re
+from dataclasses import dataclass
 from string import ascii_letters, digits
 from typing import ClassVar, NamedTuple
 
@@ -14,16 +20,72 @@ from textual.app import ComposeResult
 from textual.binding import Binding, BindingType
 
 from multidrop.dialects.values import BY, DISABLE, ENABLE, HIGH, HOME_MINUS, HOME_PLUS, LOW, STOP, TO, Control, Controls
-from multidrop.tui.jog import Jog
-from multidrop.tui.panels.axis import drive_rows, unit_of
-from multidrop.tui.panels.glance import Glance, name_of
-from multidrop.tui.panels.view import View
+from multidrop.tui.outbox import Place, selected_place
+from multidrop.tui.panels.drive import drive_rows, unit_of
+from multidrop.tui.panels.view import Glance, View, name_of
 from multidrop.tui.readout import READ, Readout, State
 from multidrop.tui.screens.dialogs import Field
 from multidrop.tui.screens.page import Host, Page
-from multidrop.tui.session_view import Place, selected_place
 from multidrop.tui.text import fit
 from multidrop.tui.widgets.lines import Row, Span, spread, width_of
+
+# Whether a key press may start a move of an axis, and how many presses were dropped. It sends nothing.
+#
+# A terminal sends no key-up, and repeats a held key. So one press is one bounded move, and it counts only while the
+# axis is known to rest: a reading that is newer than the last line says so, and no line runs or waits. A press right
+# after another one is the keyboard's repetition. What does not count is dropped and counted, and nothing of it is
+# kept.
+
+
+REPETITION = 0.2
+"""Seconds between two presses below which the second is the repetition of a held key."""
+SETTLE = 0.05
+"""Seconds after the end of a line before a reading shows what the line has done."""
+
+
+@dataclass
+class Jog:
+    """The presses of one page."""
+
+    dropped: int = 0
+    """Presses that did not count since the last one that did."""
+    why: str = ""
+    """The reason of the last drop."""
+    _pressed: float = -math.inf
+    _busy: float = -math.inf
+    """When a line was last seen to run or wait."""
+
+    def look(self, now: float, *, idle: bool) -> None:
+        """Note whether lines run or wait."""
+        if not idle:
+            self._busy = now
+
+    def allows(self, readout: Readout, axis: Readout, state: State, now: float, *, idle: bool) -> bool:
+        """Whether a press at this time counts; one that does not is dropped."""
+        self.look(now, idle=idle)
+        repeated = now - self._pressed < REPETITION
+        self._pressed = now
+        self.why = "a key that is held repeats" if repeated else self.obstacle(readout, axis, state, now)
+        if self.why:
+            self.dropped += 1
+            return False
+        self.dropped, self._busy = 0, now
+        return True
+
+    def obstacle(self, readout: Readout, axis: Readout, state: State, now: float) -> str:
+        """The reason for which no move may start now; empty: it may."""
+        if state not in READ or axis.last is None:
+            return f"it is {'not read yet' if state is State.UNKNOWN else state.word}"
+        if state is State.MOVING or axis.last.velocity != 0:
+            return "it moves"
+        if self._busy == now:
+            return "a line is on its way"
+        if axis.last.at <= max(self._busy + SETTLE, readout.touched) or readout.old(now):
+            return "it has not been read at rest since the last line"
+        if axis.conditions is not None and axis.conditions.disabled:
+            return f"no current in the motor ({axis.conditions.disabled})"
+        return "a program runs" if readout.program.name else ""
+
 
 STEPS = tuple(10**n for n in range(8))
 """The sizes of a step that keys choose."""

@@ -9,7 +9,7 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from typing import ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 from textual.app import ComposeResult
 from textual.binding import Binding, BindingType
@@ -18,16 +18,26 @@ from textual.containers import Horizontal, Vertical
 from multidrop.dialects import Diagnostic
 from multidrop.dialects.program_files import Part, Problem
 from multidrop.shell.edited_file import ChangedMeanwhile, real_text
-from multidrop.tui.editor.grammar import Grammar, MacroGrammar, grammar_of
-from multidrop.tui.editor.texts import OpenText
-from multidrop.tui.editor.widget import Editor
+from multidrop.tui.editor import Editor, Grammar, MacroGrammar, grammar_of
 from multidrop.tui.panels.view import View
 from multidrop.tui.readout import ProgramFacts
-from multidrop.tui.screens import program_choices as choices
 from multidrop.tui.screens.dialogs import Confirm, Search
 from multidrop.tui.screens.page import Host, Page
-from multidrop.tui.screens.program_rows import Findings, heading_row, news_rows, problem_rows, rule
-from multidrop.tui.session_view import SessionView
+from multidrop.tui.screens.program_rows import (
+    UPLOAD,
+    Finder,
+    Findings,
+    files_in,
+    heading_row,
+    news_rows,
+    problem_rows,
+    rule,
+    target_of,
+)
+from multidrop.tui.texts import OpenText
+
+if TYPE_CHECKING:
+    from multidrop.shell.session import Session
 
 # The lines of a file and those in a drive: which line of the file has which address, where both hold one program.
 
@@ -206,17 +216,17 @@ class EditPage(Page):
     async def action_open(self, folder: str = "") -> None:
         """Choose a file to edit, of this folder or of another one."""
         self.take_text()
-        found = await asyncio.to_thread(choices.files_in, folder)
+        found = await asyncio.to_thread(files_in, folder)
         selected = self.host.session.selected
-        drive = "" if selected is None else choices.target_of(self.host.session) or selected.product
-        find = choices.Finder(found, self.host.texts.unsaved(), drive, folder)
+        drive = "" if selected is None else target_of(self.host.session) or selected.product
+        find = Finder(found, self.host.texts.unsaved(), drive, folder)
         hint = "type a name, with / a folder   ↑↓ choose   Enter open   Esc close"
         await self.app.push_screen(
             Search(f"Program file in {folder}" if folder else "Program file", find, hint), self._open
         )
 
     async def _open(self, name: str | None) -> None:
-        if name == choices.UPLOAD:
+        if name == UPLOAD:
             await self.upload()
         elif name and name.endswith("/"):
             await self.action_open(name)
@@ -317,7 +327,7 @@ class EditPage(Page):
         super().action_leave()
 
 
-def product_of(session: SessionView) -> str:
+def product_of(session: Session) -> str:
     """The product of the selected drive; empty without one."""
     return session.selected.product if session.selected is not None else ""
 

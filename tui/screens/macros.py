@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Sequence
 from string import ascii_letters, digits
-from typing import ClassVar, NamedTuple
+from typing import TYPE_CHECKING, ClassVar, NamedTuple
 
 from textual.app import ComposeResult
 from textual.binding import Binding, BindingType
@@ -15,9 +15,12 @@ from multidrop.tui.panels.view import View
 from multidrop.tui.screens.dialogs import Ask, Confirm
 from multidrop.tui.screens.page import Host, Page
 from multidrop.tui.screens.program_rows import news_rows, rule
-from multidrop.tui.session_view import MacrosView, MacroView, PlayingView
 from multidrop.tui.text import fit, visible
 from multidrop.tui.widgets.lines import Row, spread
+
+if TYPE_CHECKING:
+    from multidrop.macros import Macro, MacroStore
+    from multidrop.shell.playing import Playing
 
 NAME, KEY = 20, 8
 NEWS = 3
@@ -32,7 +35,7 @@ class Listed(NamedTuple):
     """A macro in the list; without a `macro`, why its file cannot be read."""
 
     name: str
-    macro: MacroView | None = None
+    macro: Macro | None = None
     trouble: str = ""
 
     @property
@@ -43,7 +46,7 @@ class Listed(NamedTuple):
         return self.macro.key if self.macro.page == "1" else f"{self.macro.key}.{self.macro.page}"
 
 
-def listed(store: MacrosView) -> list[Listed]:
+def listed(store: MacroStore) -> list[Listed]:
     """Every macro. For a thread."""
     try:
         return [_listed(store, name) for name in store.names()]
@@ -51,7 +54,7 @@ def listed(store: MacrosView) -> list[Listed]:
         return [Listed("", None, str(problem))]
 
 
-def _listed(store: MacrosView, name: str) -> Listed:
+def _listed(store: MacroStore, name: str) -> Listed:
     try:
         macro = store.load(name)
         macro.values  # noqa: B018  # a value that is declared wrong is a trouble of the file
@@ -60,7 +63,7 @@ def _listed(store: MacrosView, name: str) -> Listed:
         return Listed(name, None, str(problem))
 
 
-def macro_row(each: Listed, playing: PlayingView | None, width: int, chosen: bool) -> Row:
+def macro_row(each: Listed, playing: Playing | None, width: int, chosen: bool) -> Row:
     """Name, key, step where it plays, length and values, note."""
     head: Row = (
         ("▸" if chosen else " ", "accent"),
@@ -76,7 +79,7 @@ def macro_row(each: Listed, playing: PlayingView | None, width: int, chosen: boo
     return (*head, (fit(about, room), "dim"))
 
 
-def step_rows(each: Listed, playing: PlayingView | None, width: int, height: int) -> list[Row]:
+def step_rows(each: Listed, playing: Playing | None, width: int, height: int) -> list[Row]:
     """The lines of a macro around the one that plays."""
     if each.macro is None or height < 1:
         return []
@@ -111,7 +114,7 @@ class MacrosPage(Page):
         Binding("enter", "play", show=False),
         Binding("e", "edit", show=False),
         Binding("k", "key", show=False),
-        Binding("n", "app.record", show=False),
+        Binding("n", "act.record", show=False),
         Binding("s", "end", show=False),
         Binding("delete", "delete", show=False),
         *(Binding(each, "unchoose", show=False) for each in ascii_letters + digits if each not in "ekns"),
@@ -169,7 +172,7 @@ class MacrosPage(Page):
         records = news_rows(self.host.last_records(NEWS), lambda at: f"{wall(at):%H:%M:%S}", width)
         self.lines("news").put([rule("transcript", width), *records])
 
-    def _show_steps(self, playing: dict[str, PlayingView], width: int, room: int) -> None:
+    def _show_steps(self, playing: dict[str, Playing], width: int, room: int) -> None:
         chosen = self._chosen()
         rows: list[Row] = []
         if chosen is not None:
@@ -230,7 +233,7 @@ class MacrosPage(Page):
         except Diagnostic as problem:
             self.host.show_line(str(problem), "x")
             return
-        await self.app.run_action("app.page('program')")
+        await self.app.run_action("act.page('program')")
 
     async def action_key(self) -> None:
         """Ask for the key of the chosen macro."""

@@ -1,28 +1,141 @@
-"""The main screen: top line, transcript, panels beside or below it, status, input, footer."""
+"""The main screen: top line, transcript in one half or two, panels beside or below it, status, input, footer."""
 
 from __future__ import annotations
 
-from collections.abc import Awaitable, Callable, Sequence
+from collections.abc import Awaitable, Callable, Iterable, Sequence
 from typing import ClassVar
 
 from rich.cells import cell_len
+from textual import events
 from textual.app import ComposeResult
 from textual.binding import Binding, BindingType
 from textual.containers import Horizontal, Vertical
 from textual.geometry import Size
 
+from multidrop.shell.transcripts import Filter
 from multidrop.tui.keymap import named_key
-from multidrop.tui.panels.column import divided, fitting
-from multidrop.tui.panels.shown import Shown
-from multidrop.tui.panels.table import CONDITIONS, MOTION, PANELS, Panel
-from multidrop.tui.screens.reading import Reading
+from multidrop.tui.panels.table import CONDITIONS, MOTION, PANELS, Panel, Shown, divided, fitting
+from multidrop.tui.screen_model import Record
+from multidrop.tui.screens.page import Framed
 from multidrop.tui.text import fit, shorter
-from multidrop.tui.widgets.banner import Banner
-from multidrop.tui.widgets.beside import Beside
+from multidrop.tui.widgets.bars import Banner, rule_row
 from multidrop.tui.widgets.entry import Complete, Draft, Entry, Menu, Typed
 from multidrop.tui.widgets.lines import Lines, Roles, Row, width_of
-from multidrop.tui.widgets.topline import rule_row
+from multidrop.tui.widgets.search_bar import Reader
 from multidrop.tui.widgets.transcript import Transcript
+
+
+class Half(Transcript):
+    """A transcript without a foot: its filter is not the person's, and `/filter` is for the other half."""
+
+    def _foot(self, width: int) -> list[Row]:
+        return []
+
+
+class Beside(Vertical):
+    """A heading and a transcript that copies what another one takes in. Hidden while it shows nothing."""
+
+    def __init__(self, clock: Callable[[float], str]) -> None:
+        super().__init__(id="beside")
+        self.display = False
+        self.bus, self.address = "", ""
+        """What it shows: a line, and the one drive on it; an empty address is all of the line."""
+        self._heading = Lines(id="beside-head")
+        self.transcript = Half(clock)
+
+    def compose(self) -> ComposeResult:
+        """Make the heading and the transcript."""
+        yield self._heading
+        yield self.transcript
+
+    def show(self, bus: str, address: str, of: Transcript) -> None:
+        """Show a line, or one drive of it; `of` has its records so far."""
+        self.bus, self.address = bus, address
+        self.display = True
+        self.transcript.clear()
+        self.transcript.set_times(of.clocks.form)
+        self.transcript.choose(Filter(address=address))
+        self.transcript.extend(of.records)
+
+    def hide(self) -> None:
+        """Show nothing."""
+        self.bus = self.address = ""
+        self.display = False
+        self.transcript.clear()
+
+    def take(self, bus: str, records: Iterable[Record]) -> None:
+        """Take in what the transcript of a line takes in."""
+        if self.display and bus == self.bus:
+            self.transcript.take(records)
+
+    def name_it(self, key: str) -> None:
+        """Write the heading: what is shown, and the key that lets one type to it."""
+        width = self.size.width
+        if width:
+            name = f" {':'.join(filter(None, (self.bus, self.address)))} "
+            hint = f" {key} types here " if key and len(name) + len(key) + 16 < width else ""
+            rule = "─" * max(0, width - len(name) - len(hint) - 2)
+            row = (("─", "rule"), (fit(name, min(len(name), width - 1)), "accent"), (hint, "dim"), (f"{rule}─", "rule"))
+            self._heading.put([row])
+
+
+class Reading(Framed):
+    """A screen with a transcript; the base of the main screen."""
+
+    BINDINGS: ClassVar[list[BindingType]] = [
+        named_key("look-back", "pageup", "look(-1)", "look back in the transcript"),
+        named_key("look-on", "pagedown", "look(1)", "look on in the transcript"),
+        named_key("oldest", "ctrl+home", "look_end(False)", "the beginning of the transcript"),
+        named_key("newest", "ctrl+end", "look_end(True)", "follow the transcript again"),
+        named_key("find", "ctrl+f", "find", "search the transcript"),
+        named_key("pause", "ctrl+s", "pause", "stop the scrolling, or let it go on"),
+        named_key("pick", "ctrl+y", "pick(0)", "pick lines of the transcript to copy; also Shift+Up"),
+        named_key("times", "", "act.run_line('/times')", "times of the lines in another form"),
+        named_key("filter-mine", "", "act.run_line('/filter mine')", "show only what you typed, and its replies"),
+        named_key("filter-off", "", "act.run_line('/filter off')", "show all lines"),
+        named_key("hex", "", "act.run_line('/hex')", "the bytes of the selected line beside its lines, or not"),
+        Binding("shift+up", "pick(-1)", show=False, priority=True),
+        Binding("shift+down", "pick(1)", show=False, priority=True),
+    ]
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.reader = Reader(self.take_keys, id="reader")
+
+    @property
+    def transcript(self) -> Transcript:
+        """The transcript that is shown."""
+        raise NotImplementedError
+
+    def take_keys(self) -> None:
+        """Give the keys to the input line."""
+        raise NotImplementedError
+
+    def on_descendant_focus(self, event: events.DescendantFocus) -> None:
+        """Close the search when the input line gets the keys."""
+        if event.widget.id == "entry":
+            self.reader.close()
+
+    def action_look(self, pages: int) -> None:
+        """Scroll back or forth by pages."""
+        self.transcript.look_page(pages)
+
+    def action_look_end(self, newest: bool) -> None:
+        """Scroll to the oldest or the newest line."""
+        self.transcript.look_end(newest)
+
+    def action_find(self) -> None:
+        """Search the transcript."""
+        self.reader.find(self.transcript)
+
+    def action_pause(self) -> None:
+        """Stop the scrolling, or let it go on."""
+        self.transcript.pause()
+
+    def action_pick(self, by: int) -> None:
+        """Pick lines to copy."""
+        self.reader.pick(self.transcript, by)
+
 
 WIDE = (110, 24)
 """Smallest width and height with a column of panels."""
@@ -54,26 +167,26 @@ class MainScreen(Reading):
         ("twin", "twin"),
     )
     BINDINGS: ClassVar[list[BindingType]] = [
-        Binding("escape", "app.end_tour", show=False, priority=True),
-        named_key("help", "f1", "app.help", "help for where you are"),
-        named_key("palette", "ctrl+p", "app.palette", "everything by name: type some letters of it"),
-        named_key("drive", "ctrl+o", "app.choose_drive", "choose the drive that plain text goes to"),
-        named_key("log", "", "app.log", "begin the session log, or end it"),
-        named_key("twin", "ctrl+f2", "app.twin", "a twin beside each drive of the line, or none"),
-        named_key("history", "ctrl+r", "app.search_history", "search the lines typed before; again: older"),
+        Binding("escape", "view.end_tour", show=False, priority=True),
+        named_key("help", "f1", "view.help", "help for where you are"),
+        named_key("palette", "ctrl+p", "act.palette", "everything by name: type some letters of it"),
+        named_key("drive", "ctrl+o", "act.choose_drive", "choose the drive that plain text goes to"),
+        named_key("log", "", "act.log", "begin the session log, or end it"),
+        named_key("twin", "ctrl+f2", "act.twin", "a twin beside each drive of the line, or none"),
+        named_key("history", "ctrl+r", "act.search_history", "search the lines typed before; again: older"),
         *(
-            named_key(f"panel-{each.name}", each.key, f"app.panel('{each.name}')", f"panel: {each.about}")
+            named_key(f"panel-{each.name}", each.key, f"view.panel('{each.name}')", f"panel: {each.about}")
             for each in PANELS
         ),
-        *(named_key(f"play-f{n}", f"f{n}", f"app.play('F{n}')", "play the macro on the key") for n in range(2, 13)),
-        named_key("macro-page", "ctrl+k", "app.macro_page", "the next page of macros on F2 .. F12"),
-        named_key("repaint", "", "app.repaint", "paint the whole screen again"),
-        named_key("split", "ctrl+l", "app.split", "split the screen; then: type to the other half"),
-        named_key("tab-before", "ctrl+pageup", "app.bus(-1)", "the line before"),
-        named_key("tab-after", "ctrl+pagedown", "app.bus(1)", "the next line"),
-        named_key("tab-left", "ctrl+shift+pageup", "app.run_line('/tab left')", "this tab to the left"),
-        named_key("tab-right", "ctrl+shift+pagedown", "app.run_line('/tab right')", "this tab to the right"),
-        *(named_key(f"tab-{n}", f"alt+{n},ctrl+{n}", f"app.bus_number({n})", f"line {n}") for n in range(1, 10)),
+        *(named_key(f"play-f{n}", f"f{n}", f"act.play('F{n}')", "play the macro on the key") for n in range(2, 13)),
+        named_key("macro-page", "ctrl+k", "act.macro_page", "the next page of macros on F2 .. F12"),
+        named_key("repaint", "", "view.repaint", "paint the whole screen again"),
+        named_key("split", "ctrl+l", "view.split", "split the screen; then: type to the other half"),
+        named_key("tab-before", "ctrl+pageup", "act.bus(-1)", "the line before"),
+        named_key("tab-after", "ctrl+pagedown", "act.bus(1)", "the next line"),
+        named_key("tab-left", "ctrl+shift+pageup", "act.run_line('/tab left')", "this tab to the left"),
+        named_key("tab-right", "ctrl+shift+pagedown", "act.run_line('/tab right')", "this tab to the right"),
+        *(named_key(f"tab-{n}", f"alt+{n},ctrl+{n}", f"act.bus_number({n})", f"line {n}") for n in range(1, 10)),
     ]
 
     def __init__(

@@ -1,36 +1,59 @@
-"""A page: what is interactive beyond the input line, in the frame of the main screen.
+"""Pages, what is interactive beyond the input line, in the frame of the main screen: top line, banner, footer.
 
-A page is added to `tui.screens.table`. Escape leaves it, a stop does not. It sends lines through the outbox alone, so
+A page is added to the table of pages. Escape leaves it, a stop does not. It sends lines through the outbox alone, so
 that the transcript shows what was sent.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import ClassVar, Protocol
+from typing import TYPE_CHECKING, ClassVar, NamedTuple, Protocol
 
 from textual.app import ComposeResult
 from textual.binding import Binding, BindingType
 from textual.containers import Vertical
+from textual.screen import Screen
 
-from multidrop.tui.editor.texts import Texts
-from multidrop.tui.frames import Frames
-from multidrop.tui.function_keys import FunctionKeys
-from multidrop.tui.keymap import named_key
+from multidrop.dialects import Diagnostic
+from multidrop.dialects.on_demand import imported
+from multidrop.tui.frame_scheduler import Frames
+from multidrop.tui.keymap import FunctionKeys, named_key
 from multidrop.tui.outbox import Outbox
 from multidrop.tui.panels.view import View
 from multidrop.tui.screen_model import Record, ScreenModel
-from multidrop.tui.screens.framed import Framed
-from multidrop.tui.session_view import SessionView
+from multidrop.tui.terminal.canvas import FrontCompositor
 from multidrop.tui.terminal.keyboard import Keyboard
-from multidrop.tui.widgets.banner import Banner
+from multidrop.tui.texts import Texts
+from multidrop.tui.widgets.bars import Banner, Footer, TopLine
 from multidrop.tui.widgets.lines import Lines
+
+if TYPE_CHECKING:
+    from multidrop.shell.session import Session
+
+
+class Framed(Screen[None]):
+    """A screen with a top line and a footer, which the presenter paints."""
+
+    PLAYS: ClassVar[bool] = False
+    """True if function keys play macros on this screen."""
+    FOOTER: ClassVar[Sequence[tuple[str, str]]] = ()
+    """Names of functions in `tui.keymap`, or keys as shown, with a word on each, the most useful ones first."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._compositor = FrontCompositor()
+        # Stored, not looked up: they are painted thirty times a second, and also while the app ends.
+        self._parts: dict[str, Lines] = {"top": TopLine(id="top"), "footer": Footer(id="footer")}
+
+    def lines(self, name: str) -> Lines:
+        """The part with a name."""
+        return self._parts[name]
 
 
 class Host(Protocol):
     """The part of the app that pages use."""
 
-    session: SessionView
+    session: Session
     model: ScreenModel
     outbox: Outbox
     texts: Texts
@@ -44,7 +67,7 @@ class Host(Protocol):
     def show_line(self, text: str, mark: str = ".") -> None:
         """Append a line of the app's own to the transcript that is shown."""
 
-    def action_select(self, address: str, bus: str = "") -> None:
+    def select(self, address: str, bus: str = "") -> None:
         """Select a drive or a bus."""
 
 
@@ -53,9 +76,9 @@ class Page(Framed):
 
     BINDINGS: ClassVar[list[BindingType]] = [
         Binding("escape", "leave", show=False),
-        named_key("help", "f1", "app.help", "help for where you are"),
-        Binding("ctrl+o", "app.choose_drive", show=False, priority=True),
-        named_key("palette", "ctrl+p", "app.palette", "everything by name: type some letters of it"),
+        named_key("help", "f1", "view.help", "help for where you are"),
+        Binding("ctrl+o", "act.choose_drive", show=False, priority=True),
+        named_key("palette", "ctrl+p", "act.palette", "everything by name: type some letters of it"),
     ]
     KEYS: ClassVar[Sequence[tuple[str, str]]] = ()
     """The keys of this page with their meanings."""
@@ -94,3 +117,40 @@ class Page(Framed):
     def action_leave(self) -> None:
         """Go back to the main screen."""
         self.dismiss(None)
+
+
+class PageEntry(NamedTuple):
+    """A page, and how a person comes to it."""
+
+    name: str
+    title: str
+    about: str
+    """One line for the palette."""
+    place: str
+    """Module and class in `tui.screens`."""
+    key: str = ""
+    """The key that opens it, as Textual spells it."""
+
+    def page(self) -> type[Page]:
+        """Import the class."""
+        found: type[Page] = imported(f"multidrop.tui.screens.{self.place}")
+        return found
+
+
+PAGES: tuple[PageEntry, ...] = (
+    PageEntry("drives", "All drives", "every drive of every line, the worst first", "all_drives:AllDrives", "ctrl+a"),
+    PageEntry("plot", "Plots", "position, velocity and values over time", "plot_page:PlotPage", "ctrl+g"),
+    PageEntry("macros", "Macros", "play, record, edit and put on keys", "macros:MacrosPage"),
+    PageEntry("program", "Program", "edit, check, download, run, trace and step", "program:ProgramPage", "ctrl+e"),
+    PageEntry("parameters", "Parameters", "every setting: search, compare, edit, save", "parameters:ParametersPage"),
+    PageEntry("controls", "Controls", "jog by steps, move, home, stop, enable", "controls:ControlsPage", "ctrl+n"),
+    PageEntry("traffic", "Traffic", "the bytes of the line, both ways, with times", "traffic:TrafficPage"),
+)
+
+
+def page_entry(name: str) -> PageEntry:
+    """Find a page by name. Raises Diagnostic."""
+    for entry in PAGES:
+        if entry.name == name:
+            return entry
+    raise Diagnostic(f"no page {name}", "/page", f"pages: {', '.join(entry.name for entry in PAGES)}")

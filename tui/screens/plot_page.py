@@ -8,10 +8,8 @@ from textual.app import ComposeResult
 from textual.binding import Binding, BindingType
 
 from multidrop.shell.roles import DIFFERENCE
-from multidrop.tui.curves.look import Look
-from multidrop.tui.panels.chart_rows import columns_of, cursor_row
-from multidrop.tui.panels.plot import plot_rows, plot_title
-from multidrop.tui.panels.series import PLOTTED
+from multidrop.tui.curves.chart import Look
+from multidrop.tui.panels.plot import PLOTTED, columns_of, cursor_row, plot_rows, plot_title
 from multidrop.tui.panels.view import View
 from multidrop.tui.polling import plotted
 from multidrop.tui.screens.page import Host, Page

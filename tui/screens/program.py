@@ -15,16 +15,22 @@ from textual.binding import Binding, BindingType
 from multidrop.dialects.program_files import Entry
 from multidrop.shell.checking import ending_of
 from multidrop.shell.program_text import ProgramGrammar
-from multidrop.tui.panels.column import column_rows
 from multidrop.tui.panels.program import SIGNS, index_of, spot_of, state_words
-from multidrop.tui.panels.table import panel
+from multidrop.tui.panels.table import column_rows, panel
 from multidrop.tui.panels.view import View
 from multidrop.tui.readout import ProgramFacts
-from multidrop.tui.screens import program_choices as choices
 from multidrop.tui.screens.dialogs import Ask, Confirm, Offer, Search, offers_like
 from multidrop.tui.screens.edit import EditPage
 from multidrop.tui.screens.page import Host
-from multidrop.tui.screens.program_rows import marks_of
+from multidrop.tui.screens.program_rows import (
+    download_choices,
+    download_facts,
+    marks_of,
+    quoted,
+    run_choices,
+    target_of,
+    with_target,
+)
 
 
 class ProgramPage(EditPage):
@@ -97,13 +103,13 @@ class ProgramPage(EditPage):
         chosen = self.host.session.selected
         if chosen is None:
             return
-        target = choices.target_of(self.host.session)
+        target = target_of(self.host.session)
         base = "-".join(filter(None, (self.host.session.selected_bus, chosen.address)))
         name = f"{base}-{self.host.session.wall(self.host.session.now()):%Y%m%d-%H%M}{ending_of(chosen.product)}"
 
         def named(file: str | None) -> None:
             if file:
-                line = choices.with_target("/upload", choices.quoted(file), target)
+                line = with_target("/upload", quoted(file), target)
                 self.run_worker(self._then_open(self._start(line), file))
 
         await self.app.push_screen(Ask(f"New file for the program in {target or base}", name), named)
@@ -122,7 +128,7 @@ class ProgramPage(EditPage):
         return task
 
     def _target(self) -> str:
-        return choices.target_of(self.host.session)
+        return target_of(self.host.session)
 
     async def action_download(self) -> None:
         """Send the file to the drive: show what that does, and ask how."""
@@ -134,8 +140,8 @@ class ProgramPage(EditPage):
         if not isinstance(self.grammar, ProgramGrammar):
             self.notify(f"{text.name} is not a program: nothing to download")
             return
-        ways = choices.download_choices(text, self._target())
-        facts = choices.download_facts(text, self.findings, self.program)
+        ways = download_choices(text, self._target())
+        facts = download_facts(text, self.findings, self.program)
 
         async def answered(line: str | None) -> None:
             if line and (await self.save() if text.changed or text.file.new else True):
@@ -155,7 +161,7 @@ class ProgramPage(EditPage):
             self.notify("No drive is selected: ^O chooses one")
             return
         program = self.program
-        found = choices.run_choices(self._entries(), self._target(), program)
+        found = run_choices(self._entries(), self._target(), program)
         found = [each for each in found if only in each.line]
         known = "is this text" if self.findings.addresses else "may be another one than this text"
         heading = f"{title} {self._target() or chosen.product}: its program {known}"
@@ -175,7 +181,7 @@ class ProgramPage(EditPage):
             return
         program = self.program
         if program.line is not None and program.phase.waits:
-            self._step = self._start(choices.with_target("/step", self._target()))
+            self._step = self._start(with_target("/step", self._target()))
         else:
             await self._choose("/step ", "Step in")
 
@@ -185,12 +191,12 @@ class ProgramPage(EditPage):
         if self.host.session.selected is None:
             return
         if self._break_line(program) == row:
-            self._start(choices.with_target("/break", target, "off"))
+            self._start(with_target("/break", target, "off"))
             return
         place = next((each.name for each in self._entries() if each.line == row + 1), "")
         place = place or next((str(at) for at, line in self.findings.addresses if line == row), "")
         if place:
-            self._start(choices.with_target("/break", target, place))
+            self._start(with_target("/break", target, place))
         else:
             self.notify(
                 "No label here, and no address: the drive is not known to hold this text; ^D sends it", timeout=6

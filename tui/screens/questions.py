@@ -4,19 +4,20 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Awaitable, Callable, Sequence
-from typing import TypeVar
+from typing import TYPE_CHECKING, TypeVar
 
 from rich.text import Text
 from textual.app import App
 
 from multidrop.shell.channel import Field
-from multidrop.tui.panels.glance import Glance
-from multidrop.tui.screens.dialogs import Ask, Choose, Confirm, Dialog, GoOn, Match, Offer, Search, TooSmall
-from multidrop.tui.screens.form import Form
-from multidrop.tui.session_view import BusView, SessionView
+from multidrop.tui.panels.view import Glance
+from multidrop.tui.screens.dialogs import Ask, Choose, Confirm, Dialog, Form, GoOn, Match, Offer, Search, TooSmall
 from multidrop.tui.text import visible
-from multidrop.tui.widgets.signs import Signs
-from multidrop.tui.widgets.theme import THEMES
+from multidrop.tui.widgets.theme import THEMES, Signs
+
+if TYPE_CHECKING:
+    from multidrop.drives.bus import Bus
+    from multidrop.shell.session import Session
 
 T = TypeVar("T")
 Answers = list[tuple[str, str]]
@@ -30,7 +31,7 @@ FOUND = 100
 class Questions:
     """Opens the dialogs of an app. Each method returns once its dialog is open and has the focus."""
 
-    def __init__(self, app: App[int], session: SessionView) -> None:
+    def __init__(self, app: App[int], session: Session) -> None:
         self._app, self._session = app, session
 
     async def paste(self, lines: list[str], send: Callable[[list[str]], None]) -> None:
@@ -105,7 +106,7 @@ class Questions:
         hint = "type to narrow   ↑↓ choose   Enter do it   Esc close"
         await self._app.push_screen(Search("Everything", find, hint), taken)
 
-    async def drive(self, glances: Callable[[BusView], list[Glance]], select: Callable[[str, str], None]) -> None:
+    async def drive(self, glances: Callable[[Bus], list[Glance]], select: Callable[[str, str], None]) -> None:
         """Choose the drive that plain text goes to."""
         options, current = drive_choices(self._session, glances)
         if not options:
@@ -119,7 +120,7 @@ class Questions:
 
         await self._app.push_screen(Choose("Plain text goes to", options, current), chosen)
 
-    async def half(self, glances: Callable[[BusView], list[Glance]], show: Callable[[str, str], None]) -> None:
+    async def half(self, glances: Callable[[Bus], list[Glance]], show: Callable[[str, str], None]) -> None:
         """Choose the drive or the line for the other half of the screen."""
         drives, _ = drive_choices(self._session, glances)
         lines = [Offer(f"{name}\n", f" {name:<8} all of the line") for name in self._session.buses]
@@ -192,7 +193,7 @@ class Questions:
         await self._app.push_screen(Search("Help", find, "type to search   ↑↓ PgUp PgDn read   Esc close"))
 
 
-def drive_choices(session: SessionView, glances: Callable[[BusView], list[Glance]]) -> tuple[list[Offer], str]:
+def drive_choices(session: Session, glances: Callable[[Bus], list[Glance]]) -> tuple[list[Offer], str]:
     """Every drive of every bus, and the key of the selected one. A key is the bus, a line feed, the address."""
     now = session.now()
     options: list[Offer] = []
@@ -208,7 +209,7 @@ def drive_choices(session: SessionView, glances: Callable[[BusView], list[Glance
 
 
 def leaving(
-    session: SessionView, moving: Sequence[str], waiting: int, unsaved: Sequence[str] = ()
+    session: Session, moving: Sequence[str], waiting: int, unsaved: Sequence[str] = ()
 ) -> tuple[list[str], Answers]:
     """What quitting would leave unfinished (empty: no need to ask), and the possible answers.
 
@@ -230,7 +231,7 @@ def leaving(
     return lines, answers
 
 
-def sending(session: SessionView, lines: Sequence[str]) -> tuple[str, list[str], Answers]:
+def sending(session: Session, lines: Sequence[str]) -> tuple[str, list[str], Answers]:
     """Title, preview and answers for several pasted lines."""
     drive = session.selected
     to = f" to {drive.address or session.selected_bus}" if drive is not None else ""

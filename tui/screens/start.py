@@ -1,27 +1,31 @@
-"""The start page: saved connections, what was opened lately, serial ports, the demo cell, the tour, or a URL.
+"""The start page, and the opening of connections: those named at the start, and those chosen on the page.
 
-The line at its top narrows the list, and takes a URL. Enter opens what is highlighted.
+It offers saved connections, what was opened lately, serial ports, the demo cell, the tour, or a URL. The line at its
+top narrows the list, and takes a URL. Enter opens what is highlighted.
 """
 
 from __future__ import annotations
 
 from collections.abc import Awaitable, Callable, Sequence
-from typing import ClassVar, Protocol
+from typing import TYPE_CHECKING, ClassVar, Protocol
 
 from rich.text import Text
-from textual.app import ComposeResult
+from textual.app import App, ComposeResult
 from textual.binding import Binding, BindingType
 from textual.containers import Vertical
 from textual.widgets import Static
 from textual.widgets.option_list import Option
 
-from multidrop.dialects import Diagnostic, DriveError
 from multidrop.dialects.text import visible
-from multidrop.transports import TransportLost
-from multidrop.tui.assist import StartEntry
+from multidrop.shell.events import FAILURES
+from multidrop.tui.assist import Assist, StartEntry
 from multidrop.tui.keymap import named_key
 from multidrop.tui.screens.dialogs import Field, Options, Over
-from multidrop.tui.widgets.banner import Banner
+from multidrop.tui.terminal.keyboard import Keyboard
+from multidrop.tui.widgets.bars import Banner
+
+if TYPE_CHECKING:
+    from multidrop.shell.session import Session
 
 DEMO = StartEntry("demo", "the demo cell", "sim:", "simulated drives, no hardware needed")
 TOUR = StartEntry("demo", "the tour", "tour", "two minutes through it, on the demo cell")
@@ -32,7 +36,6 @@ KINDS = (
     ("port", "Serial ports"),
     ("demo", "Without hardware"),
 )
-FAILURES = (DriveError, Diagnostic, TransportLost)
 Connect = Callable[[str, bool], Awaitable[str]]
 """Opens a URL, raw or not; returns an empty string, or one line with the reason of the failure."""
 
@@ -68,7 +71,7 @@ class Start(Over[None]):
         Binding("ctrl+r", "raw", show=False, priority=True),
         Binding("ctrl+s", "scan", show=False, priority=True),
         Binding("ctrl+e", "edit", show=False, priority=True),
-        named_key("palette", "ctrl+p", "app.palette", "everything by name: type some letters of it"),
+        named_key("palette", "ctrl+p", "act.palette", "everything by name: type some letters of it"),
     ]
 
     def __init__(
@@ -263,3 +266,75 @@ class Start(Over[None]):
         """Go to the main screen on Escape, unless nothing is open."""
         if not self.only:
             self.dismiss(None)
+
+
+TRY = "try PR P, MR 51200 and @b PR P, each with Enter; /tour walks through everything"
+"""What an empty demo cell offers."""
+
+
+class Opener:
+    """Opens connections. `show_line` writes to the transcript, `begin_tour` begins the tour."""
+
+    def __init__(
+        self,
+        app: App[int],
+        session: Session,
+        assist: Assist,
+        keyboard: Keyboard,
+        show_line: Callable[[str, str], None],
+        begin_tour: Callable[[], Awaitable[None]],
+    ) -> None:
+        self._app, self._session, self._assist, self._keyboard = app, session, assist, keyboard
+        self._show_line, self._begin_tour = show_line, begin_tour
+
+    async def open_all(self, urls: Sequence[str]) -> None:
+        """Open what was named at the start, side by side; ask if nothing could be opened."""
+        failures: list[str] = []
+
+        def failed(number: int, failure: BaseException) -> None:
+            if not isinstance(failure, FAILURES):
+                raise failure
+            failures.append(str(failure))
+            self._show_line(failures[-1], "x")
+
+        for url in urls:
+            self._show_line(f"opening {url} …", ".")
+        await self._session.open_all(urls, failed)
+        if DEMO.url in urls:
+            self._show_line(TRY, ".")
+        if not self._session.buses:
+            self._keyboard.turn_deaf()
+            await self.ask(failures[-1])
+
+    async def connect(self, url: str, raw: bool = False) -> str:
+        """Open a URL; return an empty string, or one line with the reason of the failure.
+
+        `tour` opens the demo cell, and the tour on it.
+        """
+        tour = url == TOUR.url
+        try:
+            if tour:
+                await self._begin_tour()
+            else:
+                await self._session.open(url, raw=raw)
+        except FAILURES as failure:
+            if self._session.buses:
+                self._show_line(str(failure), "x")
+            return str(failure)
+        if url == DEMO.url:
+            self._show_line(TRY, ".")
+        elif not tour:
+            await self._assist.opened(url)
+        return ""
+
+    async def ask(self, trouble: str = "") -> None:
+        """Show what can be opened. Keys wait while a connection opens, as their meaning is unknown until then."""
+
+        def opening(begun: bool) -> None:
+            if begun:
+                self._keyboard.hold()
+            else:
+                self._keyboard.release()
+
+        only = not self._session.buses
+        await self._app.push_screen(Start(self.connect, self._assist, opening, only=only, trouble=trouble))

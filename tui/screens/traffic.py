@@ -10,9 +10,9 @@ from textual.binding import Binding, BindingType
 
 from multidrop.tui.panels.traffic import piece_rows
 from multidrop.tui.panels.view import View
+from multidrop.tui.screen_model import TrafficStore
 from multidrop.tui.screens.page import Host, Page
 from multidrop.tui.text import visible
-from multidrop.tui.traffic import TrafficStore
 from multidrop.tui.widgets.lines import Row, spread
 
 NO_TRAFFIC = TrafficStore()

@@ -1,13 +1,26 @@
-"""Colours: a dark and a light theme, and one of the terminal's own sixteen.
+"""Colours and signs: a dark and a light theme, one of the terminal's own sixteen, and the signs that a font holds.
 
 Red belongs to the stop and to errors, amber to motion, one accent to focus. Everything else is text on background.
+All code writes the full signs. A filter replaces them at the very end, in panels, dialogs and borders alike, each by
+one of the same width. So a new sign is added to the tables here, and no other module asks what a terminal can show.
 """
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from enum import Enum
+from functools import lru_cache
+
+from rich.cells import cell_len
+from rich.segment import Segment
+from textual.app import App
+from textual.color import Color
+from textual.filter import LineFilter
 from textual.theme import BUILTIN_THEMES, Theme
 
 from multidrop.dialects.text import visible
+from multidrop.shell.connect.settings_tables import Look
+from multidrop.tui.curves.raster import INKS, Ink
 
 DARK = Theme(
     name="multidrop-dark",
@@ -104,3 +117,86 @@ def wrong_theme(name: str) -> list[str]:
     if not name or name in known:
         return []
     return [f"screen.theme: no theme {visible(name)}; `Theme` in the palette lists them"]
+
+
+BRAILLE = range(0x2800, 0x2900)
+UPPER, LOWER = 0b00011011, 0b11100100
+"""The dots of the upper and the lower half of a braille character."""
+
+
+class Signs(Enum):
+    """The signs that the font of a terminal holds."""
+
+    FULL = "full"
+    BOXES = "boxes"
+    """Lines and blocks, no braille: the Linux console, many fonts of PuTTY."""
+    ASCII = "ascii"
+
+
+def _pairs(text: str) -> dict[int, str]:
+    """Make a table of pairs such as `▶>`."""
+    return {ord(pair[0]): pair[1] for pair in text.split()}
+
+
+def _braille(halves: str) -> dict[int, str]:
+    """The characters for braille by what is set: nothing, the upper half, the lower half, both."""
+    return {code: halves[bool(code & UPPER) + 2 * bool(code & LOWER)] for code in BRAILLE}
+
+
+_RARE = "□_ ┊: ┄. ◇+ ≠! −- ✗x ✓v ●* ◉* ○o □o ›> …~ –- —- ▏| ▎| ▍| ▕| ╴- ╶- ╵| ╷|"
+TABLES: Mapping[Signs, Mapping[int, str]] = {
+    Signs.FULL: {},
+    Signs.BOXES: _pairs(f"{_RARE} ▶► ▷» ▸► ◀◄ ◂◄ ╭┌ ╮┐ ╰└ ╯┘ ▁_ ▂▄ ▃▄ ▅▄ ▆█ ▇█ ▔▀") | _braille(" ▀▄█"),
+    Signs.ASCII: _pairs(
+        f"{_RARE} ▶> ▷) ▸> ►> ◀< ◂< ■# ◆@ ·. •* »}} «< →> ←< ↑^ ↓v ↔- ⇄- │| ─- ├+ ┤+ ┬+ ┴+ ┼+ ┌+ ┐+ └+ ┘+ ╭+ ╮+ ╰+ ╯+"
+        " ◄< ▼v ▲^ ━= ┃| ═= ║| █# ▓# ▒: ░. ▀' ▄. ▌| ▐| ▁_ ▂_ ▃- ▄- ▅= ▆= ▇# ▔' ×x µu °o ±~ ²2 ³3"
+    )
+    | _braille(" '.:"),
+}
+
+
+def signs_for(wanted: str, environment: Mapping[str, str]) -> Signs:
+    """The signs that a person set, or with `auto` those that fit the terminal."""
+    if wanted != "auto":
+        return Signs(wanted)
+    locale = environment.get("LC_ALL") or environment.get("LC_CTYPE") or environment.get("LANG") or ""
+    if locale and "utf8" not in locale.lower().replace("-", ""):
+        return Signs.ASCII
+    return Signs.BOXES if environment.get("TERM") == "linux" else Signs.FULL
+
+
+@lru_cache(4096)
+def shown_as(text: str, signs: Signs) -> str:
+    """Write a text in the characters that a terminal can show, in as many cells."""
+    if signs is Signs.FULL or text.isascii():
+        return text
+    found = text.translate(TABLES[signs])
+    if signs is Signs.BOXES or found.isascii():
+        return found
+    return "".join(each if each.isascii() else "?" * cell_len(each) for each in found)
+
+
+class SignFilter(LineFilter):
+    """Replaces the signs of all that Textual paints."""
+
+    def __init__(self, signs: Signs) -> None:
+        super().__init__()
+        self.font = signs
+
+    def apply(self, segments: list[Segment], background: Color) -> list[Segment]:
+        """Replace the signs of a line."""
+        return [Segment(shown_as(text, self.font), style, control) for text, style, control in segments]
+
+
+def ink_of(signs: Signs) -> Ink:
+    """The signs of curves that a terminal can show."""
+    return INKS[signs.value]
+
+
+def dress(app: App[int], look: Look) -> None:
+    """Use the theme that a configuration names, else one that fits the terminal."""
+    for theme in THEMES:
+        app.register_theme(theme)
+    app.theme = theme_for(None if app.no_color else app.console.color_system)
+    if look.theme in app.available_themes and not app.no_color:
+        app.theme = look.theme

@@ -1,7 +1,8 @@
-"""The top line (a tab for each line of drives, recording, log, the clock) and the rule under it.
+"""The lines around the screen: the top line with its tabs, the red line under it, the footer with the keys.
 
 Tabs give way in steps: the words of the states, the names, then runs of neighbours without trouble fold into one
-(`4-12 ■`). The selected tab and those in trouble stay; trouble that finds no room is counted (`✗9`).
+(`4-12 ■`). The selected tab and those in trouble stay; trouble that finds no room is counted (`✗9`). In the footer the
+stop always comes first; the rest gives way from the right.
 """
 
 from __future__ import annotations
@@ -12,9 +13,110 @@ from dataclasses import dataclass
 
 from textual import events
 
+from multidrop.shell.stop_report import Tally, headline, words
+from multidrop.tui.keymap import read_key
 from multidrop.tui.readout import State
 from multidrop.tui.text import fit
 from multidrop.tui.widgets.lines import Lines, Row, Span, width_of
+
+
+def banner_row(tally: Tally | None, lost: str, width: int) -> Row:
+    """The text of the banner; an empty row if there is none.
+
+    `tally` is what is known since a latched stop, `lost` the reason of a lost bus. A tally of drives that stood before
+    their bus was lost is not shown in place of the loss.
+    """
+    if tally is not None and not (lost and tally.stand):
+        text = f" {headline(tally, width - 1)}"
+    elif lost:
+        text = f" ✗ LOST - {lost}" + (f"; before that {words(tally)}" if tally is not None else "")
+    else:
+        return ()
+    return ((fit(text, width), "stop"),)
+
+
+class Banner(Lines):
+    """One red line that takes no room while it is empty."""
+
+    def __init__(self) -> None:
+        super().__init__(classes="banner")
+
+    def show(self, row: Row) -> None:
+        """Show a row; hide for an empty one."""
+        if self.display != bool(row):
+            self.display = bool(row)
+        self.put([row])
+
+
+STOP = "^X STOP ALL"
+
+
+def footer_row(keys: Sequence[tuple[str, str]], recording: bool, latched: bool, width: int, progress: str = "") -> Row:
+    """The stop and the keys that work here, (key, word), in `width` cells; a function without a key is left out.
+
+    `progress`: the words on the job that runs, after the stop.
+    """
+    keys = [(key, word[:14]) for key, word in keys if key]
+    if recording:
+        keys.insert(0, ("/record stop", "ends it"))
+    if latched:
+        keys.insert(0, ("/resume", "run again"))
+    row: list[Span] = [*STOP_ROW]
+    if progress:
+        row.append((f" {fit(progress, max(0, width - width_of(row) - 2)).rstrip()} ", "strong"))
+    for key, what in keys:
+        span: list[Span] = [("  ", "text"), (key, "key"), (f" {what}", "dim")]
+        if width_of(row) + width_of(span) > width - 1:
+            break
+        row += span
+    return tuple(row)
+
+
+STOP_ROW: Row = ((" ", "text"), (f" {STOP} ", "stop"), (" ", "text"))
+
+
+class StopSign(Lines):
+    """The stop alone, for screens that lie over a footer and dim it."""
+
+    def on_mount(self) -> None:
+        """Show it."""
+        self.put([STOP_ROW])
+
+
+def key_at(row: Row, x: int) -> str:
+    """The key at a column of the footer, or the one whose word is there; empty beside them."""
+    shown, end = "", 0
+    for text, role in row:
+        end += width_of([(text, role)])
+        shown = text.strip() if role == "key" else shown if role == "dim" else ""
+        if x < end:
+            return shown
+    return ""
+
+
+MOVING = frozenset({"act.play", "play", "jog", "step", "enter"})
+"""Actions that may move a drive, or send what is pending: they need their key. A click may only focus the terminal."""
+
+
+class Footer(Lines):
+    """The footer. A click on a key does what the key does, unless that moves; the app handles the one on the stop."""
+
+    @staticmethod
+    def is_stop(x: int) -> bool:
+        """True if a column belongs to the stop."""
+        return 0 < x <= len(STOP) + 2
+
+    async def on_click(self, event: events.Click) -> None:
+        """Do what the key under the pointer does, or begin the line that stands there."""
+        shown = key_at(self.rows[0], event.x) if self.rows else ""
+        if shown.startswith("/") and len(shown) > 1:
+            await self.run_action(f"act.begin_line({shown!r})")
+        elif found := self.screen.active_bindings.get(read_key(shown)):
+            if found.binding.action.partition("(")[0] in MOVING:
+                self.notify(f"Nothing was sent: a click moves nothing; press {shown}", timeout=4)
+                return
+            await self.app.run_action(found.binding.action, found.node)
+
 
 NAME = " multidrop  "
 TROUBLE = frozenset({State.LOST, State.SILENT, State.TROUBLE, State.DIFFERS})
@@ -183,4 +285,4 @@ class TopLine(Lines):
         """Show the bus of the tab under the pointer."""
         number = tab_at(self.rows[0], event.x) if self.rows else None
         if number is not None:
-            await self.run_action(f"app.bus_number({number})")
+            await self.run_action(f"act.bus_number({number})")

@@ -17,8 +17,9 @@ from textual.reactive import Reactive
 from textual.widgets import Input
 
 from multidrop.tui.widgets.lines import Lines, Row, spread, width_of
-from multidrop.tui.widgets.sight import Picked, Search
 from multidrop.tui.widgets.transcript import Transcript
+from multidrop.tui.widgets.viewport import Picked, Search
+
 
 LONGEST = 200
 """Characters of a searched text."""

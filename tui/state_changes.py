@@ -13,6 +13,7 @@ from multidrop.dialects.values import UNREAD, Conditions
 from multidrop.drives.events import Conditioned, Sample, Silent
 from multidrop.tui.text import digits
 
+
 LIMITS = {"lim+": "limit+", "lim-": "limit-"}
 """Lamps whose lighting is reported, by function."""
 ALARMS = ("fault", "failed", "locked", "error", "overflow", "stall")
@@ -59,7 +60,7 @@ class Known(Protocol):
         """All axes of the drive, the first one first."""
 
 
-def of(known: Known, event: Sample | Silent | Conditioned) -> Iterator[Happening]:
+def changes_of(known: Known, event: Sample | Silent | Conditioned) -> Iterator[Happening]:
     """Compare an event of a drive with what was read before it."""
     if isinstance(event, Silent):
         if known.silent_since is None:

@@ -1,20 +1,26 @@
-"""The transcripts on the screen, for the verbs that change or save what is shown of them."""
+"""What a session asks of the screen: questions, forms, pages, the editor, changes of transcripts, the end."""
 
 from __future__ import annotations
 
 import asyncio
 from collections.abc import Awaitable, Callable, Sequence
 from datetime import datetime, timedelta
+from typing import TYPE_CHECKING
 
 from multidrop.dialects import Diagnostic
 from multidrop.dialects.text import visible
 from multidrop.shell import new_file
+from multidrop.shell.channel import Field
 from multidrop.shell.transcripts import Filter
+from multidrop.tui.actions import Actions, Parts
 from multidrop.tui.outbox import Outbox
+from multidrop.tui.presenter import Presenter
 from multidrop.tui.screen_model import Record
 from multidrop.tui.screens.main_screen import MainScreen
-from multidrop.tui.session_view import SessionView
-from multidrop.tui.widgets.gutter import MARKS
+from multidrop.tui.widgets.transcript import MARKS
+
+if TYPE_CHECKING:
+    from multidrop.shell.session import Session
 
 
 class Transcripts:
@@ -26,7 +32,7 @@ class Transcripts:
     def __init__(
         self,
         main: MainScreen,
-        session: SessionView,
+        session: Session,
         outbox: Outbox,
         offer: Callable[[list[str], Callable[[list[str]], None]], Awaitable[None]],
         turn_deaf: Callable[[], None],
@@ -77,3 +83,47 @@ def _write(path: str, records: Sequence[Record], zero: datetime) -> None:
         time = (zero + timedelta(seconds=record.at)).isoformat(" ", "milliseconds")
         lines.append(f"{time}  {record.address:3} {MARKS[record.mark][0]} {visible(record.text)}\n")
     new_file.write(path, "".join(lines))
+
+
+class Hooks:
+    """Sets the functions of a session that need the screen. `closed` is called after each dialog."""
+
+    def __init__(self, parts: Parts, actions: Actions, presenter: Presenter, closed: Callable[[], None]) -> None:
+        self._parts, self._actions, self._presenter, self._closed = parts, actions, presenter, closed
+        session = parts.session
+        session.ask, session.fill = self._go_on, self._fill_in
+        session.screen, session.edit = self._show_page, self._edit
+        session.before_quit, session.renamed = self._before_quit, parts.selection.rename
+
+    async def _go_on(self, question: str) -> bool:
+        """Put a question of the session. Keys typed ahead answer nothing."""
+        self._parts.host.keyboard.turn_deaf()
+        main = self._parts.main
+        self._presenter.take_records(main)
+        return await self._parts.questions.go_on(question, main.transcript.since_typed(), self._closed)
+
+    async def _fill_in(self, title: str, fields: Sequence[Field]) -> dict[str, str] | None:
+        """Put a form of the session. Keys typed ahead are not for it."""
+        self._parts.host.keyboard.turn_deaf()
+        return await self._parts.questions.fill(title, fields, self._closed)
+
+    async def _show_page(self, name: str) -> None:
+        """Show what `/page` and `/tour` name. Raises Diagnostic, and what an opening raises."""
+        app = self._parts.app
+        if name == "tour":
+            await self._parts.tour.begin()
+            return
+        before = app.screen
+        await self._actions.action_page(name)
+        if app.screen is not before:
+            self._parts.host.keyboard.turn_deaf()  # what was typed after the line was not meant for the page
+
+    async def _edit(self, path: str) -> None:
+        """Show a file in the editor. Raises Diagnostic."""
+        self._parts.host.texts.open(path)
+        await self._actions.action_page("program")
+
+    async def _before_quit(self) -> bool:
+        """Take `/quit` as Ctrl+Q, which ends the app by itself."""
+        self._parts.app.call_later(self._parts.app.action_quit)
+        return False

@@ -5,18 +5,48 @@ Columns are fixed and numbers are right-aligned, so that nothing jumps while val
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
-from multidrop.tui.panels.axis import NUMBER, poll_words
-from multidrop.tui.panels.glance import NOT_REFERENCED, Glance
-from multidrop.tui.panels.lamps import flowing, lamp_groups, program_words, trouble_of
-from multidrop.tui.panels.spark import spark
-from multidrop.tui.panels.travel import bar, to_go_words
-from multidrop.tui.panels.twin import SIGN, alarm_words, difference_words, differs
-from multidrop.tui.panels.view import View
-from multidrop.tui.readout import READ, Readout, State
+from multidrop.tui.curves.raster import BRAILLE, Curve, Frame, Raster, Scale
+from multidrop.tui.curves.samples import Columns, Trace
+from multidrop.tui.panels.drive import (
+    NUMBER,
+    SIGN,
+    alarm_words,
+    bar,
+    difference_words,
+    differs,
+    flowing,
+    lamp_groups,
+    poll_words,
+    program_words,
+    to_go_words,
+    trouble_of,
+)
+from multidrop.tui.panels.view import NOT_REFERENCED, Glance, View
+from multidrop.tui.readout import READ, SPAN, Readout, State
 from multidrop.tui.text import age, digits, fit
 from multidrop.tui.widgets.lines import Row, Span, spread, width_of
+
+
+def spark(readout: Readout, now: float, width: int) -> str:
+    """Draw the first axis; a resting drive is a line at the foot, and what was not read stays empty."""
+    if not readout.points or width < 1:
+        return " " * max(0, width)
+    trace = Trace()
+    for point in readout.points:
+        trace.add(point.at, point.position)
+    low, high = min(trace.values), max(trace.values)
+    if readout.silent_since is None and now - trace.at[-1] < 3 * max(readout.period, 1.0):
+        trace.add(now, trace.values[-1])
+    dot = SPAN / (2 * width)
+    first = math.floor(now / dot) // 2 - width + 1
+    columns = Columns(trace, dot, 2 * first)
+    columns.update(2 * first)
+    frame = Frame(first, width, 1, Scale(low, high if high > low else low + 1, 1), BRAILLE)
+    return "".join(text for text, _ in Raster().draw([Curve(columns, 0)], frame)[0])
+
 
 NAME = 9
 STATE = 14

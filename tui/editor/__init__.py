@@ -1,1 +1,0 @@
-"""Editing text files on the screen: the widget, the languages, the texts under editing."""
