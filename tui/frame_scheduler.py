@@ -13,7 +13,6 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Callable
 
-
 FRAMES = 30
 """Paints a second, at most."""
 PANELS = 3

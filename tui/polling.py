@@ -17,8 +17,7 @@ from multidrop.tui.screen_model import ScreenModel
 
 if TYPE_CHECKING:
     from multidrop.drives.bus import Bus
-    from multidrop.drives.subscriptions import Subscription
-    from multidrop.drives.telemetry import Telemetry
+    from multidrop.drives.telemetry import Subscription, Telemetry
     from multidrop.shell.session import Session
 
 PLOT = 0.02

@@ -13,7 +13,6 @@ from multidrop.dialects.values import UNREAD, Conditions
 from multidrop.drives.events import Conditioned, Sample, Silent
 from multidrop.tui.text import digits
 
-
 LIMITS = {"lim+": "limit+", "lim-": "limit-"}
 """Lamps whose lighting is reported, by function."""
 ALARMS = ("fault", "failed", "locked", "error", "overflow", "stall")

@@ -26,7 +26,6 @@ from multidrop.dialects.text import visible
 from multidrop.macros.atomic import write_atomically
 from multidrop.shell.events import FAILURES
 from multidrop.shell.lines import DriveLine, TypedLine, VerbLine, parse
-from multidrop.shell.operations.table import VERBS
 
 if sys.platform != "win32":
     import fcntl
@@ -256,4 +255,6 @@ def _concurrent(line: Line) -> bool:
     """Whether a line runs beside those that are typed after it."""
     if not line.verb:
         return False
+    from multidrop.shell.operations.table import VERBS  # late: the first frame of the screen needs no verb
+
     return line.verb in VERBS and VERBS[line.verb].concurrent

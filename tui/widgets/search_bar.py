@@ -20,7 +20,6 @@ from multidrop.tui.widgets.lines import Lines, Row, spread, width_of
 from multidrop.tui.widgets.transcript import Transcript
 from multidrop.tui.widgets.viewport import Picked, Search
 
-
 LONGEST = 200
 """Characters of a searched text."""
 MOST_COPIED = 50_000
