@@ -118,7 +118,7 @@ async def _do(app: MultidropApp, pilot: Pilot[int], step: Step) -> None:
     elif isinstance(step, str) and step.startswith(
         "page "
     ):  # as its key does: a page that a line opens takes no keys for half a second
-        await app.run_action(f"page('{step.removeprefix('page ')}')")
+        await app.run_action(f"act.page('{step.removeprefix('page ')}')")
         await asyncio.sleep(0.2)
     else:
         app.main.entry.value, seconds = (step, 0.6) if isinstance(step, str) else step

@@ -49,7 +49,7 @@ def test_page(snap_compare: Compare, name: str, size: str) -> None:
         await settle(pilot)
         if name == "parameters":
             session.emit(SettingsRead(session.time, "press", "a", FOUND))
-            await pilot.app.run_action("page('parameters')")
+            await pilot.app.run_action("act.page('parameters')")
             await settle(pilot)
         await pilot.press(*KEYS[name])
         await settle(pilot)

@@ -91,7 +91,7 @@ def test_an_edit_is_planned_by_the_family() -> None:
 async def opened(pilot: Pilot[int], session: FakeSession, found: Readings | None = FOUND) -> ParametersPage:
     if found is not None:
         session.emit(SettingsRead(session.time, "press", "a", found))
-    await pilot.app.run_action("page('parameters')")
+    await pilot.app.run_action("act.page('parameters')")
     await settle(pilot)
     page = pilot.app.screen
     assert isinstance(page, ParametersPage)

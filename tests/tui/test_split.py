@@ -38,7 +38,7 @@ async def test_the_other_half_of_a_closed_line_goes_and_the_palette_ends_the_spl
     session = demo_session()
     app = make_app(session)
     async with app.run_test(size=(80, 24)) as pilot:
-        app._show_half("", "eth")
+        app.view._show_half("", "eth")
         session.emit(Entered(session.time, "PR MV", By.OPERATOR, "eth", ""))
         await settle(pilot)
         assert "PR MV" in app.main.beside.transcript.plain
@@ -46,7 +46,7 @@ async def test_the_other_half_of_a_closed_line_goes_and_the_palette_ends_the_spl
         app.model.changed = True
         await settle(pilot)
         assert not app.main.beside.display
-        app._show_half("b", "press")
+        app.view._show_half("b", "press")
         await pilot.press("ctrl+p", *"one half", "enter")
         await settle(pilot)
         assert not app.main.beside.display
