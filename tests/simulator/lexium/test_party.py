@@ -110,7 +110,7 @@ def test_the_escape_modes_stop_whom_they_mean(mode, key, stops):
     wire = line(a, b)
     talk(wire, b"\n*SL 1000\n", 0.0, 0.5)
     talk(wire, key, 0.5, 0.6)
-    assert "".join(each.name for each in (a, b) if not each.moving(0.6)) == stops
+    assert "".join(each.memory.name for each in (a, b) if not each.moving(0.6)) == stops
 
 
 @pytest.mark.parametrize(
@@ -121,7 +121,7 @@ def test_the_reset_modes_reset_whom_they_mean(mode, key, resets):
     wire = line(a, b)
     talk(wire, b"\n*R1=9\n", 0.0, 0.5)
     talk(wire, key, 0.5, 0.6)
-    assert "".join(each.name for each in (a, b) if each.execute("PR R1", 0.6).lines == ("0",)) == resets
+    assert "".join(each.memory.name for each in (a, b) if each.execute("PR R1", 0.6).lines == ("0",)) == resets
 
 
 def test_a_baud_rate_acts_after_it_was_saved_and_a_reset_only():
