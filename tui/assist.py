@@ -182,6 +182,7 @@ class ShellAssist(Assist):
     async def prepare(self) -> None:
         """Import it in a thread; the rest depends on the drive and is less."""
         await asyncio.to_thread(imported, "multidrop.shell.front.complete:complete")
+        await asyncio.to_thread(imported("multidrop.shell.operations.table:load"))
         self.hint(ANY_LETTER)
         self.complete(ANY_LETTER)
 

@@ -131,7 +131,8 @@ def place(end: BaseException, file: str) -> int:
 def traceback_of(end: BaseException) -> list[str]:
     found = traceback.TracebackException.from_exception(end)
     each: traceback.TracebackException | None = found
-    ours = _ours()
+    loaded = [module for name, module in sys.modules.items() if name.partition(".")[0] == multidrop.__name__]
+    ours = {getattr(module, "__file__", None) or "" for module in loaded}
     while each is not None:
         frames: list[traceback.FrameSummary] = list(each.stack)
         inside = dropwhile(lambda frame: frame.filename in ours, frames)
@@ -139,11 +140,6 @@ def traceback_of(end: BaseException) -> list[str]:
         each.stack = traceback.StackSummary.from_list(kept)
         each = each.__cause__ or each.__context__
     return "".join(found.format()).rstrip().splitlines()
-
-
-def _ours() -> set[str]:
-    loaded = [module for name, module in sys.modules.items() if name.partition(".")[0] == multidrop.__name__]
-    return {getattr(module, "__file__", None) or "" for module in loaded}
 
 
 @contextlib.contextmanager

@@ -111,14 +111,11 @@ class Report:
         self._reported: list[int] = []
         self._failed: dict[int, Result] = {}
         if not as_json:
-            self._note()
-
-    def _note(self) -> None:
-        asked = self._plan.asked
-        if asked.draws is not None:
-            write(sys.stderr, f"{asked.draws} draws with --seed {asked.seed}")
-        if any(key.part == SEED for key in self._plan.job.keys):
-            write(sys.stderr, "seed changes the faults of a wire only, and a program test has no wire")
+            asked = plan.asked
+            if asked.draws is not None:
+                write(sys.stderr, f"{asked.draws} draws with --seed {asked.seed}")
+            if any(key.part == SEED for key in plan.job.keys):
+                write(sys.stderr, "seed changes the faults of a wire only, and a program test has no wire")
 
     def take_all(self, results: Iterator[list[Result]]) -> None:
         """Take results as they come; report each once all before it are done."""
@@ -165,7 +162,9 @@ class Report:
             summary = {"cases": len(self._reported), "failed": len(self._failed), "seconds": round(seconds, 3)}
             write(sys.stdout, json.dumps({"summary": summary}))
         else:
-            self._write_text(failures, seconds)
+            if failures.groups:
+                write(sys.stdout, *rows(self._plan, failures))
+            write(sys.stdout, f"{self._counted}, {len(self._failed)} failed, {seconds:.1f} s")
         if code:
             write(sys.stderr, f"ended after {self._counted} of {self._plan.count}; the others were not run")
         elif interruption.came:
@@ -191,11 +190,6 @@ class Report:
                 return None
 
         return grouped(self._plan, self._failed.values(), run)
-
-    def _write_text(self, failures: Failures, seconds: float) -> None:
-        if failures.groups:
-            write(sys.stdout, *rows(self._plan, failures))
-        write(sys.stdout, f"{self._counted}, {len(self._failed)} failed, {seconds:.1f} s")
 
     def _finish_junit(self, failures: Failures, seconds: float, code: int) -> int:
         if not self._junit.wanted:

@@ -65,3 +65,9 @@ def find(name: str) -> Operation:
         raise Diagnostic(f"{name} is a verb of scripts", hint="multidrop run SCRIPT, or run - for standard input")
     near = difflib.get_close_matches(name, VERBS, 2) or ["/help"]
     raise Diagnostic(f"no verb {name}", hint=f"try {' or '.join(near)}")
+
+
+def load() -> None:
+    """Import the work of all verbs; a screen does this in a thread before the first verb is typed."""
+    for verb in VERBS.values():
+        verb.imported(verb.work)

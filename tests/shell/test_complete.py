@@ -5,6 +5,7 @@ import pytest
 
 from multidrop import cli
 from multidrop.dialects.families import FAMILIES
+from multidrop.dialects.on_demand import imported
 from multidrop.shell.connect.url_forms import URL_FORMS
 from multidrop.shell.connect.urls import KEYS
 from multidrop.shell.front.complete import complete, hint
@@ -219,3 +220,10 @@ def test_a_usage_is_read_as_its_forms(usage, lines):
 )
 def test_the_hint_narrows_with_what_is_typed(session, text, told):
     assert hint(session, text).startswith(told)
+
+
+@pytest.mark.parametrize("verb", VERBS.values(), ids=VERBS)
+def test_a_declaration_names_functions(verb):
+    named = [each for each in (verb.work, verb.recorded, verb.checked) if each not in ("", "typed")]
+    assert named and all(callable(verb.imported(each)) for each in named)
+    assert not verb.rows or callable(imported(verb.rows))
