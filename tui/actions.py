@@ -90,7 +90,6 @@ class ViewActions(Target):
         self._parts.main.transcript.clear()
 
     def action_copy_view(self) -> None:
-        """Copy the transcript in view to the clipboard."""
         self._parts.app.copy_to_clipboard(self._parts.main.transcript.plain)
         self._parts.app.notify("Sent to the terminal's clipboard", timeout=4)
 
@@ -123,7 +122,6 @@ class ViewActions(Target):
         parts.app.refresh(layout=True)  # an equal style sheet paints nothing
 
     async def action_help(self) -> None:
-        """Search the help for the screen that is shown."""
         parts = self._parts
         shown = [each for each in parts.app.screen_stack if isinstance(each, Framed)]
         found = entries(shown[-1], parts.keymap, parts.macros.bound)
@@ -179,7 +177,6 @@ class Actions(Target):
             task.result()
 
     def action_begin_line(self, text: str) -> None:
-        """Put the beginning of a line into the input line."""
         self._parts.main.entry.put(text)
         self._parts.main.take_keys()
 
@@ -216,7 +213,6 @@ class Actions(Target):
             host.show_line(f"{key} plays nothing; /key {key} NAME{page} puts a macro on it")
 
     def action_macro_page(self) -> None:
-        """Use the next page of function keys."""
         macros = self._parts.macros
         macros.read(self._parts.session.macros)
         if len(macros.pages) > 1:
@@ -245,7 +241,6 @@ class Actions(Target):
         await self._parts.questions.history(self._parts.assist.history(), self.action_begin_line)
 
     def commands(self) -> list[Command]:
-        """The commands of the palette."""
         parts = self._parts
         switches = Switches(parts.polling.on, parts.mouse_on, parts.model.bus("").twinned)
         return parts.recent.first(
@@ -267,7 +262,6 @@ class Actions(Target):
         await parts.questions.palette(lambda typed: commands_like(found, typed, width), run)
 
     async def action_choose_drive(self) -> None:
-        """Choose the drive that plain text goes to."""
         glances = partial(glances_of, self._parts.session, self._parts.model)
         await self._parts.questions.drive(glances, self._parts.selection.select)
 
@@ -293,5 +287,4 @@ class Actions(Target):
         parts.host.frames.wake()
 
     async def action_open(self) -> None:
-        """Show what can be opened."""
         await self._parts.opener.ask()

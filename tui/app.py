@@ -240,7 +240,6 @@ class MultidropApp(App[int]):
     # Life
 
     def on_mount(self) -> None:
-        """Begin to paint."""
         self.set_interval(AGEING, self.frames.age)
 
     async def on_ready(self) -> None:
@@ -389,12 +388,10 @@ class MultidropApp(App[int]):
         return f"{self.session.wall(at):%H:%M:%S}"
 
     def last_records(self, number: int) -> Sequence[Record]:
-        """The last records of the transcript that is shown."""
         records = self.main.page(self.main.current).records
         return [records[each] for each in range(max(records.first, records.taken - number), records.taken)]
 
     def select(self, address: str, bus: str = "") -> None:
-        """Select a drive or a bus."""
         self.selection.select(address, bus)
 
     def show_line(self, text: str, mark: str = ".") -> None:
@@ -411,7 +408,6 @@ class MultidropApp(App[int]):
             self.typist.edited()
 
     def action_stop_all(self) -> None:
-        """Stop everything."""
         self.stop_all()
 
     async def action_quit(self) -> None:

@@ -68,7 +68,6 @@ class Assist:
         """Keep a typed line for the history."""
 
     def saved(self) -> Sequence[StartEntry]:
-        """Saved connections."""
         return ()
 
     async def ports(self) -> Sequence[StartEntry]:
@@ -126,11 +125,9 @@ class ShellAssist(Assist):
         return self._history.lines()
 
     def keep(self, line: str) -> None:
-        """Keep a typed line for the history."""
         self._history.append(line)
 
     def saved(self) -> Sequence[StartEntry]:
-        """Saved connections."""
         return [StartEntry("saved", each.name, each.name, each.url) for each in self._settings.connections.values()]
 
     async def ports(self) -> Sequence[StartEntry]:
@@ -146,7 +143,6 @@ class ShellAssist(Assist):
         return [StartEntry("lately", each.url, each.url, f"opened {ago(now - each.at)}") for each in found[:LATELY]]
 
     async def opened(self, url: str) -> None:
-        """Keep a URL that was opened."""
         from multidrop.shell.connect.port_state import note
 
         await asyncio.to_thread(note, self._settings.state, url)
@@ -176,7 +172,6 @@ class ShellAssist(Assist):
         return [(verb.name, verb.usage, verb.lines[0]) for verb in VERBS.values()]
 
     def drafts(self) -> Drafts | None:
-        """The copies in the folder of the state."""
         return Drafts(self._settings.state)
 
     async def prepare(self) -> None:

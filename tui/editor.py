@@ -76,7 +76,6 @@ def _problem(problem: Diagnostic) -> Problem:
 
 
 def grammar_of(file: str) -> Grammar:
-    """The grammar of a file by its name."""
     return MacroGrammar(file) if file.lower().endswith(".toml") else ProgramGrammar(file)
 
 
@@ -122,7 +121,6 @@ class Editor(TextArea):
         self._current: int | None = None
 
     def show_text(self, text: str, grammar: Grammar, cursor: tuple[int, int]) -> None:
-        """Show another text."""
         self._grammar, self._marks, self._current = grammar, {}, None
         self.load_text(text)
         self.move_cursor(cursor, center=True)
@@ -146,7 +144,6 @@ class Editor(TextArea):
     # Painting
 
     def notify_style_update(self) -> None:
-        """Forget the styles when the theme changes."""
         super().notify_style_update()
         self._styles_of.clear()
 
@@ -177,7 +174,6 @@ class Editor(TextArea):
         return super().gutter_width + 1
 
     def render_line(self, y: int) -> Strip:
-        """Render a line with the sign in its gutter."""
         strip = super().render_line(y)
         mark = self._marks.get(y + self.scroll_offset.y)
         if mark is None or not strip.cell_length:
@@ -192,14 +188,12 @@ class Editor(TextArea):
         self.move_cursor(self.document.end if last else (0, 0))
 
     def action_new_line(self) -> None:
-        """Begin a line with the indent of this one."""
         row, column = self.cursor_location
         before = self.document.get_line(row)[:column]
         indent = before[: len(before) - len(before.lstrip(" \t"))]
         self.replace(f"\n{indent}", *self.selection, maintain_selection_offset=False)
 
     def action_indent(self) -> None:
-        """Insert blanks up to the next stop."""
         self.replace(" " * self._find_columns_to_next_tab_stop(), *self.selection, maintain_selection_offset=False)
 
     def action_outdent(self) -> None:

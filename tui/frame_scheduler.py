@@ -143,6 +143,5 @@ class Pace:
         return True
 
     def answered(self) -> None:
-        """Note a reply."""
         self._asked_at, self._unanswered = None, 0
         self._answers = self._known = True

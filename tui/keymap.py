@@ -165,7 +165,6 @@ class FunctionKeys:
         return before[0] == key and now - before[1] < HELD
 
     def turn(self) -> None:
-        """Use the next page."""
         self.page = self.pages[(self.pages.index(self.page) + 1) % len(self.pages)]
 
     @property

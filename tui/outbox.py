@@ -79,7 +79,6 @@ class Outbox:
         return sum(len(lane.waiting) for lane in self._lanes)
 
     def type(self, text: str) -> None:
-        """Take a line at its Enter."""
         line, now = self._line(text), asyncio.get_running_loop().time()
         if line.verb == "/quit":
             self._session.start(text, since=line.since)
@@ -94,7 +93,6 @@ class Outbox:
         self._add(self._lane(), [self._line(text) for text in texts])
 
     def paste(self, texts: Sequence[str]) -> None:
-        """Take several lines that a person agreed to send."""
         lines = [self._line(text) for text in texts]
         buses = {line.bus for line in lines if line.bus}
         lane = next(filter(None, map(self._talking, buses)), None) or self._lane()
@@ -124,7 +122,6 @@ class Outbox:
         return Line.entered(text, self._session.stops, selected_place(self._session))
 
     def _talking(self, bus: str) -> Lane | None:
-        """Find the lane in which a typed line for that bus waits for its answer."""
         return next((lane for lane in self._lanes if bus and lane.running and lane.running.bus == bus), None)
 
     def _lane(self) -> Lane:
@@ -208,7 +205,6 @@ class Outbox:
 
 
 def them(lines: Sequence[object]) -> str:
-    """The pronoun for some lines."""
     return "them" if len(lines) > 1 else "it"
 
 

@@ -168,7 +168,6 @@ def _other(on: bool) -> str:
 
 
 def _line(line: str) -> str:
-    """The action that runs a line."""
     return _call("act.run_line", line)
 
 

@@ -73,7 +73,6 @@ class Polling:
         _hold(session, self._read, values, lambda telemetry: telemetry.read)
 
     def end(self) -> None:
-        """End all subscriptions."""
         for held in (self._polled, self._watched, self._read):
             for each in held.values():
                 each.subscription.close()
@@ -145,7 +144,6 @@ def _watches(session: Session) -> Wanted[str]:
 
 
 def _values(session: Session, plotted: Sequence[Series]) -> Wanted[Value]:
-    """The periods of values."""
     wanted: Wanted[Value] = {}
     for bus in _open(session):
         values = tuple(

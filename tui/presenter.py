@@ -41,7 +41,6 @@ class Presenter:
         """Records wait for the next paint of a transcript."""
 
     def view(self, now: float) -> View:
-        """The facts for panels and pages."""
         bus = self.session.buses.get(self.session.selected_bus)
         glances = [] if bus is None else glances_of(self.session, self.model, bus)
         return View(self.session, self.model, glances, now, self.polling.on)
@@ -113,7 +112,6 @@ class Presenter:
         return f"{bus.lost}; trying again" if bus.name in self.session.reconnections.trying else str(bus.lost)
 
     def _paint_frame(self, screen: Framed, now: float) -> None:
-        """Paint top line and footer of the main screen or of a page."""
         width = screen.size.width
         clock = f"{self.session.wall(now):%H:%M:%S}"
         playing = " ".join(each.short for each in self.session.playing)

@@ -57,12 +57,10 @@ class State(Enum):
 
     @property
     def word(self) -> str:
-        """The state in one word."""
         return self.value[1]
 
     @property
     def role(self) -> str:
-        """The role that selects the style."""
         return self.value[2]
 
 
@@ -100,7 +98,6 @@ class Travelled:
         self.high = position if self.high is None else max(self.high, position)
 
     def learn(self, conditions: Conditions, position: int) -> None:
-        """Note the position of an axis at rest on a limit switch."""
         for lamp in conditions.lamps:
             if lamp.on and lamp.function in SWITCHES:
                 self.at_switch[lamp.function] = position
@@ -129,12 +126,10 @@ class ProgramFacts:
 
     @property
     def runs(self) -> bool:
-        """Whether a program is known to run."""
         return self.ran and not self.past
 
     @property
     def past(self) -> bool:
-        """Whether a stop came since that was read."""
         return self.known_at <= self.stopped_at
 
 
@@ -242,7 +237,6 @@ class Readout:
         return current and known == list(event.conditions)
 
     def note(self, event: Sample | Silent | Conditioned) -> None:
-        """Take what a bus has read."""
         if isinstance(event, Sample):
             self.take(event)
         elif isinstance(event, Conditioned):
@@ -290,11 +284,9 @@ class Readout:
         return self.last is not None and self.touched > self.last.at and now - self.last.at > SHORTEST
 
     def aged(self, now: float) -> bool:
-        """Whether the conditions of an axis may be outdated."""
         return self._aged(self.conditioned_at, now)
 
     def program_aged(self, now: float) -> bool:
-        """Whether it may be outdated whether a program runs."""
         return self._aged(self.program.known_at, now)
 
     def _aged(self, at: float, now: float) -> bool:
@@ -311,7 +303,6 @@ class Readout:
 
     @property
     def differs(self) -> bool:
-        """Whether an axis differs from its twin."""
         return any(each.twin is not None and each.twin.diverged is not None for each in self.axes)
 
     @property

@@ -151,7 +151,6 @@ class BusFacts:
 
     @property
     def twinned(self) -> bool:
-        """Whether a drive has a twin."""
         return any(axis.twin is not None for readout in self.readouts.values() for axis in readout.axes)
 
 
@@ -188,7 +187,6 @@ class ScreenModel:
         }
 
     def take(self, event: SessionEvent) -> None:
-        """Fold one event in."""
         self._takers[type(event)](event)
 
     def quiet(self, event: SessionEvent) -> bool:
@@ -213,12 +211,10 @@ class ScreenModel:
         return self.bus(name if name in self._opened() else "").fresh
 
     def rename(self, before: str, now: str) -> None:
-        """Know a bus by another name."""
         self.buses[now] = self.buses.pop(before, BusFacts())
         self.traces.rename(before, now)
 
     def forget(self, name: str) -> None:
-        """Forget a closed bus."""
         self.buses.pop(name, None)
         self.traces.forget(name)
 

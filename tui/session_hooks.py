@@ -42,7 +42,6 @@ class Transcripts:
 
     @property
     def times(self) -> str:
-        """The form of the times."""
         return self._main.times
 
     def set_times(self, form: str) -> None:
@@ -96,7 +95,6 @@ class Hooks:
         session.before_quit, session.renamed = self._before_quit, parts.selection.rename
 
     async def _go_on(self, question: str) -> bool:
-        """Put a question of the session. Keys typed ahead answer nothing."""
         self._parts.host.keyboard.turn_deaf()
         main = self._parts.main
         self._presenter.take_records(main)

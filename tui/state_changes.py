@@ -76,7 +76,6 @@ def changes_of(known: Known, event: Sample | Silent | Conditioned) -> Iterator[H
 
 
 def _troubled(before: str, after: str, axis: str) -> Iterator[Happening]:
-    """The changes in the trouble that a reading of the position reports."""
     if after:
         yield Happening(_named(after, axis), warning=True)
     else:
@@ -140,5 +139,4 @@ def _alarms(before: Conditions, after: Conditions) -> Iterator[Happening]:
 
 
 def _named(text: str, axis: str) -> str:
-    """The text with the axis that it is about."""
     return f"{axis}: {text}" if axis else text

@@ -61,7 +61,6 @@ class Texts:
         return found if found is not None and found.text != real_text(text.text) else None
 
     def unsaved(self) -> list[OpenText]:
-        """The texts that differ from their files."""
         if self.take is not None:
             self.take()
         return [text for text in self._open.values() if text.changed]
@@ -88,7 +87,6 @@ class Texts:
         text.kept = None
 
     def close(self, text: OpenText) -> None:
-        """Give up a text and its copy."""
         self.drop_draft(text)
         self._open = {place: each for place, each in self._open.items() if each is not text}
         self.current = None if self.current is text else self.current

@@ -94,13 +94,11 @@ class Tour:
         self.begin_on(self._session.of_demo(LINE))
 
     def begin_on(self, bus: str) -> None:
-        """Begin on an open line of a demo cell."""
         self.bus, self._at = bus, 0
         self._session.select("", bus)
         self._next(0)
 
     def end(self) -> None:
-        """End it."""
         self.bus = ""
 
     def _take(self, event: SessionEvent) -> None:

@@ -74,7 +74,6 @@ class Selection:
         self._meant = self._meant or by_use
 
     def rename(self, before: str, now: str) -> None:
-        """Know the drive that is shown by the new name of its bus."""
         self._model.rename(before, now)
         self._main.rename_page(before, now)
         if self.shown.bus == before:
@@ -201,7 +200,6 @@ class Typist:
         self._meaning = ""
 
     def edited(self) -> None:
-        """Show the meaning of the typed text and its completions."""
         text = self._main.entry.value
         self._meaning = self._assist.hint(text) if len(text) <= LONGEST else ""
         self.show_hint()
@@ -237,7 +235,6 @@ class Typist:
         await asyncio.sleep(0)
 
     def _follow(self, line: str) -> None:
-        """Follow a line that was sent."""
         self._assist.keep(line)
         self._main.page(self._main.current).look_end(newest=True)
         self._selection.follow()

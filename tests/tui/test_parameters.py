@@ -172,11 +172,11 @@ async def test_a_file_and_another_drive_to_compare_with(tmp_path: Path) -> None:
     async with make_app(session).run_test(size=(80, 24)) as pilot:
         page = await opened(pilot, session)
         await pilot.press("f")
-        page._field.value = str(tmp_path / "none.toml")
+        page.field.value = str(tmp_path / "none.toml")
         await pilot.press("enter")
         await settle(pilot)
         assert "nothing was sent" in page.lines("said").plain
-        page._field.value = str(tmp_path / "a.toml")
+        page.field.value = str(tmp_path / "a.toml")
         await pilot.press("enter", "equals_sign")
         await settle(pilot)
         assert names(page) == ["VM"] and "a.toml" in page.lines("columns").plain

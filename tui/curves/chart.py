@@ -21,7 +21,6 @@ class Window(NamedTuple):
 
     @property
     def last(self) -> int:
-        """The newest column."""
         return self.first + self.columns - 1
 
     @property
@@ -47,7 +46,6 @@ class Extent(NamedTuple):
 
     @property
     def width(self) -> float:
-        """Their difference."""
         return self.high - self.low
 
 
@@ -140,7 +138,6 @@ class Look:
         return SPANS[self._span]
 
     def window(self, now: float, columns: int, wide: int) -> Window:
-        """The window at a time."""
         end = now if self.paused_at is None else self.paused_at
         last = floor(end / (self.span / columns))
         return Window(self.span, last - columns + 1, columns, wide)
@@ -153,7 +150,6 @@ class Look:
             self.go_on()
 
     def go_on(self) -> None:
-        """Show the newest samples again."""
         self.paused_at = self.cursor = None
 
     def shorter(self, by: int) -> None:
@@ -167,7 +163,6 @@ class Look:
         self.zoom = min(max(1, self.zoom << by if by > 0 else self.zoom >> -by), LARGEST)
 
     def automatic(self) -> None:
-        """Go back to the usual span and scale."""
         self._span, self.zoom = USUAL, 1
 
     def move_cursor(self, columns: int, now: float, width: int) -> None:

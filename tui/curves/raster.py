@@ -43,7 +43,6 @@ class Ink:
     """The dots of a twin that are shown, of `SPARSE`."""
 
     def glyph(self, dots: int, series: int) -> str:
-        """The sign of a dot pattern."""
         return self.glyphs[dots] if self.glyphs else _mark(series)
 
     def dots(self, series: int, x: int, top: int, bottom: int) -> Sequence[int]:

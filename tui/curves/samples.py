@@ -92,14 +92,12 @@ class Traces:
         self._traces: dict[Quantity, Trace] = {}
 
     def add(self, quantity: Quantity, at: float, value: float) -> None:
-        """Take a sample."""
         trace = self._traces.get(quantity)
         if trace is None:
             trace = self._traces[quantity] = Trace()
         trace.add(at, value)
 
     def take(self, bus: str, event: Sample | Valued) -> None:
-        """Take what was read from a drive of a bus."""
         if isinstance(event, Valued):
             self.add(Quantity(bus, event.address, "", event.word), event.at, event.value)
         else:
@@ -122,13 +120,11 @@ class Traces:
         return [each.axis for each in self._traces if each[:2] == (bus, address) and each.word == "position"]
 
     def rename(self, before: str, now: str) -> None:
-        """Know a bus by another name."""
         self._traces = {
             each._replace(bus=now) if each.bus == before else each: trace for each, trace in self._traces.items()
         }
 
     def forget(self, bus: str) -> None:
-        """Forget a closed bus."""
         for each in [each for each in self._traces if each.bus == bus]:
             del self._traces[each]
 

@@ -200,7 +200,6 @@ def phase(readout: Readout) -> str:
 
 
 def _earlier(readout: Readout) -> Point | None:
-    """The newest reading that is old enough to compare with the last one."""
     assert readout.last is not None
     points = reversed(readout.points)
     return next((each for each in points if readout.last.at - each.at >= LOOK_BACK), None)
@@ -361,7 +360,6 @@ def _troubles(axis: Readout, now: float) -> list[Span]:
 
 
 def unit_of(axis: Readout, otherwise: str) -> str:
-    """The unit of positions of an axis."""
     return axis.conditions.unit if axis.conditions is not None else otherwise
 
 

@@ -35,12 +35,10 @@ class Line(NamedTuple):
 
     @property
     def stroke(self) -> int:
-        """The number of its dashes or dots."""
         return self.number + TWINS * self.twin
 
     @property
     def of_drive(self) -> Line:
-        """The line of what is measured."""
         if not self.twin:
             return self
         return self._replace(twin=False, quantity=self.quantity._replace(word=_MEASURED[self.quantity.word]))
@@ -115,7 +113,6 @@ def _unit(view: View, bus: str, address: str, axis: str) -> str:
 
 
 def role_of(number: int) -> str:
-    """The role of a line by its number."""
     return SERIES[number]
 
 
@@ -376,7 +373,6 @@ def _with_words(view: View, taken: Sequence[tuple[Group, Chart, dict[Line, Exten
 
 
 def _agree(twin: Line, extents: Mapping[Line, Extent]) -> bool:
-    """Whether a drive has the values of its twin."""
     own, predicted = extents.get(twin.of_drive), extents.get(twin)
     if own is None or predicted is None:
         return False
@@ -384,7 +380,6 @@ def _agree(twin: Line, extents: Mapping[Line, Extent]) -> bool:
 
 
 def _slack(line: Line, velocities: Mapping[tuple[str, str, str], Extent]) -> float:
-    """The change of a value other than a motion."""
     resting = velocities.get(line.quantity[:3]) == (0, 0)
     return REST if line.of_drive.quantity.word == "position" and resting else 0.0
 

@@ -9,7 +9,7 @@ from multidrop.shell.events import Phase
 from multidrop.tui.panels.view import Glance, View
 from multidrop.tui.readout import Readout
 from multidrop.tui.text import age, fit
-from multidrop.tui.widgets.lines import Row
+from multidrop.tui.widgets.lines import Row, in_view
 
 SIGNS = {Phase.EXECUTES: "▶", Phase.BEFORE: "║", Phase.AFTER: "✓"}
 """The sign of the current line: it is executed; the program waits before it; it was executed, and the program waits."""
@@ -93,10 +93,9 @@ def listing_rows(readout: Readout, width: int, height: int) -> list[Row]:
     """The lines of a program around the current one, which has a sign; from the first one where none is current."""
     lines, spot = readout.program.lines, spot_of(readout)
     current = index_of(lines, spot.address) if spot is not None else None
-    first = max(0, min((current or 0) - height // 2, len(lines) - height))
     digits = len(str(lines[-1][0])) if lines else 0
     rows: list[Row] = []
-    for number, (address, text) in enumerate(lines[first : first + height], first):
+    for number, (address, text) in in_view(lines, current or 0, height):
         here = spot is not None and number == current
         sign = SIGNS[spot.phase] if spot is not None and here else " "
         role = "motion" if here else "text"

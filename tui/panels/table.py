@@ -112,7 +112,6 @@ PANELS: tuple[Panel, ...] = (
 
 
 def panel(name: str) -> Panel:
-    """Find a panel by name."""
     return next(each for each in PANELS if each.name == name)
 
 
@@ -140,7 +139,6 @@ class Shown:
         return on
 
     def wants(self, wide: bool) -> frozenset[str]:
-        """The readings that the shown panels want."""
         return frozenset().union(*(panel.wants for panel in self.panels(wide)))
 
 
@@ -186,7 +184,6 @@ def column_rows(panels: Sequence[Panel], view: View, width: int, height: int, bo
 
 
 def title_row(panel: Panel, view: View, width: int, edge: str) -> Row:
-    """A rule with the title of a panel in it."""
     title: Row = ((f" {panel.title} ", "strong"),) if isinstance(panel.title, str) else panel.title(view)
     kept: list[tuple[str, str]] = [(edge, "rule")]
     for text, role in title:

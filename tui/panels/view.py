@@ -49,7 +49,6 @@ class Glance:
         return State.LOST if self.lost else self.readout.state(storing=self.storing)
 
     def sign(self, now: float, width: int = STATE) -> Span:
-        """Sign and words of the state in a fixed width."""
         state = self.state()
         words = state.word if self.lost else self.readout.words(now, storing=self.storing)
         aged = state in READ and self.readout.old(now)
@@ -112,5 +111,4 @@ class View:
 
     @property
     def chosen(self) -> Glance | None:
-        """The selected drive."""
         return next((glance for glance in self.glances if glance.selected), None)

@@ -7,7 +7,6 @@ from collections.abc import Sequence
 from string import ascii_letters, digits
 from typing import ClassVar, NamedTuple
 
-from textual.app import ComposeResult
 from textual.binding import Binding, BindingType
 
 from multidrop.dialects.text import visible
@@ -15,10 +14,9 @@ from multidrop.tui.panels.drive import SIGN, alarm_words, program_words, trouble
 from multidrop.tui.panels.drives import STATE, short_words, spark
 from multidrop.tui.panels.view import NOT_REFERENCED, Glance, View, glances_of
 from multidrop.tui.readout import State
-from multidrop.tui.screens.dialogs import Field
-from multidrop.tui.screens.page import Host, Page
+from multidrop.tui.screens.page import AskingPage, Host
 from multidrop.tui.text import fit
-from multidrop.tui.widgets.lines import Row, Span, spread, width_of
+from multidrop.tui.widgets.lines import Row, Span, in_view, spread, width_of
 
 URGENCY = (
     *(State.LOST, State.SILENT, State.MOVING, State.DWELL, State.STORING, State.UNKNOWN),
@@ -116,7 +114,6 @@ def drive_row(place: Place, now: float, width: int, chosen: bool) -> Row:
 
 
 def columns_row(width: int) -> Row:
-    """The heads of the columns."""
     names = f" {fit('drive', NAME)} {fit('state', STATE)}{'position':>{POSITION}}"
     if width < NARROW:
         return ((names, "dim"),)
@@ -131,7 +128,7 @@ def summary(places: Sequence[Place]) -> str:
     return " · ".join([*said, *(f"{counts[state]} {state.word}" for state in URGENCY if counts[state])])
 
 
-class AllDrives(Page):
+class AllDrives(AskingPage):
     """All drives. Enter selects one and goes back; what is typed filters."""
 
     AUTO_FOCUS = ""
@@ -146,38 +143,24 @@ class AllDrives(Page):
     ]
     KEYS = (("↑↓", "choose"), ("Enter", "select"), ("/", "filter"))
     WANTS = frozenset({"motion", "conditions"})
+    PARTS = {"heading": None, "filter": None, "columns": None, "drives": "1fr"}
+    FIELD = "filter"
 
     def __init__(self, host: Host) -> None:
         super().__init__(host)
-        self._filter = Field(lambda _: self.action_take(), edited=self._edited, placeholder="filter", id="filter")
         self._chosen: tuple[str, str] | None = None
         self._places: list[Place] = []
         self._view: View | None = None
 
-    def content(self) -> ComposeResult:
-        """Make the heading, the filter and the rows."""
-        yield self.part("heading")
-        yield self._filter
-        yield self.part("columns")
-        rows = self.part("drives")
-        rows.styles.height = "1fr"
-        yield rows
-
-    def on_mount(self) -> None:
-        """Hide the filter until it is asked for."""
-        self._filter.display = False
-
     def show(self, view: View) -> None:
-        """Paint the rows around the chosen one."""
         self._view = view
-        self._places = worst_first(view, self._filter.value)
+        self._places = worst_first(view, self.field.value)
         at = self._at()
         if self._chosen is None:
             self.action_step(0)  # it stays the chosen one when another gets worse
         rows, width = self.lines("drives"), self.size.width
-        first = max(0, min(at - rows.size.height // 2, len(self._places) - rows.size.height))
-        shown = self._places[first : first + max(0, rows.size.height)]
-        rows.put([drive_row(place, view.now, width, n == at) for n, place in enumerate(shown, first)] or [_NOTHING])
+        shown = in_view(self._places, at, rows.size.height)
+        rows.put([drive_row(place, view.now, width, n == at) for n, place in shown] or [_NOTHING])
         heading: Row = ((" ALL DRIVES   ", "strong"), (summary(self._places), "text"))
         self.lines("heading").put([spread(heading, [("worst first ", "dim")], width)])
         self.lines("columns").put([columns_row(width)])
@@ -188,19 +171,19 @@ class AllDrives(Page):
         return keys.index(self._chosen) if self._chosen in keys else 0
 
     def action_step(self, by: int) -> None:
-        """Choose another drive."""
         if self._places:
             place = self._places[min(max(self._at() + by, 0), len(self._places) - 1)]
             self._chosen = (place.bus, place.glance.address)
 
     def action_filter(self, typed: str) -> None:
         """Show the filter and type into it: a letter or `/` begins it."""
-        self._filter.display = True
-        self.set_focus(self._filter)
-        self._filter.value += typed
-        self._filter.cursor_position = len(self._filter.value)
+        self.ask_for(self.field.value + typed, "filter")
+        self.field.cursor_position = len(self.field.value)
 
-    def _edited(self, text: str) -> None:
+    def typed(self, text: str) -> None:
+        self.action_take()
+
+    def edited(self, text: str) -> None:
         """Narrow the list at once: Enter may follow in the same read. An address that is typed is the chosen drive."""
         if self._view is None:
             return
@@ -213,15 +196,12 @@ class AllDrives(Page):
 
     def action_leave(self) -> None:
         """Leave the filter, then the page."""
-        if self._filter.display:
-            self._filter.value = ""
-            self._filter.display = False
-            self.set_focus(None)
+        if self.field.display:
+            self.end_asking()
             return
         super().action_leave()
 
     def action_take(self) -> None:
-        """Select the chosen drive and go back."""
         if self._places:
             place = self._places[self._at()]
             self.dismiss(None)

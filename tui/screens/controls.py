@@ -14,18 +14,16 @@ import math
 import re
 from dataclasses import dataclass
 from string import ascii_letters, digits
-from typing import ClassVar, NamedTuple
+from typing import ClassVar
 
-from textual.app import ComposeResult
 from textual.binding import Binding, BindingType
 
 from multidrop.dialects.values import BY, DISABLE, ENABLE, HIGH, HOME_MINUS, HOME_PLUS, LOW, STOP, TO, Control, Controls
-from multidrop.tui.outbox import Place, selected_place
+from multidrop.tui.outbox import selected_place
 from multidrop.tui.panels.drive import drive_rows, unit_of
 from multidrop.tui.panels.view import Glance, View, name_of
 from multidrop.tui.readout import READ, Readout, State
-from multidrop.tui.screens.dialogs import Field
-from multidrop.tui.screens.page import Host, Page
+from multidrop.tui.screens.page import AskingPage, Begun, Host
 from multidrop.tui.text import fit
 from multidrop.tui.widgets.lines import Row, Span, spread, width_of
 
@@ -56,7 +54,6 @@ class Jog:
     """When a line was last seen to run or wait."""
 
     def look(self, now: float, *, idle: bool) -> None:
-        """Note whether lines run or wait."""
         if not idle:
             self._busy = now
 
@@ -110,15 +107,7 @@ WORD = 10
 LINE = 22
 
 
-class Asked(NamedTuple):
-    """A number that is typed, or a control that waits for Enter: its key, the stops and the drive when it was begun."""
-
-    key: str
-    stops: int
-    place: Place
-
-
-class ControlsPage(Page):
+class ControlsPage(AskingPage):
     """Controls of the selected drive."""
 
     AUTO_FOCUS = ""
@@ -135,39 +124,26 @@ class ControlsPage(Page):
     ]
     KEYS = (("←→", "jog"), ("↑↓", "step"), ("Space", "stop"))
     WANTS = frozenset({"motion", "conditions"})
+    PARTS = {"heading": None, "drive": "auto", "controls": "1fr", "number": None, "said": None}
+    FIELD = "number"
 
     def __init__(self, host: Host) -> None:
         super().__init__(host)
         self.step = FIRST_STEP
         self._jog = Jog()
         self._axis = 0
-        self._asked: Asked | None = None
-        self._begun: Asked | None = None
+        self._asked: Begun | None = None
+        self._begun: Begun | None = None
         """The control that Enter would send."""
         self._painted = False
         """The line of that control was shown, and no key waited then that was typed before."""
-        self._said: Span = ("", "dim")
         self._place = selected_place(host.session)
         self._view: View | None = None
-        self._field = Field(self._typed, edited=self._edited, id="number")
-
-    def content(self) -> ComposeResult:
-        """Make the heading, the drive, the controls, and the place for a number."""
-        yield self.part("heading")
-        drive = self.part("drive")
-        drive.styles.height = "auto"
-        drive.styles.max_height = "50%"
-        yield drive
-        controls = self.part("controls")
-        controls.styles.height = "1fr"
-        yield controls
-        yield self._field
-        yield self.part("said")
 
     def on_mount(self) -> None:
         """Hide the field until a number is asked for; what failed before is not the page's."""
         self.host.model.trouble = ""
-        self._field.display = False
+        self.lines("drive").styles.max_height = "50%"
 
     # What is shown
 
@@ -176,7 +152,7 @@ class ControlsPage(Page):
         self._view = view
         self._follow(view)
         if view.model.trouble:
-            self._say(f"✗ {view.model.trouble}", "!")
+            self.say(f"✗ {view.model.trouble}")
             view.model.trouble, self._begun = "", None
         self._jog.look(view.now, idle=self.host.outbox.idle)
         glance, width = view.chosen, self.size.width
@@ -190,7 +166,7 @@ class ControlsPage(Page):
             drive.styles.height = len(rows)
         drive.put(rows)
         self.lines("controls").put(self._rows(view, glance, width))
-        self.lines("said").put([((" ", "text"), (fit(self._said[0], width - 2), self._said[1]))])
+        self.lines("said").put([((" ", "text"), (fit(self.said[0], width - 2), self.said[1]))])
         self._painted = self._begun is not None and (self._painted or self.host.keyboard.idle)
 
     def _follow(self, view: View) -> None:
@@ -199,12 +175,12 @@ class ControlsPage(Page):
         if place != self._place:
             self._place, self._axis, self._jog = place, 0, Jog()
         asked = self._asked
-        if asked is not None and (asked.stops != view.session.stops or asked.place != place):
+        if asked is not None and self.overtaken(asked):
             self._close("stopped; the number was not used" if asked.place == place else "another drive is selected")
         begun = self._begun
-        if begun is not None and (begun.stops != view.session.stops or begun.place != place):
+        if begun is not None and self.overtaken(begun):
             self._begun = None
-            self._say("stopped; nothing was sent" if begun.place == place else "another drive is selected", "!")
+            self.say("stopped; nothing was sent" if begun.place == place else "another drive is selected")
 
     def _rows(self, view: View, glance: Glance | None, width: int) -> list[Row]:
         controls = self._controls()
@@ -265,7 +241,6 @@ class ControlsPage(Page):
         return {} if drive is None or chosen is None else drive.family.controls(drive.state, chosen[1].axis)
 
     def action_step(self, by: int) -> None:
-        """Choose another size of the step."""
         self._begun = None
         larger = [each for each in STEPS if each > self.step]
         smaller = [each for each in STEPS if each < self.step]
@@ -273,7 +248,6 @@ class ControlsPage(Page):
         self.step = found[0] if found else self.step
 
     def action_axis(self) -> None:
-        """Choose the next axis."""
         self._begun = None
         chosen = self._chosen()
         if chosen is not None:
@@ -291,28 +265,27 @@ class ControlsPage(Page):
         control = self._controls().get(name)
         self._begun = None
         if control is None or control.absent:
-            self._say(f"no {WORDS[name]}: {control.absent}" if control is not None else "no drive is selected", "!")
+            self.say(f"no {WORDS[name]}: {control.absent}" if control is not None else "no drive is selected")
         elif name == STOP:
             self.host.outbox.at_once(control.filled())
             self._tell(control.filled())
         else:
-            self._begun = Asked(key, self.host.session.stops, selected_place(self.host.session))
+            self._begun = self.begin(key)
             self._painted = False
             about = f" - {control.about}" if control.about else ""
-            self._say(f"Enter sends {', '.join(control.filled())}{about}   Esc: nothing", "!")
+            self.say(f"Enter sends {', '.join(control.filled())}{about}   Esc: nothing")
 
     def action_go(self) -> None:
         """Send the control that was begun, unless a stop or another drive came in between."""
         if self._begun is not None and not self._painted:
             return  # an Enter that was typed before the line was seen
         begun, self._begun = self._begun, None
-        session = self.host.session
         if begun is None:
             return
-        if begun.stops != session.stops or begun.place != selected_place(session):
-            self._say("nothing was sent: a stop or another drive came in between", "!")
+        if self.overtaken(begun):
+            self.say("nothing was sent: a stop or another drive came in between")
             return
-        name = KEYED[begun.key]
+        name = KEYED[begun.kind]
         if name in (HOME_MINUS, HOME_PLUS):
             self._move(name, 0)
         elif (control := self._controls().get(name)) is not None:
@@ -322,42 +295,38 @@ class ControlsPage(Page):
         """Drop the control that waits for Enter: a key that means nothing here is part of a word, such as `halt`."""
         if self._begun is not None:
             self._begun = None
-            self._say("nothing was sent", "!")
+            self.say("nothing was sent")
 
     def action_ask(self, key: str) -> None:
         """Ask for a number."""
         self._begun = None
         if not self._controls():
-            self._say("no drive is selected", "!")
+            self.say("no drive is selected")
             return
-        self._asked = Asked(key, self.host.session.stops, selected_place(self.host.session))
-        self._field.placeholder = f"{NUMBERED[key][1]}: a whole number, then Enter; Esc: none; Space: stop"
-        self._field.value = ""
-        self._field.display = True
-        self.set_focus(self._field)
+        self._asked = self.begin(key)
+        self.ask_for("", f"{NUMBERED[key][1]}: a whole number, then Enter; Esc: none; Space: stop")
 
-    def _edited(self, text: str) -> None:
+    def edited(self, text: str) -> None:
         """Take a blank, which no number has, as the key of the stop."""
         if " " in text:
-            self._field.value = text.replace(" ", "")
+            self.field.value = text.replace(" ", "")
             self.action_do(SPACE)
 
-    def _typed(self, text: str) -> None:
+    def typed(self, text: str) -> None:
         """Take a number on Enter."""
         asked = self._asked
-        session = self.host.session
-        if asked is None or asked.stops != session.stops or asked.place != selected_place(session):
+        if asked is None or self.overtaken(asked):
             self._close("the number was not used")
             return
-        name, what = NUMBERED[asked.key]
+        name, what = NUMBERED[asked.kind]
         if not WHOLE.fullmatch(text):
             wrong = f"no {what} {text[:20]}; " if text else ""
-            self._say(f"nothing was sent: {wrong}type a whole number such as -1500", "!")
+            self.say(f"nothing was sent: {wrong}type a whole number such as -1500")
             return
         number = int(text)
         if not LOW <= number <= HIGH or (not name and number <= 0):
             low = LOW if name else 1
-            self._say(f"nothing was sent: {what} {number} is out of range; valid: {low} to {HIGH}", "!")
+            self.say(f"nothing was sent: {what} {number} is out of range; valid: {low} to {HIGH}")
             return
         self._close("")
         if name:
@@ -369,18 +338,18 @@ class ControlsPage(Page):
         """Start a move, if the drive is known to rest."""
         chosen, control = self._chosen(), self._controls().get(name)
         if chosen is None or control is None:
-            self._say("no drive is selected", "!")
+            self.say("no drive is selected")
             return
         glance, axis = chosen
         host = self.host
         state = axis_state(glance, axis)
         if not self._jog.allows(glance.readout, axis, state, host.session.now(), idle=host.outbox.idle):
-            self._say(f"not sent: {self._jog.why}", "!")
+            self.say(f"not sent: {self._jog.why}")
             return
         assert axis.last is not None
         to = number if name == TO else axis.last.position + number
         if not LOW <= to <= HIGH:
-            self._say(f"not sent: the end of the move, {to}, is out of range", "!")
+            self.say(f"not sent: the end of the move, {to}, is out of range")
             return
         self._send(control.filled(by=number, to=to))
 
@@ -391,7 +360,7 @@ class ControlsPage(Page):
         self._tell(lines)
 
     def _tell(self, lines: tuple[str, ...]) -> None:
-        self._say(f"sent: {', '.join(lines)}", ".")
+        self.say(f"sent: {', '.join(lines)}", "dim")
 
     def action_leave(self) -> None:
         """Leave the number or the control that waits for Enter, then the page."""
@@ -405,14 +374,9 @@ class ControlsPage(Page):
 
     def _close(self, said: str) -> None:
         self._asked = None
-        self._field.value = ""
-        self._field.display = False
-        self.set_focus(None)
+        self.end_asking()
         if said:
-            self._say(said, "!")
-
-    def _say(self, text: str, mark: str) -> None:
-        self._said = (text, "strong" if mark == "!" else "dim")
+            self.say(said)
 
 
 def axis_state(glance: Glance, axis: Readout) -> State:

@@ -45,12 +45,10 @@ class Field(Input):
         self.cursor_blink = False
 
     def watch_value(self, value: str) -> None:
-        """Report the new text."""
         if self._edited is not None and self.is_mounted:
             self._edited(value)
 
     async def action_submit(self) -> None:
-        """Hand on the text on Enter."""
         self._entered(self.value.strip())
 
 
@@ -62,7 +60,6 @@ class Options(OptionList):
         self._taken = taken
 
     def action_select(self) -> None:
-        """Take the highlighted option."""
         number = self.highlighted
         if number is not None and not self.get_option_at_index(number).disabled:
             self._taken(number)
@@ -100,14 +97,12 @@ class Ask(Dialog[str]):
         self.heading, self.value, self.hint = title, value, hint
 
     def compose(self) -> ComposeResult:
-        """Make the question and its line."""
         with Vertical(classes="box"):
             yield Static(self.heading, classes="title", markup=False)
             yield Field(self._entered, self.value)
             yield Static(self.hint, classes="keys", markup=False)
 
     def on_mount(self) -> None:
-        """Focus the line."""
         self.set_focus(self.query_one(Field))
 
     def _entered(self, text: str) -> None:
@@ -137,7 +132,6 @@ class Confirm(Dialog[str]):
             yield Static("↑↓ or a letter choose   Enter take   Esc close", classes="keys")
 
     def on_mount(self) -> None:
-        """Highlight the first answer."""
         self.query_one(Options).highlighted = 0
         self.set_focus(self.query_one(Options))
 
@@ -242,7 +236,6 @@ class Search(Dialog[str]):
             yield Static(self.hint, classes="keys", markup=False)
 
     def on_mount(self) -> None:
-        """Show all results."""
         self.set_focus(self.query_one(Field))
         self._narrow("")
 
@@ -254,7 +247,6 @@ class Search(Dialog[str]):
         options.highlighted = 0 if self.found else None
 
     def action_step(self, by: int) -> None:
-        """Highlight another result."""
         options = self.query_one(Options)
         if self.found and options.highlighted is not None:
             options.highlighted = min(max(options.highlighted + by, 0), len(self.found) - 1)
@@ -313,11 +305,9 @@ class TooSmall(Over[None]):
     """A notice that the terminal is too small; it closes when the terminal grows."""
 
     def compose(self) -> ComposeResult:
-        """Make the line."""
         yield Static(id="too-small", markup=False)
 
     def on_resize(self) -> None:
-        """Show the current size."""
         width, height = self.app.size
         need = f"{LEAST[0]}x{LEAST[1]}"
         text = f"too small: {need} needed, this is {width}x{height}; ^X still stops"
@@ -366,7 +356,6 @@ class Form(Dialog[dict[str, str]]):
         self.set_focus(self._field(number))
 
     def action_step(self, by: int) -> None:
-        """Go to another value."""
         self._go((self._at + by) % len(self.wanted))
 
     def action_refuse(self) -> None:

@@ -127,7 +127,6 @@ class EditPage(Page):
     # Painting
 
     def show(self, view: View) -> None:
-        """Paint heading and problems."""
         self.view = view
         width = self.editor.size.width
         title = self.grammar.title if self.grammar is not None else ""
@@ -139,7 +138,6 @@ class EditPage(Page):
 
     @property
     def program(self) -> ProgramFacts:
-        """The facts of the program in the selected drive."""
         chosen = self.view.chosen if self.view is not None else None
         return chosen.readout.program if chosen is not None else NO_FACTS
 
@@ -155,7 +153,6 @@ class EditPage(Page):
         below.put(rows)
 
     def state_words(self) -> str:
-        """The remark below the editor of a narrow screen."""
         return ""
 
     # The text
@@ -166,7 +163,6 @@ class EditPage(Page):
         self.findings = replace(self.findings, pending=True)
 
     def take_text(self) -> None:
-        """Take the text from the editor."""
         if self.text is not None and not self.editor.read_only:
             self.text.text, self.text.cursor = self.editor.text, self.editor.cursor_location
 
@@ -265,7 +261,6 @@ class EditPage(Page):
         self.app.push_screen(Confirm("A text that was not saved", lines, answers), answered)
 
     async def action_save(self) -> None:
-        """Save the text in its file."""
         await self.save()
 
     async def save(self, over: bool = False) -> bool:

@@ -7,7 +7,6 @@ from collections.abc import Sequence
 from string import ascii_letters, digits
 from typing import TYPE_CHECKING, ClassVar, NamedTuple
 
-from textual.app import ComposeResult
 from textual.binding import Binding, BindingType
 
 from multidrop.dialects import Diagnostic
@@ -16,7 +15,7 @@ from multidrop.tui.screens.dialogs import Ask, Confirm
 from multidrop.tui.screens.page import Host, Page
 from multidrop.tui.screens.program_rows import news_rows, rule
 from multidrop.tui.text import fit, visible
-from multidrop.tui.widgets.lines import Row, spread
+from multidrop.tui.widgets.lines import Row, in_view, spread
 
 if TYPE_CHECKING:
     from multidrop.macros import Macro, MacroStore
@@ -85,14 +84,13 @@ def step_rows(each: Listed, playing: Playing | None, width: int, height: int) ->
         return []
     lines = each.macro.lines
     current = playing.step - 1 if playing is not None and playing.step else None
-    first = max(0, min((current or 0) - height // 2, len(lines) - height))
     return [
         (
             (" ▶ " if number == current else "   ", "motion"),
             (f"{number + 1:>3}  ", "dim"),
             (fit(visible(line), width - 8), "motion" if number == current else "text"),
         )
-        for number, line in enumerate(lines[first : first + height], first)
+        for number, line in in_view(lines, current or 0, height)
     ]
 
 
@@ -121,6 +119,7 @@ class MacrosPage(Page):
     ]
     KEYS = (("Enter", "play"), ("s", "end it"), ("n", "record"), ("e", "edit"), ("k", "key"), ("Del", "delete"))
     WANTS = frozenset({"motion"})
+    PARTS = {"heading": None, "macros": "1fr", "steps": None, "news": NEWS + 1}
 
     def __init__(self, host: Host) -> None:
         super().__init__(host)
@@ -132,17 +131,6 @@ class MacrosPage(Page):
         """The facts of the app at the last reading: it makes new ones whenever a macro may have changed."""
         self._reading = self._known = False
         """Reading goes on; they were read once."""
-
-    def content(self) -> ComposeResult:
-        """Make the heading, the list and the lines of the chosen macro."""
-        yield self.part("heading")
-        rows = self.part("macros")
-        rows.styles.height = "1fr"
-        yield rows
-        yield self.part("steps")
-        news = self.part("news")
-        news.styles.height = NEWS + 1
-        yield news
 
     def show(self, view: View) -> None:
         """Paint the list around the chosen macro, and its lines."""
@@ -159,15 +147,14 @@ class MacrosPage(Page):
             [spread(heading, [(recording, "motion" if view.session.recording else "dim")], width)]
         )
         room = min(max(len(self._macros), 2), height // 2)
-        first = max(0, min(self._at - room // 2, len(self._macros) - room))
-        shown, chosen = self._macros[first : first + room], self._chosen()
-        rows = [macro_row(each, playing.get(each.name), width, each is chosen) for each in shown]
+        chosen = self._chosen()
+        shown = in_view(self._macros, self._at, room)
+        rows = [macro_row(each, playing.get(each.name), width, each is chosen) for _, each in shown]
         self.lines("macros").put(rows or (NOTHING if self._known else []))
         self._show_steps(playing, width, height - room)
         self._show_news(view, width)
 
     def _show_news(self, view: View, width: int) -> None:
-        """The last lines of the transcript."""
         wall = view.session.wall
         records = news_rows(self.host.last_records(NEWS), lambda at: f"{wall(at):%H:%M:%S}", width)
         self.lines("news").put([rule("transcript", width), *records])
@@ -218,7 +205,6 @@ class MacrosPage(Page):
             self.host.outbox.at_once([f"/play {chosen.name}"])
 
     def action_end(self) -> None:
-        """End the chosen macro."""
         if (chosen := self._chosen()) is not None:
             self.host.outbox.at_once([f"/play stop {chosen.name}"])
 

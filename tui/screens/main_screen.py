@@ -44,7 +44,6 @@ class Beside(Vertical):
         self.transcript = Half(clock)
 
     def compose(self) -> ComposeResult:
-        """Make the heading and the transcript."""
         yield self._heading
         yield self.transcript
 
@@ -58,13 +57,11 @@ class Beside(Vertical):
         self.transcript.extend(of.records)
 
     def hide(self) -> None:
-        """Show nothing."""
         self.bus = self.address = ""
         self.display = False
         self.transcript.clear()
 
     def take(self, bus: str, records: Iterable[Record]) -> None:
-        """Take in what the transcript of a line takes in."""
         if self.display and bus == self.bus:
             self.transcript.take(records)
 
@@ -104,28 +101,22 @@ class Reading(Framed):
 
     @property
     def transcript(self) -> Transcript:
-        """The transcript that is shown."""
         raise NotImplementedError
 
     def take_keys(self) -> None:
-        """Give the keys to the input line."""
         raise NotImplementedError
 
     def on_descendant_focus(self, event: events.DescendantFocus) -> None:
-        """Close the search when the input line gets the keys."""
         if event.widget.id == "entry":
             self.reader.close()
 
     def action_look(self, pages: int) -> None:
-        """Scroll back or forth by pages."""
         self.transcript.look_page(pages)
 
     def action_look_end(self, newest: bool) -> None:
-        """Scroll to the oldest or the newest line."""
         self.transcript.look_end(newest)
 
     def action_find(self) -> None:
-        """Search the transcript."""
         self.reader.find(self.transcript)
 
     def action_pause(self) -> None:
@@ -133,7 +124,6 @@ class Reading(Framed):
         self.transcript.pause()
 
     def action_pick(self, by: int) -> None:
-        """Pick lines to copy."""
         self.reader.pick(self.transcript, by)
 
 
@@ -256,7 +246,6 @@ class MainScreen(Reading):
         return [("far", left), ("side", right)]
 
     def wants(self) -> frozenset[str]:
-        """The readings that the shown panels want."""
         shown = [panel for name, panels in self.columns() for panel in fitting(panels, self.size_of(name).height)]
         below = frozenset[str]() if self.wide else frozenset({MOTION, CONDITIONS})
         return below.union(*(panel.wants for panel in shown))
@@ -293,7 +282,6 @@ class MainScreen(Reading):
         self.make_room()
 
     def on_resize(self) -> None:
-        """Divide the new room."""
         self.make_room()
 
     def size_of(self, name: str) -> Size:
@@ -356,11 +344,9 @@ class MainScreen(Reading):
 
     @property
     def transcript(self) -> Transcript:
-        """The transcript that is shown."""
         return self.page(self.current)
 
     def take_keys(self) -> None:
-        """Give the keys to the input line."""
         self.set_focus(self.entry)
 
     # The input line
@@ -392,12 +378,10 @@ class MainScreen(Reading):
             hint.put([((" " * (room - cell_len(text) - 1), "text"), (text, "dim"))] if text else [])
 
     def put_status(self, rows: Sequence[Row]) -> None:
-        """Show the rows of the drives below the transcript of a narrow screen."""
         if len(rows) != len(self.lines("status").rows):
             self.lines("status").styles.height = len(rows)
         self.lines("status").put(rows)
 
     def show_menu(self) -> None:
-        """Show the completions above the line."""
         below = 2 if self.wide else 2 + max(2, len(self.lines("status").rows))
         self.menu.show(self.entry.listing, self.lines("label").size.width, below)

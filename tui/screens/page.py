@@ -6,7 +6,7 @@ that the transcript shows what was sent.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, ClassVar, NamedTuple, Protocol
 
 from textual.app import ComposeResult
@@ -18,14 +18,15 @@ from multidrop.dialects import Diagnostic
 from multidrop.dialects.on_demand import imported
 from multidrop.tui.frame_scheduler import Frames
 from multidrop.tui.keymap import FunctionKeys, named_key
-from multidrop.tui.outbox import Outbox
+from multidrop.tui.outbox import Outbox, Place, selected_place
 from multidrop.tui.panels.view import View
 from multidrop.tui.screen_model import Record, ScreenModel
+from multidrop.tui.screens.dialogs import Field
 from multidrop.tui.terminal.canvas import FrontCompositor
 from multidrop.tui.terminal.keyboard import Keyboard
 from multidrop.tui.texts import Texts
 from multidrop.tui.widgets.bars import Banner, Footer, TopLine
-from multidrop.tui.widgets.lines import Lines
+from multidrop.tui.widgets.lines import Lines, Span
 
 if TYPE_CHECKING:
     from multidrop.shell.session import Session
@@ -46,7 +47,6 @@ class Framed(Screen[None]):
         self._parts: dict[str, Lines] = {"top": TopLine(id="top"), "footer": Footer(id="footer")}
 
     def lines(self, name: str) -> Lines:
-        """The part with a name."""
         return self._parts[name]
 
 
@@ -71,6 +71,16 @@ class Host(Protocol):
         """Select a drive or a bus."""
 
 
+class Begun(NamedTuple):
+    """A text that is being typed, or lines that wait for Enter; the stops and the drive when it was begun."""
+
+    kind: str
+    stops: int
+    place: Place
+    name: str = ""
+    lines: tuple[str, ...] = ()
+
+
 class Page(Framed):
     """The base of all pages. `content` makes the widgets, `show` paints them when something has happened."""
 
@@ -85,12 +95,14 @@ class Page(Framed):
     WANTS: ClassVar[frozenset[str]] = frozenset()
     """What must be polled while it is shown, in the words of `tui.panels.table`."""
 
+    PARTS: ClassVar[Mapping[str, str | int | None]] = {}
+    """The parts that are rows, from top to bottom, with their heights; None: as the style sheet has it."""
+
     def __init__(self, host: Host) -> None:
         super().__init__()
         self.host = host
 
     def compose(self) -> ComposeResult:
-        """Make the frame with the content in it."""
         yield self.lines("top")
         yield Banner()
         with Vertical(classes="page-body"):
@@ -99,14 +111,17 @@ class Page(Framed):
 
     def content(self) -> ComposeResult:
         """Make the widgets between banner and footer."""
-        raise NotImplementedError
+        for name, height in self.PARTS.items():
+            part = self.part(name)
+            if height is not None:
+                part.styles.height = height
+            yield part
 
     def on_worker_state_changed(self) -> None:
         """Paint what a worker has brought: nothing else may have happened."""
         self.host.frames.wake()
 
     def show(self, view: View) -> None:
-        """Paint the facts."""
         raise NotImplementedError
 
     def part(self, name: str) -> Lines:
@@ -115,8 +130,58 @@ class Page(Framed):
         return self._parts[name]
 
     def action_leave(self) -> None:
-        """Go back to the main screen."""
         self.dismiss(None)
+
+
+class AskingPage(Page):
+    """A page with a line to type in, which is hidden until it is asked for, and a row for what is said last."""
+
+    FIELD: ClassVar[str] = ""
+    """The name of the line among the parts."""
+
+    def __init__(self, host: Host) -> None:
+        super().__init__(host)
+        self.field = Field(self.typed, edited=self.edited, id=self.FIELD)
+        self.said: Span = ("", "dim")
+
+    def content(self) -> ComposeResult:
+        """Make the parts with the line in its place."""
+        for part in super().content():
+            if part.id == self.FIELD:
+                self.field.display = False
+                yield self.field
+            else:
+                yield part
+
+    def typed(self, text: str) -> None:
+        """Take what was typed, on Enter."""
+
+    def edited(self, text: str) -> None:
+        """Take each change of it."""
+
+    def ask_for(self, text: str, placeholder: str = "") -> None:
+        """Show the line to type in, with a text in it."""
+        self.field.value, self.field.placeholder = text, placeholder
+        self.field.display = True
+        self.set_focus(self.field)
+
+    def end_asking(self) -> None:
+        """Empty and hide the line to type in."""
+        self.field.value = ""
+        self.field.display = False
+        self.set_focus(None)
+
+    def say(self, text: str, role: str = "strong") -> None:
+        """Say something in the last row."""
+        self.said = (text, role)
+
+    def begin(self, kind: str, name: str = "", lines: tuple[str, ...] = ()) -> Begun:
+        """Note what begins now."""
+        return Begun(kind, self.host.session.stops, selected_place(self.host.session), name, lines)
+
+    def overtaken(self, begun: Begun) -> bool:
+        """Whether a stop, or another drive, came since something was begun."""
+        return begun[1:3] != (self.host.session.stops, selected_place(self.host.session))
 
 
 class PageEntry(NamedTuple):
@@ -132,7 +197,6 @@ class PageEntry(NamedTuple):
     """The key that opens it, as Textual spells it."""
 
     def page(self) -> type[Page]:
-        """Import the class."""
         found: type[Page] = imported(f"multidrop.tui.screens.{self.place}")
         return found
 

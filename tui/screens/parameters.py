@@ -7,9 +7,8 @@ sends the lines that are shown. They go out as if they were typed, and then ever
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, ClassVar, NamedTuple
+from typing import TYPE_CHECKING, ClassVar
 
-from textual.app import ComposeResult
 from textual.binding import Binding, BindingType
 
 from multidrop.dialects import Diagnostic
@@ -17,12 +16,11 @@ from multidrop.dialects.parameters import VARIABLES, Readings, Value
 from multidrop.shell.params import file as files
 from multidrop.shell.params.page import Edit, edit, found_in, meanings_of, parsed, rows
 from multidrop.shell.params.page import Row as Setting
-from multidrop.tui.outbox import Place, selected_place
+from multidrop.tui.outbox import selected_place
 from multidrop.tui.panels.view import Glance, View, name_of
-from multidrop.tui.screens.dialogs import Field
-from multidrop.tui.screens.page import Host, Page
+from multidrop.tui.screens.page import AskingPage, Begun, Host
 from multidrop.tui.text import age, fit
-from multidrop.tui.widgets.lines import Row, Span, spread
+from multidrop.tui.widgets.lines import Row, Span, in_view, spread
 
 if TYPE_CHECKING:
     from multidrop.drives.drive import Drive
@@ -61,23 +59,16 @@ class SettingsTable:
 
     @property
     def chosen(self) -> Setting | None:
-        """The chosen setting."""
         return self.shown[self.at] if self.shown else None
 
     def step(self, by: int) -> None:
-        """Choose another one."""
         self.at = min(max(self.at + by, 0), max(0, len(self.shown) - 1))
 
     def compare(self, name: str, values: dict[str, Value]) -> None:
-        """Compare with these values."""
         self.other, self.at = (name, values), 0
 
     def rows(self, width: int, height: int) -> list[Row]:
-        """The rows around the chosen one."""
-        first = max(0, min(self.at - height // 2, len(self.shown) - height))
-        return [
-            self._row(each, width, n == self.at) for n, each in enumerate(self.shown[first : first + height], first)
-        ]
+        return [self._row(each, width, n == self.at) for n, each in in_view(self.shown, self.at, height)]
 
     def heading(self, view: View, glance: Glance | None, width: int) -> Row:
         """The drive, how many settings are shown, and when they were read."""
@@ -143,25 +134,7 @@ ASKS = {
 }
 
 
-class Asked(NamedTuple):
-    """A text that is being typed: its kind, the setting, and the stops and the drive when it was begun."""
-
-    kind: str
-    name: str
-    stops: int
-    place: Place
-
-
-class Pending(NamedTuple):
-    """Lines that a second Enter sends, and the stops and the drive when they were planned."""
-
-    lines: tuple[str, ...]
-    warning: str
-    stops: int
-    place: Place
-
-
-class ParametersPage(Page):
+class ParametersPage(AskingPage):
     """All settings of the selected drive."""
 
     AUTO_FOCUS = ""
@@ -188,58 +161,45 @@ class ParametersPage(Page):
         ("S", "save"),
     )
     WANTS = frozenset({"motion"})
+    PARTS = {"heading": None, "columns": None, "table": "1fr", "meaning": None, "asked": None, "said": None}
+    FIELD = "asked"
 
     def __init__(self, host: Host) -> None:
         super().__init__(host)
         self._table = SettingsTable()
-        self._asked: Asked | None = None
-        self._pending: Pending | None = None
+        self._asked: Begun | None = None
+        self._pending: Begun | None = None
         self._painted = False
         """The pending lines were shown."""
         self._reading = False
         """The settings are to be read again once no line runs or waits."""
-        self._said: Span = ("", "dim")
         self._place = selected_place(host.session)
         self._glance: Glance | None = None
-        self._field = Field(self._typed, edited=self._edited, id="asked")
-
-    def content(self) -> ComposeResult:
-        """Make the heading, the table and the place for what is typed."""
-        yield self.part("heading")
-        yield self.part("columns")
-        table = self.part("table")
-        table.styles.height = "1fr"
-        yield table
-        yield self.part("meaning")
-        yield self._field
-        yield self.part("said")
 
     def on_mount(self) -> None:
         """Hide the field until it is needed; what failed before is not the page's."""
         self.host.model.trouble = ""
-        self._field.display = False
 
     # What is shown
 
     def show(self, view: View) -> None:
-        """Paint the table around the chosen row."""
         self._glance = view.chosen
         self._follow(view)
         if view.model.trouble:
-            self._say(f"✗ {view.model.trouble}")
+            self.say(f"✗ {view.model.trouble}")
             view.model.trouble = ""
         if self._reading and self.host.outbox.idle:
             self._reading = False
             self.host.outbox.type("/params read")
         width, lines, drive = self.size.width, self.lines("table"), self.host.session.selected
-        if self._said[0] == READING and self._table.found is not self._settings():
-            self._say("", "dim")
+        if self.said[0] == READING and self._table.found is not self._settings():
+            self.say("", "dim")
         self._table.make(self._settings(), drive)
         lines.put(self._table.rows(width, max(0, lines.size.height)) or self._nothing())
         self.lines("heading").put([self._table.heading(view, self._glance, width)])
         self.lines("columns").put([self._table.columns(width)])
         self.lines("meaning").put([((f" {fit(self._table.about(drive), width - 2)}", "dim"),)])
-        self.lines("said").put([((f" {fit(self._said[0], width - 2)}", self._said[1]),)])
+        self.lines("said").put([((f" {fit(self.said[0], width - 2)}", self.said[1]),)])
         self._painted = self._pending is not None
 
     def _follow(self, view: View) -> None:
@@ -268,17 +228,15 @@ class ParametersPage(Page):
     # Keys
 
     def action_step(self, by: int) -> None:
-        """Choose another row."""
         if self._pending is None:
             self._table.step(by)
 
     def action_read(self) -> None:
-        """Read every setting."""
         if self._glance is None:
-            self._say("no drive is selected")
+            self.say("no drive is selected")
         else:
             self.host.outbox.type("/params read")
-            self._say(READING, "dim")
+            self.say(READING, "dim")
 
     def action_defaults(self) -> None:
         """Compare with the defaults, or with nothing."""
@@ -289,7 +247,7 @@ class ParametersPage(Page):
         elif found is not None and found.defaults:
             table.other = ("default", found.defaults)
         else:
-            self._say(
+            self.say(
                 "the defaults of its settings are not known" if found is not None else "r reads the settings first"
             )
 
@@ -297,7 +255,7 @@ class ParametersPage(Page):
         """Show only what differs, or everything."""
         table = self._table
         if table.other is None:
-            self._say("d, f or a chooses what to compare with first")
+            self.say("d, f or a chooses what to compare with first")
         else:
             table.only_differing, table.at = not table.only_differing, 0
 
@@ -306,14 +264,10 @@ class ParametersPage(Page):
         self._table.words = "" if self._table.words == VARIABLES else VARIABLES
 
     def action_ask(self, kind: str, name: str = "", value: str = "") -> None:
-        """Show the field."""
         self._pending = None
-        self._asked = Asked(kind, name, self.host.session.stops, selected_place(self.host.session))
-        self._field.value = self._table.words if kind == SEARCH else value
-        self._field.placeholder = ASKS[kind]
-        self._field.display = True
-        self.set_focus(self._field)
-        self._say(f"{name}: {ASKS[kind]}" if name else ASKS[kind], "dim")
+        self._asked = self.begin(kind, name)
+        self.ask_for(self._table.words if kind == SEARCH else value, ASKS[kind])
+        self.say(f"{name}: {ASKS[kind]}" if name else ASKS[kind], "dim")
 
     def action_enter(self) -> None:
         """Edit the chosen setting, or send what is pending."""
@@ -329,7 +283,7 @@ class ParametersPage(Page):
     def action_save(self) -> None:
         """Have the drive keep its settings; the verb asks first."""
         if self._glance is None:
-            self._say("no drive is selected")
+            self.say("no drive is selected")
         else:
             self.host.outbox.type("/params save")
 
@@ -344,14 +298,14 @@ class ParametersPage(Page):
 
     # What is typed
 
-    def _edited(self, text: str) -> None:
+    def edited(self, text: str) -> None:
         """Search while the words are typed."""
         if self._asked is not None and self._asked.kind == SEARCH:
             self._table.words, self._table.at = text, 0
 
-    def _typed(self, text: str) -> None:
-        asked, session = self._asked, self.host.session
-        if asked is None or asked.stops != session.stops or asked.place != selected_place(session):
+    def typed(self, text: str) -> None:
+        asked = self._asked
+        if asked is None or self.overtaken(asked):
             self._close("it was not used")
             return
         if asked.kind == SEARCH:
@@ -362,7 +316,7 @@ class ParametersPage(Page):
             taken = {FILE: self._file, DRIVE: self._drive, EDIT: self._value}[asked.kind]
             taken(asked.name, text)
         except Diagnostic as failure:
-            self._say(f"nothing was sent: {failure}")
+            self.say(f"nothing was sent: {failure}")
 
     def _file(self, name: str, text: str) -> None:
         loaded = files.load(text)
@@ -392,27 +346,19 @@ class ParametersPage(Page):
         self._plan(planned.lines, planned.warning)
 
     def _plan(self, lines: tuple[str, ...], warning: str) -> None:
-        """Show the lines that the next Enter sends."""
-        session = self.host.session
-        self._pending, self._painted = Pending(lines, warning, session.stops, selected_place(session)), False
-        self._say(f"Enter sends {', '.join(lines)}{f' - {warning}' if warning else ''}   Esc: nothing")
+        self._pending, self._painted = self.begin(EDIT, lines=lines), False
+        self.say(f"Enter sends {', '.join(lines)}{f' - {warning}' if warning else ''}   Esc: nothing")
 
-    def _send(self, pending: Pending) -> None:
-        session = self.host.session
-        if pending.stops != session.stops or pending.place != selected_place(session):
-            self._say("nothing was sent: a stop or another drive came in between")
+    def _send(self, pending: Begun) -> None:
+        if self.overtaken(pending):
+            self.say("nothing was sent: a stop or another drive came in between")
             return
         for line in pending.lines:
             self.host.outbox.type(line)
         self._reading = True
-        self._say(f"sent: {', '.join(pending.lines)}", "dim")
+        self.say(f"sent: {', '.join(pending.lines)}", "dim")
 
     def _close(self, said: str) -> None:
         self._asked, self._pending = None, None
-        self._field.value = ""
-        self._field.display = False
-        self.set_focus(None)
-        self._say(said, "strong" if said else "dim")
-
-    def _say(self, text: str, role: str = "strong") -> None:
-        self._said = (text, role)
+        self.end_asking()
+        self.say(said, "strong" if said else "dim")

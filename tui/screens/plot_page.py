@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import ClassVar
 
-from textual.app import ComposeResult
 from textual.binding import Binding, BindingType
 
 from multidrop.shell.roles import DIFFERENCE
@@ -57,6 +56,7 @@ class PlotPage(Page):
         ("0", "reset"),
     )
     WANTS = frozenset({"motion", "plot", "samples"})
+    PARTS = {"heading": None, "charts": "1fr", "below": None}
 
     def __init__(self, host: Host) -> None:
         super().__init__(host)
@@ -66,16 +66,7 @@ class PlotPage(Page):
     def _look(self) -> Look:
         return self.host.model.look
 
-    def content(self) -> ComposeResult:
-        """Make the title, the charts, and a row for the cursor and rerun."""
-        yield self.part("heading")
-        charts = self.part("charts")
-        charts.styles.height = "1fr"
-        yield charts
-        yield self.part("below")
-
     def show(self, view: View) -> None:
-        """Paint the charts."""
         charts = self.lines("charts")
         size = charts.size
         self._columns = max(1, columns_of(size.width))
@@ -123,7 +114,6 @@ class PlotPage(Page):
         self._look.closer(by)
 
     def action_automatic(self) -> None:
-        """Go back to the newest samples at the usual scales."""
         self._look.automatic()
         self._look.go_on()
 
@@ -151,7 +141,6 @@ class PlotPage(Page):
             self._type(f"/plot {' '.join(texts)}")
 
     def action_all_drives(self) -> None:
-        """Plot all drives of the selected line."""
         self._type(f"/plot {self.host.session.selected_bus}:*")
 
     def action_difference(self) -> None:
@@ -172,14 +161,12 @@ class PlotPage(Page):
         self._type(f"/plot {texts} --serve {PORT}")
 
     def action_copy(self) -> None:
-        """Copy the line that a person types at a desk to see a served plot."""
         served = [each.desk for each in self.host.session.plots if each.desk]
         if served:
             self.app.copy_to_clipboard(served[0])
             self.notify("Copied", timeout=2)
 
     def on_mount(self) -> None:
-        """Show failures from here on."""
         self.host.model.trouble = ""
 
     def on_unmount(self) -> None:

@@ -93,7 +93,6 @@ class ProgramPage(EditPage):
         return next((each.line - 1 for each in self.findings.entries if place and each.name == place), None)
 
     def _entries(self) -> Sequence[Entry]:
-        """The places at which a program of the text can begin."""
         return self.grammar.entries(self.editor.text) if self.grammar is not None else ()
 
     # The drive
@@ -152,7 +151,6 @@ class ProgramPage(EditPage):
         await self.app.push_screen(Confirm(title, facts, answers), answered)
 
     async def action_run(self) -> None:
-        """Choose a way to run a program of the drive."""
         await self._choose("", "Run in")
 
     async def _choose(self, only: str, title: str) -> None:

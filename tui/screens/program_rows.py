@@ -150,7 +150,6 @@ def target_of(session: Session) -> str:
 
 
 def with_target(verb: str, target: str, *words: str) -> str:
-    """A line of a verb for a drive."""
     return " ".join(each for each in (verb, target, *words) if each)
 
 
@@ -223,7 +222,6 @@ def _match(name: str, about: str) -> Match:
 
 
 def download_choices(text: OpenText, target: str) -> list[Choice]:
-    """The ways to send a file to a drive."""
     file = quoted(text.name)
     first = "Save the file and send it" if text.changed or text.file.new else "Send it"
     return [

@@ -76,8 +76,6 @@ class Questions:
             closed()
 
     async def macro_name(self, record: Callable[[str], Awaitable[None]]) -> None:
-        """Ask for the name of a macro to record."""
-
         async def named(name: str | None) -> None:
             if name:
                 await record(name)
@@ -134,8 +132,6 @@ class Questions:
             await self._app.push_screen(Choose("The other half shows", [*drives, *lines]), chosen)
 
     async def theme(self) -> None:
-        """Choose the colours."""
-
         def chosen(name: str | None) -> None:
             if name is not None:
                 self._app.theme = name

@@ -110,7 +110,6 @@ class Start(Over[None]):
             self.show(f"✗ {self._trouble}", bad=True)
 
     def action_look_again(self) -> None:
-        """Look for serial ports."""
         self._found = None
         self._fill()
         self.run_worker(self._look(), exclusive=True, group="ports")
@@ -159,7 +158,6 @@ class Start(Over[None]):
         return self._places[number] if number is not None and number < len(self._places) else None
 
     def action_step(self, by: int) -> None:
-        """Highlight another place."""
         options = self.query_one(Options)
         if by > 0:
             options.action_cursor_down()

@@ -5,7 +5,6 @@ from __future__ import annotations
 from itertools import islice
 from typing import ClassVar
 
-from textual.app import ComposeResult
 from textual.binding import Binding, BindingType
 
 from multidrop.tui.panels.traffic import piece_rows
@@ -35,6 +34,7 @@ class TrafficPage(Page):
     ]
     KEYS = (("Space", "pause"), ("↑↓", "look back"), ("End", "follow"), ("p", "polls"), ("h", "hex"))
     WANTS = frozenset({"motion"})
+    PARTS = {"heading": None, "traffic": "1fr"}
 
     def __init__(self, host: Host) -> None:
         super().__init__(host)
@@ -45,13 +45,6 @@ class TrafficPage(Page):
         self._shown = 1
         """Pieces in view."""
 
-    def content(self) -> ComposeResult:
-        """Make the heading and the rows."""
-        yield self.part("heading")
-        rows = self.part("traffic")
-        rows.styles.height = "1fr"
-        yield rows
-
     def _store(self) -> TrafficStore:
         name = self.host.session.selected_bus
         if name != self._bus:
@@ -59,7 +52,6 @@ class TrafficPage(Page):
         return self.host.model.bus(name).traffic if name in self.host.session.buses else NO_TRAFFIC
 
     def show(self, view: View) -> None:
-        """Paint the last pieces up to the bottom of the view."""
         store, part = self._store(), self.lines("traffic")
         height, rows = part.size.height, list[Row]()
         self._shown = 0
@@ -89,11 +81,9 @@ class TrafficPage(Page):
         self._bottom = None if bottom >= store.taken - 1 else max(bottom, oldest)
 
     def action_page(self, by: int) -> None:
-        """Look back or on by the pieces in view."""
         self.action_look(by * max(1, self._shown - 1))
 
     def action_follow(self) -> None:
-        """Follow the newest piece."""
         self._bottom = None
 
     def action_pause(self) -> None:
@@ -101,7 +91,6 @@ class TrafficPage(Page):
         self._bottom = self._store().taken - 1 if self._bottom is None else None
 
     def action_polls(self) -> None:
-        """Show or hide polls and their replies."""
         self._polls = not self._polls
 
     def action_hex(self) -> None:

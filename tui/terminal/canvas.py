@@ -51,7 +51,6 @@ class FrontCompositor(Compositor):
 
 
 def _free(rows: Sequence[Row], y: int, shown: Region) -> list[int]:
-    """The places of a row in which a widget is visible."""
     return [x for x, strip in rows[y].items() if strip is None and shown.x <= x < shown.right]
 
 
@@ -137,7 +136,6 @@ class Pens:
         return found
 
     def change(self, before: int, after: int) -> str:
-        """The shortest sequence from one pen to another."""
         if before == after:
             return ""
         found = self._changes.get((before, after))
@@ -224,7 +222,6 @@ class Canvas:
 
     @property
     def _unseen(self) -> Shown:
-        """A row that may show anything."""
         return Shown(UNSEEN * self._size[0], TAIL * self._size[0])
 
     def draw(self, pieces: Mapping[int, Iterable[Piece]], width: int, height: int) -> str:

@@ -68,12 +68,10 @@ class ScreenWriter(LinuxDriver):
         super().start_application_mode()  # type: ignore[no-untyped-call]
 
     def stop_application_mode(self) -> None:
-        """Restore the terminal."""
         self._leaving = True
         super().stop_application_mode()
 
     def close(self) -> None:
-        """Give the output a moment to leave."""
         super().close()
         until = time.monotonic() + AT_THE_END
         while not self._out.idle and time.monotonic() < until:

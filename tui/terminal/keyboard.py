@@ -83,7 +83,6 @@ class Keyboard:
         self._held = True
 
     def release(self) -> None:
-        """Work off keys again."""
         self._held = False
         self._wake()
 

@@ -100,7 +100,6 @@ class Splitter:
         return bool(self._rest) and not self.pasting
 
     def split(self, text: str) -> Iterator[Piece]:
-        """Yield the pieces that end in this text."""
         text, self._rest = self._rest + text, ""
         while text:
             if self.pasting:
@@ -122,7 +121,6 @@ class Splitter:
             yield from self.split(rest[1:])
 
     def forget(self) -> None:
-        """Forget an unfinished piece outside of a paste."""
         if not self.pasting:
             self._rest = ""
 
@@ -304,7 +302,6 @@ class KeyStream:
         self._wait_for_more()
 
     def _wait_for_more(self) -> None:
-        """Restart the time limit of an unfinished sequence at each byte."""
         if self._escape is not None:
             self._escape.cancel()
         self._escape = self._loop.call_later(constants.ESCAPE_DELAY, self._alone) if self._splitter.open else None

@@ -79,7 +79,6 @@ class StopSign(Lines):
     """The stop alone, for screens that lie over a footer and dim it."""
 
     def on_mount(self) -> None:
-        """Show it."""
         self.put([STOP_ROW])
 
 
@@ -146,7 +145,6 @@ class Tab:
 
     @property
     def role(self) -> str:
-        """The role of its state."""
         return "dim" if self.old and self.state is not State.LOST else self.state.role
 
 
@@ -282,7 +280,6 @@ class TopLine(Lines):
     """The top line. A click on a tab shows its bus."""
 
     async def on_click(self, event: events.Click) -> None:
-        """Show the bus of the tab under the pointer."""
         number = tab_at(self.rows[0], event.x) if self.rows else None
         if number is not None:
             await self.run_action(f"act.bus_number({number})")

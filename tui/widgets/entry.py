@@ -217,7 +217,6 @@ class Entry(Input):
         return Listing(text, found)
 
     async def action_submit(self) -> None:
-        """Send the line."""
         self._submitted = True
         await self._typed(self.value, self.exchange)
 
@@ -245,7 +244,6 @@ class Entry(Input):
             self.post_message(self.Edited())
 
     def action_fold(self) -> None:
-        """Close the list on Escape."""
         self.listing = Listing(self.value)
         self.post_message(self.Edited())
 

@@ -7,6 +7,7 @@ defined in the style sheet. An unchanged row costs nothing on the wire.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import TypeVar
 
 from rich.cells import cell_len
 from rich.segment import Segment
@@ -17,6 +18,7 @@ from textual.widget import Widget
 
 from multidrop.dialects.text import visible
 
+T = TypeVar("T")
 Span = tuple[str, str]
 """A text and its role."""
 Row = tuple[Span, ...]
@@ -39,6 +41,12 @@ def spread(left: Sequence[Span], right: Sequence[Span], width: int) -> Row:
     if gap < 1:
         return tuple(left)
     return (*left, (" " * gap, "text"), *right)
+
+
+def in_view(items: Sequence[T], at: int, height: int) -> list[tuple[int, T]]:
+    """The items around the one at a place that find room in `height` rows, with their places."""
+    first = max(0, min(at - height // 2, len(items) - height))
+    return list(enumerate(items[first : first + max(0, height)], first))
 
 
 class Roles(Widget):
@@ -64,7 +72,6 @@ class Lines(Widget):
         """The last rows, their region, and their strips."""
 
     def put(self, rows: Sequence[Row]) -> None:
-        """Show these rows from the top of the widget."""
         before, new = self.rows, list(rows)
         if before == new:
             return
@@ -74,7 +81,6 @@ class Lines(Widget):
                 self.refresh(Region(0, y, self.size.width, 1))
 
     def notify_style_update(self) -> None:
-        """Forget the styles when the theme or the style sheet changes."""
         super().notify_style_update()
         self._styles_of.clear()
         self._strips.clear()
@@ -137,7 +143,6 @@ class Lines(Widget):
         return strips
 
     def render_line(self, y: int) -> Strip:
-        """Render one line of the widget."""
         rows = self.shown()
         return self.strip(rows[y] if y < len(rows) else (), self.size.width)
 

@@ -51,11 +51,9 @@ class FindField(Input):
         self._edited, self._act = edited, act
 
     def watch_value(self, value: str) -> None:
-        """Search for the new text."""
         self._edited(value)
 
     def action_act(self, what: str) -> None:
-        """Do what a key asks."""
         self._act(what)
 
 
@@ -75,11 +73,9 @@ class PickBar(Lines, can_focus=True):
         self._move, self._act = move, act
 
     def action_move(self, by: int, extend: bool) -> None:
-        """Move by lines."""
         self._move(by, extend)
 
     def action_act(self, what: str) -> None:
-        """Do what a key asks."""
         self._act(what)
 
 

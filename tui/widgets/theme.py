@@ -184,12 +184,10 @@ class SignFilter(LineFilter):
         self.font = signs
 
     def apply(self, segments: list[Segment], background: Color) -> list[Segment]:
-        """Replace the signs of a line."""
         return [Segment(shown_as(text, self.font), style, control) for text, style, control in segments]
 
 
 def ink_of(signs: Signs) -> Ink:
-    """The signs of curves that a terminal can show."""
     return INKS[signs.value]
 
 

@@ -96,7 +96,6 @@ def _aside(text: str, room: int) -> tuple[Span, ...]:
 
 
 def marked(row: Row, sign: str, role: str) -> Row:
-    """A row with a mark in its first cell."""
     (text, plain), *rest = row
     return ((sign, role), (text[1:], plain), *rest)
 
@@ -170,13 +169,11 @@ class Transcript(Lines, can_focus=False):
         self._unshown = self._unshown or bool(new)
 
     def show_new(self) -> None:
-        """Show what was taken in since the last time."""
         if self._unshown:
             self._unshown = False
             self.changed()
 
     def clear(self) -> None:
-        """Forget all records."""
         self.records.clear()
         self.sight.look_end(newest=True)
         self.changed()
@@ -195,7 +192,6 @@ class Transcript(Lines, can_focus=False):
         self.changed()
 
     def look_end(self, newest: bool) -> None:
-        """Go to the newest or to the oldest line."""
         self.sight.look_end(newest)
         self.changed()
 
@@ -210,7 +206,6 @@ class Transcript(Lines, can_focus=False):
         self.changed()
 
     def set_times(self, form: str) -> None:
-        """Show times in another form."""
         self.clocks = self.clocks._replace(form=form)
         self.changed()
 
@@ -223,23 +218,19 @@ class Transcript(Lines, can_focus=False):
             self.changed()
 
     def changed(self) -> None:
-        """Paint again."""
         self._view = None
         self.refresh()
 
     # Painting
 
     def notify_style_update(self) -> None:
-        """Repaint under another theme."""
         super().notify_style_update()
         self._view = None
 
     def on_resize(self, event: events.Resize) -> None:
-        """Wrap again for the new width."""
         self.changed()
 
     def shown(self) -> list[Row]:
-        """The rows in view."""
         return self._rows()
 
     @property
@@ -312,11 +303,9 @@ class Transcript(Lines, can_focus=False):
         return [_ends(left, right, width)]
 
     def on_mouse_scroll_up(self, event: events.MouseScrollUp) -> None:
-        """Scroll up three lines."""
         self.look(-3)
 
     def on_mouse_scroll_down(self, event: events.MouseScrollDown) -> None:
-        """Scroll down three lines."""
         self.look(3)
 
 

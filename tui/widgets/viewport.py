@@ -53,7 +53,6 @@ class Records:
 
     @property
     def first(self) -> int:
-        """The number of the oldest kept record."""
         return self.taken - len(self._kept)
 
     @property
@@ -73,7 +72,6 @@ class Records:
             self._room += len(kept.popleft().text)
 
     def clear(self) -> None:
-        """Forget all records."""
         self._room += sum(len(record.text) for record in self._kept)
         self._kept.clear()
         self.cleared = self.taken
@@ -151,7 +149,6 @@ class Holding:
         self._text, self._records, self._shown = text.casefold(), records, shown
 
     def __call__(self, number: int, record: Record) -> tuple[int, ...]:
-        """Return the numbers of those that hold the text."""
         if self._shown is None:
             return (number,) if self._text in record.text.casefold() else ()
         shown = self._shown(number, record)
@@ -240,7 +237,6 @@ class Sight:
 
     @property
     def below(self) -> int:
-        """The number of shown records below the view."""
         return len(self.numbers) - self.end
 
     def hold(self) -> None:
@@ -286,7 +282,6 @@ class Sight:
             self._stay(place + 1 + self.height // 3)
 
     def show_last(self, number: int) -> None:
-        """Bring a record to the bottom of the view."""
         self._stay(bisect_right(self.numbers, number))
 
     def _stay(self, end: int) -> None:
@@ -311,7 +306,6 @@ class Search:
 
     @property
     def numbers(self) -> Sequence[int]:
-        """The numbers of all records that hold the text."""
         return self._index.numbers if self._index is not None else ()
 
     def find(self, text: str) -> None:
