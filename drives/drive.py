@@ -336,7 +336,8 @@ class Drive:
 
     def start(self, procedure: Procedure[T], on_over: OnOver[T], on_ended: OnEnded | None = None) -> Conversation[T]:
         """Begin a conversation with this drive."""
-        address, *_ = before = (self.address, self.programming, self.codec)
+        state = self.state
+        address, *_ = before = (state.address, state.programming, state.codec)
         commanded = self._neighbours.conversation_begins(self)
 
         def watch(transaction: Transaction) -> None:
@@ -353,7 +354,8 @@ class Drive:
             elif outcome.error is None and self.missing and not self.programming:
                 self.missing = False
                 self._neighbours.replied_again(self)
-            if (self.address, self.programming, self.codec) != before:
+            state = self.state
+            if (state.address, state.programming, state.codec) != before:
                 self.link.publish(Changed(self.link.now(), self.address))
             on_over(outcome)
 

@@ -174,7 +174,7 @@ class EventQueue:
         self._events: deque[BusEvent] = deque()
         self._watchers: tuple[Watcher, ...] = ()
         self._telling = False
-        self._apart = isolated(f"a watcher of {name}")
+        self._isolated = isolated(f"a watcher of {name}")
 
     def watch(self, watcher: Watcher) -> Callable[[], None]:
         self._watchers = (*self._watchers, watcher)
@@ -202,10 +202,12 @@ class EventQueue:
         self._telling = True
         try:
             while self._events:
-                event = self._events.popleft()
-                for watcher in self._watchers:
-                    with self._apart:
-                        watcher(event)
+                event, watchers, over = self._events.popleft(), iter(self._watchers), False
+                while not over:  # after a watcher that fails, the next one
+                    with self._isolated:
+                        for watcher in watchers:
+                            watcher(event)
+                        over = True
         finally:
             self._telling = False
 
@@ -246,7 +248,7 @@ class Witnesses:
 
     def __init__(self, name: str) -> None:
         self._all: tuple[Witness, ...] = ()
-        self._apart = isolated(f"a witness of {name}")
+        self._isolated = isolated(f"a witness of {name}")
 
     def __bool__(self) -> bool:
         return bool(self._all)
@@ -263,5 +265,5 @@ class Witnesses:
     def report(self, concluded: Concluded) -> None:
         """Call each with a conversation that is over."""
         for witness in self._all:
-            with self._apart:
+            with self._isolated:
                 witness(concluded)

@@ -12,7 +12,6 @@ reply.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
 
 from multidrop.dialects import Codec, Kind, Request
 
@@ -58,14 +57,6 @@ LONGEST_TAIL = 4096
 """Longest unsolicited line without an end, in characters; a longer one is published in pieces."""
 
 
-@dataclass(frozen=True)
-class _CutOff:
-    """A PR that a stop interrupted. Of its reply, `received` bytes came before; the rest is not program output."""
-
-    request: Request
-    received: int
-
-
 class Inbox:
     """The buffer of a line. It removes the local echo and sorts out unsolicited lines."""
 
@@ -79,7 +70,8 @@ class Inbox:
         self._begun_at = float("-inf")
         self._tail = b""
         """The beginning of a line that was published before its end came: its check byte covers both parts."""
-        self._cut_off: _CutOff | None = None
+        self._cut_off: tuple[Request, int] | None = None
+        """A PR that a stop interrupted, and how many bytes of its reply came before; the rest is not program output."""
         self._publish = publish
 
     # Bytes
@@ -133,7 +125,7 @@ class Inbox:
         `request` is the one in flight.
         """
         if request is not None and self._can_interrupt(request):
-            self._cut_off = _CutOff(request, len(self.buffer))
+            self._cut_off = request, len(self.buffer)
         elif self._cut_off is None and not self.codec.framed:
             self.buffer = b""
 
@@ -146,7 +138,7 @@ class Inbox:
         """Whether the rest of an interrupted reply is still awaited; remove it once it is whole or overdue."""
         if self._cut_off is None or not self.buffer:
             return False
-        request, received = self._cut_off.request, self._cut_off.received
+        request, received = self._cut_off
         found = request.codec.decode(request, self.buffer)
         if found is None and self.awaits_tail(now):
             return True

@@ -11,7 +11,6 @@ import re
 from collections import deque
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Protocol
 
 from multidrop.dialects.errors import Diagnostic
 from multidrop.dialects.text import visible
@@ -27,22 +26,6 @@ KEPT = 10_000
 """The number of events that are kept of each kind."""
 _FIXED = re.compile(r"[^\d\"'{}\s][^\d\"'{}]*")
 _WAITS = ("/wait", "/sleep")
-
-
-class Line(Protocol):
-    """A line under recording."""
-
-    @property
-    def line(self) -> str:
-        """Its text."""
-
-    @property
-    def at(self) -> float:
-        """The time at which it was typed, s."""
-
-    @property
-    def starts(self) -> bool:
-        """Whether it can start motion or a program."""
 
 
 @dataclass(frozen=True)
@@ -70,7 +53,7 @@ class Observed:
     """Each reading of a velocity: whether it was not 0."""
 
 
-def offers(lines: Sequence[Line], observed: Observed) -> list[Offer]:
+def offers(lines: Sequence[Recorded], observed: Observed) -> list[Offer]:
     found, moved = [], False
     for number, (before, line) in enumerate(zip(lines, lines[1:], strict=False), 2):
         waited = _is_wait(before)
@@ -110,7 +93,7 @@ def _ended_by(begin: float, end: float, moved: bool, observed: Observed) -> str:
     return "/wait stopped" if stood_up or (moved and not readings) else ""
 
 
-def _is_wait(line: Line) -> bool:
+def _is_wait(line: Recorded) -> bool:
     return line.line.split()[:1] in ([word] for word in _WAITS)
 
 

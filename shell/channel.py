@@ -103,9 +103,12 @@ class Channel:
 
     def publish(self, event: SessionEvent) -> None:
         """Pass an event to every subscriber."""
-        for callback in self._callbacks:
+        callbacks, over = iter(self._callbacks), False
+        while not over:  # after a subscriber that fails, the next one
             with self._apart:
-                callback(event)
+                for callback in callbacks:
+                    callback(event)
+                over = True
 
     def output(self, text: str, *, columns: bool = False) -> None:
         """Publish a line of a verb's result. `columns`: a screen breaks it between words."""

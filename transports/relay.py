@@ -21,9 +21,12 @@ import sys
 import time
 from collections.abc import Callable, Iterator
 from enum import IntEnum
-from typing import Protocol
+from typing import TYPE_CHECKING
 
-from multidrop.transports import Endpoint, PortControl, TransportLost
+from multidrop.transports import PortControl, TransportLost
+
+if TYPE_CHECKING:
+    from multidrop.transports.serial_port import SerialEndpoint
 
 WORD = "multidrop-relay"
 VERSION = 1
@@ -117,18 +120,10 @@ _LOOK = 0.002
 """Seconds between two looks at what the driver holds."""
 
 
-class Port(Endpoint, Protocol):
-    """An open port."""
-
-    @property
-    def control(self) -> PortControl:
-        """Its settings."""
-
-
 class Relay:
     """The relay as bytes in and out; `serve` is the loop that waits."""
 
-    def __init__(self, port: Port) -> None:
+    def __init__(self, port: SerialEndpoint) -> None:
         self.port = port
         self.out = bytearray(f"{GREETING}\n".encode())
         """What the reader has not taken yet."""
@@ -240,7 +235,7 @@ def _changed(control: PortControl, setting: int, value: bytes) -> str:
     return ""
 
 
-def serve(port: Port, source: int = 0, sink: int = 1, silence: float = SILENCE) -> None:
+def serve(port: SerialEndpoint, source: int = 0, sink: int = 1, silence: float = SILENCE) -> None:
     """Lend an open port to the other end of these descriptors; return when that end is gone.
 
     Raises TransportLost where the port is lost, or where the input is not that of multidrop. Closes the port.
