@@ -25,7 +25,7 @@ from typing import TYPE_CHECKING
 
 from multidrop.transports import PortControl, TransportLost
 
-if TYPE_CHECKING:
+if TYPE_CHECKING and sys.platform != "win32":
     from multidrop.transports.serial_port import SerialEndpoint
 
 WORD = "multidrop-relay"
