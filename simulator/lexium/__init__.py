@@ -1,5 +1,5 @@
 """The simulated MCode drives: Lexium MDrive, Lexium Motion Module and MDrivePlus.
 
-`state` is what a drive remembers, `motion` what its motor does, `language` what its lines say. `nvm` and `power` keep
-and restart all of it, `event_loop` lets time pass, and `device` puts it together for the `ports`.
+`state` holds memory and runs the program, `motion` is the motor, `power` the supply and the memory that lasts,
+`event_loop` lets time pass, `language` carries out lines, and `device` puts it together for the `ports`.
 """

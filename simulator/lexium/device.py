@@ -80,7 +80,6 @@ class MCodeDevice:
 
     @property
     def boots(self) -> int:
-        """How often it has begun as at power-up."""
         return self._power.boots
 
     @property
@@ -90,7 +89,7 @@ class MCodeDevice:
 
     @property
     def stepping(self) -> bool:
-        """Whether a program is executed step by step, and waits for keys."""
+        """Return whether a program is executed step by step, and waits for keys."""
         return self.core.thread.stepping
 
     @property
@@ -118,11 +117,10 @@ class MCodeDevice:
 
     @property
     def deadline(self) -> float | None:
-        """When something next happens by itself; None if nothing will."""
         return self._loop.deadline
 
     def proceed(self, now: float) -> float | None:
-        """Let time pass up to `now`, or to where there is news; gives when that is, None for nothing."""
+        """Let time pass up to `now`, or to where there is news; return when that is, None for nothing."""
         return self._loop.proceed(now)
 
     def advance(self, now: float, *, program: bool = False) -> None:
@@ -130,7 +128,7 @@ class MCodeDevice:
         self._loop.advance(now, program=program)
 
     def quiet(self, now: float, running: bool) -> bool:
-        """Whether nothing changes up to `now`, if it was `running` before. Quick to ask."""
+        """Return whether nothing changes up to `now`, if it was `running` before. Quick to ask."""
         return self._loop.quiet(now, running)
 
     # Lines.
@@ -170,7 +168,6 @@ class MCodeDevice:
         self.interpreter.refuse(code, handle=self._mode.address is None)
 
     def prints(self) -> list[tuple[float, str]]:
-        """What was printed by itself since this was last asked, with the times."""
         return self.core.printer.take()
 
     # Keys and power.
@@ -210,7 +207,6 @@ class MCodeDevice:
 
 
 def _memory(spec: DriveSpec) -> Memory:
-    """Make the working memory of a drive with this identity."""
     memory, own = Memory(spec.personality), spec.identity
     memory.model = memory.model._replace(
         part=own.part or memory.model.part, version=own.version or memory.model.version

@@ -49,7 +49,7 @@ class EventLoop:
         self._fallen = {PAUSE: self._resume, **jogs}
 
     def proceed(self, now: float) -> float | None:
-        """Let time pass up to `now`, or to where there is news; gives when that is, None for nothing.
+        """Let time pass up to `now`, or to where there is news; return when that is, None for nothing.
 
         News is a print, the start or end of a program, a loss of power, a restart.
         """
@@ -92,7 +92,7 @@ class EventLoop:
         return None if due == inf else max(due, self._timeline.now)
 
     def quiet(self, now: float, running: bool) -> bool:
-        """Whether nothing changes up to `now`, if it was `running` before. Quick to ask.
+        """Return whether nothing changes up to `now`, if it was `running` before. Quick to ask.
 
         It has power and has printed nothing, nothing happens by itself, and its program has neither begun nor ended.
         """
@@ -102,7 +102,7 @@ class EventLoop:
         return thread.running == running and (not thread.live or thread.next_at > now)
 
     def _comes_up(self, now: float) -> bool:
-        """Whether it has booted by now."""
+        """Return whether it has booted by now."""
         boots_at = self.power.boots_at
         if boots_at is None or boots_at > now:
             return False
@@ -111,7 +111,7 @@ class EventLoop:
         return True
 
     def _run(self, now: float, program: bool) -> bool:
-        """Let lines and events take turns up to `now`. Gives whether that was reached."""
+        """Let lines and events take turns up to `now`. Return whether that was reached."""
         timeline = self._timeline
         while not program or self._thread.running:
             if timeline.outdated:
@@ -135,7 +135,7 @@ class EventLoop:
         return self._thread.running, self.power.on, self.power.boots
 
     def _news(self) -> bool:
-        """Whether `proceed` waits for news, and there is some."""
+        """Return whether `proceed` waits for news, and there is some."""
         return self._before is not None and (self._printer.pending or self._state() != self._before)
 
     def _plan(self) -> None:
@@ -144,22 +144,19 @@ class EventLoop:
         self._look()
         now, trips = self._timeline.now, self._motor.trips
         tripped, bit = trips.next(now)
+        wakes_at = inf
+        if self._thread.waits_for_motion:
+            wakes_at = max(self._motor.status.settled_at(), self._thread.next_at)
         self._next = min(
             (tripped, partial(trips.fire, bit) if bit else nothing),
             self._motor.next(now),
-            (self._wakes_at(), self._thread.wake),
+            (wakes_at, self._thread.wake),
             (self._inputs.next_change(now), nothing),
             key=when,
         )
 
-    def _wakes_at(self) -> float:
-        """When the motion is over for which a hold, or the end of the program, waits."""
-        if not self._thread.waits_for_motion:
-            return inf
-        return max(self._motor.status.settled_at(), self._thread.next_at)
-
     def _look(self) -> bool:
-        """Act on inputs that have become active or inactive. Gives whether any has."""
+        """Act on inputs that have become active or inactive. Return whether any has."""
         inputs, motor, now = self._inputs, self._motor, self._timeline.now
         risen, fallen = inputs.refresh(now)
         motor.look(now)

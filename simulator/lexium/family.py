@@ -41,7 +41,7 @@ def read_drive(table: Table, folder: Folder) -> DriveSpec:
     common = common_keys(table, folder)
     personality = common["personality"]
     name = table.text("name", "!")
-    if not _can_be_a_name(name):
+    if not (len(name) == 1 and name.isascii() and (name.isalnum() or name == "!")):
         raise table.wrong("name", f"cannot be {quoted(name)}", "valid: one of a-z, A-Z, 0-9 or !")
     points = MODELS[personality].points
     variables = table.table("variables", "[bus.drive.variables]")
@@ -57,10 +57,6 @@ def read_drive(table: Table, folder: Folder) -> DriveSpec:
         set=read_settings(table.table("set", "set"), _checker(personality)),
         world=read_world(world, points.inputs, points.analog),
     )
-
-
-def _can_be_a_name(name: str) -> bool:
-    return len(name) == 1 and name.isascii() and (name.isalnum() or name == "!")
 
 
 def _can_be_a_variable(personality: str, name: str) -> bool:
@@ -112,7 +108,6 @@ Row = tuple[int, str]
 
 
 def describe(snapshot: Snapshot) -> DriveText:
-    """Make the table of a drive."""
     personality = nearest(snapshot.product)
     readings = [each for each in snapshot.readings.readings if each.name not in KEY_OF]
     users = [each for each in readings if each.section == VARIABLES and lookup(each.name, personality) is None]
@@ -186,7 +181,7 @@ def _settings(readings: list[Reading], personality: str) -> Iterator[Entry]:
 
 
 def _unset(reading: Reading, personality: str) -> bool:
-    """Whether a value shows that nothing was set: a default that cannot be written, and PF, which pads once it is set.
+    """Return whether nothing was set: a default that cannot be written, and PF, which pads once it is set.
 
     A trip without a set-up has the default 0.
     """
@@ -196,7 +191,7 @@ def _unset(reading: Reading, personality: str) -> bool:
 
 
 def _acceptable(reading: Reading, personality: str) -> bool:
-    """Whether the simulated drive takes a number, whatever the unit of motion is."""
+    """Return whether the simulated drive takes a number, whatever the unit of motion is."""
     row = lookup(reading.name, personality)
     if row is None or isinstance(reading.value, (tuple, str)):
         return True

@@ -35,7 +35,7 @@ class Nvm:
 
     @property
     def locked(self) -> bool:
-        """Whether a lock (LK) has been saved."""
+        """Return whether a lock (LK) has been saved."""
         return bool(self.store.values.get("LK"))
 
     def save(self) -> None:
@@ -62,7 +62,6 @@ class Nvm:
         self.store = fresh
 
     def keep(self) -> None:
-        """Copy everything that lasts to NVM."""
         store = self.store
         self._memory.save(store)
         store.inputs, store.outputs = dict(self._motor.inputs.types), dict(self._outputs.types)
@@ -105,7 +104,7 @@ class Power:
 
     @property
     def on(self) -> bool:
-        """Whether it has power, and is up."""
+        """Return whether it has power, and is up."""
         return self._motor.bridges.powered
 
     def switch(self, on: bool) -> None:
@@ -128,7 +127,6 @@ class Power:
         self.boots_at = self._timeline.now + ETHERNET_BOOT
 
     def come_up(self) -> None:
-        """Begin with power: the drive has booted."""
         self._motor.bridges.powered, self.boots_at = True, None
         self.boots += 1
         self.boot()

@@ -137,7 +137,7 @@ class ProgramRun:
         yield from self._execute(until)
 
     def refusals(self) -> Iterator[Failed]:
-        """Load the file without running it; give the refused lines. A refused PG counts as PG 1."""
+        """Load the file without running it; return the refused lines. A refused PG counts as PG 1."""
         return (each for each in self._load(anywhere=True) if isinstance(each, Failed))
 
     # Loading.
@@ -345,7 +345,6 @@ def _statement(text: str) -> Statement | None:
 
 
 def _too_big(line: ProgramLine, lines: Sequence[ProgramLine], personality: str) -> Problem:
-    """The first line that has no room in the drive."""
     inside = [each for each in lines if each.section == "program" and each.mark is None]
     size = sum(size_of(statement, personality) for each in inside if (statement := _statement(each.text)) is not None)
     what = f"program too big: {len(inside)} lines take {size} bytes, the drive holds {SPACE}"

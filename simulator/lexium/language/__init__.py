@@ -1,1 +1,1 @@
-"""The MCode language of a simulated drive: lines compiled to closures, and the interpreter that runs them."""
+"""The MCode language of a simulated drive: lines compiled to closures."""

@@ -51,7 +51,7 @@ class Instructions:
         }
 
     def reader(self, word: str) -> Read | None:
-        """A closure that gives a variable's value; None for a name that is not a variable, now or in the program."""
+        """Return a closure that reads a variable; None for a name that is no variable, now or in the program."""
         if self._memory.row(word) is None and not self._variables.declared(word):
             return None
         try:
@@ -60,13 +60,15 @@ class Instructions:
             return None
 
     def compile(self, statement: Statement, stored: bool) -> Action:
-        """A closure that carries a line out; `stored`: it is a program's. Raises Fault for what cannot stand there."""
+        """Return a closure that carries a line out; `stored`: it is a program's. Raises Fault for a wrong line."""
         word = statement.word
         if not word:
             return self.motions.counted(word, self._programs.number(statement))
         row = self._memory.row(word)
         if row is None:
-            return self._user_variable(statement)
+            if not self._variables.declared(word) and word not in self._program.labels:
+                raise Fault(E.UNKNOWN_VARIABLE if statement.equals else E.UNKNOWN_COMMAND)
+            return self._assignment(statement)
         if row.kind in ("math", "reserved"):
             illegal = row.kind == "reserved" and statement.arguments
             raise Fault(E.ILLEGAL_DATA if illegal else E.UNKNOWN_COMMAND)
@@ -91,12 +93,6 @@ class Instructions:
                 raise Fault(code, fatal)
 
             return refuse
-
-    def _user_variable(self, statement: Statement) -> Action:
-        word = statement.word
-        if not self._variables.declared(word) and word not in self._program.labels:
-            raise Fault(E.UNKNOWN_VARIABLE if statement.equals else E.UNKNOWN_COMMAND)
-        return self._assignment(statement)
 
     def _assignment(self, statement: Statement) -> Action:
         """`VM=5` or `VM 5`, and what is computed."""

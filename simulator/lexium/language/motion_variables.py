@@ -28,7 +28,6 @@ class MotionVariables:
         self._memory, self._values, self._timeline, self._motor = core.memory, core.values, core.timeline, motor
 
     def readers(self) -> dict[str, Read]:
-        """By word."""
         motor, timeline = self._motor, self._timeline
         counters, status, hmt = motor.counters, motor.status, motor.hmt
         return {
@@ -48,7 +47,6 @@ class MotionVariables:
         }
 
     def writers(self) -> dict[str, Write]:
-        """By word."""
         return {
             "VI": self._write_vi,
             "VM": self._write_vm,

@@ -39,7 +39,6 @@ class MotorCommands:
         self.begun = 0
 
     def commands(self) -> Mapping[str, Compile]:
-        """By word."""
         moves = {"MA": self._move, "MR": self._move, "SL": self._slew, "SC": self._test}
         homings = dict.fromkeys(("HM", "HI", "HF"), self._home)
         return {
@@ -145,7 +144,6 @@ class Setups:
         self._points = core.model.points
 
     def commands(self) -> Mapping[str, Compile]:
-        """By word."""
         return {
             "DN": self._device_name,
             "IS": self._input,

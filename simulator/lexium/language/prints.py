@@ -178,7 +178,6 @@ class Prints:
         return [f"{word} = {n}, {_fields(each)}" for n, each in rows.items()]
 
     def _point(self, n: int) -> str:
-        """PR S<n>."""
         return _fields(self._motor.inputs.types[n])
 
     def _trip(self, word: str) -> str:

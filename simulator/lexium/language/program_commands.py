@@ -40,7 +40,6 @@ class ProgramCommands:
         self._variables, self._motor, self._nvm = variables, motor, nvm
 
     def commands(self) -> Mapping[str, Compile]:
-        """By word."""
         return {
             "E": bare(self._end),
             "RT": bare(self._thread.give_back),

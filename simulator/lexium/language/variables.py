@@ -34,7 +34,6 @@ Compile = Callable[[Statement], Action]
 
 
 def is_place(argument: Argument | None) -> bool:
-    """Whether an argument can be a label or an address."""
     return isinstance(argument, (Name, Number))
 
 
@@ -136,7 +135,6 @@ class Variables:
         }
 
     def reader(self, word: str) -> Read:
-        """A closure that gives a variable's value."""
         row = self._memory.row(word)
         if row is not None and word in self._readers:
             return self._readers[word]
@@ -155,7 +153,7 @@ class Variables:
         return read
 
     def writer(self, word: str) -> Write:
-        """A closure that gives a variable a value, or raises Fault."""
+        """Return a closure that writes a variable, or raises Fault."""
         row = self._memory.row(word)
         if row is None:
             return self._user_writer(word)
@@ -170,7 +168,7 @@ class Variables:
         return self._plain_writer(row)
 
     def value(self, argument: Argument | None, floating: bool = False) -> Read:
-        """A closure that gives an argument's value. Raises Fault (21, 24) for what has none."""
+        """Return a closure that reads an argument's value. Raises Fault (21, 24) for what has none."""
         if isinstance(argument, Text):
             raise Fault(E.OUT_OF_RANGE)
         if argument is None or isinstance(argument, Compare):
@@ -180,7 +178,7 @@ class Variables:
         return compile_value(argument, self.reader, floating)
 
     def numbers(self, statement: Statement, least: int, most: int) -> Callable[[], list[int]]:
-        """A closure that gives all arguments as whole numbers. Raises Fault (24, 34, 38)."""
+        """Return a closure that reads all arguments as whole numbers. Raises Fault (24, 34, 38)."""
         count = len(statement.arguments)
         if not count:
             raise missing(statement)
@@ -192,7 +190,7 @@ class Variables:
         return lambda: [whole(read()) for read in reads]
 
     def declared(self, word: str) -> bool:
-        """Whether a user variable is there, or will be once the program has run its VA line."""
+        """Return whether a user variable is there, or will be once the program has run its VA line."""
         return word in self._memory.scopes or word in self._program.declared
 
     def _user_writer(self, word: str) -> Write:

@@ -37,12 +37,11 @@ class Bridges:
 
     @property
     def enabled(self) -> bool:
-        """DE."""
         return bool(self._values["DE"])
 
     @property
     def driving(self) -> bool:
-        """Whether they can turn the motor: enabled, supplied, and not switched off by a locked rotor."""
+        """Return whether they can turn the motor: enabled, supplied, and not switched off by a locked rotor."""
         return bool(self._values["DE"]) and self.supply and not self.locked
 
     def check(self) -> None:
@@ -90,7 +89,6 @@ class Backlash:
         self.added = 0
 
     def convert(self, ratio: float) -> None:
-        """Convert what was added to another unit of commands."""
         self.added = round(self.added * ratio)
 
     def plan(self, distance: int, absolute: bool) -> tuple[int, int]:
@@ -125,7 +123,7 @@ class Supervisor(Protocol):
 
     @property
     def homing_active(self) -> bool:
-        """Whether a homing is under way, which other motions have to wait for."""
+        """Return whether a homing is under way, which other motions have to wait for."""
 
     def refuse(self, t: float, direction: float) -> int:
         """The code of what forbids a motion in a direction, or 0."""
@@ -164,7 +162,7 @@ class Axis:
         return self.profile.position(t)
 
     def commanded(self, t: float) -> bool:
-        """Whether a motion is under way, or is being worked out and about to begin."""
+        """Return whether a motion is under way, or is being worked out and about to begin."""
         return t < self.profile.end
 
     def heading(self, t: float) -> float:
@@ -173,7 +171,7 @@ class Axis:
         return profile.velocity(t) if t >= profile.start else profile.target - profile.origin
 
     def at_rest(self, t: float) -> bool:
-        """Whether no motion is commanded."""
+        """Return whether no motion is commanded."""
         return not self.commanded(t) and not self._supervisor.homing_active
 
     def direction(self, t: float) -> float:
@@ -317,7 +315,6 @@ class Axis:
         return (SLEW, 0.0) if self.kind == SLEW else (self.kind, self.profile.target)
 
     def _take_up(self, kind: str, value: float, t: float) -> None:
-        """Go on with what was paused."""
         here, now = self.profile.position(t), self.profile.velocity(t)
         if kind == SLEW:
             self.slow_to(value, t)
@@ -382,7 +379,6 @@ class Axis:
     # What a motor step and an encoder count are: EE, AS, MS, SA, EL, RD. The rotor stays where it is.
 
     def set_counter(self, name: str, value: int, t: float) -> None:
-        """Make a counter read `value` now."""
         self.counters.set(name, value, t)
         if name == self.counters.source:
             self.backlash.forget()
@@ -423,7 +419,7 @@ class MotionStatus:
         return round(self._rotor.velocity(t)) if self._values.get("AS") else 0
 
     def moving(self, t: float) -> bool:
-        """Whether pulses are put out, or about to be; those of make-up are some too."""
+        """Return whether pulses are put out, or about to be; those of make-up are some too."""
         if t < self._axis.profile.end or self._supervisor.homing_active:
             return True
         return self._rotor.state == CATCHING and t < self._rotor.caught_up_at()

@@ -10,7 +10,6 @@ from __future__ import annotations
 from math import floor, inf, nextafter
 
 from multidrop.dialects.mcode.manual.errors import ErrorNumber as E
-from multidrop.simulator.kinematics.profile import Profile
 from multidrop.simulator.lexium.motion.inputs import MINUS, PLUS
 from multidrop.simulator.lexium.motion.rotor import TOUCH, Rotor
 from multidrop.simulator.lexium.state.expressions import wrap
@@ -34,7 +33,6 @@ class Counters:
         return "C2" if self._memory.counting else "C1"
 
     def value(self, name: str, t: float) -> int:
-        """C1 or C2."""
         return wrap(self.raw(name, t) + self._offsets[name])
 
     def position(self, t: float) -> int:
@@ -42,7 +40,6 @@ class Counters:
         return self.value(self.source, t)
 
     def set(self, name: str, value: int, t: float) -> None:
-        """Make a counter read `value` now."""
         self._offsets[name] += value - self.value(name, t)
 
     def raw(self, name: str, t: float) -> int:
@@ -54,7 +51,6 @@ class Counters:
         self._base = (self._rotor.position(t), self._counts(t))
 
     def restart(self, t: float) -> None:
-        """Begin again at 0."""
         self._base = (self._rotor.position(t), 0.0)
         for name in self._offsets:
             self.set(name, 0, t)
@@ -62,11 +58,9 @@ class Counters:
     # Where P is, in motor steps since power-up.
 
     def place(self, t: float) -> float:
-        """Where P is."""
         return self._rotor.position(t) if self._memory.counting else self._rotor.command.position(t)
 
     def place_of(self, value: float) -> float:
-        """Where P reads a value."""
         return self.place_of_raw(value - self._offsets[self.source])
 
     def place_of_raw(self, raw: float) -> float:
@@ -84,7 +78,7 @@ class Counters:
 
     def passing(self, place: float, t: float, direction: float = 0.0) -> float:
         """The first time from t on at which P passes a place, in a direction if one is given; infinite: never."""
-        profile, shift = self._path
+        profile, shift = self._rotor.path if self._memory.counting else (self._rotor.command, 0.0)
         if profile.end <= t:
             return inf
         found = profile.crossing(place - shift, t, direction)
@@ -100,11 +94,6 @@ class Counters:
     def stator_shift(self, t: float) -> float:
         """By how much the command is ahead of the counter that P is, steps."""
         return self._rotor.command.position(t) - self._rotor.position(t) if self._memory.counting else 0.0
-
-    @property
-    def _path(self) -> tuple[Profile, float]:
-        """The profile that P follows, and what is added to that."""
-        return self._rotor.path if self._memory.counting else (self._rotor.command, 0.0)
 
     def _counts(self, t: float) -> float:
         steps, counts = self._base

@@ -35,7 +35,7 @@ class Encoder:
 
     @property
     def watching(self) -> bool:
-        """Whether they are in force."""
+        """Return whether they are in force."""
         values = self._values
         return bool(values.get("EE") and not values.get("AS") and self._axis.bridges.driving)
 
@@ -44,7 +44,6 @@ class Encoder:
         return self._axis.position(t) - self._axis.aligned - self._axis.rotor.position(t)
 
     def restart(self) -> None:
-        """Forget what was going on."""
         self._stalled, self._check_at = False, inf
 
     def begin(self) -> None:
@@ -68,7 +67,6 @@ class Encoder:
             self._check_at = t + self._values["MT"] / 1000
 
     def look(self, t: float) -> None:
-        """See a rotor that was pushed, or is free again."""
         if not self.watching:
             return
         if abs(self.error(t)) < self._stall_at - TOUCH:

@@ -46,7 +46,7 @@ class Heat:
         return values["RC"] * share if t < self.holds_at() else float(values["HC"])
 
     def holding(self, t: float) -> bool:
-        """Whether the current is the holding one."""
+        """Return whether the current is the holding one."""
         return self._bridges.driving and not self._torque.active and t >= self.holds_at()
 
     def holds_at(self) -> float:
@@ -66,7 +66,6 @@ class Heat:
         return AMBIENT + (self.bridge(t) - AMBIENT) / 2
 
     def look(self, t: float) -> None:
-        """Follow the current, which may have changed."""
         towards = AMBIENT + RISE * (self.current(t) / 100) ** 2 * (1 + self._world.load)
         if towards != self._towards:
             self._was, self._since, self._towards = self.bridge(t), t, towards

@@ -48,7 +48,7 @@ class Torque:
         self._timeline.replan()
 
     def halt(self) -> bool:
-        """Slow down and stand, in torque mode. Gives whether the drive is in that mode."""
+        """Slow down and stand, in torque mode. Return whether the drive is in that mode."""
         if not self.active:
             return False
         self.halted = True
@@ -60,12 +60,12 @@ class Torque:
         self._timeline.replan()
 
     def turn(self, t: float) -> bool:
-        """Turn as TS and TD say, or stand while halted or at a limit. Gives whether something holds the rotor."""
+        """Turn as TS and TD say, or stand while halted or at a limit. Return whether something holds the rotor."""
         values, axis = self._values, self._axis
         direction = 1.0 if values["TD"] else -1.0
         free = self._axis.bridges.driving and not self.halted and not self._limits.refuse(t, direction)
         speed = float(values["TS"]) if free else 0.0
-        if speed and self._held(direction):
+        if speed and (axis.rotor.holds(direction) or values["TQ"] <= 100 * self._world.load):
             if axis.profile.moving(t) and axis.profile.velocity(t) * direction >= 0:
                 axis.begin(TORQUE, halt(t, axis.position(t)), t)
                 self._timeline.replan()
@@ -76,9 +76,6 @@ class Torque:
             axis.slow_to(wanted, t, kind=TORQUE)
             self._timeline.replan()
         return False
-
-    def _held(self, direction: float) -> bool:
-        return self._axis.rotor.holds(direction) or self._values["TQ"] <= 100 * self._world.load
 
 
 CALIBRATION = 0.02
@@ -113,12 +110,12 @@ class Hmt:
 
     @property
     def closed(self) -> bool:
-        """Whether the rotor is kept track of."""
+        """Return whether the rotor is kept track of."""
         return self.mode in (FIXED, VARIABLE) and self._bridges.driving
 
     @property
     def calibrating(self) -> bool:
-        """Whether no move may be made yet (88)."""
+        """Return whether no move may be made yet (88)."""
         return self._ready_at < inf
 
     def lag(self, t: float) -> int:
@@ -218,7 +215,6 @@ class Hmt:
     # What happens.
 
     def restart(self) -> None:
-        """Begin at power-up, calibrated already."""
         self._ready_at = self._held_since = inf
         self._failed = self._zero = self._active = self._bridges.locked = self._torque.halted = False
         self._reported.clear()
@@ -230,7 +226,6 @@ class Hmt:
             self._interpreter.raise_error(E.LEAD_LAG_LEFT)
 
     def look(self, t: float) -> None:
-        """See where the rotor is."""
         if self._torque.active:
             self._note_held(self._torque.turn(t), t)
         elif self.mode:

@@ -77,7 +77,7 @@ class Homing:
         return {direction} if blocked else set()
 
     def again(self) -> Callable[[float], None] | None:
-        """A closure that goes on with the homing that is under way (PS, RS); None if there is none."""
+        """Return a closure that goes on with the homing that is under way (PS, RS); None if there is none."""
         if not self.phase:
             return None
         word, directions, met = self._word, self._directions, self._met
@@ -123,7 +123,6 @@ class Homing:
             self._finish(t)
 
     def arrive(self, t: float) -> None:
-        """Go on with the next phase: the motor has stopped."""
         if self.phase == TURN:
             self._seek(-self._directions[0], t)
         elif self.phase == BRAKE:
@@ -140,7 +139,7 @@ class Homing:
             self._approach(t)
 
     def limit(self, direction: int, t: float) -> bool:
-        """Act on a limit that is met. Gives whether that was all there is to do."""
+        """Act on a limit that is met. Return whether that was all there is to do."""
         if not self.phase:
             return False
         mode = self._values["LM"]
@@ -232,7 +231,6 @@ class LimitStop:
         self._barred = 0
 
     def next(self, t: float) -> Event:
-        """When P next passes a software limit on its way out."""
         at, direction = self._limits.next_passed(t)
         return at, lambda at: self.reach(direction, at)
 
@@ -251,7 +249,7 @@ class LimitStop:
         self._report(direction)
 
     def bars(self, t: float, steps: int) -> bool:
-        """Whether an active limit keeps steps of a clock from being made; the first of them is the error."""
+        """Return whether an active limit keeps steps of a clock from being made; the first of them is the error."""
         code = self._limits.refuse(t, steps)
         if code and code != self._barred:
             self._report(1 if steps > 0 else -1)

@@ -54,11 +54,9 @@ class Inputs:
         self.defaults()
 
     def defaults(self) -> None:
-        """Set every input up as from the factory."""
         self.types = dict(self.points.fresh)
 
     def restore(self, types: Mapping[int, tuple[int, ...]]) -> None:
-        """Take back what NVM keeps."""
         self.defaults()
         self.types.update(types)
 
@@ -76,25 +74,16 @@ class Inputs:
             raise Fault(E.OUT_OF_RANGE)
         if kind not in self.points.input_types[n]:
             raise Fault(E.WRONG_POINT_TYPE)
-        if self._taken(kind, n):
+        clocks = self.points.clock_types
+        several = kind in (GENERAL, *clocks)
+        if not several and any(self.types[k][0] == kind for k in self.numbers if k != n):
             raise Fault(E.TYPE_IN_USE)
         self.types[n] = (kind, active)
-        if n in self.points.clocks:
-            self._pair(n, kind)
-
-    def _taken(self, kind: int, n: int) -> bool:
-        """Whether another input has a type that only one may have."""
-        several = kind in (GENERAL, *self.points.clock_types)
-        return not several and any(self.types[k][0] == kind for k in self.numbers if k != n)
-
-    def _pair(self, n: int, kind: int) -> None:
-        """Give both inputs of a clock one type; free the other input of a pair that is no longer a clock."""
-        clocks, other = self.points.clock_types, sum(self.points.clocks) - n
-        was, active = self.types[other][:2]
-        if kind in clocks:
-            self.types[other] = (kind, active)
-        elif was in clocks:
-            self.types[other] = (GENERAL, active)
+        if n in self.points.clocks:  # both inputs of a clock have one type; the other of a former clock becomes free
+            other = sum(self.points.clocks) - n
+            was, level = self.types[other][:2]
+            if kind in clocks or was in clocks:
+                self.types[other] = (kind if kind in clocks else GENERAL, level)
 
     def active(self, n: int) -> bool:
         """I<n>: active, filtered."""
@@ -102,11 +91,9 @@ class Inputs:
         return self._active.get(n, False) if level is None else level == self.types[n][1]
 
     def active_types(self) -> list[int]:
-        """The types of the inputs that are active."""
         return [self.types[n][0] for n in self.numbers if self._active.get(n)]
 
     def has(self, kind: int) -> bool:
-        """Whether an input is set up for a type."""
         return any(self.types[n][0] == kind for n in self.numbers)
 
     def wants(self, kind: int) -> int:
@@ -132,7 +119,6 @@ class Inputs:
             self._active[n] = level == self.types[n][1]
 
     def refresh(self, t: float) -> Filtered:
-        """Look at the levels."""
         self._settle_analog(t)
         risen: list[int] = []
         fallen: list[int] = []

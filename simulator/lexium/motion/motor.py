@@ -58,11 +58,9 @@ class Motor:
 
     @property
     def homing_active(self) -> bool:
-        """Whether a homing is under way, which other motions have to wait for."""
         return self.homing.phase != ""
 
     def refuse(self, t: float, direction: float) -> int:
-        """The code of what forbids a motion in a direction, or 0."""
         if self.hmt.calibrating or (self.axis.kind == TEST and self.axis.profile.moving(t)):
             return E.MOVE_WHILE_CALIBRATING
         return E.HOMING_OR_MOVING if self.torque.active else self.limits.refuse(t, direction)
@@ -76,7 +74,6 @@ class Motor:
     # What happens.
 
     def next(self, t: float) -> Event:
-        """What happens next."""
         axis = self.axis
         return min(
             self.limit_stop.next(t),
@@ -111,7 +108,7 @@ class Motor:
             switches.update([DIRECTIONS[kind] for kind in self.inputs.active_types() if kind in DIRECTIONS])
 
     def input_changed(self, kind: int, active: bool, t: float) -> None:
-        """Act on an input of a type that is a matter of motion."""
+        """Act on an input of a type that acts on motion."""
         if kind == HOME:
             self.homing.home(active, t)
         elif kind in DIRECTIONS and active and not self._memory.values.get("CM"):
@@ -120,7 +117,6 @@ class Motor:
     # What is commanded.
 
     def stop(self, t: float) -> None:
-        """Stand at once, whatever it was doing."""
         self.homing.cancel()
         self.axis.stop(t)
         self.encoder.begin()
@@ -237,7 +233,6 @@ class Motor:
         self.hmt.tune()
 
     def restart(self, t: float) -> None:
-        """Begin at power-up or reset."""
         self.homing.cancel()
         self.encoder.restart()
         self.hmt.restart()

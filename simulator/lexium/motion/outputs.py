@@ -1,7 +1,7 @@
 """Outputs of a simulated MCode drive: their set-up, and what makes each of them active.
 
 A program drives an output of type 16. Any other one follows the drive's own state, worked out when it is read.
-Active is a matter of the program, the level one of the wiring: the third number of OS says which level is active.
+Active is set by the program, the level by the wiring: the third number of OS says which level is active.
 The trip output (28, output 3 only) gives a pulse as long as CW says. Manual 3.4.3, 5.1.5, 5.1.24, 5.1.90 to 5.1.94.
 
 Of the events of AO the manual's text has lost the table. Known are 1 (error), 4 and 8 (lead and lag limit), 512 (hold
@@ -31,7 +31,7 @@ PULSE_UNIT = 50e-9
 """What CW counts, s."""
 
 State = Callable[[float], bool]
-"""Whether an output is active at a time."""
+"""True while an output is active; takes the time."""
 
 
 class Outputs:
@@ -65,23 +65,14 @@ class Outputs:
         kind, active = (*rest, 0)[:2] if rest else (-1, 0)
         if len(rest) > 2 or active not in (0, 1):
             raise Fault(E.OUT_OF_RANGE)
-        if not self._fits(kind, n):
+        if kind not in self._points.output_types[n] or (kind in HMT_TYPES and "AS" not in self._values):
             raise Fault(E.WRONG_POINT_TYPE)
-        if self._taken(kind, n):
+        several = kind in (GENERAL, *CLOCK_TYPES)
+        if not several and any(kind == self.types[k][0] for k in self.types if k != n):
             raise Fault(E.TYPE_IN_USE)
         self.types[n] = (kind, 0 if kind == TRIP else active)
 
-    def _fits(self, kind: int, n: int) -> bool:
-        """Whether an output takes a type on this product."""
-        return kind in self._points.output_types[n] and (kind not in HMT_TYPES or "AS" in self._values)
-
-    def _taken(self, kind: int, n: int) -> bool:
-        """Whether another output has a type that only one may have."""
-        several = kind in (GENERAL, *CLOCK_TYPES)
-        return not several and any(kind == self.types[k][0] for k in self.types if k != n)
-
     def release(self, n: int) -> None:
-        """Make a point of an MDrivePlus an input."""
         if n in self.types:
             self.types[n] = (NOT_ONE, 0)
 
@@ -100,14 +91,13 @@ class Outputs:
             self.driven[n] = value >> place & 1
 
     def active(self, n: int, t: float) -> bool:
-        """Whether an output is active at a time not before the last one."""
+        """Return whether an output is active at a time not before the last one."""
         kind = self.types[n][0]
         if kind == GENERAL:
             return bool(self.driven[n])
         return kind in self._states and self._states[kind](t)
 
     def put_out(self, n: int) -> int | None:
-        """The level of a point that is an output, now; None for an input."""
         if not self._points.shared or self.types.get(n, (NOT_ONE,))[0] == NOT_ONE:
             return None
         return self.level(n, self._timeline.now)

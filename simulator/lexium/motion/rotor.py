@@ -37,7 +37,6 @@ class WorldFrame:
 
     @property
     def turn(self) -> float:
-        """Motor steps in a turn."""
         return REVOLUTION / abs(self._rate)
 
     def orient(self, here: float, steps_per_turn: float, reverse: bool) -> None:
@@ -81,7 +80,6 @@ class WorldFrame:
         return (self._world.stall_at - self._origin) / self._rate, copysign(1.0, self._side * self._rate)
 
     def pushed(self, steps: float, here: float) -> float:
-        """A push by the world's steps, which ends at the wall, in the axis's."""
         if self._world.stall_at is not None:
             room = (self._world.stall_at - self.physical(here)) * self._side
             steps = steps if steps * self._side <= room else room * self._side
@@ -139,7 +137,7 @@ class Rotor:
         return self.frame.next_switch(*self.path, t)
 
     def holds(self, direction: float) -> bool:
-        """Whether it is at rest and cannot turn in a direction."""
+        """Return whether it is at rest and cannot turn in a direction."""
         if self.state != STANDING:
             return False
         wall = self.frame.wall()
@@ -182,11 +180,10 @@ class Rotor:
 
     @property
     def pushed(self) -> bool:
-        """Whether hands have pushed it since the last look."""
         return self.world.pushed != self._seen
 
     def look(self, t: float, driven: bool, coasts: bool = False) -> bool:
-        """See whether hands have pushed it, taken hold of it or released it. Gives whether it was pushed.
+        """See whether hands have pushed it, taken hold of it or released it. Return whether it was pushed.
 
         `coasts`: no current turns it, while the command may go on.
         """

@@ -35,11 +35,9 @@ class Trips:
 
     @property
     def armed(self) -> int:
-        """The bits of TE."""
         return int(self._values["TE"])
 
     def clear(self) -> None:
-        """Forget every trip."""
         self.defined.clear()
         self._values["TE"] = 0
 
@@ -113,11 +111,10 @@ class Trips:
 
     @property
     def _on_steps(self) -> bool:
-        """Whether TP is in motor steps while P is not."""
+        """Return whether TP is in motor steps while P is not."""
         return self._memory.model.trips_on_steps and self._memory.counting
 
     def input(self, n: int, t: float) -> None:
-        """Act on an input that has become active."""
         armed, inputs = self.armed, self._inputs
         if armed & INPUT and self.defined[INPUT].value == n:
             self.fire(INPUT, t)
@@ -125,14 +122,13 @@ class Trips:
             self.fire(CAPTURE, t)
 
     def hmt(self, bits: int, t: float) -> bool:
-        """Act on something in hMT (bits of TA). Gives whether a trip waited for it."""
+        """Act on something in hMT (bits of TA). Return whether a trip waited for it."""
         if not self.armed & HMT or not self.defined[HMT].value & bits:
             return False
         self.fire(HMT, t)
         return True
 
     def power_lost(self, t: float) -> None:
-        """Act on the loss of +V."""
         if self.armed & POWER:
             self.fire(POWER, t)
 

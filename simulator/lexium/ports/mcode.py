@@ -76,11 +76,9 @@ class MCodePort:
 
     @property
     def deadline(self) -> float | None:
-        """Time of the device's next event, s."""
         return self._device.deadline
 
     def quiet(self, now: float) -> bool:
-        """See `wire.Port`."""
         device = self._device
         same = self._powered and self._boots == device.boots
         return same and not self._replier.queue and device.quiet(now, self._running)
@@ -111,11 +109,11 @@ class MCodePort:
         self._replier.collect(self._last)
 
     def advance(self, now: float) -> bytes:
-        """Give what the drive has sent up to `now`, since it was last asked."""
+        """Return what the drive has sent up to `now`, since it was last asked."""
         return b"".join(each.data for each in self.sent(now))
 
     def sent(self, now: float) -> list[Transmission]:
-        """Give the same as transmissions; other drives overhear prints in party mode."""
+        """Return the same as transmissions; other drives overhear prints in party mode."""
         self._settle(now)
         return self._replier.take()
 
@@ -171,7 +169,7 @@ class MCodePort:
     # -- bytes --------------------------------------------------------------------------------------
 
     def _take(self, data: bytes, at: int, now: float) -> int:
-        """Take one byte, or the text of a line up to the next key; give the place of the next byte."""
+        """Take one byte, or the text of a line up to the next key; return the place of the next byte."""
         if self._line is not None and (plain := PLAIN.match(data, at)) is not None:
             self._before = data[plain.end() - 1]
             self._on_text(self._line, plain[0], now)

@@ -51,7 +51,7 @@ class ModbusPort:
         self._begun = bytearray()
 
     def receive(self, data: bytes, now: float) -> bytes:
-        """Take bytes; give the replies to the messages that they complete."""
+        """Take bytes; return the replies to the messages that they complete."""
         if not self._drive.powered:
             self._drive.advance(now)
         if not self._drive.powered:

@@ -109,7 +109,6 @@ class Registers:
         return [active.get(n, False) for n in range(start + 1, start + count + 1)]
 
     def write_coil(self, address: int, on: bool, now: float) -> None:
-        """Switch one output."""
         if not address < OUTPUTS:
             raise Refusal(ILLEGAL_ADDRESS)
         self.carry_out(f"O{address + 1}={int(on)}", now)
@@ -124,7 +123,8 @@ class Registers:
         if name not in READ_BY_NAME:
             raise Refusal(ILLEGAL_VALUE)
         if name in POINT_OF:
-            return self._point(POINT_OF[name], now)
+            self._drive.advance(now)
+            return ", ".join(str(each) for each in (*self._inputs.types[POINT_OF[name]], 0)[:3])
         if name == "TR" and RELATIVE not in self._trips.defined:
             return "0, 0, 0"
         return CRLF.join(self.carry_out(f"PR {name}", now).lines)[:LONGEST_TEXT]
@@ -141,14 +141,9 @@ class Registers:
             name, text = "IS", f"={POINT_OF[name]},{kind},{active}".removesuffix(",")
         self.carry_out(f"{name}{text}" if text.startswith("=") else f"{name} {text}", now)
 
-    def _point(self, n: int, now: float) -> str:
-        self._drive.advance(now)
-        return ", ".join(str(each) for each in (*self._inputs.types[n], 0)[:3])
-
     # What no line gives.
 
     def set_torque_speed(self, speed: int) -> None:
-        """Set TS, steps/s."""
         self._torque.set_speed(speed)
 
     def trip(self, now: float) -> int:
@@ -167,7 +162,7 @@ class Registers:
     # Lines.
 
     def text(self, word: str, now: float) -> str:
-        """Give the first line that PR prints of a word."""
+        """Return the first line that PR prints of a word."""
         return self.carry_out(f"PR {word}", now).lines[0]
 
     def carry_out(self, line: str, now: float) -> Answer:

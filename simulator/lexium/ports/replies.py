@@ -119,7 +119,6 @@ class Replier:
         self._begun = b""
 
     def mode(self) -> Mode:
-        """The settings under which a line begins now."""
         memory, serial = self._memory, self._serial
         return Mode(memory.echo_mode, serial and memory.party, memory.checksum if serial else 0, memory.name)
 
@@ -136,7 +135,6 @@ class Replier:
         line.mine = False
 
     def carry_out(self, line: Line, now: float) -> None:
-        """Carry out a complete line, and reply."""
         device, memory, mode = self._device, self._memory, line.mode
         command, sound = split(line)
         before, busy, flagged = memory.checksum, device.running, memory.answers_by_nak
@@ -171,7 +169,6 @@ class Replier:
             self.send(now, CRLF + self._prompt().encode())
 
     def escaped(self, now: float) -> None:
-        """Reply to ESC."""
         echo = self._memory.echo_mode
         if echo == 0:
             self.send(now, b"#" + CRLF + self._prompt().encode())
@@ -179,13 +176,11 @@ class Replier:
             self.send(now, CRLF)
 
     def send(self, at: float, data: bytes, *, overheard: bool = False) -> None:
-        """Send bytes."""
         if data:
             self.queue.append(Transmission(at, data, overheard))
             self._busy_until = max(self._busy_until, at) + len(data) * self._byte_time
 
     def take(self) -> list[Transmission]:
-        """Take what there is to send."""
         queue, self.queue = self.queue, []
         return queue
 

@@ -1,1 +1,1 @@
-"""What a simulated drive remembers: variables, program memory, its error, its time, what it has printed."""
+"""The memory of a simulated drive, its virtual time, and the interpreter of its program."""

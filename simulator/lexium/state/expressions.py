@@ -2,7 +2,7 @@
 
 Whole numbers are 32 bits wide: results wrap around, division drops the fraction (toward zero). An expression is
 carried out in double precision if it holds an F register, a number with a point or a function, or if its result goes
-to an F register. Operators have no precedence; how a condition is read is the parser's matter. Manual 5.1.43, 5.2.
+to an F register. Operators have no precedence; the parser reads conditions. Manual 5.1.43, 5.2.
 """
 
 from __future__ import annotations
@@ -82,7 +82,7 @@ _PLAIN: Mapping[str, Callable[[float], float]] = {
 
 
 def is_floating(expression: Expression) -> bool:
-    """Whether an expression needs double precision by itself."""
+    """Return whether an expression needs double precision by itself."""
     if isinstance(expression, Number):
         return isinstance(expression.value, float)
     if isinstance(expression, Name):
@@ -95,7 +95,7 @@ def is_floating(expression: Expression) -> bool:
 
 
 def compile_value(expression: Expression, lookup: Lookup, floating: bool = False) -> Read:
-    """A closure that gives the expression's value, or raises Fault. `floating`: the result goes to an F register.
+    """Return a closure that reads the expression, or raises Fault. `floating`: the result goes to an F register.
 
     Raises Fault (24) where a comparison is in it: only conditions hold one.
     """
@@ -103,12 +103,12 @@ def compile_value(expression: Expression, lookup: Lookup, floating: bool = False
 
 
 def compile_whole(expression: Expression, lookup: Lookup) -> Read:
-    """A closure that gives the value on a drive without floating point, where `F1` is a name. Raises Fault (24)."""
+    """Return a closure for a drive without floating point, where `F1` is a name. Raises Fault (24)."""
     return _Compiler(lookup, floating_point=False).value(_without_comparison(expression))
 
 
 def compile_condition(condition: Expression, lookup: Lookup, floating: bool = True) -> Callable[[], bool]:
-    """A closure that evaluates a condition, or raises Fault. `floating`: the drive has floating point.
+    """Return a closure that evaluates a condition, or raises Fault. `floating`: the drive has floating point.
 
     A condition without a comparison holds while its value is not 0.
     """
@@ -122,7 +122,7 @@ def _without_comparison(expression: Expression) -> Expression:
 
 
 def _calls(expression: Expression) -> bool:
-    """Whether a function is in it."""
+    """Return whether a function is in it."""
     if isinstance(expression, Unary):
         return expression.op in FUNCTIONS or _calls(expression.operand)
     return isinstance(expression, Binary | Compare) and (_calls(expression.left) or _calls(expression.right))

@@ -214,7 +214,7 @@ class Interpreter:
         return self._break is not None and self.linked.index.get(self._break[0]) == pc
 
     def _breaks(self, pc: int) -> bool:
-        """Whether stepping begins before this line."""
+        """Return whether stepping begins before this line."""
         if self._thread.mode in (NORMAL, STEPPED) or not self._at_break(pc):
             return False
         self._passes += 1
@@ -318,7 +318,7 @@ class Interpreter:
             self.on_error(self._timeline.now)
 
     def on_error(self, t: float) -> bool:
-        """Call the error handler, if one is declared and not at work already. Gives whether it was called."""
+        """Call the error handler, if one is declared and not at work already. Return whether it was called."""
         if self.handler is None or self._thread.handling:
             return False
         try:

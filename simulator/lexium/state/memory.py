@@ -118,7 +118,7 @@ class Memory:
 
     @property
     def counting(self) -> bool:
-        """Whether motion is in encoder counts: EE=1, and no hMT (manual 3.4.2)."""
+        """Return whether motion is in encoder counts: EE=1, and no hMT (manual 3.4.2)."""
         return bool(self.values.get("EE")) and not self.values.get("AS")
 
     @property
@@ -194,7 +194,7 @@ class Memory:
 
     @property
     def answers_by_nak(self) -> bool:
-        """Whether a reply with checksum is NAK now: the product says so while an error is set."""
+        """Return whether a reply with checksum is NAK now: the product says so while an error is set."""
         return self.model.flags_by_nak and self.error_flag
 
     # Ranges of words; those of motion depend on EE.
@@ -244,7 +244,6 @@ class Memory:
                 self.values[name], self.bank[name] = self.bank[name], self.values[name]
 
     def declare(self, name: str, scope: str, value: Value) -> None:
-        """Make a user variable, or give it a new value."""
         self.scopes[name] = scope
         self.values[slot(name)] = value
 
@@ -254,12 +253,10 @@ class Memory:
             self.forget(name)
 
     def forget(self, name: str) -> None:
-        """Drop a user variable."""
         del self.scopes[name]
         self.values.pop(slot(name), None)
 
     def save(self, store: Store) -> None:
-        """Copy what lasts to NVM."""
         users = {slot(name) for name in self.scopes}
         store.values = {key: value for key, value in self.values.items() if key not in NOT_KEPT and key not in users}
         store.bank, store.texts = dict(self.bank), {name: text for name, text in self.texts.items() if name != "MD"}

@@ -40,7 +40,6 @@ class Program:
 
     @property
     def declared(self) -> set[str]:
-        """The names that its VA lines declare."""
         if self._declared is None:
             self._declared = {name for line in self.lines.values() if (name := declared_by(line.statement))}
         return self._declared
@@ -50,12 +49,11 @@ class Program:
         return Program(dict(self.lines), dict(self.labels), list(self.order), self.product)
 
     def load(self, other: Program) -> None:
-        """Become a copy of another program memory."""
         self.lines, self.labels, self.order = dict(other.lines), dict(other.labels), list(other.order)
         self._declared = None
 
     def store(self, address: int, text: str, statement: Statement) -> int:
-        """Store a line, and delete those that it overlaps. Gives the next address. Raises Fault (45)."""
+        """Store a line, and delete those that it overlaps. Return the next address. Raises Fault (45)."""
         size = size_of(statement, self.product)
         if address + size > FIRST + SPACE:
             raise Fault(E.PROGRAM_MEMORY_FULL)

@@ -70,7 +70,6 @@ class Thread:
         self.refresh()
 
     def finish_after_motion(self) -> None:
-        """End the program when the motion that is under way is over."""
         self.ending = True
         self.refresh()
 
@@ -88,11 +87,10 @@ class Thread:
 
     @property
     def waits_for_motion(self) -> bool:
-        """Whether a hold, or the end of the program, waits for the end of the motion."""
+        """Return whether a hold, or the end of the program, waits for the end of the motion."""
         return not self.paused and (self.waiting or self.ending)
 
     def wake(self, t: float) -> None:
-        """Go on: the motion is over."""
         self.waiting = False
         self.next_at = max(self.next_at, t)
         if self.ending:
@@ -100,7 +98,6 @@ class Thread:
         self.refresh()
 
     def delay(self, until: float) -> None:
-        """Execute no line before a time."""
         if self.live:
             self.next_at = max(self.next_at, until)
 
@@ -126,7 +123,7 @@ class Thread:
 
     @property
     def stepping(self) -> bool:
-        """Whether it waits for the keys of single step."""
+        """Return whether it waits for the keys of single step."""
         return self.running and self.mode == STEPPED
 
     def step_from_here(self) -> None:

@@ -54,15 +54,14 @@ class Printer:
 
     @property
     def pending(self) -> bool:
-        """Whether something was printed since `take`."""
+        """Return whether something was printed since `take`."""
         return bool(self._printed)
 
     def begin_answer(self) -> None:
-        """Begin to carry out a typed line."""
         self._answer, self.immediate = [], True
 
     def end_answer(self) -> str:
-        """End it; gives what it printed."""
+        """End it; return what it printed."""
         self.immediate = False
         return "".join(self._answer)
 
@@ -84,6 +83,5 @@ class Printer:
             self._timeline.replan()
 
     def take(self) -> list[tuple[float, str]]:
-        """What was printed by itself since the last time, with the times."""
         printed, self._printed = self._printed, []
         return printed
