@@ -222,7 +222,7 @@ def test_encoder_outputs_are_in_quadrature():
     device = drive("OS=1,26,1", "OS=2,27,1")
     seen = []
     for count in range(8):
-        device.motor.scale.set_counter("C2", count, 0.0)
+        device.motor.axis.set_counter("C2", count, 0.0)
         seen.append((device.outputs(0.0)[1], device.outputs(0.0)[2]))
     assert len(set(seen[:4])) == 4 and seen[4:] == seen[:4]
     assert all((a != c) + (b != d) == 1 for (a, b), (c, d) in zip(seen, seen[1:], strict=False))
