@@ -11,7 +11,7 @@ from multidrop.dialects.families import DEFAULT, FAMILIES
 from multidrop.drives.conversations import Conversations
 from multidrop.drives.drive import Drive
 from multidrop.drives.events import Changed
-from multidrop.drives.line import Line
+from multidrop.drives.line import DEFAULT_TIMEOUT, Line
 from multidrop.drives.link import Link, Reserved
 from multidrop.drives.port_journal import Keeper
 from multidrop.drives.roster import Roster, Search
@@ -32,7 +32,7 @@ class Bus:
         *,
         baud: int = 0,
         local_echo: bool = False,
-        timeout: float = 1.0,
+        timeout: float = DEFAULT_TIMEOUT,
         family: str = "",
         keeper: Keeper | None = None,
     ) -> None:

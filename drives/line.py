@@ -26,6 +26,8 @@ from multidrop.drives.events import Transaction, Unsolicited
 from multidrop.drives.inbox import NEVER_QUIET, TAIL, Inbox
 from multidrop.drives.late_replies import Doubt
 
+DEFAULT_TIMEOUT = 1.0
+"""Longest wait for a reply after the last byte, s, unless a URL gives `timeout`."""
 CHATTER = 4.0
 """Longest wait for a reply, in timeouts, while a running program keeps the wire busy."""
 LONGEST_LIST = 60.0
@@ -66,13 +68,18 @@ class Flight:
 
         `default`: the line's timeout, s.
         """
-        patience = self.request.codec.quiet_time(self.request, buffer)
+        patience, own = self.request.codec.quiet_time(self.request, buffer), self.request.timeout
+        if (
+            self.request.signed and own is not None
+        ):  # it ends by itself: a line with a longer timeout gives it that much
+            slow = max(0.0, default - DEFAULT_TIMEOUT)
+            patience, own = patience + slow, own + slow
         since = max(self.received_at, self.transmitted_at)
         quiet = since + patience
         if self.request.kind is Kind.COMMAND:
             # A command prints nothing, so a program that prints without a pause does not delay it.
             quiet = min(quiet, self.transmitted_at + max(2 * patience, NEVER_QUIET))
-        timeout = max(default if self.request.timeout is None else self.request.timeout, patience)
+        timeout = max(default if own is None else own, patience)
         longest = self.transmitted_at + (LONGEST_LIST if self.request.kind is Kind.LIST else CHATTER * timeout)
         if not buffer.endswith(b"\n"):  # not in the middle of a program's line
             longest = max(longest, min(self.received_at + TAIL, longest + NEVER_QUIET))
@@ -132,7 +139,9 @@ State = Flight | Recovering | None
 class Line:
     """The wire. Call `events` after every other call, and when `deadline` has come."""
 
-    def __init__(self, codec: Codec, *, baud: int = 0, local_echo: bool = False, timeout: float = 1.0) -> None:
+    def __init__(
+        self, codec: Codec, *, baud: int = 0, local_echo: bool = False, timeout: float = DEFAULT_TIMEOUT
+    ) -> None:
         self.timeout = timeout
         self.inbox = Inbox(codec, local_echo, self._publish)
         self.transmitted = float("-inf")

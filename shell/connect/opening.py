@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 from multidrop.dialects import Diagnostic, Family, Hints
 from multidrop.dialects.families import DEFAULT, FAMILIES
 from multidrop.drives.bus import Bus
+from multidrop.drives.line import DEFAULT_TIMEOUT
 from multidrop.shell.connect import settings
 from multidrop.shell.connect.port_state import PortState
 from multidrop.shell.connect.reconnect import HostAgain, LoginAgain, Reopen, SerialAgain, simulated, timed
@@ -152,9 +153,6 @@ def _bus(name: str, transport: Transport, connection: Connection, family: str, k
     timeout = connection.timeout or DEFAULT_TIMEOUT
     echo, baud = connection.local_echo, _baud(connection)
     return Bus(name, transport, baud=baud, local_echo=echo, timeout=timeout, family=family, keeper=keeper)
-
-
-DEFAULT_TIMEOUT = 1.0
 
 
 async def _transport(

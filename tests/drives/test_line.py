@@ -74,6 +74,14 @@ def test_a_request_without_an_answer_ends_once_and_is_written_once():
     assert finished(events) == [(1.0, "PR P", End.TIMEOUT, ())]
 
 
+@pytest.mark.parametrize(("timeout", "end"), [(1.0, End.SILENT), (5.0, End.DONE)])
+def test_a_signed_print_is_awaited_longer_on_a_line_whose_timeout_is_longer(timeout, end):
+    """Marks wait 0.25 s of a wire: on a link of 4 s, for which a person said timeout=5, none came in time."""
+    line = Line(QUIETLY, timeout=timeout)
+    line.ask(request('PR P,"~1"', kind=Kind.QUIET, timeout=0.25, expect=r"(-?\d+)~1", signed=True))
+    assert [each[2] for each in finished(run(line, 9.0, answers={4.0: b"\r\n7~1\r\n"}))] == [end]
+
+
 def test_the_wires_own_time_is_added_to_the_timeout():
     line = Line(QUIETLY, baud=9600, timeout=1.0)
     line.ask(request("PR P"))
