@@ -112,7 +112,8 @@ def parts(path: Path) -> list[Path]:
     number = 1
     while os.path.exists(part(path, number)):
         number += 1
-    return [part(path, each) for each in range(number - 1, -1, -1)]
+    found = [part(path, each) for each in range(number - 1, -1, -1)]
+    return found if number == 1 or os.path.exists(path) else found[:-1]  # rotated, and nothing written since
 
 
 def lines(path: Path, offset: int = 0, number: int = 0) -> Iterator[Line]:

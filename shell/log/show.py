@@ -6,12 +6,14 @@ r"""A log for people: entries as text, searched, and followed while they are wri
 
 from __future__ import annotations
 
+import os
 import re
 import time
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
 from pathlib import Path
 
+from multidrop.dialects import Diagnostic
 from multidrop.dialects.text import visible
 from multidrop.shell.lines import join_target
 from multidrop.shell.log import files
@@ -99,8 +101,12 @@ class Following:
 
     def look(self) -> Iterator[Line]:
         """Yield the whole lines since the last look. Raises Diagnostic where the log cannot be read."""
-        for part in self._unread():
-            yield from self._lines(part)
+        try:
+            for part in self._unread():
+                yield from self._lines(part)
+        except Diagnostic:
+            if os.path.exists(self._path) or not os.path.exists(files.part(self._path, 1)):
+                raise  # else it is being rotated: the next look finds its parts
 
     def _unread(self) -> list[Path]:
         """The part that is read, and those after it."""

@@ -32,7 +32,7 @@ def bus(name: str, serve: str, drives: str = "a", em: int = 1, ck: int = 1, baud
     return head + "".join(f'{drive}name = "{each}"\nset = {{ EM = {em}, CK = {ck} }}\n' for each in drives)
 
 
-KNOWN = "party=1&checksum=1&em=1"
+KNOWN = "party=1&checksum=1&em=1&timeout=20"
 """What a URL says so that opening takes less time."""
 TCP, PTY = '"tcp://127.0.0.1:0"', '"pty:{}.tty"'
 CELL = "".join(
@@ -275,7 +275,7 @@ def test_a_line_that_is_half_sent_when_the_stop_comes_moves_nothing(shop):
     script = shop.file("half.txt", "@a MR 512000." + "0" * 45 + "\n")
     with socket.create_connection(shop.ports["echo"], PATIENCE) as wire:  # which hears the drive echo what has arrived
         child = shop.terminal(
-            "run", script, "--on", f"{shop.folder}/echo.tty?baud=1200&drives=a&party=1&em=0&checksum=0"
+            "run", script, "--on", f"{shop.folder}/echo.tty?baud=1200&drives=a&party=1&em=0&checksum=0&timeout=20"
         )
         child.delaybeforesend = None
         heard = b""
@@ -285,7 +285,7 @@ def test_a_line_that_is_half_sent_when_the_stop_comes_moves_nothing(shop):
         child.expect(pexpect.EOF)
     child.close()
     assert child.exitstatus == 4
-    url = f"tcp://127.0.0.1:{shop.ports['echo'][1]}?drives=a&party=1&em=0&checksum=0"
+    url = f"tcp://127.0.0.1:{shop.ports['echo'][1]}?drives=a&party=1&em=0&checksum=0&timeout=20"
     assert shop.done("send", url, "PR P", "PR V")[:2] == (0, "0\n0\n")
 
 

@@ -13,7 +13,6 @@ from multidrop.shell.transcripts import Filter
 from multidrop.tui.app import MultidropApp
 from multidrop.tui.outbox import BURST
 from multidrop.tui.screens.dialogs import LEAST, Confirm
-from multidrop.tui.terminal.keyboard import PAUSE
 from multidrop.tui.widgets.search_bar import MOST_COPIED
 from tests.support.fake_session import FakeSession, a_talk, demo_session, make_app, settle
 
@@ -198,7 +197,10 @@ async def test_in_raw_mode_a_line_keeps_its_spaces_and_enter_alone_ends_one() ->
         assert session.stops == 1, "a verb is a verb, and the stop waits for nothing"
 
 
-async def test_lines_that_were_not_sent_are_offered_and_keys_typed_ahead_agree_to_nothing() -> None:
+async def test_lines_that_were_not_sent_are_offered_and_keys_typed_ahead_agree_to_nothing(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr("multidrop.tui.terminal.keyboard.PAUSE", 1e6)  # keys count once the test says so
     session = demo_session()
     session.refuses["BAD"] = "a: 20 unknown"
     app = make_app(session)
@@ -213,7 +215,7 @@ async def test_lines_that_were_not_sent_are_offered_and_keys_typed_ahead_agree_t
         await session.transcripts.offer_unsent()
         await pilot.press("enter")
         assert isinstance(app.screen, Confirm) and [line for line, _ in session.lines] == ["BAD"]
-        await pilot.pause(PAUSE + 0.1)
+        app.keyboard._deaf_until = 0.0
         await pilot.press("enter")
         await settle(pilot)
         assert [line for line, _ in session.lines] == ["BAD", "MR 1", "MR 2"]
