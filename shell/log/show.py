@@ -105,7 +105,7 @@ class Following:
             for part in self._unread():
                 yield from self._lines(part)
         except Diagnostic:
-            if os.path.exists(self._path) or not os.path.exists(files.part(self._path, 1)):
+            if os.path.exists(self._path) or not os.path.exists(part(self._path, 1)):
                 raise  # else it is being rotated: the next look finds its parts
 
     def _unread(self) -> list[Path]:
