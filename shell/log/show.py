@@ -102,8 +102,8 @@ class Following:
     def look(self) -> Iterator[Line]:
         """Yield the whole lines since the last look. Raises Diagnostic where the log cannot be read."""
         try:
-            for part in self._unread():
-                yield from self._lines(part)
+            for each in self._unread():
+                yield from self._lines(each)
         except Diagnostic:
             if os.path.exists(self._path) or not os.path.exists(part(self._path, 1)):
                 raise  # else it is being rotated: the next look finds its parts
