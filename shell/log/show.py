@@ -17,6 +17,7 @@ from multidrop.dialects import Diagnostic
 from multidrop.dialects.text import visible
 from multidrop.shell.lines import join_target
 from multidrop.shell.log import files
+from multidrop.shell.log.disk import part
 from multidrop.shell.log.entries import KINDS, TRAFFIC, Entry
 from multidrop.shell.log.files import Line
 from multidrop.shell.raw import text_of
