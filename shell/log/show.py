@@ -61,8 +61,8 @@ def matches(entry: Entry, pattern: re.Pattern[str]) -> bool:
 
 def whole(path: Path) -> Iterator[Line]:
     """The lines of a log and of its rotated parts, the oldest first. Raises Diagnostic."""
-    for part in files.parts(path):
-        yield from files.lines(part)
+    for each in files.parts(path):
+        yield from files.lines(each)
 
 
 def joined(lines: Iterable[Line]) -> Iterator[Line]:
@@ -112,7 +112,7 @@ class Following:
     def _unread(self) -> list[Path]:
         """The part that is read, and those after it."""
         parts = files.parts(self._path)
-        firsts = [_first(part) for part in parts]
+        firsts = [_first(each) for each in parts]
         if self._file in firsts:
             return parts[firsts.index(self._file) :]
         self.lost = self._file != b""
