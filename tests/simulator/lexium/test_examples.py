@@ -8,7 +8,7 @@ from tests.support.lexium import drive
 
 def typed(device, *lines):
     """What a terminal gets for each line typed; half a minute passes after every one."""
-    port, now = MCodePort(device, serial=not device.ethernet), device.now
+    port, now = MCodePort(device, serial=not device.memory.model.ethernet), device.now
     heard = []
     for line in lines:
         port.receive(line.encode() + b"\r", now)
