@@ -32,7 +32,7 @@ def bus(name: str, serve: str, drives: str = "a", em: int = 1, ck: int = 1, baud
     return head + "".join(f'{drive}name = "{each}"\nset = {{ EM = {em}, CK = {ck} }}\n' for each in drives)
 
 
-KNOWN = "party=1&checksum=1&em=1&timeout=20"
+KNOWN = "party=1&checksum=1&em=1"
 """What a URL says so that opening takes less time."""
 TCP, PTY = '"tcp://127.0.0.1:0"', '"pty:{}.tty"'
 CELL = "".join(
