@@ -24,7 +24,7 @@ from multidrop.tui.screens.all_drives import drive_row, summary, worst_first
 from multidrop.tui.widgets.lines import Row, width_of
 from multidrop.tui.widgets.theme import Signs, shown_as
 from tests.support.fake_session import AT_LIMIT, FakeSession, demo_session, make_app, settle
-from tests.support.fake_twin import apart, beside
+from tests.support.fake_twin import beside, isolated
 
 
 def view(session: FakeSession, *events: SessionEvent) -> View:
@@ -60,20 +60,22 @@ def test_what_is_predicted_is_below_what_is_measured() -> None:
 
 def test_a_divergence_has_a_sign_its_limit_and_its_causes() -> None:
     session = demo_session()
-    rows = drive_rows(view(session, *beside(session.time, 0, 0, 8112), apart(session)), 45, 20)
+    rows = drive_rows(view(session, *beside(session.time, 0, 0, 8112), isolated(session)), 45, 20)
     assert plain(*rows[3:5]).splitlines() == [
         " ≠      -8112 difference           limit 200",
         "   stall, load",
     ]
     assert "error" in roles(rows[3]) and roles(rows[4]) == {"error"}
-    after = view(session, *beside(session.time, 0, 0, 8112), apart(session), OnBus("press", Agreed(session.time, "a")))
+    after = view(
+        session, *beside(session.time, 0, 0, 8112), isolated(session), OnBus("press", Agreed(session.time, "a"))
+    )
     assert "≠" not in plain(*drive_rows(after, 45, 20))
 
 
 def test_a_twin_that_ended_is_not_shown() -> None:
     session = demo_session()
     ended = OnBus("press", TwinEnded(session.time, "a"))
-    shown = view(session, *beside(session.time, 0, 0, 8112), apart(session), ended)
+    shown = view(session, *beside(session.time, 0, 0, 8112), isolated(session), ended)
     text = plain(*drive_rows(shown, 45, 20), *narrow_rows(shown, 80))
     assert "twin" not in text and "≠" not in text and trouble_mark(shown.model.bus("press"), ["a"], False) == ""
     assert "a gantry twin at rest at 8112" in plain(*plot_rows(shown, 60, 20)), "it was there in the time shown"
@@ -91,7 +93,7 @@ def test_a_prediction_that_is_not_renewed_is_dim() -> None:
 def test_each_axis_has_its_own_twin() -> None:
     session = demo_session()
     events = [*beside(session.time, 5, 0, 0, axis="x"), *beside(session.time, 7, 0, 9000, axis="y")]
-    text = plain(*drive_rows(view(session, *events, apart(session, axis="y")), 45, 20))
+    text = plain(*drive_rows(view(session, *events, isolated(session, axis="y")), 45, 20))
     assert "+0 difference" in text and "≠      -9000 difference" in text
 
 
@@ -109,7 +111,7 @@ def test_predictions_that_come_before_the_first_samples_make_no_further_axis() -
 
 def test_rows_of_drives_have_a_sign_and_as_many_causes_as_fit() -> None:
     session = demo_session()
-    shown = view(session, *beside(session.time, 0, 600_000, 8112), apart(session))
+    shown = view(session, *beside(session.time, 0, 600_000, 8112), isolated(session))
     assert "600000/s ≠ -8112 stall, load" in plain(*narrow_rows(shown, 80))
     assert plain(drives_rows(shown, 45, 3)[0]).endswith("≠ -8112")
     agrees = view(session, *beside(session.time, 0, 0, 14))
@@ -120,7 +122,7 @@ def test_rows_of_drives_have_a_sign_and_as_many_causes_as_fit() -> None:
 def test_a_drive_that_differs_comes_first_of_all_drives(width: int) -> None:
     session = demo_session()
     rests = OnBus("press", Sample(session.time, "c", 0, 0))
-    shown = view(session, rests, *beside(session.time, 0, 0, 8112, "b"), apart(session, "b"))
+    shown = view(session, rests, *beside(session.time, 0, 0, 8112, "b"), isolated(session, "b"))
     places = worst_first(shown, "≠")
     assert [place.glance.address for place in places] == ["b"]
     assert next(place for place in worst_first(shown, "") if place.bus == "press").glance.address == "b"
@@ -132,7 +134,7 @@ def test_a_drive_that_differs_comes_first_of_all_drives(width: int) -> None:
 def test_trouble_and_a_difference_are_both_said() -> None:
     session = demo_session()
     error = OnBus("press", Conditioned(session.time, "a", (replace(AT_LIMIT, lamps=()),)))
-    shown = view(session, *beside(session.time, 0, 0, 8112), apart(session), error)
+    shown = view(session, *beside(session.time, 0, 0, 8112), isolated(session), error)
     assert plain(narrow_rows(shown, 80)[0]).endswith(" ✗ error ≠ -8112")
     assert plain(drives_rows(shown, 45, 3)[0]).endswith(" ✗ error ≠ -8112")
     assert plain(drives_rows(shown, 39, 3)[0]).endswith(" ✗ error ≠")
@@ -143,9 +145,9 @@ def test_trouble_and_a_difference_are_both_said() -> None:
 
 def test_a_tab_counts_a_drive_that_differs_as_trouble() -> None:
     session = demo_session()
-    facts = view(session, *beside(session.time, 0, 0, 8112), apart(session)).model.bus("press")
+    facts = view(session, *beside(session.time, 0, 0, 8112), isolated(session)).model.bus("press")
     assert bus_state(facts, ["a"], False) is State.DIFFERS and trouble_mark(facts, ["a"], False) == ""
-    facts = view(session, *beside(session.time, 0, 9, 8112), apart(session)).model.bus("press")
+    facts = view(session, *beside(session.time, 0, 9, 8112), isolated(session)).model.bus("press")
     assert bus_state(facts, ["a"], False) is State.MOVING and trouble_mark(facts, ["a"], False) == "≠"
     assert bus_state(facts, ["a"], True) is State.LOST and trouble_mark(facts, ["a"], True) == ""
     tab = make_app(session).presenter.tabs(session.time)[0]
@@ -228,7 +230,7 @@ def test_rows_with_a_twin_stay_in_their_room(width: int, height: int, places: li
     session = demo_session()
     session.plotted = tuple(Series("press", each) for each in "abc"[: 1 + 2 * several])
     events = [each for n, place in enumerate(places) for each in beside(50.0 + n / 2, place, place // 7, -place)]
-    shown = view(session, *events, apart(session))
+    shown = view(session, *events, isolated(session))
     rows = plot_rows(shown, width, height)
     assert len(rows) <= height and all(width_of(row) <= width for row in rows)
     assert all(width_of(row) <= max(width, 45) for row in drive_rows(shown, max(width, 39), height))
@@ -245,7 +247,7 @@ async def test_a_key_begins_and_ends_the_twins_of_the_line_as_typed_lines_do() -
     app = make_app(session)
     async with app.run_test(size=(200, 50)) as pilot:
         await pilot.press("ctrl+f2")
-        session.emit(*beside(session.time, 0, 0, 8112), apart(session))
+        session.emit(*beside(session.time, 0, 0, 8112), isolated(session))
         await settle(pilot)
         assert "≠" in app.main.lines("side").plain + app.main.lines("far").plain
         assert "≠ twin" in app.main.lines("top").plain and "^F2 twin" in app.main.lines("footer").plain

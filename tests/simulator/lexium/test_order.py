@@ -65,7 +65,7 @@ def test_steps_of_time_do_not_matter(kinds, changes, times, d5):
     assert stepped.outputs(3.0) == whole.outputs(3.0)
     assert stepped.position(3.0) == whole.position(3.0)
     assert stepped.memory.values == whole.memory.values
-    assert abs(stepped.inputs.analog(3.0) - whole.inputs.analog(3.0)) <= 1
+    assert abs(stepped.motor.inputs.analog(3.0) - whole.motor.inputs.analog(3.0)) <= 1
 
 
 WORDS = tuple(
