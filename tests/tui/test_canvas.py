@@ -160,6 +160,14 @@ def test_rows_that_move_leave_a_row_of_letters_that_share_a_cell_in_its_place() 
     assert terminal.lines == [unicodedata.normalize("NFC", row.text.rstrip()) for row in moved]
 
 
+def test_letters_that_share_the_last_cell_of_the_screen_do_not_scroll_it() -> None:
+    terminal = Terminal()
+    terminal.show([plain("")] * 7 + [plain("1" * (WIDTH - 1) + "e\u0301tat")])
+    assert terminal.lines == [""] * 7 + ["1" * (WIDTH - 1) + "é"]
+    terminal.show([plain("")] * HEIGHT)
+    assert terminal.lines == [""] * HEIGHT
+
+
 @pytest.mark.parametrize("text", ["right" * 8, "e\u0301tat" * 8])
 @pytest.mark.parametrize("x", [WIDTH - 2, WIDTH, WIDTH + 20])
 def test_a_picture_of_a_wider_terminal_is_cut(text: str, x: int) -> None:

@@ -268,15 +268,18 @@ class Canvas:
         return Shown(text, pens)
 
     def _write_plainly(self, y: int, row: Iterable[Piece], width: int) -> str:
-        """Write pieces whose characters share cells, as they are. What the row shows then is not known."""
+        """Write pieces whose characters share cells, as they are. What the row shows then is not known.
+
+        The terminal does not wrap meanwhile: one that counts other widths would scroll the last row away.
+        """
         self._rows[y] = self._unseen
-        written = []
+        written = ["\x1b[?7l"]
         for x, segments in row:
             written.append(f"\x1b[{y + 1};{x + 1}H")
             for text, style, control in Segment.adjust_line_length(list(segments), width - x, pad=False):
                 if not control:
                     written += [self._switch(self._pens.number(style)), text]
-        return "".join(written)
+        return "".join([*written, "\x1b[?7h"])
 
     def _changed(self, y: int, new: Shown) -> str:
         """Write the cells of a row that differ."""
