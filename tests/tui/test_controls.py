@@ -20,6 +20,7 @@ from multidrop.tui.screens.controls import ControlsPage, Jog
 from tests.support.fake_session import FakeSession, demo_session, make_app, settle
 
 at_screen = pytest.mark.tui
+UNSEEN = "nothing was sent: the drive was not shown yet"
 
 
 # The rule
@@ -233,7 +234,9 @@ async def test_a_disabled_axis_has_its_own_state_and_takes_no_move() -> None:
         assert "1 press □ off" in app.main.lines("top").plain
         status = app.main.lines("status").plain
         assert "a gantry □ no current" in status and "b clamp  ■ stopped" in status
-        await pilot.press("ctrl+n", "right")
+        await pilot.press("ctrl+n")
+        await settle(pilot)
+        await pilot.press("right")
         await settle(pilot)
         page = app.screen
         assert isinstance(page, ControlsPage)
@@ -261,6 +264,27 @@ async def test_the_stop_of_the_drive_waits_for_no_line_and_counts_while_a_number
         await pilot.press("space")
         await settle(pilot)
         assert session.sent[2:] == ["press:a SL 0"]
+
+
+@pytest.mark.parametrize(
+    ("key", "sent", "said"),
+    [("space", ["press:a SL 0"], "SL 0"), ("b", [], UNSEEN), ("h", [], UNSEEN), ("right", [], UNSEEN)],
+)
+@at_screen
+async def test_of_a_drive_that_is_not_shown_yet_the_stop_alone_is_sent(key: str, sent: list[str], said: str) -> None:
+    session = demo_session()
+    app = make_app(session)
+    async with app.run_test(size=(80, 24)) as pilot:
+        await settle(pilot)
+        page = ControlsPage(app)
+        await app.push_screen(page)
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr(page, "show", lambda view: None)
+            page._view = None
+            await pilot.press(key)
+            await pilot.pause()
+        assert session.sent == sent
+        assert said in page.said[0]
 
 
 @at_screen

@@ -101,6 +101,7 @@ WORDS = {
     ENABLE: "enable",
     DISABLE: "disable",
 }
+NO_CONTROLS = "this family has no controls"
 WHOLE = re.compile(r"[+-]?[0-9]{1,10}")
 KEY = 8
 WORD = 10
@@ -185,7 +186,7 @@ class ControlsPage(AskingPage):
     def _rows(self, view: View, glance: Glance | None, width: int) -> list[Row]:
         controls = self._controls()
         if glance is None or not controls:
-            return [((" ^O chooses a drive" if glance is None else " this family has no controls", "dim"),)]
+            return [((" ^O chooses a drive" if glance is None else f" {NO_CONTROLS}", "dim"),)]
         axes = glance.readout.axes
         axis = axes[min(self._axis, len(axes) - 1)]
         other = "   Tab chooses the axis" if len(axes) > 1 else ""
@@ -236,9 +237,22 @@ class ControlsPage(AskingPage):
         return glance, axes[min(self._axis, len(axes) - 1)]
 
     def _controls(self) -> Controls:
-        drive = self.host.session.selected
+        """The controls of the chosen axis; of the first axis of a drive that is not shown yet: its stop does not wait."""
+        session = self.host.session
+        drive = session.selected
+        if drive is None:
+            return {}
         chosen = self._chosen()
-        return {} if drive is None or chosen is None else drive.family.controls(drive.state, chosen[1].axis)
+        first = self.host.model.bus(session.selected_bus).readout(drive.address).axes[0]
+        return drive.family.controls(drive.state, first.axis if chosen is None else chosen[1].axis)
+
+    def _nothing(self) -> str:
+        """Why a key other than the stop does nothing: there is no drive, or the person has not seen it yet."""
+        if self.host.session.selected is None:
+            return "no drive is selected"
+        return (
+            "" if self._chosen() is not None else "nothing was sent: the drive was not shown yet; press the key again"
+        )
 
     def action_step(self, by: int) -> None:
         self._begun = None
@@ -264,11 +278,13 @@ class ControlsPage(AskingPage):
         name = KEYED[key]
         control = self._controls().get(name)
         self._begun = None
-        if control is None or control.absent:
-            self.say(f"no {WORDS[name]}: {control.absent}" if control is not None else "no drive is selected")
-        elif name == STOP:
+        if name == STOP and control is not None and not control.absent:
             self.host.outbox.at_once(control.filled())
             self._tell(control.filled())
+        elif nothing := self._nothing():
+            self.say(nothing)
+        elif control is None or control.absent:
+            self.say(f"no {WORDS[name]}: {control.absent}" if control is not None else NO_CONTROLS)
         else:
             self._begun = self.begin(key)
             self._painted = False
@@ -300,8 +316,8 @@ class ControlsPage(AskingPage):
     def action_ask(self, key: str) -> None:
         """Ask for a number."""
         self._begun = None
-        if not self._controls():
-            self.say("no drive is selected")
+        if not self._controls() or self._nothing():
+            self.say(self._nothing() or NO_CONTROLS)
             return
         self._asked = self.begin(key)
         self.ask_for("", f"{NUMBERED[key][1]}: a whole number, then Enter; Esc: none; Space: stop")
@@ -338,7 +354,7 @@ class ControlsPage(AskingPage):
         """Start a move, if the drive is known to rest."""
         chosen, control = self._chosen(), self._controls().get(name)
         if chosen is None or control is None:
-            self.say("no drive is selected")
+            self.say(self._nothing() or NO_CONTROLS)
             return
         glance, axis = chosen
         host = self.host
