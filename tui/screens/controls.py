@@ -237,7 +237,7 @@ class ControlsPage(AskingPage):
         return glance, axes[min(self._axis, len(axes) - 1)]
 
     def _controls(self) -> Controls:
-        """The controls of the chosen axis; of the first axis of a drive that is not shown yet: its stop does not wait."""
+        """The controls of the chosen axis. A drive that is not shown yet has its first axis: its stop does not wait."""
         session = self.host.session
         drive = session.selected
         if drive is None:
