@@ -16,7 +16,7 @@ from multidrop.dialects import Diagnostic, DriveError, Inexpressible, Procedure,
 from multidrop.dialects.debugging import Debugging, Look, Neighbours, Row
 from multidrop.drives.events import Lost
 from multidrop.shell.events import OnBus, Phase, SessionEvent
-from multidrop.shell.observed import Listing, Sight, Watched
+from multidrop.shell.program_listing import Listing, Sight, Watched
 from multidrop.transports import TransportLost
 
 if TYPE_CHECKING:

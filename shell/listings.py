@@ -10,7 +10,7 @@ from multidrop.dialects.program_files import Held
 from multidrop.shell import new_file, sources
 from multidrop.shell.channel import running, transferring
 from multidrop.shell.lines import EVERYONE
-from multidrop.shell.observed import Listing, Sight
+from multidrop.shell.program_listing import Listing, Sight
 
 if TYPE_CHECKING:
     from multidrop.drives.drive import Drive
