@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from multidrop.dialects import Diagnostic, DriveError, Inexpressible, Stopped
 from multidrop.dialects.program_files import Held, Stored
-from multidrop.shell import listings, new_file
+from multidrop.shell import new_file, program_listing
 from multidrop.shell.channel import running, transferring
 from multidrop.simulator import cells
 from multidrop.simulator.cell.writer import BusText, DriveText, write
@@ -48,7 +48,9 @@ async def read(workspace: Workspace, drive: Drive) -> Snapshot:
     with running(workspace, f"{workspace.display_name(drive)}: snapshot") as progress:
         found = await transferring(drive, take(drive.state, progress))
     program = Held(tuple(Stored(at, text) for at, text in found.program))
-    return replace(found, remarked=tuple(listings.remarked(workspace, drive, program))) if program.lines else found
+    return (
+        replace(found, remarked=tuple(program_listing.remarked(workspace, drive, program))) if program.lines else found
+    )
 
 
 def described(snapshot: Snapshot) -> DriveText:

@@ -23,7 +23,7 @@ from multidrop.drives.drive import still
 from multidrop.shell import backups, sources
 from multidrop.shell.channel import running, transferring
 from multidrop.shell.events import By, Printed
-from multidrop.shell.listings import check_one, read
+from multidrop.shell.program_listing import check_one, read
 from multidrop.shell.unfinished import marked
 
 if TYPE_CHECKING:

@@ -11,7 +11,7 @@ from multidrop.api.calls import Calls, Stopping
 from multidrop.api.pictures import table
 from multidrop.dialects import Diagnostic, Motion, Refused
 from multidrop.drives.drive import still
-from multidrop.shell import listings, new_file, stop_report, transfers, waits
+from multidrop.shell import new_file, program_listing, stop_report, transfers, waits
 from multidrop.shell.events import By
 from multidrop.shell.lines import join_target
 from multidrop.shell.params import file as files
@@ -41,7 +41,7 @@ class AsyncPrograms:
     async def list(self) -> Lines:
         """Read the program as a listing, with the remarks of its file where those are known."""
         shell = self._calls.shell
-        return await self._calls.run(lambda: listings.readable(shell, self._drive))
+        return await self._calls.run(lambda: program_listing.readable(shell, self._drive))
 
     async def upload(self, file: str = "", *, raw: bool = False) -> Lines:
         """Read the program as the lines of a file; write them to a new `file` if one is named.
@@ -53,7 +53,7 @@ class AsyncPrograms:
         if file:
             new_file.check(file)
         shell = self._calls.shell
-        lines = await self._calls.run(lambda: listings.upload(shell, self._drive, raw))
+        lines = await self._calls.run(lambda: program_listing.upload(shell, self._drive, raw))
         if file:
             new_file.write(file, "".join(f"{line}\n" for line in lines))
         return lines

@@ -11,7 +11,7 @@ from multidrop.dialects import Diagnostic
 from multidrop.dialects.families import program_language_of, program_languages
 from multidrop.dialects.files import program_text_of
 from multidrop.dialects.program_files import errors
-from multidrop.shell import listings, new_file, replacement, snapshots, transfers
+from multidrop.shell import new_file, program_listing, replacement, snapshots, transfers
 from multidrop.shell.connect import settings
 from multidrop.shell.front import batch
 from multidrop.shell.lines import split_target
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 def list_(chosen: argparse.Namespace) -> int:
     async def show(session: Session, drive: Drive) -> None:
         own = f"{session.display_name(drive)}: " if is_several(chosen.drive) else ""
-        for line in await listings.readable(session, drive):
+        for line in await program_listing.readable(session, drive):
             session.output(f"{own}{line}")
 
     return _with_drive(chosen, show)
@@ -41,11 +41,11 @@ def upload(chosen: argparse.Namespace) -> int:
     check_new(chosen.file, chosen.drive)
 
     async def save(session: Session, drive: Drive) -> None:
-        lines = await listings.upload(session, drive, chosen.raw)
+        lines = await program_listing.upload(session, drive, chosen.raw)
         file = file_of(session, drive, chosen.file, chosen.drive, drive.program_files.endings[0])
         if is_several(chosen.drive):
             Path(file).parent.mkdir(parents=True, exist_ok=True)
-        listings.save_new(session, drive, file, lines)
+        program_listing.save_new(session, drive, file, lines)
 
     return _with_drive(chosen, save, unsolicited=chosen.file != STANDARD_OUTPUT)
 

@@ -10,7 +10,7 @@ from multidrop.dialects import Diagnostic, Inexpressible
 from multidrop.dialects.families import program_language_of
 from multidrop.dialects.program_files import errors
 from multidrop.drives.drive import Drive
-from multidrop.shell import debugging, listings, new_file, transfers
+from multidrop.shell import debugging, new_file, program_listing, transfers
 from multidrop.shell.checking import examine
 from multidrop.shell.debugging import LEFT, Debugger
 from multidrop.shell.lines import split_target
@@ -40,9 +40,9 @@ async def list_(call: Call) -> None:
     drive, file = _listed(call)
     if file:
         new_file.check(call.output_file(file), printed=True)
-    lines = await listings.readable(call.session, drive)
+    lines = await program_listing.readable(call.session, drive)
     if file:
-        return listings.save_new(call.session, drive, file, lines)
+        return program_listing.save_new(call.session, drive, file, lines)
     for line in lines:
         call.session.output(line)
 
@@ -56,7 +56,7 @@ async def upload(call: Call) -> None:
     name, *target = call.words()
     file, drive = call.output_file(name), call.drive("".join(target))
     new_file.check(file, printed=True)
-    listings.save_new(call.session, drive, file, await listings.upload(call.session, drive))
+    program_listing.save_new(call.session, drive, file, await program_listing.upload(call.session, drive))
 
 
 def _downloaded(call: Call) -> tuple[str, str, dict[str, str]]:
