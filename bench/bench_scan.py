@@ -27,7 +27,7 @@ from multidrop.dialects.mcode.manual.statements import NAMES
 from multidrop.shell.connect.opening import open_buses
 from multidrop.shell.connect.settings import Settings
 from multidrop.shell.connect.urls import parse
-from multidrop.shell.scanning import NothingFound, Scanning
+from multidrop.shell.finding.scanning import NothingFound, Scanning
 from multidrop.shell.session import Session
 
 CELL = '[[bus]]\nname = "line"\nserve = ["pty:line.tty"]\nbaud = {baud}\n' + "".join(

@@ -33,11 +33,11 @@ def _guarded(arguments: Sequence[str], own: bool) -> int:
         code = _run(arguments, own)
         sys.stdout.flush()
     except KeyboardInterrupt:
-        from multidrop.shell.output import INTERRUPTED, final
+        from multidrop.shell.streams.stdout import INTERRUPTED, final
 
         return final(INTERRUPTED)
     except BrokenPipeError:  # the reader of the output is gone
-        from multidrop.shell.output import READER_GONE, silence
+        from multidrop.shell.streams.stdout import READER_GONE, silence
 
         silence(sys.stdout)
         return READER_GONE
@@ -64,28 +64,28 @@ def _run(arguments: Sequence[str], own: bool) -> int:
 
     try:
         chosen = parse(arguments)
-        from multidrop.shell import outlets, output
+        from multidrop.shell.streams import output_streams, stdout
 
-        outlets.as_json = getattr(chosen, "json", False) is True
+        output_streams.as_json = getattr(chosen, "json", False) is True
         if own and chosen.run_by not in PROTOCOLS:
-            output.watch_reader(signal.SIGINT)
+            stdout.watch_reader(signal.SIGINT)
         code = run(chosen)
-        output.flush_printed()
+        stdout.flush_printed()
         unwritten = _unwritten()
-        return output.final(code) or unwritten
+        return stdout.final(code) or unwritten
     except SystemExit as end:  # --help, --version, and wrong usage
         return end.code if isinstance(end.code, int) else 0
 
 
 def _unwritten(problem: OSError | None = None) -> int:
     """Return 1, and report it, if output could not be written (a full disk)."""
-    from multidrop.shell import output
+    from multidrop.shell.streams import stdout
 
     if problem is not None:
-        output.lose(sys.stdout, problem)
-    if output.dropped:
-        output.write(sys.stderr, output.dropped[0])
-    return int(bool(output.dropped))
+        stdout.lose(sys.stdout, problem)
+    if stdout.dropped:
+        stdout.write(sys.stderr, stdout.dropped[0])
+    return int(bool(stdout.dropped))
 
 
 if __name__ == "__main__":

@@ -112,7 +112,7 @@ class Parser(argparse.ArgumentParser):
 
     def error(self, message: str) -> NoReturn:
         """Report wrong usage and where to look, and exit with 2."""
-        from multidrop.shell.output import shortened, write
+        from multidrop.shell.streams.stdout import shortened, write
 
         write(sys.stderr, f"{self.prog}: {shortened(' '.join(message.split()))}; see {self.prog} --help")
         self.exit(2)

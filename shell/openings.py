@@ -10,11 +10,11 @@ from functools import partial
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from multidrop.dialects import Diagnostic, DriveError
-from multidrop.shell import unfinished
 from multidrop.shell.connect.opening import port_name
 from multidrop.shell.connect.urls import Connection, parse
 from multidrop.shell.lines import EVERYONE, split_target
 from multidrop.shell.raw import RawLine
+from multidrop.shell.state import crash_marks
 from multidrop.shell.workspace import BeingOpened
 from multidrop.transports import TransportLost
 
@@ -270,7 +270,7 @@ class _Opening:
         label(opened.bus, connection)
         self._workspace.identified(opened.bus)
         self._workspace.notify(described(opened.bus), bus=opened.bus.name)
-        for text in unfinished.left(self._workspace.settings.state, self._workspace.of(opened.bus).port):
+        for text in crash_marks.left(self._workspace.settings.state, self._workspace.of(opened.bus).port):
             self._workspace.notify(f"{opened.bus.name}: {text}", bus=opened.bus.name, warning=True)
 
 

@@ -1,4 +1,4 @@
-"""What a drive holds of programs: read, listed with the remarks of its file, made into a file; what is observed of it."""
+"""The programs of a drive: read, listed with the remarks of their file, made into a file; what is observed of one."""
 
 from __future__ import annotations
 
@@ -11,10 +11,11 @@ from multidrop.dialects import Diagnostic, SourceLine
 from multidrop.dialects.debugging import Row
 from multidrop.dialects.family import Programs
 from multidrop.dialects.program_files import Held, Stored
-from multidrop.shell import new_file, sources
+from multidrop.shell import new_file
 from multidrop.shell.channel import Channel, running, transferring
 from multidrop.shell.events import Phase, ProgramRead, ProgramSeen
 from multidrop.shell.lines import EVERYONE
+from multidrop.shell.state import downloaded_sources
 
 if TYPE_CHECKING:
     from multidrop.drives.drive import Drive
@@ -31,7 +32,7 @@ class Listing:
     def __init__(self, state: Path, programs: Programs[Any], rows: Sequence[Row] = ()) -> None:
         self.rows = tuple(rows)
         held = Held(tuple(Stored(*row) for row in self.rows))
-        source = sources.recall(state, held) if rows else None
+        source = downloaded_sources.recall(state, held) if rows else None
         lines = () if source is None else programs.annotated(source.text, held)
         self._remarks = {int(found[1]): found[2] for line in lines if (found := _LISTED.fullmatch(line))}
 
@@ -130,7 +131,7 @@ async def upload(workspace: Workspace, drive: Drive, raw: bool = False) -> list[
     name = workspace.display_name(drive)
     held = await read(workspace, drive, "upload")
     held.check_program(name)
-    source = sources.recall(workspace.settings.state, held)
+    source = downloaded_sources.recall(workspace.settings.state, held)
     if raw or source is None or not _is_of(drive, source, held):
         return list(drive.programs.file(drive.state, held, raw))
     workspace.notify(f"{name}: remarks and layout are those of {source.file}, downloaded {source.at}", outcome=True)
@@ -139,13 +140,13 @@ async def upload(workspace: Workspace, drive: Drive, raw: bool = False) -> list[
 
 def remarked(workspace: Workspace, drive: Drive, held: Held) -> list[str]:
     """The listing with the remarks and the layout of the file that it came from; empty where that is not known."""
-    source = sources.recall(workspace.settings.state, held) if held.lines else None
+    source = downloaded_sources.recall(workspace.settings.state, held) if held.lines else None
     if source is None or not _is_of(drive, source, held):
         return []
     return list(drive.programs.annotated(source.text, held))
 
 
-def _is_of(drive: Drive, source: sources.Source, held: Held) -> bool:
+def _is_of(drive: Drive, source: downloaded_sources.Source, held: Held) -> bool:
     """Whether a kept file has exactly the lines of the drive."""
     try:
         lines = drive.program_files.language.read(source.text, source.file)

@@ -48,9 +48,9 @@ async def read(workspace: Workspace, drive: Drive) -> Snapshot:
     with running(workspace, f"{workspace.display_name(drive)}: snapshot") as progress:
         found = await transferring(drive, take(drive.state, progress))
     program = Held(tuple(Stored(at, text) for at, text in found.program))
-    return (
-        replace(found, remarked=tuple(program_listing.remarked(workspace, drive, program))) if program.lines else found
-    )
+    if not program.lines:
+        return found
+    return replace(found, remarked=tuple(program_listing.remarked(workspace, drive, program)))
 
 
 def described(snapshot: Snapshot) -> DriveText:

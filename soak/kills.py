@@ -25,8 +25,8 @@ from multidrop.dialects import Diagnostic
 from multidrop.macros import MacroStore
 from multidrop.shell.connect.settings import Settings
 from multidrop.shell.events import Notified
-from multidrop.shell.front.typed_lines import History
 from multidrop.shell.log.entries import entry_of
+from multidrop.shell.prompt.typed_lines import History
 from multidrop.shell.session import Session
 from multidrop.simulator import cells
 from multidrop.simulator.floor import Floor

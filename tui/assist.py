@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple, Protocol
 
 from multidrop.dialects.on_demand import imported
-from multidrop.shell.drafts import Drafts
+from multidrop.shell.state.drafts import Drafts
 from multidrop.tui.text import ago
 
 if TYPE_CHECKING:
@@ -101,14 +101,14 @@ class ShellAssist(Assist):
     """The help that the prompt gives, too."""
 
     def __init__(self, session: Session, settings: Settings) -> None:
-        from multidrop.shell.front.typed_lines import History
+        from multidrop.shell.prompt.typed_lines import History
 
         self._session, self._settings = session, settings
         self._history = History(settings.history)
 
     def complete(self, text: str, learned: Callable[[], None] | None = None) -> Sequence[CompletionView]:
         """Complete the typed text. `learned`: a person asks; it is called when a drive has reported its names."""
-        from multidrop.shell.front.complete import complete, names_of
+        from multidrop.shell.prompt.complete import complete, names_of
 
         if learned is not None and (drive := names_of(self._session, text)) is not None:
             self._session.names.ask(drive, learned)
@@ -116,7 +116,7 @@ class ShellAssist(Assist):
 
     def hint(self, text: str) -> str:
         """Usage and meaning of the typed text, in one line."""
-        from multidrop.shell.front.complete import hint
+        from multidrop.shell.prompt.complete import hint
 
         return hint(self._session, text)
 
@@ -136,14 +136,14 @@ class ShellAssist(Assist):
 
     def lately(self) -> Sequence[StartEntry]:
         """URLs opened lately, the newest first; saved connections are listed themselves."""
-        from multidrop.shell.connect.port_state import lately
+        from multidrop.shell.state.port_state import lately
 
         now, saved = time.time(), self._settings.connections
         found = [each for each in lately(self._settings.state) if each.url not in saved]
         return [StartEntry("lately", each.url, each.url, f"opened {ago(now - each.at)}") for each in found[:LATELY]]
 
     async def opened(self, url: str) -> None:
-        from multidrop.shell.connect.port_state import note
+        from multidrop.shell.state.port_state import note
 
         await asyncio.to_thread(note, self._settings.state, url)
 
@@ -151,8 +151,8 @@ class ShellAssist(Assist):
         """Search a port for drives, without a question: at its own baud rate, then at the others. Raises Diagnostic."""
         from multidrop.shell.connect.opening import open_buses
         from multidrop.shell.connect.urls import parse
-        from multidrop.shell.found import FoundDrive, url_of
-        from multidrop.shell.scanning import Scanning
+        from multidrop.shell.finding.found_drives import FoundDrive, url_of
+        from multidrop.shell.finding.scanning import Scanning
 
         opener = partial(open_buses, state=self._settings.state)
         connection = parse(url, self._settings.connections)
@@ -176,14 +176,14 @@ class ShellAssist(Assist):
 
     async def prepare(self) -> None:
         """Import it in a thread; the rest depends on the drive and is less."""
-        await asyncio.to_thread(imported, "multidrop.shell.front.complete:complete")
+        await asyncio.to_thread(imported, "multidrop.shell.prompt.complete:complete")
         await asyncio.to_thread(imported("multidrop.shell.operations.table:load"))
         self.hint(ANY_LETTER)
         self.complete(ANY_LETTER)
 
 
 def _ports(state: Path) -> list[StartEntry]:
-    from multidrop.shell.connect.port_state import memory_of
+    from multidrop.shell.state.port_state import memory_of
     from multidrop.transports.serial_ports import holder, list_ports
 
     entries = []

@@ -17,8 +17,8 @@ from textual.widgets import TextArea
 from multidrop.dialects import Diagnostic
 from multidrop.dialects.program_files import Entry, Part, Problem, in_order
 from multidrop.macros import parse_macro
-from multidrop.shell.edited_file import STAND_INS, edited
-from multidrop.shell.program_text import ProgramGrammar
+from multidrop.shell.programs.edited_file import STAND_INS, edited
+from multidrop.shell.programs.program_text import ProgramGrammar
 
 _LINE = re.compile(r":(\d+)(?::(\d+))?\Z")
 _TOML = re.compile(

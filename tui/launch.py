@@ -30,7 +30,7 @@ def run(urls: Sequence[str], reconnect: bool = True, raw: bool = False, twin: bo
     Raises Diagnostic if there is no terminal, or if the configuration is wrong.
     """
     from multidrop.shell.connect.settings import load
-    from multidrop.shell.front.keyboard import SWITCH
+    from multidrop.shell.prompt.keyboard import SWITCH
 
     if not (sys.stdin.isatty() and sys.stdout.isatty()):
         raise Diagnostic("the screen needs a terminal", "tui", "multidrop shell reads lines from standard input")
@@ -41,8 +41,8 @@ def run(urls: Sequence[str], reconnect: bool = True, raw: bool = False, twin: bo
 
 async def _run(urls: Sequence[str], settings: Settings, reconnect: bool, raw: bool, twin: bool) -> int:
     with importing():
-        from multidrop.shell.front.collector import collected_at_rest
         from multidrop.shell.log.writer import begin
+        from multidrop.shell.prompt.collector import collected_at_rest
         from multidrop.shell.session import Session
 
     session = Session(settings, reconnect=reconnect, raw=raw)
@@ -65,7 +65,7 @@ async def _leave(session: Session) -> None:
     from multidrop.shell import stop_report
     from multidrop.shell.automation import outcome, settled
     from multidrop.shell.macro_arguments import keep_unended
-    from multidrop.shell.output import finish, nonblocking, write
+    from multidrop.shell.streams.stdout import finish, nonblocking, write
 
     if not session.automations.was_interrupted:
         session.interrupt()

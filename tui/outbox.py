@@ -18,8 +18,8 @@ from collections.abc import Callable, Coroutine, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from multidrop.shell.front.typed_lines import BURST, Line
 from multidrop.shell.lines import pinned
+from multidrop.shell.prompt.typed_lines import BURST, Line
 
 if TYPE_CHECKING:
     from multidrop.shell.session import Session

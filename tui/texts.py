@@ -8,8 +8,8 @@ from datetime import datetime
 from pathlib import Path
 
 from multidrop.dialects import Diagnostic
-from multidrop.shell.drafts import Draft, Drafts
-from multidrop.shell.edited_file import EditedFile, real_text
+from multidrop.shell.programs.edited_file import EditedFile, real_text
+from multidrop.shell.state.drafts import Draft, Drafts
 
 
 @dataclass

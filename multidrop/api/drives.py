@@ -11,16 +11,17 @@ from multidrop.api.calls import Calls, Stopping
 from multidrop.api.pictures import table
 from multidrop.dialects import Diagnostic, Motion, Refused
 from multidrop.drives.drive import still
-from multidrop.shell import new_file, program_listing, stop_report, transfers, waits
+from multidrop.shell import new_file, program_listing, stop_report, waits
 from multidrop.shell.events import By
 from multidrop.shell.lines import join_target
 from multidrop.shell.params import file as files
 from multidrop.shell.params import readings
 from multidrop.shell.params.readings import Difference
 from multidrop.shell.params.restore import Options, restore
+from multidrop.shell.programs import transfers
+from multidrop.shell.programs.transfers import Wanted
 from multidrop.shell.scripts.execution import ask
 from multidrop.shell.scripts.expression import Value, Word, written
-from multidrop.shell.transfers import Wanted
 
 if TYPE_CHECKING:
     from multidrop.api.telemetry import AsyncTelemetry

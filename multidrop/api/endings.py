@@ -16,8 +16,8 @@ import threading
 from collections.abc import Callable
 from typing import Protocol
 
-from multidrop.shell import output
 from multidrop.shell.signals import SIGNALS
+from multidrop.shell.streams import stdout
 
 SIGNALLED = 128
 """The exit code after a signal is this and its number."""
@@ -41,14 +41,14 @@ def opened(session: Endable) -> None:
         for each in SIGNALS:
             if each not in _handled and signal.getsignal(each) is signal.SIG_DFL:
                 _handled[each] = signal.signal(each, _exit)
-        if signal.SIGTERM in _handled and output.watch is None:
-            output.watch_reader(signal.SIGTERM)
+        if signal.SIGTERM in _handled and stdout.watch is None:
+            stdout.watch_reader(signal.SIGTERM)
 
 
 def closing(session: Endable) -> None:
     """Note that a session is being closed: a reader that leaves does not interrupt the end of the last one."""
     if _open == {session} and signal.SIGTERM in _handled:
-        output.work_done()
+        stdout.work_done()
 
 
 def closed(session: Endable) -> None:
@@ -60,8 +60,8 @@ def closed(session: Endable) -> None:
             if signal.getsignal(each) is _exit:
                 signal.signal(each, before)
         if signal.SIGTERM in _handled:
-            output.work_done()
-            output.watch = None
+            stdout.work_done()
+            stdout.watch = None
         _handled.clear()
 
 
@@ -72,9 +72,9 @@ def flush_printed() -> None:
 
 
 def _exit(number: int, _: object) -> None:
-    if output.reader_left():
-        output.silence(sys.stdout)  # or the interpreter fails as it flushes
-        raise SystemExit(output.READER_GONE)
+    if stdout.reader_left():
+        stdout.silence(sys.stdout)  # or the interpreter fails as it flushes
+        raise SystemExit(stdout.READER_GONE)
     raise SystemExit(SIGNALLED + number)
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 
-from multidrop.shell.output import exit_code, report, write
+from multidrop.shell.streams.stdout import exit_code, report, write
 
 
 def fail(failure: BaseException) -> int:

@@ -11,15 +11,16 @@ from multidrop.dialects import Diagnostic
 from multidrop.dialects.families import program_language_of, program_languages
 from multidrop.dialects.files import program_text_of
 from multidrop.dialects.program_files import errors
-from multidrop.shell import new_file, program_listing, replacement, snapshots, transfers
+from multidrop.shell import new_file, program_listing, snapshots
+from multidrop.shell.batch import runner
 from multidrop.shell.connect import settings
-from multidrop.shell.front import batch
 from multidrop.shell.lines import split_target
 from multidrop.shell.new_file import STANDARD_OUTPUT
 from multidrop.shell.params import file as files
-from multidrop.shell.params import work
+from multidrop.shell.params import replacement, work
 from multidrop.shell.params.restore import Options
 from multidrop.shell.params.work import check_new, each, file_of, is_several, targets
+from multidrop.shell.programs import transfers
 from multidrop.simulator import cells
 
 if TYPE_CHECKING:
@@ -77,7 +78,7 @@ def _with_drive(
     async def work(session: Session) -> None:
         await each(session, targets(session, chosen.drive, "programs"), lambda drive: body(session, drive))
 
-    return batch.run([chosen.url], work, agreed=agreed, unsolicited=unsolicited, tried=chosen.drive.split(","))
+    return runner.run([chosen.url], work, agreed=agreed, unsolicited=unsolicited, tried=chosen.drive.split(","))
 
 
 DIFFERS = 1
@@ -86,7 +87,7 @@ DIFFERS = 1
 
 def params_backup(chosen: argparse.Namespace) -> int:
     work.check_new(chosen.file, chosen.drive)
-    return batch.run(
+    return runner.run(
         [chosen.url],
         lambda session: work.backup(session, chosen.file, chosen.drive),
         unsolicited=False,
@@ -114,7 +115,7 @@ def params_diff(chosen: argparse.Namespace) -> int:
         differs = await work.diff(session, chosen.drive, name=chosen.file, other=other, as_json=chosen.json)
 
     tried = [*chosen.drive.split(","), "" if chosen.against else chosen.other]
-    code = batch.run([chosen.url], compare, unsolicited=False, tried=tried)
+    code = runner.run([chosen.url], compare, unsolicited=False, tried=tried)
     return code or (DIFFERS if differs else 0)
 
 
@@ -132,13 +133,13 @@ def params_restore(chosen: argparse.Namespace) -> int:
     async def put(session: Session) -> None:
         await work.restore_each(session, chosen.file, chosen.drive, options)
 
-    return batch.run([chosen.url], put, agreed=chosen.yes, unsolicited=False, tried=chosen.drive.split(","))
+    return runner.run([chosen.url], put, agreed=chosen.yes, unsolicited=False, tried=chosen.drive.split(","))
 
 
 def snapshot(chosen: argparse.Namespace) -> int:
     new_file.check(chosen.output, printed=True)
     printed = chosen.output == new_file.STANDARD_OUTPUT
-    return batch.run(chosen.urls, lambda session: snapshots.save(session, chosen.output), unsolicited=not printed)
+    return runner.run(chosen.urls, lambda session: snapshots.save(session, chosen.output), unsolicited=not printed)
 
 
 def apply(chosen: argparse.Namespace) -> int:
@@ -163,4 +164,4 @@ def apply(chosen: argparse.Namespace) -> int:
         specs = {drive: replacement.chosen(cell, chosen.file, drive, chosen.source, several) for drive in drives}
         await each(session, drives, lambda drive: replacement.apply(session, drive, chosen.file, specs[drive], wanted))
 
-    return batch.run([chosen.url], work, agreed=chosen.yes, tried=chosen.drive.split(","))
+    return runner.run([chosen.url], work, agreed=chosen.yes, tried=chosen.drive.split(","))

@@ -18,10 +18,10 @@ if TYPE_CHECKING:
 def shell(chosen: argparse.Namespace) -> int:
     if sys.stdin.isatty():
         with importing():
-            from multidrop.shell.front.prompt import run
+            from multidrop.shell.prompt.prompt import run
         return run(chosen.urls, reconnect=not chosen.no_reconnect, agreed=chosen.yes, raw=chosen.raw, twin=chosen.twin)
-    from multidrop.shell.front import batch
-    from multidrop.shell.front.terminal_input import run_stream
+    from multidrop.shell.batch import runner
+    from multidrop.shell.prompt.terminal_input import run_stream
 
     async def lines(session: Session) -> None:
         if chosen.twin:
@@ -29,20 +29,20 @@ def shell(chosen: argparse.Namespace) -> int:
                 await session.twins.start(bus)
         await run_stream(session, descriptor=sys.stdin.fileno())
 
-    return batch.run(chosen.urls, lines, watch_keys=False, agreed=chosen.yes, asks=False, raw=chosen.raw)
+    return runner.run(chosen.urls, lines, watch_keys=False, agreed=chosen.yes, asks=False, raw=chosen.raw)
 
 
 def send(chosen: argparse.Namespace) -> int:
     with importing():
-        from multidrop.shell.front import batch
-        from multidrop.shell.front.terminal_input import run_lines
+        from multidrop.shell.batch import runner
         from multidrop.shell.lines import each_names_one_drive, targets
+        from multidrop.shell.prompt.terminal_input import run_lines
 
     lazy, tried = each_names_one_drive(chosen.lines), targets(chosen.lines)
     if not chosen.json:
         lines = partial(run_lines, lines=chosen.lines)
-        return batch.run([chosen.url], lines, lazy=lazy, agreed=chosen.yes, asks=False, tried=tried)
-    from multidrop.shell.front.report import Report
+        return runner.run([chosen.url], lines, lazy=lazy, agreed=chosen.yes, asks=False, tried=tried)
+    from multidrop.shell.batch.report import Report
     from multidrop.shell.scripts.executor import run_typed
 
     report = Report("send", as_json=True)
@@ -50,14 +50,14 @@ def send(chosen: argparse.Namespace) -> int:
     async def body(session: Session) -> None:
         await run_typed(session, chosen.lines, report.executed)
 
-    code = batch.run([chosen.url], body, lazy=lazy, agreed=chosen.yes, asks=False, replies=False, tried=tried)
+    code = runner.run([chosen.url], body, lazy=lazy, agreed=chosen.yes, asks=False, replies=False, tried=tried)
     return report.finish(code)
 
 
 def run(chosen: argparse.Namespace) -> int:
     from multidrop.macros import MacroStore
+    from multidrop.shell.batch.report import Report
     from multidrop.shell.connect.settings import Settings
-    from multidrop.shell.front.report import Report
     from multidrop.shell.scripts.reading import WrongScript, read_script
 
     if not (chosen.on or chosen.role):
@@ -78,7 +78,7 @@ def run(chosen: argparse.Namespace) -> int:
     except Diagnostic as problem:
         report.wrong((problem,))
         return fail(problem)
-    from multidrop.shell.front import batch
+    from multidrop.shell.batch import runner
     from multidrop.shell.lines import targets
     from multidrop.shell.scripts.executor import run_script
     from multidrop.shell.scripts.model import lines_of
@@ -89,7 +89,7 @@ def run(chosen: argparse.Namespace) -> int:
             await run_script(session, script, report.executed)
 
     tried = targets(each.text for each in lines_of(script.body))
-    return report.finish(batch.run([], body, agreed=chosen.yes, asks=False, replies=not chosen.json, tried=tried))
+    return report.finish(runner.run([], body, agreed=chosen.yes, asks=False, replies=not chosen.json, tried=tried))
 
 
 def start(chosen: argparse.Namespace) -> int:

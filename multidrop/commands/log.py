@@ -15,7 +15,7 @@ from multidrop.shell.log import files, steps
 from multidrop.shell.log import show as showing
 from multidrop.shell.log.entries import Entry
 from multidrop.shell.log.files import Line
-from multidrop.shell.output import lose, write
+from multidrop.shell.streams.stdout import lose, write
 
 if TYPE_CHECKING:
     from multidrop.shell.session import Session
@@ -64,16 +64,16 @@ def replay(chosen: argparse.Namespace) -> int:
     found = steps.read(Path(chosen.file))
     if not found.steps:
         raise Diagnostic("no line of the log was sent to a drive", chosen.file, "/log before the lines keeps them")
-    from multidrop.shell.front import batch
-    from multidrop.shell.front.replay import ReplayReport, VirtualLoop
-    from multidrop.shell.front.replay import replay as run
+    from multidrop.shell.batch import runner
+    from multidrop.shell.batch.replay import ReplayReport, VirtualLoop
+    from multidrop.shell.batch.replay import replay as run
 
     async def body(session: Session) -> None:
         await run(session, found, fast=chosen.fast, positions=bool(chosen.against), report=ReplayReport(chosen.json))
 
     url = chosen.to or f"sim:{chosen.against.removeprefix('sim:')}"
     loop = VirtualLoop if chosen.against else None
-    return batch.run([url], body, agreed=chosen.yes, unsolicited=False, replies=False, loop=loop)
+    return runner.run([url], body, agreed=chosen.yes, unsolicited=False, replies=False, loop=loop)
 
 
 def _reported(work: Callable[[], None]) -> int:

@@ -20,8 +20,8 @@ from multidrop.macros import MacroStore
 from multidrop.shell.connect import settings
 from multidrop.shell.connect.settings import Settings
 from multidrop.shell.new_file import STANDARD_OUTPUT
-from multidrop.shell.output import write
 from multidrop.shell.secrets import HIDDEN, holds_password, toml_without_secrets, url_without_secrets, without_secrets
+from multidrop.shell.streams.stdout import write
 
 REFUSED = "   # default; the file's does not count"
 WRONG = 2

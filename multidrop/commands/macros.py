@@ -15,7 +15,7 @@ from multidrop.macros import Macro, MacroStore, format_macro, missing
 from multidrop.macros.store import begin_draft, finish_draft, listed
 from multidrop.shell import macro_changes
 from multidrop.shell.connect.settings import Settings
-from multidrop.shell.output import INTERRUPTED, write
+from multidrop.shell.streams.stdout import INTERRUPTED, write
 
 if TYPE_CHECKING:
     from multidrop.shell.session import Session
@@ -42,7 +42,7 @@ def show(chosen: argparse.Namespace) -> int:
 
 def play(chosen: argparse.Namespace) -> int:
     """Play a macro; report wrong values and lines before anything is opened."""
-    from multidrop.shell.front.report import Report
+    from multidrop.shell.batch.report import Report
     from multidrop.shell.scripts.reading import WrongScript, read_macro
 
     if not (chosen.on or chosen.role):
@@ -64,7 +64,7 @@ def play(chosen: argparse.Namespace) -> int:
         return fail(problem)
     except KeyboardInterrupt:
         return INTERRUPTED
-    from multidrop.shell.front import batch
+    from multidrop.shell.batch import runner
     from multidrop.shell.scripts.executor import play as play_macro
 
     async def body(session: Session) -> None:
@@ -72,15 +72,15 @@ def play(chosen: argparse.Namespace) -> int:
         with report.noting():
             await play_macro(session, macro, values, times=chosen.times, fast=chosen.fast, watcher=report)
 
-    return report.finish(batch.run([], body, agreed=chosen.yes, asks=False, replies=not chosen.json))
+    return report.finish(runner.run([], body, agreed=chosen.yes, asks=False, replies=not chosen.json))
 
 
 def _asked(macro: Macro, values: Mapping[str, str]) -> dict[str, str]:
     """Ask at the terminal for the values, if one is missing that must be given."""
     if not missing(macro, values):
         return {}
-    from multidrop.shell.front import terminal_input
     from multidrop.shell.macro_arguments import value_fields
+    from multidrop.shell.prompt import terminal_input
 
     if not terminal_input.can_ask():
         return {}

@@ -17,8 +17,8 @@ from multidrop.dialects import Diagnostic
 from multidrop.dialects.families import program_language_of
 from multidrop.dialects.files import program_text_of
 from multidrop.dialects.program_files import errors
-from multidrop.shell.checking import Checked, examine, rewrite
-from multidrop.shell.output import reader_left, shortened, write
+from multidrop.shell.programs.checking import Checked, examine, rewrite
+from multidrop.shell.streams.stdout import reader_left, shortened, write
 
 if TYPE_CHECKING:
     from multidrop.simulator.cell.spec import DriveSpec

@@ -28,12 +28,12 @@ from multidrop.api.sessions import Notice
 from multidrop.commands import fail
 from multidrop.dialects import Diagnostic, Stopped
 from multidrop.dialects.files import bytes_of
+from multidrop.shell.batch.report import Report
 from multidrop.shell.events import FAILURES, Entered, Output, Printed, SessionEvent
-from multidrop.shell.front.keyboard import on_stop_key
-from multidrop.shell.front.report import Report
-from multidrop.shell.output import INTERRUPTED, exit_code, lost_reader, why_interrupted, work_done, write
+from multidrop.shell.prompt.keyboard import on_stop_key
 from multidrop.shell.scripts.model import Result, ScriptLine
 from multidrop.shell.signals import SIGNALS, early_ends
+from multidrop.shell.streams.stdout import INTERRUPTED, exit_code, lost_reader, why_interrupted, work_done, write
 
 T = TypeVar("T")
 

@@ -9,20 +9,20 @@ from dataclasses import replace
 from functools import partial
 
 from multidrop.dialects import Diagnostic
+from multidrop.shell.batch import runner
 from multidrop.shell.connect import settings
 from multidrop.shell.connect.opening import open_buses
 from multidrop.shell.connect.urls import parse
-from multidrop.shell.found import FoundDrive, url_of
-from multidrop.shell.front import batch
-from multidrop.shell.rescuing import Rescue
-from multidrop.shell.scanning import Scanning
+from multidrop.shell.finding.found_drives import FoundDrive, url_of
+from multidrop.shell.finding.rescuing import Rescue
+from multidrop.shell.finding.scanning import Scanning
 from multidrop.shell.session import Session
 
 
 def run(chosen: argparse.Namespace) -> int:
     if chosen.save:
         settings.check_new(chosen.save)
-    return batch.run([], partial(_scan, chosen), agreed=chosen.yes, unsolicited=False)
+    return runner.run([], partial(_scan, chosen), agreed=chosen.yes, unsolicited=False)
 
 
 async def _scan(chosen: argparse.Namespace, session: Session) -> None:
@@ -62,7 +62,7 @@ def _form(drive: FoundDrive) -> tuple[object, ...]:
 
 
 def rescue(chosen: argparse.Namespace) -> int:
-    return batch.run([], partial(_rescue, chosen), agreed=chosen.yes, unsolicited=False)
+    return runner.run([], partial(_rescue, chosen), agreed=chosen.yes, unsolicited=False)
 
 
 async def _rescue(chosen: argparse.Namespace, session: Session) -> None:

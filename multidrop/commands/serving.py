@@ -12,7 +12,7 @@ from types import FrameType
 
 from multidrop.commands import fail
 from multidrop.dialects import Diagnostic
-from multidrop.shell.output import write
+from multidrop.shell.streams.stdout import write
 
 FILES = {"bash": "multidrop.bash", "zsh": "_multidrop", "fish": "multidrop.fish"}
 """The completion of each shell in `multidrop/shipped`, which `make shipped` writes."""
@@ -24,7 +24,7 @@ def sim(chosen: argparse.Namespace) -> int:
     from pathlib import Path
 
     from multidrop.shell.connect import settings
-    from multidrop.shell.output import finish, nonblocking
+    from multidrop.shell.streams.stdout import finish, nonblocking
     from multidrop.simulator.serving.command import serve
 
     async def body() -> int:
@@ -43,15 +43,15 @@ def sim(chosen: argparse.Namespace) -> int:
 
 
 def share(chosen: argparse.Namespace) -> int:
-    from multidrop.shell.front import sharing
+    from multidrop.shell.sharing import command
 
-    return sharing.run(chosen.url, chosen.rfc2217, as_json=chosen.json)
+    return command.run(chosen.url, chosen.rfc2217, as_json=chosen.json)
 
 
 def plot(chosen: argparse.Namespace) -> int:
-    from multidrop.shell.front import plotting
+    from multidrop.shell.plots import command
 
-    return plotting.run(
+    return command.run(
         chosen.url,
         [] if "all" in chosen.drive else chosen.drive,
         to=chosen.to,
@@ -62,9 +62,9 @@ def plot(chosen: argparse.Namespace) -> int:
 
 
 def publish(chosen: argparse.Namespace) -> int:
-    from multidrop.shell.front import publishing
+    from multidrop.shell.publishing import command
 
-    return publishing.run(chosen.urls, to=chosen.to, rate=chosen.rate, reconnect=not chosen.no_reconnect)
+    return command.run(chosen.urls, to=chosen.to, rate=chosen.rate, reconnect=not chosen.no_reconnect)
 
 
 def relay(chosen: argparse.Namespace) -> int:

@@ -15,11 +15,11 @@ from functools import partial
 
 from multidrop.commands import fail
 from multidrop.dialects import Diagnostic
+from multidrop.shell.batch.junit import Case as JUnitCase
+from multidrop.shell.batch.junit import JUnitFile
 from multidrop.shell.connect import settings
-from multidrop.shell.front.junit import Case as JUnitCase
-from multidrop.shell.front.junit import JUnitFile
-from multidrop.shell.output import INTERRUPTED, write
-from multidrop.shell.status_line import StatusLine
+from multidrop.shell.streams.status_line import StatusLine
+from multidrop.shell.streams.stdout import INTERRUPTED, write
 from multidrop.shell.sweeps import plan as planning
 from multidrop.shell.sweeps import workers
 from multidrop.shell.sweeps.failures import Failures, command, grouped, rows
@@ -75,7 +75,7 @@ def _agree(address: str, yes: bool, what: str, interruption: Interruption) -> No
         return
     import asyncio
 
-    from multidrop.shell.front.terminal_input import ask_outside_a_session
+    from multidrop.shell.prompt.terminal_input import ask_outside_a_session
 
     where = f"--cluster {address}"
     with interruption.open():

@@ -14,7 +14,7 @@ from lsprotocol import types
 from multidrop.dialects.families import program_languages
 from multidrop.dialects.program_editing import Block, Offer, Span
 from multidrop.dialects.program_files import Problem
-from multidrop.shell.program_text import Coloured, Edit, Fold, ProgramGrammar, ProgramText
+from multidrop.shell.programs.program_text import Coloured, Edit, Fold, ProgramGrammar, ProgramText
 from multidrop.shell.threads import in_thread
 
 T = TypeVar("T")

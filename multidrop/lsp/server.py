@@ -18,7 +18,7 @@ from multidrop.dialects import Diagnostic
 from multidrop.dialects.program_files import Problem
 from multidrop.lsp import replies
 from multidrop.lsp.replies import DELAY, Document, Documents, Positions
-from multidrop.shell.output import shortened
+from multidrop.shell.streams.stdout import shortened
 from multidrop.simulator.families import TABLE
 
 TRIGGERS = (" ", ",", "=")

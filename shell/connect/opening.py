@@ -16,9 +16,9 @@ from multidrop.dialects.families import DEFAULT, FAMILIES
 from multidrop.drives.bus import Bus
 from multidrop.drives.line import DEFAULT_TIMEOUT
 from multidrop.shell.connect import settings
-from multidrop.shell.connect.port_state import PortState
 from multidrop.shell.connect.reconnect import HostAgain, LoginAgain, Reopen, SerialAgain, simulated, timed
 from multidrop.shell.connect.urls import Connection
+from multidrop.shell.state.port_state import PortState
 from multidrop.transports import Unreachable
 from multidrop.transports.ssh import FarPort
 

@@ -9,7 +9,7 @@ from datetime import datetime
 
 from multidrop.dialects.values import UNREAD, Conditions
 from multidrop.shell.log.entries import Entry, line_of
-from multidrop.shell.output import shortened
+from multidrop.shell.streams.stdout import shortened
 
 ONLINE, LOST, BYE = "online", "lost", "bye"
 """Plain words: the states of this program, and of a line."""

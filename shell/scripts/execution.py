@@ -21,6 +21,7 @@ from multidrop.shell.events import FAILURES, By, Failed, Progressed
 from multidrop.shell.lines import join_target, pinned, split_target
 from multidrop.shell.playing import Playing, cast, played_by
 from multidrop.shell.scripts import words
+from multidrop.shell.scripts.captured_prints import Hearing
 from multidrop.shell.scripts.expression import (
     Expression,
     Name,
@@ -33,7 +34,6 @@ from multidrop.shell.scripts.expression import (
     value_of,
     written,
 )
-from multidrop.shell.scripts.hearing import Hearing
 from multidrop.shell.scripts.model import (
     CallFile,
     CallMacro,

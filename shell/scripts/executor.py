@@ -18,15 +18,15 @@ from multidrop.drives.drive import Drive
 from multidrop.drives.events import Lost
 from multidrop.drives.stopping import Halt
 from multidrop.macros import Macro
-from multidrop.shell import unfinished
 from multidrop.shell.automation import outcome, settled
 from multidrop.shell.events import FAILURES, By, OnBus, SessionEvent
 from multidrop.shell.playing import NO_ROLES, cast
+from multidrop.shell.scripts.captured_prints import hearing
 from multidrop.shell.scripts.execution import CUT, Execution, Frame, Unfinished
-from multidrop.shell.scripts.hearing import hearing
 from multidrop.shell.scripts.model import Ending, Executed, Result, Script, ScriptLine, Watcher
 from multidrop.shell.scripts.planning import bind, macro_claims, script_claims
 from multidrop.shell.scripts.reading import read_macro
+from multidrop.shell.state import crash_marks
 from multidrop.shell.waits import Standing, standings
 from multidrop.shell.workspace import LATCHED
 from multidrop.transports import TransportLost
@@ -141,7 +141,7 @@ async def play(
     name, begun = macro.name, session.now()
     own = macro_claims(session, played, roles)
     state, ports = session.settings.state, {link.name: session.of(session.buses[link.name]).port for link, _ in own}
-    with hearing(session.subscribe) as heard, unfinished.playing(state, ports.values(), name, session.wall(begun)):
+    with hearing(session.subscribe) as heard, crash_marks.playing(state, ports.values(), name, session.wall(begun)):
         execution = Execution(session, heard, watcher.executed)
         async with (
             session.automations.run(f"macro {name}", own),

@@ -16,7 +16,7 @@ from multidrop.drives.events import BusEvent, Changed, Concluded, Conditioned, L
 from multidrop.drives.port_journal import GLOBAL
 from multidrop.drives.telemetry import Subscription, Value
 from multidrop.shell.events import TwinEnded, TwinEvent
-from multidrop.shell.twins.beside import Beside
+from multidrop.shell.twins.pair import Beside
 
 PERIOD = 0.1
 """Seconds between two samples of a drive, at most."""

@@ -114,7 +114,7 @@ class Twins:
     async def _start(self, twins: BusTwins, drive: Drive) -> tuple[str, ...]:
         """Read a drive, and run a twin beside it; return the gaps of the twin."""
         from multidrop.shell import snapshots
-        from multidrop.shell.twins.beside import Beside
+        from multidrop.shell.twins.pair import Beside
         from multidrop.shell.twins.twin import make
 
         name, bus = self._workspace.display_name(drive), twins.bus

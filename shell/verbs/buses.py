@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 
 from multidrop.dialects import Diagnostic, Inexpressible
 from multidrop.dialects.text import whole
-from multidrop.shell import scanning
 from multidrop.shell.connect import settings
+from multidrop.shell.finding import scanning
 from multidrop.shell.lines import split_target
 from multidrop.shell.openings import model
 from multidrop.shell.raw import TERMINATORS, Form, RawLine, Watched, parse_bytes

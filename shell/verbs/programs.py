@@ -10,10 +10,11 @@ from multidrop.dialects import Diagnostic, Inexpressible
 from multidrop.dialects.families import program_language_of
 from multidrop.dialects.program_files import errors
 from multidrop.drives.drive import Drive
-from multidrop.shell import debugging, new_file, program_listing, transfers
-from multidrop.shell.checking import examine
-from multidrop.shell.debugging import LEFT, Debugger
+from multidrop.shell import new_file, program_listing
 from multidrop.shell.lines import split_target
+from multidrop.shell.programs import debugging, transfers
+from multidrop.shell.programs.checking import examine
+from multidrop.shell.programs.debugging import LEFT, Debugger
 from multidrop.shell.verbs.call import Call
 from multidrop.simulator.families import PROGRAMS, TABLE
 

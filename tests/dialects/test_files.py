@@ -26,9 +26,9 @@ from multidrop.macros import MacroStore
 from multidrop.macros.toml_format import parse_macro
 from multidrop.macros.vendor import imported
 from multidrop.shell.connect import settings
-from multidrop.shell.edited_file import EditedFile
 from multidrop.shell.log import files as log_files
 from multidrop.shell.params import file as params_file
+from multidrop.shell.programs.edited_file import EditedFile
 from multidrop.shell.scripts.reading import read_script
 from multidrop.simulator import cells
 from multidrop.simulator.serving.command import read_lines

@@ -28,7 +28,7 @@ OTHERS = HOSTS - MCODE - {"multidrop.drives.bus", "multidrop.shell.session"}
 VERBS = {
     "multidrop.shell.verbs.call",
     "multidrop.shell.plots",
-    "multidrop.shell.transfers",
+    "multidrop.shell.programs.transfers",
     "secrets",
     "hashlib",
     "difflib",
@@ -37,7 +37,7 @@ VERBS = {
 IDLE = "multidrop.dialects.errors", "shutil", "dataclasses", "json", "pathlib"
 
 TABLE = {
-    ("--version",): NO_LINE | {*IDLE, "multidrop.shell.output"},
+    ("--version",): NO_LINE | {*IDLE, "multidrop.shell.streams.stdout"},
     ("--help",): NO_LINE | {"json", "pathlib"},
     ("send", "--help"): NO_LINE | {"json", "pathlib"},
     ("program", "check", "a.mxt"): NO_LINE

@@ -12,7 +12,7 @@ from pytest_lsp import LanguageClient
 
 from multidrop.dialects.families import program_languages
 from multidrop.lsp.replies import LEGEND
-from multidrop.shell.checking import examine_text
+from multidrop.shell.programs.checking import examine_text
 from tests.support.lsp_session import Editor, editing
 
 PROGRAM = "VA Q1=5\t' half\r\nPG 1\r\nLB G1 ' 20 °C 😀 go\r\n  mr q1  ' one\r\n H\r\n br g1,q1<3\r\nE\r\nPG\r\n"

@@ -10,7 +10,7 @@ from lsprotocol import types
 from multidrop.dialects.program_files import Problem
 from multidrop.lsp import replies
 from multidrop.lsp.replies import Document, Positions
-from multidrop.shell.program_text import ProgramGrammar, ProgramText
+from multidrop.shell.programs.program_text import ProgramGrammar, ProgramText
 from tests.support.program_texts import TEXTS
 
 SIZES = {

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.shell.test_interrupts import Shop
+from tests.shell.scripts.test_interrupts import Shop
 from tests.support.front_door import Command, multidrop
 from tests.support.until import PATIENCE
 

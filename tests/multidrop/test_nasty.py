@@ -29,9 +29,9 @@ from multidrop.macros import parse_macro
 from multidrop.shell.connect import settings, urls
 from multidrop.shell.connect.settings import Settings
 from multidrop.shell.events import FAILURES
-from multidrop.shell.output import LONGEST, report, shortened
 from multidrop.shell.plots.target import parse_target
 from multidrop.shell.session import Session
+from multidrop.shell.streams.stdout import LONGEST, report, shortened
 from multidrop.simulator import cells
 from multidrop.simulator.floor import Floor
 from tests.support.front_door import Command

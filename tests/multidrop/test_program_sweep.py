@@ -12,7 +12,7 @@ from xml.etree import ElementTree
 import pytest
 
 from multidrop.dialects import Diagnostic
-from multidrop.shell.front.junit import Case, JUnitFile
+from multidrop.shell.batch.junit import Case, JUnitFile
 from multidrop.shell.sweeps import trial
 from tests.support.front_door import Command, Done
 from tests.support.front_door import multidrop as multidrop
@@ -232,6 +232,8 @@ def test_a_lost_report_is_said_beside_failed_cases(sweep, monkeypatch: pytest.Mo
 
 
 def test_lost_output_is_said_beside_failed_cases(sweep, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("multidrop.shell.output.dropped", ["the output cannot be written: No space left on device"])
+    monkeypatch.setattr(
+        "multidrop.shell.streams.stdout.dropped", ["the output cannot be written: No space left on device"]
+    )
     done = sweep(*FAILING)
     assert (done.returncode, done.stderr) == (1, "the output cannot be written: No space left on device\n")

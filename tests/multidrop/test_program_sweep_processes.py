@@ -15,7 +15,7 @@ from pathlib import Path
 
 import pytest
 
-from multidrop.shell.front import terminal_input
+from multidrop.shell.prompt import terminal_input
 from multidrop.shell.sweeps import cluster as cluster_of_cases
 from tests.support.front_door import Command
 from tests.support.front_door import multidrop as multidrop

@@ -6,7 +6,7 @@ import pytest
 
 from multidrop.dialects import Diagnostic, Stopped
 from multidrop.shell.connect.settings import Settings
-from multidrop.shell.front.terminal_input import PAUSE, Answer, at_lines
+from multidrop.shell.prompt.terminal_input import PAUSE, Answer, at_lines
 from multidrop.shell.session import Session
 from tests.support.virtual import in_virtual_time
 

@@ -7,7 +7,7 @@ import pytest
 from multidrop.dialects import DriveError, Refused, Stopped
 from multidrop.macros import Macro, Step
 from multidrop.shell.events import By
-from multidrop.shell.front.terminal_input import run_lines
+from multidrop.shell.prompt.terminal_input import run_lines
 from multidrop.shell.scripts import model
 from multidrop.shell.scripts.executor import run_script
 from multidrop.transports import TransportLost

@@ -7,7 +7,7 @@ import pytest
 
 from multidrop.dialects import Diagnostic
 from multidrop.shell.events import Bytes
-from multidrop.shell.printer import Printer
+from multidrop.shell.streams.event_printer import Printer
 from tests.support.cell_session import CellSession, bus
 from tests.support.virtual import in_virtual_time
 

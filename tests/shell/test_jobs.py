@@ -7,7 +7,7 @@ import pytest
 
 from multidrop.shell.channel import running
 from multidrop.shell.events import Notified, Printed, Progressed
-from multidrop.shell.printer import Printer
+from multidrop.shell.streams.event_printer import Printer
 
 
 class Channel:

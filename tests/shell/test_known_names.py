@@ -11,8 +11,8 @@ from multidrop.dialects.mcode.host.program_readout import offered
 from multidrop.dialects.program_files import Held
 from multidrop.drives.events import Ended
 from multidrop.shell.events import OnBus
-from multidrop.shell.front.complete import complete, names_of
-from multidrop.shell.front.prompt_lines import SessionCompleter
+from multidrop.shell.prompt.complete import complete, names_of
+from multidrop.shell.prompt.view import SessionCompleter
 from tests.support.cases import for_each
 from tests.support.cell_session import CellSession, bus, party
 from tests.support.virtual import in_virtual_time

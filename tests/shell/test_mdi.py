@@ -10,7 +10,7 @@ import pytest
 from multidrop.dialects import Refused
 from multidrop.shell.connect.settings import Settings
 from multidrop.shell.events import Output
-from multidrop.shell.front import complete
+from multidrop.shell.prompt import complete
 from multidrop.shell.session import Session
 
 pytestmark = pytest.mark.virtual

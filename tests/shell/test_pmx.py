@@ -10,7 +10,7 @@ from multidrop.dialects import Diagnostic, Refused, Stopped
 from multidrop.drives.events import Sample
 from multidrop.shell.connect.settings import Settings
 from multidrop.shell.events import By, Notified, OnBus, Output, Printed
-from multidrop.shell.front.complete import complete, hint
+from multidrop.shell.prompt.complete import complete, hint
 from multidrop.shell.session import Session
 from tests.support.until import PATIENCE
 

@@ -15,8 +15,8 @@ from multidrop.macros import Macro, Step
 from multidrop.shell.connect.opening import Opened
 from multidrop.shell.connect.settings import SavedConnection, Settings
 from multidrop.shell.events import By, Entered, Failed, Notified, OnBus, Printed, StateChanged
-from multidrop.shell.output import report
 from multidrop.shell.session import Session
+from multidrop.shell.streams.stdout import report
 from multidrop.transports import TransportLost
 
 

@@ -8,9 +8,10 @@ from pathlib import Path
 import pytest
 
 from multidrop.dialects import Diagnostic, DriveError, Stopped
-from multidrop.shell import snapshots, transfers
+from multidrop.shell import snapshots
 from multidrop.shell.connect.settings import Settings
 from multidrop.shell.events import Notified
+from multidrop.shell.programs import transfers
 from multidrop.shell.session import Session
 from multidrop.simulator import cells
 from multidrop.transports import TransportLost

@@ -14,7 +14,7 @@ from multidrop.drives.stopping import stop_forms
 from multidrop.shell.connect.settings import Settings
 from multidrop.shell.connect.urls import parse as parse_url
 from multidrop.shell.events import By, Notified, OnBus, Output, Printed
-from multidrop.shell.front.complete import complete, hint
+from multidrop.shell.prompt.complete import complete, hint
 from multidrop.shell.session import Session
 from tests.support.until import PATIENCE
 

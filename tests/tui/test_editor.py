@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 from multidrop.dialects import Diagnostic
 from multidrop.dialects.families import program_languages
 from multidrop.dialects.program_files import Part
-from multidrop.shell.drafts import Drafts
-from multidrop.shell.program_text import ProgramGrammar
+from multidrop.shell.programs.program_text import ProgramGrammar
+from multidrop.shell.state.drafts import Drafts
 from multidrop.tui.editor import MacroGrammar, grammar_of
 from multidrop.tui.screens.dialogs import Match
 from multidrop.tui.screens.edit import aligned

@@ -17,7 +17,7 @@ from multidrop.tui.app import MultidropApp
 from multidrop.tui.assist import ShellAssist
 from multidrop.tui.launch import driver
 from multidrop.shell.connect.settings import load
-from multidrop.shell.front.collector import collected_at_rest
+from multidrop.shell.prompt.collector import collected_at_rest
 from multidrop.shell.log.writer import begin
 from multidrop.shell.session import Session
 from multidrop.tui.screens.start import Opener
@@ -58,7 +58,7 @@ LATER = {
         "multidrop.tui.editor",
         "multidrop.shell.params.page",
         "multidrop.shell.operations.offers",
-        "multidrop.shell.front.complete",
+        "multidrop.shell.prompt.complete",
     ),
     *(
         "multidrop.dialects.mcode.family",

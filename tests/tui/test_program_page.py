@@ -11,8 +11,8 @@ import pytest
 from textual import events
 from textual.pilot import Pilot
 
-from multidrop.shell.drafts import Draft, Drafts
 from multidrop.shell.events import Phase, ProgramRead, ProgramSeen
+from multidrop.shell.state.drafts import Draft, Drafts
 from multidrop.tui.app import MultidropApp
 from multidrop.tui.screens.dialogs import Confirm, Search
 from multidrop.tui.screens.program import ProgramPage

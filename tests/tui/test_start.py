@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from multidrop.dialects import Diagnostic
-from multidrop.shell.connect import port_state
+from multidrop.shell.state import port_state
 from multidrop.transports import Unreachable
 from multidrop.transports.serial_ports import holder
 from multidrop.tui.app import MultidropApp

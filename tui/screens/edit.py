@@ -1,7 +1,7 @@
 """A page with a text file in an editor: opened, checked as it is typed, saved; its copy survives a crash.
 
 The text stays when the page is left, after a stop and when the line is lost. Soon after an edit a copy of it is on the
-disk (`shell.drafts`).
+disk (`shell.state.drafts`).
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from textual.containers import Horizontal, Vertical
 
 from multidrop.dialects import Diagnostic
 from multidrop.dialects.program_files import Part, Problem
-from multidrop.shell.edited_file import ChangedMeanwhile, real_text
+from multidrop.shell.programs.edited_file import ChangedMeanwhile, real_text
 from multidrop.tui.editor import Editor, Grammar, MacroGrammar, grammar_of
 from multidrop.tui.panels.view import View
 from multidrop.tui.readout import ProgramFacts

@@ -13,8 +13,8 @@ from typing import ClassVar
 from textual.binding import Binding, BindingType
 
 from multidrop.dialects.program_files import Entry
-from multidrop.shell.checking import ending_of
-from multidrop.shell.program_text import ProgramGrammar
+from multidrop.shell.programs.checking import ending_of
+from multidrop.shell.programs.program_text import ProgramGrammar
 from multidrop.tui.panels.program import SIGNS, index_of, spot_of, state_words
 from multidrop.tui.panels.table import column_rows, panel
 from multidrop.tui.panels.view import View

@@ -29,8 +29,8 @@ from textual.drivers.linux_driver import LinuxDriver
 from textual.geometry import Offset, Size
 from textual.message import Message
 
-from multidrop.shell.front import raw_terminal
-from multidrop.shell.outlets import Lane, Loss
+from multidrop.shell.prompt import raw_terminal
+from multidrop.shell.streams.output_streams import Lane, Loss
 from multidrop.tui.frame_scheduler import Pace
 from multidrop.tui.terminal.canvas import Canvas, pieces_of
 from multidrop.tui.terminal.keystream import STOP, KeyStream

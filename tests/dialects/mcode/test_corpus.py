@@ -16,7 +16,7 @@ from multidrop.dialects.mcode.host.state import MCodeState
 from multidrop.dialects.mcode.manual.program_checker import check
 from multidrop.dialects.mcode.manual.program_file import formatted, read, remark_at
 from multidrop.dialects.mcode.manual.statements import canonical
-from multidrop.shell.checking import examine
+from multidrop.shell.programs.checking import examine
 from multidrop.simulator.cell.spec import DriveSpec, WorldSpec
 from multidrop.simulator.lexium.device import MCodeDevice
 from multidrop.simulator.world import World

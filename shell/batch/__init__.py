@@ -1,0 +1,1 @@
+"""Runs without a screen: lines, scripts, replayed logs; reports and exit codes."""

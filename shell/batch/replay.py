@@ -1,0 +1,322 @@
+"""A session log, taken again on other drives: the same lines, and where the answers differ.
+
+A number that a drive prints while it may move may be another number. A drive may move from a line that can start it
+until a wait or a stop. The replay ends at the first difference in an error, and stops the drives that it moved. Against
+a cell, it also compares the positions in the log with those of the simulated drives at the same times.
+
+Against a cell it runs in virtual time: where nothing is ready, time goes on to the next timer.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import json
+import selectors
+import sys
+from collections.abc import AsyncIterator, Callable, Mapping, Sequence
+from concurrent.futures import Executor, ThreadPoolExecutor, wait
+from typing import TYPE_CHECKING, Any
+
+from multidrop.dialects import Diagnostic, DriveError, Stopped
+from multidrop.shell import waits
+from multidrop.shell.automation import outcome, settled
+from multidrop.shell.events import By, Printed, SessionEvent
+from multidrop.shell.lines import EVERYONE, join_target
+from multidrop.shell.log.steps import WORLD, Step, Steps, compared, errors_differ
+from multidrop.shell.openings import model
+from multidrop.shell.streams.stdout import write
+from multidrop.shell.workspace import LATCHED
+
+if TYPE_CHECKING:
+    from multidrop.drives.drive import Drive
+    from multidrop.shell.channel import Channel
+    from multidrop.shell.log.twin_comparison import Divergence, Positions, Reading
+    from multidrop.shell.session import Session
+
+
+class ReplayReport:
+    """Writes what differs to standard output as it is found. `as_json`: as objects, and the summary too."""
+
+    def __init__(self, as_json: bool = False) -> None:
+        self._json = as_json
+
+    def differs(self, step: Step, text: str, difference: str) -> None:
+        """Report another answer."""
+        place = {"bus": step.bus, "drive": step.drive, "line": step.text}
+        self._put(text, {"where": step.where, **place, "differs": difference})
+
+    def diverged(self, found: Divergence) -> None:
+        """Report the first divergence of an axis."""
+        fact = {
+            "drive": found.drive,
+            "time": found.at.isoformat(timespec="microseconds"),
+            "difference": found.difference,
+            "limit": found.limit,
+            "causes": found.causes,
+        }
+        self._put(found.text, {"diverged": fact})
+
+    def summary(
+        self, channel: Channel, lines: int, differences: int, uncompared: int, positions: Positions | None
+    ) -> None:
+        """Report the counts, and the largest difference of each axis."""
+        moved = f"; {uncompared} in motion printed another number" if uncompared else ""
+        channel.notify(f"{lines} lines replayed, {differences} differ{moved}", outcome=True)
+        fact: dict[str, object] = {"lines": lines, "differ": differences}
+        if positions is not None:
+            largest, compared = positions.largest, positions.compared
+            for name, number in compared.items():
+                noun = "position" if number == 1 else "positions"
+                text = f"{name}: {number} {noun} compared, largest difference {largest[name]} steps"
+                channel.notify(text, outcome=True)
+            fact |= {"compared": sum(compared.values()), "diverged": len(positions.diverged), "largest": largest}
+        if self._json:
+            write(sys.stdout, json.dumps({"summary": fact}))
+
+    @staticmethod
+    def words(lines: int, differences: int, positions: Positions | None) -> str:
+        """The differences in words; empty: none."""
+        said = [f"{differences} of {lines} lines gave another answer than in the log"] if differences else []
+        if positions is not None and positions.diverged:
+            axes = f"{len(positions.diverged)} of {len(positions.compared)} axes"
+            said.append(f"{axes} were not where the log has them")
+        return "; ".join(said)
+
+    def _put(self, text: str, fact: dict[str, object]) -> None:
+        write(sys.stdout, json.dumps(fact) if self._json else text)
+
+
+class _Impatient(selectors.DefaultSelector):
+    """Takes what is ready, and counts how long it would have waited."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.skipped = 0.0
+
+    def select(self, timeout: float | None = None) -> list[Any]:
+        ready = super().select(0)
+        if ready or timeout is None:
+            return ready or super().select(timeout)
+        self.skipped += max(0.0, timeout)
+        return ready
+
+
+class VirtualLoop(asyncio.SelectorEventLoop):
+    """Runs an hour of timers in no time. A call in a thread takes none either."""
+
+    def __init__(self) -> None:
+        self._impatient = _Impatient()
+        super().__init__(self._impatient)
+
+    def time(self) -> float:
+        """Virtual seconds, from 0."""
+        return self._impatient.skipped
+
+    def run_in_executor(  # type: ignore[override]
+        self, executor: Executor | None, func: Callable[..., Any], *arguments: Any
+    ) -> Any:
+        """Wait for a thread's end here, so that time does not run on meanwhile."""
+        with ThreadPoolExecutor(1) as threads:
+            done = threads.submit(func, *arguments)
+            wait([done])
+        return asyncio.wrap_future(done, loop=self)
+
+
+async def replay(
+    session: Session, found: Steps, *, fast: bool, positions: bool = False, report: ReplayReport | None = None
+) -> None:
+    """Take the steps on the open buses; `fast`: without the pauses of the log.
+
+    `positions`: also compare the positions in the log; the drives are simulated.
+
+    Raises Diagnostic where the drives do not fit or the person does not agree, DriveError where an answer differs.
+    """
+    work = Replay(session, found, report or ReplayReport())
+    await work.agree()
+    differences = await work.run(fast, positions and not fast)
+    if differences:
+        raise DriveError(differences)
+    session.automations.interrupt()
+    await settled(session)
+    for text in outcome(session, session.automations.interrupted):
+        session.notify(text, outcome=True)
+
+
+class Replay:
+    """The steps of a log with the drives that they are for."""
+
+    def __init__(self, session: Session, found: Steps, report: ReplayReport) -> None:
+        """Find the drives. Raises Diagnostic where a bus or a drive of the log has no counterpart."""
+        self._session, self._found, self._report = session, found, report
+        self._simulated = all(name in session.cells for name in session.buses)
+        self.steps = [step for step in found.steps if self._simulated or step.text.split()[:1] != [WORLD]]
+        self._targets = _targets(session, self.steps)
+        self._moving: set[Drive] = set()
+        """The drives that may move."""
+        self._uncompared = 0
+        self._printed: list[str] = []
+
+    async def agree(self) -> None:
+        """Say what is left out; where drives are real, list them and what can move them, and ask."""
+        left_out = [*self._found.skipped, *([WORLD] if len(self.steps) < len(self._found.steps) else [])]
+        if left_out:
+            self._session.notify(f"not replayed: {', '.join(left_out)}", outcome=True)
+        if self._found.unsent:
+            self._session.notify(f"not replayed: {self._found.unsent} lines that were not sent then", outcome=True)
+        if not self._simulated:
+            moving = self._announced()
+            await self._session.confirm(
+                f"{len(self.steps)} lines are sent; {moving} of them can start motion or ask first"
+            )
+        self._session.agreed = True
+
+    def _announced(self) -> int:
+        """List the drives, and the lines that can start motion or need a yes; return the number of those."""
+        session = self._session
+        for each in dict.fromkeys(self._targets.values()):
+            session.notify(f"drive {_name(each)}: {model(each)} on {each.link.transport.name}", outcome=True)
+        number = 0
+        for step in self.steps:
+            if (drive := self._targets.get((step.bus, step.drive))) is None:
+                continue
+            guarded = session.settings.guards.what(drive.family, drive.state, step.text)
+            if guarded or drive.codec.starts_motion(step.text):
+                session.notify(
+                    f"{step.where}: {_name(drive)} {step.text}" + f" ({guarded})" * bool(guarded), outcome=True
+                )
+                number += 1
+        return number
+
+    async def run(self, fast: bool, positions: bool) -> str:
+        """Take the steps; return what differs, in words. Raises DriveError at a difference in an error."""
+        leave = self._session.subscribe(self._note)
+        measured = self._positions() if positions and self.steps else None
+        differences = done = 0
+        began = self._session.now()
+        try:
+            async with _beside(measured, began):
+                for step in self.steps:
+                    if not fast:
+                        await waits.sleep(
+                            max(0.0, began + (step.at - self.steps[0].at).total_seconds() - self._session.now())
+                        )
+                    differences += await self._step(step)
+                    done += 1
+        finally:
+            leave()
+            self._report.summary(self._session, done, differences, self._uncompared, measured)
+        return self._report.words(len(self.steps), differences, measured)
+
+    def _positions(self) -> Positions:
+        from multidrop.shell.log.twin_comparison import Positions
+
+        targets = {place: drive for place, drive in self._targets.items() if drive.address not in EVERYONE}
+        polls = [each for each in self._found.polls if (each.bus, each.drive) in targets]
+        return Positions(targets, polls, self.steps, self._read, self._report.diverged)
+
+    def _read(self, drive: Drive) -> Reading:
+        """The simulated drive in the part of one, and its time. Raises Diagnostic."""
+        bus = self._session.buses[drive.link.name]
+        cell = self._session.cells[bus.name]
+        shadow = cell.shadow(bus.link.transport.name.rpartition("#")[2], drive.address)
+        if shadow is None:
+            raise Diagnostic("the simulator does not tell where it is", _name(drive))
+        return shadow, cell.now()
+
+    async def _step(self, step: Step) -> bool:
+        """Take a step; whether its answer differs, which is shown."""
+        if not step.text:
+            await self._stop()
+            return False
+        drive = self._targets.get((step.bus, step.drive))
+        may_move = self._may_move(drive, step.text)
+        failed = await self._sent(step, drive)
+        if step.is_verb and not failed:
+            self._moving.clear()
+        difference = compared(step, self._printed, failed, may_move)
+        if not difference:
+            self._uncompared += self._printed != step.printed
+            return False
+        text = f"{step.where}: {_name(drive) + ' ' if drive else ''}{step.text}: {difference}"
+        if errors_differ(step.failed, failed):
+            raise DriveError(text)
+        self._report.differs(step, text, difference)
+        return True
+
+    def _may_move(self, drive: Drive | None, text: str) -> bool:
+        """Whether the drive may move when it replies."""
+        if drive is None:
+            return False
+        if drive.starts(text):
+            self._moving |= {
+                drive,
+                *(self._session.buses[drive.link.name].all_drives if drive.address in EVERYONE else ()),
+            }
+        return drive in self._moving
+
+    async def _sent(self, step: Step, drive: Drive | None) -> str:
+        """Send a line or run a verb; the failure in words."""
+        self._printed = []
+        target = f"@{join_target(drive.link.name, drive.address)} " if drive is not None else ""
+        try:
+            await self._session.run(f"{target}{step.text}", By.SCRIPT)
+        except Stopped:
+            raise
+        except (DriveError, Diagnostic) as failure:
+            return str(failure)
+        return ""
+
+    async def _stop(self) -> None:
+        """Stop every drive, as it was done then, and go on."""
+        if self._session.latched:
+            raise Stopped(LATCHED)
+        self._session.stop("the stop in the log")
+        self._session.resume()
+        await settled(self._session)
+        self._moving.clear()
+
+    def _note(self, event: SessionEvent) -> None:
+        if isinstance(event, Printed):
+            self._printed.append(event.text)
+
+
+@contextlib.asynccontextmanager
+async def _beside(positions: Positions | None, began: float) -> AsyncIterator[None]:
+    """Compare positions meanwhile, to the end of the log; an early end ends that, too."""
+    if positions is None:
+        yield
+        return
+    comparing = asyncio.create_task(positions.run(began))
+    try:
+        yield
+        await comparing
+    finally:
+        comparing.cancel()
+        await asyncio.wait([comparing])
+
+
+def _name(drive: Drive) -> str:
+    """The bus and the address; the bus alone where its drive has none."""
+    return join_target(drive.link.name, drive.address) if drive.address else drive.link.name
+
+
+def _targets(session: Session, steps: Sequence[Step]) -> Mapping[tuple[str, str], Drive]:
+    """The drive for each place in the log. Raises Diagnostic."""
+    places = dict.fromkeys((step.bus, step.drive) for step in steps if step.bus)
+    return {place: _target(session, place, list(places)) for place in places}
+
+
+def _target(session: Session, place: tuple[str, str], places: Sequence[tuple[str, str]]) -> Drive:
+    """The drive for one place: of the same name, or the only one where the log has only one."""
+    name, address = place
+    if name not in session.buses and len({bus for bus, _ in places}) == len(session.buses) == 1:
+        name = next(iter(session.buses))
+    if name not in session.buses:
+        raise Diagnostic(f"the log has a bus {name}", hint=f"open: {', '.join(session.buses)}")
+    bus = session.buses[name]
+    if address in bus.drives or address in EVERYONE:
+        return session.drive(name, address)
+    if len(bus.drives) == 1 and len([each for each in places if each[0] == place[0]]) == 1:
+        return next(iter(bus.drives.values()))
+    raise Diagnostic(f"the log has a drive {join_target(*place)}", hint=f"on {name}: {', '.join(bus.drives)}")

@@ -1,0 +1,158 @@
+"""A run without a screen: open the URLs, await the work, close, return the exit code.
+
+The work is one automation: its early end stops what it started. A signal ends it with exit code 130, and so does the
+end of the reader of standard output, with exit code 141. The stop key stops every drive and ends it with exit code 4.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import sys
+from collections.abc import Awaitable, Callable, Sequence
+from contextlib import nullcontext
+from functools import partial
+
+from multidrop.shell import stop_report
+from multidrop.shell.automation import outcome, settled
+from multidrop.shell.connect import settings
+from multidrop.shell.events import FAILURES
+from multidrop.shell.log.writer import begin as begin_log
+from multidrop.shell.prompt.keyboard import on_signals, on_stop_key
+from multidrop.shell.prompt.terminal_input import asker
+from multidrop.shell.session import Session
+from multidrop.shell.signals import early_ends
+from multidrop.shell.streams.event_printer import Printer
+from multidrop.shell.streams.stdout import (
+    INTERRUPTED,
+    exit_code,
+    finish,
+    nonblocking,
+    report,
+    why_interrupted,
+    work_done,
+    write,
+)
+
+Body = Callable[[Session], Awaitable[None]]
+
+
+def run(
+    urls: Sequence[str],
+    body: Body,
+    *,
+    watch_keys: bool = True,
+    interrupted: int = INTERRUPTED,
+    lazy: bool = False,
+    reconnect: bool = False,
+    agreed: bool = False,
+    asks: bool = True,
+    unsolicited: bool = True,
+    replies: bool = True,
+    raw: bool = False,
+    tried: Sequence[str] = (),
+    loop: Callable[[], asyncio.AbstractEventLoop] | None = None,
+) -> int:
+    """Open the URLs, await the body, close, and return the exit code (`interrupted` after a signal).
+
+    `lazy`: each line of the body names one drive. `reconnect`: a lost bus is tried again; otherwise the body fails
+    with it. `agreed`: every question is answered with yes. `asks`: a question is put to the terminal; otherwise, and
+    where there is none, what needs an answer is refused. `unsolicited`: what drives send by themselves is printed.
+    `replies`: standard output shows replies; otherwise the body writes there itself. `raw`: the URLs are opened
+    in raw mode. `tried`: see `Session`. `loop` makes the event loop, where it is not the usual one. A failure is one
+    line on standard error.
+    """
+    try:
+        found = settings.load()
+    except FAILURES as failure:
+        write(sys.stderr, report(failure))
+        return exit_code(failure)
+    try:
+        make = partial(_session, partial(Session, found, lazy=lazy, reconnect=reconnect, raw=raw, tried=tried), agreed)
+        printer = Printer(unsolicited=unsolicited, replies=replies)
+        with early_ends(), asyncio.Runner(loop_factory=loop) as runner:  # before the log has its thread
+            return runner.run(_run(make, printer, urls, body, watch_keys, interrupted, asks))
+    except KeyboardInterrupt:
+        return interrupted
+
+
+def _session(make: Callable[[], Session], agreed: bool) -> Session:
+    made = make()
+    made.agreed = agreed
+    return made
+
+
+async def _run(
+    make: Callable[[], Session],
+    printer: Printer,
+    urls: Sequence[str],
+    body: Body,
+    watch_keys: bool,
+    interrupted: int,
+    asks: bool,
+) -> int:
+    with nonblocking() as streams:
+        session = make()
+        session.ready = streams.ready
+        session.subscribe(printer.show)
+        begin_log(session)
+        host = _Host(session, printer, interrupted)
+        stop = partial(session.stop, "Ctrl+X")
+        keys = on_stop_key(session.stop_ahead, stop, host.interrupt) if watch_keys else nullcontext()
+        with on_signals(host.interrupt), keys as keyboard:
+            session.ask = asker(keyboard) if asks else None
+            session.beforehand = "--yes agrees beforehand"
+            try:
+                code = await host.result(urls, body)
+            finally:
+                await session.close()
+            await finish(streams, lambda: host.interrupted or session.latched)
+            return code
+
+
+class _Host:
+    def __init__(self, session: Session, printer: Printer, code: int) -> None:
+        self._session = session
+        self._printer = printer
+        self._code = code
+        self._work: asyncio.Task[None] | None = None
+        self.interrupted = False
+
+    def interrupt(self) -> None:
+        """End the work after a signal."""
+        self.interrupted = True
+        self._session.interrupt()
+        if self._work is not None:
+            self._work.cancel()
+
+    async def result(self, urls: Sequence[str], body: Body) -> int:
+        self._work = asyncio.create_task(self._session.tasks.run(self._whole(urls, body)))
+        code, lines = 0, [""]
+        try:
+            await self._work
+        except FAILURES as failure:
+            code, lines = exit_code(failure), [report(failure)]
+        except asyncio.CancelledError:
+            if not self.interrupted:
+                raise
+        finally:
+            work_done()
+        if self._session.latched or self.interrupted:
+            await settled(self._session)
+        if self.interrupted:
+            code, lines = self._code, self._interruption()
+        elif self._session.latched and (tally := self._session.tally()).found:  # a search has closed its port by now
+            lines.insert(0, f"stop: {stop_report.words(tally)}")
+        for each in lines:
+            if each:
+                self._printer.notify(each)
+        return code
+
+    def _interruption(self) -> list[str]:
+        """The lines after a signal; none for a plot, which ends well."""
+        lines = outcome(self._session, self._session.automations.interrupted) or [""]
+        return [f"{why_interrupted()}; {lines[0]}".removesuffix("; "), *lines[1:]] if self._code else []
+
+    async def _whole(self, urls: Sequence[str], body: Body) -> None:
+        async with self._session.automations.run():
+            await self._session.open_all(urls)
+            await body(self._session)

@@ -1,0 +1,403 @@
+"""The search for drives on a port: language by language, baud rate by baud rate, one opening of the port for each.
+
+It begins with the given baud rate and MCode, and ends with the first of these at which a drive replies, unless all are
+asked for. Anything else may be an error to a drive that is set to another baud rate or speaks another language, so a
+person is asked before it is tried.
+"""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import AsyncIterator, Callable, Iterable, Iterator, Sequence
+from contextlib import AsyncExitStack, asynccontextmanager, suppress
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from multidrop.dialects import Diagnostic, DriveState, Procedure
+from multidrop.dialects.families import DEFAULT, FAMILIES
+from multidrop.dialects.scanning import WINDOW, Reach, Scan
+from multidrop.shell import stop_report
+from multidrop.shell.channel import Job, running
+from multidrop.shell.connect.opening import BAUDED, port_name
+from multidrop.shell.connect.urls import Connection
+from multidrop.shell.finding.found_drives import FoundDrive, port_of
+from multidrop.shell.state.port_state import memory_of
+from multidrop.transports import Transport, TransportLost
+
+if TYPE_CHECKING:
+    from multidrop.drives.bus import Bus
+    from multidrop.drives.stopping import Halt
+    from multidrop.shell.connect.opening import Opened, Opener
+    from multidrop.shell.workspace import Workspace
+
+SLOWEST = 0.2
+"""The longest time for which a network's reply is waited, s; `timeout=` in the URL replaces it."""
+TURNS = {"tcp": 1.0, "ssh": 0.25}
+"""The part of the time of an opening that a question and its reply take, at most, over a network."""
+SPREAD, JITTER = 2.0, 0.02
+"""Over a network, a reply may take this many times as long as the measured one, and this time, s, more."""
+PLACE = 0
+BYTES = 20
+"""The mean size of the questions to one address, bytes; for the estimate."""
+REPEATED = 0.2
+"""The time in which a stop is repeated once the line is quiet, s."""
+UNLISTED = "It was not confirmed for drives that have not replied"
+SO_FAR = "nothing more was sent"
+"""What a refused question says in the middle of a search."""
+HAZARD = (
+    "a drive that receives another baud rate or language may take it for an error, and the OE subroutine of its "
+    "program may then run and move it"
+)
+
+
+class NothingFound(TransportLost):
+    """No drive replied."""
+
+
+class Stage(NamedTuple):
+    """One part of a search."""
+
+    family: str
+    baud: int | None
+    """None: the port has no baud rate."""
+
+    @property
+    def scan(self) -> Scan[Any]:
+        """The search of the family."""
+        found = FAMILIES[self.family].scan
+        assert found is not None
+        return found
+
+    @property
+    def words(self) -> str:
+        """The part for a person."""
+        return f"{self.scan.title} at {self.baud} baud" if self.baud else self.scan.title
+
+
+class Steps:
+    """Counts the steps of one stage among those of all."""
+
+    def __init__(self, job: Job, done: int, total: int) -> None:
+        self._job, self.done, self._total = job, done, total
+
+    def __call__(self) -> None:
+        """Count one step."""
+        self.done = min(self.done + 1, self._total)
+        self._job(self.done, self._total)
+
+
+class Scanning:
+    """One search of a port. `report` is called with each drive as soon as it is identified."""
+
+    def __init__(
+        self, workspace: Workspace, opener: Opener, connection: Connection, report: Callable[[FoundDrive], None]
+    ) -> None:
+        """Search nothing yet. Raises Diagnostic for a port that needs no search."""
+        if connection.hints.family and FAMILIES[connection.hints.family].scan is None:
+            raise Diagnostic(
+                f"scan searches for {' and '.join(_titles(_families()))} drives", connection.text, "open it instead"
+            )
+        self.found: list[FoundDrive] = []
+        self._workspace = workspace
+        self._opener = opener
+        self._connection = connection
+        self._report = report
+        self._done = 0
+        self._agreed_to: dict[Stage, None] = {}
+        """The stages that need no question, and those that a person has agreed to."""
+        self._tried: dict[Stage, None] = {}
+        """The stages at which the port was opened."""
+        self._stopped: dict[Stage, None] = {}
+        """The stages at which a stop was sent."""
+        self._read: list[Halt] = []
+        """The stops whose drives were read."""
+        self._said: set[str] = set()
+
+    async def run(self, bauds: Sequence[int], everything: bool) -> None:
+        """Search. `bauds`: only these; `everything`: do not end with the first stage that finds a drive.
+
+        Raises NothingFound, Diagnostic where a person does not agree, and the failures of a port.
+        """
+        first, *others = self.stages(bauds)
+        async with self.stopping_all():
+            await self.search([first], False)
+            if others and (everything or not self.found):
+                so_far = f"{len(self.found)} found" if self.found else "no drive replies"
+                seconds = round(sum(map(self._seconds, others)))
+                on = f"the search goes on with {listed(others)} (about {seconds} s)"
+                what = f"{so_far} with {listed([first])}; {on}; {HAZARD}"
+                if await self._agreed(what):
+                    await self.search(others, everything)
+        if not self.found:
+            raise self.nothing([first, *others], "; multidrop rescue PORT frees a drive that is stuck")
+
+    async def _agreed(self, what: str) -> bool:
+        """Ask; a no ends the search where a drive was found. Raises Diagnostic otherwise."""
+        try:
+            await self._workspace.confirm(what, self.port, SO_FAR)
+        except Diagnostic:
+            if not self.found or self._workspace.ask is None:
+                raise
+            return False
+        return True
+
+    @property
+    def port(self) -> str:
+        """The port for a person."""
+        return port_of(self._connection, "")
+
+    def stages(self, bauds: Sequence[int]) -> list[Stage]:
+        """The stages in their order: the given language and baud rate first."""
+        given = self._connection.hints.family
+        families = [given] if given else _families()
+        if self._connection.scheme not in BAUDED:
+            if bauds:
+                raise Diagnostic("the port has no baud rate", self._connection.text, "drop --baud")
+            return [Stage(family, None) for family in families]
+        return [Stage(family, baud) for family in families for baud in self._bauds(family, bauds)]
+
+    def _bauds(self, family: str, bauds: Sequence[int]) -> list[int]:
+        record = FAMILIES[family]
+        assert record.scan is not None
+        return list(dict.fromkeys(bauds or (self._connection.baud or record.baud, *record.scan.bauds)))
+
+    async def search(self, stages: Sequence[Stage], everything: bool, hasty: bool = False) -> None:
+        """Search these stages, to the first one that finds a drive unless `everything`. `hasty`: see `Reach`.
+
+        A person has agreed to all of them, or need not.
+        """
+        before, self._done = len(self.found), 0
+        self._agreed_to |= dict.fromkeys(stages)
+        with running(self._workspace, f"{self._connection.short}: scan") as job:
+            for stage in stages:
+                await self._stage(stage, job, stages, hasty)
+                if len(self.found) > before and not everything:
+                    return
+
+    # A stop meanwhile
+
+    @asynccontextmanager
+    async def stopping_all(self) -> AsyncIterator[None]:
+        """Have a stop meanwhile reach drives wherever they may be, once it was written as the port is open now."""
+        stops = self._workspace.stops
+        try:
+            yield
+        except BaseException:
+            if self._workspace.stops != stops:
+                stopping = asyncio.ensure_future(self._stop_everywhere())
+                while not stopping.done():
+                    with suppress(asyncio.CancelledError):  # another stop key, or the end: the stop goes on
+                        await asyncio.shield(stopping)
+                stopping.result()
+            raise
+
+    async def _stop_everywhere(self) -> None:
+        """Send a stop where drives replied, are remembered or were sent something; then as far as was agreed.
+
+        At a wrong rate it is an error, and an OE subroutine may move its drive: so the first ones follow again. What
+        replied is read in the end, because that takes as long as a drive slows down.
+        """
+        replied = [_stage_of(each.connection) for each in self.found]
+        likely = list(dict.fromkeys([*replied, *self._remembered(), *self._tried]))
+        others = [each for each in self._agreed_to if each not in likely]
+        for stage in [*(each for each in likely if each not in self._stopped), *others]:
+            await self._stop_at(stage, confirm=False)
+        for stage in likely if others else dict.fromkeys(replied):
+            await self._stop_at(stage, confirm=True)
+        if self._stopped:
+            left_out = [each for each in self.stages(()) if each not in {**self._stopped, **self._agreed_to}]
+            why = f"; not with {listed(left_out)}: no search there was agreed to" if left_out else ""
+            tally = stop_report.of_halts(self._read, self._workspace.wall(self._workspace.stopped_at), False)
+            read = f"; {stop_report.words(tally)}" if tally.found else ""
+            self._warn(self.port, [f"the stop was sent with {listed(self._stopped)}{why}{read}. {UNLISTED}"])
+
+    async def _stop_at(self, stage: Stage, confirm: bool) -> None:
+        """Send a stop at a stage, to the drives that replied there by name; `confirm`: read them."""
+        try:
+            opened = await self._opener(self.connection(stage), self._named)
+        except TransportLost as loss:
+            self._warn(self.port, [f"NO STOP SENT with {stage.words}: {loss}"])
+            return
+        for each in opened:
+            async with self._adopted(each, stage):
+                for found in self.found:
+                    if _stage_of(found.connection) == stage:
+                        each.bus.roster.found(found.state)
+                halt = each.bus.halt()
+                each.bus.halted(halt, confirm=confirm and bool(each.bus.drives))
+                await each.bus.stopped()
+                await asyncio.sleep(REPEATED + 2 * len(halt.data) * 10 / (stage.baud or 1_000_000))
+                if confirm and each.bus.drives:
+                    self._read.append(halt)
+
+    def _remembered(self) -> list[Stage]:
+        """The stage at which the last session's drives replied on this port."""
+        memory, _ = memory_of(self._workspace.settings.state, port_name(self._connection))
+        named = self._connection.hints.family in ("", DEFAULT)
+        return [Stage(DEFAULT, memory.baud)] if named and memory.drives and memory.baud else []
+
+    def connection(self, stage: Stage) -> Connection:
+        """The connection for a stage."""
+        return next(self._forms(stage))
+
+    async def converse(self, connection: Connection, procedure: Callable[[], Procedure[None]]) -> None:
+        """Open the port, and run a conversation with all that is there."""
+        async with self.opened(connection) as bus:
+            await bus.search(procedure())
+
+    @asynccontextmanager
+    async def opened(self, connection: Connection) -> AsyncIterator[Bus]:
+        """Open the port, of several simulated buses the first, and close it in the end; a stop reaches it meanwhile."""
+        opened, *others = await self._opener(connection, self._named)
+        for each in others:
+            await each.bus.close()
+        async with self._adopted(opened, _stage_of(connection)) as bus:
+            yield bus
+
+    @asynccontextmanager
+    async def _adopted(self, opened: Opened, stage: Stage) -> AsyncIterator[Bus]:
+        """Have a stop reach a bus, and close it in the end."""
+        bus = opened.bus
+        self._tried[stage] = None
+        bus.roster.probing = stage.scan.names
+        self._workspace.adopt(opened, PLACE)
+        if opened.limits and opened.limits not in self._said:
+            self._said.add(opened.limits)
+            self._warn(self.port, [opened.limits])
+        try:
+            yield bus
+        finally:
+            if bus.last_stop is not None and bus.last_stop.data:
+                self._stopped[stage] = None
+            await self._workspace.forget(bus)
+
+    def nothing(self, stages: Sequence[Stage], advice: str = "") -> NothingFound:
+        """Make the failure that names what was tried."""
+        return NothingFound(
+            f"no drive replies on {self.port} ({listed(stages)}; all names, with and without a checksum); check power, "
+            f"wiring (are A and B swapped?) and the adapter{advice}"
+        )
+
+    def _seconds(self, stage: Stage) -> float:
+        reach = self._reach()
+        return stage.scan.places(reach) * (reach.window + BYTES * 10 / (stage.baud or 1_000_000))
+
+    def _reach(self, distance: float = 0.0, hasty: bool = False) -> Reach:
+        """The manner of the search. `distance`: the time of the network to a drive and back, s."""
+        scheme, window = self._connection.scheme, self._connection.timeout or WINDOW
+        if self._connection.timeout is None:
+            window += distance
+        return Reach(window=window, alone=scheme == "udp", hasty=hasty)
+
+    # One stage
+
+    async def _stage(self, stage: Stage, job: Job, all_: Sequence[Stage], hasty: bool) -> None:
+        """Open the port for a stage, search, and close it."""
+        total = sum(each.scan.places(self._reach()) for each in all_)
+        begun = self._done
+        for connection in self._forms(stage):
+            began = self._workspace.now()
+            buses = await self._opener(connection, self._named)
+            took = self._workspace.now() - began
+            reach = self._reach(_distance(buses[0].bus.link.transport, connection.scheme, took), hasty)
+            async with AsyncExitStack() as open_:
+                for each in buses:
+                    await open_.enter_async_context(self._adopted(each, stage))
+                steps = [Steps(job, begun, total) for _ in buses]
+                outcomes = [
+                    await self._searched(each, stage, connection, reach, count)
+                    for each, count in zip(buses, steps, strict=True)
+                ]
+            if not any(outcomes):
+                return
+            text = "the adapter repeats what it sends: the search begins again with echo=local"
+            self._warn(port_of(connection, ""), [text])
+
+    def _forms(self, stage: Stage) -> Iterator[Connection]:
+        """The connections of a stage: a second one, with echo=local, for an adapter that repeats what it sends."""
+        hints = replace(self._connection.hints, family=stage.family)
+        given = replace(self._connection, baud=stage.baud, hints=hints)
+        yield given
+        if not given.local_echo:
+            self._connection = replace(self._connection, local_echo=True)
+            yield replace(given, local_echo=True)
+
+    async def _searched(self, opened: Opened, stage: Stage, connection: Connection, reach: Reach, steps: Steps) -> bool:
+        """Search one bus; return whether its adapter repeats what it sends."""
+        bus, hints = opened.bus, opened.hints
+        port = port_of(connection, bus.name)
+
+        def found(state: DriveState) -> None:
+            bus.roster.probes(state.address)
+            each = FoundDrive(connection, port, state)
+            self.found.append(each)
+            self._report(each)
+            self._warn(port, state.take_messages()[0])
+
+        reach = replace(reach, cut=hints.cut, first_mark=hints.first_mark)
+        outcome = await bus.search(stage.scan.search(reach, found, steps))
+        self._done = steps.done
+        self._warn(f"{port}: {stage.words}", outcome.remarks)
+        return bool(outcome.echo)
+
+    def _warn(self, where: str, texts: Iterable[str]) -> None:
+        for each in texts:
+            self._workspace.notify(f"{where}: {each}", warning=True)
+
+    def _named(self, name: str) -> str:
+        return name
+
+
+def _stage_of(connection: Connection) -> Stage:
+    return Stage(connection.hints.family or DEFAULT, connection.baud)
+
+
+def _families() -> list[str]:
+    """The languages that a search tries."""
+    return [name for name, family in FAMILIES.items() if family.scan is not None]
+
+
+def _titles(names: Iterable[str]) -> list[str]:
+    return [scan.title for name in names if (scan := FAMILIES[name].scan) is not None]
+
+
+async def extend(workspace: Workspace, bus: Bus) -> list[str]:
+    """Search an open bus for drives that are not listed, and list them; return their addresses. Raises Diagnostic."""
+    scan = bus.roster.family.scan
+    if scan is None:
+        raise Diagnostic(f"{bus.name}: its drives cannot be searched for", hint="/open URL names them in drives=")
+    if "" in bus.drives:
+        raise Diagnostic(f"{bus.name}: its drive takes no address", hint="no other drive can share its line")
+    if storing := [each.address for each in bus.all_drives if each.programming]:
+        raise Diagnostic(f"{bus.name}: {storing[0]} is in program mode", hint=f"@{storing[0]} PG ends it")
+    found: list[DriveState] = []
+    reach = Reach(known=tuple(bus.drives))
+    total, done = scan.places(reach), 0
+
+    def step() -> None:
+        nonlocal done
+        done += 1
+        job(done, total)
+
+    with running(workspace, f"{bus.name}: scan") as job:
+        outcome = await bus.search(scan.search(reach, found.append, step))
+    for each in outcome.remarks:
+        workspace.notify(f"{bus.name}: {each}", bus=bus.name, warning=True)
+    await bus.add(found)
+    return [state.address for state in found]
+
+
+def listed(stages: Iterable[Stage]) -> str:
+    """Stages in words: `MCode at 4800, 19200 baud and PMX at 9600 baud`."""
+    by_family: dict[str, list[str]] = {}
+    for each in stages:
+        by_family.setdefault(each.scan.title, []).extend([str(each.baud)] if each.baud else [])
+    parts = [f"{title} at {', '.join(bauds)} baud" if bauds else title for title, bauds in by_family.items()]
+    return " and ".join(parts)
+
+
+def _distance(transport: Transport, scheme: str, took: float) -> float:
+    """The time that a network takes to a drive and back, s; `took`: the time of the opening, s."""
+    if transport.round_trip is not None:
+        return SPREAD * transport.round_trip + JITTER
+    return min(took * TURNS.get(scheme, 0.0), SLOWEST)

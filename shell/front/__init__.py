@@ -1,1 +1,0 @@
-"""The front ends without a screen: prompt, scripts, piped lines, plots."""

@@ -1,0 +1,256 @@
+"""The comparison after the fact: positions in a log beside those of simulated drives at the same times."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from copy import copy
+from dataclasses import dataclass
+from datetime import datetime, timedelta
+from typing import NamedTuple
+
+from multidrop.dialects import DriveError, Priority, Procedure, Request
+from multidrop.dialects.codec import Reply
+from multidrop.dialects.family import Motion
+from multidrop.dialects.text import whole
+from multidrop.drives.drive import Drive
+from multidrop.drives.events import Sample
+from multidrop.shell.events import Diverged
+from multidrop.shell.lines import EVERYONE, join_target
+from multidrop.shell.log.steps import Exchange, Step
+from multidrop.shell.twins.comparing import LIMIT, Verdict
+from multidrop.shell.twins.pair import Compared
+from multidrop.simulator.family import Shadow
+
+# The positions that a log holds: polls as their bytes, decoded by the conversation that once made them.
+
+
+WORDS = {"P": "", "PX": "x", "PY": "y"}
+"""The axis of the words that print a position."""
+
+
+class Measured(NamedTuple):
+    """The measured position of an axis of a drive."""
+
+    where: str
+    at: datetime
+    axis: str
+    position: int
+    velocity: int | None
+    """None: only the position was read."""
+
+
+class Decoding:
+    """Decodes the polls of one drive, in their order."""
+
+    def __init__(self, drive: Drive) -> None:
+        self._drive = drive
+        self._procedure: Procedure[tuple[Motion, ...]] | None = None
+        self._request: Request | None = None
+
+    def take(self, poll: Exchange) -> Iterator[Measured]:
+        """Take a request with its reply; yield what the drive's motion was once that is known."""
+        try:
+            result = self._step(poll)
+        except DriveError:  # it is in program mode now, or the reply was damaged then, too
+            self._request, result = None, ()
+        for each in result:
+            yield Measured(poll.where, poll.at, each.axis, each.position, each.velocity)
+
+    def _step(self, poll: Exchange) -> tuple[Motion, ...]:
+        """Go on with the conversation that the request belongs to, or begin one; return its result at its end."""
+        try:
+            if self._request is None or not self._fits(self._request, poll):
+                self._procedure = self._drive.family.motion(copy(self._drive.state), Priority.POLL)
+                self._request = next(self._procedure)
+            request, self._request = self._request, None
+            reply = self._reply(request, poll) if self._fits(request, poll) else None
+            if reply is not None and self._procedure is not None:
+                self._request = self._procedure.send(reply)
+        except StopIteration as done:
+            motion: tuple[Motion, ...] = done.value
+            return motion
+        return ()
+
+    @staticmethod
+    def _fits(request: Request | None, poll: Exchange) -> bool:
+        """Whether a request has these bytes. The number of one that has a number begins its bytes."""
+        if request is None:
+            return False
+        numbered = request.numbered(int.from_bytes(poll.sent[:2], "big"))
+        return request.codec.encode(numbered) == poll.sent
+
+    @staticmethod
+    def _reply(request: Request, poll: Exchange) -> Reply | None:
+        numbered = request.numbered(int.from_bytes(poll.sent[:2], "big"))
+        codec, received = request.codec, poll.received
+        found = codec.decode(numbered, received) or codec.on_quiet(numbered, received)
+        return found.reply.heard(received[: found.used], False) if found is not None else None
+
+
+def printed(step: Step, drive: Drive) -> Iterator[Measured]:
+    """Yield the position that a line has printed."""
+    questions = {drive.family.question(word): axis for word, axis in WORDS.items()}
+    axis = questions.get(" ".join(step.text.upper().split()))
+    position = whole(step.printed[0].strip(), -(2**31), 2**31 - 1) if len(step.printed) == 1 else None
+    if axis is not None and position is not None:
+        yield Measured(step.where, step.at, axis, position, None)
+
+
+LATE = 0.05
+"""Seconds by which a line may have left later than the log says that it was typed."""
+Place = tuple[str, str]
+"""Bus and address in the log."""
+Reading = tuple[Shadow, float]
+"""A simulated drive, and its time."""
+
+
+@dataclass(frozen=True)
+class Divergence:
+    """The first difference of an axis beyond the limit."""
+
+    drive: str
+    at: datetime
+    difference: int
+    limit: int
+    causes: tuple[str, ...]
+
+    @property
+    def text(self) -> str:
+        """The difference in one line."""
+        steps = f"{abs(self.difference)} steps from the simulated drive since {self.at:%H:%M:%S.%f}"[:-5]
+        return f"{self.drive}: {steps} (limit {self.limit}): {', '.join(self.causes)}"
+
+
+class _Simulated:
+    """A simulated drive that runs by itself: it is read when it is asked, whatever time is given."""
+
+    def __init__(self, read: Callable[[], Reading]) -> None:
+        self._read = read
+
+    def motion(self, at: float) -> dict[str, Motion]:
+        shadow, now = self._read()
+        return {each.axis: each for each in shadow.motion(now)}
+
+    def align(self, axis: str, position: int, at: float) -> None:
+        shadow, now = self._read()
+        shadow.align(axis, position, now)
+
+
+class _Place:
+    """One drive of the log."""
+
+    def __init__(self, place: Place, drive: Drive, read: Callable[[], Reading]) -> None:
+        self.name = join_target(*place)
+        self.address, self.drive = place[1], drive
+        self.decoding = Decoding(drive)
+        self.compared = Compared(_Simulated(read))
+        self.counts: dict[str, int] = {}
+        """The positions that were compared, by axis."""
+        self._moved = False
+        """Whether a line that can start motion was replayed."""
+
+    def disturbed(self, at: float, line: str) -> None:
+        """Note a line or a stop (empty) that acts on the drive now."""
+        self._moved = self._moved or (bool(line) and self.drive.starts(line))
+        self.compared.disturbed(at)
+
+    def take(self, found: Measured, at: float) -> Iterator[Diverged]:
+        """Compare a position; the simulated drive begins at one that was measured before the first motion."""
+        expected = self.compared.twin.motion(at).get(found.axis)
+        if expected is None:
+            return
+        velocity = expected.velocity if found.velocity is None else found.velocity
+        if found.axis not in self.counts and not (self._moved or velocity or expected.velocity):
+            self.compared.twin.align(found.axis, found.position, at)
+        self.counts[found.axis] = self.counts.get(found.axis, 0) + 1
+        self.compared.comparison(found.axis).lag = LATE
+        sample = Sample(at, self.address, found.position, velocity, found.axis)
+        yield from (each for each in self.compared.sample(sample, LIMIT) if isinstance(each, Diverged))
+
+    def end(self) -> Iterator[Diverged]:
+        """Report the differences with which the log ends."""
+        for axis, comparison in self.compared.axes.items():
+            if comparison.settle() is Verdict.DIVERGED:
+                news = self.compared.news(Verdict.DIVERGED, comparison, self.address, axis, LIMIT)
+                assert isinstance(news, Diverged)
+                yield news
+
+    def shown(self, axis: str) -> str:
+        """The name of an axis."""
+        return f"{self.name}.{axis}" if axis else self.name
+
+
+class Positions:
+    """The measured positions of a log, each compared when its time has come."""
+
+    def __init__(
+        self,
+        targets: Mapping[Place, Drive],
+        polls: Sequence[Exchange],
+        steps: Sequence[Step],
+        read: Callable[[Drive], Reading],
+        found: Callable[[Divergence], None],
+    ) -> None:
+        """`read`: of the simulated drive in the part of one; `found`: called with the first divergence of each axis."""
+        self._places = {
+            place: _Place(place, drive, lambda drive=drive: read(drive))  # type: ignore[misc]
+            for place, drive in targets.items()
+            if place[1] not in EVERYONE
+        }
+        self._found = found
+        self._first = steps[0].at
+        self.diverged: dict[str, Divergence] = {}
+        """The first divergence of each axis, by its name."""
+        everything: list[Exchange | Step] = [*polls, *steps]
+        self._all = sorted(everything, key=lambda each: each.at)
+
+    async def run(self, began: float) -> None:
+        """Compare each position at its time. `began`: the time of the first step."""
+        loop = asyncio.get_running_loop()
+        for each in self._all:
+            at = (each.at - self._first).total_seconds()
+            if began + at > loop.time():
+                await asyncio.sleep(began + at - loop.time())
+            self._take(each, at)
+        for place in self._places.values():
+            self._report(place, place.end())
+
+    def _take(self, each: Exchange | Step, at: float) -> None:
+        if isinstance(each, Step) and (not each.text or each.drive in EVERYONE):  # a stop, or a line for all
+            for (bus, _), place in self._places.items():
+                if each.bus in ("", bus):
+                    place.disturbed(at, each.text)
+        elif (found := self._places.get((each.bus, each.drive))) is not None:
+            self._take_of(found, each, at)
+
+    def _take_of(self, place: _Place, each: Exchange | Step, at: float) -> None:
+        measured = list(place.decoding.take(each) if isinstance(each, Exchange) else printed(each, place.drive))
+        if isinstance(each, Step) and not measured:
+            place.disturbed(at, each.text)
+        for found in measured:
+            self._report(place, place.take(found, at))
+
+    def _report(self, place: _Place, news: Iterator[Diverged]) -> None:
+        """Report the first divergence of an axis."""
+        for each in news:
+            name = place.shown(each.axis)
+            if name not in self.diverged:
+                at = self._first + timedelta(seconds=each.at)
+                self.diverged[name] = Divergence(name, at, each.difference, each.limit, each.causes)
+                self._found(self.diverged[name])
+
+    @property
+    def compared(self) -> dict[str, int]:
+        """The number of positions that were compared, by axis."""
+        return {place.shown(axis): n for place in self._places.values() for axis, n in place.counts.items()}
+
+    @property
+    def largest(self) -> dict[str, int]:
+        """The largest difference of each axis, steps."""
+        return {
+            place.shown(axis): abs(comparison.furthest.difference)
+            for place in self._places.values()
+            for axis, comparison in place.compared.axes.items()
+            if comparison.furthest is not None
+        }

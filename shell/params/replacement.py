@@ -1,0 +1,290 @@
+"""A replacement drive gets the state of one drive of a cell file.
+
+Theory of operation. Everything is read and shown before the question; after it, each step makes the drive more like the
+one in the file, and each can be repeated: what is the same already is not sent. So an apply that was cut off goes on
+when it is run again. It always saves: no drive reports what is saved already. The drive's communication is last, in
+the drive's working memory only; what is saved answers to the new name already. Nothing here moves the motor: settings
+that could are left alone until they are named.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+from multidrop.dialects import Diagnostic, DriveError, Inexpressible, Refused
+from multidrop.dialects.parameters import Permission, Plan, Readings, differing
+from multidrop.dialects.program_files import LOCKED
+from multidrop.shell import snapshots
+from multidrop.shell.channel import running, transferring
+from multidrop.shell.params.file import shown
+from multidrop.shell.params.readings import parameters, read
+from multidrop.shell.programs import transfers
+from multidrop.simulator import cells
+from multidrop.simulator.cell.writer import BusText, write
+from multidrop.simulator.families import family_of, snapshots_of
+
+if TYPE_CHECKING:
+    from multidrop.dialects.values import Snapshot
+    from multidrop.drives.drive import Drive
+    from multidrop.shell.session import Session
+    from multidrop.simulator.cell.spec import Cell, DriveSpec
+    from multidrop.simulator.family import Snapshots
+
+UNNAMED = "!"
+"""The name of a drive that has none of its own."""
+
+
+@dataclass(frozen=True)
+class Wanted:
+    """What a person wants of an apply. `named`: settings to write although they can move the motor or lock the drive.
+
+    `dry`: show it only. `other_product`: the drive may be another product than the one in the file.
+    """
+
+    named: frozenset[str] = frozenset()
+    dry: bool = False
+    other_product: bool = False
+
+
+def chosen(cell: Cell, file: str, drive: Drive, name: str, several: bool = False) -> DriveSpec:
+    """Find a drive of a cell: `NAME`, `BUS:NAME`, or the one with the drive's own name. Raises Diagnostic.
+
+    `several` drives are written to: each from its own name, even if there is only one in the file.
+    """
+    bus, _, own = name.rpartition(":")
+    placed = [(each.name, spec) for each in cell.buses for spec in each.drives]
+    own = own or drive.address or drive.state.name
+    found = [spec for place, spec in placed if spec.name == own and bus in ("", place)]
+    if not name and len(placed) == 1 and not several:
+        found = [placed[0][1]]
+    if len(found) == 1:
+        return found[0]
+    names = ", ".join(f"{place}:{spec.name}" for place, spec in placed)
+    what = f'no drive "{name or own}"' if not found else f'"{own}" is the name of several drives'
+    hint = f"the file has {names}; --drive names one drive" if several else f"--from names one of {names}"
+    raise Diagnostic(what, file, hint)
+
+
+async def apply(session: Session, drive: Drive, file: str, spec: DriveSpec, wanted: Wanted) -> None:
+    """Put the state of a drive in a file onto a drive. Raises Diagnostic, DriveError or TransportLost."""
+    await _Replacement(session, drive, file, spec, wanted).run()
+
+
+class _Replacement:
+    """One apply: the drive, and what it is to become."""
+
+    def __init__(
+        self,
+        session: Session,
+        drive: Drive,
+        file: str,
+        spec: DriveSpec,
+        wanted: Wanted,
+    ) -> None:
+        self._session, self._drive, self._file = session, drive, file
+        self._spec, self._wanted, self._parameters = spec, wanted, parameters(drive)
+        self._settings = _tables(spec).wanted(spec)
+        self._program = _tables(spec).program(spec)
+        self._done: list[str] = []
+        self._in_between = False
+        """Its communication is being changed, and is not saved yet."""
+
+    @property
+    def _name(self) -> str:
+        return self._session.display_name(self._drive)
+
+    async def run(self) -> None:
+        """Read, show, ask, write, verify."""
+        now = await snapshots.read(self._session, self._drive)
+        here = _spec(now)
+        self._check(now, here)
+        changes = self._show(now, here)
+        if self._wanted.dry:
+            return
+        await self._check_ready()
+        steps = ", ".join(changes) if changes else f"nothing differs, {self._parameters.saving} saves it"
+        await self._session.confirm(f"it gets the state of {self._spec.name!r} in {self._file}: {steps}", self._name)
+        await self._check_ready()  # a person may have thought about it for long
+        with self._reporting():
+            await self._write(here)
+            now = await snapshots.read(self._session, self._drive)
+        self._verify(_spec(now))
+
+    @property
+    def _clearing(self) -> str:
+        """The line that erases all programs; empty where the family has none."""
+        programs = self._drive.family.programs
+        return programs.clearing if programs is not None else ""
+
+    # Before anything is sent
+
+    def _check(self, now: Snapshot, here: DriveSpec) -> None:
+        """Refuse another product, a name that another drive of the line bears, and a locked program."""
+        spec = self._spec
+        if unknown := sorted(self._wanted.named - {*self._settings}):
+            raise Diagnostic(f"{spec.name!r} has no setting {unknown[0]}", self._file, "--with takes names of its set")
+        what = f"product {now.product}, and {spec.name!r} in {self._file} is {spec.personality}; nothing was sent"
+        if family_of(here.personality) is not family_of(spec.personality):
+            raise Diagnostic(what, self._name, "a drive of its family is needed")
+        if here.personality != spec.personality and not self._wanted.other_product:
+            raise Diagnostic(what, self._name, "--other-product applies it all the same")
+        bus = self._session.buses[self._drive.link.name]
+        others = [each for each in bus.drives.values() if each is not self._drive]
+        if any(spec.name in (each.address, each.state.name) for each in others):
+            raise Diagnostic(f"another drive on {bus.name} is named {spec.name!r}; nothing was sent", self._name)
+        if others and here.party and not spec.party:
+            what = f"{spec.name!r} in {self._file} is not in party mode, and {bus.name} has other drives"
+            raise Diagnostic(f"{what}; nothing was sent", self._name)
+        if self._program.lines and self._drive.family.programs is None:
+            raise Inexpressible(f"{self._name}: {self._drive.family.no_programs}")
+        if now.readings.values.get("LK") and self._program.lines:
+            raise Refused(f"{self._name}: {LOCKED} (nothing was sent)")
+        if now.program and self._clearing and not self._program.lines:
+            raise Refused(
+                f"{self._name}: it holds a program of {len(now.program)} lines, and {spec.name!r} in {self._file} has "
+                f"none: {self._clearing} erases it (nothing was sent)"
+            )
+
+    async def _check_ready(self) -> None:
+        """Raise Refused where the drive is at work."""
+        if reason := await transferring(self._drive, self._parameters.ready(self._drive.state)):
+            raise Refused(f"{reason} (nothing was sent)")
+
+    def _show(self, now: Snapshot, here: DriveSpec) -> list[str]:
+        """Publish everything that will happen; return it in short."""
+        out, spec = self._session.output, self._spec
+        for key in ("part", "version", "serial"):
+            mine, theirs = getattr(here.identity, key), getattr(spec.identity, key)
+            if theirs and mine != theirs:
+                out(f"{self._name}: {key} {mine or 'not known'}; in {self._file} {theirs}")
+        changes = []
+        if self._differs(here):
+            changes.append(f"a program of {len(self._program.lines)} lines")
+            out(f"{self._name}: program: {len(self._program.lines)} lines in place of {len(now.program)}")
+        elif now.program and not self._program.lines:
+            out(f"{self._name}: its program of {len(now.program)} lines stays: {self._file} has none")
+        readings = replace(now.readings, labels=(*now.readings.labels, *self._program.labels))
+        ordinary, whole = self._plan(readings), self._plan(readings, communication=True)
+        final = {each.name: each for each in whole if not each.temporary}
+        wire = [name for name in final if name not in {each.name for each in ordinary}]
+        for name, each in final.items():
+            before = "" if each.before is None else f" (was {shown(each.before)})"
+            out(f"{self._name}: {each.text}{before}{', at the end' if name in wire else ''}")
+        if count := len(final) - len(wire):
+            changes.append(f"{count} setting{'s' * (count != 1)}")
+        if wire:
+            changes.append(f"then {', '.join(final[name].text for name in wire)}")
+        if spec.name == UNNAMED != here.name:
+            out(f"{self._name}: its name stays {here.name!r}: only FD gives back {UNNAMED!r}")
+        for name, reason in whole.withheld:
+            out(f"{self._name}: {name} is left alone: {reason} (--with {name} writes it)")
+        for name, reason in (*whole.impossible, *self._strangers(now.readings)):
+            out(f"{self._name}: {name} is left alone: {reason}")
+        if unread := [name for name, _ in now.readings.unread]:
+            text = f"{self._name}: no snapshot has what a drive does not print; check it: {', '.join(unread)}"
+            self._session.notify(text, warning=True)
+        out(f"{self._name}: saved at the end ({self._parameters.saving}); its position is not changed")
+        for name in final:
+            if name in self._parameters.later:
+                out(f"{self._name}: after that, {name} waits until the drive is switched off and on")
+        return changes
+
+    def _differs(self, here: DriveSpec) -> bool:
+        program = self._program.lines
+        return bool(program) and _tables(here).program(here).lines != program
+
+    def _plan(self, readings: Readings, communication: bool = False) -> Plan:
+        allowed = Permission(self._wanted.named, communication)
+        present = {*readings.values, *self._spec.variables}
+        goal = {name: value for name, value in self._settings.items() if name in present}
+        return self._parameters.plan(self._drive.state, readings, goal, allowed)
+
+    def _strangers(self, readings: Readings) -> list[tuple[str, str]]:
+        known = {*readings.values, *self._spec.variables}
+        return [(name, "this drive does not print it") for name in self._settings if name not in known]
+
+    # After the question
+
+    @contextmanager
+    def _reporting(self) -> Iterator[None]:
+        """Publish what was done, where it is cut off."""
+        try:
+            yield
+        except BaseException:
+            done = "; ".join(self._done) or "nothing"
+            text = f"{self._name}: cut off; done: {done}; run it again to go on{self._found_again()}"
+            self._session.notify(text, warning=True)
+            raise
+
+    def _found_again(self) -> str:
+        """Where the drive replies from here on, while its communication is between the old and the new form."""
+        if not self._in_between or not self._spec.party:
+            return ""
+        return (
+            f". It may be in party mode already (URL?drives={self._spec.name}&party=1); switched off and on it is "
+            "as before"
+        )
+
+    async def _write(self, here: DriveSpec) -> None:
+        if self._differs(here):
+            await self._download(clear=bool(_tables(here).program(here).lines))
+        await self._change(communication=False)
+        await self._save("settings and program")
+        self._in_between = True
+        if await self._change(communication=True):
+            await self._save("communication")
+        self._in_between = False
+
+    async def _download(self, clear: bool) -> None:
+        """Load the program with the user's variables; what was in the drive goes to a backup first.
+
+        `clear`: erase all programs before that, so that none of them stays beside it.
+        """
+        first = (self._clearing,) if clear and self._clearing else ()
+        text = "".join(f"{line}\n" for line in (*first, *self._program.file))
+        name = f"{self._file}#{self._spec.name}"
+        saved = transfers.Wanted(save=True)
+        await transfers.download(self._session, self._drive, name, saved, text)
+        self._done.append("program")
+
+    async def _change(self, communication: bool) -> int:
+        """Write the settings that differ now, those of communication in their order; return how many."""
+        drive, workspace = self._drive, self._session
+        workspace.addressed.add((drive.link.name, drive.address))
+        steps = self._plan(await read(workspace, drive, "apply"), communication)
+        with running(workspace, f"{self._name}: apply") as progress:
+            for number, each in enumerate(steps, 1):
+                if each.name in self._wanted.named and drive.starts(each.text):
+                    self._session.starting(drive)
+                await transferring(drive, self._parameters.write(drive.state, each))
+                self._done.append(each.text)
+                progress(number, len(steps))
+        return len(steps)
+
+    async def _save(self, what: str) -> None:
+        await transferring(self._drive, self._parameters.save(self._drive.state))
+        self._done.append(f"{what} saved ({self._parameters.saving})")
+
+    def _verify(self, here: DriveSpec) -> None:
+        """Compare what was read last with the file. Raises DriveError where it is not the same."""
+        values = _tables(here).wanted(here)
+        found = [each for each in differing(values, self._settings) if each[0] in self._settings]
+        wrong = [f"{name} {shown(mine)}, in the file {shown(value)}" for name, mine, value in found]
+        if self._differs(here):
+            wrong.append("its program")
+        if wrong:
+            raise DriveError(f"{self._name} is not as {self._spec.name!r} in {self._file}: {'; '.join(wrong)}")
+        self._session.notify(f"{self._name}: verified: it is as {self._spec.name!r} in {self._file}", outcome=True)
+
+
+def _tables(spec: DriveSpec) -> Snapshots:
+    return snapshots_of(family_of(spec.personality))
+
+
+def _spec(snapshot: Snapshot) -> DriveSpec:
+    """A drive that was read, as a cell file describes it."""
+    text = write([BusText("line", [snapshots.described(snapshot)])])
+    return cells.read(text, "snapshot").buses[0].drives[0]

@@ -1,0 +1,74 @@
+"""`multidrop plot`: plot drives until a signal."""
+
+from __future__ import annotations
+
+import asyncio
+import sys
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+from multidrop.dialects import Diagnostic, DriveError
+from multidrop.shell.batch import runner
+from multidrop.shell.events import SessionEvent, StateChanged
+from multidrop.shell.plots.feed import begin
+from multidrop.shell.plots.plot import Plot
+from multidrop.shell.plots.rate import parse_rate
+from multidrop.shell.plots.series import parse_series, read_first
+from multidrop.shell.plots.target import PlotTarget, parse_target
+from multidrop.shell.streams.stdout import report, write
+
+if TYPE_CHECKING:
+    from multidrop.shell.workspace import Workspace
+    from multidrop.transports import TransportLost
+
+
+def run(
+    url: str, drives: Sequence[str], *, to: str | None, serve: str | None, rate: str, reconnect: bool = True
+) -> int:
+    """Plot until a signal, which ends it well; return the exit code. `reconnect`: a lost bus leaves a gap."""
+    try:
+        target, period = parse_target(to, serve), parse_rate(rate)
+    except Diagnostic as problem:
+        write(sys.stderr, report(problem))
+        return 2
+    return runner.run(
+        [url], lambda workspace: _until_ended(workspace, target, drives, period), interrupted=0, reconnect=reconnect
+    )
+
+
+async def _until_ended(workspace: Workspace, target: PlotTarget, drives: Sequence[str], period: float) -> None:
+    series = parse_series(workspace, drives)
+    await read_first(workspace, series)
+    plotting = await begin(workspace, target, series, period)
+    write(sys.stderr, f"plotting to {plotting.where}, {plotting.rate}; Ctrl+C ends it")
+    if plotting.desk:
+        write(sys.stderr, f"at your desk: {plotting.desk}, then rerun {plotting.where}")
+    try:
+        await _ended(workspace, plotting.plot)
+    finally:
+        write(sys.stderr, await plotting.end())
+
+
+async def _ended(workspace: Workspace, plot: Plot) -> None:
+    """Wait until the plot fails, or a bus is lost for good. Raises that failure."""
+    broken = asyncio.Event()
+
+    def noticed(event: SessionEvent) -> None:
+        if isinstance(event, StateChanged) and _lost(workspace):
+            broken.set()
+
+    leave = workspace.subscribe(noticed)
+    waits = [asyncio.create_task(plot.ended.wait()), asyncio.create_task(broken.wait())]
+    try:
+        await asyncio.wait(waits, return_when=asyncio.FIRST_COMPLETED)
+    finally:
+        leave()
+        for each in waits:
+            each.cancel()
+    raise _lost(workspace) or DriveError(plot.failure)
+
+
+def _lost(workspace: Workspace) -> TransportLost | None:
+    """The loss of a bus that is not tried again."""
+    trying = workspace.reconnections.trying
+    return next((bus.lost for bus in workspace.buses.values() if bus.lost and bus.name not in trying), None)

@@ -1,0 +1,1 @@
+"""Programs of drives: checked, edited, downloaded, listed, debugged."""

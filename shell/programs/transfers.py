@@ -1,0 +1,291 @@
+"""Programs between files and drives, for verbs and the command line.
+
+A download checks the file, ends a running program, reads what the drive holds and saves it to a backup. Then it sends
+the file, saves, and compares what the drive holds then. Nothing is changed in the drive before the backup is on the
+disk.
+"""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+from weakref import WeakSet
+
+from multidrop.dialects import Diagnostic, DriveError, Refused, SourceLine
+from multidrop.dialects.errors import Differs
+from multidrop.dialects.families import program_languages
+from multidrop.dialects.files import program_text_of
+from multidrop.dialects.program_files import LOCKED, Difference, Held, errors, refuse
+from multidrop.drives.drive import still
+from multidrop.shell.channel import running, transferring
+from multidrop.shell.events import By, Printed
+from multidrop.shell.program_listing import check_one, read
+from multidrop.shell.state import backups, downloaded_sources
+from multidrop.shell.state.crash_marks import marked
+
+if TYPE_CHECKING:
+    from multidrop.drives.drive import Drive
+    from multidrop.shell.session import Session
+    from multidrop.shell.workspace import Workspace
+
+LIMIT = 10.0
+"""The longest wait for a running program and its motion to end, s."""
+APART = 0.05
+"""The time between two looks at it, s."""
+_under_way: WeakSet[Drive] = WeakSet()
+"""The drives to which a file is being downloaded."""
+MOST = 20
+"""The largest number of differing lines that are shown."""
+
+
+@dataclass(frozen=True)
+class Wanted:
+    """What a download does beside sending the file."""
+
+    verify: bool = True
+    save: bool = False
+    only_changed: bool = False
+    run: str = ""
+    """The label of the program to execute at the end; empty: none."""
+
+
+# Checking
+
+
+async def checked(
+    workspace: Workspace, drive: Drive, file: str, text: str | None = None
+) -> tuple[str, Sequence[SourceLine]]:
+    """Return a file's text and its lines; publish warnings. `text`: what a file of that name would hold.
+
+    Raises Diagnostic for the first error, or for another language.
+    """
+    own, text = drive.program_files, await asyncio.to_thread(program_text_of, file) if text is None else text
+    problems = await asyncio.to_thread(own.language.check, text, drive.product)
+    for other in program_languages().values() if errors(problems) else ():
+        if other is not own and not errors(await asyncio.to_thread(other.language.check, text)):
+            raise Diagnostic(f"is {other.title}, and {workspace.display_name(drive)} runs {own.title}", file)
+    refuse(problems, file)
+    for each in problems:
+        if each.warning:
+            workspace.notify(f"{each.where(file)}: warning: {each.what}", warning=True)
+    return text, await asyncio.to_thread(own.language.read, text, file)
+
+
+# Download
+
+
+async def download(
+    session: Session,
+    drive: Drive,
+    file: str,
+    wanted: Wanted = Wanted(),
+    text: str | None = None,
+    by: By = By.OPERATOR,
+) -> None:
+    """Send a program file to a drive. `text`: what a file of that name would hold.
+
+    Raises Diagnostic for the file, the backup and lines that were not agreed to, and the drive's failures.
+    """
+    text, lines = await checked(session, drive, file, text)
+    check_one(drive)
+    if drive in _under_way:
+        raise Refused(f"{session.display_name(drive)}: a download to it is under way (nothing was sent)")
+    _under_way.add(drive)
+    try:
+        made = _Download(session, drive, file, wanted)
+        await made.agree(lines, by)
+        await made.run(text, lines)
+    finally:
+        _under_way.discard(drive)
+
+
+class _Download:
+    """One download: a drive, a file, and what is wanted of it."""
+
+    def __init__(self, session: Session, drive: Drive, file: str, wanted: Wanted) -> None:
+        self._session, self._drive = session, drive
+        self._file, self._wanted = file, wanted
+        self._programs = drive.programs
+        self._name = session.display_name(drive)
+
+    async def run(self, text: str, lines: Sequence[SourceLine]) -> None:
+        """Do all of it."""
+        start = self._start_line(lines)
+        ends_program = self._programs.size(lines) > 0
+        if ends_program and not self._wanted.only_changed:  # one that prints without a pause lets nothing be listed
+            await self._end_program()
+            ends_program = False
+        held = await read(self._session, self._drive, "backup", lines)
+        if self._wanted.only_changed and not await self._is_changed(lines, held):
+            await self._use_held(start)
+            return
+        backup = await self._back_up(lines, held)
+        port = self._session.of(self._session.buses[self._drive.link.name]).port
+        try:
+            with marked(self._session.settings.state, port, self._drive.address, self._file, backup):
+                if ends_program:
+                    await self._end_program()
+                sent = await self._send(lines, held)
+                await self._save(lines)
+                if self._programs.size(lines) and self._wanted.verify:
+                    await self._verify(text, lines, sent, held)
+        except BaseException:
+            self._say(f"what was in it before is in {backup}", warning=True)
+            raise
+        if start:
+            await self._start(start)
+
+    def _say(self, text: str, warning: bool = False) -> None:
+        self._session.notify(f"{self._name}: {text}", bus=self._drive.link.name, warning=warning, outcome=True)
+
+    def _start_line(self, lines: Sequence[SourceLine]) -> str:
+        """Return the line that starts the wanted program. Raises Diagnostic for an unknown label."""
+        if not self._wanted.run:
+            return ""
+        try:
+            return self._programs.start(lines, self._wanted.run)
+        except Diagnostic as problem:
+            raise Diagnostic(f"{problem.message} (nothing was sent)", self._file, problem.hint) from None
+
+    async def _is_changed(self, lines: Sequence[SourceLine], held: Held) -> bool:
+        """Whether the file must be sent; publish why, or that the drive holds it."""
+        why = await transferring(self._drive, self._programs.to_send(self._drive.state, lines, held))
+        more = "the program is not sent again" if self._wanted.save or self._wanted.run else "nothing was sent"
+        self._say(f"{self._file} is sent: {why}" if why else f"holds {self._file} already; {more}")
+        return bool(why)
+
+    async def _use_held(self, start: str) -> None:
+        """Save and start the program that the drive holds already, where that is wanted."""
+        if start:
+            await self._end_program()
+        if self._wanted.save:
+            await self._save(())
+        if start:
+            await self._start(start)
+
+    async def agree(self, lines: Sequence[SourceLine], by: By) -> None:
+        """Ask before lines outside of a program that act: the drive executes them at once. Raises Diagnostic."""
+        guards, drive = self._session.settings.guards, self._drive
+        found = []
+        for line in self._outside(lines):
+            what = guards.what(drive.family, drive.state, line.text)
+            if what or self._programs.acts(line.text):
+                found.append(f"line {line.number}: " + (what or f"'{line.text}' starts motion or a program"))
+        if not found:
+            return
+        what = f"{self._file}, outside of its program, {'; '.join(found)}"
+        if self._session.agreed:
+            self._say(what, warning=True)
+        await self._session.confirm(what, self._name, by=by)
+
+    def _outside(self, lines: Sequence[SourceLine]) -> list[SourceLine]:
+        """The lines of a file that the drive executes as they come, without declarations."""
+        return [line for line in self._programs.executed(lines) if not line.text.upper().startswith("VA ")]
+
+    async def _back_up(self, lines: Sequence[SourceLine], held: Held) -> Path:
+        """Save what the drive holds. Raises Refused for a locked program that the file would overwrite."""
+        if held.locked and self._programs.size(lines):
+            raise Refused(f"{self._name}: no backup is possible: {LOCKED} (nothing was sent)")
+        state, workspace = self._drive.state, self._session
+        parts = (state.product, state.version, f"part {state.part}" * bool(state.part), f"serial {state.serial}")
+        backup = backups.Backup(
+            bus=self._drive.link.name,
+            address=self._drive.address,
+            at=workspace.wall(workspace.now()),
+            described="; ".join(each for each in parts[: 3 + bool(state.serial)] if each),
+            remark=self._programs.remark,
+            ending=self._drive.program_files.endings[0],
+            names=held.names,
+            lines=self._programs.file(state, held, True),
+        )
+        path = await asyncio.to_thread(backups.write, workspace.settings.state, backup)
+        workspace.notify(f"backup: {path}", bus=self._drive.link.name, outcome=True)
+        return path
+
+    async def _end_program(self) -> None:
+        """End a running program, with the motion that it has begun. Raises DriveError where it goes on."""
+        drive = self._drive
+        if not await transferring(drive, self._programs.end(drive.state)):
+            return
+        self._say("its program ran and was ended", warning=True)
+        deadline = self._session.now() + LIMIT
+        while await drive.busy() or not await still(drive):
+            if self._session.now() >= deadline:
+                raise DriveError(
+                    f"{self._name}: its program goes on for {LIMIT:g} s; stop it (nothing was overwritten)"
+                )
+            await asyncio.sleep(APART)
+
+    async def _send(self, lines: Sequence[SourceLine], held: Held) -> Sequence[SourceLine]:
+        """Send the file; a refusal names its line."""
+        drive, workspace = self._drive, self._session
+        workspace.addressed.add((drive.link.name, drive.address))
+        if any(drive.codec.starts_motion(line.text) for line in self._programs.executed(lines)):
+            self._session.starting(drive)
+        try:
+            with running(workspace, f"{self._name}: download") as job:
+                sent = await drive.download(lines, held, job)
+        except DriveError as error:
+            text = str(error)
+            error.args = (f"{self._file}:{text.removeprefix('line ') if text.startswith('line ') else f' {text}'}",)
+            raise
+        outside = [line.text for line in self._outside(lines)]
+        more = f" and {len(outside) - MOST} more" if len(outside) > MOST else ""
+        executed = f"; executed at once: {', '.join(outside[:MOST])}{more}" if outside else ""
+        self._say(f"{self._file} downloaded, {len(lines)} lines{executed}")
+        return sent
+
+    async def _save(self, lines: Sequence[SourceLine]) -> None:
+        """Send S where that is wanted, unless the file ends with it."""
+        word = self._programs.save
+        executed = [line.text.strip().upper() for line in self._programs.executed(lines)]
+        if not word:
+            if self._wanted.save:
+                self._say("it keeps programs at once; --save sends nothing")
+        elif word in executed[-1:]:
+            self._say(f"saved ({word} in the file)")
+        elif self._wanted.save:
+            await self._drive.send(word)
+            self._say(f"saved ({word})")
+        elif word not in executed:
+            self._say(f"not saved: what is not saved is lost at power-off; --save sends {word}")
+
+    async def _verify(self, text: str, lines: Sequence[SourceLine], sent: Sequence[SourceLine], before: Held) -> None:
+        """Compare what the drive holds with the lines that were sent. Raises Differs."""
+        held = await read(self._session, self._drive, "verify", lines)
+        if held.locked:
+            self._say("not verified: the program is locked now (LK=1)", warning=True)
+            return
+        found = self._programs.differences(self._drive.state, sent, held, before)
+        for each in found[:MOST]:
+            self._session.notify(self._difference(each), warning=True)
+        if found:
+            count = f"{len(found)} lines differ" if len(found) > 1 else "1 line differs"
+            raise Differs(f"{self._name}: {count} from {self._file}; download it again")
+        size = self._programs.size(lines)
+        self._say(f"verified, {size} lines")
+        if (
+            size == len(held.lines)
+            and text.split() != " ".join(self._programs.file(self._drive.state, held, True)).split()
+        ):
+            workspace = self._session
+            at = workspace.wall(workspace.now()).isoformat(" ", "seconds")
+            downloaded_sources.remember(workspace.settings.state, held, downloaded_sources.Source(self._file, text, at))
+
+    def _difference(self, each: Difference) -> str:
+        """Describe a line that differs: here in the file, there in the drive."""
+        where = f"{self._file}:{each.number}" if each.number else self._file
+        here = f"here '{each.here}'" if each.here else "here no line"
+        there = f"in {self._name} '{each.there}' at {each.at}" if each.at is not None else f"in {self._name} no line"
+        return f"{where}: {here}, {there}"
+
+    async def _start(self, line: str) -> None:
+        """Execute the program that was wanted."""
+        drive, workspace = self._drive, self._session
+        self._session.starting(drive)
+        for text in await drive.send(line):
+            workspace.publish(Printed(workspace.now(), drive.link.name, drive.address, text))
+        self._say(f"started ({line})")

@@ -1,0 +1,72 @@
+"""A session's events as lines on the standard streams."""
+
+from __future__ import annotations
+
+import sys
+from typing import TextIO
+
+from multidrop.dialects.text import visible
+from multidrop.drives.events import Unsolicited
+from multidrop.shell.events import Bytes, Failed, Notified, OnBus, Output, Printed, Progressed, SessionEvent
+from multidrop.shell.layout import laid_out
+from multidrop.shell.streams.status_line import StatusLine
+from multidrop.shell.streams.stdout import write
+
+
+class Printer:
+    """Prints a session's events. Subscribe its `show`.
+
+    `talkative`: print all notices and the failures of background lines; otherwise print warnings and outcomes only.
+    The prompt, which is talkative, shows progress itself. `unsolicited`: print what drives send by themselves.
+    `replies`: print replies; otherwise standard output belongs to a report.
+    """
+
+    def __init__(self, talkative: bool = False, unsolicited: bool = True, replies: bool = True) -> None:
+        self._talkative = talkative
+        self._replies = replies
+        self._unsolicited = unsolicited
+        self._last = ""
+        self._progress = StatusLine()
+
+    def show(self, event: SessionEvent) -> None:
+        """Print an event if it is for this output."""
+        if isinstance(event, Progressed):
+            self._progressed(event)
+        elif isinstance(event, Bytes | Output | Printed | OnBus) and not self._replies:
+            return
+        elif isinstance(event, Bytes):
+            head = f"{event.clock} {'>' if event.outgoing else '<'} "
+            rows = (head + row for row in event.rows)
+            self._write(sys.stderr if event.outgoing or event.watched else sys.stdout, *rows, spare=True)
+        elif isinstance(event, Output | Printed | OnBus | Notified | Failed):
+            self._print(event)
+
+    def _progressed(self, event: Progressed) -> None:
+        if event.over:
+            self._progress.erase()
+        elif not self._talkative:
+            self._progress.show(event.text)
+
+    def _print(self, event: Output | Printed | OnBus | Notified | Failed) -> None:
+        if isinstance(event, Output) and event.columns and sys.stdout.isatty():
+            from shutil import get_terminal_size
+
+            for row in laid_out(visible(event.text, tabs=True), get_terminal_size().columns):
+                self._write(sys.stdout, row)
+        elif isinstance(event, OnBus):
+            if self._unsolicited and isinstance(event.event, Unsolicited):
+                self._write(sys.stdout, *event.event.lines, spare=True)
+        elif isinstance(event, Output | Printed):
+            self._write(sys.stdout, event.text)
+        elif self._talkative or (isinstance(event, Notified) and (event.warning or event.outcome)):
+            self.notify(event.text)
+
+    def notify(self, text: str) -> None:
+        """Write a line to standard error. The same line twice in a row is written once, unless talkative."""
+        if text != self._last or self._talkative:
+            self._last = text
+            self._write(sys.stderr, text)
+
+    def _write(self, stream: TextIO, *lines: str, spare: bool = False) -> None:
+        self._progress.erase()
+        write(stream, *lines, spare=spare)

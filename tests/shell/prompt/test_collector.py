@@ -1,0 +1,57 @@
+"""The garbage collector keeps out of the stop's way: it visits what is kept only while everything is at rest."""
+
+import asyncio
+import gc
+import weakref
+
+import pytest
+
+from multidrop.shell.prompt import collector
+from multidrop.shell.prompt.collector import collected_at_rest
+from tests.support.virtual import in_virtual_time
+
+pytestmark = pytest.mark.slow
+
+
+class Kept:
+    """Holds itself, so that only the collector can take it away."""
+
+    def __init__(self):
+        self.itself = self
+
+
+async def frozen_cycle():
+    """A cycle that was alive when it was frozen and is garbage now."""
+    kept = Kept()
+    await asyncio.sleep(2 * collector.FREEZE)
+    return weakref.ref(kept)
+
+
+@in_virtual_time
+async def test_what_survives_is_frozen_each_second_and_visited_no_more():
+    with collected_at_rest(lambda: False):
+        kept = [Kept() for _ in range(1000)]
+        await asyncio.sleep(1.5 * collector.FREEZE)
+        assert len(kept) < gc.get_freeze_count()
+        assert not [each for each in gc.get_objects() if isinstance(each, Kept)]
+    assert gc.get_freeze_count() == 0
+
+
+@in_virtual_time
+async def test_everything_is_collected_while_all_is_at_rest():
+    resting = False
+    with collected_at_rest(lambda: resting):
+        lost = await frozen_cycle()
+        await asyncio.sleep(2 * collector.FULL)
+        assert lost() is not None
+        resting = True
+        await asyncio.sleep(2 * collector.FREEZE)
+        assert lost() is None
+
+
+@in_virtual_time
+async def test_a_machine_that_never_rests_is_collected_all_the_same_in_the_end():
+    with collected_at_rest(lambda: False):
+        lost = await frozen_cycle()
+        await asyncio.sleep(collector.LONGEST)
+        assert lost() is None

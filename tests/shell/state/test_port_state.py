@@ -1,0 +1,233 @@
+"""What is kept of a port for the session after one that is cut off: read whatever stands there."""
+
+import asyncio
+import json
+import os
+from dataclasses import asdict
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from multidrop.dialects import Owed
+from multidrop.dialects.mcode.host.codec import MCode
+from multidrop.dialects.mcode.host.state import MCodeState
+from multidrop.dialects.tmcl.host.codec import Tmcl, TmclState
+from multidrop.shell.state.port_state import MOST, PortState
+
+PORT = "/dev/serial/by-id/usb-FTDI/RS485: 1"
+OWED = Owed(1, "a", "LMDCM", "LMDCM 6.002", "LMDCM571", "0401")
+
+
+def known(owed=OWED, restore=None):
+    return MCodeState(
+        MCode(), owed.name, owed.name, owed.product, owed.version, owed.part, owed.serial, restore=restore
+    )
+
+
+@pytest.fixture
+def port(tmp_path):
+    """Opens the port, and closes what is open of it before."""
+    opened = []
+
+    def make(name=PORT):
+        for each in opened:
+            each.close()
+        opened.append(PortState(tmp_path, name))
+        return opened[-1]
+
+    yield make
+    for each in opened:
+        each.close()
+
+
+def kept(tmp_path):
+    return sorted(path for path in (tmp_path / "ports").iterdir() if path.suffix == ".json")
+
+
+def test_the_first_session_finds_nothing(port):
+    state = port()
+    assert (state.cut, state.owed, state.remarks) == ("", (), [])
+
+
+def test_a_line_that_was_cut_off_is_known_to_the_next_session_until_the_drives_have_overflowed(port):
+    port().begun("aMR 51200")
+    assert port().cut == "aMR 51200"
+    state = port()
+    assert state.cut == "aMR 51200"
+    state.ended()
+    assert port().cut == ""
+
+
+def test_a_line_that_is_answered_is_no_more_known(port):
+    state = port()
+    for number in range(3):
+        state.begun(f"aMR {number}")
+        state.ended()
+    assert port().cut == ""
+
+
+@given(st.binary(max_size=200))
+def test_whatever_stands_in_the_lines_file_is_one_printable_line(tmp_path_factory, data):
+    folder = tmp_path_factory.mktemp("state")
+    PortState(folder, PORT).close()
+    [file] = (folder / "ports").iterdir()
+    file.write_bytes(data)
+    state = PortState(folder, PORT)
+    assert state.cut.isprintable() and len(state.cut) <= 128
+    state.ended()
+    state.close()
+    state = PortState(folder, PORT)
+    assert state.cut == ""
+    state.close()
+
+
+async def test_what_is_owed_is_written_before_it_is_changed_and_gone_once_it_is_put_back(port, tmp_path):
+    state, drive = port(), known(restore=OWED)
+    await state.owes(drive)
+    [path] = kept(tmp_path)
+    assert json.loads(path.read_text()) == {"port": PORT, "owed": [asdict(OWED)]}
+    assert port().owed == (OWED,)
+    state = port()
+    drive.restore = None
+    await state.owes(drive)
+    assert kept(tmp_path) == [] and port().owed == ()
+
+
+async def test_a_download_of_a_module_is_kept_until_the_module_executes_commands_again(port):
+    state, modules = port(), [TmclState(Tmcl(), each, name=each, product="TMCM-1241", version="1.15") for each in "13"]
+    for module in modules:
+        module.found_storing()
+        await state.owes(module)
+    state = port()
+    assert [each.name for each in state.owed] == ["1", "3"]
+    modules[0].executes()
+    modules[0].owes_nothing()
+    await state.owes(modules[0])
+    assert [each.name for each in port().owed] == ["3"]
+
+
+async def test_another_drive_strikes_nothing_out(port):
+    state = port()
+    await state.owes(known(restore=OWED))
+    for other in (
+        Owed(1, "a", "LMDCM", "LMDCM 6.002", "LMDCM571", "0402"),
+        Owed(1, "b", "LMDCM", "LMDCM 6.002", "LMDCM571", "0401"),
+        Owed(1, "a", "LMDOM", "LMDCM 6.002", "LMDCM571", "0401"),
+    ):
+        await state.owes(known(other))
+    assert port().owed == (OWED,)
+
+
+async def test_several_drives_are_kept_and_the_oldest_forgotten(port):
+    state = port()
+    drives = [Owed(2, "a", "LMDCM", "v", "p", str(number)) for number in range(MOST + 3)]
+    await asyncio.gather(*(state.owes(known(each, each)) for each in drives))
+    assert port().owed == tuple(drives[3:])
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "",
+        "{",
+        "[]",
+        "{}",
+        "null",
+        '{"owed": 5}',
+        '{"owed": [5]}',
+        '{"owed": [{}]}',
+        "[" * 100_000,
+        '{"owed": [{"em": 7, "name": "", "product": "", "version": "", "part": "", "serial": ""}]}',
+        '{"owed": [{"em": true, "name": "", "product": "", "version": "", "part": "", "serial": ""}]}',
+        '{"owed": [{"em": 1, "name": 1, "product": "", "version": "", "part": "", "serial": ""}]}',
+        b"\xff\xfe\x00",
+    ],
+)
+async def test_a_damaged_file_is_passed_over_with_a_word_and_replaced(port, tmp_path, text):
+    state = port()
+    await state.owes(known(restore=OWED))
+    [path] = kept(tmp_path)
+    path.write_bytes(text if isinstance(text, bytes) else text.encode())
+    state = port()
+    assert state.owed == () and state.remarks == [f"{path} is damaged and is ignored; delete it"]
+    await state.owes(known(restore=OWED))
+    assert port().owed == (OWED,)
+
+
+def test_ports_of_any_name_have_files_of_their_own(tmp_path):
+    names = ["COM3", "com3", "/a/b", "%2Fa%2Fb", "10.0.0.5:503", "..", "x" * 300, "x" * 299 + "y", "a:b", "a*b"]
+    for number, name in enumerate(names):
+        state = PortState(tmp_path, name)
+        state.begun(f"MR {number}")
+        state.close()
+    for number, name in enumerate(names):
+        state = PortState(tmp_path, name)
+        assert (state.cut, state.remarks) == (f"MR {number}", [])
+        state.close()
+
+
+async def test_while_one_session_has_the_port_another_keeps_nothing_and_says_so_when_it_matters(tmp_path):
+    told = []
+    first, second = PortState(tmp_path, PORT), PortState(tmp_path, PORT)
+    second.notify = told.append
+    first.begun("aMR 51200")
+    second.begun("aMR 5")
+    second.ended()
+    await second.owes(known())
+    assert (second.cut, second.remarks, told) == ("", [], [])
+    for _ in range(2):
+        await second.owes(known(restore=OWED))
+    assert len(told) == 1 and "another session" in told[0]
+    first.close()
+    second.close()
+    third = PortState(tmp_path, PORT)
+    assert third.cut == "aMR 51200"
+    third.close()
+
+
+async def test_without_a_folder_that_can_be_written_a_session_works_and_says_so(tmp_path, monkeypatch):
+    def read_only(*_, **__):
+        raise OSError(30, "Read-only file system")
+
+    monkeypatch.setattr(os, "open", read_only)
+    told = []
+    state = PortState(tmp_path, PORT)
+    state.notify = told.append
+    await state.owes(known())
+    state.ended()
+    assert (state.remarks, told) == ([], [])
+    for _ in range(2):
+        state.begun("aMR 5")
+        state.ended()
+        await state.owes(known(restore=OWED))
+    assert len(told) == 1 and "Read-only file system" in told[0]
+    state.close()
+
+
+async def test_a_folder_that_is_a_file_is_said_and_nothing_else_happens(tmp_path):
+    (tmp_path / "ports").write_text("mine")
+    state, told = PortState(tmp_path, PORT), []
+    state.notify = told.append
+    await state.owes(known(restore=OWED))
+    state.begun("aMR 5")
+    assert len(told) == 1 and "cannot be used" in told[0]
+    state.close()
+    assert (tmp_path / "ports").read_text() == "mine"
+
+
+async def test_a_disk_that_becomes_full_is_said_once(tmp_path, monkeypatch):
+    told = []
+    state = PortState(tmp_path, PORT)
+    state.notify = told.append
+
+    def full(*_):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(os, "fsync", full)
+    for _ in range(2):
+        await state.owes(known(restore=OWED))
+        state.begun("aMR 5")
+    state.close()
+    assert len(told) == 1 and "No space left on device" in told[0]
+    assert [path.suffix for path in (tmp_path / "ports").iterdir()] == [".line"]
