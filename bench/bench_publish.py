@@ -28,7 +28,7 @@ import paho.mqtt.client as mqtt
 from report import Row, compared, main
 from sim_process import ROOT, all_served, busy
 
-from multidrop.shell.connect.settings_tables import MqttSettings
+from multidrop.shell.connect.settings import MqttSettings
 from multidrop.shell.publishing.backlog import Backlog, Message
 from multidrop.shell.publishing.broker import WINDOW, Connection
 from multidrop.shell.publishing.publisher import Publisher

@@ -9,10 +9,11 @@ import sys
 from pathlib import Path
 
 
-def write_atomically(path: Path, data: bytes, mode: int = 0o666) -> None:
+def write_atomically(path: Path, data: bytes, mode: int = 0o666, *, synced: bool = True) -> None:
     """Replace a file's content, or create the file with `mode` less the umask. On OSError the old file is unchanged.
 
-    A new file in the same folder replaces the old one only once all of it is on the disk. A link stays a link.
+    A new file in the same folder replaces the old one only once all of it is on the disk. A link stays a link. Not
+    `synced`: it survives the process, not the machine, and takes microseconds.
     """
     path.parent.mkdir(parents=True, exist_ok=True)
     target = Path(os.path.realpath(path))
@@ -22,13 +23,16 @@ def write_atomically(path: Path, data: bytes, mode: int = 0o666) -> None:
             _take_over(target, file.fileno())
             file.write(data)
             file.flush()
-            os.fsync(file.fileno())
+            if synced:
+                os.fsync(file.fileno())
         os.replace(beside, target)
     except BaseException:
         with contextlib.suppress(OSError):
             beside.unlink()
         raise
-    sync_folder(target.parent)
+    if synced:
+        with contextlib.suppress(OSError):  # the file is whole already
+            sync_folder(target.parent)
 
 
 def create_atomically(path: Path, data: bytes) -> None:
@@ -39,26 +43,22 @@ def create_atomically(path: Path, data: bytes) -> None:
             file.write(data)
             file.flush()
             os.fsync(file.fileno())
-        _name_new(beside, path)
+        if sys.platform == "win32":
+            os.rename(beside, path)  # which refuses a name that is taken
+        else:
+            try:
+                os.link(beside, path)
+            except FileExistsError:
+                raise
+            except OSError:  # some disks have no links
+                if os.path.lexists(path):
+                    raise FileExistsError(errno.EEXIST, os.strerror(errno.EEXIST), str(path)) from None
+                os.rename(beside, path)
     finally:
         with contextlib.suppress(OSError):
             beside.unlink()
-    sync_folder(path.parent)
-
-
-def _name_new(beside: Path, path: Path) -> None:
-    """Give a whole file its name, unless another has it. Windows' rename refuses that, and some disks have no links."""
-    if sys.platform == "win32":
-        os.rename(beside, path)
-        return
-    try:
-        os.link(beside, path)
-    except FileExistsError:
-        raise
-    except OSError:
-        if os.path.lexists(path):
-            raise FileExistsError(errno.EEXIST, os.strerror(errno.EEXIST), str(path)) from None
-        os.rename(beside, path)
+    with contextlib.suppress(OSError):
+        sync_folder(path.parent)
 
 
 def _take_over(old: Path, new: int) -> None:
@@ -76,8 +76,8 @@ def _take_over(old: Path, new: int) -> None:
 
 
 def sync_folder(folder: Path) -> None:
-    """Make the new name survive a power cut, where folders can be synced; the file is whole already."""
-    with contextlib.suppress(OSError):
+    """Make new names survive a power cut. Raises OSError where a folder cannot be synced; Windows has no such call."""
+    if sys.platform != "win32":
         descriptor = os.open(folder, os.O_RDONLY)
         try:
             os.fsync(descriptor)

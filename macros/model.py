@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 from multidrop.dialects.errors import Diagnostic
@@ -35,11 +35,8 @@ def fill(line: str, values: Mapping[str, str], where: str = "") -> str:
         if name is None and len(match[0]) == 2:
             return match[0][0]
         if name is None:
-            raise Diagnostic(
-                f"a lone {match[0]} at column {match.start() + 1}",
-                where,
-                f"write {match[0] * 2} for a brace",
-            )
+            what = f"a lone {match[0]} at column {match.start() + 1}"
+            raise Diagnostic(what, where, f"write {match[0] * 2} for a brace")
         if name not in values:
             raise Diagnostic(f"no value for {{{name}}}", where, f"set {name}=VALUE, or write {{{{ for a brace")
         return values[name]
@@ -80,14 +77,11 @@ class Parameter:
             return " or ".join(self.choices)
         if self.kind == "text":
             return "one line of text"
-        return f"{_NAMES[self.kind]}{self._limits}"
-
-    @property
-    def _limits(self) -> str:
         low, high = (None if each is None else written(each) for each in (self.low, self.high))
         if low is not None and high is not None:
-            return f", {low} to {high}"
-        return f", {low} or more" if low is not None else f", {high} or less" if high is not None else ""
+            return f"{_NAMES[self.kind]}, {low} to {high}"
+        limit = f", {low} or more" if low is not None else f", {high} or less" if high is not None else ""
+        return f"{_NAMES[self.kind]}{limit}"
 
     @property
     def example(self) -> str:
@@ -103,32 +97,14 @@ class Parameter:
 
     def take(self, text: str, where: str = "") -> Value:
         """Read a value. Raises Diagnostic with the valid ones."""
-        found = _READ[self.kind](self, text)
-        if found is None:
-            raise Diagnostic(f"invalid {self.name} = {visible(text)!r}", where, f"valid: {self.valid}")
-        return found
-
-    def _text(self, text: str) -> str | None:
-        return text if visible(text) == text else None
-
-    def _choice(self, text: str) -> str | None:
-        return text if text in self.choices else None
-
-    def _number(self, text: str) -> int | float | None:
-        if not _FORMS[self.kind].fullmatch(text):
-            return None
-        number = int(text) if self.kind == "int" else float(text)
-        low = -LARGEST if self.low is None else self.low
-        high = LARGEST if self.high is None else self.high
-        return number if low <= number <= high else None
-
-
-_READ: dict[str, Callable[[Parameter, str], Value | None]] = {
-    "int": Parameter._number,
-    "float": Parameter._number,
-    "text": Parameter._text,
-    "choice": Parameter._choice,
-}
+        if self.kind in _FORMS and _FORMS[self.kind].fullmatch(text):
+            number = int(text) if self.kind == "int" else float(text)
+            low = -LARGEST if self.low is None else self.low
+            if low <= number <= (LARGEST if self.high is None else self.high):
+                return number
+        elif (self.kind == "text" and visible(text) == text) or (self.kind == "choice" and text in self.choices):
+            return text
+        raise Diagnostic(f"invalid {self.name} = {visible(text)!r}", where, f"valid: {self.valid}")
 
 
 def written(value: Value) -> str:
@@ -146,12 +122,6 @@ def plain(line: str) -> str:
     return _PLACE.sub(lambda match: f"{{{match['name']}}}" if match["name"] else match[0], line)
 
 
-def begins_with_value(line: str) -> bool:
-    """Whether the first character of a line is that of a value."""
-    match = _PLACE.match(line.lstrip())
-    return match is not None and match["name"] is not None
-
-
 def declared(lines: Sequence[tuple[str, str]]) -> tuple[Parameter, ...]:
     """The parameters of lines, each line with its place, in the order of the lines.
 
@@ -161,7 +131,7 @@ def declared(lines: Sequence[tuple[str, str]]) -> tuple[Parameter, ...]:
     own = {match["name"] for _, line in lines if (match := _SET.match(line.strip()))}
     found: dict[str, tuple[Parameter, str]] = {}
     plain_ones: dict[str, None] = {}
-    for where, match in _places(lines):
+    for where, match in ((where, match) for where, line in lines for match in _PLACE.finditer(line) if match["name"]):
         name = match["name"]
         plain_ones.setdefault(name)
         if match["type"] is None:
@@ -170,19 +140,9 @@ def declared(lines: Sequence[tuple[str, str]]) -> tuple[Parameter, ...]:
         before, first = found.setdefault(name, (parameter, where))
         if before != parameter:
             hint = f"write {{{name}}} in one of them, or the same type in both"
-            raise Diagnostic(f"{match[0]} differs from {name} in {_last_word(first)}", where, hint)
+            place = first.rpartition(", ")[2].rpartition(": ")[2]
+            raise Diagnostic(f"{match[0]} differs from {name} in {place}", where, hint)
     return tuple(found[n][0] if n in found else Parameter(n) for n in plain_ones if n in found or n not in own)
-
-
-def _places(lines: Iterable[tuple[str, str]]) -> Iterable[tuple[str, re.Match[str]]]:
-    for where, line in lines:
-        for match in _PLACE.finditer(line):
-            if match["name"]:
-                yield where, match
-
-
-def _last_word(where: str) -> str:
-    return where.rpartition(", ")[2].rpartition(": ")[2]
 
 
 def _defined(name: str, text: str, where: str) -> Parameter:
@@ -193,28 +153,21 @@ def _defined(name: str, text: str, where: str) -> Parameter:
         raise Diagnostic("invalid type of a value", where, _USAGE)
     kind = "choice" if match["choices"] is not None else match["kind"]
     choices = tuple(word.strip() for word in (match["choices"] or "").split("|")) if kind == "choice" else ()
-    if kind == "choice" and (limits or not _are_words(choices)):
+    words = len(set(choices)) == len(choices) and all(word and visible(word) == word for word in choices)
+    if kind == "choice" and (limits or not words):
         raise Diagnostic("invalid choices", where, "valid: choice(a|b), each word once, without limits")
-    low, high = (_limit(limits[end], kind, where) if limits else None for end in ("low", "high"))
+    ends: list[int | float | None] = []
+    for end in ("low", "high"):
+        limit = Parameter("limit", kind).take(limits[end], where) if limits and limits[end] else None
+        assert not isinstance(limit, str)  # no text and no choice has limits
+        ends.append(limit)
+    low, high = ends
     if low is not None and high is not None and low > high:
         raise Diagnostic(f"no value from {written(low)} to {written(high)}", where, "write the lower limit first")
     parameter = Parameter(name, kind, None, low, high, choices)
     if match["default"] is None:
         return parameter
     return Parameter(name, kind, parameter.take(match["default"].strip(), where), low, high, choices)
-
-
-def _are_words(choices: Sequence[str]) -> bool:
-    return len(set(choices)) == len(choices) and all(word and visible(word) == word for word in choices)
-
-
-def _limit(text: str, kind: str, where: str) -> int | float | None:
-    """Parse a limit; an empty one is none."""
-    if not text:
-        return None
-    value = Parameter("limit", kind).take(text, where)
-    assert not isinstance(value, str)  # no text and no choice has limits
-    return value
 
 
 NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_-]{0,63}")
@@ -300,10 +253,7 @@ class Macro:
 
     def _numbered(self) -> Iterator[tuple[str, str]]:
         yield from ((self.where(number), step.line) for number, step in enumerate(self.steps, 1))
-        yield from ((self._on_stop(number), line) for number, line in enumerate(self.on_stop, 1))
-
-    def _on_stop(self, number: int) -> str:
-        return f"macro {self.name}, on_stop {number}"
+        yield from ((f"macro {self.name}, on_stop {number}", line) for number, line in enumerate(self.on_stop, 1))
 
 
 def checked_values(macro: Macro, given: Mapping[str, str]) -> dict[str, str]:
@@ -321,10 +271,14 @@ def checked_values(macro: Macro, given: Mapping[str, str]) -> dict[str, str]:
     for name, each in parameters.items():
         value = each.take(given[name], f"macro {macro.name}") if name in given else each.default
         if value is None:
-            raise _missing(macro, each)
+            where = next(place for place, line in macro._numbered() if name in value_names(plain(line)))
+            kind = "" if each.kind == "text" else f" ({each.valid})"
+            raise Diagnostic(f"no value for {{{name}}}", where, f"set {name}=VALUE{kind}, or write {{{{ for a brace")
         values[name] = written(value)
     for where, line in macro._numbered():
-        _check_head(line, fill(plain(line), _with_own(line, values), where), where)
+        text, begins = fill(plain(line), _with_own(line, values), where).lstrip(), _PLACE.match(line.lstrip())
+        if begins is not None and begins["name"] is not None and text.startswith(("/", "@")):
+            raise Diagnostic(f"a value begins the line with {text[0]}", where, "valid: text for the drive only")
     return values
 
 
@@ -343,36 +297,16 @@ def _with_own(line: str, values: Mapping[str, str]) -> dict[str, str]:
     return {**{name: f"{{{name}}}" for name in value_names(plain(line))}, **values}
 
 
-def _missing(macro: Macro, parameter: Parameter) -> Diagnostic:
-    where = next(place for place, line in macro._numbered() if parameter.name in value_names(plain(line)))
-    kind = "" if parameter.kind == "text" else f" ({parameter.valid})"
-    hint = f"set {parameter.name}=VALUE{kind}, or write {{{{ for a brace"
-    return Diagnostic(f"no value for {{{parameter.name}}}", where, hint)
-
-
-def _check_head(line: str, filled: str, where: str) -> None:
-    if begins_with_value(line) and filled.lstrip().startswith(("/", "@")):
-        raise Diagnostic(f"a value begins the line with {filled.lstrip()[0]}", where, "valid: text for the drive only")
-
-
-def nowhere(where: str) -> At:
-    """All keys in one place that has no lines."""
-    return lambda key, step: where
-
-
 def check_name(name: str, where: str = "") -> None:
     """Raise Diagnostic unless `name` is valid for a macro and its file."""
     if not NAME.fullmatch(name):
-        raise Diagnostic(
-            f"invalid macro name {name!r}",
-            where,
-            "use up to 64 letters, digits, - and _, the first of them no -",
-        )
+        hint = "use up to 64 letters, digits, - and _, the first of them no -"
+        raise Diagnostic(f"invalid macro name {name!r}", where, hint)
 
 
 def check(macro: Macro, where: str = "", at: At | None = None) -> None:
     """Raise Diagnostic for a macro that cannot be stored or played. `at` finds the places of its keys."""
-    at = at or nowhere(where)
+    at = at or (lambda key, step: where)
     check_name(macro.name, at("name", 0))
     if macro.key and macro.key not in KEYS:
         raise Diagnostic(f"invalid key {macro.key!r}", at("key", 0), 'use F2 to F12, or key = ""')
@@ -380,35 +314,35 @@ def check(macro: Macro, where: str = "", at: At | None = None) -> None:
         hint = "use a number, or up to 16 letters, digits, - and _"
         raise Diagnostic(f"invalid page {macro.page!r}", at("page", 0), hint)
     _check_text(macro.note, "note", at("note", 0))
-    _check_roles(macro.roles, at("roles", 0))
+    for role in macro.roles:
+        if not is_role(role):
+            raise Diagnostic(f"invalid role {role!r}", at("roles", 0), "use letters, digits, - and _")
+    if len(set(macro.roles)) < len(macro.roles):
+        raise Diagnostic("a role is named twice", at("roles", 0), "name each role once")
     if not macro.steps:
         raise Diagnostic("a macro without steps", where, 'add a [[step]] with after = 0.0 and line = "..."')
     for number, step in enumerate(macro.steps, 1):
-        _check_step(step, number, at)
+        if not math.isfinite(step.after) or step.after < 0:
+            what = f"step {number}: invalid after = {step.after}"
+            raise Diagnostic(what, at("after", number), "valid: 0.0 s or more")
+        _check_line(step.line, f"step {number}", at("line", number))
+        for text in (step.drive, *step.replies):
+            _check_text(text, f"step {number}: what was recorded", at("replies", number))
     for number, line in enumerate(macro.on_stop, 1):
         _check_line(line, f"on_stop {number}", at("on_stop", 0))
-    _check_parameters(macro, at)
+    try:
+        names = {each.name for each in macro.parameters}
+    except Diagnostic as problem:  # a step is named by its number, as the lines count
+        place = problem.where.partition(", ")[2]
+        step_number = re.match(r"step (\d+)", place)
+        place_of = at("line", int(step_number[1])) if step_number else at("on_stop", 0)
+        raise Diagnostic(f"{place}: {problem.message}", place_of, problem.hint) from None
+    if both := sorted(names & set(macro.roles)):
+        raise Diagnostic(f"{both[0]} is a role and a value", at("roles", 0), "give one of them another name")
 
 
 def is_role(name: str) -> bool:
     return _ROLE.fullmatch(name) is not None
-
-
-def _check_roles(roles: Sequence[str], where: str) -> None:
-    for role in roles:
-        if not is_role(role):
-            raise Diagnostic(f"invalid role {role!r}", where, "use letters, digits, - and _")
-    if len(set(roles)) < len(roles):
-        raise Diagnostic("a role is named twice", where, "name each role once")
-
-
-def _check_step(step: Step, number: int, at: At) -> None:
-    which = f"step {number}"
-    if not math.isfinite(step.after) or step.after < 0:
-        raise Diagnostic(f"{which}: invalid after = {step.after}", at("after", number), "valid: 0.0 s or more")
-    _check_line(step.line, which, at("line", number))
-    for text in (step.drive, *step.replies):
-        _check_text(text, f"{which}: what was recorded", at("replies", number))
 
 
 def _check_line(line: str, which: str, where: str) -> None:
@@ -417,26 +351,12 @@ def _check_line(line: str, which: str, where: str) -> None:
         raise Diagnostic(f"{which}: more than one line of text", where, "give each line a [[step]]")
 
 
-def _check_parameters(macro: Macro, at: At) -> None:
-    """Check the types of values; a step is named by its number, as the lines count."""
-    try:
-        names = {each.name for each in declared(list(macro._numbered()))}
-    except Diagnostic as problem:
-        place = problem.where.partition(", ")[2]
-        number = re.match(r"step (\d+)", place)
-        where = at("line", int(number[1])) if number else at("on_stop", 0)
-        raise Diagnostic(f"{place}: {problem.message}", where, problem.hint) from None
-    if both := sorted(names & set(macro.roles)):
-        raise Diagnostic(f"{both[0]} is a role and a value", at("roles", 0), "give one of them another name")
-
-
 def _check_text(text: str, what: str, where: str) -> None:
     try:
         text.encode("utf-8")
     except UnicodeEncodeError as error:
-        raise Diagnostic(
-            f"{what}: half a character at position {error.start + 1}", where, "type the line again"
-        ) from None
+        what = f"{what}: half a character at position {error.start + 1}"
+        raise Diagnostic(what, where, "type the line again") from None
 
 
 def page_order(page: str) -> tuple[bool, int, str]:

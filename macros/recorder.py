@@ -119,8 +119,11 @@ class Recorded:
     @property
     def replies(self) -> tuple[str, ...]:
         """The replies, cut to a length that people read."""
+        kept = []
+        for text in map(visible, self.heard[:REPLIES]):
+            kept.append(text if len(text) <= LONGEST else f"{text[:LONGEST]}... ({len(text)} characters)")
         more = len(self.heard) - REPLIES
-        return (*map(_cut, self.heard[:REPLIES]), *([f"... {more} more"] if more > 0 else []))
+        return (*kept, *([f"... {more} more"] if more > 0 else []))
 
 
 class Recorder:
@@ -168,7 +171,13 @@ class Recorder:
         if not self._recorded:
             self.discard()
             raise Diagnostic(f"nothing was typed for the macro {name}", hint="it is not stored; record it again")
-        return Macro(name, _steps(self._recorded), recorded=self._begun)
+        first = before = self._recorded[0].at
+        steps = []
+        for each in self._recorded:  # offsets from the first line are rounded, not gaps: a long macro does not drift
+            gap = round(each.at - first, 3) - round(before - first, 3)
+            steps.append(Step(max(0.0, round(gap, 3)), each.line, each.drive, each.replies))
+            before = each.at
+        return Macro(name, tuple(steps), recorded=self._begun)
 
     @property
     def offers(self) -> list[Offer]:
@@ -176,19 +185,3 @@ class Recorder:
 
     def discard(self) -> None:
         self.name, self.before, self._recorded = "", None, []
-
-
-def _steps(recorded: list[Recorded]) -> tuple[Step, ...]:
-    """Round the offsets from the first line, not the gaps, so that a long macro does not drift."""
-    first = before = recorded[0].at
-    steps = []
-    for each in recorded:
-        gap = round(each.at - first, 3) - round(before - first, 3)
-        steps.append(Step(max(0.0, round(gap, 3)), each.line, each.drive, each.replies))
-        before = each.at
-    return tuple(steps)
-
-
-def _cut(text: str) -> str:
-    shown = visible(text)
-    return shown if len(shown) <= LONGEST else f"{shown[:LONGEST]}... ({len(shown)} characters)"

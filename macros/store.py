@@ -28,8 +28,11 @@ class MacroStore:
 
     def __init__(self, folder: Path, project: Path | None = None) -> None:
         self.folder = folder
-        self.project = None if project is None or _same(project, folder) else project
+        self.project = project
         """The folder beside a project; its macros come first."""
+        with contextlib.suppress(OSError):
+            if project is not None and project.resolve() == folder.resolve():
+                self.project = None
 
     @property
     def folders(self) -> tuple[Path, ...]:
@@ -77,9 +80,8 @@ class MacroStore:
             data = _bytes(path)
         except FileNotFoundError:
             if path.is_symlink():
-                raise Diagnostic(
-                    "a link to a file that is not there", str(path), "correct or delete the link"
-                ) from None
+                what = "a link to a file that is not there"
+                raise Diagnostic(what, str(path), "correct or delete the link") from None
             names = ", ".join(self.names())
             hint = f"valid: {names}" if names else "no macro has been recorded"
             where = " and ".join(map(str, self.folders))
@@ -88,11 +90,8 @@ class MacroStore:
             raise _unreadable(path, error) from None
         macro = parse_macro(utf8(data, str(path)), str(path))
         if macro.name != name:
-            raise Diagnostic(
-                f"name = {macro.name!r} in the file of {name!r}",
-                str(path),
-                "make the name and the file's agree",
-            )
+            what = f"name = {macro.name!r} in the file of {name!r}"
+            raise Diagnostic(what, str(path), "make the name and the file's agree")
         return macro
 
     def contents(self, name: str) -> bytes | None:
@@ -159,9 +158,7 @@ class MacroStore:
 
     def save_text(self, macro: Macro, text: str, before: bytes | None) -> Path:
         """Write the text of a macro as `save` does; what a person wrote into it stays."""
-        path = self.path(macro.name)
-        check(macro, str(path))
-        self._check_free(macro, path)
+        path = self._checked_path(macro)
         if self.contents(macro.name) != before:
             raise Diagnostic("the file has changed meanwhile" if before else "the file exists already", str(path))
         if before is None:
@@ -182,9 +179,7 @@ class MacroStore:
         self._change(replace(self.load(name), note=note), {"note": note})
 
     def _change(self, macro: Macro, changes: Mapping[str, str]) -> None:
-        path = self.path(macro.name)
-        check(macro, str(path))
-        self._check_free(macro, path)
+        path = self._checked_path(macro)
         text = (self.contents(macro.name) or b"").decode("utf-8")
         _write(path, with_values(text, changes, str(path)))
 
@@ -217,12 +212,15 @@ class MacroStore:
             number += 1
         return f"{name[:60]}-{number}"
 
-    def _check_free(self, macro: Macro, path: Path) -> None:
-        others = [each.name for each in self.on_key(macro.key, macro.page)[0]] if macro.key else []
-        if others := [name for name in others if name != macro.name]:
-            raise Diagnostic(
-                f"{macro.place} already plays {others[0]}", str(path), "take another key, or none, for one of them"
-            )
+    def _checked_path(self, macro: Macro) -> Path:
+        """The path of a macro's file. Raises Diagnostic for an invalid macro, and a key that is taken."""
+        path = self.path(macro.name)
+        check(macro, str(path))
+        for other in self.on_key(macro.key, macro.page)[0] if macro.key else ():
+            if other.name != macro.name:
+                what = f"{macro.place} already plays {other.name}"
+                raise Diagnostic(what, str(path), "take another key, or none, for one of them")
+        return path
 
     def delete(self, name: str) -> Path:
         path = self.path(name)
@@ -259,9 +257,8 @@ def _write(path: Path, text: str) -> None:
     try:
         write_atomically(path, text.encode("utf-8"))
     except OSError as error:
-        raise Diagnostic(
-            f"cannot write the file ({error.strerror or error})", str(path), "the old file is unchanged"
-        ) from None
+        what = f"cannot write the file ({error.strerror or error})"
+        raise Diagnostic(what, str(path), "the old file is unchanged") from None
 
 
 def _unlink(path: Path) -> None:
@@ -271,12 +268,6 @@ def _unlink(path: Path) -> None:
         raise Diagnostic(f"no macro {path.stem!r}", str(path.parent)) from None
     except OSError as error:
         raise Diagnostic(f"cannot delete the file ({error.strerror})", str(path)) from None
-
-
-def _same(first: Path, second: Path) -> bool:
-    with contextlib.suppress(OSError):
-        return first.resolve() == second.resolve()
-    return False
 
 
 def _unreadable(path: Path, error: OSError) -> Diagnostic:
@@ -304,9 +295,6 @@ def listed(store: MacroStore) -> Listing:
     return Listing(lines, [*store.clashes(), *store.hidden()], broken)
 
 
-MODE = 0o600
-
-
 class Draft(NamedTuple):
     """A copy that is being edited."""
 
@@ -329,22 +317,17 @@ def begin_draft(store: MacroStore, folder: Path, name: str) -> Draft:
         if file.exists() and kept.exists() and kept.read_bytes() == current:
             changed = file.read_bytes() != current
             return Draft(name, file, current, f"goes on with the text of the last edit, {file}" if changed else "")
-        remark = _aside(file, name) if file.exists() else ""
-        write_atomically(kept, current, MODE)
-        write_atomically(file, current, MODE)
+        remark = ""
+        if file.exists():  # a draft of a macro that has changed since: it stays under another name
+            number = next(n for n in range(1, 10_000) if not file.with_suffix(f".{n}.toml").exists())
+            other = file.rename(file.with_suffix(f".{number}.toml"))
+            remark = f"{name} has changed since the last edit, whose text is in {other}"
+        for each in (kept, file):
+            write_atomically(each, current, 0o600)
     except OSError as error:
-        raise Diagnostic(
-            f"cannot write the copy ({error.strerror or error})", str(file), f"{name} is as it was"
-        ) from None
+        what = f"cannot write the copy ({error.strerror or error})"
+        raise Diagnostic(what, str(file), f"{name} is as it was") from None
     return Draft(name, file, current, remark)
-
-
-def _aside(file: Path, name: str) -> str:
-    """Keep a draft of a macro that has changed since under another name."""
-    number = next(n for n in range(1, 10_000) if not file.with_suffix(f".{n}.toml").exists())
-    other = file.with_suffix(f".{number}.toml")
-    file.rename(other)
-    return f"{name} has changed since the last edit, whose text is in {other}"
 
 
 def finish_draft(store: MacroStore, draft: Draft) -> str:
@@ -356,30 +339,21 @@ def finish_draft(store: MacroStore, draft: Draft) -> str:
     try:
         data = draft.file.read_bytes()
         if data != draft.base:
-            _put(store, draft, data)
+            text = utf8(data, str(draft.file))
+            macro = parse_macro(text, str(draft.file))
+            if macro.name != draft.name:
+                hint = f"write name = {draft.name!r}; macro rename {draft.name} {macro.name} renames it"
+                raise Diagnostic(f"name = {macro.name!r} in the macro {draft.name}", str(draft.file), hint)
+            store.save_text(macro, text, draft.base)
     except OSError as error:
-        raise Diagnostic(
-            f"cannot read it ({error.strerror or error})", str(draft.file), f"{draft.name} is as it was"
-        ) from None
+        what = f"cannot read it ({error.strerror or error})"
+        raise Diagnostic(what, str(draft.file), f"{draft.name} is as it was") from None
     except Diagnostic as problem:
         kept = f"{draft.name} is as it was; your text is in {draft.file}, and macro edit {draft.name} goes on with it"
         raise Diagnostic(problem.message, problem.where, f"{problem.hint}; {kept}".removeprefix("; ")) from None
-    drop_draft(draft)
-    if data == draft.base:
-        return f"macro {draft.name}: unchanged"
-    return f"macro {draft.name}: {store.load(draft.name).length} in {store.path(draft.name)}"
-
-
-def drop_draft(draft: Draft) -> None:
     for path in (draft.file, draft.file.with_suffix(".base")):
         with contextlib.suppress(OSError):
             path.unlink()
-
-
-def _put(store: MacroStore, draft: Draft, data: bytes) -> None:
-    text = utf8(data, str(draft.file))
-    macro = parse_macro(text, str(draft.file))
-    if macro.name != draft.name:
-        hint = f"write name = {draft.name!r}; macro rename {draft.name} {macro.name} renames it"
-        raise Diagnostic(f"name = {macro.name!r} in the macro {draft.name}", str(draft.file), hint)
-    store.save_text(macro, text, draft.base)
+    if data == draft.base:
+        return f"macro {draft.name}: unchanged"
+    return f"macro {draft.name}: {store.load(draft.name).length} in {store.path(draft.name)}"

@@ -54,13 +54,11 @@ def format_macro(macro: Macro) -> str:
     parts += [f"{key} = {_texts(values)}\n" for key in ("roles", "on_stop") if (values := getattr(macro, key))]
     if macro.on_stop_moves:
         parts.append("on_stop_moves = true\n")
-    return "".join([*parts, *map(_step_text, macro.steps)])
-
-
-def _step_text(step: Step) -> str:
-    drive = f"drive = {quoted(step.drive)}\n" if step.drive else ""
-    replies = f"replies = {_texts(step.replies)}\n" if step.replies else ""
-    return f"\n[[step]]\nafter = {float(step.after)!r}\nline = {quoted(step.line)}\n{drive}{replies}"
+    for step in macro.steps:
+        parts.append(f"\n[[step]]\nafter = {float(step.after)!r}\nline = {quoted(step.line)}\n")
+        parts.append(f"drive = {quoted(step.drive)}\n" if step.drive else "")
+        parts.append(f"replies = {_texts(step.replies)}\n" if step.replies else "")
+    return "".join(parts)
 
 
 def parse_macro(text: str, where: str = "") -> Macro:
@@ -136,15 +134,11 @@ def _texts(values: Sequence[str]) -> str:
 
 def quoted(text: str) -> str:
     """Format a TOML basic string; escape quotes, backslashes, and all that TOML or a terminal would act upon."""
-    return '"' + "".join(_SHORT.get(char) or (char if _plain(char) else _coded(char)) for char in text) + '"'
-
-
-def _plain(char: str) -> bool:
-    return char == " " or char.isprintable()
-
-
-def _coded(char: str) -> str:
-    return f"\\u{ord(char):04x}" if ord(char) < 0x10000 else f"\\U{ord(char):08x}"
+    parts = []
+    for char in text:
+        coded = f"\\u{ord(char):04x}" if ord(char) < 0x10000 else f"\\U{ord(char):08x}"
+        parts.append(_SHORT.get(char) or (char if char.isprintable() else coded))
+    return f'"{"".join(parts)}"'
 
 
 MARK = "\ufeff"
@@ -165,7 +159,14 @@ def with_value(text: str, key: str, value: str, where: str) -> str:
     """
     body = text.removeprefix(MARK)
     before = tomllib.loads(body)
-    edited = _replaced(body, key, value) if key in before else _added(body, f"{key} = {quoted(value)}")
+    if key in before:
+        import tomlkit  # takes 30 ms to import, and only a change wants it
+
+        document = tomlkit.parse(body)
+        document[key] = value
+        edited = tomlkit.dumps(document)
+    else:
+        edited = _added(body, f"{key} = {quoted(value)}")
     try:
         same = tomllib.loads(edited) == {**before, key: value}
     except tomllib.TOMLDecodeError:
@@ -175,14 +176,6 @@ def with_value(text: str, key: str, value: str, where: str) -> str:
     return text[: len(text) - len(body)] + edited
 
 
-def _replaced(text: str, key: str, value: str) -> str:
-    import tomlkit  # takes 30 ms to import, and only a change wants it
-
-    document = tomlkit.parse(text)
-    document[key] = value
-    return tomlkit.dumps(document)
-
-
 def _added(text: str, line: str) -> str:
     """Insert a line after the first statement, or before it if it spans several lines or begins a table.
 
@@ -190,21 +183,17 @@ def _added(text: str, line: str) -> str:
     """
     lines = re.split(r"(?<=\n)", text)
     first = next((n for n, each in enumerate(lines) if each.strip() and not each.lstrip().startswith("#")), len(lines))
-    whole = first < len(lines) and not lines[first].lstrip().startswith("[") and _is_whole(lines[first])
+    whole = first < len(lines) and not lines[first].lstrip().startswith("[")
+    if whole:
+        try:
+            tomllib.loads(lines[first])
+        except tomllib.TOMLDecodeError:
+            whole = False  # a statement of several lines
     end = "\r\n" if any(each.endswith("\r\n") for each in lines[: first + 1]) else "\n"
     if whole and not lines[first].endswith(("\n", "\r\n")):
         lines[first] += end
     lines.insert(first + whole, line + end)
     return "".join(lines)
-
-
-def _is_whole(line: str) -> bool:
-    """Whether a line is a complete statement."""
-    try:
-        tomllib.loads(line)
-    except tomllib.TOMLDecodeError:
-        return False
-    return True
 
 
 def in_text(text: str, where: str) -> At:

@@ -54,11 +54,20 @@ class _Steps:
 
     def take(self, match: re.Match[str], column: int) -> None:
         """Take a token."""
-        if match["text"] is not None:
-            self._text(match["text"], column)
+        if (text := match["text"]) is not None:
+            if not self.text and text.lstrip().startswith(("/", "@")):
+                raise self.wrong(column, f"{text.lstrip()[0]} at the beginning of a line would be multidrop's own")
+            if visible(text, tabs=True) != text:
+                raise self.wrong(column, f"a control character in {visible(text)}")
+            self.text += text
+            self.stopped = False
             return
         if match["end"] is not None:
-            self._end(column)
+            if self.text.strip():
+                self.add(escape(self.text.strip()))
+            elif not self.stopped:
+                raise self.wrong(column, "an empty line cannot be sent")
+            self.text, self.stopped = "", False
             return
         self.stopped = False
         if self.text:
@@ -70,21 +79,6 @@ class _Steps:
             self._wait(_PAUSES[match["pause"]], column)
         else:
             self._word(match["word"], match["number"], column)
-
-    def _text(self, text: str, column: int) -> None:
-        if not self.text and text.lstrip().startswith(("/", "@")):
-            raise self.wrong(column, f"{text.lstrip()[0]} at the beginning of a line would be multidrop's own")
-        if visible(text, tabs=True) != text:
-            raise self.wrong(column, f"a control character in {visible(text)}")
-        self.text += text
-        self.stopped = False
-
-    def _end(self, column: int) -> None:
-        if self.text.strip():
-            self.add(escape(self.text.strip()))
-        elif not self.stopped:
-            raise self.wrong(column, "an empty line cannot be sent")
-        self.text, self.stopped = "", False
 
     def _wait(self, milliseconds: int, column: int) -> None:
         self.pause += milliseconds
@@ -99,17 +93,14 @@ class _Steps:
             self._wait(number, column)
         elif word == "f":
             self.add(f"/play f{number}")
+        elif not self.done or not number:
+            raise self.wrong(column, f"^r{number} repeats nothing")
+        elif len(self.done) * number > MOST:
+            raise self.wrong(column, f"^r{number} makes more than {MOST} lines")
         else:
-            self._repeat(number, column)
-
-    def _repeat(self, times: int, column: int) -> None:
-        if not self.done or not times:
-            raise self.wrong(column, f"^r{times} repeats nothing")
-        if len(self.done) * times > MOST:
-            raise self.wrong(column, f"^r{times} makes more than {MOST} lines")
-        (first, *rest), between = self.done, self.pause
-        again = Step(first.after + between / 1000, first.line)
-        self.done += [again, *rest] * (times - 1)
+            first, *rest = self.done
+            again = Step(first.after + self.pause / 1000, first.line)
+            self.done += [again, *rest] * (number - 1)
 
     def macro_steps(self, column: int) -> tuple[Step, ...]:
         """The steps once all is read; a pause at the end sleeps."""
@@ -163,13 +154,15 @@ def _macro(row: str, where: str) -> Macro:
 
 def _check_chains(macros: Mapping[str, Macro], where: str, known: set[str]) -> None:
     """Check that every chain has an end."""
-    chains = {name: [found[0] for step in macro.steps if (found := _chained(step))] for name, macro in macros.items()}
+    chains = {
+        name: [f"f{match['number']}" for step in macro.steps if (match := PLAY.fullmatch(step.line))]
+        for name, macro in macros.items()
+    }
     for name, others in chains.items():
         for other in others:
             if other not in macros and other not in known:
-                raise Diagnostic(
-                    f"{name.upper()} calls {other.upper()}, which is not there", where, "nothing was imported"
-                )
+                what = f"{name.upper()} calls {other.upper()}, which is not there"
+                raise Diagnostic(what, where, "nothing was imported")
         way, seen = list(others), set[str]()
         while way:
             other = way.pop()
@@ -181,16 +174,16 @@ def _check_chains(macros: Mapping[str, Macro], where: str, known: set[str]) -> N
                 way += chains.get(other, ())
 
 
-def _chained(step: Step) -> tuple[str, ...]:
-    match = PLAY.fullmatch(step.line)
-    return (f"f{match['number']}",) if match else ()
-
-
 def exported(macros: Iterable[Macro]) -> str:
     """The text of a file of function keys. Raises Diagnostic for what has no counterpart in the notation."""
     rows: dict[int, str] = {}
     for macro in macros:
-        number = _number(macro)
+        match = _NAME.fullmatch(macro.name)
+        digits = match["number"] if match else macro.key[1:]
+        if not digits:
+            hint = f"/key F3 {macro.name} gives it one"
+            raise Diagnostic("it is on no function key", f"macro {macro.name}", hint)
+        number = int(digits)
         if number in rows:
             raise Diagnostic(f"F{number} is taken by another macro", f"macro {macro.name}", "/key gives it another one")
         note = " ".join(visible(macro.note.replace(f"({REMARK})", "")).split())
@@ -200,15 +193,6 @@ def exported(macros: Iterable[Macro]) -> str:
 
 def is_key_name(name: str) -> bool:
     return _NAME.fullmatch(name) is not None
-
-
-def _number(macro: Macro) -> int:
-    match = _NAME.fullmatch(macro.name)
-    digits = match["number"] if match else macro.key[1:]
-    if not digits:
-        hint = f"/key F3 {macro.name} gives it one"
-        raise Diagnostic("it is on no function key", f"macro {macro.name}", hint)
-    return int(digits)
 
 
 def _string(macro: Macro) -> str:
@@ -224,9 +208,8 @@ def _string(macro: Macro) -> str:
         slept, text = _part(step.line.strip(), place)
         part = _pause(pause, text, place) + text
         if parts and parts[-1][-1:].isdigit() and part[:1].isdigit():
-            raise Diagnostic(
-                "a line that begins with a digit after ^f has no counterpart", place, "nothing was exported"
-            )
+            what = "a line that begins with a digit after ^f has no counterpart"
+            raise Diagnostic(what, place, "nothing was exported")
         parts.append(part)
     if not (string := "".join([*parts, _pause(slept, "", where)])):
         raise Diagnostic("a macro that does nothing has no counterpart", where, "nothing was exported")
@@ -242,13 +225,7 @@ def _part(line: str, where: str) -> tuple[int, str]:
     if match := SLEEP.fullmatch(line):
         return _milliseconds(float(match["seconds"]), where), ""
     text = fill(line, {}, where)
-    if (
-        not text
-        or text.startswith(("/", "@"))
-        or "^" in text
-        or re.search(r"\s;", text)
-        or visible(text, tabs=True) != text
-    ):
+    if not text or text.startswith(("/", "@")) or re.search(r"\^|\s;", text) or visible(text, tabs=True) != text:
         raise Diagnostic(f"{visible(line)!r} has no counterpart in function keys", where, "nothing was exported")
     return 0, f"{text}^M"
 
@@ -256,9 +233,8 @@ def _part(line: str, where: str) -> tuple[int, str]:
 def _milliseconds(seconds: float, where: str) -> int:
     milliseconds = round(seconds * 1000)
     if abs(milliseconds - seconds * 1000) > 1e-6 or milliseconds > LONGEST:
-        raise Diagnostic(
-            f"a pause of {seconds:g} s has no counterpart", where, "valid: whole milliseconds, up to a day"
-        )
+        hint = "valid: whole milliseconds, up to a day"
+        raise Diagnostic(f"a pause of {seconds:g} s has no counterpart", where, hint)
     return milliseconds
 
 
@@ -270,7 +246,6 @@ def _pause(milliseconds: int, text: str, where: str) -> str:
     if not text[:1].isdigit():
         return f"^d{milliseconds}"
     if milliseconds % 50:
-        raise Diagnostic(
-            f"a pause of {milliseconds} ms before a digit has no counterpart", where, "nothing was exported"
-        )
+        what = f"a pause of {milliseconds} ms before a digit has no counterpart"
+        raise Diagnostic(what, where, "nothing was exported")
     return f"^d{milliseconds - 50}^m"

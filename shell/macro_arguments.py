@@ -29,7 +29,11 @@ async def settled(
     for role in macro.roles:
         if role not in roles and (bus := only_bus(workspace, macro, role)):
             roles[role] = bus
-    fields = [_role_field(workspace, macro, role) for role in macro.roles if role not in roles]
+    buses, fields = tuple(workspace.buses), []
+    for role in macro.roles:
+        if role not in roles:
+            take = partial(check_bus, workspace, macro, role)
+            fields.append(Field(role, f"an open bus: {' or '.join(buses)}", None, take, buses))
     if not fields or workspace.fill is not None:
         examples = {each.name: each.example for each in missing(macro, values)}
         checked_values(macro, {**examples, **values})  # what is given is right
@@ -79,11 +83,6 @@ def check_bus(workspace: Workspace, macro: Macro, role: str, bus: str) -> None:
     if bus not in workspace.buses:
         hint = f"open: {', '.join(workspace.buses)}" if workspace.buses else "nothing is open"
         raise Diagnostic(f"no bus {bus} for the role {role}", f"macro {macro.name}", hint)
-
-
-def _role_field(workspace: Workspace, macro: Macro, role: str) -> Field:
-    buses = tuple(workspace.buses)
-    return Field(role, f"an open bus: {' or '.join(buses)}", None, partial(check_bus, workspace, macro, role), buses)
 
 
 def unbound(workspace: Workspace, macro: Macro, role: str) -> Diagnostic:

@@ -8,11 +8,10 @@ import shutil
 import sys
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from pathlib import Path
 
 from multidrop.dialects import Diagnostic
 from multidrop.dialects.files import text_of
-from multidrop.macros import FIRST_PAGE, Macro, MacroStore, format_macro
+from multidrop.macros import FIRST_PAGE, MacroStore, format_macro
 from multidrop.macros.atomic import write_atomically
 from multidrop.macros.vendor import REMARK, STOP, exported, imported, is_key_name
 from multidrop.shell import new_file
@@ -37,13 +36,11 @@ def editor() -> list[str]:
 
 
 def rename(store: MacroStore, name: str, new: str) -> list[str]:
-    """Give a macro another name."""
     path = store.rename(name, new)
     return [f"macro {name} is {new} now, in {path}", *_callers(store, name)]
 
 
 def describe(store: MacroStore, name: str, note: str) -> list[str]:
-    """Change a macro's note."""
     store.describe(name, note)
     return [f"macro {name}: {note}" if note else f"macro {name} has no note now"]
 
@@ -55,7 +52,6 @@ def copy(store: MacroStore, name: str, new: str, project: bool = False) -> list[
 
 
 def delete(store: MacroStore, name: str) -> list[str]:
-    """Delete a macro."""
     path = store.delete(name)
     return [f"macro {name} is deleted, with {path}", *_callers(store, name)]
 
@@ -111,37 +107,24 @@ def import_text(store: MacroStore, text: str, file: str, force: bool = False) ->
     lines, written = [], list[str]()
     for macro in macros:
         try:
-            free = _without_taken_key(store, macro)
-            path = store.save(free, before[macro.name])
+            others = store.on_key(macro.key, macro.page)[0] if macro.key else []
+            taken = any(each.name != macro.name for each in others)
+            path = store.save(replace(macro, key="") if taken else macro, before[macro.name])
         except Diagnostic as problem:
-            _undo(store, {name: before[name] for name in written})
+            for name in written:  # the files are put back as they were
+                data = before[name]
+                if data is None:
+                    store.delete(name)
+                else:
+                    write_atomically(store.path(name), data)
             raise Diagnostic(f"{problem.message}; nothing was imported", problem.where, problem.hint) from None
         written.append(macro.name)
-        lines += _described(macro, free, path)
+        lines.append(f"macro {macro.name}: {macro.length} in {path}")
+        if taken:
+            lines.append(f"macro {macro.name}: {macro.key} plays another macro already, so it is on no key")
+        if any(step.line == STOP for step in macro.steps):
+            lines.append(f"macro {macro.name}: {REMARK}; /stop stops every drive")
     return lines
-
-
-def _described(macro: Macro, free: Macro, path: Path) -> list[str]:
-    lines = [f"macro {macro.name}: {macro.length} in {path}"]
-    if free.key != macro.key:
-        lines.append(f"macro {macro.name}: {macro.key} plays another macro already, so it is on no key")
-    if any(step.line == STOP for step in macro.steps):
-        lines.append(f"macro {macro.name}: {REMARK}; /stop stops every drive")
-    return lines
-
-
-def _without_taken_key(store: MacroStore, macro: Macro) -> Macro:
-    others = store.on_key(macro.key, macro.page)[0] if macro.key else []
-    return replace(macro, key="") if any(each.name != macro.name for each in others) else macro
-
-
-def _undo(store: MacroStore, before: dict[str, bytes | None]) -> None:
-    """Put the files back as they were."""
-    for name, data in before.items():
-        if data is None:
-            store.delete(name)
-        else:
-            write_atomically(store.path(name), data)
 
 
 def export(store: MacroStore, file: str, names: Sequence[str], output: Callable[[str], None]) -> list[str]:
@@ -150,18 +133,14 @@ def export(store: MacroStore, file: str, names: Sequence[str], output: Callable[
     `output` takes the lines of the file `-`.
     """
     new_file.check(file, printed=True)
-    chosen = [store.load(name) for name in names] or _on_keys(store)
+    loaded = [store.load(name) for name in names or store.names()]
+    chosen = [each for each in loaded if names or each.key or is_key_name(each.name)]
     if not chosen:
         raise Diagnostic("no macro is on a function key", file, "/key F3 MACRO puts one there, or name the macros")
     text = exported(chosen)
     new_file.write(file, text, output)
     count = text.count("\n")
     return [f"{count} {'macro' if count == 1 else 'macros'}{new_file.place(file)}"]
-
-
-def _on_keys(store: MacroStore) -> list[Macro]:
-    loaded = [store.load(name) for name in store.names()]
-    return [macro for macro in loaded if macro.key or is_key_name(macro.name)]
 
 
 def text_of_macro(store: MacroStore, name: str) -> list[str]:

@@ -6,7 +6,7 @@ import asyncio
 import contextlib
 from collections.abc import Callable, Coroutine, Iterator, Sequence
 from dataclasses import replace
-from functools import partial
+from itertools import count
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from multidrop.dialects import Diagnostic, DriveError
@@ -24,22 +24,6 @@ if TYPE_CHECKING:
     from multidrop.drives.stopping import Halt
     from multidrop.shell.connect.opening import Opened, Opener
     from multidrop.shell.workspace import Workspace
-
-
-def free(name: str, taken: set[str]) -> str:
-    """The name, with a number appended if it is taken."""
-    if name not in taken:
-        return name
-    return next(each for number in range(2, 1000) if (each := f"{name}-{number}") not in taken)
-
-
-def named(base: str, name: str | None, taken: set[str], before: set[str]) -> str:
-    """The requested name; several buses of one cell append their own. Raises Diagnostic for a taken name."""
-    if name is None:
-        return base
-    if name in before:
-        raise Diagnostic(f"bus {name} is already open", hint="use another name, or /close it first")
-    return name if taken == before else f"{name}-{base}"
 
 
 def model(drive: Drive) -> str:
@@ -78,13 +62,13 @@ class Openings:
         self._opener = opener
         self._reserved: set[str] = set()
         """The names of buses that are being opened."""
-        self._places = 0
+        self._places = count(1)
         self._cells = asyncio.Lock()
         """Cells are opened in turn: only an open cell names its buses."""
 
     async def open(self, url: str, name: str | None = None, *, raw: bool = False) -> list[Bus]:
         """Open one URL; its first bus is selected where none is. `raw`: look for no drives."""
-        opening = _Opening(self._workspace, self._reserved, self._place(), name)
+        opening = _Opening(self._workspace, self._reserved, next(self._places), name)
         opened = await self._run(opening, parse(url, self._workspace.settings.connections), raw)
         self._select_first(opened)
         return opened
@@ -95,35 +79,21 @@ class Openings:
         No bus is selected before every URL ahead of it is open or has failed: a typed line must not go to another
         line of drives only because that one was faster. A failure goes to `failed`; without it, it ends the others.
         """
-        numbers, works = [], []
+        numbers, prepared = [], []
         for number, url in enumerate(urls):
             try:
-                works.append(self._prepared(url))
+                connection = parse(url, self._workspace.settings.connections)
+                opening = _Opening(self._workspace, self._reserved, next(self._places))
+                if connection.scheme != SIMULATED:
+                    opening.reserve(connection.short)
+                prepared.append((opening, connection))
                 numbers.append(number)
             except Diagnostic as problem:
                 if failed is None:
                     raise
                 failed(number, problem)
         on_failure = failed and (lambda which, failure: failed(numbers[which], failure))
-        await side_by_side([work() for work in works], self._select_first, on_failure)
-
-    def _prepared(self, url: str) -> Callable[[], Coroutine[Any, Any, list[Bus]]]:
-        """Reserve a place, and a name where it is known, for a URL; return the work that opens it."""
-        connection = parse(url, self._workspace.settings.connections)
-        opening = _Opening(self._workspace, self._reserved, self._place())
-        if connection.scheme != SIMULATED:
-            opening.reserve(connection.short)
-        return partial(self._run, opening, connection, self._raw)
-
-    def _tried_on(self, bus: Bus, opening: _Opening, connection: Connection) -> tuple[str, ...]:
-        """The addresses to try on a bus; one without a bus belongs to the first URL. A label counts as its address."""
-        addresses = {label: address for address, label in connection.labels.items()}
-        own = [address for name, address in self._tried if name == bus.name or (not name and opening.place == 1)]
-        return tuple(dict.fromkeys(addresses.get(each, each) for each in own if each and each not in EVERYONE))
-
-    def _place(self) -> int:
-        self._places += 1
-        return self._places
+        await side_by_side([self._run(*each, self._raw) for each in prepared], self._select_first, on_failure)
 
     def _select_first(self, opened: list[Bus]) -> None:
         for bus in opened:
@@ -180,11 +150,13 @@ class Openings:
             with opening.listed(connection.name or connection.text):
                 async with in_turn:
                     found = await self._opener(connection, opening.named)
-            lazy = self._lazy and not raw
-            hinted = [
-                replace(each, hints=replace(each.hints, lazy=lazy, tried=self._tried_on(each.bus, opening, connection)))
-                for each in found
-            ]
+            addresses = {label: address for address, label in connection.labels.items()}
+            hinted = []
+            for each in found:  # an address without a bus belongs to the first URL; a label counts as its address
+                own = [to for name, to in self._tried if name == each.bus.name or (not name and opening.place == 1)]
+                tried = tuple(dict.fromkeys(addresses.get(to, to) for to in own if to and to not in EVERYONE))
+                hints = replace(each.hints, lazy=self._lazy and not raw, tried=tried)
+                hinted.append(replace(each, hints=hints))
             return await opening.identify(hinted, connection, raw)
         finally:
             self._reserved -= opening.names
@@ -210,11 +182,19 @@ class _Opening:
         self._next = self.named(base)
 
     def named(self, base: str) -> str:
-        """Return a free name for a bus; the requested one for the first."""
+        """Return a free name for a bus: the requested one, to which further buses of a cell append their own.
+
+        Raises Diagnostic for a requested name that is taken.
+        """
         if self._next:
             return self._next
-        taken = self._before | self.names
-        chosen = free(named(base, self._name, taken, self._before), taken | self._reserved | {*self._workspace.buses})
+        name, taken = base, self._before | self.names
+        if self._name is not None:
+            if self._name in self._before:
+                raise Diagnostic(f"bus {self._name} is already open", hint="use another name, or /close it first")
+            name = self._name if taken == self._before else f"{self._name}-{base}"
+        taken |= {*self._reserved, *self._workspace.buses}
+        chosen = next(each for each in (name, *(f"{name}-{number}" for number in range(2, 1000))) if each not in taken)
         self.names.add(chosen)
         self.bases[chosen] = base
         self._reserved.add(chosen)
@@ -241,37 +221,38 @@ class _Opening:
                 workspace.adopt(replace(each, warnings=()) if raw else each, self.place, connection, in_cell)
                 if each.limits:
                     workspace.notify(f"{each.bus.name}: {each.limits}", bus=each.bus.name, warning=True)
-            late = [self._stop(each.bus) for each in found if self._stops != workspace.stops]
+            late: list[tuple[Bus, Halt]] = []
+            for bus in [each.bus for each in found] if self._stops != workspace.stops else ():
+                late.append((bus, bus.halt()))  # the stop that came meanwhile, before anything else
+                bus.halted(late[-1][1])
+                text = f"{bus.name}: the stop that came while it was being opened was sent first"
+                workspace.notify(text, bus=bus.name)
             for each in found:
                 port = workspace.of(each.bus).port = port_name(connection)
-                await (self._begin_raw(each) if raw else self._identify(each, connection))
-                self._workspace.reconnections.add(each.bus, each.hints, each.reopen, port)
-            for each, halt in zip(found, late, strict=False):
-                _stop_found(each.bus, halt)
+                await self._find(each, connection, raw)
+                workspace.reconnections.add(each.bus, each.hints, each.reopen, port)
+            for bus, halt in late:  # again by name, as some drives need it, and confirmed; but none started since
+                standing = [drive for drive in bus.all_drives if not halt.started_since(drive)]
+                bus.halted(bus.halt(None if len(standing) == len(bus.all_drives) else standing))
             failing.pop_all()
         return [each.bus for each in found]
 
-    def _stop(self, bus: Bus) -> Halt:
-        """Send a bus the stop that came while it was being opened, before anything else."""
-        halt = bus.halt()
-        bus.halted(halt)
-        self._workspace.notify(f"{bus.name}: the stop that came while it was being opened was sent first", bus=bus.name)
-        return halt
-
-    async def _begin_raw(self, opened: Opened) -> None:
-        await opened.bus.reserve()
-        begin_raw(self._workspace, opened.bus)
-        self._workspace.identified(opened.bus)
-        if opened.hints.cut:
-            self._workspace.notify(f"{opened.bus.name}: {CUT.format(opened.hints.cut)}", warning=True)
-
-    async def _identify(self, opened: Opened, connection: Connection) -> None:
-        await opened.bus.identify(opened.hints)
-        label(opened.bus, connection)
-        self._workspace.identified(opened.bus)
-        self._workspace.notify(described(opened.bus), bus=opened.bus.name)
-        for text in crash_marks.left(self._workspace.settings.state, self._workspace.of(opened.bus).port):
-            self._workspace.notify(f"{opened.bus.name}: {text}", bus=opened.bus.name, warning=True)
+    async def _find(self, opened: Opened, connection: Connection, raw: bool) -> None:
+        """Find the drives of a bus, or show its bytes."""
+        workspace, bus = self._workspace, opened.bus
+        if raw:
+            await bus.reserve()
+            begin_raw(workspace, bus)
+            workspace.identified(bus)
+            if opened.hints.cut:
+                workspace.notify(f"{bus.name}: {CUT.format(opened.hints.cut)}", warning=True)
+            return
+        await bus.identify(opened.hints)
+        label(bus, connection)
+        workspace.identified(bus)
+        workspace.notify(described(bus), bus=bus.name)
+        for text in crash_marks.left(workspace.settings.state, workspace.of(bus).port):
+            workspace.notify(f"{bus.name}: {text}", bus=bus.name, warning=True)
 
 
 def label(bus: Bus, connection: Connection) -> None:
@@ -292,12 +273,6 @@ def begin_raw(workspace: Workspace, bus: Bus) -> None:
     raw.open()
     text = f"{bus.name} is raw: text goes to {bus.link.transport.name} with CR; /help /raw"
     workspace.notify(text, bus=bus.name)
-
-
-def _stop_found(bus: Bus, halt: Halt) -> None:
-    """Stop by name the drives that were found since a stop, as some need it, and confirm it; but none started since."""
-    standing = [drive for drive in bus.all_drives if not halt.started_since(drive)]
-    bus.halted(bus.halt(None if len(standing) == len(bus.all_drives) else standing))
 
 
 T = TypeVar("T")

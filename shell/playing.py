@@ -8,23 +8,15 @@ from collections.abc import Iterator, Mapping
 from contextvars import ContextVar
 from dataclasses import dataclass, field
 from types import MappingProxyType
-from typing import Protocol
+
+from multidrop.shell.channel import PERIOD, Channel
+from multidrop.shell.events import Progressed
 
 FOREVER = "forever"
 """The word for rounds without an end."""
 NO_ROLES: Mapping[str, str] = MappingProxyType({})
 """No bus plays a role."""
 _roles: ContextVar[Mapping[str, str]] = ContextVar("roles", default=NO_ROLES)
-
-
-class Progress(Protocol):
-    """Shows how far a macro is."""
-
-    def begins(self, step: int, line: str) -> None:
-        """Take the beginning of a step."""
-
-    def show(self) -> None:
-        """Show it now."""
 
 
 @dataclass(eq=False)
@@ -39,7 +31,7 @@ class Playing:
     """The rounds that are done."""
     step: int = 0
     """The step under way; 0 before the first one."""
-    progress: Progress | None = None
+    progress: StepProgress | None = None
     task: asyncio.Task[object] | None = field(default_factory=asyncio.current_task)
     ended: bool = False
     """Its end was asked for (`/play stop`)."""
@@ -64,13 +56,47 @@ class Playing:
     def at(self) -> str:
         """The place in the macro: `step 2 of 5, round 2 of 3`."""
         step = f"step {self.step} of {self.steps}" if self.step else "its beginning"
-        return f"{step}{self._round}"
-
-    @property
-    def _round(self) -> str:
         if self.times == 1:
-            return ""
-        return f", round {self.round}" + (f" of {self.times}" if self.times else "")
+            return step
+        return f"{step}, round {self.round}" + (f" of {self.times}" if self.times else "")
+
+
+class StepProgress:
+    """Shows the step that is under way. The last one of a fast row is shown too: it may last."""
+
+    def __init__(self, channel: Channel, playing: Playing) -> None:
+        self._channel = channel
+        self._playing = playing
+        self._text = ""
+        self._shown_at = float("-inf")
+        self._timer: asyncio.TimerHandle | None = None
+
+    def begins(self, step: int, line: str) -> None:
+        """Take the beginning of a step."""
+        self._playing.step = step
+        self._text = f"{self._playing.name}, {self._playing.at}: {line}"
+        late = self._shown_at + PERIOD - self._channel.now()
+        if late <= 0:
+            self.show()
+        elif self._timer is None:
+            self._timer = asyncio.get_running_loop().call_later(late, self.show)
+
+    def show(self) -> None:
+        self._cancel()
+        if self._text:
+            self._shown_at = self._channel.now()
+            self._channel.publish(Progressed(self._shown_at, self._text, 0, 1))
+
+    def end(self) -> None:
+        """Publish the end, if anything was published."""
+        self._cancel()
+        if self._shown_at > float("-inf"):
+            self._channel.publish(Progressed(self._channel.now(), self._text, 1, 1, 0.0))
+
+    def _cancel(self) -> None:
+        if self._timer is not None:
+            self._timer.cancel()
+            self._timer = None
 
 
 @contextlib.contextmanager

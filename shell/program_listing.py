@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -15,7 +15,7 @@ from multidrop.shell import new_file
 from multidrop.shell.channel import Channel, running, transferring
 from multidrop.shell.events import Phase, ProgramRead, ProgramSeen
 from multidrop.shell.lines import EVERYONE
-from multidrop.shell.state import downloaded_sources
+from multidrop.shell.state.store import Copy, Sources
 
 if TYPE_CHECKING:
     from multidrop.drives.drive import Drive
@@ -32,7 +32,7 @@ class Listing:
     def __init__(self, state: Path, programs: Programs[Any], rows: Sequence[Row] = ()) -> None:
         self.rows = tuple(rows)
         held = Held(tuple(Stored(*row) for row in self.rows))
-        source = downloaded_sources.recall(state, held) if rows else None
+        source = Sources(state).find(held) if rows else None
         lines = () if source is None else programs.annotated(source.text, held)
         self._remarks = {int(found[1]): found[2] for line in lines if (found := _LISTED.fullmatch(line))}
 
@@ -89,29 +89,6 @@ class Sight:
         return self._channel.now(), self._drive.link.name, self._drive.address
 
 
-class Watched:
-    """Watched names of a drive, and their last values."""
-
-    def __init__(self) -> None:
-        self.names: tuple[str, ...] = ()
-        self._values: Mapping[str, str] = {}
-
-    def watch(self, names: Sequence[str]) -> None:
-        """Watch these names, and forget the values of others."""
-        self.names, self._values = tuple(names), {}
-
-    def changed(self, values: Mapping[str, str]) -> str:
-        """Take present values; return those that changed, as a person reads them, with blanks before."""
-        found = {name: text for name, text in values.items() if self._values.get(name) != text}
-        self._values = values
-        return "".join(f"   {name}={text}" for name, text in found.items())
-
-    @property
-    def missing(self) -> list[str]:
-        """The names without a value."""
-        return [name for name in self.names if name not in self._values]
-
-
 async def readable(workspace: Workspace, drive: Drive) -> list[str]:
     """List the program of a drive, with the remarks of the file that it came from where that is known.
 
@@ -131,7 +108,7 @@ async def upload(workspace: Workspace, drive: Drive, raw: bool = False) -> list[
     name = workspace.display_name(drive)
     held = await read(workspace, drive, "upload")
     held.check_program(name)
-    source = downloaded_sources.recall(workspace.settings.state, held)
+    source = Sources(workspace.settings.state).find(held)
     if raw or source is None or not _is_of(drive, source, held):
         return list(drive.programs.file(drive.state, held, raw))
     workspace.notify(f"{name}: remarks and layout are those of {source.file}, downloaded {source.at}", outcome=True)
@@ -140,13 +117,13 @@ async def upload(workspace: Workspace, drive: Drive, raw: bool = False) -> list[
 
 def remarked(workspace: Workspace, drive: Drive, held: Held) -> list[str]:
     """The listing with the remarks and the layout of the file that it came from; empty where that is not known."""
-    source = downloaded_sources.recall(workspace.settings.state, held) if held.lines else None
+    source = Sources(workspace.settings.state).find(held) if held.lines else None
     if source is None or not _is_of(drive, source, held):
         return []
     return list(drive.programs.annotated(source.text, held))
 
 
-def _is_of(drive: Drive, source: downloaded_sources.Source, held: Held) -> bool:
+def _is_of(drive: Drive, source: Copy, held: Held) -> bool:
     """Whether a kept file has exactly the lines of the drive."""
     try:
         lines = drive.program_files.language.read(source.text, source.file)

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple, Protocol
 
 from multidrop.dialects.on_demand import imported
-from multidrop.shell.state.drafts import Drafts
+from multidrop.shell.state.store import Drafts
 from multidrop.tui.text import ago
 
 if TYPE_CHECKING:
@@ -136,14 +136,14 @@ class ShellAssist(Assist):
 
     def lately(self) -> Sequence[StartEntry]:
         """URLs opened lately, the newest first; saved connections are listed themselves."""
-        from multidrop.shell.state.port_state import lately
+        from multidrop.shell.state.store import lately
 
         now, saved = time.time(), self._settings.connections
         found = [each for each in lately(self._settings.state) if each.url not in saved]
         return [StartEntry("lately", each.url, each.url, f"opened {ago(now - each.at)}") for each in found[:LATELY]]
 
     async def opened(self, url: str) -> None:
-        from multidrop.shell.state.port_state import note
+        from multidrop.shell.state.store import note
 
         await asyncio.to_thread(note, self._settings.state, url)
 
@@ -151,8 +151,7 @@ class ShellAssist(Assist):
         """Search a port for drives, without a question: at its own baud rate, then at the others. Raises Diagnostic."""
         from multidrop.shell.connect.opening import open_buses
         from multidrop.shell.connect.urls import parse
-        from multidrop.shell.finding.found_drives import FoundDrive, url_of
-        from multidrop.shell.finding.scanning import Scanning
+        from multidrop.shell.finding.scanning import FoundDrive, Scanning, url_of
 
         opener = partial(open_buses, state=self._settings.state)
         connection = parse(url, self._settings.connections)

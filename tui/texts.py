@@ -9,7 +9,7 @@ from pathlib import Path
 
 from multidrop.dialects import Diagnostic
 from multidrop.shell.programs.edited_file import EditedFile, real_text
-from multidrop.shell.state.drafts import Draft, Drafts
+from multidrop.shell.state.store import Copy, Drafts
 
 
 @dataclass
@@ -53,7 +53,7 @@ class Texts:
         self.current = self._open[place]
         return self.current
 
-    def draft(self, text: OpenText) -> Draft | None:
+    def draft(self, text: OpenText) -> Copy | None:
         """A copy of an earlier session that differs from the file; None without one."""
         if self._drafts is None or text.changed or text.kept is not None:
             return None
@@ -75,7 +75,7 @@ class Texts:
             return
         now = text.text
         if text.changed:
-            self._drafts.keep(Draft(text.name, real_text(now), f"{datetime.now():%Y-%m-%d %H:%M}"))
+            self._drafts.keep(Copy(text.name, real_text(now), f"{datetime.now():%Y-%m-%d %H:%M}"))
             text.kept = now
         else:
             self.drop_draft(text)

@@ -147,9 +147,9 @@ def apply(chosen: argparse.Namespace) -> int:
     if chosen.source and is_several(chosen.drive):
         raise Diagnostic(f"--from {chosen.source} is for one drive", "snapshot apply", "--drive names one")
     cell = cells.load(chosen.file, settings.load().allowed)
-    wanted = replacement.Wanted(
+    wanted = Options(
         named=frozenset(name.strip().upper() for name in ",".join(chosen.named).split(",") if name.strip()),
-        dry=chosen.dry_run,
+        dry_run=chosen.dry_run,
         other_product=chosen.other_product,
     )
 

@@ -13,9 +13,8 @@ from multidrop.shell.batch import runner
 from multidrop.shell.connect import settings
 from multidrop.shell.connect.opening import open_buses
 from multidrop.shell.connect.urls import parse
-from multidrop.shell.finding.found_drives import FoundDrive, url_of
 from multidrop.shell.finding.rescuing import Rescue
-from multidrop.shell.finding.scanning import Scanning
+from multidrop.shell.finding.scanning import FoundDrive, Scanning, url_of
 from multidrop.shell.session import Session
 
 

@@ -16,7 +16,7 @@ from multidrop.dialects.families import DEFAULT, FAMILIES
 from multidrop.drives.bus import Bus
 from multidrop.drives.line import DEFAULT_TIMEOUT
 from multidrop.shell.connect import settings
-from multidrop.shell.connect.reconnect import HostAgain, LoginAgain, Reopen, SerialAgain, simulated, timed
+from multidrop.shell.connect.reconnect import LoginAgain, Reopen, SerialAgain, host_again, simulated
 from multidrop.shell.connect.urls import Connection
 from multidrop.shell.state.port_state import PortState
 from multidrop.transports import Unreachable
@@ -61,8 +61,7 @@ async def open_buses(connection: Connection, naming: Naming, state: Path | None 
         return await _simulated(connection, naming)
     if family.prepare is not None:
         await asyncio.to_thread(family.prepare)  # a stop of another bus must not wait for it
-    transport, took = await timed(_transport(connection))
-    reopen = _reopen(connection, took)
+    transport, reopen = await _connected(connection)
     limits = transport.limits
     hints, name = connection.hints, naming(connection.short)
     if state is None or not family.repairs:
@@ -114,8 +113,8 @@ async def open_port(connection: Connection) -> OpenedPort:
                 await each.transport.close()
             raise Diagnostic(f"{len(found)} buses", connection.text, f"name one of them, as in sim:#{first.name}")
         return OpenedPort(first.name, first.transport, family or first.dialect, first.baud or baud, simulated(first))
-    transport, took = await timed(_transport(connection))
-    return OpenedPort(connection.short, transport, family, baud, _reopen(connection, took))
+    transport, reopen = await _connected(connection)
+    return OpenedPort(connection.short, transport, family, baud, reopen)
 
 
 def port_name(connection: Connection) -> str:
@@ -183,13 +182,17 @@ async def _transport(
     return await open_tcp(connection.host, connection.port, connection.scheme, within)
 
 
-def _reopen(connection: Connection, took: float) -> Reopen | None:
+async def _connected(connection: Connection) -> tuple[Transport, Reopen | None]:
+    """Open a transport; return with it the way to open it again after a loss, if there is one."""
+    clock = asyncio.get_running_loop().time
+    begun = clock()
+    transport, took = await _transport(connection), clock() - begun
     if connection.scheme == "ssh":
-        return LoginAgain(lambda within, baud: _transport(connection, within=within, baud=baud), took)
+        return transport, LoginAgain(lambda within, baud: _transport(connection, within=within, baud=baud), took)
     if connection.scheme != "serial":
-        return HostAgain(lambda within: _transport(connection, within=within), took)
+        return transport, host_again(lambda within: _transport(connection, within=within), took)
     again = SerialAgain(connection.target, partial(_transport, connection))
-    return again if again.possible else None
+    return transport, again if again.possible else None
 
 
 async def _simulated(connection: Connection, naming: Naming) -> list[Opened]:

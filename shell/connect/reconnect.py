@@ -59,13 +59,10 @@ class SerialAgain:
         self._open = open_
         self._before = _terminal(self._name)
 
-    @property
-    def possible(self) -> bool:
-        """Whether the name follows the port: the number of a pseudo-terminal does not."""
-        return not self._name.startswith(TERMINALS)
+        self.possible = not self._name.startswith(TERMINALS)
+        """The name follows the port: the number of a pseudo-terminal does not."""
 
     async def __call__(self, old: Transport) -> Transport:
-        """Open it, once it is there."""
         await old.close()
         if not os.path.exists(self._name) or (self._before and _terminal(self._name) == self._before):
             raise Absent(f"{self._name} is not there")
@@ -85,17 +82,14 @@ def _terminal(name: str) -> tuple[int, int] | None:
     return link.st_ino, link.st_mtime_ns
 
 
-class HostAgain:
-    """A host's port. `took` is how long the first connection took, s: a slow network stays reachable."""
+def host_again(open_: Callable[[float], Awaitable[Transport]], took: float) -> Reopen:
+    """Connect to a host again. `took` is how long the first connection took, s: a slow network stays reachable."""
 
-    def __init__(self, open_: Callable[[float], Awaitable[Transport]], took: float) -> None:
-        self._open = open_
-        self._within = min(max(SHORTEST, PATIENCE * took), SLOWEST)
-
-    async def __call__(self, old: Transport) -> Transport:
-        """Connect to it."""
+    async def again(old: Transport) -> Transport:
         await old.close()
-        return await _at_the_same_baud(await self._open(self._within), old)
+        return await _at_the_same_baud(await open_(min(max(SHORTEST, PATIENCE * took), SLOWEST)), old)
+
+    return again
 
 
 class LoginAgain:
@@ -110,7 +104,6 @@ class LoginAgain:
         self._pause = 0.0
 
     async def __call__(self, old: Transport) -> Transport:
-        """Log in, and open it."""
         await old.close()
         await asyncio.sleep(self._pause)
         self._pause = min(2 * self._pause + FIRST_PAUSE, LONGEST_PAUSE)
@@ -141,12 +134,6 @@ def simulated(bus: SimBus) -> Reopen:
     return again
 
 
-async def timed(opening: Awaitable[Transport]) -> tuple[Transport, float]:
-    """Await a transport; return how long that took, s."""
-    begun = asyncio.get_running_loop().time()
-    return await opening, asyncio.get_running_loop().time() - begun
-
-
 FIRST = 0.1
 """The pause before the first attempt, s; each further one is twice as long."""
 LONGEST = 0.7
@@ -156,6 +143,11 @@ GLANCE = 0.2
 
 Say = Callable[[str, str], None]
 """Publishes a warning: the name of the bus, the text."""
+
+
+def next_pause(pause: float, failure: TransportLost) -> float:
+    """The pause after an attempt that failed, s; `pause`: the one before it."""
+    return min(2 * pause, GLANCE if isinstance(failure, Absent) else LONGEST)
 
 
 class Reconnections:
@@ -170,7 +162,6 @@ class Reconnections:
 
     @property
     def trying(self) -> Collection[str]:
-        """The names of the buses that are being tried again."""
         return self._tasks.keys()
 
     def add(self, bus: Bus, hints: Hints, reopen: Reopen | None, port: str) -> None:
@@ -205,15 +196,10 @@ class Reconnections:
         finally:
             if self._tasks.get(bus.name) is asyncio.current_task():
                 del self._tasks[bus.name]
-        if trouble:
-            self._gave_up(bus, trouble[0])
-
-    def _gave_up(self, bus: Bus, trouble: str) -> None:
-        """Publish that a defect has ended the attempts."""
-        if bus.lost is None:
-            self._say(bus.name, f"{bus.name} is back, but whether a drive moves was not read ({trouble})")
-        else:
-            self._say(bus.name, f"{bus.name} is lost and not tried again ({trouble}); /close it, then open it")
+        if trouble and bus.lost is None:  # a defect has ended the attempts
+            self._say(bus.name, f"{bus.name} is back, but whether a drive moves was not read ({trouble[0]})")
+        elif trouble:
+            self._say(bus.name, f"{bus.name} is lost and not tried again ({trouble[0]}); /close it, then open it")
             bus.link.publish(Changed(bus.now()))
 
     async def remove(self, name: str) -> None:
@@ -242,29 +228,31 @@ class _Return:
         self._publish(self._bus.name, text)
 
     async def run(self) -> None:
-        """Try until the bus is back."""
+        """Try until the bus is back, and say what its drives do."""
+        bus = self._bus
         if self._unsure:
             seen = ", ".join(f"{each.shown} {last_seen(each, self._since)}" for each in self._unsure)
-            self._say(f"{self._bus.name}: cannot be stopped from here until the line is back: {seen}{E_STOP}")
+            self._say(f"{bus.name}: cannot be stopped from here until the line is back: {seen}{E_STOP}")
         pause = FIRST
         while pause:
             await asyncio.sleep(pause)
-            pause = await self._try(pause)
-        await self._report()
-
-    async def _try(self, pause: float) -> float:
-        """Make one attempt; return the pause before the next one, s: 0 if the bus is back."""
-        try:
-            await self._attempt()
-        except (Absent, Stopped):
-            return min(2 * pause, GLANCE)
-        except DriveError as failure:  # after a search of some seconds
-            self._failed(str(failure))
-            return FIRST
-        except TransportLost as failure:
-            self._failed(str(failure))
-            return min(2 * pause, LONGEST)
-        return 0.0
+            try:
+                await self._attempt()
+            except Stopped:
+                pause = min(2 * pause, GLANCE)
+            except DriveError as failure:  # after a search of some seconds
+                self._failed(str(failure))
+                pause = FIRST
+            except TransportLost as failure:
+                if not isinstance(failure, Absent):
+                    self._failed(str(failure))
+                pause = next_pause(pause, failure)
+            else:
+                pause = 0.0
+        self._say(f"{bus.name} is back after {bus.now() - self._since:.1f} s")
+        for drive in self._unsure:
+            if drive.address in bus.drives and not drive.programming and not self._stopped:
+                self._say(f"{bus.name}: {await _motion(drive)}")
 
     async def _attempt(self) -> None:
         bus = self._bus
@@ -283,13 +271,6 @@ class _Return:
             self._said.add(reason)
             self._say(f"{self._bus.name}: still lost: {reason}")
         self._reason = reason
-
-    async def _report(self) -> None:
-        bus = self._bus
-        self._say(f"{bus.name} is back after {bus.now() - self._since:.1f} s")
-        for drive in self._unsure:
-            if drive.address in bus.drives and not drive.programming and not self._stopped:
-                self._say(f"{bus.name}: {await _motion(drive)}")
 
 
 async def _motion(drive: Drive) -> str:

@@ -1,74 +1,61 @@
 """The user's configuration: one TOML file in the platform's configuration folder, checked as a whole.
 
-    [connections.press]
-    url = "serial:/dev/ttyUSB0?drives=a,b"
-    names = { a = "gantry", b = "clamp" }
+[connections.press]
+url = "serial:/dev/ttyUSB0?drives=a,b"
+names = { a = "gantry", b = "clamp" }
 
-    [guards]                    # which lines need a yes (`settings_tables`)
-    off = ["BD"]
-    also = ["S"]
+[guards]
+off = ["BD", "*"]           # guards that ask no more; "*": what can start every drive of a line
+also = ["S", "EX"]          # words that ask, too
 
-    [log]                       # the session log (`settings_tables`)
-    always = true
+[log]
+always = true               # a log of each session, in the state folder
+megabytes = 16              # the size at which a part is full
+files = 8                   # the parts that are kept
 
-    [mqtt]                      # the login for a broker (`settings_tables`)
-    username = "shop-7"
+[screen]
+theme = "multidrop-light"
+signs = "ascii"             # auto, full, boxes, ascii
+times = "last"              # of the lines in a transcript: off, clock, start, last
 
-    [screen]                    # colours and signs, and [keys] (`settings_tables`)
-    theme = "multidrop-light"
+[keys]                      # keys by the names of functions
+palette = "^G"
+panel-plot = "F9"
 
-`MULTIDROP_CONFIG_DIR` moves the configuration and the macros; `MULTIDROP_STATE_DIR` moves the history.
+[mqtt]                              # for `multidrop publish`
+username = "shop-7"
+password_file = "broker.password"   # or password = "..."
+ca = "plant-ca.pem"                 # the authority of the broker's certificate, for mqtts://
+cert = "shop-7.pem"                 # our certificate, where the broker requires one
+key = "shop-7.key"
+
+A relative path begins at the folder of the configuration file. `MULTIDROP_CONFIG_DIR` moves the configuration and the
+macros; `MULTIDROP_STATE_DIR` moves the history.
 """
 
 from __future__ import annotations
 
 import os
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from multidrop.dialects import Diagnostic
-from multidrop.dialects.files import split_lines, toml_of, utf8_of, why
+from multidrop.dialects.files import opened, split_lines, text_of, toml_of, utf8_of, why
 from multidrop.dialects.text import visible
 from multidrop.macros.atomic import write_atomically
-from multidrop.shell.connect.settings_tables import (
-    DEFAULT_LOOK,
-    Guarding,
-    LogSettings,
-    Look,
-    MqttSettings,
-    read_guards,
-    read_log,
-    read_look,
-    read_mqtt,
-)
+from multidrop.shell.transcripts import TIMES
 
-# The line of a key in a TOML file, for messages: the parser that reads the values does not report it.
+if TYPE_CHECKING:
+    from multidrop.dialects import DriveState, Family
 
-
-def line_of(text: str, key: Sequence[str]) -> int:
-    """The number of the line with a key, given with its tables (`screen`, `theme`), or with its table; 0: not found."""
-    table: tuple[str, ...] = ()
-    best = 0
-    for number, line in enumerate(split_lines(text), 1):
-        if header := re.match(r"\s*\[\[?([^\]]+)\]", line):
-            table = _parts(header[1])
-            found = table
-        elif pair := re.match(r"\s*([^=#]+?)\s*=", line):
-            found = (*table, *_parts(pair[1]))
-        else:
-            continue
-        if found == tuple(key):
-            return number
-        if not best and found and found == tuple(key[: len(found)]):
-            best = number
-    return best
-
-
-def _parts(dotted: str) -> tuple[str, ...]:
-    return tuple(part.strip().strip("\"'") for part in dotted.split("."))
+MEGABYTE = 1_000_000
+CHOICES = {"signs": ("auto", "full", "boxes", "ascii"), "times": tuple(TIMES)}
+"""The settings that have one of a few words."""
+MQTT_FILES = ("password_file", "ca", "cert", "key")
+TABLES = ("connections", "guards", "keys", "log", "mqtt", "screen", "simulator", "sweep")
 
 
 @dataclass(frozen=True)
@@ -78,6 +65,77 @@ class SavedConnection:
     name: str
     url: str
     names: Mapping[str, str] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Guarding:
+    """The changes of the configuration to the families' guards, in capitals."""
+
+    off: frozenset[str] = frozenset()
+    also: frozenset[str] = frozenset()
+
+    def what(self, family: Family[Any], state: DriveState, text: str) -> str:
+        """What a line for a drive will do, if a person must agree to it; empty: it needs no yes."""
+        guards = family.guards
+        if guards is None or state.programming:
+            return ""
+        found = guards.find(state, text)
+        if found is not None and found.name not in self.off:
+            return found.what
+        word = guards.word_of(text) if self.also else ""
+        return f"'{text.strip()}' is sent: [guards] also has {word}" if word in self.also else ""
+
+
+@dataclass(frozen=True)
+class LogSettings:
+    """How logs are kept; `size` is that of a part, bytes."""
+
+    always: bool = False
+    size: int = 16 * MEGABYTE
+    files: int = 8
+
+
+@dataclass(frozen=True)
+class Look:
+    """The settings of the screen. The screen itself checks the names of themes, functions and keys."""
+
+    theme: str = ""
+    signs: str = "auto"
+    keys: Mapping[str, str] = field(default_factory=dict)
+    where: str = ""
+    """The file, for messages."""
+    times: str = "clock"
+
+
+DEFAULT_LOOK = Look()
+
+
+@dataclass(frozen=True)
+class MqttSettings:
+    """A login, and paths of files; an empty one is not given."""
+
+    username: str = ""
+    password: str = field(default="", repr=False)
+    password_file: str = ""
+    ca: str = ""
+    cert: str = ""
+    key: str = ""
+
+    def secret(self) -> str:
+        """The password. Raises Diagnostic where its file cannot be read."""
+        return text_of(self.password_file).rstrip("\r\n") if self.password_file else self.password
+
+    def unreadable(self) -> Iterator[str]:
+        """Yield the keys whose files cannot be opened, with the reason."""
+        for name in MQTT_FILES:
+            path = getattr(self, name)
+            try:
+                if path:
+                    opened(path).close()
+            except OSError as problem:
+                yield f"mqtt.{name}: {path} cannot be read: {problem.strerror}"
+            except Diagnostic as problem:
+                yield f"mqtt.{name}: {problem}"
 
 
 @dataclass(frozen=True)
@@ -166,32 +224,65 @@ def placed(message: str, text: str, where: str, hint: str = "") -> Diagnostic:
     return Diagnostic(message, f"{where}:{line}" if line else where, hint)
 
 
+def line_of(text: str, key: Sequence[str]) -> int:
+    """The number of the line with a key, given with its tables (`screen`, `theme`), or with its table; 0: not found."""
+    table: tuple[str, ...] = ()
+    best = 0
+    for number, line in enumerate(split_lines(text), 1):
+        if header := re.match(r"\s*\[\[?([^\]]+)\]", line):
+            table = _parts(header[1])
+            found = table
+        elif pair := re.match(r"\s*([^=#]+?)\s*=", line):
+            found = (*table, *_parts(pair[1]))
+        else:
+            continue
+        if found == tuple(key):
+            return number
+        if not best and found and found == tuple(key[: len(found)]):
+            best = number
+    return best
+
+
+def _parts(dotted: str) -> tuple[str, ...]:
+    return tuple(part.strip().strip("\"'") for part in dotted.split("."))
+
+
 def _read(document: Mapping[str, Any], where: str) -> Settings:
-    _only(document, {"connections", "guards", "keys", "log", "mqtt", "screen", "simulator", "sweep"}, where, "")
+    _table(document, "", TABLES, where, "")
     tables = document.get("connections", {})
     if not isinstance(tables, dict):
         raise Diagnostic("connections is not a table", where, "write [connections.NAME]")
     connections = {name: _connection(name, table, where) for name, table in tables.items()}
+    guards, log = _guards(document.get("guards", {}), where), _log(document.get("log", {}), where)
+    look = _look(document.get("screen", {}), document.get("keys", {}), where)
+    mqtt = _mqtt(document.get("mqtt", {}), where)
+    lists: dict[str, list[str]] = {}
+    for name, key in (("simulator", "allow"), ("sweep", "clusters")):
+        table = _table(document.get(name, {}), name, (key,), where, f"write [{name}] with {key} = [...]")
+        lists[key] = found = table.get(key, [])
+        if not isinstance(found, list) or not all(isinstance(each, str) and each for each in found):
+            raise Diagnostic(f"{name}.{key} is not a list of texts", where, f'as in {key} = ["..."]')
+    allowed = tuple(Path(where).parent / os.path.expanduser(each) for each in lists["allow"])
     return Settings(
-        connections,
-        guards=read_guards(document.get("guards", {}), where),
-        log=read_log(document.get("log", {}), where),
-        look=read_look(document.get("screen", {}), document.get("keys", {}), where),
-        mqtt=read_mqtt(document.get("mqtt", {}), where),
-        allowed=tuple(
-            Path(where).parent / os.path.expanduser(each) for each in _texts(document, "simulator", "allow", where)
-        ),
-        clusters=_texts(document, "sweep", "clusters", where),
+        connections, guards=guards, log=log, look=look, mqtt=mqtt, allowed=allowed, clusters=tuple(lists["clusters"])
     )
 
 
-def _connection(name: str, table: Any, where: str) -> SavedConnection:
+def _table(found: Any, name: str, keys: Sequence[str], where: str, hint: str) -> Mapping[str, Any]:
+    """A table with no keys but these; an empty name is that of the whole file. Raises Diagnostic."""
+    if not isinstance(found, dict):
+        raise Diagnostic(f"{name} is not a table", where, hint)
+    for key in found:
+        if key not in keys:
+            raise Diagnostic(f"no key {f'{name}.' if name else ''}{key}", where, f"valid: {', '.join(keys)}")
+    return found
+
+
+def _connection(name: str, found: Any, where: str) -> SavedConnection:
     key = f"connections.{name}"
     if not re.fullmatch(r"[A-Za-z0-9_-]+", name):
         raise Diagnostic(f"{key}: not a name", where, "valid: letters, digits, - and _")
-    if not isinstance(table, dict):
-        raise Diagnostic(f"{key} is not a table", where, f"write [{key}] with url = ...")
-    _only(table, {"url", "names"}, where, f"{key}.")
+    table = _table(found, key, ("names", "url"), where, f"write [{key}] with url = ...")
     url = table.get("url")
     if not isinstance(url, str) or not url:
         raise Diagnostic(f"{key}.url is missing or not text", where)
@@ -205,22 +296,85 @@ def _connection(name: str, table: Any, where: str) -> SavedConnection:
     return SavedConnection(name, url, names)
 
 
-def _texts(document: Mapping[str, Any], name: str, key: str, where: str) -> tuple[str, ...]:
-    """The list of texts that is the only key of a table."""
-    table = document.get(name, {})
-    if not isinstance(table, dict):
-        raise Diagnostic(f"{name} is not a table", where, f"write [{name}] with {key} = [...]")
-    _only(table, {key}, where, f"{name}.")
-    found = table.get(key, [])
-    if not isinstance(found, list) or not all(isinstance(each, str) and each for each in found):
-        raise Diagnostic(f"{name}.{key} is not a list of texts", where, f'as in {key} = ["..."]')
-    return tuple(found)
+def _guards(found: Any, where: str) -> Guarding:
+    table = _table(found, "guards", ("also", "off"), where, 'write [guards] with off = ["WORD"] or also = ["WORD"]')
+    words: dict[str, frozenset[str]] = {}
+    for key in ("off", "also"):
+        given = table.get(key, [])
+        if not isinstance(given, list) or not all(isinstance(word, str) for word in given):
+            raise Diagnostic(f"guards.{key} is not a list of words", where, f'as in {key} = ["BD"]')
+        words[key] = frozenset(word.upper() for word in given)
+        if not given:
+            continue  # only a configuration with guards imports all families
+        from multidrop.dialects.families import FAMILIES
+
+        known = sorted({name for family in FAMILIES.values() if family.guards for name in family.guards.names})
+        for word in sorted(words[key]):
+            if key == "off" and word not in known:
+                raise Diagnostic(f"guards.off: no guard {word}", where, f"valid: {', '.join(known)}")
+            if key == "also" and not any(family.language.knows(word) for family in FAMILIES.values()):
+                raise Diagnostic(f"guards.also: no drive has a word {word}", where, "valid: words that /help lists")
+    return Guarding(**words)
 
 
-def _only(table: Mapping[str, Any], known: set[str], where: str, prefix: str) -> None:
-    for key in table:
-        if key not in known:
-            raise Diagnostic(f"no key {prefix}{key}", where, f"valid: {', '.join(sorted(known))}")
+def _log(found: Any, where: str) -> LogSettings:
+    table = _table(found, "log", ("always", "files", "megabytes"), where, "write [log]")
+    always = table.get("always", False)
+    if not isinstance(always, bool):
+        raise Diagnostic("log.always is not true or false", where)
+    numbers = []
+    for key, default, least, most in (("megabytes", 16, 0.01, 10_000), ("files", 8, 1, 1000)):
+        number = table.get(key, default)
+        if isinstance(number, bool) or not isinstance(number, int | float) or not least <= number <= most:
+            raise Diagnostic(f"log.{key} is not a number from {least:g} to {most:g}", where)
+        numbers.append(number)
+    size, files = numbers
+    if files != int(files):
+        raise Diagnostic("log.files is not a whole number", where)
+    return LogSettings(always, int(size * MEGABYTE), int(files))
+
+
+def _look(screen: Any, keys: Any, where: str) -> Look:
+    if not isinstance(screen, dict) or not isinstance(keys, dict):
+        table = "keys" if isinstance(screen, dict) else "screen"
+        raise Diagnostic(f"{table} is not a table", where, f"write [{table}]")
+    for key, value in screen.items():
+        _table({key: value}, "screen", (*CHOICES, "theme"), where, "")
+        if not isinstance(value, str):
+            raise Diagnostic(f"screen.{key} is not text", where)
+        if key in CHOICES and value not in CHOICES[key]:
+            raise Diagnostic(f"screen.{key}: {value!r} is unknown", where, f"valid: {', '.join(CHOICES[key])}")
+    for name, key in keys.items():
+        if not isinstance(key, str):
+            raise Diagnostic(f"keys.{name} is not text", where, 'write a key as in "^T" or "F9"')
+    return Look(**screen, keys=keys, where=where)
+
+
+def _mqtt(found: Any, where: str) -> MqttSettings:
+    """Check the table. Raises Diagnostic without a value, which may be a secret."""
+    keys = ("username", "password", *MQTT_FILES)
+    table = _table(found, "mqtt", keys, where, "write [mqtt]")
+    texts: dict[str, str] = {}
+    for key in keys:
+        text = table.get(key, "")
+        if not isinstance(text, str) or "\0" in text:
+            raise Diagnostic(f"mqtt.{key} is not text", where, f'as in {key} = "..."')
+        texts[key] = text
+    if texts["password"] and texts["password_file"]:
+        raise Diagnostic("mqtt.password_file: password is given, too", where, "keep one of them")
+    if texts["key"] and not texts["cert"]:
+        raise Diagnostic("mqtt.key: cert is missing", where, "name the certificate of this key")
+    for key in MQTT_FILES:
+        if text := texts[key]:
+            try:
+                path = Path(text).expanduser()
+            except RuntimeError:  # a ~ and no home
+                path = Path(text)
+            texts[key] = str(Path(where).parent / path)
+    return MqttSettings(**texts)
+
+
+# Changes
 
 
 def check_new(name: str) -> None:

@@ -13,8 +13,7 @@ from typing import TYPE_CHECKING
 from multidrop.dialects import Diagnostic, Procedure
 from multidrop.dialects.families import FAMILIES, family_of
 from multidrop.drives.events import Traffic
-from multidrop.shell.finding.found_drives import FoundDrive
-from multidrop.shell.finding.scanning import HAZARD, SO_FAR, Scanning, Stage, listed
+from multidrop.shell.finding.scanning import HAZARD, SO_FAR, FoundDrive, Scanning, Stage, listed
 
 if TYPE_CHECKING:
     from multidrop.drives.events import BusEvent

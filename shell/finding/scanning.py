@@ -10,7 +10,7 @@ from __future__ import annotations
 import asyncio
 from collections.abc import AsyncIterator, Callable, Iterable, Iterator, Sequence
 from contextlib import AsyncExitStack, asynccontextmanager, suppress
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from multidrop.dialects import Diagnostic, DriveState, Procedure
@@ -18,11 +18,10 @@ from multidrop.dialects.families import DEFAULT, FAMILIES
 from multidrop.dialects.scanning import WINDOW, Reach, Scan
 from multidrop.shell import stop_report
 from multidrop.shell.channel import Job, running
-from multidrop.shell.connect.opening import BAUDED, port_name
+from multidrop.shell.connect.opening import BAUDED, far_port, port_name
 from multidrop.shell.connect.urls import Connection
-from multidrop.shell.finding.found_drives import FoundDrive, port_of
 from multidrop.shell.state.port_state import memory_of
-from multidrop.transports import Transport, TransportLost
+from multidrop.transports import TransportLost
 
 if TYPE_CHECKING:
     from multidrop.drives.bus import Bus
@@ -50,6 +49,85 @@ HAZARD = (
 )
 
 
+@dataclass(frozen=True)
+class FoundDrive:
+    """A drive that replied, and where."""
+
+    connection: Connection
+    """Leads to the port as the drive is set."""
+    port: str
+    state: DriveState
+
+    @property
+    def url(self) -> str:
+        """The URL that opens this drive alone."""
+        return url_of([self])
+
+    def facts(self) -> dict[str, Any]:
+        """The drive for a program."""
+        state, codec = self.state, self.state.codec
+        return {
+            "port": self.port,
+            "baud": self.connection.baud,
+            "dialect": codec.family,
+            "address": state.address,
+            "name": state.name,
+            "product": state.product,
+            "part": state.part,
+            "version": state.version,
+            "serial": state.serial,
+            **{key: getattr(codec, key, None) for key in ("party", "checksum", "em", "escape")},
+            "url": self.url,
+        }
+
+    def words(self) -> str:
+        """The drive for a person, in one line."""
+        state = self.state
+        baud = f"{self.connection.baud} baud" if self.connection.baud else ""
+        name = state.address or (f"({state.name})" if state.name else "-")
+        part = f"part {state.part}" if state.part else ""
+        serial = f"serial {state.serial}" if state.serial else ""
+        product = "" if state.version.startswith(state.product) else state.product
+        modes = getattr(state.codec, "shown", "")
+        return "  ".join(filter(None, (self.port, baud, name, product, state.version, part, serial, modes)))
+
+
+def url_of(found: Sequence[FoundDrive]) -> str:
+    """The URL that opens drives of one language and baud rate on one port."""
+    connection, codec = found[0].connection, found[0].state.codec
+    keys = []
+    if connection.baud:
+        keys.append(f"baud={connection.baud}")
+    if codec.family != DEFAULT:
+        keys.append(f"dialect={codec.family}")
+    party = getattr(codec, "party", None)
+    if party is not None and connection.scheme != "udp":
+        keys.append(f"party={int(party)}")
+    if names := [each.state.address for each in found if each.state.address]:
+        keys.append(f"drives={','.join(names)}")
+    elif party is None:
+        keys.append("address=none")
+    if connection.relay:
+        keys.append(f"relay={connection.relay}")
+    if connection.local_echo:
+        keys.append("echo=local")
+    base = f"serial:{port_name(connection)}" if connection.scheme == "serial" else found[0].port
+    head, _, bus = base.partition("#")
+    return head + (f"?{'&'.join(keys)}" if keys else "") + (f"#{bus}" if bus else "")
+
+
+def port_of(connection: Connection, bus: str) -> str:
+    """The port for a person and a program, without keys."""
+    if connection.scheme == "serial":
+        return connection.target
+    if connection.scheme == "sim":
+        return f"sim:{connection.target}" + (f"#{connection.bus or bus}" if connection.bus or bus else "")
+    if connection.scheme == "ssh":
+        return far_port(connection).name
+    host = f"[{connection.host}]" if ":" in connection.host else connection.host
+    return f"{connection.scheme}://{host}:{connection.port}"
+
+
 class NothingFound(TransportLost):
     """No drive replied."""
 
@@ -74,18 +152,6 @@ class Stage(NamedTuple):
         return f"{self.scan.title} at {self.baud} baud" if self.baud else self.scan.title
 
 
-class Steps:
-    """Counts the steps of one stage among those of all."""
-
-    def __init__(self, job: Job, done: int, total: int) -> None:
-        self._job, self.done, self._total = job, done, total
-
-    def __call__(self) -> None:
-        """Count one step."""
-        self.done = min(self.done + 1, self._total)
-        self._job(self.done, self._total)
-
-
 class Scanning:
     """One search of a port. `report` is called with each drive as soon as it is identified."""
 
@@ -94,10 +160,11 @@ class Scanning:
     ) -> None:
         """Search nothing yet. Raises Diagnostic for a port that needs no search."""
         if connection.hints.family and FAMILIES[connection.hints.family].scan is None:
-            raise Diagnostic(
-                f"scan searches for {' and '.join(_titles(_families()))} drives", connection.text, "open it instead"
-            )
+            titles = [scan.title for family in FAMILIES.values() if (scan := family.scan) is not None]
+            raise Diagnostic(f"scan searches for {' and '.join(titles)} drives", connection.text, "open it instead")
         self.found: list[FoundDrive] = []
+        self.port = port_of(connection, "")
+        """The port for a person."""
         self._workspace = workspace
         self._opener = opener
         self._connection = connection
@@ -123,43 +190,35 @@ class Scanning:
             await self.search([first], False)
             if others and (everything or not self.found):
                 so_far = f"{len(self.found)} found" if self.found else "no drive replies"
-                seconds = round(sum(map(self._seconds, others)))
-                on = f"the search goes on with {listed(others)} (about {seconds} s)"
-                what = f"{so_far} with {listed([first])}; {on}; {HAZARD}"
-                if await self._agreed(what):
-                    await self.search(others, everything)
+                reach, seconds = self._reach(), 0.0
+                for each in others:
+                    seconds += each.scan.places(reach) * (reach.window + BYTES * 10 / (each.baud or 1_000_000))
+                on = f"the search goes on with {listed(others)} (about {round(seconds)} s)"
+                try:
+                    what = f"{so_far} with {listed([first])}; {on}; {HAZARD}"
+                    await self._workspace.confirm(what, self.port, SO_FAR)
+                except Diagnostic:
+                    if not self.found or self._workspace.ask is None:
+                        raise
+                    return  # a no ends the search where a drive was found
+                await self.search(others, everything)
         if not self.found:
             raise self.nothing([first, *others], "; multidrop rescue PORT frees a drive that is stuck")
 
-    async def _agreed(self, what: str) -> bool:
-        """Ask; a no ends the search where a drive was found. Raises Diagnostic otherwise."""
-        try:
-            await self._workspace.confirm(what, self.port, SO_FAR)
-        except Diagnostic:
-            if not self.found or self._workspace.ask is None:
-                raise
-            return False
-        return True
-
-    @property
-    def port(self) -> str:
-        """The port for a person."""
-        return port_of(self._connection, "")
-
     def stages(self, bauds: Sequence[int]) -> list[Stage]:
         """The stages in their order: the given language and baud rate first."""
-        given = self._connection.hints.family
-        families = [given] if given else _families()
-        if self._connection.scheme not in BAUDED:
+        given = self._connection
+        searched = [name for name, family in FAMILIES.items() if family.scan is not None]
+        stages = [Stage(family, None) for family in ([given.hints.family] if given.hints.family else searched)]
+        if given.scheme not in BAUDED:
             if bauds:
-                raise Diagnostic("the port has no baud rate", self._connection.text, "drop --baud")
-            return [Stage(family, None) for family in families]
-        return [Stage(family, baud) for family in families for baud in self._bauds(family, bauds)]
-
-    def _bauds(self, family: str, bauds: Sequence[int]) -> list[int]:
-        record = FAMILIES[family]
-        assert record.scan is not None
-        return list(dict.fromkeys(bauds or (self._connection.baud or record.baud, *record.scan.bauds)))
+                raise Diagnostic("the port has no baud rate", given.text, "drop --baud")
+            return stages
+        return [
+            Stage(each.family, baud)
+            for each in stages
+            for baud in dict.fromkeys(bauds or (given.baud or FAMILIES[each.family].baud, *each.scan.bauds))
+        ]
 
     async def search(self, stages: Sequence[Stage], everything: bool, hasty: bool = False) -> None:
         """Search these stages, to the first one that finds a drive unless `everything`. `hasty`: see `Reach`.
@@ -198,7 +257,10 @@ class Scanning:
         replied is read in the end, because that takes as long as a drive slows down.
         """
         replied = [_stage_of(each.connection) for each in self.found]
-        likely = list(dict.fromkeys([*replied, *self._remembered(), *self._tried]))
+        memory, _ = memory_of(self._workspace.settings.state, port_name(self._connection))
+        named = self._connection.hints.family in ("", DEFAULT)
+        remembered = [Stage(DEFAULT, memory.baud)] if named and memory.drives and memory.baud else []
+        likely = list(dict.fromkeys([*replied, *remembered, *self._tried]))
         others = [each for each in self._agreed_to if each not in likely]
         for stage in [*(each for each in likely if each not in self._stopped), *others]:
             await self._stop_at(stage, confirm=False)
@@ -214,7 +276,7 @@ class Scanning:
     async def _stop_at(self, stage: Stage, confirm: bool) -> None:
         """Send a stop at a stage, to the drives that replied there by name; `confirm`: read them."""
         try:
-            opened = await self._opener(self.connection(stage), self._named)
+            opened = await self._opener(self.connection(stage), str)
         except TransportLost as loss:
             self._warn(self.port, [f"NO STOP SENT with {stage.words}: {loss}"])
             return
@@ -230,14 +292,7 @@ class Scanning:
                 if confirm and each.bus.drives:
                     self._read.append(halt)
 
-    def _remembered(self) -> list[Stage]:
-        """The stage at which the last session's drives replied on this port."""
-        memory, _ = memory_of(self._workspace.settings.state, port_name(self._connection))
-        named = self._connection.hints.family in ("", DEFAULT)
-        return [Stage(DEFAULT, memory.baud)] if named and memory.drives and memory.baud else []
-
     def connection(self, stage: Stage) -> Connection:
-        """The connection for a stage."""
         return next(self._forms(stage))
 
     async def converse(self, connection: Connection, procedure: Callable[[], Procedure[None]]) -> None:
@@ -248,7 +303,7 @@ class Scanning:
     @asynccontextmanager
     async def opened(self, connection: Connection) -> AsyncIterator[Bus]:
         """Open the port, of several simulated buses the first, and close it in the end; a stop reaches it meanwhile."""
-        opened, *others = await self._opener(connection, self._named)
+        opened, *others = await self._opener(connection, str)
         for each in others:
             await each.bus.close()
         async with self._adopted(opened, _stage_of(connection)) as bus:
@@ -278,10 +333,6 @@ class Scanning:
             f"wiring (are A and B swapped?) and the adapter{advice}"
         )
 
-    def _seconds(self, stage: Stage) -> float:
-        reach = self._reach()
-        return stage.scan.places(reach) * (reach.window + BYTES * 10 / (stage.baud or 1_000_000))
-
     def _reach(self, distance: float = 0.0, hasty: bool = False) -> Reach:
         """The manner of the search. `distance`: the time of the network to a drive and back, s."""
         scheme, window = self._connection.scheme, self._connection.timeout or WINDOW
@@ -295,20 +346,25 @@ class Scanning:
         """Open the port for a stage, search, and close it."""
         total = sum(each.scan.places(self._reach()) for each in all_)
         begun = self._done
+
+        def step() -> None:
+            self._done = min(self._done + 1, total)
+            job(self._done, total)
+
         for connection in self._forms(stage):
             began = self._workspace.now()
-            buses = await self._opener(connection, self._named)
-            took = self._workspace.now() - began
-            reach = self._reach(_distance(buses[0].bus.link.transport, connection.scheme, took), hasty)
+            buses = await self._opener(connection, str)
+            distance = min((self._workspace.now() - began) * TURNS.get(connection.scheme, 0.0), SLOWEST)
+            if (trip := buses[0].bus.link.transport.round_trip) is not None:
+                distance = SPREAD * trip + JITTER
+            repeats = False
             async with AsyncExitStack() as open_:
                 for each in buses:
                     await open_.enter_async_context(self._adopted(each, stage))
-                steps = [Steps(job, begun, total) for _ in buses]
-                outcomes = [
-                    await self._searched(each, stage, connection, reach, count)
-                    for each, count in zip(buses, steps, strict=True)
-                ]
-            if not any(outcomes):
+                for each in buses:
+                    self._done = begun
+                    repeats |= await self._searched(each, stage, connection, self._reach(distance, hasty), step)
+            if not repeats:
                 return
             text = "the adapter repeats what it sends: the search begins again with echo=local"
             self._warn(port_of(connection, ""), [text])
@@ -322,7 +378,9 @@ class Scanning:
             self._connection = replace(self._connection, local_echo=True)
             yield replace(given, local_echo=True)
 
-    async def _searched(self, opened: Opened, stage: Stage, connection: Connection, reach: Reach, steps: Steps) -> bool:
+    async def _searched(
+        self, opened: Opened, stage: Stage, connection: Connection, reach: Reach, step: Callable[[], None]
+    ) -> bool:
         """Search one bus; return whether its adapter repeats what it sends."""
         bus, hints = opened.bus, opened.hints
         port = port_of(connection, bus.name)
@@ -335,8 +393,7 @@ class Scanning:
             self._warn(port, state.take_messages()[0])
 
         reach = replace(reach, cut=hints.cut, first_mark=hints.first_mark)
-        outcome = await bus.search(stage.scan.search(reach, found, steps))
-        self._done = steps.done
+        outcome = await bus.search(stage.scan.search(reach, found, step))
         self._warn(f"{port}: {stage.words}", outcome.remarks)
         return bool(outcome.echo)
 
@@ -344,21 +401,9 @@ class Scanning:
         for each in texts:
             self._workspace.notify(f"{where}: {each}", warning=True)
 
-    def _named(self, name: str) -> str:
-        return name
-
 
 def _stage_of(connection: Connection) -> Stage:
     return Stage(connection.hints.family or DEFAULT, connection.baud)
-
-
-def _families() -> list[str]:
-    """The languages that a search tries."""
-    return [name for name, family in FAMILIES.items() if family.scan is not None]
-
-
-def _titles(names: Iterable[str]) -> list[str]:
-    return [scan.title for name in names if (scan := FAMILIES[name].scan) is not None]
 
 
 async def extend(workspace: Workspace, bus: Bus) -> list[str]:
@@ -394,10 +439,3 @@ def listed(stages: Iterable[Stage]) -> str:
         by_family.setdefault(each.scan.title, []).extend([str(each.baud)] if each.baud else [])
     parts = [f"{title} at {', '.join(bauds)} baud" if bauds else title for title, bauds in by_family.items()]
     return " and ".join(parts)
-
-
-def _distance(transport: Transport, scheme: str, took: float) -> float:
-    """The time that a network takes to a drive and back, s; `took`: the time of the opening, s."""
-    if transport.round_trip is not None:
-        return SPREAD * transport.round_trip + JITTER
-    return min(took * TURNS.get(scheme, 0.0), SLOWEST)

@@ -1,27 +1,55 @@
-"""The file of a drive's settings: TOML with `[drive]`, `[parameters]`, `[io]`, `[variables]` and `[unread]`.
+"""The settings of a drive: read from it, and its file: `[drive]`, `[parameters]`, `[io]`, `[variables]`, `[unread]`.
 
-The file has no date, so two backups of one drive are equal. A comment has the unit and the default of a setting.
+The file, TOML, has no date, so two backups of one drive are equal. A comment has the unit and the default of a setting.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from multidrop.dialects import Diagnostic
+from multidrop.dialects import Diagnostic, Inexpressible
 from multidrop.dialects.files import escaped_toml, text_of, toml_of
-from multidrop.dialects.parameters import SECTIONS, VARIABLES, Reading, Readings, Scalar, Value
+from multidrop.dialects.parameters import SECTIONS, VARIABLES, Parameters, Readings, Value
+from multidrop.shell.channel import running, transferring
+from multidrop.shell.events import SettingsRead
 
 if TYPE_CHECKING:
     from multidrop.dialects import DriveState
+    from multidrop.drives.drive import Drive
+    from multidrop.shell.workspace import Workspace
 
 DRIVE, UNREAD = "drive", "unread"
 HEAD = (
     "The settings of one drive. `multidrop params diff` compares them, `multidrop params restore` sends what differs."
 )
 _TOML_INTEGERS = range(-(2**63), 2**63)
+LISTED = 8
+"""The number of settings that a message names."""
+
+
+def parameters(drive: Drive) -> Parameters[Any]:
+    """The parameters of a drive's family. Raises Inexpressible where the host reads none."""
+    found = drive.family.parameters
+    if found is None:
+        raise Inexpressible(f"{drive.shown}: the host does not read the parameters of this family")
+    return found
+
+
+async def read(workspace: Workspace, drive: Drive, what: str) -> Readings:
+    """Read every setting of a drive. Raises DriveError; nothing is changed."""
+    with running(workspace, f"{workspace.display_name(drive)}: {what}") as progress:
+        found = await transferring(drive, parameters(drive).read(drive.state, progress))
+    workspace.publish(SettingsRead(workspace.now(), drive.link.name, drive.address, found))
+    return found
+
+
+def listed(names: Sequence[str]) -> str:
+    """Names in a message, at most LISTED of them."""
+    more = f" and {len(names) - LISTED} more" if len(names) > LISTED else ""
+    return f"{', '.join(names[:LISTED])}{more}"
 
 
 @dataclass(frozen=True)
@@ -64,19 +92,14 @@ def formatted(drive: Mapping[str, str], found: Readings) -> str:
         for each in found.readings:
             if each.section == section:
                 item = tomlkit.item(list(each.value) if isinstance(each.value, tuple) else each.value)
-                if remark := _remark(each):
+                default = "" if each.default is None else f"default {shown(each.default)}"
+                if remark := ", ".join(filter(None, (each.unit, default))):
                     item.comment(remark)
                 table.add(each.name, item)
         document[section] = table
     if found.unread:
         document[UNREAD] = dict(found.unread)
     return escaped_toml(tomlkit.dumps(document))
-
-
-def _remark(reading: Reading) -> str:
-    """Unit and default of a setting, as its comment."""
-    default = "" if reading.default is None else f"default {shown(reading.default)}"
-    return ", ".join(each for each in (reading.unit, default) if each)
 
 
 def shown(value: Value | None) -> str:
@@ -105,7 +128,8 @@ def load(path: str | Path) -> SettingsFile:
             if upper in named:
                 raise Diagnostic(f"{upper} is there twice", f"{where}: [{each}]", "keep one of them")
             named[upper], section[upper] = _value(value, f"{where}: [{each}] {name}"), each
-    product, language, name = (_text(drive, key) for key in ("product", "language", "name"))
+    known = (drive.get(key, "") for key in ("product", "language", "name"))
+    product, language, name = (text if isinstance(text, str) else "" for text in known)
     return SettingsFile(where, product, language, name, named, section, VARIABLES in tables)
 
 
@@ -116,23 +140,14 @@ def _table(tables: Mapping[str, Any], name: str, where: str) -> Mapping[str, Any
     return found
 
 
-def _text(table: Mapping[str, Any], key: str) -> str:
-    found = table.get(key, "")
-    return found if isinstance(found, str) else ""
-
-
 def _value(value: Any, where: str) -> Value:
-    if isinstance(value, list) and value:
-        return tuple(_scalar(each, where) for each in value)
-    return _scalar(value, where)
-
-
-def _scalar(value: Any, where: str) -> Scalar:
-    number = isinstance(value, (int, float)) and not isinstance(value, bool)
-    if (number and (isinstance(value, float) or value in _TOML_INTEGERS)) or isinstance(value, str):
-        scalar: Scalar = value
-        return scalar
-    raise Diagnostic("must be a number, a text, or a list of them", where)
+    several = isinstance(value, list) and bool(value)
+    for each in value if several else (value,):
+        whole = isinstance(each, int) and not isinstance(each, bool) and each in _TOML_INTEGERS
+        if not (whole or isinstance(each, float | str)):
+            raise Diagnostic("must be a number, a text, or a list of them", where)
+    found: Value = tuple(value) if several else value
+    return found
 
 
 def _list(names: tuple[str, ...]) -> str:

@@ -8,12 +8,11 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any
 
 from multidrop.dialects import Diagnostic
 from multidrop.dialects.parameters import (
     ORDINARY,
-    Change,
     Parameters,
     Permission,
     Reading,
@@ -24,15 +23,11 @@ from multidrop.dialects.parameters import (
 )
 from multidrop.shell.params.file import shown
 
+if TYPE_CHECKING:
+    from multidrop.dialects.family import Language
+
 _NUMBER = re.compile(r"[+-]?\d{1,20}")
 _FRACTION = re.compile(r"[+-]?(?:\d{1,20}\.\d*|\.\d+)(?:[eE][+-]?\d{1,3})?")
-
-
-class Meanings(Protocol):
-    """Help on words."""
-
-    def describe(self, word: str, product: str = "") -> list[str]:
-        """The help on a word. Raises Diagnostic."""
 
 
 @dataclass(frozen=True)
@@ -52,16 +47,9 @@ def rows(found: Readings, other: Mapping[str, Value] | None, meanings: Mapping[s
     made = []
     for each in found.readings:
         there = None if other is None else other.get(each.name)
-        compared = other is not None and (there is not None or each.default is None)
-        made.append(
-            Row(
-                each,
-                shown(each.value),
-                "" if there is None else shown(there),
-                compared and there is not None and not same(each.value, there),
-                meanings.get(each.name, ""),
-            )
-        )
+        compared = "" if there is None else shown(there)
+        differs = there is not None and not same(each.value, there)
+        made.append(Row(each, shown(each.value), compared, differs, meanings.get(each.name, "")))
     return made
 
 
@@ -77,7 +65,7 @@ def found_in(table: Sequence[Row], words: str, *, differing: bool = False) -> li
     return sorted(chosen, key=lambda row: row.reading.name.casefold() != words.strip().casefold())
 
 
-def meanings_of(found: Readings, language: Meanings, product: str) -> dict[str, str]:
+def meanings_of(found: Readings, language: Language, product: str) -> dict[str, str]:
     """The first line of help on each setting, without its name."""
     made = {}
     for each in found.readings:
@@ -96,31 +84,25 @@ def parsed(text: str) -> Value:
     fields = [each.strip() for each in text.strip().strip("[]").split(",")]
     if not all(fields):
         raise Diagnostic("a value is missing", text, "such as 600000, or 1,1,0 for a set-up")
-    values = tuple(_scalar(each) for each in fields)
-    return values[0] if len(values) == 1 else values
-
-
-def _scalar(text: str) -> Scalar:
-    if _NUMBER.fullmatch(text):
-        return int(text)
-    if _FRACTION.fullmatch(text):
-        return float(text)
-    if text.isascii() and text.isprintable():
-        return text.strip('"')
-    raise Diagnostic("not a value", text, "a number, or text in plain ASCII")
+    values: list[Scalar] = []
+    for each in fields:
+        if _NUMBER.fullmatch(each):
+            values.append(int(each))
+        elif _FRACTION.fullmatch(each):
+            values.append(float(each))
+        elif each.isascii() and each.isprintable():
+            values.append(each.strip('"'))
+        else:
+            raise Diagnostic("not a value", each, "a number, or text in plain ASCII")
+    return values[0] if len(values) == 1 else tuple(values)
 
 
 @dataclass(frozen=True)
 class Edit:
     """The lines that change one setting, and what a person must know before they are sent."""
 
-    changes: tuple[Change, ...]
+    lines: tuple[str, ...]
     warning: str = ""
-
-    @property
-    def lines(self) -> tuple[str, ...]:
-        """The lines, in order."""
-        return tuple(change.text for change in self.changes)
 
 
 def edit(parameters: Parameters[Any], state: Any, present: Readings, name: str, value: Value) -> Edit:
@@ -133,4 +115,4 @@ def edit(parameters: Parameters[Any], state: Any, present: Readings, name: str, 
         raise Diagnostic("; ".join(reason for _, reason in made.impossible), name)
     if not made.changes:
         raise Diagnostic(f"it is {shown(value)} already", name)
-    return Edit(made.changes, "; ".join(filter(None, (warning, *made.remarks))))
+    return Edit(tuple(change.text for change in made.changes), "; ".join(filter(None, (warning, *made.remarks))))

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from multidrop.dialects import Diagnostic, DriveError, Inexpressible, Refused
@@ -19,8 +19,8 @@ from multidrop.dialects.parameters import Permission, Plan, Readings, differing
 from multidrop.dialects.program_files import LOCKED
 from multidrop.shell import snapshots
 from multidrop.shell.channel import running, transferring
-from multidrop.shell.params.file import shown
-from multidrop.shell.params.readings import parameters, read
+from multidrop.shell.params.file import parameters, read, shown
+from multidrop.shell.params.restore import Options, check_ready
 from multidrop.shell.programs import transfers
 from multidrop.simulator import cells
 from multidrop.simulator.cell.writer import BusText, write
@@ -35,18 +35,6 @@ if TYPE_CHECKING:
 
 UNNAMED = "!"
 """The name of a drive that has none of its own."""
-
-
-@dataclass(frozen=True)
-class Wanted:
-    """What a person wants of an apply. `named`: settings to write although they can move the motor or lock the drive.
-
-    `dry`: show it only. `other_product`: the drive may be another product than the one in the file.
-    """
-
-    named: frozenset[str] = frozenset()
-    dry: bool = False
-    other_product: bool = False
 
 
 def chosen(cell: Cell, file: str, drive: Drive, name: str, several: bool = False) -> DriveSpec:
@@ -68,7 +56,7 @@ def chosen(cell: Cell, file: str, drive: Drive, name: str, several: bool = False
     raise Diagnostic(what, file, hint)
 
 
-async def apply(session: Session, drive: Drive, file: str, spec: DriveSpec, wanted: Wanted) -> None:
+async def apply(session: Session, drive: Drive, file: str, spec: DriveSpec, wanted: Options) -> None:
     """Put the state of a drive in a file onto a drive. Raises Diagnostic, DriveError or TransportLost."""
     await _Replacement(session, drive, file, spec, wanted).run()
 
@@ -76,18 +64,14 @@ async def apply(session: Session, drive: Drive, file: str, spec: DriveSpec, want
 class _Replacement:
     """One apply: the drive, and what it is to become."""
 
-    def __init__(
-        self,
-        session: Session,
-        drive: Drive,
-        file: str,
-        spec: DriveSpec,
-        wanted: Wanted,
-    ) -> None:
+    def __init__(self, session: Session, drive: Drive, file: str, spec: DriveSpec, wanted: Options) -> None:
         self._session, self._drive, self._file = session, drive, file
         self._spec, self._wanted, self._parameters = spec, wanted, parameters(drive)
         self._settings = _tables(spec).wanted(spec)
         self._program = _tables(spec).program(spec)
+        programs = drive.family.programs
+        self._clearing = programs.clearing if programs is not None else ""
+        """The line that erases all programs; empty where the family has none."""
         self._done: list[str] = []
         self._in_between = False
         """Its communication is being changed, and is not saved yet."""
@@ -102,22 +86,16 @@ class _Replacement:
         here = _spec(now)
         self._check(now, here)
         changes = self._show(now, here)
-        if self._wanted.dry:
+        if self._wanted.dry_run:
             return
-        await self._check_ready()
+        await check_ready(self._drive)
         steps = ", ".join(changes) if changes else f"nothing differs, {self._parameters.saving} saves it"
         await self._session.confirm(f"it gets the state of {self._spec.name!r} in {self._file}: {steps}", self._name)
-        await self._check_ready()  # a person may have thought about it for long
+        await check_ready(self._drive)  # a person may have thought about it for long
         with self._reporting():
             await self._write(here)
             now = await snapshots.read(self._session, self._drive)
         self._verify(_spec(now))
-
-    @property
-    def _clearing(self) -> str:
-        """The line that erases all programs; empty where the family has none."""
-        programs = self._drive.family.programs
-        return programs.clearing if programs is not None else ""
 
     # Before anything is sent
 
@@ -148,11 +126,6 @@ class _Replacement:
                 f"none: {self._clearing} erases it (nothing was sent)"
             )
 
-    async def _check_ready(self) -> None:
-        """Raise Refused where the drive is at work."""
-        if reason := await transferring(self._drive, self._parameters.ready(self._drive.state)):
-            raise Refused(f"{reason} (nothing was sent)")
-
     def _show(self, now: Snapshot, here: DriveSpec) -> list[str]:
         """Publish everything that will happen; return it in short."""
         out, spec = self._session.output, self._spec
@@ -181,7 +154,9 @@ class _Replacement:
             out(f"{self._name}: its name stays {here.name!r}: only FD gives back {UNNAMED!r}")
         for name, reason in whole.withheld:
             out(f"{self._name}: {name} is left alone: {reason} (--with {name} writes it)")
-        for name, reason in (*whole.impossible, *self._strangers(now.readings)):
+        known = {*now.readings.values, *spec.variables}
+        strangers = [(name, "this drive does not print it") for name in self._settings if name not in known]
+        for name, reason in (*whole.impossible, *strangers):
             out(f"{self._name}: {name} is left alone: {reason}")
         if unread := [name for name, _ in now.readings.unread]:
             text = f"{self._name}: no snapshot has what a drive does not print; check it: {', '.join(unread)}"
@@ -202,10 +177,6 @@ class _Replacement:
         goal = {name: value for name, value in self._settings.items() if name in present}
         return self._parameters.plan(self._drive.state, readings, goal, allowed)
 
-    def _strangers(self, readings: Readings) -> list[tuple[str, str]]:
-        known = {*readings.values, *self._spec.variables}
-        return [(name, "this drive does not print it") for name in self._settings if name not in known]
-
     # After the question
 
     @contextmanager
@@ -214,41 +185,26 @@ class _Replacement:
         try:
             yield
         except BaseException:
-            done = "; ".join(self._done) or "nothing"
-            text = f"{self._name}: cut off; done: {done}; run it again to go on{self._found_again()}"
+            text = f"{self._name}: cut off; done: {'; '.join(self._done) or 'nothing'}; run it again to go on"
+            if self._in_between and self._spec.party:
+                url = f"URL?drives={self._spec.name}&party=1"
+                text += f". It may be in party mode already ({url}); switched off and on it is as before"
             self._session.notify(text, warning=True)
             raise
 
-    def _found_again(self) -> str:
-        """Where the drive replies from here on, while its communication is between the old and the new form."""
-        if not self._in_between or not self._spec.party:
-            return ""
-        return (
-            f". It may be in party mode already (URL?drives={self._spec.name}&party=1); switched off and on it is "
-            "as before"
-        )
-
     async def _write(self, here: DriveSpec) -> None:
-        if self._differs(here):
-            await self._download(clear=bool(_tables(here).program(here).lines))
+        if self._differs(here):  # the user's variables too; what was in the drive goes to a backup first
+            clear = self._clearing and _tables(here).program(here).lines  # else an old program stays beside the new one
+            lines = (*((self._clearing,) if clear else ()), *self._program.file)
+            text, saved = "".join(f"{line}\n" for line in lines), transfers.Wanted(save=True)
+            await transfers.download(self._session, self._drive, f"{self._file}#{self._spec.name}", saved, text)
+            self._done.append("program")
         await self._change(communication=False)
         await self._save("settings and program")
         self._in_between = True
         if await self._change(communication=True):
             await self._save("communication")
         self._in_between = False
-
-    async def _download(self, clear: bool) -> None:
-        """Load the program with the user's variables; what was in the drive goes to a backup first.
-
-        `clear`: erase all programs before that, so that none of them stays beside it.
-        """
-        first = (self._clearing,) if clear and self._clearing else ()
-        text = "".join(f"{line}\n" for line in (*first, *self._program.file))
-        name = f"{self._file}#{self._spec.name}"
-        saved = transfers.Wanted(save=True)
-        await transfers.download(self._session, self._drive, name, saved, text)
-        self._done.append("program")
 
     async def _change(self, communication: bool) -> int:
         """Write the settings that differ now, those of communication in their order; return how many."""

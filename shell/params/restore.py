@@ -15,8 +15,7 @@ from typing import TYPE_CHECKING
 from multidrop.dialects import Diagnostic, DriveError, NoAnswer, Refused
 from multidrop.dialects.parameters import COMMUNICATION, IO, PARAMETERS, Change, Permission, Plan, Readings, Value, same
 from multidrop.shell.channel import running, transferring
-from multidrop.shell.params.file import SettingsFile, shown
-from multidrop.shell.params.readings import listed, parameters, read
+from multidrop.shell.params.file import SettingsFile, listed, parameters, read, shown
 
 if TYPE_CHECKING:
     from multidrop.drives.drive import Drive
@@ -56,27 +55,45 @@ class Wanted:
 
 async def restore(session: Session, drive: Drive, file: SettingsFile, options: Options) -> None:
     """Send what differs from a file. Raises Diagnostic or DriveError."""
-    who = session.display_name(drive)
-    _check_product(drive, file, options, who)
+    who, family = session.display_name(drive), parameters(drive)
+    if file.language and file.language != family.language:
+        what = f"has settings of {file.product or 'a drive'} in {file.language}, and {who} has {family.language}"
+        raise Diagnostic(f"{what}; nothing was sent", file.path)
+    if file.product and drive.product and file.product != drive.product and not options.other_product:
+        what = f"has the settings of an {file.product}, and {who} is an {drive.product}; nothing was sent"
+        raise Diagnostic(what, file.path, "--other-product restores what both have")
     present = await read(session, drive, "reading")
     wanted = _wanted(present, file, options, who)
-    plan = _plan(drive, present, wanted, options, file)
-    _check_neighbours(session, drive, plan, file)
+    try:
+        permission = Permission(options.named, options.communication)
+        plan = family.plan(drive.state, present, wanted.values, permission)
+    except Diagnostic as problem:
+        raise Diagnostic(f"{problem.message} (nothing was sent)", problem.where or file.path, problem.hint) from None
+    others = {each.address for each in session.buses[drive.link.name].all_drives if each is not drive}
+    if reason := family.conflict(plan, others - {""}):
+        raise Diagnostic(f"{who}: {reason}; nothing was sent", file.path)
     _show(session, who, plan, wanted)
     if not plan.changes:
         left = wanted.withheld or plan.withheld or plan.impossible
         session.notify(f"{who}: nothing {'else ' if left else ''}differs from {file.path}")
         _check_complete(wanted, who)
         return
-    await _check_ready(session, drive)
+    await check_ready(drive)
     if options.dry_run:
         session.notify(f"{who}: {len(plan)} steps; nothing was sent (--dry-run)")
         return
     await _agree(session, drive, present, plan, file)
     aside = {*wanted.withheld, *dict(plan.withheld), *dict(plan.impossible)}
     goal = {name: value for name, value in wanted.values.items() if name not in aside}
+    session.addressed.add((drive.link.name, drive.address))
     with _accounted(session, who, plan) as written:
-        await _write(session, drive, plan, options, written)
+        with running(session, f"{who}: restore") as progress:
+            for change in plan:  # a step that was named can start motion: an early end then stops the drive's line
+                if change.name in options.named and drive.starts(change.text):
+                    session.starting(drive)
+                await transferring(drive, family.write(drive.state, change))
+                written.append(change)
+                progress(len(written), len(plan))
         await _finish(session, drive, plan, goal, options)
     _check_complete(wanted, who)
 
@@ -86,27 +103,6 @@ def _check_complete(wanted: Wanted, who: str) -> None:
     if wanted.unread:
         names = ", ".join(wanted.unread)
         raise NoAnswer(f"{who}: {names} could not be read and is left alone; restore the file again")
-
-
-def _check_product(drive: Drive, file: SettingsFile, options: Options, who: str) -> None:
-    """Raise Diagnostic for a file of another family or product."""
-    language = parameters(drive).language
-    if file.language and file.language != language:
-        what = f"has settings of {file.product or 'a drive'} in {file.language}, and {who} has {language}"
-        raise Diagnostic(f"{what}; nothing was sent", file.path)
-    if file.product and drive.product and file.product != drive.product and not options.other_product:
-        raise Diagnostic(
-            f"has the settings of an {file.product}, and {who} is an {drive.product}; nothing was sent",
-            file.path,
-            "--other-product restores what both have",
-        )
-
-
-def _check_neighbours(workspace: Workspace, drive: Drive, plan: Plan, file: SettingsFile) -> None:
-    """Raise Diagnostic for an address that another drive of the line has."""
-    others = {each.address for each in workspace.buses[drive.link.name].all_drives if each is not drive}
-    if reason := parameters(drive).conflict(plan, others - {""}):
-        raise Diagnostic(f"{workspace.display_name(drive)}: {reason}; nothing was sent", file.path)
 
 
 def _wanted(present: Readings, file: SettingsFile, options: Options, who: str) -> Wanted:
@@ -128,14 +124,6 @@ def _wanted(present: Readings, file: SettingsFile, options: Options, who: str) -
     return wanted
 
 
-def _plan(drive: Drive, present: Readings, wanted: Wanted, options: Options, file: SettingsFile) -> Plan:
-    permission = Permission(options.named, options.communication)
-    try:
-        return parameters(drive).plan(drive.state, present, wanted.values, permission)
-    except Diagnostic as problem:
-        raise Diagnostic(f"{problem.message} (nothing was sent)", problem.where or file.path, problem.hint) from None
-
-
 def _show(workspace: Workspace, who: str, plan: Plan, wanted: Wanted) -> None:
     """Print the steps, and say which settings are left alone."""
     for change in plan:
@@ -150,7 +138,7 @@ def _show(workspace: Workspace, who: str, plan: Plan, wanted: Wanted) -> None:
         workspace.notify(f"{who}: {name} is left alone: {reason}", warning=True)
 
 
-async def _check_ready(workspace: Workspace, drive: Drive) -> None:
+async def check_ready(drive: Drive) -> None:
     """Raise Refused where the drive is at work."""
     if reason := await transferring(drive, parameters(drive).ready(drive.state)):
         raise Refused(f"{reason} (nothing was sent)")
@@ -165,25 +153,10 @@ async def _agree(workspace: Workspace, drive: Drive, present: Readings, plan: Pl
     )
     if agreed:
         return
-    await _check_ready(workspace, drive)
+    await check_ready(drive)
     again = await read(workspace, drive, "reading again")
     if any(not same(value, again.values.get(name)) for name, value in present.values.items()):
         raise Refused(f"{who}: its settings changed meanwhile; nothing was sent; try again")
-
-
-async def _write(session: Session, drive: Drive, plan: Plan, options: Options, written: list[Change]) -> None:
-    """Send the steps, and note each that is done.
-
-    Only a step that a person has named can start motion: an early end then stops the drive, and with it its line.
-    """
-    session.addressed.add((drive.link.name, drive.address))
-    with running(session, f"{session.display_name(drive)}: restore") as progress:
-        for change in plan:
-            if change.name in options.named and drive.starts(change.text):
-                session.starting(drive)
-            await transferring(drive, parameters(drive).write(drive.state, change))
-            written.append(change)
-            progress(len(written), len(plan))
 
 
 @contextmanager
@@ -193,21 +166,19 @@ def _accounted(workspace: Workspace, who: str, plan: Plan) -> Iterator[list[Chan
     try:
         yield written
     except BaseException as ending:
-        if not isinstance(ending, Unlike):
-            workspace.notify(f"{who}: {_account(plan.changes, len(written))}", warning=True)
+        if isinstance(ending, Unlike):
+            raise
+        done, last = len(written), {change.name: change for change in written}
+        if done == len(plan):
+            account = "all steps are done; reading back or saving was cut off; restore again to make sure"
+        else:
+            temporary = [f"{each.name}={shown(each.after)}" for each in last.values() if each.temporary]
+            held_for_now = f"; for a while it has {', '.join(temporary)}" if temporary else ""
+            names = f": {', '.join(last)}" if last else ""
+            more = f"; {plan.changes[done].text} may be done{held_for_now}; nothing was saved; restore again"
+            account = f"{done} of {len(plan)} steps are done{names}{more}"
+        workspace.notify(f"{who}: {account}", warning=True)
         raise
-
-
-def _account(changes: tuple[Change, ...], done: int) -> str:
-    """What a restore that ended early has done."""
-    written: Mapping[str, Change] = {change.name: change for change in changes[:done]}
-    temporary = [f"{each.name}={shown(each.after)}" for each in written.values() if each.temporary]
-    held_for_now = f"; for a while it has {', '.join(temporary)}" if temporary else ""
-    names = f": {', '.join(written)}" if written else ""
-    if done == len(changes):
-        return "all steps are done; reading back or saving was cut off; restore again to make sure"
-    under_way = f"; {changes[done].text} may be done"
-    return f"{done} of {len(changes)} steps are done{names}{under_way}{held_for_now}; nothing was saved; restore again"
 
 
 async def _finish(workspace: Workspace, drive: Drive, plan: Plan, goal: Mapping[str, Value], options: Options) -> None:

@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Awaitable, Callable, Sequence
+from collections.abc import Awaitable, Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from multidrop.dialects import Diagnostic, DriveError, Stopped
-from multidrop.dialects.parameters import Readings
+from multidrop.dialects.parameters import VARIABLES, Readings, Value, same
 from multidrop.shell import new_file
 from multidrop.shell.channel import transferring
 from multidrop.shell.lines import split_target
 from multidrop.shell.params import file as files
-from multidrop.shell.params import readings
-from multidrop.shell.params.readings import Difference
 from multidrop.shell.params.restore import Options, restore
 from multidrop.transports import TransportLost
 
@@ -25,6 +23,10 @@ if TYPE_CHECKING:
 
 ALL = ("all", "*")
 Work = Callable[["Drive"], Awaitable[None]]
+Difference = tuple[str, Value | None, Value | None]
+"""A name, the value here, and the value there; None where one side has none."""
+OWN_NAME = frozenset({"DN"})
+"""What two drives on one line never share."""
 
 
 def targets(workspace: Workspace, target: str, having: str = "parameters") -> list[Drive]:
@@ -84,17 +86,12 @@ async def each(workspace: Workspace, drives: Sequence[Drive], work: Work) -> Non
             failed[workspace.display_name(drive)] = failure
             workspace.notify(str(failure), bus=drive.link.name, warning=True)
     if failed:
-        raise _summary(failed, len(drives))
-
-
-def _summary(failed: dict[str, DriveError | Diagnostic | TransportLost], count: int) -> Exception:
-    """A failure of the gravest kind: no connection, then a drive, then a file."""
-    rest = "; the others are done" if len(failed) < count else ""
-    text = f"{len(failed)} of {count} drives failed: {', '.join(failed)}{rest}"
-    for kind in (TransportLost, DriveError):
-        if any(isinstance(each, kind) for each in failed.values()):
-            return kind(text)
-    return Diagnostic(text)
+        rest = "; the others are done" if len(failed) < len(drives) else ""
+        text = f"{len(failed)} of {len(drives)} drives failed: {', '.join(failed)}{rest}"
+        for kind in (TransportLost, DriveError):  # of the gravest kind: no connection, then a drive, then a file
+            if any(isinstance(each, kind) for each in failed.values()):
+                raise kind(text)
+        raise Diagnostic(text)
 
 
 async def backup(workspace: Workspace, name: str, target: str) -> None:
@@ -105,10 +102,13 @@ async def backup(workspace: Workspace, name: str, target: str) -> None:
         if is_several(target):
             Path(own).parent.mkdir(parents=True, exist_ok=True)
         new_file.check(own, printed=True)
-        found = await readings.read(workspace, drive, "backup")
-        text = files.formatted(files.identity(drive.state, readings.parameters(drive).language), found)
+        found, who = await files.read(workspace, drive, "backup"), workspace.display_name(drive)
+        text = files.formatted(files.identity(drive.state, files.parameters(drive).language), found)
         new_file.write(own, text, workspace.output)
-        _say_backup(workspace, drive, found, own)
+        workspace.notify(f"{who}: {len(found.readings)} settings{new_file.place(own)}")
+        if found.unread:
+            names = files.listed([name for name, _ in found.unread])
+            workspace.notify(f"{who}: not read: {names}; [unread] in the file has the reasons", warning=True)
 
     await each(workspace, targets(workspace, target), keep)
 
@@ -117,7 +117,7 @@ async def read(workspace: Workspace, target: str) -> None:
     """Read the settings of drives, and say how many there are; screens show them."""
 
     async def count(drive: Drive) -> None:
-        found = await readings.read(workspace, drive, "reading")
+        found = await files.read(workspace, drive, "reading")
         workspace.notify(f"{workspace.display_name(drive)}: {len(found.readings)} settings read")
 
     await each(workspace, targets(workspace, target), count)
@@ -127,7 +127,7 @@ async def save(workspace: Workspace, target: str) -> None:
     """Have drives keep their present settings, after a question. Raises Diagnostic where it is not agreed to."""
 
     async def keep(drive: Drive) -> None:
-        family, who = readings.parameters(drive), workspace.display_name(drive)
+        family, who = files.parameters(drive), workspace.display_name(drive)
         await workspace.confirm(f"'{family.saving}' keeps all present settings over power-off", who)
         await transferring(drive, family.save(drive.state))
         workspace.notify(f"{who}: its settings are saved")
@@ -135,33 +135,32 @@ async def save(workspace: Workspace, target: str) -> None:
     await each(workspace, targets(workspace, target), keep)
 
 
-def _say_backup(workspace: Workspace, drive: Drive, found: Readings, own: str) -> None:
-    who = workspace.display_name(drive)
-    workspace.notify(f"{who}: {len(found.readings)} settings{new_file.place(own)}")
-    if found.unread:
-        names = readings.listed([name for name, _ in found.unread])
-        workspace.notify(f"{who}: not read: {names}; [unread] in the file has the reasons", warning=True)
-
-
 async def diff(
     workspace: Workspace, target: str, *, name: str = "", other: Drive | None = None, as_json: bool = False
 ) -> bool:
     """Print what differs from a file, another drive, or (without both) the defaults; whether anything does."""
     differs = False
-    reference = await readings.read(workspace, other, "reading") if other is not None else None
+    reference = await files.read(workspace, other, "reading") if other is not None else None
+    several = is_several(target)
 
     async def compare(drive: Drive) -> None:
         nonlocal differs
         file = files.load(file_of(workspace, drive, name, target)) if name else None
         _check_language(workspace, drive, file, other)
-        found = await readings.read(workspace, drive, "reading")
-        rows = _differences(workspace, drive, found, file, reference)
+        found, who = await files.read(workspace, drive, "reading"), workspace.display_name(drive)
+        rows = _differences(workspace, who, found, file, reference)
         differs = differs or bool(rows)
         units = {each.name: each.unit for each in found.readings}
-        for row in rows:
-            workspace.output(_line(workspace, drive, row, units, target, as_json))
+        for setting, here, there in rows:
+            if as_json:
+                own = {"drive": who} if several else {}
+                workspace.output(json.dumps({**own, "name": setting, "here": here, "there": there}))
+            else:
+                unit = f" {units[setting]}" if units.get(setting) else ""
+                values = f"here {files.shown(here)}, there {files.shown(there)}{unit}"
+                workspace.output(f"{f'{who}: ' if several else ''}{setting}: {values}")
         if not rows and not as_json:
-            workspace.notify(f"{workspace.display_name(drive)}: nothing differs")
+            workspace.notify(f"{who}: nothing differs")
 
     await each(workspace, targets(workspace, target), compare)
     return differs
@@ -169,39 +168,39 @@ async def diff(
 
 def _check_language(workspace: Workspace, drive: Drive, file: files.SettingsFile | None, other: Drive | None) -> None:
     """Raise Diagnostic for a file or a drive of another family: no setting has the same meaning there."""
-    own = readings.parameters(drive).language
+    own = files.parameters(drive).language
     who = f"{workspace.display_name(drive)} has {own}; their settings cannot be compared"
     if file is not None and file.language and file.language != own:
         raise Diagnostic(f"has settings of {file.product or 'a drive'} in {file.language}, and {who}", file.path)
-    if other is not None and (theirs := readings.parameters(other).language) != own:
+    if other is not None and (theirs := files.parameters(other).language) != own:
         raise Diagnostic(f"{workspace.display_name(other)} has {theirs}, and {who}")
 
 
 def _differences(
-    workspace: Workspace, drive: Drive, found: Readings, file: files.SettingsFile | None, reference: Readings | None
+    workspace: Workspace, who: str, found: Readings, file: files.SettingsFile | None, reference: Readings | None
 ) -> list[Difference]:
-    who = workspace.display_name(drive)
+    """Compare with another drive, with a file and all variables where it has their table, or with the defaults.
+
+    Raises Diagnostic where the defaults are not known.
+    """
+    there: Mapping[str, Value]
     if reference is not None:
-        return readings.from_drive(found, reference)
-    if file is None:
-        return readings.from_defaults(found, who)
-    if aside := readings.not_compared(found, file):
-        workspace.notify(f"{who}: not read, so not compared: {readings.listed(aside)}", warning=True)
-    return readings.from_file(found, file)
-
-
-def _line(
-    workspace: Workspace, drive: Drive, row: Difference, units: dict[str, str], target: str, as_json: bool
-) -> str:
-    name, here, there = row
-    who = workspace.display_name(drive)
-    if as_json:
-        return json.dumps(
-            {**({"drive": who} if is_several(target) else {}), "name": name, "here": here, "there": there}
-        )
-    unit = f" {units[name]}" if units.get(name) else ""
-    own = f"{who}: " if is_several(target) else ""
-    return f"{own}{name}: here {files.shown(here)}, there {files.shown(there)}{unit}"
+        there = reference.values
+        names = [name for name in (found.values | there) if name not in OWN_NAME]
+    elif file is None:
+        there, names = found.defaults, [*found.defaults]
+        if not any(each.default is not None for each in found.readings if each.section != VARIABLES):
+            raise Diagnostic(f"{who}: the defaults of its settings are not known", hint="compare with a file")
+    else:
+        there = file.named
+        aside = [name for name, _ in found.unread if name in there]
+        if aside:
+            workspace.notify(f"{who}: not read, so not compared: {files.listed(aside)}", warning=True)
+        names = [name for name in there if name not in aside]
+        variables = [each.name for each in found.readings if each.section == VARIABLES]
+        names += [name for name in variables if file.has_variables and name not in there]
+    rows = [(name, found.values.get(name), there.get(name)) for name in names]
+    return [each for each in rows if not same(each[1], each[2])]
 
 
 async def restore_each(session: Session, name: str, target: str, options: Options) -> None:

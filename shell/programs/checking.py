@@ -57,9 +57,14 @@ def examine_text(text: str, file: str, personality: str, language: str = "", enc
     named, language = language, language or program_language_of(file)
     source = program_languages()[language].language
     problems = source.check(text, personality)
-    if not named and _mostly_wrong(text, problems) and (other := _other_language(text, language)) is not None:
-        return Checked(file, [other])
-    problems = in_order([*problems, *_refusals(text, file, language, personality, problems)])
+    if not named and len(text) <= LONGEST:
+        lines = sum(bool(line.strip()) for line in split_lines(text))
+        mostly_wrong = 3 * len({each.line for each in errors(problems)}) >= lines > 0
+        if mostly_wrong and (other := _other_language(text, language)) is not None:
+            return Checked(file, [other])
+    refusals = PROGRAMS[language].refusals  # what a simulated drive refuses beyond what the text alone shows
+    more = refusals(text, file, personality, problems) if refusals is not None else []
+    problems = in_order([*problems, *more])
     if errors(problems):
         return Checked(file, problems)
     return Checked(file, problems, f"nothing wrong, {source.measure(text)}", text, source.formatted(text), encoding)
@@ -78,12 +83,6 @@ def ending_of(product: str) -> str:
     return known[(names or list(known))[0]].endings[0]
 
 
-def _mostly_wrong(text: str, problems: Sequence[Problem]) -> bool:
-    """Whether a text no longer than a program has errors in a third of its lines or more."""
-    lines = sum(bool(line.strip()) for line in split_lines(text))
-    return len(text) <= LONGEST and 3 * len({each.line for each in errors(problems)}) >= lines > 0
-
-
 def _other_language(text: str, language: str) -> Problem | None:
     """Report that a text is a correct program of another language; None if it is not."""
     known = program_languages()
@@ -92,12 +91,6 @@ def _other_language(text: str, language: str) -> Problem | None:
             hint = f"name it {' or '.join(other.endings)}, or check it with --language {name}"
             return Problem(1, 1, f"this is {other.title}, not {known[language].title}", hint)
     return None
-
-
-def _refusals(text: str, file: str, language: str, personality: str, found: Sequence[Problem]) -> list[Problem]:
-    """Find what a simulated drive refuses beyond the problems that the text alone shows."""
-    refusals = PROGRAMS[language].refusals
-    return refusals(text, file, personality, found) if refusals is not None else []
 
 
 def rewrite(checked: Checked) -> None:

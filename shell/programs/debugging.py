@@ -8,21 +8,19 @@ times of holds, and forgets them at a stop.
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from multidrop.dialects import Diagnostic, DriveError, Inexpressible, Procedure, Refused
 from multidrop.dialects.debugging import Debugging, Look, Neighbours, Row
 from multidrop.drives.events import Lost
 from multidrop.shell.events import OnBus, Phase, SessionEvent
-from multidrop.shell.program_listing import Listing, Sight, Watched
+from multidrop.shell.program_listing import Listing, Sight
 from multidrop.transports import TransportLost
 
 if TYPE_CHECKING:
     from multidrop.drives.drive import Drive
     from multidrop.shell.session import Session
-    from multidrop.shell.workspace import Workspace
 
 PERIOD = 0.1
 """The time between two looks at a running program, s."""
@@ -61,7 +59,9 @@ class Debugger:
         """Until then a timed H holds the program."""
         self.break_point = ""
         """The place of the break point that this session has set; empty: none."""
-        self._watched = Watched()
+        self._watched: tuple[str, ...] = ()
+        self._values: Mapping[str, str] = {}
+        """The last values of the watched names; a name without one is not there."""
         self._sight = Sight(session, drive)
         self._checks: set[asyncio.Task[None]] = set()
         self._unsubscribe = session.subscribe(self._notice)
@@ -71,9 +71,13 @@ class Debugger:
     async def trace(self, place: str) -> None:
         """Run a program, and show its lines until it ends or comes to its break point."""
         others = [each.address for each in self._session.bus(self._drive.link.name).all_drives]
-        with _annotating(self._session, self._drive.link.name, self._annotated):
+        annotators = self._session.of(self._session.buses[self._drive.link.name]).annotators
+        annotators.append(self._annotated)
+        try:
             await self._start(place, others, self._debugging.trace)
             await self._follow()
+        finally:
+            annotators.remove(self._annotated)
 
     async def begin(self, place: str) -> None:
         """Start a program that waits before each line."""
@@ -227,17 +231,21 @@ class Debugger:
         """Watch variables from now on, and show their values."""
         upper = tuple(dict.fromkeys(name.upper() for name in names))
         self._debugging.names(self._drive.state, upper)
-        self._watched.watch(upper)
+        self._watched, self._values = upper, {}
         if upper:
             shown = await self._changed()
-            absent = f"   not there now: {', '.join(self._watched.missing)}" if self._watched.missing else ""
+            missing = [name for name in upper if name not in self._values]
+            absent = f"   not there now: {', '.join(missing)}" if missing else ""
             self._session.output((shown + absent).strip())
 
     async def _changed(self) -> str:
-        """Read what is watched; return the values that changed, as a person reads them."""
-        if not self._watched.names:
+        """Read what is watched; return the values that changed, as a person reads them, with blanks before."""
+        if not self._watched:
             return ""
-        return self._watched.changed(await self._run(self._debugging.values(self._drive.state, self._watched.names)))
+        values: Mapping[str, str] = await self._run(self._debugging.values(self._drive.state, self._watched))
+        changed = {name: text for name, text in values.items() if self._values.get(name) != text}
+        self._values = values
+        return "".join(f"   {name}={text}" for name, text in changed.items())
 
     # The listing
 
@@ -311,17 +319,6 @@ class Debugger:
         self._session.notify(
             f"{self._session.display_name(self._drive)}: {text}", bus=self._drive.link.name, warning=warning
         )
-
-
-@contextmanager
-def _annotating(workspace: Workspace, bus: str, annotate: Callable[[str], str]) -> Iterator[None]:
-    """Pass the unsolicited lines of a bus through `annotate`."""
-    callbacks = workspace.of(workspace.buses[bus]).annotators
-    callbacks.append(annotate)
-    try:
-        yield
-    finally:
-        callbacks.remove(annotate)
 
 
 def of(session: Session, drive: Drive) -> Debugger:

@@ -33,11 +33,15 @@ class EditedFile:
     def __init__(self, path: str | Path) -> None:
         """Read the file; one that does not exist is empty. Raises Diagnostic."""
         self.path = Path(path)
-        self.encoding, self.newline = "utf-8", "\n"
-        self.mixed = False
-        """The line ends differ; a save makes them one kind."""
         self._data = _content(self.path)
-        self.text = self._decoded(self._data or b"")
+        text, self.encoding = decoded(self._data or b"")
+        if _REAL.keys() & set(map(ord, text)):
+            raise Diagnostic("holds characters of the private area U+F700", str(self.path), "edit it elsewhere")
+        ends = re.findall(_end(text), text)
+        self.newline = max(set(ends), key=ends.count) if ends else "\n"
+        self.mixed = len(set(ends)) > 1
+        """The line ends differ; a save makes them one kind."""
+        self.text = edited(text)
 
     @property
     def new(self) -> bool:
@@ -67,15 +71,6 @@ class EditedFile:
             hint = "nothing was saved" if now is None else "the file is as it was"
             raise Diagnostic(f"cannot be written: {why(problem)}", str(self.path), hint) from None
         self._data, self.text, self.mixed = data, text, False
-
-    def _decoded(self, data: bytes) -> str:
-        text, self.encoding = decoded(data)
-        if _REAL.keys() & set(map(ord, text)):
-            raise Diagnostic("holds characters of the private area U+F700", str(self.path), "edit it elsewhere")
-        ends = re.findall(_end(text), text)
-        self.mixed = len(set(ends)) > 1
-        self.newline = max(set(ends), key=ends.count) if ends else "\n"
-        return edited(text)
 
     def _encoded(self, text: str) -> bytes:
         real = real_text(text)

@@ -31,27 +31,22 @@ class ProgramGrammar:
         self.title = self._files.title
 
     def parts(self, line: str) -> Sequence[Part]:
-        """Return the parts of a line that have a style of their own."""
         return self._files.language.parts(line)
 
     def check(self, text: str, product: str) -> Sequence[Problem]:
         """Return the problems of `multidrop program check`; none for an empty text, which a person has just begun."""
-        from multidrop.shell.programs.checking import (
-            examine_text,
-            personality_of,
-        )  # a screen without an editor needs no simulator
+        # A screen without an editor needs no simulator.
+        from multidrop.shell.programs.checking import examine_text, personality_of
 
         if not text.strip():
             return ()
         return examine_text(text, self._file, personality_of(self.language, product), self._named).problems
 
     def entries(self, text: str) -> Sequence[Entry]:
-        """Return the places at which a program can begin."""
         return self._files.language.entries(text)
 
     @property
     def editing(self) -> EditingLanguage:
-        """Names, help and completion of the language."""
         return self._files.editing
 
     def formatted(self, text: str) -> str:
@@ -99,7 +94,6 @@ class ProgramText:
 
     @cached_property
     def lines(self) -> list[str]:
-        """The lines without their ends."""
         return split_lines(self.text)
 
     @cached_property
@@ -109,12 +103,10 @@ class ProgramText:
 
     @cached_property
     def names(self) -> Sequence[UserName]:
-        """The labels, variables and subroutines."""
         return self._language.names(self.text)
 
     @cached_property
     def outline(self) -> Sequence[Block]:
-        """The parts of the program."""
         return self._language.outline(self.text)
 
     @cached_property
@@ -125,10 +117,6 @@ class ProgramText:
             for place in name.places:
                 found.setdefault(place.line, []).append((place, name))
         return {line: sorted(places, key=lambda each: each[0]) for line, places in found.items()}
-
-    @cached_property
-    def _words(self) -> frozenset[str]:
-        return frozenset(name.word for name in self.names)
 
     def line(self, number: int) -> str:
         """Return a line; an empty one beyond the text."""
@@ -144,7 +132,8 @@ class ProgramText:
     def help_at(self, line: int, column: int) -> Help | None:
         """Return the help on the word at a place, or that ends there: the name of the user's, or the drive's word."""
         found = self.name_at(line, column)
-        words = [each for each in self._language.words(self.line(line), self._words) if each.start <= column]
+        own = frozenset(name.word for name in self.names)
+        words = [each for each in self._language.words(self.line(line), own) if each.start <= column]
         word = next((each for each in reversed(words) if column <= each.stop), None)
         lines = self._described(found[0]) if found is not None else []
         if word is not None:
@@ -204,24 +193,26 @@ class ProgramText:
         yield from _folds(self.outline)
         first: int | None = None
         for number, line in enumerate([*self.lines, ""]):
-            if self._is_remark(line):
+            parts = self.grammar.parts(line) if line.strip() else ()
+            if parts and parts[0].kind == "remark" and not line[: parts[0].start].strip():
                 first = number if first is None else first
             else:
                 if first is not None and first < number - 1:
                     yield Fold(first, number - 1, remarks=True)
                 first = None
 
-    def _is_remark(self, line: str) -> bool:
-        parts = self.grammar.parts(line) if line.strip() else ()
-        return bool(parts) and parts[0].kind == "remark" and not line[: parts[0].start].strip()
-
     def formatted(self, first: int, last: int) -> list[Edit]:
         """Return the edits that give lines their canonical spelling. Raises Diagnostic for a text with errors."""
         if wrong := errors(self.problems):
             count = f"{len(wrong)} errors, the first" if len(wrong) > 1 else "an error"
             raise Diagnostic(f"not formatted: {count} in line {wrong[0].line}: {wrong[0].what}", "", wrong[0].hint)
-        lines = zip(self.lines, split_lines(self.grammar.formatted(self.text)), strict=True)
-        return [_edit(n, old, new) for n, (old, new) in enumerate(lines) if old != new and first <= n <= last]
+        edits, lines = [], zip(self.lines, split_lines(self.grammar.formatted(self.text)), strict=True)
+        for number, (old, new) in enumerate(lines):
+            if old != new and first <= number <= last:  # without what both spellings begin and end with
+                start = len(commonprefix((old, new)))
+                end = min(len(commonprefix((old[::-1], new[::-1]))), min(len(old), len(new)) - start)
+                edits.append(Edit(Span(number, start, len(old) - end), new[start : len(new) - end]))
+        return edits
 
 
 def _folds(blocks: Sequence[Block]) -> Iterator[Fold]:
@@ -229,11 +220,3 @@ def _folds(blocks: Sequence[Block]) -> Iterator[Fold]:
         if block.last > block.place.line:
             yield Fold(block.place.line, block.last)
         yield from _folds(block.parts)
-
-
-def _edit(line: int, old: str, new: str) -> Edit:
-    """Return the edit of a line, without what both spellings begin and end with."""
-    start = len(commonprefix((old, new)))
-    most = min(len(old), len(new)) - start
-    end = min(len(commonprefix((old[::-1], new[::-1]))), most)
-    return Edit(Span(line, start, len(old) - end), new[start : len(new) - end])

@@ -18,13 +18,13 @@ from multidrop.dialects import Diagnostic, DriveError, Refused, SourceLine
 from multidrop.dialects.errors import Differs
 from multidrop.dialects.families import program_languages
 from multidrop.dialects.files import program_text_of
-from multidrop.dialects.program_files import LOCKED, Difference, Held, errors, refuse
+from multidrop.dialects.program_files import LOCKED, Held, errors, refuse
 from multidrop.drives.drive import still
 from multidrop.shell.channel import running, transferring
 from multidrop.shell.events import By, Printed
 from multidrop.shell.program_listing import check_one, read
-from multidrop.shell.state import backups, downloaded_sources
 from multidrop.shell.state.crash_marks import marked
+from multidrop.shell.state.store import Copy, Sources, write_backup
 
 if TYPE_CHECKING:
     from multidrop.drives.drive import Drive
@@ -112,16 +112,30 @@ class _Download:
         self._name = session.display_name(drive)
 
     async def run(self, text: str, lines: Sequence[SourceLine]) -> None:
-        """Do all of it."""
-        start = self._start_line(lines)
-        ends_program = self._programs.size(lines) > 0
-        if ends_program and not self._wanted.only_changed:  # one that prints without a pause lets nothing be listed
+        """Do all of it. Raises Diagnostic for an unknown label to run."""
+        programs, wanted, start = self._programs, self._wanted, ""
+        if wanted.run:
+            try:
+                start = programs.start(lines, wanted.run)
+            except Diagnostic as problem:
+                raise Diagnostic(f"{problem.message} (nothing was sent)", self._file, problem.hint) from None
+        ends_program = programs.size(lines) > 0
+        if ends_program and not wanted.only_changed:  # one that prints without a pause lets nothing be listed
             await self._end_program()
             ends_program = False
         held = await read(self._session, self._drive, "backup", lines)
-        if self._wanted.only_changed and not await self._is_changed(lines, held):
-            await self._use_held(start)
-            return
+        if wanted.only_changed:
+            why = await transferring(self._drive, programs.to_send(self._drive.state, lines, held))
+            more = "the program is not sent again" if wanted.save or wanted.run else "nothing was sent"
+            self._say(f"{self._file} is sent: {why}" if why else f"holds {self._file} already; {more}")
+            if not why:
+                if start:
+                    await self._end_program()
+                if wanted.save:
+                    await self._save(())
+                if start:
+                    await self._start(start)
+                return
         backup = await self._back_up(lines, held)
         port = self._session.of(self._session.buses[self._drive.link.name]).port
         try:
@@ -130,7 +144,7 @@ class _Download:
                     await self._end_program()
                 sent = await self._send(lines, held)
                 await self._save(lines)
-                if self._programs.size(lines) and self._wanted.verify:
+                if programs.size(lines) and wanted.verify:
                     await self._verify(text, lines, sent, held)
         except BaseException:
             self._say(f"what was in it before is in {backup}", warning=True)
@@ -140,31 +154,6 @@ class _Download:
 
     def _say(self, text: str, warning: bool = False) -> None:
         self._session.notify(f"{self._name}: {text}", bus=self._drive.link.name, warning=warning, outcome=True)
-
-    def _start_line(self, lines: Sequence[SourceLine]) -> str:
-        """Return the line that starts the wanted program. Raises Diagnostic for an unknown label."""
-        if not self._wanted.run:
-            return ""
-        try:
-            return self._programs.start(lines, self._wanted.run)
-        except Diagnostic as problem:
-            raise Diagnostic(f"{problem.message} (nothing was sent)", self._file, problem.hint) from None
-
-    async def _is_changed(self, lines: Sequence[SourceLine], held: Held) -> bool:
-        """Whether the file must be sent; publish why, or that the drive holds it."""
-        why = await transferring(self._drive, self._programs.to_send(self._drive.state, lines, held))
-        more = "the program is not sent again" if self._wanted.save or self._wanted.run else "nothing was sent"
-        self._say(f"{self._file} is sent: {why}" if why else f"holds {self._file} already; {more}")
-        return bool(why)
-
-    async def _use_held(self, start: str) -> None:
-        """Save and start the program that the drive holds already, where that is wanted."""
-        if start:
-            await self._end_program()
-        if self._wanted.save:
-            await self._save(())
-        if start:
-            await self._start(start)
 
     async def agree(self, lines: Sequence[SourceLine], by: By) -> None:
         """Ask before lines outside of a program that act: the drive executes them at once. Raises Diagnostic."""
@@ -189,20 +178,21 @@ class _Download:
         """Save what the drive holds. Raises Refused for a locked program that the file would overwrite."""
         if held.locked and self._programs.size(lines):
             raise Refused(f"{self._name}: no backup is possible: {LOCKED} (nothing was sent)")
-        state, workspace = self._drive.state, self._session
+        drive, workspace = self._drive, self._session
+        state, bus, at = drive.state, drive.link.name, workspace.wall(workspace.now())
+        where = f"{bus}, drive {drive.address}" if drive.address else bus
         parts = (state.product, state.version, f"part {state.part}" * bool(state.part), f"serial {state.serial}")
-        backup = backups.Backup(
-            bus=self._drive.link.name,
-            address=self._drive.address,
-            at=workspace.wall(workspace.now()),
-            described="; ".join(each for each in parts[: 3 + bool(state.serial)] if each),
-            remark=self._programs.remark,
-            ending=self._drive.program_files.endings[0],
-            names=held.names,
-            lines=self._programs.file(state, held, True),
-        )
-        path = await asyncio.to_thread(backups.write, workspace.settings.state, backup)
-        workspace.notify(f"backup: {path}", bus=self._drive.link.name, outcome=True)
+        head = [
+            f"multidrop backup of {where}, {at.isoformat(' ', 'seconds')}",
+            "; ".join(each for each in parts[: 3 + bool(state.serial)] if each),
+            *(["names in the drive:", *(f"  {name}" for name in held.names)] if held.names else ["no names"]),
+        ]
+        program = self._programs.file(state, held, True)
+        head += [] if program else ["the drive holds no program and no variable"]
+        text = "".join(f"{line}\n" for line in (*(f"{self._programs.remark} {line}" for line in head), *program))
+        ending = drive.program_files.endings[0]
+        path = await asyncio.to_thread(write_backup, workspace.settings.state, at, bus, drive.address, ending, text)
+        workspace.notify(f"backup: {path}", bus=bus, outcome=True)
         return path
 
     async def _end_program(self) -> None:
@@ -261,31 +251,24 @@ class _Download:
             return
         found = self._programs.differences(self._drive.state, sent, held, before)
         for each in found[:MOST]:
-            self._session.notify(self._difference(each), warning=True)
+            where = f"{self._file}:{each.number}" if each.number else self._file
+            here = f"here '{each.here}'" if each.here else "here no line"
+            line = f"'{each.there}' at {each.at}" if each.at is not None else "no line"
+            self._session.notify(f"{where}: {here}, in {self._name} {line}", warning=True)
         if found:
             count = f"{len(found)} lines differ" if len(found) > 1 else "1 line differs"
             raise Differs(f"{self._name}: {count} from {self._file}; download it again")
         size = self._programs.size(lines)
         self._say(f"verified, {size} lines")
-        if (
-            size == len(held.lines)
-            and text.split() != " ".join(self._programs.file(self._drive.state, held, True)).split()
-        ):
+        plain = " ".join(self._programs.file(self._drive.state, held, True))
+        if size == len(held.lines) and text.split() != plain.split():
             workspace = self._session
             at = workspace.wall(workspace.now()).isoformat(" ", "seconds")
-            downloaded_sources.remember(workspace.settings.state, held, downloaded_sources.Source(self._file, text, at))
-
-    def _difference(self, each: Difference) -> str:
-        """Describe a line that differs: here in the file, there in the drive."""
-        where = f"{self._file}:{each.number}" if each.number else self._file
-        here = f"here '{each.here}'" if each.here else "here no line"
-        there = f"in {self._name} '{each.there}' at {each.at}" if each.at is not None else f"in {self._name} no line"
-        return f"{where}: {here}, {there}"
+            Sources(workspace.settings.state).keep(held, Copy(self._file, text, at))
 
     async def _start(self, line: str) -> None:
-        """Execute the program that was wanted."""
         drive, workspace = self._drive, self._session
-        self._session.starting(drive)
+        workspace.starting(drive)
         for text in await drive.send(line):
             workspace.publish(Printed(workspace.now(), drive.link.name, drive.address, text))
         self._say(f"started ({line})")

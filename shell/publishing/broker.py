@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any
 from multidrop.dialects import Diagnostic
 from multidrop.dialects.files import why
 from multidrop.dialects.on_demand import importing
-from multidrop.shell.connect.settings_tables import MqttSettings
+from multidrop.shell.connect.settings import MqttSettings
 from multidrop.shell.publishing.backlog import Message
 from multidrop.shell.publishing.target import Target
 from multidrop.shell.threads import in_thread

@@ -23,7 +23,7 @@ from multidrop.shell.streams.stdout import report, write
 
 if TYPE_CHECKING:
     from multidrop.drives.bus import Bus
-    from multidrop.shell.connect.settings_tables import MqttSettings
+    from multidrop.shell.connect.settings import MqttSettings
     from multidrop.shell.session import Session
     from multidrop.shell.workspace import Workspace
     from multidrop.transports import TransportLost

@@ -16,10 +16,9 @@ from multidrop.dialects import Diagnostic, DriveError, Stopped
 from multidrop.drives.drive import Drive
 from multidrop.macros import checked_values, fill
 from multidrop.shell import waits
-from multidrop.shell.channel import PERIOD, Channel
-from multidrop.shell.events import FAILURES, By, Failed, Progressed
+from multidrop.shell.events import FAILURES, By, Failed
 from multidrop.shell.lines import join_target, pinned, split_target
-from multidrop.shell.playing import Playing, cast, played_by
+from multidrop.shell.playing import Playing, StepProgress, cast, played_by
 from multidrop.shell.scripts import words
 from multidrop.shell.scripts.captured_prints import Hearing
 from multidrop.shell.scripts.expression import (
@@ -48,44 +47,6 @@ from multidrop.shell.scripts.model import (
 from multidrop.shell.scripts.planning import bind
 from multidrop.shell.session import Session
 from multidrop.shell.workspace import LATCHED, Workspace
-
-
-class StepProgress:
-    """Shows the step that is under way. The last one of a fast row is shown too: it may last."""
-
-    def __init__(self, channel: Channel, playing: Playing) -> None:
-        self._channel = channel
-        self._playing = playing
-        self._text = ""
-        self._shown_at = float("-inf")
-        self._timer: asyncio.TimerHandle | None = None
-
-    def begins(self, step: int, line: str) -> None:
-        """Take the beginning of a step."""
-        self._playing.step = step
-        self._text = f"{self._playing.name}, {self._playing.at}: {line}"
-        late = self._shown_at + PERIOD - self._channel.now()
-        if late <= 0:
-            self.show()
-        elif self._timer is None:
-            self._timer = asyncio.get_running_loop().call_later(late, self.show)
-
-    def show(self) -> None:
-        self._cancel()
-        if self._text:
-            self._shown_at = self._channel.now()
-            self._channel.publish(Progressed(self._shown_at, self._text, 0, 1))
-
-    def end(self) -> None:
-        """Publish the end, if anything was published."""
-        self._cancel()
-        if self._shown_at > float("-inf"):
-            self._channel.publish(Progressed(self._channel.now(), self._text, 1, 1, 0.0))
-
-    def _cancel(self) -> None:
-        if self._timer is not None:
-            self._timer.cancel()
-            self._timer = None
 
 
 class Place:

@@ -10,7 +10,7 @@ from typing import Any, cast
 
 from multidrop.dialects import StopPiece
 from multidrop.shell.connect.opening import OpenedPort
-from multidrop.shell.connect.reconnect import FIRST, GLANCE, LONGEST, Absent
+from multidrop.shell.connect.reconnect import FIRST, next_pause
 from multidrop.shell.sharing.actions import Action, Close, Purge, Say, Send, Set, Stop, Write
 from multidrop.shell.sharing.exchange import NEVER, NOT_REACHED, Exchange
 from multidrop.shell.sharing.stop_bytes import StopBytes
@@ -219,10 +219,8 @@ class SharedPort:
             await asyncio.sleep(pause)
             try:
                 self._transport = await self._port.reopen(self._transport)
-            except Absent:
-                pause = min(2 * pause, GLANCE)
-            except TransportLost:
-                pause = min(2 * pause, LONGEST)
+            except TransportLost as failure:
+                pause = next_pause(pause, failure)
             else:
                 self._loss, self._purged = None, 0
         self._transport.start(self._received, self._broke)

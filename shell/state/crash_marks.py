@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 import contextlib
-import json
 import os
 import sys
 from collections.abc import Iterable, Iterator
 from datetime import datetime
 from pathlib import Path
+from typing import Any
 from urllib.parse import quote
 
-from multidrop.macros.atomic import write_atomically
-
-FOLDER = "unfinished"
+from multidrop.shell.state.store import Store
 
 
 @contextlib.contextmanager
@@ -44,35 +42,37 @@ def playing(state: Path, ports: Iterable[str], macro: str, begun: datetime) -> I
 @contextlib.contextmanager
 def _mark(state: Path, port: str, name: str, text: str) -> Iterator[None]:
     """Keep a mark in the folder of a port. A disk that is full costs the mark, and ends nothing."""
-    path = _folder(state, port) / f"{name}.json"
+    marks = _marks(state, port)
     if port:
         with contextlib.suppress(OSError):
-            write_atomically(path, json.dumps({"pid": os.getpid(), "text": text}).encode(), 0o600)
+            marks.write(f"{name}.json", {"pid": os.getpid(), "text": text})
     try:
         yield
     finally:
         if port:
-            with contextlib.suppress(OSError):
-                path.unlink()
+            marks.forget(f"{name}.json")
 
 
 def left(state: Path, port: str) -> list[str]:
     """Return what killed sessions on a port have left, a line each, and forget it."""
     if not port:
         return []
-    found = []
-    for path in sorted(_folder(state, port).glob("*.json")):
-        with contextlib.suppress(OSError, ValueError, TypeError, KeyError, RecursionError):
-            mark = json.loads(path.read_text(encoding="utf-8"))
-            if _runs(int(mark["pid"])):
-                continue
-            path.unlink()
-            found.append(str(mark["text"]))
+
+    def parse(mark: Any) -> tuple[int, str]:
+        return int(mark["pid"]), str(mark["text"])
+
+    marks, found = _marks(state, port), []
+    for path in sorted(marks.folder.glob("*.json")):
+        mark = marks.find(path.name, parse)
+        if mark is not None and not _runs(mark[0]):
+            with contextlib.suppress(OSError):
+                path.unlink()
+                found.append(mark[1])
     return found
 
 
-def _folder(state: Path, port: str) -> Path:
-    return state / FOLDER / quote(port, safe="")[:100]
+def _marks(state: Path, port: str) -> Store:
+    return Store(state / "unfinished" / quote(port, safe="")[:100])
 
 
 def _runs(pid: int) -> bool:

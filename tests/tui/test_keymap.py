@@ -5,7 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from textual.binding import Binding
 
-from multidrop.shell.connect.settings_tables import Look
+from multidrop.shell.connect.settings import Look
 from multidrop.tui.app import MultidropApp, bindings
 from multidrop.tui.keymap import keymap, read_key
 from multidrop.tui.screens.all_drives import AllDrives

@@ -12,7 +12,7 @@ from textual import events
 from textual.pilot import Pilot
 
 from multidrop.shell.events import Phase, ProgramRead, ProgramSeen
-from multidrop.shell.state.drafts import Draft, Drafts
+from multidrop.shell.state.store import Copy, Drafts
 from multidrop.tui.app import MultidropApp
 from multidrop.tui.screens.dialogs import Confirm, Search
 from multidrop.tui.screens.program import ProgramPage
@@ -162,7 +162,7 @@ async def test_the_end_of_the_app_keeps_a_copy_of_the_last_keys(folder: Path, mo
 
 
 async def test_a_copy_of_an_earlier_session_is_offered(folder: Path) -> None:
-    Drafts(folder / "state").keep(Draft("a.mxt", "' of yesterday\n", "2026-11-21 22:10"))
+    Drafts(folder / "state").keep(Copy("a.mxt", "' of yesterday\n", "2026-11-21 22:10"))
     async with page(folder, file="") as pilot:
         typed(pilot, "a.mxt", "enter")
         await asked(pilot)

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from multidrop.dialects import Diagnostic
-from multidrop.shell.state import port_state
+from multidrop.shell.state import store
 from multidrop.transports import Unreachable
 from multidrop.transports.serial_ports import holder
 from multidrop.tui.app import MultidropApp
@@ -127,15 +127,15 @@ async def test_the_url_of_a_port_can_be_edited() -> None:
 
 
 def test_what_was_opened_last_is_kept_newest_first(tmp_path: Path) -> None:
-    assert port_state.lately(tmp_path / "none") == []
-    for url in ("a", "b", "a", *map(str, range(port_state.MOST_OPENED))):
-        port_state.note(tmp_path, url)
-    assert [each.url for each in port_state.lately(tmp_path)][:2] == ["11", "10"]
-    assert len(port_state.lately(tmp_path)) == port_state.MOST_OPENED
+    assert store.lately(tmp_path / "none") == []
+    for url in ("a", "b", "a", *map(str, range(store.MOST_OPENED))):
+        store.note(tmp_path, url)
+    assert [each.url for each in store.lately(tmp_path)][:2] == ["11", "10"]
+    assert len(store.lately(tmp_path)) == store.MOST_OPENED
     (tmp_path / "opened.json").write_text("[")
-    assert port_state.lately(tmp_path) == []
-    port_state.note(tmp_path, "b")
-    assert [each.url for each in port_state.lately(tmp_path)] == ["b"]
+    assert store.lately(tmp_path) == []
+    store.note(tmp_path, "b")
+    assert [each.url for each in store.lately(tmp_path)] == ["b"]
 
 
 def test_the_holder_of_a_port_is_found_by_its_lock_file_or_its_open_file(tmp_path: Path) -> None:

@@ -6,7 +6,7 @@ from multidrop.dialects import Diagnostic, Hints
 from multidrop.shell.connect.opening import port_name
 from multidrop.shell.connect.settings import SavedConnection
 from multidrop.shell.connect.urls import KEYS, SCHEMES, parse
-from multidrop.shell.finding.found_drives import port_of
+from multidrop.shell.finding.scanning import port_of
 
 
 @pytest.mark.parametrize(

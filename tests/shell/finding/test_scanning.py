@@ -7,8 +7,7 @@ import pytest
 from multidrop.dialects import Diagnostic, Stopped
 from multidrop.dialects.state import Remembered
 from multidrop.shell.connect.urls import parse
-from multidrop.shell.finding.found_drives import url_of
-from multidrop.shell.finding.scanning import NothingFound, Scanning
+from multidrop.shell.finding.scanning import NothingFound, Scanning, url_of
 from multidrop.shell.state.port_state import PortState
 from multidrop.transports import TransportLost
 from tests.support.cell_session import CellSession, bus, party, pmx

@@ -12,8 +12,7 @@ from hypothesis import strategies as st
 
 from multidrop.dialects import Diagnostic, Priority
 from multidrop.drives.events import Ended, Sent, Traffic, Unsolicited
-from multidrop.shell.connect.settings import Settings, parse
-from multidrop.shell.connect.settings_tables import LogSettings
+from multidrop.shell.connect.settings import LogSettings, Settings, parse
 from multidrop.shell.events import By, Entered, Failed, Notified, OnBus, Output, Printed, StateChanged
 from multidrop.shell.log import disk, files
 from multidrop.shell.log.entries import KINDS, TRAFFIC, Entry, entry_of, line_of

@@ -13,7 +13,7 @@ from multidrop.shell.connect.settings import Settings
 from multidrop.shell.events import Notified, OnBus, Output
 from multidrop.shell.params import file as files
 from multidrop.shell.params import restore
-from multidrop.shell.params.readings import read
+from multidrop.shell.params.file import read
 from multidrop.shell.session import Session
 from multidrop.transports import TransportLost
 

@@ -12,6 +12,7 @@ from multidrop.dialects import Diagnostic, DriveError, Refused, Stopped
 from multidrop.drives.events import Traffic
 from multidrop.shell import snapshots
 from multidrop.shell.params import replacement
+from multidrop.shell.params.restore import Options
 from multidrop.simulator import cells
 from multidrop.transports import TransportLost
 from tests.support.cell_session import CellSession, bus
@@ -56,7 +57,7 @@ async def applied(cell: CellSession, folder: Path, source: str = "b", **wanted: 
     cell.session.agreed = True
     drive = cell.session.drive()
     spec = replacement.chosen(machine, "machine.toml", drive, source)
-    asked = replacement.Wanted(**wanted)  # type: ignore[arg-type]
+    asked = Options(**wanted)  # type: ignore[arg-type]
     await replacement.apply(cell.session, drive, "machine.toml", spec, asked)
 
 
@@ -88,7 +89,7 @@ async def test_a_second_run_only_saves_as_no_drive_tells_what_is_saved(tmp_path)
 
 async def test_a_dry_run_shows_it_and_sends_nothing(tmp_path):
     async with CellSession(tmp_path, unit(OTHER)) as cell:
-        await applied(cell, tmp_path, dry=True)
+        await applied(cell, tmp_path, dry_run=True)
         assert cell.session.drive().commands == 0
         assert "line: VM=400000 (was 500000)" in cell.printed()
         assert 'line: DN="b" (was "!"), at the end' in cell.printed()
@@ -103,7 +104,7 @@ async def test_without_a_yes_nothing_is_sent(tmp_path):
         spec = replacement.chosen(cells.load(tmp_path / "machine.toml"), "m", drive, "b")
         cell.session.agreed = False
         with pytest.raises(Diagnostic, match="nothing was sent; --yes agrees to it"):
-            await replacement.apply(cell.session, drive, "m", spec, replacement.Wanted())
+            await replacement.apply(cell.session, drive, "m", spec, Options())
         assert drive.commands == 0
 
 
@@ -141,9 +142,9 @@ async def test_what_could_move_the_motor_is_left_alone_and_said(tmp_path):
         drive = cell.session.drive()
         spec = replacement.chosen(cells.load(tmp_path / "m.toml"), "m.toml", drive, "b")
         with pytest.raises(DriveError, match="is not as 'b' in m.toml: AS 0, in the file 1"):
-            await replacement.apply(cell.session, drive, "m.toml", spec, replacement.Wanted())
+            await replacement.apply(cell.session, drive, "m.toml", spec, Options())
         assert any("AS is left alone: it can turn the motor" in line for line in cell.printed())
-        await replacement.apply(cell.session, drive, "m.toml", spec, replacement.Wanted(named=frozenset({"AS"})))
+        await replacement.apply(cell.session, drive, "m.toml", spec, Options(named=frozenset({"AS"})))
 
 
 @pytest.mark.slow
@@ -215,7 +216,7 @@ async def becomes(folder: Path, machine: str, present: str, name: str, **named: 
     cell.session.agreed = True
     drive = cell.session.drive()
     spec = replacement.chosen(cells.load(folder / "machine.toml"), "machine.toml", drive, name)
-    asked = replacement.Wanted(**named)  # type: ignore[arg-type]
+    asked = Options(**named)  # type: ignore[arg-type]
     await replacement.apply(cell.session, drive, "machine.toml", spec, asked)
     return cell
 

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from multidrop.dialects import Diagnostic
 from multidrop.shell.programs.edited_file import ChangedMeanwhile, EditedFile, edited, real_text
-from multidrop.shell.state.drafts import Draft, Drafts
+from multidrop.shell.state.store import Copy, Drafts
 
 
 @pytest.mark.parametrize(
@@ -116,8 +116,8 @@ def test_a_read_only_file_is_left(tmp_path: Path) -> None:
 def test_a_draft_is_found_again_until_it_is_forgotten(tmp_path: Path) -> None:
     drafts, file = Drafts(tmp_path), str(tmp_path / "a.mxt")
     assert drafts.find(file) is None
-    drafts.keep(Draft(file, "MR 5\n", "12:40"))
-    assert Drafts(tmp_path).find(file) == Draft(file, "MR 5\n", "12:40")
+    drafts.keep(Copy(file, "MR 5\n", "12:40"))
+    assert Drafts(tmp_path).find(file) == Copy(file, "MR 5\n", "12:40")
     drafts.forget(file)
     drafts.forget(file)
     assert drafts.find(file) is None
@@ -125,9 +125,9 @@ def test_a_draft_is_found_again_until_it_is_forgotten(tmp_path: Path) -> None:
 
 def test_a_damaged_draft_is_none_and_a_full_disk_is_a_diagnostic(tmp_path: Path) -> None:
     drafts, file = Drafts(tmp_path), "a.mxt"
-    drafts.keep(Draft(file, "x", "12:40"))
+    drafts.keep(Copy(file, "x", "12:40"))
     next((tmp_path / "drafts").iterdir()).write_text("{")
     assert drafts.find(file) is None
     (tmp_path / "other").write_text("a file, no folder")
     with pytest.raises(Diagnostic, match="no copy"):
-        Drafts(tmp_path / "other").keep(Draft(file, "x", "12:40"))
+        Drafts(tmp_path / "other").keep(Copy(file, "x", "12:40"))

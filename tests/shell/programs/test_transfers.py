@@ -8,7 +8,7 @@ import pytest
 
 from multidrop.dialects import Diagnostic
 from multidrop.shell.events import Progressed
-from multidrop.shell.state import backups
+from multidrop.shell.state.store import write_backup
 from tests.support.cell_session import bus, pmx
 from tests.support.transfers import FILE, LISTED, LONG, SLOW, kept, load, shop_with
 from tests.support.virtual import in_virtual_time
@@ -63,8 +63,8 @@ async def test_an_empty_drive_has_a_backup_too_and_none_replaces_another(tmp_pat
 def test_a_backup_never_takes_the_name_of_another(tmp_path: Path) -> None:
     from datetime import UTC, datetime
 
-    made = backups.Backup("bus/x", "a", datetime(2026, 11, 22, 10, 5, 37, tzinfo=UTC), "LMDCM", "'", ".mxt", (), ())
-    names = [backups.write(tmp_path, made).name for _ in range(3)]
+    at = datetime(2026, 11, 22, 10, 5, 37, tzinfo=UTC)
+    names = [write_backup(tmp_path, at, "bus/x", "a", ".mxt", "' LMDCM\n").name for _ in range(3)]
     assert names == [f"2026-11-22-100537-bus%2Fx-a{more}.mxt" for more in ("", "-2", "-3")]
 
 

@@ -16,7 +16,7 @@ from multidrop.dialects import Diagnostic
 from multidrop.dialects.values import UNREAD, Conditions
 from multidrop.drives.events import Conditioned, Sample
 from multidrop.shell.connect import settings
-from multidrop.shell.connect.settings_tables import MqttSettings
+from multidrop.shell.connect.settings import MqttSettings
 from multidrop.shell.log.entries import Entry
 from multidrop.shell.publishing import messages
 from multidrop.shell.publishing.backlog import Backlog, Message
