@@ -15,9 +15,8 @@ from multidrop.shell import new_file, program_listing, stop_report, waits
 from multidrop.shell.events import By
 from multidrop.shell.lines import join_target
 from multidrop.shell.params import file as files
-from multidrop.shell.params import readings
-from multidrop.shell.params.readings import Difference
 from multidrop.shell.params.restore import Options, restore
+from multidrop.shell.params.work import Difference, differences
 from multidrop.shell.programs import transfers
 from multidrop.shell.programs.transfers import Wanted
 from multidrop.shell.scripts.execution import ask
@@ -87,13 +86,13 @@ class AsyncParameters:
     async def read(self) -> Readings:
         """Read every setting: `.values` by name, `.defaults`, and each with its unit in `.readings`."""
         shell = self._calls.shell
-        return await self._calls.run(lambda: readings.read(shell, self._drive, "reading"))
+        return await self._calls.run(lambda: files.read(shell, self._drive, "reading"))
 
     async def backup(self, file: str) -> Readings:
         """Read every setting, and write them to a new file. Raises Diagnostic for a file that exists."""
         new_file.check(file)
         found = await self.read()
-        identity = files.identity(self._drive.state, readings.parameters(self._drive).language)
+        identity = files.identity(self._drive.state, files.parameters(self._drive).language)
         new_file.write(file, files.formatted(identity, found))
         return found
 
@@ -101,9 +100,7 @@ class AsyncParameters:
         """Compare with a file, or without one with the defaults: (name, value here, value there)."""
         there = files.load(file) if file else None
         found = await self.read()
-        if there is None:
-            return readings.from_defaults(found, self._calls.shell.display_name(self._drive))
-        return readings.from_file(found, there)
+        return differences(found, there, self._calls.shell.display_name(self._drive))
 
     async def restore(
         self,

@@ -148,7 +148,9 @@ async def diff(
         file = files.load(file_of(workspace, drive, name, target)) if name else None
         _check_language(workspace, drive, file, other)
         found, who = await files.read(workspace, drive, "reading"), workspace.display_name(drive)
-        rows = _differences(workspace, who, found, file, reference)
+        if file is not None and (aside := [name for name, _ in found.unread if name in file.named]):
+            workspace.notify(f"{who}: not read, so not compared: {files.listed(aside)}", warning=True)
+        rows = differences(found, file if reference is None else reference, who)
         differs = differs or bool(rows)
         units = {each.name: each.unit for each in found.readings}
         for setting, here, there in rows:
@@ -176,29 +178,24 @@ def _check_language(workspace: Workspace, drive: Drive, file: files.SettingsFile
         raise Diagnostic(f"{workspace.display_name(other)} has {theirs}, and {who}")
 
 
-def _differences(
-    workspace: Workspace, who: str, found: Readings, file: files.SettingsFile | None, reference: Readings | None
-) -> list[Difference]:
-    """Compare with another drive, with a file and all variables where it has their table, or with the defaults.
+def differences(found: Readings, other: files.SettingsFile | Readings | None, who: str) -> list[Difference]:
+    """Compare with a file, and all variables where it has their table; with another drive; or with the defaults.
 
     Raises Diagnostic where the defaults are not known.
     """
     there: Mapping[str, Value]
-    if reference is not None:
-        there = reference.values
-        names = [name for name in (found.values | there) if name not in OWN_NAME]
-    elif file is None:
+    if other is None:
         there, names = found.defaults, [*found.defaults]
         if not any(each.default is not None for each in found.readings if each.section != VARIABLES):
             raise Diagnostic(f"{who}: the defaults of its settings are not known", hint="compare with a file")
+    elif isinstance(other, Readings):
+        there = other.values
+        names = [name for name in (found.values | there) if name not in OWN_NAME]
     else:
-        there = file.named
-        aside = [name for name, _ in found.unread if name in there]
-        if aside:
-            workspace.notify(f"{who}: not read, so not compared: {files.listed(aside)}", warning=True)
-        names = [name for name in there if name not in aside]
-        variables = [each.name for each in found.readings if each.section == VARIABLES]
-        names += [name for name in variables if file.has_variables and name not in there]
+        there, unread = other.named, {name for name, _ in found.unread}
+        names = [name for name in there if name not in unread]
+        if other.has_variables:
+            names += [each.name for each in found.readings if each.section == VARIABLES and each.name not in there]
     rows = [(name, found.values.get(name), there.get(name)) for name in names]
     return [each for each in rows if not same(each[1], each[2])]
 

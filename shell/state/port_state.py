@@ -82,9 +82,9 @@ class PortMemory:
         if set(drives) != set(self.drives) or baud != self.baud:
             self.drives, self.baud = drives, baud
             if self._store.folder.is_dir():
-                kept = {"baud": baud, "drives": list(map(asdict, drives))}
                 with contextlib.suppress(OSError):
-                    self._store.write(self._name, kept, 1, synced=False)
+                    content = {"baud": baud, "drives": list(map(asdict, drives))}
+                    self._store.write(self._name, content, 1, synced=False)
 
 
 def _row(kind: type[Row], row: object, **kinds: type) -> Row:
