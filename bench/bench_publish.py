@@ -29,10 +29,8 @@ from report import Row, compared, main
 from sim_process import ROOT, all_served, busy
 
 from multidrop.shell.connect.settings import MqttSettings
-from multidrop.shell.publishing.backlog import Backlog, Message
-from multidrop.shell.publishing.broker import WINDOW, Connection
-from multidrop.shell.publishing.publisher import Publisher
-from multidrop.shell.publishing.target import parse_target
+from multidrop.shell.publishing.broker import WINDOW, Connection, Message, parse_target
+from multidrop.shell.publishing.publisher import Backlog, Publisher
 
 MOSQUITTO = shutil.which("mosquitto", path=f"{os.environ.get('PATH', '')}:/usr/sbin") or ""
 NAMES = "abc"

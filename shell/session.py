@@ -25,7 +25,7 @@ from multidrop.shell.lines import EVERYONE, DriveLine, TypedLine, VerbLine, join
 from multidrop.shell.openings import Openings
 from multidrop.shell.operations.table import find
 from multidrop.shell.playing import played_by
-from multidrop.shell.twins import Twins
+from multidrop.shell.twins.twins import Twins
 from multidrop.shell.waits import in_motion
 from multidrop.shell.workspace import LATCHED, Workspace
 

@@ -7,6 +7,9 @@ import signal
 import sys
 import threading
 from collections.abc import Iterator
+from contextlib import contextmanager
+from types import FrameType
+from typing import Any
 
 
 def _existing(*names: str) -> tuple[signal.Signals, ...]:
@@ -58,3 +61,38 @@ def _pipe_taken() -> Iterator[None]:
         signal.pthread_kill(taker.ident or 0, signal.SIGPIPE)
         taker.join()
         signal.pthread_sigmask(signal.SIG_SETMASK, mask)
+
+
+class Interruption:
+    """Takes the signals within its block, in the main thread. Those that come outside of `open` wait for it."""
+
+    def __init__(self) -> None:
+        self.came = False
+        self._open = False
+        self._before: dict[int, Any] = {}
+
+    def __enter__(self) -> Interruption:
+        if threading.current_thread() is threading.main_thread():
+            self._before = {each: signal.signal(each, self._take) for each in SIGNALS}
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        for each, handler in self._before.items():
+            signal.signal(each, handler)
+
+    @contextmanager
+    def open(self) -> Iterator[None]:
+        """Raise KeyboardInterrupt for a signal, within this block."""
+        self._open = True
+        try:
+            if self.came:
+                raise KeyboardInterrupt
+            yield
+        finally:
+            self._open = False
+
+    def _take(self, number: int, frame: FrameType | None) -> None:
+        self.came = True
+        if self._open:
+            self._open = False
+            raise KeyboardInterrupt

@@ -25,7 +25,7 @@ from multidrop.dialects import Diagnostic
 from multidrop.macros import MacroStore
 from multidrop.shell.connect.settings import Settings
 from multidrop.shell.events import Notified
-from multidrop.shell.log.entries import entry_of
+from multidrop.shell.log.files import entry_of
 from multidrop.shell.prompt.typed_lines import History
 from multidrop.shell.session import Session
 from multidrop.simulator import cells

@@ -250,7 +250,7 @@ def _series(entity: str, twin: bool) -> tuple[str, str, str] | None:
 
     `twin`: of `/BUS/ADDRESS/AXIS/twin/position`.
     """
-    from multidrop.shell.plots.layout import TWIN
+    from multidrop.shell.plots.sink import TWIN
 
     *parts, what = entity.strip("/").replace("\\", "").split("/")
     of_twin = len(parts) > 1 and parts[-1] == TWIN

@@ -1,30 +1,44 @@
-"""`multidrop log show|follow|grep|replay`: session logs for people and programs, and taken again."""
+r"""`multidrop log show|follow|grep|replay`: session logs as text, searched, followed, and taken again.
+
+2026-11-22 12:41:06.020 >  press:b PR P
+2026-11-22 12:41:06.020 >> press:b bPR P\n
+"""
 
 from __future__ import annotations
 
 import argparse
+import os
 import re
 import sys
-from collections.abc import Callable, Iterable
+import time
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import replace as replaced
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from multidrop.dialects import Diagnostic
+from multidrop.dialects.text import visible
 from multidrop.shell.connect import settings
+from multidrop.shell.lines import join_target
 from multidrop.shell.log import files, steps
-from multidrop.shell.log import show as showing
-from multidrop.shell.log.entries import Entry
-from multidrop.shell.log.files import Line
+from multidrop.shell.log.files import KINDS, TRAFFIC, Entry, Line
+from multidrop.shell.raw import text_of
 from multidrop.shell.streams.stdout import lose, write
 
 if TYPE_CHECKING:
     from multidrop.shell.session import Session
 
 NOTHING_FOUND = 1
+PERIOD = 0.1
+"""The time between two looks at a log that is followed, s."""
+LONGEST = 200
+"""The bytes in one line, where no end of line came."""
+LAST = 10
+"""The entries before the end with which following begins."""
 
 
 def show(chosen: argparse.Namespace) -> int:
-    return _reported(lambda: _print(showing.whole(_path(chosen)), chosen, _wanted(chosen)))
+    return _reported(lambda: _print(files.whole(_path(chosen)), chosen, _wanted(chosen)))
 
 
 def grep(chosen: argparse.Namespace) -> int:
@@ -38,23 +52,31 @@ def grep(chosen: argparse.Namespace) -> int:
 
     def counted(entry: Entry) -> bool:
         nonlocal found
-        matches = wanted(entry) and showing.matches(entry, pattern)
+        matches = wanted(entry) and pattern.search(text(entry)) is not None
         found += matches
         return matches
 
-    code = _reported(lambda: _print(showing.whole(_path(chosen)), chosen, counted))
+    code = _reported(lambda: _print(files.whole(_path(chosen)), chosen, counted))
     return code or (0 if found else NOTHING_FOUND)
 
 
 def follow(chosen: argparse.Namespace) -> int:
+    """Print the last lines of a log, and then what is added, until interrupted."""
     wanted = _wanted(chosen)
 
     def put(lines: Iterable[Line]) -> None:
-        for line in lines if chosen.json else showing.joined(lines):
+        for line in lines if chosen.json else joined(lines):
             _put(line, chosen, wanted)
 
+    def work() -> None:
+        following = Following(_path(chosen))
+        put(list(following.look())[-LAST:])
+        while True:
+            time.sleep(PERIOD)
+            put(following.look())
+
     try:
-        return _reported(lambda: showing.follow(_path(chosen), put))
+        return _reported(work)
     except KeyboardInterrupt:
         return 0
 
@@ -105,7 +127,7 @@ def _wanted(chosen: argparse.Namespace) -> Callable[[Entry], bool]:
 def _print(lines: Iterable[Line], chosen: argparse.Namespace, wanted: Callable[[Entry], bool]) -> None:
     """Print the entries; report the lines that are none. Raises Diagnostic for a file without an entry."""
     known, wrong = 0, ""
-    for line in lines if chosen.json else showing.joined(lines):
+    for line in lines if chosen.json else joined(lines):
         known += line.entry is not None
         wrong = wrong or ("" if line.entry else line.where)
         if known:
@@ -119,6 +141,81 @@ def _put(line: Line, chosen: argparse.Namespace, wanted: Callable[[Entry], bool]
         if line.data.strip():
             write(sys.stderr, f"{line.where}: not a whole entry: {line.data[:80]!r}")
     elif wanted(line.entry):
-        text = line.data.decode().rstrip("\n") if chosen.json else showing.text(line.entry)
-        sys.stdout.write(text.encode(encoding := sys.stdout.encoding, "backslashreplace").decode(encoding) + "\n")
+        shown = line.data.decode().rstrip("\n") if chosen.json else text(line.entry)
+        sys.stdout.write(shown.encode(encoding := sys.stdout.encoding, "backslashreplace").decode(encoding) + "\n")
         sys.stdout.flush()
+
+
+def text(entry: Entry) -> str:
+    """An entry in one line, its control characters written out."""
+    stamp = f"{entry.time:%Y-%m-%d %H:%M:%S}.{entry.time.microsecond // 1000:03}"
+    where, typed = join_target(entry.bus, entry.drive), entry.text
+    if entry.kind in TRAFFIC:
+        return f"{stamp} {KINDS[entry.kind]:<2} {where} {text_of(typed.encode('latin-1'))}"
+    if entry.kind == "typed" and entry.bus and typed.startswith("@"):  # the address precedes it already
+        typed = typed.partition(" ")[2].strip()
+    where = "" if entry.kind in ("notice", "failed") or not where else f"{visible(where)} "
+    return f"{stamp} {KINDS[entry.kind]:<2} {where}{visible(typed, tabs=True)}"
+
+
+def joined(lines: Iterable[Line]) -> Iterator[Line]:
+    """Join the pieces of a reply that came one after the other, up to its end of line; the time is the first one's."""
+    held: Line | None = None
+    for line in lines:
+        entry = line.entry
+        if held is not None and not _continues(held.entry, entry):
+            yield held
+            held = None
+        if entry is None or entry.kind != "received":
+            yield line
+        elif held is None or held.entry is None:
+            held = line
+        else:
+            held = held._replace(entry=replaced(held.entry, text=held.entry.text + entry.text))
+    if held is not None:
+        yield held
+
+
+def _continues(held: Entry | None, entry: Entry | None) -> bool:
+    if held is None or entry is None or entry.kind != "received" or held.text.endswith("\n"):
+        return False
+    return (held.bus, held.drive, held.poll) == (entry.bus, entry.drive, entry.poll) and len(held.text) < LONGEST
+
+
+class Following:
+    """The lines that are added to a log, across its rotation. Nothing is held open between two looks."""
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+        self._file = b""
+        """The first line of the part that is read: it has a time, and a part is renamed."""
+        self._offset = self._number = 0
+        self.lost = False
+        """Parts were removed before they were read."""
+
+    def look(self) -> Iterator[Line]:
+        """Yield the whole lines since the last look. Raises Diagnostic where the log cannot be read."""
+        try:
+            parts = files.parts(self._path)
+            firsts = [_first(each) for each in parts]
+            if self._file in firsts:
+                parts = parts[firsts.index(self._file) :]
+            else:
+                self.lost = self._file != b""
+            for path in parts:
+                if (first := _first(path)) != self._file:
+                    self._file, self._offset, self._number = first, 0, 0
+                for line in files.lines(path, self._offset, self._number):
+                    if line.data.endswith(b"\n"):
+                        self._offset += len(line.data)
+                        self._number = line.number
+                        yield line
+        except Diagnostic:
+            if os.path.exists(self._path) or not os.path.exists(files.part(self._path, 1)):
+                raise  # else it is being rotated: the next look finds its parts
+
+
+def _first(path: Path) -> bytes:
+    """The first line of a file, once it is whole."""
+    first = next(files.lines(path), None)
+    return first.data if first is not None and first.data.endswith(b"\n") else b""

@@ -43,9 +43,9 @@ def sim(chosen: argparse.Namespace) -> int:
 
 
 def share(chosen: argparse.Namespace) -> int:
-    from multidrop.shell.sharing import command
+    from multidrop.shell.sharing import server
 
-    return command.run(chosen.url, chosen.rfc2217, as_json=chosen.json)
+    return server.run(chosen.url, chosen.rfc2217, as_json=chosen.json)
 
 
 def plot(chosen: argparse.Namespace) -> int:

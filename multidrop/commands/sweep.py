@@ -15,19 +15,17 @@ from functools import partial
 
 from multidrop.commands import fail
 from multidrop.dialects import Diagnostic
-from multidrop.shell.batch.junit import Case as JUnitCase
-from multidrop.shell.batch.junit import JUnitFile
+from multidrop.shell.batch.report import Case as JUnitCase
+from multidrop.shell.batch.report import JUnitFile
 from multidrop.shell.connect import settings
-from multidrop.shell.streams.status_line import StatusLine
-from multidrop.shell.streams.stdout import INTERRUPTED, write
+from multidrop.shell.signals import Interruption
+from multidrop.shell.streams.stdout import INTERRUPTED, StatusLine, write
 from multidrop.shell.sweeps import plan as planning
 from multidrop.shell.sweeps import workers
 from multidrop.shell.sweeps.failures import Failures, command, grouped, rows
-from multidrop.shell.sweeps.interruption import Interruption
 from multidrop.shell.sweeps.plan import Asked, Plan
 from multidrop.shell.sweeps.trial import Case, Result, bench
-from multidrop.shell.sweeps.values import spelled
-from multidrop.shell.sweeps.variation import SEED
+from multidrop.shell.sweeps.variation import SEED, spelled
 from multidrop.transports import TransportLost
 
 
@@ -60,10 +58,8 @@ def run(chosen: argparse.Namespace) -> int:
 def _results(plan: Plan, chosen: argparse.Namespace, interruption: Interruption) -> Iterator[list[Result]]:
     cases = (plan.case(number) for number in range(1, plan.count + 1))
     if chosen.cluster:
-        from multidrop.shell.sweeps import cluster
-
-        agree = partial(_agree, chosen.cluster, chosen.yes, cluster.TRUST, interruption)
-        return cluster.results(plan.job, cases, chosen.cluster, interruption, agree)
+        agree = partial(_agree, chosen.cluster, chosen.yes, workers.TRUST, interruption)
+        return workers.cluster_results(plan.job, cases, chosen.cluster, interruption, agree)
     jobs = chosen.jobs or workers.cores()
     return workers.results(plan.job, cases, plan.count, jobs, interruption)
 

@@ -42,12 +42,16 @@ class ReplayReport:
         self._json = as_json
 
     def differs(self, step: Step, text: str, difference: str) -> None:
-        """Report another answer."""
-        place = {"bus": step.bus, "drive": step.drive, "line": step.text}
-        self._put(text, {"where": step.where, **place, "differs": difference})
+        fact: dict[str, object] = {
+            "where": step.where,
+            "bus": step.bus,
+            "drive": step.drive,
+            "line": step.text,
+            "differs": difference,
+        }
+        self._put(text, fact)
 
     def diverged(self, found: Divergence) -> None:
-        """Report the first divergence of an axis."""
         fact = {
             "drive": found.drive,
             "time": found.at.isoformat(timespec="microseconds"),
@@ -230,7 +234,10 @@ class Replay:
             await self._stop()
             return False
         drive = self._targets.get((step.bus, step.drive))
-        may_move = self._may_move(drive, step.text)
+        if drive is not None and drive.starts(step.text):
+            everyone = drive.address in EVERYONE
+            self._moving |= {drive, *(self._session.buses[drive.link.name].all_drives if everyone else ())}
+        may_move = drive in self._moving
         failed = await self._sent(step, drive)
         if step.is_verb and not failed:
             self._moving.clear()
@@ -243,17 +250,6 @@ class Replay:
             raise DriveError(text)
         self._report.differs(step, text, difference)
         return True
-
-    def _may_move(self, drive: Drive | None, text: str) -> bool:
-        """Whether the drive may move when it replies."""
-        if drive is None:
-            return False
-        if drive.starts(text):
-            self._moving |= {
-                drive,
-                *(self._session.buses[drive.link.name].all_drives if drive.address in EVERYONE else ()),
-            }
-        return drive in self._moving
 
     async def _sent(self, step: Step, drive: Drive | None) -> str:
         """Send a line or run a verb; the failure in words."""

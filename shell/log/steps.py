@@ -14,9 +14,7 @@ from pathlib import Path
 from multidrop.dialects import Diagnostic
 from multidrop.dialects.text import visible
 from multidrop.shell.lines import WAITS
-from multidrop.shell.log.entries import BEGIN, TRAFFIC, Entry
-from multidrop.shell.log.files import Line
-from multidrop.shell.log.show import whole
+from multidrop.shell.log.files import BEGIN, TRAFFIC, Entry, Line, whole
 from multidrop.shell.secrets import HIDDEN
 
 WORLD = "/sim"
@@ -43,7 +41,6 @@ class Step:
 
     @property
     def is_verb(self) -> bool:
-        """Whether it is a verb."""
         return self.text.startswith("/")
 
 
@@ -112,7 +109,9 @@ class _Reader:
         elif entry.kind == "sent" and not entry.poll and place in self._last:
             self._last[place].sent = True
         elif entry.kind == "failed":
-            self._failed(entry)
+            step = self._last.get(place) if entry.drive else self._newest
+            if step is not None and not step.printed and not step.failed:
+                step.failed = entry.text
 
     def _typed(self, where: str, entry: Entry) -> None:
         text = entry.text.strip()
@@ -147,11 +146,6 @@ class _Reader:
             self._polled[entry.bus] = poll = Exchange(where, entry.time, entry.bus, entry.drive, data)
             self._polls.append(poll)
 
-    def _failed(self, entry: Entry) -> None:
-        step = self._last.get((entry.bus, entry.drive)) if entry.drive else self._newest
-        if step is not None and not step.printed and not step.failed:
-            step.failed = entry.text
-
     def whole(self) -> Steps:
         sent = [step for step in self._steps if step.sent]
         for step in sent:
@@ -167,7 +161,11 @@ def compared(step: Step, printed: list[str], failed: str, moving: bool) -> str:
     """
     if errors_differ(step.failed, failed):
         return f"then {step.failed or 'no error'}; now {failed or 'no error'}"
-    if len(printed) == len(step.printed) and all(map(_same if not moving else _alike, step.printed, printed)):
+
+    def alike(then: str, now: str) -> bool:
+        return then == now or (moving and _is_number(then) and _is_number(now))
+
+    if len(printed) == len(step.printed) and all(map(alike, step.printed, printed)):
         return ""
     return f"then {_quoted(step.printed)}; now {_quoted(printed)}"
 
@@ -181,14 +179,6 @@ def errors_differ(then: str, now: str) -> bool:
 def _number_of_error(text: str) -> str:
     after = text.partition(" error ")[2]
     return after[: len(after) - len(after.lstrip("0123456789"))]
-
-
-def _same(then: str, now: str) -> bool:
-    return then == now
-
-
-def _alike(then: str, now: str) -> bool:
-    return then == now or (_is_number(then) and _is_number(now))
 
 
 def _is_number(text: str) -> bool:

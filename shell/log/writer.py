@@ -1,10 +1,12 @@
-"""The writer of a session log: the events of a session as entries, until it is closed or a write fails."""
+"""The writer of a session log: the events of a session as entries, and the file that a thread appends them to."""
 
 from __future__ import annotations
 
+import errno
+import os
+import stat
 from collections import deque
-from collections.abc import Iterator
-from functools import partial
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -24,9 +26,9 @@ from multidrop.shell.events import (
     TwinEvent,
 )
 from multidrop.shell.log import files
-from multidrop.shell.log.disk import Disk
-from multidrop.shell.log.entries import BEGIN, KINDS, TRAFFIC, Entry, line_of
+from multidrop.shell.log.files import BEGIN, KINDS, TRAFFIC, Entry, line_of
 from multidrop.shell.openings import model
+from multidrop.shell.threads import BoundedWriter
 
 if TYPE_CHECKING:
     from multidrop.dialects import Request
@@ -64,9 +66,8 @@ class SessionLog:
         """By bus, the request whose bytes are written next."""
         self._in_flight: dict[str, Request] = {}
         limits = workspace.settings.log
-        head, missing = partial(self._head), partial(self._missing)
         try:
-            self._disk = Disk(self.path, limits.size, limits.files, head, missing)
+            self._disk = Disk(self.path, limits.size, limits.files, self._head, self._missing)
         except (OSError, ValueError) as problem:
             raise Diagnostic(f"cannot be written: {why(problem)}", str(path)) from None
         self._put(self._changes(workspace.now()))
@@ -80,7 +81,6 @@ class SessionLog:
 
     @property
     def size(self) -> int:
-        """Bytes in the file."""
         return self._disk.size
 
     def last(self, number: int) -> list[str]:
@@ -109,7 +109,7 @@ class SessionLog:
         made = list(entries)
         self._last.extend(each for each in made if each.kind not in TRAFFIC)
         if data := b"".join(map(line_of, made)):
-            self._disk.put(data)
+            self._disk.put(data, len(made))
 
     def _entry(self, at: float, kind: str, text: str, bus: str = "", drive: str = "", **more: object) -> Entry:
         return Entry(self._workspace.wall(at), kind, text, bus, drive, **more)  # type: ignore[arg-type]
@@ -133,14 +133,10 @@ class SessionLog:
             assert isinstance(event, Printed | Output | Notified | Failed)
             bus, drive = getattr(event, "bus", ""), getattr(event, "address", "")
             warning = isinstance(event, Notified) and event.warning
-            yield from self._stopped(event.at)
+            if self._stops != self._workspace.stops:  # a stop came since the last entry
+                self._stops = self._workspace.stops
+                yield self._entry(event.at, "stop", "stop of every drive")
             yield self._entry(event.at, kind, event.text, bus, drive, warning=warning)
-
-    def _stopped(self, at: float) -> Iterator[Entry]:
-        """The stop that came since the last entry."""
-        if self._stops != self._workspace.stops:
-            self._stops = self._workspace.stops
-            yield self._entry(at, "stop", "stop of every drive")
 
     def _changes(self, at: float) -> Iterator[Entry]:
         """The buses that were opened, closed, or have other drives than before."""
@@ -178,3 +174,112 @@ def _described(bus: Bus) -> str:
     """The port of a bus and its drives, in a line."""
     found = ", ".join(f"{address} {model(drive)}".strip() for address, drive in bus.drives.items())
     return f"{bus.link.transport.name}: {found or 'no drive yet'}"
+
+
+PATIENCE = 0.05
+"""The longest wait for a write, s."""
+HELD = 1024 * 1024
+"""The largest number of bytes that wait for a slow disk."""
+ENDING = 1.0
+"""The longest wait for the rest at the end, s."""
+_FLAGS = os.O_WRONLY | os.O_APPEND | os.O_CREAT | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0)
+
+
+class Disk:
+    """A file that is appended to by a thread, rotated at a size, bounded in memory.
+
+    Theory of operation. `put` queues bytes and waits for the thread to write them, so that a crash of this program
+    loses nothing that was put. A disk that takes longer than PATIENCE is not waited for again until it has caught up.
+    Meanwhile the queue is bounded; what has no room is counted, and the file says so. Another session may write the
+    same file: each write begins at its end, and a session follows the other's rotation.
+
+    `head` makes the first bytes of each part, `missing` the bytes in place of so many dropped entries.
+    """
+
+    def __init__(
+        self, path: Path, size: int, files: int, head: Callable[[], bytes], missing: Callable[[int], bytes]
+    ) -> None:
+        """Open the file. Raises OSError, ValueError."""
+        self.size = 0
+        """Bytes in the file after the last write."""
+        self._path, self._size, self._files, self._head = path, size, files, head
+        self._slow = False
+        self._descriptor = os.open(path, _FLAGS, 0o666)
+        self._regular = stat.S_ISREG(os.fstat(self._descriptor).st_mode)
+        self._writer = BoundedWriter(
+            self._write, lambda loss: missing(loss.count), lambda problem: self._close(), HELD, HELD, "log"
+        )
+        self._writer.put(self._gap() + head())
+
+    @property
+    def problem(self) -> OSError | None:
+        """The reason why the file can no longer be written."""
+        return self._writer.problem
+
+    def put(self, data: bytes, count: int = 1) -> None:
+        """Write `count` entries, which are whole lines. Waits for PATIENCE at most; does nothing after a problem."""
+        caught_up = self._writer.idle
+        if self._writer.put(data, count=count) and (caught_up or not self._slow):
+            self._slow = not self._writer.wait(PATIENCE)
+
+    def close(self) -> None:
+        """Write the rest, for ENDING at most. May be called again."""
+        self._writer.close(ENDING)
+
+    def _write(self, data: bytes) -> int:
+        rest = data
+        if self._regular:
+            self._follow()
+            now = os.fstat(self._descriptor).st_size
+            if now and now + len(data) > self._size:
+                rest, now = self._rotate() + data, 0
+            self.size = now + len(rest)
+        while rest:
+            try:
+                rest = rest[os.write(self._descriptor, rest) :]
+            except BlockingIOError:
+                raise OSError(errno.EAGAIN, "its reader does not take it") from None
+        return len(data)
+
+    def _follow(self) -> None:
+        """Open the path again where another session has rotated it. Raises FileNotFoundError where it is gone."""
+        try:
+            found = os.stat(self._path)
+        except FileNotFoundError:
+            raise FileNotFoundError(errno.ENOENT, "the file is gone") from None
+        ours = os.fstat(self._descriptor)
+        if (found.st_dev, found.st_ino) != (ours.st_dev, ours.st_ino):
+            self._close()
+            self._descriptor = os.open(self._path, _FLAGS, 0o666)
+
+    def _rotate(self) -> bytes:
+        """Begin a new part; return its first bytes. A part that cannot be renamed now is so at a later write."""
+        self._close()  # Windows renames no open file
+        head = b""
+        try:
+            if self._files == 1:
+                os.truncate(self._path, 0)
+            for number in range(self._files - 1, 0, -1):
+                if (older := files.part(self._path, number - 1)).exists():
+                    older.replace(files.part(self._path, number))
+            head = self._head()
+        except PermissionError:  # Windows: another program reads it
+            if self._path.stat().st_size > 2 * self._size:
+                raise
+        self._descriptor = os.open(self._path, _FLAGS, 0o666)
+        return head
+
+    def _close(self) -> None:
+        descriptor, self._descriptor = self._descriptor, -1
+        if descriptor != -1:
+            os.close(descriptor)
+
+    def _gap(self) -> bytes:
+        """The end of a last line that a full disk or a power failure cut off."""
+        if not self._regular:
+            return b""
+        with self._path.open("rb") as file:
+            if not file.seek(0, os.SEEK_END):
+                return b""
+            file.seek(-1, os.SEEK_END)
+            return b"" if file.read(1) == b"\n" else b"\n"

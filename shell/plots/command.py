@@ -10,11 +10,8 @@ from typing import TYPE_CHECKING
 from multidrop.dialects import Diagnostic, DriveError
 from multidrop.shell.batch import runner
 from multidrop.shell.events import SessionEvent, StateChanged
-from multidrop.shell.plots.feed import begin
-from multidrop.shell.plots.plot import Plot
-from multidrop.shell.plots.rate import parse_rate
-from multidrop.shell.plots.series import parse_series, read_first
-from multidrop.shell.plots.target import PlotTarget, parse_target
+from multidrop.shell.plots.plot import Plot, begin
+from multidrop.shell.plots.request import PlotTarget, parse_rate, parse_series, parse_target, read_first
 from multidrop.shell.streams.stdout import report, write
 
 if TYPE_CHECKING:

@@ -58,12 +58,10 @@ class RecordingFile:
 
     @property
     def adds(self) -> bool:
-        """Whether the plot adds to a recording."""
         return bool(self.identity)
 
     @property
     def writes(self) -> Path:
-        """The file that the plot writes now."""
         return self.part if self.adds else self.path
 
     def _take_lock(self) -> int:
@@ -87,20 +85,19 @@ class RecordingFile:
         if not self.adds:
             return  # new, or left by a plot that was killed before its first sample
         if os.path.exists(self.part):
-            self._add_leftover()
+            if _identity(self.part) not in ("", self.identity):
+                raise Diagnostic(f"{self.part} is another recording", hint="rename it")
+            try:
+                self._join(None)
+            except SinkBroken as error:
+                raise Diagnostic(f"cannot add {self.part}, which a plot left: {error}") from None
         end = -GAP
         for chunk in _chunks(self.path):
-            end = max(end, _end(chunk))
             self.paths.add(str(chunk.entity_path))
+            if "elapsed" in chunk.timeline_names:
+                times = [each.value for each in chunk.to_record_batch().column("elapsed") if each.is_valid]
+                end = max(end, max(times, default=-GAP * 1e9) / 1e9)
         self.offset = end + GAP
-
-    def _add_leftover(self) -> None:
-        if _identity(self.part) not in ("", self.identity):
-            raise Diagnostic(f"{self.part} is another recording", hint="rename it")
-        try:
-            self._join(None)
-        except SinkBroken as error:
-            raise Diagnostic(f"cannot add {self.part}, which a plot left: {error}") from None
 
     def mark(self) -> None:
         """Note that the file is complete up to here."""
@@ -167,18 +164,12 @@ def _identity(path: Path) -> str:
         reader = RrdReader(str(path))
         found, layouts = reader.recordings(), reader.blueprints()
     except RuntimeError as error:
-        raise Diagnostic(
-            f"{path} cannot be added to: {_last(error)}", hint="use another file; this one is unchanged"
-        ) from None
+        last = str(error).split(": ", 1)[-1]  # the most specific part of rerun's chain of reasons
+        raise Diagnostic(f"{path} cannot be added to: {last}", hint="use another file; this one is unchanged") from None
     strange = [entry for entry in (*found, *layouts) if entry.application_id != APPLICATION]
     if strange or len(found) > 1 or (layouts and not found):
         raise Diagnostic(f"{path} is not a plot of multidrop", hint="use another file; this one is unchanged")
     return str(found[0].recording_id) if found else ""
-
-
-def _last(error: RuntimeError) -> str:
-    """The end of rerun's chain of reasons, its most specific part."""
-    return str(error).split(": ", 1)[-1]
 
 
 def _chunks(path: Path) -> Iterator[Any]:
@@ -187,14 +178,6 @@ def _chunks(path: Path) -> Iterator[Any]:
     reader = RrdReader(str(path))
     if reader.recordings():
         yield from reader.stream()
-
-
-def _end(chunk: Any) -> float:
-    """The last `elapsed` in a chunk, s; -GAP if it has none."""
-    if "elapsed" not in chunk.timeline_names:
-        return -GAP
-    column = chunk.to_record_batch().column("elapsed")
-    return max((value.value for value in column if value.is_valid), default=-GAP * 1e9) / 1e9
 
 
 def _disk_full(folder: Path) -> bool:

@@ -1,4 +1,4 @@
-"""A plot of positions and velocities to rerun, with commands and replies as a text log on the same timelines.
+"""A plot to rerun, and its feed: samples, values, states and twins of drives; typed and printed lines as a text log.
 
 Theory of operation. A plot takes samples and texts at almost no cost. A thread passes them on in batches. A killed
 process loses at most half a second, and a frozen viewer delays nothing. There are two timelines: `elapsed` (s since the
@@ -9,18 +9,38 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
 from datetime import datetime
+from functools import partial
+from typing import TYPE_CHECKING
 
 from multidrop.dialects import Diagnostic
-from multidrop.drives.events import Sample, Valued
-from multidrop.shell.events import Predicted
+from multidrop.dialects.values import UNREAD, Conditions
+from multidrop.drives.events import Conditioned, Lost, Sample, Unsolicited, Valued
+from multidrop.drives.telemetry import MODEST, USUAL, Subscription, Telemetry, Value
+from multidrop.shell.events import (
+    Diverged,
+    Entered,
+    Failed,
+    Notified,
+    OnBus,
+    Predicted,
+    Printed,
+    SessionEvent,
+    TwinEnded,
+    TwinEvent,
+)
 from multidrop.shell.plots.file import SinkBroken
-from multidrop.shell.plots.layout import COLOURS, RUNS, TWIN
-from multidrop.shell.plots.sink import Batch, Curve, Sink, State
-from multidrop.shell.plots.target import PlotTarget
-from multidrop.shell.roles import DIFFERENCE
+from multidrop.shell.plots.request import PlotTarget, shown
+from multidrop.shell.plots.sink import AGREES, COLOURS, DIFFERS, RUNS, TWIN, Batch, Curve, Sink, State
+from multidrop.shell.roles import DIFFERENCE, Series
 from multidrop.shell.threads import in_thread
+from multidrop.transports.sockets import exposed
+
+if TYPE_CHECKING:
+    from multidrop.shell.workspace import Workspace
+
 
 FILE_PERIOD, LIVE_PERIOD = 0.4, 0.1
 """The time between batches, s: longer makes a smaller file, shorter a smoother view."""
@@ -33,7 +53,10 @@ ABANDON_TIMEOUT = 2.0
 
 
 class Plot:
-    """An open plot. `open` makes one, `close` ends it; it ends by itself when its sink breaks."""
+    """An open plot. `open` makes one, `close` ends it; it ends by itself when its sink breaks.
+
+    What takes samples, values, states and texts never blocks.
+    """
 
     def __init__(self, sink: Sink, clock: Callable[[], float], wall: Callable[[float], datetime]) -> None:
         """Use `open`."""
@@ -80,7 +103,6 @@ class Plot:
         self._batch.labels[bus, address] = label
 
     def sample(self, bus: str, sample: Sample) -> None:
-        """Take a sample. Never blocks."""
         if not self._done:
             self.samples += 1
             drive = (bus, sample.address, sample.axis)
@@ -88,13 +110,12 @@ class Plot:
             self._point(Curve(*drive, "velocity"), sample.at, sample.velocity)
 
     def value(self, bus: str, read: Valued) -> None:
-        """Take a value. Never blocks."""
         if not self._done:
             self.samples += 1
             self._point(Curve(bus, read.address, "", read.word), read.at, read.value)
 
     def predicted(self, bus: str, twin: Predicted, *, alone: bool = False) -> None:
-        """Take a prediction of a drive's twin; `alone`: the difference only. Never blocks."""
+        """Take a prediction of a drive's twin; `alone`: the difference only."""
         if not self._done:
             self.samples += alone
             drive = (bus, twin.address, twin.axis)
@@ -105,7 +126,6 @@ class Plot:
                 self.state(*drive, TWIN, twin.at, RUNS)
 
     def twin_ended(self, bus: str, address: str, at: float) -> None:
-        """End the curves of a twin. Never blocks."""
         for curve in self._curves if not self._done else ():
             if curve.twin and curve[:2] == (bus, address):
                 self._batch.gaps.setdefault(curve, []).append(self._times(at))
@@ -118,14 +138,14 @@ class Plot:
         self._batch.curves.setdefault(curve, []).append((*self._times(at), float(value)))
 
     def state(self, bus: str, address: str, axis: str, name: str, at: float, text: str) -> None:
-        """Take a state; one that has not changed takes no room. Never blocks."""
+        """Take a state; one that has not changed takes no room."""
         lane = State(bus, address, axis, name)
         if not self._done and self._states.get(lane) != text:
             self._states[lane] = text
             self._batch.states.setdefault(lane, []).append((*self._times(at), text))
 
     def gap(self, bus: str, at: float) -> None:
-        """End the curves of a bus that is lost; their next samples begin them again. Never blocks."""
+        """End the curves of a bus that is lost; their next samples begin them again."""
         for curve in self._curves if not self._done else ():
             if curve.bus == bus:
                 self._batch.gaps.setdefault(curve, []).append(self._times(at))
@@ -134,7 +154,7 @@ class Plot:
                 self.state(*lane, at, "")
 
     def text(self, bus: str, address: str, at: float, text: str, level: str) -> None:
-        """Take a line of text; `level` is `command`, `reply`, `error` or `note`. Never blocks."""
+        """Take a line of text; `level` is `command`, `reply`, `error` or `note`."""
         if level not in COLOURS:
             raise ValueError(f"level {level!r}")
         if not self._done:
@@ -198,3 +218,177 @@ class Plot:
 
 def _timeout(target: PlotTarget) -> float:
     return BATCH_TIMEOUT if target.file is None else FILE_TIMEOUT
+
+
+ON = {True: "on", False: "off", None: ""}
+
+
+def states_of(conditions: Conditions) -> Iterator[tuple[str, str]]:
+    """The name of each lane and its state; an empty state is not known."""
+    yield "program", conditions.program or "none"
+    if conditions.error:
+        number = "set" if conditions.error == UNREAD else str(conditions.error)
+        yield "error", f"{number} {conditions.error_text}".strip()
+    else:
+        yield "error", "none"
+    for lamp in conditions.lamps:
+        if lamp.function.isdecimal():
+            continue  # an analogue input, whose value can be plotted
+        kind = "output" if lamp.output else "input"
+        function = lamp.function.replace("+", " plus").replace("-", " minus").split()
+        yield "-".join((kind, lamp.name, *function)), ON[lamp.on]
+
+
+STATES, SPARING = 1.0, 2.0
+"""Seconds between two readings of states on a bus, of one drive after the other; the second where all that the line
+carries is asked for: a reading takes the time of four samples."""
+
+
+@dataclass(eq=False)
+class Plotting:
+    """A plot and its feed from a workspace."""
+
+    workspace: Workspace
+    plot: Plot
+    detach: Callable[[], None]
+    period: float
+
+    @property
+    def where(self) -> str:
+        return self.plot.target.text
+
+    @property
+    def desk(self) -> str:
+        """The line that a person types at another desk to see it."""
+        return self.plot.target.desk
+
+    @property
+    def rate(self) -> str:
+        """The rate of its samples that was asked for, in words."""
+        return shown(self.period)
+
+    async def end(self) -> str:
+        """End the plot; return one line about the result. Raises Diagnostic where it could not be written."""
+        if self in self.workspace.plots:
+            self.workspace.plots.remove(self)
+        self.detach()
+        return await self.plot.close()
+
+
+async def begin(workspace: Workspace, target: PlotTarget, series: Sequence[Series], period: float = MODEST) -> Plotting:
+    """Begin to plot drives and values, each every `period` s; 0: as fast as the line allows."""
+    if not series:
+        raise Diagnostic("no drive to plot", hint="/open URL opens a line of drives")
+    plot = await Plot.open(target, clock=workspace.now, wall=workspace.wall)
+    plotting = Plotting(workspace, plot, attach(workspace, plot, series, period), period)
+    workspace.plots.append(plotting)
+    if target.serves and exposed(target.host):
+        workspace.notify(f"other computers can read the plot at {target.text}; they need no password", warning=True)
+    return plotting
+
+
+def attach(workspace: Workspace, plot: Plot, series: Sequence[Series], period: float = MODEST) -> Callable[[], None]:
+    """Feed the plot: poll drives and values every `period` s, and log the lines of their buses.
+
+    The function returned ends the polling; so does the end of the plot. Raises Diagnostic for a bus that is not open.
+    """
+    for each in series:
+        if each.bus not in workspace.buses:
+            raise Diagnostic(f"no bus {each.bus!r}", hint=f"open: {', '.join(workspace.buses) or 'none'}")
+    wanted, buses = set(series), {each.bus for each in series}
+    for bus, address, _ in series:
+        plot.label(bus, address, workspace.buses[bus].drives[address].label)
+    ends: list[Callable[[], None]] = [workspace.subscribe(partial(_take, plot, wanted, buses))]
+    for bus in sorted(buses):
+        ends += _polls(
+            workspace.buses[bus].telemetry, [each for each in dict.fromkeys(series) if each.bus == bus], period
+        )
+
+    def detach() -> None:
+        while ends:
+            ends.pop()()
+
+    def failed(reason: str) -> None:
+        detach()
+        workspace.notify(reason, warning=True)
+
+    plot.on_failure(failed)
+    return detach
+
+
+def _take(plot: Plot, wanted: set[Series], buses: set[str], event: SessionEvent) -> None:
+    """Plot an event of a wanted series, or of one of the buses."""
+    if not isinstance(event, OnBus):
+        return _log(plot, buses, event)
+    bus, inner = event
+    if isinstance(inner, TwinEvent):
+        return _twin(plot, wanted, bus, inner)
+    if isinstance(inner, Sample) and Series(bus, inner.address) in wanted:
+        plot.sample(bus, inner)
+    elif isinstance(inner, Valued) and Series(bus, inner.address, inner.word) in wanted:
+        plot.value(bus, inner)
+    elif isinstance(inner, Conditioned) and Series(bus, inner.address) in wanted:
+        for each in inner.conditions:
+            for name, state in states_of(each):
+                plot.state(bus, inner.address, each.axis, name, inner.at, state)
+    elif isinstance(inner, Lost) and bus in buses:
+        plot.gap(bus, inner.at)
+    elif isinstance(inner, Unsolicited) and bus in buses:
+        for text in inner.lines:
+            plot.text(bus, "", inner.at, text, "reply")
+
+
+def _polls(telemetry: Telemetry, series: Sequence[Series], period: float) -> Iterator[Callable[[], None]]:
+    """Begin to poll drives and values of a bus; the functions that end that."""
+    if addresses := list(dict.fromkeys(each.address for each in series if each.of_motion)):
+        yield telemetry.subscribe(addresses, period).close
+        if period:
+            yield telemetry.watch(addresses, len(addresses) * STATES).close
+        else:
+            yield from _sparing(telemetry, addresses)
+    if values := [Value(each.address, each.word) for each in series if not each.of_motion]:
+        yield telemetry.read(values, max(period, USUAL)).close
+
+
+def _sparing(telemetry: Telemetry, addresses: Sequence[str]) -> Iterator[Callable[[], None]]:
+    """Begin to read the states of one drive after the other, as a first reading takes the time of many samples."""
+    loop, pause = asyncio.get_running_loop(), SPARING * len(addresses)
+    watches: list[Subscription[str]] = []
+    for place, address in enumerate(addresses, 1):
+        yield loop.call_later(
+            place * SPARING, lambda each: watches.append(telemetry.watch([each], pause)), address
+        ).cancel
+
+    def close() -> None:
+        for watch in watches:
+            watch.close()
+
+    yield close
+
+
+def _twin(plot: Plot, wanted: set[Series], bus: str, event: TwinEvent) -> None:
+    """Plot the predictions of a wanted drive's twin, or only the difference, and whether they agree."""
+    whole = Series(bus, event.address) in wanted
+    if not whole and Series(bus, event.address, DIFFERENCE) not in wanted:
+        return
+    if isinstance(event, Predicted):
+        plot.predicted(bus, event, alone=not whole)
+    elif isinstance(event, TwinEnded):
+        plot.twin_ended(bus, event.address, event.at)
+    else:
+        said = DIFFERS if isinstance(event, Diverged) else AGREES
+        plot.state(bus, event.address, event.axis, TWIN, event.at, said)
+
+
+def _log(plot: Plot, buses: set[str], event: SessionEvent) -> None:
+    """Log an event of these buses, or of no bus (a verb)."""
+    if not isinstance(event, Entered | Printed | Failed | Notified) or event.bus not in {*buses, ""}:
+        return
+    if isinstance(event, Entered):
+        plot.text(event.bus, event.address, event.at, event.line, "command")
+    elif isinstance(event, Printed):
+        plot.text(event.bus, event.address, event.at, event.text, "reply")
+    elif isinstance(event, Failed):
+        plot.text(event.bus, event.address, event.at, event.text, "error")
+    else:
+        plot.text(event.bus, "", event.at, event.text, "note")

@@ -1,9 +1,13 @@
-"""The blocking half of a plot: all calls of rerun, which is imported with the first plot.
+"""The blocking half of a plot: all calls of rerun, which is imported with the first plot, and the views in the viewer.
 
 Five properties of rerun shaped this file. It writes on the screen unless that is turned off before its import. A failed
 write shows at the next flush. A client waits for seconds where nothing listens. It waits forever for a frozen viewer.
 For a table at the end of a file it keeps a row for each chunk in memory; our files have no such table. Only threads
 that a caller may abandon call this module, never the event loop.
+
+The views show velocities, positions, values, states, and the log of commands and replies; their time axes are linked. A
+view of one drive bears its name, and has no legend that could cover a curve, unless it has a twin. A twin's position
+and velocity share the charts of its drive; the difference has a chart of its own.
 """
 
 from __future__ import annotations
@@ -13,29 +17,127 @@ import os
 import secrets
 import socket
 import warnings
+from collections.abc import Iterable, Mapping, Sequence, Set
 from dataclasses import dataclass, field, replace
 from typing import Any, NamedTuple
 
 from multidrop.dialects import Diagnostic
 from multidrop.dialects.files import why
 from multidrop.shell.plots.file import APPLICATION, FLUSH, GAP, RecordingFile, SinkBroken
-from multidrop.shell.plots.layout import (
-    BAND,
-    COLOURS,
-    LINES,
-    PALE,
-    SHADES,
-    STATE,
-    TWIN,
-    UNITS,
-    drives_of,
-    entity_path,
-    is_state,
-    layout,
-)
-from multidrop.shell.plots.target import PlotTarget, bracketed
+from multidrop.shell.plots.request import PlotTarget, bracketed
 from multidrop.shell.roles import DIFFERENCE
 from multidrop.transports import Unreachable
+
+UNITS = {"position": "steps", "velocity": "steps/s", DIFFERENCE: "steps"}
+"""The quantities of every drive, and the difference from its twin, with their units."""
+TWIN = "twin"
+"""The part of a path before the quantities of a twin; also its lane of states."""
+RUNS, AGREES, DIFFERS = "runs", "agrees", "differs"
+"""The states of a twin: it runs, it agrees with its drive again, or the two differ."""
+STATE = "state"
+"""The part of a path after which the name of a lane of states follows."""
+COLOURS = {"command": 0x2F8FD0FF, "reply": 0x808A90FF, "error": 0xE04848FF, "note": 0xB07D10FF}
+"""The colour of a log line, by level; each can be read on a dark and on a light ground."""
+LINES = (0x3FA0E0FF, 0x009E73FF, 0xCC79A7FF, 0xD08C00FF, 0x7A6FD0FF, 0x808A90FF, 0x40B0A8FF, 0xA07850FF)
+"""The colours of drives, which people with any colour vision can tell apart. None is that of an error."""
+SHADES = {
+    "on": 0x3FA0E0FF,
+    "off": 0x80808050,
+    "none": 0x80808050,
+    RUNS: 0x80808050,
+    AGREES: 0x80808050,
+    DIFFERS: 0xE04848FF,
+}
+"""The colours of states that need no attention, and of what is on; the viewer chooses those of others."""
+BAND, PALE = 4.0, 0x70
+"""The width of a twin's line, and its opacity: a pale band in the colour of its drive, whose thin line lies in it."""
+SIDE_BY_SIDE = 4
+"""The greatest number of drives that open with views of their own."""
+
+
+def layout(paths: Set[str], names: Mapping[str, str]) -> Any:
+    """The views of these entities, one below the other; `names` are those of drives, by their paths."""
+    import rerun.blueprint as rrb
+
+    rows: list[Any] = [_charts(rrb, paths, names)] if _curves(paths) else []
+    if lanes := sorted(path for path in paths if is_state(path)):
+        rows.append(
+            rrb.StateTimelineView(name="programs, errors, inputs, outputs", contents=lanes, time_view=_linked(rrb))
+        )
+    log = sorted(path for path in paths if path.rpartition("/")[2] == "log")
+    rows.append(rrb.TextLogView(name="commands and replies", contents=log))
+    shares = [4.0, 1.5, 1.0] if len(rows) == 3 else [4.0, 1.0][-len(rows) :]
+    return rrb.Blueprint(
+        rrb.Vertical(*rows, row_shares=shares),
+        rrb.TimePanel(state="collapsed", timeline="elapsed"),
+        rrb.BlueprintPanel(state="collapsed"),
+        rrb.SelectionPanel(state="collapsed"),
+        auto_layout=False,
+        auto_views=False,
+    )
+
+
+def _charts(rrb: Any, paths: Set[str], names: Mapping[str, str]) -> Any:
+    """The charts of one drive; of several, each drive beside the others, and all together."""
+    drives = drives_of(paths)
+    if len(drives) == 1:
+        return _column(rrb, _curves(paths), names.get(drives[0], drives[0]))
+    together = _column(rrb, _curves(paths), "")
+    each = [
+        _column(rrb, [path for path in _curves(paths) if _drive(path) == drive], names.get(drive, drive))
+        for drive in drives
+    ]
+    beside = rrb.Horizontal(*each, name="each drive")
+    few = len(drives) <= SIDE_BY_SIDE
+    return rrb.Tabs(beside, together, active_tab=0 if few else 1)
+
+
+def _column(rrb: Any, curves: Iterable[str], drive: str) -> Any:
+    """One chart for each quantity, one below the other; `drive` names the only one, or is empty."""
+    words: dict[str, list[str]] = {word: [] for word in UNITS}
+    for path in sorted(curves):
+        words.setdefault(path.rpartition("/")[2], []).append(path)
+    charts = [
+        rrb.TimeSeriesView(
+            name=" ".join(filter(None, (drive.lstrip("/"), word, f"({UNITS[word]})" if word in UNITS else ""))),
+            contents=found,
+            axis_x=_linked(rrb),
+            plot_legend=rrb.PlotLegend(visible=not drive or len(found) > 1),
+        )
+        for word, found in words.items()
+        if found
+    ]
+    return rrb.Vertical(*charts, name=drive.lstrip("/") or "all drives together")
+
+
+def _linked(rrb: Any) -> Any:
+    """A time axis that moves with all others."""
+    return rrb.TimeAxis(link="LinkToGlobal")
+
+
+def is_state(path: str) -> bool:
+    """Whether a path is that of a lane of states."""
+    return path.split("/")[-2:-1] == [STATE]
+
+
+def _curves(paths: Set[str]) -> list[str]:
+    return sorted(path for path in paths if not is_state(path) and path.rpartition("/")[2] != "log")
+
+
+def _drive(path: str) -> str:
+    parent = path.rpartition("/")[0]
+    return parent.removesuffix(f"/{TWIN}") or parent  # a line of drives may have that name
+
+
+def drives_of(paths: Set[str]) -> list[str]:
+    """The paths of the axes of drives that have curves."""
+    return sorted({_drive(path) for path in _curves(paths)})
+
+
+def entity_path(rr: Any, *parts: str) -> str:
+    """The path of an entity from its parts; empty parts are left out."""
+    return str(rr.new_entity_path([part for part in parts if part]))
+
 
 _INSTALL = "pip install 'multidrop[rerun]'"
 
@@ -54,7 +156,6 @@ class Curve(NamedTuple):
 
     @property
     def place(self) -> tuple[str, ...]:
-        """The parts of its path."""
         return (*self[:3], *(TWIN,) * self.twin, self.word)
 
     @property
@@ -86,7 +187,6 @@ class Batch:
     """Drives that begin to be plotted, in order, with the names that people gave to them."""
 
     def __bool__(self) -> bool:
-        """Whether the batch has content."""
         return bool(self.curves or self.texts or self.gaps or self.states or self.labels)
 
 
@@ -112,7 +212,8 @@ class Sink:
     def __init__(self, target: PlotTarget) -> None:
         """Open the target. Raises Diagnostic if that fails, and leaves the target unchanged then."""
         self._rr = load()
-        self._target = _numeric(target) if target.serves else target
+        self.target = _numeric(target) if target.serves else target
+        """The target, with the port that is in use."""
         self._file = None if target.file is None else RecordingFile(self._rr, target.file)
         self._paths: set[str] = set(self._file.paths) if self._file else set()
         self._drives = drives_of(self._paths)
@@ -123,7 +224,9 @@ class Sink:
         """The last `elapsed` sent."""
         self.offset = self._file.offset if self._file else 0.0
         """The first `elapsed`, s: after the samples that exist already."""
-        if self._target.serves and self._go_on_serving():
+        if self.target.serves and (served := _SERVED.pop((self.target.host, self.target.port), None)) is not None:
+            # The recording that an earlier plot of this process serves at this port goes on.
+            self._recording, self._paths, self._drives, self.offset = served
             return
         identity = (self._file and self._file.identity) or secrets.token_hex(16)
         self._recording = self._rr.RecordingStream(APPLICATION, recording_id=identity)
@@ -131,50 +234,41 @@ class Sink:
             self._recording.set_sinks(self._make_sink())
             self._recording.flush(timeout_sec=FLUSH)
         except (RuntimeError, ValueError) as error:
-            self._give_up()
+            if self.target.url:
+                self.leave_behind()
+            if self._file:
+                self._file.release()
             raise Diagnostic(f"cannot plot to {target.text}: {error}") from None
         if self._file:
             self._file.mark()
 
-    @property
-    def target(self) -> PlotTarget:
-        """The target, with the port that is in use."""
-        return self._target
-
     def _make_sink(self) -> Any:
         if self._file:
             return self._rr.FileSink(str(self._file.writes), write_footer=False)
-        if self._target.url:
-            _probe(self._target)
-            return self._rr.GrpcSink(self._target.url)
-        self._target = _free(self._target)
-        return self._rr.GrpcServerSink(self._target.host, self._target.port, server_memory_limit="64MiB")
-
-    def _go_on_serving(self) -> bool:
-        """Continue the recording that an earlier plot of this process serves at this port; False if there is none."""
-        served = _SERVED.pop((self._target.host, self._target.port), None)
-        if served is not None:
-            self._recording, self._paths, self._drives, self.offset = served
-        return served is not None
-
-    def _give_up(self) -> None:
-        if self._target.url:
-            self.leave_behind()
-        if self._file:
-            self._file.release()
+        if self.target.url:
+            _probe(self.target)
+            return self._rr.GrpcSink(self.target.url)
+        self.target = _free(self.target)
+        return self._rr.GrpcServerSink(self.target.host, self.target.port, server_memory_limit="64MiB")
 
     def send(self, batch: Batch) -> None:
         """Write a batch and flush it. Raises SinkBroken."""
         try:
             self._describe(batch)
             for curve, rows in batch.curves.items():
-                self._send_samples(curve, rows)
+                self._columns(curve.place, rows, self._rr.Scalars.columns(scalars=[row[2] for row in rows]))
             for bus, texts in batch.texts.items():
-                self._send_texts(bus, texts)
+                columns = self._rr.TextLog.columns(
+                    text=[row[2] for row in texts],
+                    level=[row[3].upper() for row in texts],
+                    color=[COLOURS[row[3]] for row in texts],
+                )
+                self._columns((bus, "log"), texts, columns)
             for curve, gaps in batch.gaps.items():
                 self._send_gaps(curve, gaps)
             for state, changes in batch.states.items():
-                self._send_states(state, changes)
+                columns = self._rr.StateChange.columns(state=[row[2] for row in changes])
+                self._columns(_place(state), changes, columns)
             self._recording.flush(timeout_sec=FLUSH)
         except (RuntimeError, OSError) as error:
             raise SinkBroken(self.why(error)) from None
@@ -185,13 +279,9 @@ class Sink:
         """Flush and close; a served recording stays visible. Raises SinkBroken."""
         try:
             self._recording.flush(timeout_sec=FLUSH)
-            if self._target.serves:
-                _SERVED[self._target.host, self._target.port] = (
-                    self._recording,
-                    self._paths,
-                    self._drives,
-                    self._end + GAP,
-                )
+            if self.target.serves:
+                served = self._recording, self._paths, self._drives, self._end + GAP
+                _SERVED[self.target.host, self.target.port] = served
                 return
             self._recording.disconnect()
         except RuntimeError as error:
@@ -219,7 +309,7 @@ class Sink:
         """The error in one line."""
         if self._file:
             return self._file.why(error)
-        return f"the viewer at {self._target.text} is gone" if self._target.url else f"cannot serve: {error}"
+        return f"the viewer at {self.target.text} is gone" if self.target.url else f"cannot serve: {error}"
 
     def _describe(self, batch: Batch) -> None:
         """Name what is new, give each drive its colour, and lay out the views again if there is anything new."""
@@ -255,18 +345,12 @@ class Sink:
         return LINES[self._number(entity_path(self._rr, *curve.drive)) % len(LINES)]
 
     def _number(self, drive: str) -> int:
-        """The number of a drive's axis by its path."""
         if drive not in self._drives:
             self._drives.append(drive)
         return self._drives.index(drive)
 
     def _layout(self) -> Any:
         return layout(self._paths, self._names)
-
-    def _send_samples(self, curve: Curve, rows: list[tuple[float, float, float]]) -> None:
-        times = self._times([row[0] for row in rows], [row[1] for row in rows])
-        values = self._rr.Scalars.columns(scalars=[row[2] for row in rows])
-        self._recording.send_columns(entity_path(self._rr, *curve.place), times, values, strict=True)
 
     def _send_gaps(self, curve: Curve, gaps: list[tuple[float, float]]) -> None:
         for elapsed, wall in gaps:
@@ -275,24 +359,13 @@ class Sink:
             self._recording.log(entity_path(self._rr, *curve.place), self._rr.Clear(recursive=False), strict=True)
         self._recording.reset_time()
 
-    def _send_states(self, state: State, rows: list[tuple[float, float, str]]) -> None:
-        times = self._times([row[0] for row in rows], [row[1] for row in rows])
-        changes = self._rr.StateChange.columns(state=[row[2] for row in rows])
-        self._recording.send_columns(entity_path(self._rr, *_place(state)), times, changes, strict=True)
-
-    def _send_texts(self, bus: str, rows: list[tuple[float, float, str, str]]) -> None:
-        times = self._times([row[0] for row in rows], [row[1] for row in rows])
-        columns = self._rr.TextLog.columns(
-            text=[row[2] for row in rows],
-            level=[row[3].upper() for row in rows],
-            color=[COLOURS[row[3]] for row in rows],
-        )
-        self._recording.send_columns(entity_path(self._rr, bus, "log"), times, columns, strict=True)
-
-    def _times(self, elapsed: list[float], wall: list[float]) -> list[Any]:
-        columns = self._rr.TimeColumn
+    def _columns(self, place: tuple[str, ...], rows: Sequence[tuple[Any, ...]], values: Any) -> None:
+        """Send the values of an entity; each row begins with its two times."""
+        elapsed, wall = [row[0] for row in rows], [row[1] for row in rows]
         self._end = max(self._end, *elapsed)
-        return [columns("elapsed", duration=elapsed), columns("time", timestamp=wall)]
+        column = self._rr.TimeColumn
+        times = [column("elapsed", duration=elapsed), column("time", timestamp=wall)]
+        self._recording.send_columns(entity_path(self._rr, *place), times, values, strict=True)
 
 
 def _place(state: State) -> tuple[str, ...]:

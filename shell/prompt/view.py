@@ -28,7 +28,8 @@ from multidrop.shell.openings import model
 from multidrop.shell.prompt import complete
 from multidrop.shell.prompt.typed_lines import History, LineQueue
 from multidrop.shell.session import Session
-from multidrop.shell.streams.output_streams import LineStream, Loss, Outlet
+from multidrop.shell.streams.output_streams import LineStream, Outlet
+from multidrop.shell.threads import Loss
 from multidrop.shell.workspace import Workspace
 
 MOST = 1000
@@ -48,7 +49,7 @@ BREATH = 0.01
 SLICE = 0.05
 """The longest time, s, for which an update hides the prompt."""
 CHUNK = 16 * 1024
-"""The number of characters after which the terminal is asked whether it keeps up; less than a lane's limit."""
+"""The number of characters after which the terminal is asked whether it keeps up; less than a writer's limit."""
 
 
 class Stream(LineStream):
@@ -99,7 +100,7 @@ class LinesAbove:
         self._damaged = False
         """Parts of the prompt were lost on their way to the terminal."""
         stdout = getattr(app.output, "stdout", None)
-        self._lane = stdout.lane if isinstance(stdout, Outlet) else None
+        self._writer = stdout.writer if isinstance(stdout, Outlet) else None
         self.on_terminal = stdout is not None and stdout.isatty()
 
     def add(self, lines: Sequence[str], keep: bool) -> None:
@@ -119,15 +120,15 @@ class LinesAbove:
 
     @property
     def _behind(self) -> bool:
-        return self._lane is not None and self._lane.behind
+        return self._writer is not None and self._writer.behind
 
     @contextlib.contextmanager
     def shown(self) -> Iterator[None]:
         """Replace the standard streams; standard output stays if it is not a terminal."""
         before, task = (sys.stdout, sys.stderr), self._loop.create_task(self._show())
-        notice = self._lane.notice if self._lane else None
-        if self._lane:
-            self._lane.notice = self._lost
+        notice = self._writer.notice if self._writer else None
+        if self._writer:
+            self._writer.notice = self._lost
         sys.stderr = cast(TextIO, Stream(self, keep=True))
         if sys.stdout.isatty():
             sys.stdout = cast(TextIO, Stream(self, keep=False))
@@ -136,12 +137,12 @@ class LinesAbove:
         finally:
             sys.stdout, sys.stderr = before
             task.cancel()
-            if self._lane and notice:
-                self._lane.notice = notice
+            if self._writer and notice:
+                self._writer.notice = notice
             self._write_rest()
 
     def _lost(self, loss: Loss) -> bytes:
-        """Draw the prompt again after a loss. Called from the lane's thread."""
+        """Draw the prompt again after a loss. Called from the writer's thread."""
         self._damaged = True
         with contextlib.suppress(RuntimeError):  # the loop has ended
             self._loop.call_soon_threadsafe(self._something.set)
@@ -209,8 +210,8 @@ class LinesAbove:
         sizes = accumulate(len(line) for line, _ in reversed(self._lines))
         self._make_way(sum(size <= CHUNK for size in sizes))
         while text := self._next():
-            if self._lane:
-                self._lane.put(text.encode(self.app.output.encoding(), "backslashreplace"), keep=True)
+            if self._writer:
+                self._writer.put(text.encode(self.app.output.encoding(), "backslashreplace"), keep=True)
             else:
                 self._write(text)
 

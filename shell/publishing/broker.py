@@ -1,4 +1,4 @@
-"""A connection to an MQTT broker, by paho, which is imported with the first one.
+"""An MQTT broker: its URL, and a connection to it by paho, which is imported with the first one.
 
 Theory of operation. Each connection is a client of its own: paho's own reconnection gives no reason for a failure. paho
 has a thread; its events are handed to the event loop. Every message is sent at QoS 1. Those that the broker has not
@@ -13,19 +13,87 @@ import os
 import ssl
 from collections import deque
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, NamedTuple
+from urllib.parse import unquote, urlsplit
 
 from multidrop.dialects import Diagnostic
 from multidrop.dialects.files import why
 from multidrop.dialects.on_demand import importing
+from multidrop.dialects.text import visible
 from multidrop.shell.connect.settings import MqttSettings
-from multidrop.shell.publishing.backlog import Message
-from multidrop.shell.publishing.target import Target
 from multidrop.shell.threads import in_thread
 from multidrop.transports import Unreachable
 
 if TYPE_CHECKING:
     from paho.mqtt.client import Client, MQTTMessageInfo
+
+
+PORTS = {"mqtt": 1883, "mqtts": 8883}
+"""The usual port of each scheme; `mqtts` is encrypted."""
+LONGEST_PREFIX = 1000
+"""The most bytes of a prefix."""
+FORM = "valid: mqtt://[USER@]BROKER[:PORT]/PREFIX or mqtts://..."
+
+
+@dataclass(frozen=True)
+class Target:
+    """A broker, and the topic above all that is published."""
+
+    host: str
+    port: int
+    prefix: str
+    encrypted: bool = False
+    user: str = ""
+
+    @property
+    def text(self) -> str:
+        """The broker for a person, without the user."""
+        host = f"[{self.host}]" if ":" in self.host else self.host
+        return f"{'mqtts' if self.encrypted else 'mqtt'}://{host}:{self.port}/{self.prefix}"
+
+
+def parse_target(text: str) -> Target:
+    """Parse the URL of a broker. Raises Diagnostic, which never holds a password."""
+    scheme, mark, rest = text.partition("://")
+    place, _, prefix = rest.partition("/")
+    user, _, address = place.rpartition("@")
+    if ":" in user or (":" in place and "@" in prefix):  # a password may hold a /
+        hint = "write it in multidrop.toml: [mqtt] with password or password_file"
+        raise Diagnostic("a password in a URL can be seen by everybody on this machine", "--to", hint)
+    if not mark or scheme not in PORTS:
+        raise Diagnostic("the URL of a broker begins with mqtt:// or mqtts://", "--to", FORM)
+    host, port = _address(scheme, address)
+    return Target(host, port, _prefix(prefix), scheme == "mqtts", unquote(user))
+
+
+def _address(scheme: str, address: str) -> tuple[str, int]:
+    try:
+        parts = urlsplit(f"//{address}")
+        host, port = parts.hostname, parts.port
+    except ValueError:
+        raise Diagnostic(f"no address {address!r} of a broker", "--to", FORM) from None
+    whole = parts.netloc == address and port != 0
+    if not (whole and host) or visible(host) != host or " " in host:
+        raise Diagnostic(f"no address {address!r} of a broker", "--to", FORM)
+    return host, port or PORTS[scheme]
+
+
+def _prefix(text: str) -> str:
+    """Check a prefix, which may have several levels."""
+    prefix = text.removesuffix("/")
+    if not prefix:
+        raise Diagnostic("no PREFIX of the topics", "--to", FORM)
+    wrong = next((each for each in prefix if each in "+#?" or visible(each) != each), "")
+    if wrong:
+        raise Diagnostic(f"a PREFIX has no {visible(wrong)!s}", "--to", FORM)
+    if prefix.startswith("$") or "" in prefix.split("/"):
+        hint = "a PREFIX begins without $, and no level of it is empty"
+        raise Diagnostic(f"no PREFIX {prefix!r}", "--to", hint)
+    if len(prefix.encode()) > LONGEST_PREFIX:
+        raise Diagnostic(f"a PREFIX has at most {LONGEST_PREFIX} bytes", "--to")
+    return prefix
+
 
 INSTALL = "pip install 'multidrop[mqtt]'"
 KEEPALIVE = 15
@@ -53,6 +121,15 @@ def load() -> Any:
 def fresh_name() -> str:
     """A name for a client, of at most 23 characters."""
     return f"multidrop-{os.urandom(6).hex()}"
+
+
+class Message(NamedTuple):
+    """A message for the broker. `bus`: the line that it is about; empty: none."""
+
+    topic: str
+    text: str
+    retain: bool = False
+    bus: str = ""
 
 
 class Connection:

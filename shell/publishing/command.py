@@ -11,13 +11,10 @@ from typing import TYPE_CHECKING
 from multidrop.dialects import Diagnostic
 from multidrop.shell.batch import runner
 from multidrop.shell.events import FAILURES, SessionEvent, StateChanged
-from multidrop.shell.publishing import broker, messages
-from multidrop.shell.publishing.backlog import Message
-from multidrop.shell.publishing.feed import Feed
-from multidrop.shell.publishing.limits import parse_rate
+from multidrop.shell.publishing import broker
+from multidrop.shell.publishing.broker import Message, Target, parse_target
+from multidrop.shell.publishing.feed import BYE, LOST, ONLINE, Feed, Topics, parse_rate
 from multidrop.shell.publishing.publisher import Publisher
-from multidrop.shell.publishing.target import Target, parse_target
-from multidrop.shell.publishing.topics import Topics
 from multidrop.shell.secrets import url_without_secrets
 from multidrop.shell.streams.stdout import report, write
 
@@ -86,8 +83,8 @@ async def _until_ended(workspace: Session, target: Target, period: float, absent
     if warning := _readable(target, settings):
         workspace.notify(warning, warning=True)
     publisher = Publisher(
-        lambda: broker.Connection(target, settings, Message(topics.status, messages.LOST, retain=True), name),
-        Message(topics.status, messages.ONLINE, retain=True),
+        lambda: broker.Connection(target, settings, Message(topics.status, LOST, retain=True), name),
+        Message(topics.status, ONLINE, retain=True),
         lambda text: workspace.notify(text, warning=True),
         lambda numbers: feed.dropped(numbers),
     )
@@ -102,7 +99,7 @@ async def _until_ended(workspace: Session, target: Target, period: float, absent
         for each in waits:
             each.cancel()
         feed.end()
-        await publisher.end(Message(topics.status, messages.BYE, retain=True))
+        await publisher.end(Message(topics.status, BYE, retain=True))
         write(sys.stderr, _summary(publisher))
 
 

@@ -9,13 +9,70 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-from collections import Counter
-from collections.abc import Callable
-from typing import Protocol
+from collections import Counter, deque
+from collections.abc import Callable, Sequence
 
 from multidrop.dialects import Diagnostic
-from multidrop.shell.publishing.backlog import Backlog, Message
+from multidrop.shell.publishing.broker import Connection, Message
 from multidrop.transports import TransportLost
+
+MOST = 10_000
+"""Messages that wait at most; some 5 MB."""
+
+
+class Backlog:
+    """A bounded queue that also keeps the last message of each retained topic."""
+
+    def __init__(self, most: int = MOST) -> None:
+        self._waiting: deque[Message] = deque()
+        self._most = most
+        self._retained: dict[str, Message] = {}
+        self._dropped: Counter[str] = Counter()
+
+    def __len__(self) -> int:
+        return len(self._waiting)
+
+    def put(self, message: Message) -> None:
+        """Add a message; a full queue drops its oldest one."""
+        if message.retain:
+            self._retained[message.topic] = message
+        self._waiting.append(message)
+        self._bound()
+
+    def first(self) -> Message | None:
+        """The oldest message; it stays until `sent`."""
+        return self._waiting[0] if self._waiting else None
+
+    def sent(self) -> None:
+        """Remove the oldest message."""
+        self._waiting.popleft()
+
+    def give_back(self, messages: Sequence[Message]) -> None:
+        """Put messages before all others."""
+        self._waiting.extendleft(reversed(messages))
+        self._bound()
+
+    def renew(self) -> None:
+        """Add every retained message again, for a broker that may have lost them or has older ones."""
+        waiting = {each.topic: each for each in self._waiting}
+        for topic, message in list(self._retained.items()):
+            if waiting.get(topic) is not message:  # else it is the last of its topic already
+                self.put(message)
+
+    @property
+    def dropped(self) -> int:
+        """The number of messages that were dropped since `take_dropped`."""
+        return self._dropped.total()
+
+    def take_dropped(self) -> Counter[str]:
+        """Return the numbers of messages that were dropped, by bus, and count from 0."""
+        found, self._dropped = self._dropped, Counter()
+        return found
+
+    def _bound(self) -> None:
+        while len(self._waiting) > self._most:
+            self._dropped[self._waiting.popleft().bus] += 1
+
 
 FIRST, LONGEST = 1.0, 30.0
 """The pause before the first attempt to connect again, s; each further one is twice as long, up to the longest."""
@@ -24,25 +81,6 @@ DRAIN = 2.0
 LOOK = 0.02
 REMIND = 60.0
 """The time between two reports of what is dropped while it goes on, s."""
-
-
-class Connection(Protocol):
-    """One connection to a broker."""
-
-    lost: asyncio.Event
-    on_room: Callable[[], None]
-
-    async def connect(self) -> None:
-        """Connect. Raises TransportLost or Diagnostic."""
-
-    def publish(self, message: Message) -> bool:
-        """Send a message; False while the connection is full."""
-
-    def in_flight(self) -> list[Message]:
-        """The messages that are not acknowledged, oldest first."""
-
-    async def close(self) -> None:
-        """End it."""
 
 
 class Publisher:

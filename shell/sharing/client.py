@@ -1,8 +1,7 @@
 """One client of a shared port as bytes: raw, or telnet with the com port option (RFC 2217).
 
-The first byte that a client sends decides: IAC begins telnet; any other one means that it
-negotiates nothing. Such a
-client is sent no byte that is not a drive's: a program would take a reason for a reply.
+The first byte that a client sends decides: IAC begins telnet; any other one means that it negotiates
+nothing. Such a client is sent no byte that is not a drive's: a program would take a reason for a reply.
 """
 
 from __future__ import annotations
@@ -70,11 +69,14 @@ class Client:
             self._begun = True
             self._telnet = telnet.Decoder() if data[0] == telnet.IAC else None
         if self._telnet is None:
-            return [self._interrupted(data)]
+            for each in INTERRUPTS if self._text else ():
+                data = data.replace(each, b"\x03")
+            return [data]
         found: list[Input] = []
         for event in self._telnet.receive(data):
             if isinstance(event, telnet.Data):
-                found.append(self._plain(event.data))
+                # A telnet terminal sends a NUL after its CR.
+                found.append(event.data if self.com_port or not self._text else event.data.translate(None, b"\0"))
             elif isinstance(event, telnet.Interrupt):
                 found.append(b"\x03")
             elif isinstance(event, telnet.Option):
@@ -83,30 +85,18 @@ class Client:
                 found.append(request)
         return [each for each in found if each]
 
-    def _interrupted(self, data: bytes) -> bytes:
-        for each in INTERRUPTS if self._text else ():
-            data = data.replace(each, b"\x03")
-        return data
-
-    def _plain(self, data: bytes) -> bytes:
-        """The data of a telnet terminal, without the NUL that follows its CR."""
-        return data if self.com_port or not self._text else data.translate(None, b"\0")
-
     def _option(self, event: telnet.Option) -> None:
         if event.verb not in telnet.OPPOSITE:
             return
         if event.option == OPTION:
-            self._agree()
+            self.com_port = True
+            for verb, option in ((telnet.DO, OPTION), (telnet.WILL, telnet.BINARY), (telnet.DO, telnet.BINARY)):
+                self._offer(verb, option)
+            self.reply(Setting.MODEM_STATE, 0)  # no modem lines are read
         elif event.option in _TAKEN:
             self._offer(telnet.OPPOSITE[event.verb], event.option)
         else:
             self._offer(telnet.REFUSAL[event.verb], event.option)
-
-    def _agree(self) -> None:
-        self.com_port = True
-        for verb, option in ((telnet.DO, OPTION), (telnet.WILL, telnet.BINARY), (telnet.DO, telnet.BINARY)):
-            self._offer(verb, option)
-        self.reply(Setting.MODEM_STATE, 0)  # no modem lines are read
 
     def _offer(self, verb: int, option: int) -> None:
         """Send an option once: an answer to each answer would never end."""
@@ -127,7 +117,9 @@ class Client:
         """Answer a request that concerns this client alone; return whether it does."""
         if request.setting in (Setting.SUSPEND, Setting.RESUME):
             self._suspended = request.setting == Setting.SUSPEND
-            self.replies += b"" if self._suspended else self._resumed()
+            if not self._suspended:
+                self.replies += self._held
+                self._held.clear()
         elif request.setting == Setting.SIGNATURE:
             self.replies += message(request.setting + REPLY, b"multidrop share")
         elif request.setting in (Setting.LINE_MASK, Setting.MODEM_MASK):
@@ -168,11 +160,6 @@ class Client:
     def overflowed(self) -> bool:
         """Whether more than `HELD` bytes wait for a client that has suspended the flow."""
         return len(self._held) > HELD
-
-    def _resumed(self) -> bytes:
-        held = bytes(self._held)
-        self._held.clear()
-        return held
 
     def farewell(self, reason: str) -> bytes:
         """The reason as the connection is closed: a signature with RFC 2217, a line for a telnet terminal."""

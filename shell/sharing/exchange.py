@@ -10,12 +10,71 @@ port is back.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 from multidrop.dialects.text import visible
-from multidrop.shell.sharing.actions import Action, Close, Purge, Say, Send, Set, Stop, Write
 from multidrop.shell.sharing.client import Client, Input, Request
-from multidrop.shell.sharing.half_line import ENDS, HalfLine
-from multidrop.shell.sharing.stop_bytes import OwedStop, StopBytes
+from multidrop.shell.sharing.stop_bytes import ENDS, HalfLine, OwedStop, StopBytes
 from multidrop.transports.telnet import FLOW, FLOW_IN, GROUPS, NEEDED, PURGE_RECEIVED, Control, Setting, group_of
+
+
+@dataclass(frozen=True)
+class Send:
+    """Send bytes to a client."""
+
+    client: int
+    data: bytes
+
+
+@dataclass(frozen=True)
+class Close:
+    """Close a client's connection, after the bytes that give the reason."""
+
+    client: int
+    farewell: bytes
+
+
+@dataclass(frozen=True)
+class Write:
+    """Write bytes to the port, for a client."""
+
+    client: int
+    data: bytes
+
+
+@dataclass(frozen=True)
+class Stop:
+    """Drop what the port has not sent, and write a stop: `mended` where something was dropped."""
+
+    data: bytes
+    mended: bytes
+
+
+@dataclass(frozen=True)
+class Purge:
+    """Drop what the port has not sent."""
+
+
+@dataclass(frozen=True)
+class Set:
+    """Change a setting of the port for a client; `applied` follows."""
+
+    client: int
+    setting: int
+    value: int
+
+
+@dataclass(frozen=True)
+class Say:
+    """Report an event to a person: the client, the event, and more about it."""
+
+    client: str
+    event: str
+    detail: str = ""
+
+
+Action = Send | Close | Write | Stop | Purge | Set | Say
+
 
 SILENT = 10.0
 """Seconds of silence after which another client may write."""
@@ -68,7 +127,6 @@ class Exchange:
     # Clients
 
     def connect(self, client: int, name: str) -> list[Action]:
-        """Take a client."""
         self.clients[client] = Client(name, not self.framed)
         self._say(client, "connected")
         return self._done()

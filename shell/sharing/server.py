@@ -1,21 +1,43 @@
-"""A shared port on the network: sockets around an `Exchange`, and the port that comes back after a loss."""
+"""`multidrop share`: lend a port to several clients until a signal: sockets around an `Exchange`.
+
+The port comes back after a loss, as a lost bus does.
+"""
 
 from __future__ import annotations
 
 import asyncio
 import contextlib
+import json
+import sys
+import time
 from collections.abc import Callable, Coroutine, Sequence
 from functools import partial
 from typing import Any, cast
 
-from multidrop.dialects import StopPiece
-from multidrop.shell.connect.opening import OpenedPort
+from multidrop.dialects import Diagnostic, StopPiece
+from multidrop.shell.connect import settings
+from multidrop.shell.connect.opening import OpenedPort, open_port
 from multidrop.shell.connect.reconnect import FIRST, next_pause
-from multidrop.shell.sharing.actions import Action, Close, Purge, Say, Send, Set, Stop, Write
-from multidrop.shell.sharing.exchange import NEVER, NOT_REACHED, Exchange
-from multidrop.shell.sharing.stop_bytes import StopBytes
+from multidrop.shell.connect.urls import listening, parse
+from multidrop.shell.events import FAILURES
+from multidrop.shell.prompt.keyboard import on_signals, on_stop_key
+from multidrop.shell.sharing.exchange import (
+    NEVER,
+    NOT_REACHED,
+    Action,
+    Close,
+    Exchange,
+    Purge,
+    Say,
+    Send,
+    Set,
+    Stop,
+    Write,
+)
+from multidrop.shell.sharing.stop_bytes import StopBytes, stop_bytes
+from multidrop.shell.streams.stdout import exit_code, finish, nonblocking, report, write
 from multidrop.transports import PortControl, TransportLost
-from multidrop.transports.sockets import host_port, set_socket_options
+from multidrop.transports.sockets import explain, exposed, host_port, set_socket_options
 from multidrop.transports.telnet import Control, Setting
 
 UNREAD = 1 << 18
@@ -67,7 +89,6 @@ class SharedPort:
         return f"rfc2217://{host_port(host, self._server.sockets[0].getsockname()[1])}"
 
     async def close(self) -> None:
-        """End the service, and close the port."""
         for name in self._exchange.owed.names if self._loss is not None else ():
             self._narrate(Say(name, NOT_REACHED, f"sharing ends before the port is back; {NEVER}"))
         if self._server is not None:
@@ -118,14 +139,12 @@ class SharedPort:
         return self._number
 
     def disconnected(self, number: int) -> None:
-        """Forget a client."""
         self._connections.pop(number, None)
         if not self._connections:
             self._left.set()
         self._do(self._exchange.leave(number))
 
     def received(self, number: int, data: bytes) -> None:
-        """Take bytes that a client has sent."""
         self._do(self._exchange.receive(number, data, self._loop.time()))
         self._set_timer()
 
@@ -152,41 +171,32 @@ class SharedPort:
             if isinstance(action, Say):
                 self._narrate(action)
             elif isinstance(action, Send):
-                self._send(action)
+                connection = self._connections.get(action.client)
+                if connection is not None and not connection.send(action.data):
+                    self._do(self._exchange.close(action.client, "dropped", f"it left {UNREAD} bytes unread"))
+                    connection.abort()
             elif isinstance(action, Close):
                 self._connections[action.client].say_goodbye(action.farewell)
             elif isinstance(action, Write):
-                self._write(action)
+                if self._transport.pending > AHEAD:
+                    ahead = (
+                        f"it wrote {AHEAD} bytes more than the line has taken; {len(action.data)} bytes were dropped"
+                    )
+                    self._do(self._exchange.close(action.client, "dropped", ahead))
+                    continue
+                self._purged = 0
+                self._transport.write(action.data)
             elif isinstance(action, Stop):
-                self._stop(action)
+                dropped = self._transport.discard(whole=self._exchange.framed)
+                self._transport.write(action.mended if dropped or self._purged else action.data)
+                self._purged = 0
+                self._do(self._exchange.dropped(dropped))
             elif isinstance(action, Purge):
-                self._purge()
+                dropped = self._transport.discard(whole=self._exchange.framed)
+                self._purged += dropped
+                self._do(self._exchange.dropped(dropped))
             else:
                 self._begin(self._apply(action))
-
-    def _send(self, action: Send) -> None:
-        if (connection := self._connections.get(action.client)) and not connection.send(action.data):
-            self._do(self._exchange.close(action.client, "dropped", f"it left {UNREAD} bytes unread"))
-            connection.abort()
-
-    def _write(self, action: Write) -> None:
-        if self._transport.pending > AHEAD:
-            ahead = f"it wrote {AHEAD} bytes more than the line has taken; {len(action.data)} bytes were dropped"
-            self._do(self._exchange.close(action.client, "dropped", ahead))
-            return
-        self._purged = 0
-        self._transport.write(action.data)
-
-    def _stop(self, action: Stop) -> None:
-        dropped = self._transport.discard(whole=self._exchange.framed)
-        self._transport.write(action.mended if dropped or self._purged else action.data)
-        self._purged = 0
-        self._do(self._exchange.dropped(dropped))
-
-    def _purge(self) -> None:
-        dropped = self._transport.discard(whole=self._exchange.framed)
-        self._purged += dropped
-        self._do(self._exchange.dropped(dropped))
 
     async def _apply(self, action: Set) -> None:
         """Change a setting, in a thread, for the call may block. A port without settings takes any."""
@@ -259,7 +269,6 @@ class Connection(asyncio.BufferedProtocol):
         self._ending: asyncio.TimerHandle | None = None
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
-        """Begin with a client."""
         self._transport = cast(asyncio.Transport, transport)
         if (made := transport.get_extra_info("socket")) is not None:
             set_socket_options(made)
@@ -267,15 +276,12 @@ class Connection(asyncio.BufferedProtocol):
         self._number = self._port.connected(self, host_port(peer[0], peer[1]))
 
     def get_buffer(self, sizehint: int) -> memoryview:
-        """Give the room for one read."""
         return self._buffer
 
     def buffer_updated(self, nbytes: int) -> None:
-        """Take bytes that the client has written."""
         self._port.received(self._number, bytes(self._buffer[:nbytes]))
 
     def connection_lost(self, exc: Exception | None) -> None:
-        """End: the client has left."""
         if self._ending is not None:
             self._ending.cancel()
         self._transport = None
@@ -304,6 +310,102 @@ class Connection(asyncio.BufferedProtocol):
             self._ending = asyncio.get_running_loop().call_later(LINGER, self.abort)
 
     def abort(self) -> None:
-        """Close the connection at once."""
         if self._transport is not None:
             self._transport.abort()
+
+
+AGAIN = 10.0
+"""Seconds for which a client that tries again and again is refused without another line."""
+_SENT_AWAY = ("refused", "lost")
+_REPEATED = ("connected", "left", *_SENT_AWAY)
+EXPOSED = "other computers can move the drives at {}; they need no password. 127.0.0.1 keeps them out"
+
+
+def run(url: str, address: str, *, as_json: bool) -> int:
+    """Lend the port until a signal, which ends it well; return the exit code."""
+    return asyncio.run(_run(url, address, as_json))
+
+
+async def _run(url: str, address: str, as_json: bool) -> int:
+    over = asyncio.Event()
+    with nonblocking() as streams, on_signals(over.set):
+        try:
+            await _share(url, address, as_json, over)
+            return 0
+        except FAILURES as failure:
+            write(sys.stderr, report(failure))
+            return exit_code(failure)
+        finally:
+            await finish(streams, over.is_set)
+
+
+async def _share(url: str, address: str, as_json: bool, over: asyncio.Event) -> None:
+    """Lend the port until a signal (`over`). Raises the loss of a port that cannot be found again."""
+    host, port = listening(address)
+    connection = parse(url, settings.load().connections)
+    if connection.scheme == "udp":
+        raise Diagnostic("datagrams cannot be shared", url, "an Ethernet drive takes several clients itself")
+    if connection.hints.family:
+        stop_bytes(connection.hints.family)
+    narrator = Narrator(as_json)
+    opened = await open_port(connection)
+    shared = SharedPort(opened, stop_bytes(opened.family, connection.hints.drives), narrator.say)
+    try:
+        try:
+            endpoint = await shared.open(host, port)
+        except OSError as error:
+            where = f"--rfc2217 {host}:{port}"
+            raise TransportLost(f"{where}: cannot listen there: {explain(error)}; give another port") from None
+        narrator.ready(opened.name, endpoint)
+        if opened.transport.limits:
+            narrator.note(f"{opened.transport.name}: {opened.transport.limits}")
+        if exposed(host):
+            narrator.note(EXPOSED.format(endpoint))
+        # The thread that reads the keys writes nothing: the event loop, which never blocks here, writes the stop.
+        with on_stop_key(lambda: None, shared.stop, over.set):
+            signalled = asyncio.create_task(over.wait())
+            ends: list[asyncio.Future[Any]] = [signalled, shared.lost_for_good]
+            await asyncio.wait(ends, return_when=asyncio.FIRST_COMPLETED)
+            signalled.cancel()
+        if shared.lost_for_good.done():
+            raise shared.lost_for_good.result().again()
+    finally:
+        await shared.close()
+
+
+class Narrator:
+    """Reports events to a person on standard error, or as JSON lines on standard output."""
+
+    def __init__(self, as_json: bool) -> None:
+        self._as_json = as_json
+        self._refused: dict[str, float] = {}
+        """The hosts whose clients were refused, and the time of that line."""
+
+    def ready(self, name: str, endpoint: str) -> None:
+        """Print where clients connect, as `multidrop sim` does."""
+        if self._as_json:
+            self._print(bus=name, endpoint=endpoint)
+            self._print(ready=True)
+        else:
+            write(sys.stdout, f"{name:<12} {endpoint}", "ready: Ctrl+X stops the drives, Ctrl+C ends it")
+
+    def note(self, text: str) -> None:
+        write(sys.stderr, f"multidrop: {text}")
+
+    def say(self, event: Say) -> None:
+        if self._as_json:
+            self._print(at=round(time.time(), 3), client=event.client, event=event.event, detail=event.detail)
+        elif not self._repeated(event, time.monotonic()):
+            detail = f": {event.detail}" if event.detail else ""
+            write(sys.stderr, f"{time.strftime('%H:%M:%S')} {event.client or 'the port'} {event.event}{detail}")
+
+    def _print(self, **fields: Any) -> None:
+        write(sys.stdout, json.dumps(fields))
+
+    def _repeated(self, event: Say, now: float) -> bool:
+        """Whether a client of a host was refused a moment ago: one that connects again by itself is said once."""
+        host = event.client.rpartition(":")[0]
+        again = bool(host) and event.event in _REPEATED and now < self._refused.get(host, -AGAIN) + AGAIN
+        if host and event.event in _SENT_AWAY and not again:
+            self._refused = {host: now, **{each: at for each, at in self._refused.items() if now < at + AGAIN}}
+        return again

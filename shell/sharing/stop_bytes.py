@@ -1,4 +1,4 @@
-"""The stops in the bytes of a client, for the languages that may be on a line.
+"""The stops in the bytes of a client, for the languages that may be on a line; and the line that a stop cuts off.
 
 A line whose URL names no language may have any language that is text. Their stops differ, and none is a command of
 another one. Where messages carry their length, a single byte has no meaning: only a whole message can be a stop.
@@ -12,6 +12,57 @@ from dataclasses import dataclass
 
 from multidrop.dialects import Diagnostic, StopPiece
 from multidrop.dialects.families import DEFAULT, FAMILIES, TABLE
+
+ENDS = b"\r\n"
+LONGEST = 80
+"""Bytes of an unfinished line that are kept."""
+_LINES = re.compile(b"[\r\n]")
+
+
+class HalfLine:
+    """The bytes of the present line. `framed`: messages carry their length, so no line is ever begun."""
+
+    def __init__(self, framed: bool) -> None:
+        self.text = b""
+        self._framed = framed
+        self._cut = False
+        """The last stop came from another client within this line."""
+        self._skipping = False
+        """The rest of that line is dropped."""
+
+    def written(self, data: bytes) -> list[bytes]:
+        """Take bytes that were written; return the lines that they end, or the messages."""
+        if self._framed:
+            return [data]
+        *ended, begun = _LINES.split(self.text + data)
+        self.text = begun[-LONGEST:]
+        return ended
+
+    def stopped(self, others: bool) -> bytes:
+        """Note a stop; return the beginning of the line that it cut off, which only the stop of `others` does."""
+        begun, self.text = self.text, b""
+        self._cut = others and bool(begun)
+        return begun if self._cut else b""
+
+    def dropped(self) -> None:
+        """Note that the beginning of the line was dropped: its rest is dropped, too, if another client cut it."""
+        self._skipping, self._cut = self._skipping or self._cut, False
+
+    def ended(self) -> None:
+        self.text = b""
+
+    def begin_writer(self) -> None:
+        """Drop no rest: the next bytes are another line's."""
+        self._skipping = False
+
+    def rest(self, data: bytes) -> bytes:
+        """Return bytes without the rest of a line whose beginning a stop has dropped."""
+        if not self._skipping:
+            return data
+        end = next((at for at, byte in enumerate(data) if byte in ENDS), None)
+        self._skipping = end is None
+        return b"" if end is None else data[end + 1 :]
+
 
 KEYS = rb"[\x03\x1b]"
 """Ctrl+C and ESC, which stop on every line of text."""
@@ -78,7 +129,6 @@ class OwedStop:
 
     @property
     def names(self) -> list[str]:
-        """The senders."""
         return list(dict.fromkeys(self._senders.values()))
 
     @property

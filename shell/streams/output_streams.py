@@ -14,21 +14,12 @@ import os
 import select
 import stat
 import sys
-import threading
-import time
-from collections import deque
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
-from datetime import datetime
 from functools import partial
 from typing import TextIO
 
-LIMIT = 64 * 1024
-"""The largest number of bytes that wait for a reader, except replies to a pipe, and all lines to a file."""
-MOST = 64 * 1024 * 1024
-"""The largest number of bytes that wait for a pipe or a file; automation waits long before that."""
-CHUNK = 16 * 1024
-"""The number of bytes in one write."""
+from multidrop.shell.threads import CHUNK, LIMIT, BoundedWriter, Loss
+
 PIPE_TIMEOUT = 60.0
 """The time without progress, s, after which a pipe's reader is given up at the end."""
 SHORT_TIMEOUT = 1.0
@@ -39,140 +30,23 @@ as_json = False
 """Standard output is a stream of JSON objects, and a loss is an object in it."""
 
 
-@dataclass
-class Loss:
-    """Lines that were dropped, and between which times of day, s."""
+def descriptor_writer(
+    descriptor: int, notice: Callable[[Loss], bytes], failed: Callable[[OSError], None], limit: int = LIMIT
+) -> BoundedWriter:
+    """Make the writer of a descriptor. `failed` is called, from its thread, once that can no longer be written."""
 
-    since: float
-    until: float
-    count: int = 0
+    def write(data: bytes) -> int:
+        try:
+            return os.write(descriptor, data[:CHUNK])
+        except BlockingIOError:  # another process that shares the descriptor made it non-blocking
+            select.select([], [descriptor], [])
+            return 0
 
-    def fact(self) -> dict[str, object]:
-        """The loss as an object for programs."""
-        since, until = (datetime.fromtimestamp(at).astimezone() for at in (self.since, self.until))
-        return {"lost": self.count, "from": since.isoformat(timespec="milliseconds")} | {
-            "to": until.isoformat(timespec="milliseconds")
-        }
+    def ended(problem: OSError | None) -> None:
+        if problem is not None:
+            failed(problem)
 
-    def __str__(self) -> str:
-        """The loss in words; its times are local."""
-        since, until = (datetime.fromtimestamp(at).strftime("%H:%M:%S.%f")[:-3] for at in (self.since, self.until))
-        return f"{self.count} {'line' if self.count == 1 else 'lines'} lost, {since} to {until}"
-
-
-class Lane:
-    """A descriptor and the thread that writes to it. `put` never waits; bytes leave in the order of `put`.
-
-    Where items were dropped, the thread calls `notice` once all before them are written, and writes the result in their
-    place. It calls `failed` when the descriptor can no longer be written.
-    """
-
-    def __init__(
-        self, descriptor: int, notice: Callable[[Loss], bytes], failed: Callable[[OSError], None], limit: int = LIMIT
-    ) -> None:
-        self.notice = notice
-        self.written = 0
-        """The number of bytes written so far."""
-        self.closed = False
-        """True after a failure, or when the reader was given up: nothing more is written."""
-        self._descriptor, self._failed, self._limit = descriptor, failed, limit
-        self._queue: deque[bytes | Loss] = deque()
-        self._held = 0
-        self._loss: Loss | None = None
-        """The loss in the queue, which grows until the thread comes to it."""
-        self._changed = threading.Condition()
-        self._thread: threading.Thread | None = None
-
-    @property
-    def idle(self) -> bool:
-        """Whether everything is written."""
-        return self.closed or not (self._held or self._loss)
-
-    @property
-    def behind(self) -> bool:
-        """Whether the reader is slower than the writer."""
-        return not self.closed and (self._loss is not None or self._held > self._limit // 2)
-
-    def put(self, data: bytes, keep: bool = False, count: int = 1) -> bool:
-        """Queue `count` lines; False if they were dropped for lack of room. `keep`: drop them only beyond MOST."""
-        with self._changed:
-            if self.closed:
-                return False
-            if self._held > MOST or (not keep and self._is_full(len(data))):
-                self._lose(count, time.time())
-                return False
-            self._add(data)
-        return True
-
-    def _lose(self, count: int, now: float) -> None:
-        if self._loss is None:
-            self._loss = Loss(now, now)
-            self._queue.append(self._loss)
-        self._loss.count += count
-        self._loss.until = now
-
-    def _is_full(self, size: int) -> bool:
-        """Whether an item of this size has no room. After a loss there is no room until the reader catches up."""
-        return self._loss is not None or (self._held > 0 and self._held + size > self._limit)
-
-    def _add(self, data: bytes) -> None:
-        self._queue.append(data)
-        self._held += len(data)
-        if self._thread is None:
-            self._thread = threading.Thread(target=self._run, daemon=True, name="output")
-            self._thread.start()
-        self._changed.notify_all()
-
-    def give_up(self) -> None:
-        """Drop what waits and write nothing more. The thread may wait for its reader forever; nothing waits for it."""
-        with self._changed:
-            self.closed = True
-            self._queue.clear()
-            self._changed.notify_all()
-
-    def _run(self) -> None:
-        while (data := self._next()) is not None:
-            try:
-                written = 0 if not data else os.write(self._descriptor, data[:CHUNK])
-            except BlockingIOError:  # another process that shares the descriptor made it non-blocking
-                select.select([], [self._descriptor], [])
-                written = 0
-            except OSError as problem:
-                self.give_up()
-                self._failed(problem)
-                return
-            self._took(data[written:], written)
-
-    def _next(self) -> bytes | None:
-        """The bytes of the next write; None at the end."""
-        with self._changed:
-            self._changed.wait_for(lambda: self._queue or self.closed)
-            if self.closed:
-                return None
-            data = b""
-            while self._queue and (not data or len(data) + self._size(self._queue[0]) <= CHUNK):
-                item = self._queue.popleft()
-                if isinstance(item, Loss):
-                    item = self._notice(item)
-                data += item
-            return data
-
-    def _size(self, item: bytes | Loss) -> int:
-        """The size of an item; a loss waits until all before it is written."""
-        return CHUNK if isinstance(item, Loss) else len(item)
-
-    def _notice(self, loss: Loss) -> bytes:
-        self._loss = None
-        notice = self.notice(loss)
-        self._held += len(notice)
-        return notice
-
-    def _took(self, rest: bytes, written: int) -> None:
-        with self._changed:
-            self.written += written
-            self._held -= written
-            if rest:
-                self._queue.appendleft(rest)
+    return BoundedWriter(write, notice, ended, limit)
 
 
 class LineStream(io.TextIOBase):
@@ -187,29 +61,25 @@ class LineStream(io.TextIOBase):
 
 
 class Outlet(LineStream):
-    """A text stream over a lane. `errors`: it carries warnings."""
+    """A text stream over a writer. `errors`: it carries warnings."""
 
-    def __init__(self, stream: TextIO, lane: Lane, errors: bool) -> None:
-        self.stream, self.lane = stream, lane
+    def __init__(self, stream: TextIO, writer: BoundedWriter, errors: bool) -> None:
+        self.stream, self.writer = stream, writer
         self.terminal, self._errors = stream.isatty(), errors
         self._file = stat.S_ISREG(os.fstat(stream.fileno()).st_mode)
         self._begun = ""
 
     @property
     def encoding(self) -> str:  # type: ignore[override]
-        """The encoding of the replaced stream."""
         return self.stream.encoding or "utf-8"
 
     def fileno(self) -> int:
-        """The descriptor of the replaced stream."""
         return self.stream.fileno()
 
     def isatty(self) -> bool:
-        """Whether the destination is a terminal."""
         return self.terminal
 
     def writable(self) -> bool:
-        """Return True."""
         return True
 
     def write(self, text: str) -> int:
@@ -220,18 +90,16 @@ class Outlet(LineStream):
         return len(text)
 
     def flush(self) -> None:
-        """Send the text written so far."""
         text, self._begun = self._begun, ""
         if text:
             self._put(text, keep=not self.terminal)
 
     def lines(self, lines: Sequence[str], spare: bool) -> None:
-        """Send lines."""
         text = "\n".join((*lines, ""))
         self._put(text, keep=self._errors or self._file or not (spare or self.terminal), count=len(lines))
 
     def _put(self, text: str, keep: bool, count: int = 1) -> None:
-        self.lane.put(text.encode(self.encoding, "backslashreplace"), keep, count)
+        self.writer.put(text.encode(self.encoding, "backslashreplace"), keep, count)
 
 
 class Streams:
@@ -244,7 +112,7 @@ class Streams:
         """Wait while the reader of a pipe or a file is behind; never for a terminal."""
         import asyncio  # only who has an event loop pays for it
 
-        while any(each.lane.behind and not each.terminal for each in self.outlets):
+        while any(each.writer.behind and not each.terminal for each in self.outlets):
             await asyncio.sleep(0.01)
 
     async def finish(self, hurried: Callable[[], bool]) -> list[Outlet]:
@@ -256,12 +124,12 @@ class Streams:
 
         loop, late = asyncio.get_running_loop(), []
         for each in self.outlets:
-            seen, since = each.lane.written, loop.time()
-            while not each.lane.idle:
-                if each.lane.written != seen:
-                    seen, since = each.lane.written, loop.time()
+            seen, since = each.writer.written, loop.time()
+            while not each.writer.idle:
+                if each.writer.written != seen:
+                    seen, since = each.writer.written, loop.time()
                 if loop.time() - since > (SHORT_TIMEOUT if each.terminal or hurried() else PIPE_TIMEOUT):
-                    each.lane.give_up()
+                    each.writer.give_up()
                     late.append(each)
                     break
                 await asyncio.sleep(0.002)
@@ -270,22 +138,22 @@ class Streams:
 
 @contextlib.contextmanager
 def outlets(failed: Callable[[TextIO, OSError], None]) -> Iterator[Streams]:
-    """Replace `sys.stdout` and `sys.stderr` by outlets, with one lane if both have the same destination.
+    """Replace `sys.stdout` and `sys.stderr` by outlets, with one writer if both have the same destination.
 
     `failed` is called, from another thread, with a stream that can no longer be written. A stream without a descriptor
     stays unchanged.
     """
     before = sys.stdout, sys.stderr
     made: dict[TextIO, Outlet] = {}
-    errors: Lane | None = None
+    errors: BoundedWriter | None = None
     for stream in (sys.stderr, sys.stdout):
         with contextlib.suppress(OSError, ValueError, AttributeError):
             if errors is not None and _place(stream) == _place(before[1]):
-                lane = errors
+                writer = errors
             else:
-                lane = Lane(stream.fileno(), _notice(stream, errors), partial(failed, stream))
-            made[stream] = Outlet(stream, lane, stream is before[1])
-            errors = errors or lane
+                writer = descriptor_writer(stream.fileno(), _notice(stream, errors), partial(failed, stream))
+            made[stream] = Outlet(stream, writer, stream is before[1])
+            errors = errors or writer
     sys.stdout, sys.stderr = (made.get(stream, stream) for stream in before)
     try:
         yield Streams(list(made.values()))
@@ -302,7 +170,7 @@ def _place(stream: TextIO) -> tuple[int, int, int]:
     return facts.st_dev, facts.st_ino, facts.st_rdev
 
 
-def _notice(stream: TextIO, errors: Lane | None) -> Callable[[Loss], bytes]:
+def _notice(stream: TextIO, errors: BoundedWriter | None) -> Callable[[Loss], bytes]:
     """The report of dropped lines: in their place, or on standard error if that is another destination."""
     on_terminal = stream.isatty()
 

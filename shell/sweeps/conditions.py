@@ -1,4 +1,4 @@
-"""The CONDITION of `--expect`: one comparison like that of `/assert`, over the results of a run instead of words.
+"""The result of a run in the terms of conditions, and the CONDITION of `--expect`: a comparison like that of `/assert`.
 
 Lists are written in brackets, compare with `==` and `!=`, and take no part in calculations: `errors == [86]`. A number
 in a list equals a print that is this number. `ended` is a text, and beside a number 1 or 0: ended by itself, or not.
@@ -7,7 +7,9 @@ in a list equals a print that is this number. `ended` is a text, and beside a nu
 from __future__ import annotations
 
 import re
+from collections.abc import Iterable
 from dataclasses import dataclass
+from typing import NamedTuple
 
 from multidrop.dialects import Diagnostic
 from multidrop.shell.scripts.expression import (
@@ -26,7 +28,42 @@ from multidrop.shell.scripts.expression import (
     unknowns,
     value_of,
 )
-from multidrop.shell.sweeps.outcome import BY_ITSELF, ENDS, Outcome
+from multidrop.simulator.program_run import Event
+
+BY_ITSELF = ("E", "END")
+"""The ends of a program that has ended by itself."""
+ENDS = (*BY_ITSELF, "error", "until")
+Position = int | tuple[int, ...]
+
+
+class Outcome(NamedTuple):
+    """`position` has a number for each axis, `errors` those that the program did not handle, in their order."""
+
+    position: Position = 0
+    errors: tuple[int | str, ...] = ()
+    prints: tuple[str, ...] = ()
+    virtual_s: float = 0.0
+    ended: str = "E"
+
+
+def outcome_of(events: Iterable[Event]) -> Outcome:
+    """Run to the end, and take the result from the events."""
+    prints: list[str] = []
+    fact = {}
+    for event in events:
+        fact = event.fact(0.0)
+        if "print" in fact:
+            prints.append(fact["print"])
+    summary = fact["summary"]
+    place = summary["position"]
+    return Outcome(
+        position=tuple(place.values()) if isinstance(place, dict) else place,
+        errors=tuple(summary["errors"]),
+        prints=tuple(prints),
+        virtual_s=summary["virtual_s"],
+        ended=summary["ended"],
+    )
+
 
 NAMES = Outcome._fields
 LISTS = ("errors", "prints")
@@ -46,7 +83,9 @@ class Condition:
 
     def holds(self, outcome: Outcome) -> bool:
         """Whether the condition holds for a result. Raises Diagnostic for a calculation without a value."""
-        known: Known = {each: _known(each.name, outcome) for each in unknowns(self.tree) if isinstance(each, Name)}
+        names = [each for each in unknowns(self.tree) if isinstance(each, Name)]
+        values = {each: getattr(outcome, each.name, each.name) for each in names}
+        known: Known = {each: "" if isinstance(value, tuple) else value for each, value in values.items()}
         left, right = (_side(each, outcome, known) for each in (self.tree.left, self.tree.right))
         if not (isinstance(left, tuple) or isinstance(right, tuple)):
             left, right = _beside(self.tree, left, right)
@@ -55,13 +94,21 @@ class Condition:
     def seen(self, outcome: Outcome) -> str:
         """Describe the results that it is about, as `errors == [86]`."""
         found = (each.name for each in unknowns(self.tree) if isinstance(each, Name))
-        names = dict.fromkeys(each for each in found if each in NAMES)
-        return ", ".join(f"{name} == {_shown(getattr(outcome, name))}" for name in names)
+        values = {each: getattr(outcome, each) for each in found if each in NAMES}
+        shown = {
+            name: f"[{', '.join(map(quoted, value))}]" if isinstance(value, tuple) else quoted(value)
+            for name, value in values.items()
+        }
+        return ", ".join(f"{name} == {value}" for name, value in shown.items())
 
 
 def parse(text: str, example: Outcome) -> Condition:
     """Parse a condition; `example` is a result of the family's programs. Raises Diagnostic."""
-    tree = _parsed(text)
+    try:
+        quoted_twice = _SINGLE.sub(lambda match: match[0] if match[1] is None else f'"{match[1]}"', text)
+        tree = parse_check(quoted_twice, (*NAMES, *ENDS), lists=True)
+    except Diagnostic as problem:
+        raise Diagnostic(problem.message, f"--expect {text}", problem.hint.replace("[@ADDR] ", "")) from None
     found = tuple(unknowns(tree))
     for each in found:
         if isinstance(each, Word) and (each.target or not each.line):
@@ -72,21 +119,11 @@ def parse(text: str, example: Outcome) -> Condition:
     return Condition(text, tree)
 
 
-def _parsed(text: str) -> Comparison:
-    try:
-        return parse_check(_SINGLE.sub(_in_double, text), (*NAMES, *ENDS), lists=True)
-    except Diagnostic as problem:
-        raise Diagnostic(problem.message, f"--expect {text}", problem.hint.replace("[@ADDR] ", "")) from None
-
-
-def _in_double(match: re.Match[str]) -> str:
-    return match[0] if match[1] is None else f'"{match[1]}"'
-
-
 def _check_lists(text: str, tree: Comparison, example: Outcome) -> None:
     """Refuse a list in a calculation, beside a number, or in an order. Raises Diagnostic."""
     sides = [_is_list(each, example) for each in (tree.left, tree.right)]
-    inner = [each for part in _inside(tree, example) for each in unknowns(part) if _is_list(each, example)]
+    no_lists = [tree.within, *(each for each in (tree.left, tree.right) if not _is_list(each, example))]
+    inner = [each for part in no_lists for each in unknowns(part) if _is_list(each, example)]
     mixed, ordered = any(sides) != all(sides), any(sides) and tree.sign not in EQUAL
     if inner or mixed or ordered:
         hint = 'as in errors == [], errors == [86], prints == ["done"]'
@@ -96,21 +133,10 @@ def _check_lists(text: str, tree: Comparison, example: Outcome) -> None:
             _items(each.text)
 
 
-def _inside(tree: Comparison, example: Outcome) -> list[Expression]:
-    """The parts in which no list may be."""
-    return [tree.within, *(each for each in (tree.left, tree.right) if not _is_list(each, example))]
-
-
 def _is_list(tree: Expression, example: Outcome) -> bool:
     if isinstance(tree, Name):
         return isinstance(getattr(example, tree.name, None), tuple)
     return isinstance(tree, Word)
-
-
-def _known(name: str, outcome: Outcome) -> Value:
-    """The value of a name in a calculation; a list has none."""
-    value = getattr(outcome, name, name)
-    return "" if isinstance(value, tuple) else value
 
 
 def _side(tree: Expression, outcome: Outcome, known: Known) -> Side:
@@ -159,7 +185,3 @@ def _items(text: str) -> List:
         found.append(value_of(bare) if bare is not None else double if double is not None else single)
         at = match.end()
     return tuple(found)
-
-
-def _shown(value: Side) -> str:
-    return f"[{', '.join(map(quoted, value))}]" if isinstance(value, tuple) else quoted(value)

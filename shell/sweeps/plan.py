@@ -17,10 +17,19 @@ from multidrop.dialects import Diagnostic
 from multidrop.dialects.families import program_language_of
 from multidrop.dialects.files import program_text_of
 from multidrop.shell.connect import settings
-from multidrop.shell.sweeps import values, variation
 from multidrop.shell.sweeps.trial import Case, Job, bench
-from multidrop.shell.sweeps.values import Value, Values
-from multidrop.shell.sweeps.variation import OWN_KEYS, Drive, Key
+from multidrop.shell.sweeps.variation import (
+    OWN_KEYS,
+    SEED,
+    Drive,
+    Key,
+    Value,
+    Values,
+    misplaced_hint,
+    parse_key,
+    parse_values,
+    spelled,
+)
 from multidrop.simulator import cells
 from multidrop.simulator.cells import Placed
 from multidrop.simulator.families import PROGRAMS
@@ -58,7 +67,6 @@ class Plan:
 
     @property
     def count(self) -> int:
-        """The number of cases."""
         return prod(each.count for each in self.values) if self.asked.draws is None else self.asked.draws
 
     @cached_property
@@ -67,7 +75,6 @@ class Plan:
         return [tuple(each.draw(rng) for each in self.values) for _ in range(self.asked.draws or 0)]
 
     def case(self, number: int) -> Case:
-        """The case of a number."""
         if self.asked.draws is not None:
             return number, self._drawn[number - 1]
         index, found = number - 1, []
@@ -96,19 +103,24 @@ def make(asked: Asked) -> Plan:
     _check_keys(keys)
     for named, key, _ in parsed:
         if named and named not in _names(chosen):
-            raise _without_effect(key, names[named], chosen)
+            name = names[named].spec.name
+            what = f"drive {chosen.spec.name} runs the program, so drive {name} changes nothing"
+            raise Diagnostic(what, f"--vary {key.text}", f"--cell {names[named].place} lets drive {name} run it")
     drive = {name: each for name, each in chosen.table.items() if name not in OWN_KEYS}
     expects = tuple(asked.expect) or EXPECTED
     where = f"drive {chosen.spec.name}"
     job = Job(asked.file, program, language, json.dumps(drive), where, keys, expects, asked.run, asked.until)
-    made = Plan(asked, job, _place(asked.cell, allow, chosen), tuple(each for _, _, each in parsed), drive)
+    place = asked.cell or ""
+    if asked.cell is not None and len(cells.matching(asked.cell, allow)) != 1:
+        place = chosen.place
+    made = Plan(asked, job, place, tuple(each for _, _, each in parsed), drive)
     _check(made)
     return made
 
 
 def _parsed(text: str, names: Collection[str]) -> tuple[str, Key]:
     try:
-        return variation.parse(text, names)
+        return parse_key(text, names)
     except Diagnostic as problem:
         hint = problem.hint or f"valid: {', '.join(sorted(names, key=lambda name: (len(name), name))) or 'KEY'}"
         raise Diagnostic(problem.message, problem.where, hint) from None
@@ -116,7 +128,7 @@ def _parsed(text: str, names: Collection[str]) -> tuple[str, Key]:
 
 def _values(key: str, text: str, asked: Asked) -> Values:
     try:
-        return values.parse(text, drawn=asked.draws is not None)
+        return parse_values(text, drawn=asked.draws is not None)
     except Diagnostic as problem:
         raise Diagnostic(problem.message, f"--vary {key}", problem.hint) from None
 
@@ -134,13 +146,6 @@ def _chosen(cell: str, allow: Sequence[Path], named: set[str]) -> Placed:
     return chosen[0] if len(candidates) > 1 and len(chosen) == 1 else cells.placed(cell, allow)
 
 
-def _place(cell: str | None, allow: Sequence[Path], chosen: Placed) -> str:
-    """The shortest `--cell` that means the drive."""
-    if cell is None:
-        return ""
-    return cell if len(cells.matching(cell, allow)) == 1 else chosen.place
-
-
 def _check_keys(keys: Sequence[Key]) -> None:
     seen: dict[tuple[str, str, str], str] = {}
     for each in keys:
@@ -148,12 +153,6 @@ def _check_keys(keys: Sequence[Key]) -> None:
         if place in seen:
             raise Diagnostic("is varied twice", f"--vary {each.text}", f"see --vary {seen[place]}")
         seen[place] = each.text
-
-
-def _without_effect(key: Key, drive: Placed, chosen: Placed) -> Diagnostic:
-    """The error for a key of a drive that does not run the program."""
-    what = f"drive {chosen.spec.name} runs the program, so drive {drive.spec.name} changes nothing"
-    return Diagnostic(what, f"--vary {key.text}", f"--cell {drive.place} lets drive {drive.spec.name} run it")
 
 
 def _check(plan: Plan) -> None:
@@ -167,14 +166,14 @@ def _check(plan: Plan) -> None:
             try:
                 _check_value(plan, index, key, value)
             except Diagnostic as problem:
-                where = f"--vary {key.text}={values.spelled(value)}"
-                hint = variation.hint(key) or problem.hint
+                where = f"--vary {key.text}={spelled(value)}"
+                hint = misplaced_hint(key) or problem.hint
                 raise Diagnostic(f"{problem.where}: {problem.message}", where, hint) from None
 
 
 def _check_value(plan: Plan, index: int, key: Key, value: Value) -> None:
     """Refuse a value that the drive refuses beside its own ones, and beside the first and last of the other keys."""
-    if key.part == variation.SEED:
+    if key.part == SEED:
         if not isinstance(value, int):
             raise Diagnostic("must be a whole number", "seed")
         return

@@ -19,10 +19,9 @@ from multiprocessing import connection
 from multiprocessing.context import BaseContext
 from typing import ParamSpec, TypeVar
 
-from multidrop.shell.signals import FROM_TERMINAL, SIGNALS
+from multidrop.shell.signals import FROM_TERMINAL, SIGNALS, Interruption
 from multidrop.shell.streams.stdout import WATCHER
 from multidrop.shell.sweeps import trial
-from multidrop.shell.sweeps.interruption import Interruption
 from multidrop.shell.sweeps.trial import DIED, Case, Job, Result
 
 AHEAD = 3

@@ -15,10 +15,8 @@ from typing import NamedTuple
 from multidrop.dialects import Diagnostic
 from multidrop.dialects.on_demand import imported
 from multidrop.shell.sweeps import conditions
-from multidrop.shell.sweeps.conditions import Condition
-from multidrop.shell.sweeps.outcome import Outcome, outcome_of
-from multidrop.shell.sweeps.values import Value
-from multidrop.shell.sweeps.variation import Drive, Key
+from multidrop.shell.sweeps.conditions import Condition, outcome_of
+from multidrop.shell.sweeps.variation import Drive, Key, Value
 from multidrop.simulator.cells import read_drive
 from multidrop.simulator.families import PROGRAMS
 from multidrop.simulator.program_run import Load, ProgramRun
@@ -83,21 +81,17 @@ class Bench:
         return self.load(read_drive(table, self.job.where))
 
     def tried(self, case: Case) -> Result:
-        """Run a case."""
         number, values = case
         job = self.job
         try:
             outcome = outcome_of(self.loaded(values).run(job.run, UNTIL if job.until is None else job.until))
-            return self._judged(number, outcome)
+            if job.until is None and outcome.ended == "until":
+                return Result(number, CUT, f"still running after {UNTIL:g} s; --until SECONDS sets another limit")
+            for index, each in enumerate(self.conditions):
+                if not each.holds(outcome):
+                    return Result(number, index, each.seen(outcome))
         except Diagnostic as problem:
             return Result(number, REFUSED, str(problem))
-
-    def _judged(self, number: int, outcome: Outcome) -> Result:
-        if self.job.until is None and outcome.ended == "until":
-            return Result(number, CUT, f"still running after {UNTIL:g} s; --until SECONDS sets another limit")
-        for index, each in enumerate(self.conditions):
-            if not each.holds(outcome):
-                return Result(number, index, each.seen(outcome))
         return Result(number)
 
 
@@ -115,18 +109,14 @@ def chunk(job: Job, cases: Sequence[Case]) -> list[Result]:
     ready, until = bench(job), time.monotonic() + LONGEST
     found: list[Result] = []
     for case in cases:
-        found.append(_named(ready, case))
+        try:
+            found.append(ready.tried(case))
+        except BaseException as error:
+            error.add_note(f"in case {case[0]} of the sweep: {case[1]}")
+            raise
         if time.monotonic() > until:
             break
     return found
-
-
-def _named(ready: Bench, case: Case) -> Result:
-    try:
-        return ready.tried(case)
-    except BaseException as error:
-        error.add_note(f"in case {case[0]} of the sweep: {case[1]}")
-        raise
 
 
 def version() -> str:

@@ -1,15 +1,193 @@
-"""The KEY of `--vary KEY=VALUES`: the place of a value in the table of a drive, and that table with other values."""
+"""The KEY and the VALUES of `--vary KEY=VALUES`.
+
+A KEY is the place of a value in the table of a drive. VALUES are `a,b,c`, `A..B`, `A..B:STEP`, and all of them with
+commas between. Numbers are exact decimals until the last moment, so that ten steps of 0.1 are ten decimals. A text that
+has a comma or two dots is written in quotation marks, a list of TOML in its brackets.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Container, Mapping
+import json
+import re
+from collections.abc import Container, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from decimal import Decimal
 from difflib import get_close_matches
+from random import Random
 from typing import Any
 
 from multidrop.dialects import Diagnostic
-from multidrop.shell.sweeps.values import Value
+from multidrop.dialects.files import toml_of
 from multidrop.simulator.cell.worlds import ENCODER_KEYS, KEYS
+
+Value = int | float | str | list[Any]
+FINE = 5
+"""Decimals more than the ends of a range have, for draws from a range without a step."""
+LARGEST = 10**15
+"""The largest number of values in a range."""
+MOST = 2000
+"""The largest number of listed values that are looked at for a simpler one."""
+_NUMBER = r"[+-]?(?:\d{1,15}(?:\.\d{1,9})?|\.\d{1,9})(?:[eE][+-]?\d)?"
+_NUMERIC = re.compile(_NUMBER, re.ASCII)
+_RANGE = re.compile(rf"({_NUMBER})\.\.({_NUMBER})(?::({_NUMBER}))?", re.ASCII)
+_ITEM = re.compile(r'\s*(?P<item>"(?:[^"\\]|\\.)*"|\[(?:[^\]"\[]|"[^"]*"|\[[^\]]*\])*\]|[^,"\[]*)\s*(?P<end>,|$)')
+_VALID = "valid: a,b,c or A..B or A..B:STEP"
+
+
+@dataclass(frozen=True)
+class Single:
+    """One value."""
+
+    value: Value
+    count = 1
+
+    def at(self, index: int) -> Value:
+        return self.value
+
+
+@dataclass(frozen=True)
+class Steps:
+    """The values of a range: `low`, `low + step` and so on, `count` of them."""
+
+    low: Decimal
+    step: Decimal
+    count: int
+
+    def at(self, index: int) -> Value:
+        return _plain(self.low + self.step * index)
+
+    def nearest(self, value: float) -> int:
+        """The index of the value that is nearest to a number."""
+        index = int(((Decimal(str(value)) - self.low) / self.step).to_integral_value())
+        return min(max(index, 0), self.count - 1)
+
+
+Piece = Single | Steps
+
+
+@dataclass(frozen=True)
+class Values:
+    """The values of one key, in the order in which they are written."""
+
+    pieces: tuple[Piece, ...]
+
+    @property
+    def count(self) -> int:
+        return sum(each.count for each in self.pieces)
+
+    def at(self, index: int) -> Value:
+        for piece in self.pieces:
+            if index < piece.count:
+                return piece.at(index)
+            index -= piece.count
+        raise IndexError(index)
+
+    def draw(self, rng: Random) -> Value:
+        return self.at(rng.randrange(self.count))
+
+    def samples(self) -> Iterator[Value]:
+        """Yield each single value, and the two ends of each range."""
+        for piece in self.pieces:
+            yield piece.at(0)
+            if piece.count > 1:
+                yield piece.at(piece.count - 1)
+
+
+def parse_values(text: str, *, drawn: bool = False) -> Values:
+    """Parse values. `drawn`: a range of fractions without a step has fine ones. Raises Diagnostic."""
+    return Values(tuple(_piece(item, drawn) for item in _items(text)))
+
+
+def spelled(value: Value) -> str:
+    """Write a value, so that `parse_values` reads it again."""
+    if isinstance(value, str):
+        return value if _is_bare(value) else json.dumps(value, ensure_ascii=False)
+    return format(Decimal(repr(value)), "f") if isinstance(value, float) else json.dumps(value)
+
+
+def _is_bare(text: str) -> bool:
+    """Whether a text is read as itself without quotation marks."""
+    if not text or text != text.strip() or _NUMERIC.fullmatch(text):
+        return False
+    return ".." not in text and not set(text) & set(',"[\\')
+
+
+def _items(text: str) -> Iterator[str]:
+    at, end = 0, ","
+    while end:
+        match = _ITEM.match(text, at)
+        if match is None:
+            raise Diagnostic(f"{text} has a bracket or a quotation mark without its end", hint=_VALID)
+        if not match["item"].strip():
+            raise Diagnostic(f"{text} has an empty value" if text.strip() else "has no values", hint=_VALID)
+        yield match["item"].strip()
+        at, end = match.end(), match["end"]
+
+
+def _piece(item: str, drawn: bool) -> Piece:
+    if item[0] in '"[':
+        return Single(toml_of(f"value = {item}", item)["value"])
+    if _NUMERIC.fullmatch(item):
+        return Single(_plain(Decimal(item)))
+    if ".." not in item:
+        return Single(item)
+    match = _RANGE.fullmatch(item)
+    if match is None:
+        raise Diagnostic(f"{item} is not a range", hint="valid: A..B or A..B:STEP; a text in quotation marks")
+    low, high, step = match.groups()
+    return _steps(item, Decimal(low), Decimal(high), Decimal(step) if step else None, drawn)
+
+
+def _steps(item: str, low: Decimal, high: Decimal, step: Decimal | None, drawn: bool) -> Steps:
+    places = max(0, -int(low.as_tuple().exponent), -int(high.as_tuple().exponent))
+    if step is None:
+        if places and not drawn and high - low < 1:
+            raise Diagnostic(f"{item} has no step", hint=f"as in {item}:0.1")
+        step = Decimal(1).scaleb(-places - FINE) if places and drawn else Decimal(1)
+    if not step:
+        raise Diagnostic(f"{item} has a step of 0", hint=_VALID)
+    count = int((high - low) / step) + 1 if (high - low) / step >= 0 else 0
+    if count > LARGEST:
+        raise Diagnostic(f"{item} has too many values", hint=f"valid: up to {LARGEST:.0e}, with a larger step")
+    if not count:
+        raise Diagnostic(f"{item} is an empty range", hint="the smaller end comes first, or the step is negative")
+    return Steps(low, step, count)
+
+
+def _plain(number: Decimal) -> int | float:
+    """The number as a value of TOML; a whole one is an int."""
+    return int(number) if number == number.to_integral_value() else float(number)
+
+
+def simpler(values: Values, value: Value, origin: Value | None) -> Sequence[Value]:
+    """The values nearer to `origin` than `value` is, nearest first; of texts and lists, those written before it.
+
+    `origin` None is 0. Of a range, these are the values between.
+    """
+    origin = 0 if origin is None else origin
+    if not (isinstance(value, int | float) and isinstance(origin, int | float)):
+        listed = [each.value for each in values.pieces if isinstance(each, Single)]
+        return listed[: listed.index(value)] if value in listed else []
+    if len(values.pieces) == 1 and isinstance(piece := values.pieces[0], Steps):
+        first, last = piece.nearest(origin), piece.nearest(value)
+        return _Between(piece, range(first, last, 1 if last > first else -1))
+    far = abs(value - origin)
+    listed = [values.at(index) for index in range(min(values.count, MOST))]
+    near = {abs(each - origin): each for each in listed if isinstance(each, int | float)}
+    return [near[gap] for gap in sorted(near) if gap < far]
+
+
+@dataclass(frozen=True)
+class _Between(Sequence[Value]):
+    piece: Steps
+    indices: range
+
+    def __len__(self) -> int:
+        return len(self.indices)
+
+    def __getitem__(self, index: Any) -> Any:
+        return self.piece.at(self.indices[index])
+
 
 SEED = "seed"
 WORLD, SETTINGS = "world", "set"
@@ -42,7 +220,6 @@ class Key:
         return table.get(self.name) if found is None and self.axis in ("", AXES[0]) else found
 
     def put(self, drive: Drive, value: Value) -> Drive:
-        """A drive's table with another value."""
         if self.part == SEED:
             return drive
         table = dict(_table(drive, self.part))
@@ -55,7 +232,7 @@ class Key:
         return {**drive, self.part: {**table, **entry}}
 
 
-def parse(text: str, names: Container[str]) -> tuple[str, Key]:
+def parse_key(text: str, names: Container[str]) -> tuple[str, Key]:
     """Parse a key; return its drive, empty for none, and the key. `names` are the drives'. Raises Diagnostic."""
     if text == SEED:
         return "", Key(text, SEED, SEED)
@@ -74,7 +251,7 @@ def parse(text: str, names: Container[str]) -> tuple[str, Key]:
     return drive, Key(text, SETTINGS, name.upper())
 
 
-def hint(key: Key) -> str:
+def misplaced_hint(key: Key) -> str:
     """What a refused setting may have meant: a key of the world with a similar name; empty if none has."""
     near = get_close_matches(key.name.lower(), (*KEYS, *ENCODER_KEYS), 1, 0.7) if key.part == SETTINGS else ()
     return f"did you mean the world's {near[0]}?" if near else ""

@@ -1,19 +1,32 @@
-"""The cases of a sweep on the cores of this machine.
+"""The cases of a sweep: on the cores of this machine, or on an existing Dask cluster, without a scheduler of our own.
 
 The first cases run in this process: they say how long one takes. Further processes begin only where that is worth it.
+
+A worker of a cluster that dies takes results along; the cluster runs those chunks again. The cases of a chunk whose
+workers died four times run alone, so that the one that kills them is named.
 """
 
 from __future__ import annotations
 
 import os
+import re
 import sys
 import time
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager, suppress
 from itertools import islice
+from typing import TYPE_CHECKING, Any
 
+from multidrop.dialects import Diagnostic
+from multidrop.shell.secrets import url_without_secrets
+from multidrop.shell.signals import Interruption
 from multidrop.shell.sweeps import trial
-from multidrop.shell.sweeps.interruption import Interruption
-from multidrop.shell.sweeps.trial import Case, Job, Result
+from multidrop.shell.sweeps.trial import DIED, Case, Job, Result
+from multidrop.transports import TransportLost, Unreachable
+
+if TYPE_CHECKING:
+    from distributed import Client, Future
+
 
 CHUNK = 0.075
 """The work of one chunk, s of processor time."""
@@ -58,3 +71,147 @@ def chunks(cases: Iterator[Case], size: int) -> Iterator[list[Case]]:
     """Divide cases into chunks."""
     while found := list(islice(cases, size)):
         yield found
+
+
+PATIENCE = 3.0
+"""Time for the scheduler to reply, s."""
+TRUST = (
+    "the scheduler, its workers and, without TLS, all computers on the network between can run any code on this "
+    "computer with your rights, because Dask unpickles what they send"
+)
+INSTALL = "pip install 'multidrop[cluster]'"
+
+
+def cluster_results(
+    job: Job, cases: Iterator[Case], address: str, interruption: Interruption, agree: Callable[[], None]
+) -> Iterator[list[Result]]:
+    """Run cases on the cluster of a scheduler; yield the results of each chunk as it ends.
+
+    `agree` is called before anything is connected; it raises Diagnostic where a person has not agreed to the address.
+    Raises Unreachable, TransportLost, and Diagnostic for workers that have another multidrop or none.
+    """
+    with _client(address, interruption, agree) as client, _reached(address):
+        with interruption.open():
+            _check_workers(client, address)
+            first = next(cases)
+            begin = time.process_time()
+            found = trial.chunk(job, [first])
+        size = max(1, round(CHUNK / max(time.process_time() - begin, 1e-6)))
+        yield found
+        if todo := list(chunks(cases, size)):
+            yield from _Work(client, job, address, interruption).results(todo)
+
+
+@contextmanager
+def _client(address: str, interruption: Interruption, agree: Callable[[], None]) -> Iterator[Client]:
+    if not re.fullmatch(r"(?:tcp|tls|ws|wss)://[^@]+:[0-9]+", address):  # no user: Dask takes none
+        raise Diagnostic(
+            "is not the address of a scheduler", f"--cluster {url_without_secrets(address)}", "as in tcp://HOST:8786"
+        )
+    try:
+        from distributed import Client
+    except ImportError:
+        raise Diagnostic("--cluster needs distributed, which is not installed", hint=INSTALL) from None
+    agree()
+    import logging  # with Dask
+
+    for name in [each for each in logging.root.manager.loggerDict if each.startswith("distributed")]:
+        logging.getLogger(name).setLevel(logging.CRITICAL)
+    try:
+        with interruption.open():
+            client = Client(address, timeout=PATIENCE, set_as_default=False)
+    except (OSError, ValueError) as problem:
+        raise Unreachable(f"{address}: no scheduler replies: {' '.join(str(problem).split())}") from None
+    try:
+        yield client
+    finally:
+        with suppress(OSError, TimeoutError):
+            client.close(timeout=PATIENCE)
+
+
+@contextmanager
+def _reached(address: str) -> Iterator[None]:
+    """Raise TransportLost where a connection to the scheduler ends in the middle of a question."""
+    from distributed.comm import CommClosedError
+
+    try:
+        yield
+    except CommClosedError:
+        raise TransportLost(f"{address}: the scheduler was lost") from None
+
+
+def _check_workers(client: Client, address: str) -> None:
+    """Refuse a cluster without workers, and workers with another multidrop."""
+    try:
+        found: dict[str, Any] = client.run(trial.version, on_error="return")
+    except ImportError as problem:
+        raise Diagnostic(
+            f"a worker has no multidrop ({problem})", address, f"install {trial.version()} there"
+        ) from None
+    if not found:
+        raise Unreachable(f"{address}: the cluster has no workers")
+    ours = trial.version()
+    for worker, theirs in found.items():
+        if theirs != ours:
+            what = "has no multidrop" if isinstance(theirs, BaseException) else f"has multidrop {theirs}"
+            raise Diagnostic(f"{what}, and this is {ours}", f"worker {worker}", "install the same there")
+
+
+class _Work:
+    """The chunks of a sweep on a cluster, and what becomes of them."""
+
+    def __init__(self, client: Client, job: Job, address: str, interruption: Interruption) -> None:
+        self._client, self._job, self._address, self._interruption = client, job, address, interruption
+        self._again: list[list[Case]] = []
+        """Chunks whose result was lost with a worker, and the rests of chunks that took long."""
+        self._alone = False
+        self._suspects: list[Case] = []
+        """Cases of chunks whose workers died. The cluster counts against all that waited there, too."""
+
+    def results(self, todo: list[list[Case]]) -> Iterator[list[Result]]:
+        """Run chunks; then alone each case whose workers died."""
+        while todo:
+            yield from self._run(todo)
+            todo, self._again = self._again, []
+            if not todo and self._suspects:
+                self._alone, todo = True, [[self._suspects.pop()]]
+
+    def _run(self, todo: list[list[Case]]) -> Iterator[list[Result]]:
+        """Submit chunks; yield the results of each as it ends."""
+        from distributed import as_completed
+
+        futures = self._client.map(trial.chunk, [self._job] * len(todo), todo, pure=False)
+        of = dict(zip(futures, todo, strict=True))
+        done = as_completed(futures, loop=self._client.loop)
+        del futures  # the cluster drops results without a holder
+        try:
+            while of:
+                with self._interruption.open():
+                    future = next(done)
+                    found = self._result(future, of[future])
+                del of[future]
+                yield found
+        finally:
+            if of:
+                with suppress(OSError, TimeoutError):
+                    self._client.cancel(list(of))
+
+    def _result(self, future: Future, cases: list[Case]) -> list[Result]:
+        """The results of a chunk; none if it is to run again. Raises TransportLost."""
+        from distributed import KilledWorker
+        from distributed.client import FutureCancelledError
+
+        try:
+            found: list[Result] = future.result()
+            if len(found) < len(cases):
+                self._again.append(cases[len(found) :])
+            return found
+        except FutureCancelledError:
+            if self._client.status != "running":
+                raise TransportLost(f"{self._address}: the scheduler was lost") from None
+            self._again.append(cases)
+        except KilledWorker:
+            if self._alone:
+                return [Result(cases[0][0], DIED, "the workers that ran it died: killed, or out of memory")]
+            self._suspects += cases
+        return []

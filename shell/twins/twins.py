@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
     from multidrop.drives.bus import Bus
     from multidrop.drives.drive import Drive
-    from multidrop.shell.twins.on_bus import BusTwins
+    from multidrop.shell.twins.pair import BusTwins
     from multidrop.shell.workspace import Workspace
 
 
@@ -35,7 +35,6 @@ class Twins:
 
     @property
     def limit(self) -> int:
-        """The limit at rest, steps."""
         return self._rest
 
     @limit.setter
@@ -85,7 +84,6 @@ class Twins:
         return bool(buses)
 
     def stop(self, bus: Bus) -> None:
-        """End the twins of a bus."""
         if task := self._tasks.pop(bus, None):
             task.cancel()
         self._paused.pop(bus, None)
@@ -96,7 +94,7 @@ class Twins:
             twins.close()
 
     def _of(self, bus: Bus) -> BusTwins:
-        from multidrop.shell.twins.on_bus import BusTwins
+        from multidrop.shell.twins.pair import BusTwins
 
         if bus not in self._buses:
             self._buses[bus] = BusTwins(
@@ -114,8 +112,7 @@ class Twins:
     async def _start(self, twins: BusTwins, drive: Drive) -> tuple[str, ...]:
         """Read a drive, and run a twin beside it; return the gaps of the twin."""
         from multidrop.shell import snapshots
-        from multidrop.shell.twins.pair import Beside
-        from multidrop.shell.twins.twin import make
+        from multidrop.shell.twins.pair import Beside, make
 
         name, bus = self._workspace.display_name(drive), twins.bus
         twins.expect(drive)

@@ -15,10 +15,8 @@ from multidrop.drives.drive import Drive
 from multidrop.shell.events import By
 from multidrop.shell.params import work
 from multidrop.shell.params.restore import Options
-from multidrop.shell.plots.feed import begin
-from multidrop.shell.plots.rate import DEFAULT, parse_rate
-from multidrop.shell.plots.series import parse_series, read_first
-from multidrop.shell.plots.target import parse_target
+from multidrop.shell.plots.plot import begin
+from multidrop.shell.plots.request import DEFAULT, parse_rate, parse_series, parse_target, read_first
 from multidrop.shell.verbs.call import Call
 
 if TYPE_CHECKING:

@@ -12,24 +12,24 @@ from typing import Any
 import pytest
 
 from multidrop.dialects.values import Conditions
-from multidrop.shell.log.entries import Entry
-from multidrop.shell.publishing import messages
-from multidrop.shell.publishing.topics import Topics
+from multidrop.shell.log.files import Entry
+from multidrop.shell.publishing import feed
+from multidrop.shell.publishing.feed import Topics
 from tests.support.paths import ROOT
 
 FOLDER = ROOT / "docs" / "recipes"
 CONSUMERS = tomllib.loads((FOLDER / "telegraf.conf").read_text())["inputs"]["mqtt_consumer"]
 BOARD = json.loads((FOLDER / "grafana-dashboard.json").read_text())
 TOPICS, NOW = Topics("plant/hall-2"), datetime(2026, 11, 22, 14, 3, 7, 123456, timezone(timedelta(hours=1)))
-ERROR = messages.error([Conditions(error=5, error_text="limit")])
+ERROR = feed.error_of([Conditions(error=5, error_text="limit")])
 TEXTS = {
     TOPICS.status: "online",
     TOPICS.bus_status("a/b+"): "lost",
-    TOPICS.transcript("press"): messages.line(Entry(NOW, "typed", "PR P", "press", "a", by="operator")),
-    TOPICS.drive("press", "a", "position"): messages.value(NOW, {"value": 5, "axis": "x"}),
-    TOPICS.drive("eth", "", "velocity"): messages.value(NOW, {"value": -5, "axis": ""}),
-    TOPICS.drive("press", "a", "state"): messages.value(NOW, {"value": "moving", "program": "G1"}),
-    TOPICS.drive("press", "a", "error"): messages.value(NOW, ERROR),
+    TOPICS.transcript("press"): feed.line_text(Entry(NOW, "typed", "PR P", "press", "a", by="operator")),
+    TOPICS.drive("press", "a", "position"): feed.value_text(NOW, {"value": 5, "axis": "x"}),
+    TOPICS.drive("eth", "", "velocity"): feed.value_text(NOW, {"value": -5, "axis": ""}),
+    TOPICS.drive("press", "a", "state"): feed.value_text(NOW, {"value": "moving", "program": "G1"}),
+    TOPICS.drive("press", "a", "error"): feed.value_text(NOW, ERROR),
 }
 """A message of each kind."""
 LAYOUT = "2006-01-02T15:04:05.999999Z07:00"
@@ -85,7 +85,7 @@ def test_every_kind_of_message_becomes_a_measurement_with_its_tags() -> None:
 
 def test_the_time_has_the_form_that_the_recipe_names() -> None:
     for time in (NOW, NOW.replace(microsecond=0), NOW.astimezone(UTC)):
-        text = json.loads(messages.value(time, {"value": 1}))["time"]
+        text = json.loads(feed.value_text(time, {"value": 1}))["time"]
         assert re.fullmatch(r"\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d\.\d{6}[+-]\d\d:\d\d", text)
 
 
@@ -113,6 +113,6 @@ def test_the_dashboard_has_the_words_of_the_states() -> None:
         for word in mapping["options"]
     }
     assert words == {
-        getattr(messages, name) for name in ("ONLINE", "LOST", "BYE", "MOVING", "AT_REST", "NO_CURRENT", "SILENT")
+        getattr(feed, name) for name in ("ONLINE", "LOST", "BYE", "MOVING", "AT_REST", "NO_CURRENT", "SILENT")
     }
     assert len({panel["id"] for panel in BOARD["panels"]}) == len(BOARD["panels"])

@@ -9,9 +9,9 @@ from datetime import UTC, datetime, timedelta
 import pytest
 
 from multidrop.cli import parse, run
-from multidrop.shell.log.disk import Disk
-from multidrop.shell.log.entries import Entry, line_of
-from multidrop.shell.log.show import Following, joined, text, whole
+from multidrop.commands.log import Following, joined, text
+from multidrop.shell.log.files import Entry, line_of, whole
+from multidrop.shell.log.writer import Disk
 
 AT = datetime(2026, 11, 22, 12, 41, 6, 20115, tzinfo=UTC)
 
@@ -157,7 +157,7 @@ def test_follow_begins_with_the_last_lines_and_ends_with_an_interruption(log, do
         with log.open("ab") as file:
             file.write(line_of(entry("notice", f"added {len(waits)}")))
 
-    monkeypatch.setattr("multidrop.shell.log.show.time.sleep", wait)
+    monkeypatch.setattr("multidrop.commands.log.time.sleep", wait)
     code, out, err = done("follow")
     assert (code, err) == (0, []) and [each.partition("*  ")[2] for each in out] == [
         *(f"n {n}" for n in range(30, 40)),
@@ -169,7 +169,7 @@ def test_follow_begins_with_the_last_lines_and_ends_with_an_interruption(log, do
 KILLED = """
 import os, sys
 from pathlib import Path
-from multidrop.shell.log import disk as at
+from multidrop.shell.log import writer as at
 at.PATIENCE = 60  # a machine under load
 disk = at.Disk(Path(sys.argv[1]), 10**6, 3, lambda: b"", lambda number: b"missing")
 for number in range(10**9):

@@ -29,7 +29,7 @@ from multidrop.macros import parse_macro
 from multidrop.shell.connect import settings, urls
 from multidrop.shell.connect.settings import Settings
 from multidrop.shell.events import FAILURES
-from multidrop.shell.plots.target import parse_target
+from multidrop.shell.plots.request import parse_target
 from multidrop.shell.session import Session
 from multidrop.shell.streams.stdout import LONGEST, report, shortened
 from multidrop.simulator import cells

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from multidrop.shell.log.entries import Entry, line_of
+from multidrop.shell.log.files import Entry, line_of
 from tests.support.processes import environment
 from tests.support.until import PATIENCE
 

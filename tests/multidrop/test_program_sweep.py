@@ -12,7 +12,7 @@ from xml.etree import ElementTree
 import pytest
 
 from multidrop.dialects import Diagnostic
-from multidrop.shell.batch.junit import Case, JUnitFile
+from multidrop.shell.batch.report import Case, JUnitFile
 from multidrop.shell.sweeps import trial
 from tests.support.front_door import Command, Done
 from tests.support.front_door import multidrop as multidrop

@@ -16,7 +16,7 @@ from pathlib import Path
 import pytest
 
 from multidrop.shell.prompt import terminal_input
-from multidrop.shell.sweeps import cluster as cluster_of_cases
+from multidrop.shell.sweeps import workers
 from tests.support.front_door import Command
 from tests.support.front_door import multidrop as multidrop
 from tests.support.paths import ROOT
@@ -103,7 +103,7 @@ def test_a_cluster_runs_the_same_cases(folder: Path, multidrop: Command, monkeyp
     here = multidrop("program", "sweep", "go.mxt", *WALLS, "--json", "--jobs", "1")
     assert (there.returncode, there.stderr) == (1, "")
     assert there.stdout.splitlines()[:-1] == here.stdout.splitlines()[:-1] and there.stdout.count("\n") == 121
-    monkeypatch.setattr(cluster_of_cases, "PATIENCE", 0.2)
+    monkeypatch.setattr(workers, "PATIENCE", 0.2)
     lost = multidrop("program", "sweep", "go.mxt", *WALLS, "--yes", "--cluster", address)
     assert lost.returncode == 3 and lost.stdout == "" and "no scheduler replies" in lost.stderr
     assert lost.stderr.count("\n") == 2  # and the one about the seed
@@ -138,7 +138,7 @@ def test_an_address_is_asked_for_once_at_a_terminal_and_a_yes_is_kept(
         return answer
 
     monkeypatch.setattr(terminal_input, "ask_outside_a_session", ask)
-    monkeypatch.setattr(cluster_of_cases, "PATIENCE", 0.2)
+    monkeypatch.setattr(workers, "PATIENCE", 0.2)
     with socket.create_server(("127.0.0.1", 0)) as scheduler:
         scheduler.setblocking(False)
         address = f"tcp://127.0.0.1:{scheduler.getsockname()[1]}"

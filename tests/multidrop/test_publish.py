@@ -18,11 +18,9 @@ import pytest
 from multidrop.shell.connect.settings import MqttSettings
 from multidrop.shell.publishing import broker as broker_module
 from multidrop.shell.publishing import publisher as publisher_module
-from multidrop.shell.publishing.backlog import Message
-from multidrop.shell.publishing.broker import Connection
+from multidrop.shell.publishing.broker import Connection, Message, parse_target
+from multidrop.shell.publishing.feed import Topics
 from multidrop.shell.publishing.publisher import Publisher
-from multidrop.shell.publishing.target import parse_target
-from multidrop.shell.publishing.topics import Topics
 from multidrop.transports import Unreachable
 from tests.support.mosquitto import PASSWORD, USER, Mosquitto, Subscriber, free_port, retained
 from tests.support.processes import Running

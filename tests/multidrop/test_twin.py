@@ -7,7 +7,7 @@ import time
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
-from multidrop.shell.log.entries import BEGIN, Entry, line_of
+from multidrop.shell.log.files import BEGIN, Entry, line_of
 from tests.support.cell_session import bus, party
 from tests.support.front_door import Command
 from tests.support.front_door import multidrop as multidrop

@@ -13,9 +13,8 @@ from hypothesis import strategies as st
 
 from multidrop.dialects.families import languages
 from multidrop.shell.events import Output, Printed
-from multidrop.shell.layout import laid_out
 from multidrop.shell.operations.table import VERBS
-from multidrop.shell.streams.event_printer import Printer
+from multidrop.shell.streams.event_printer import Printer, laid_out
 
 NOTE = "  note       beyond one comparison it is read from left to right: R1=1&MV as (R1=1)&MV, KF&12=12 as (KF&12)=12"
 

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from multidrop.shell.sharing.actions import Action, Close, Purge, Say, Send, Set, Stop, Write
-from multidrop.shell.sharing.exchange import Exchange
+from multidrop.shell.sharing.exchange import Action, Close, Exchange, Purge, Say, Send, Set, Stop, Write
 from multidrop.shell.sharing.stop_bytes import stop_bytes
 
 ADA, BOB, EVE = 1, 2, 3

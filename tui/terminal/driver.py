@@ -30,7 +30,8 @@ from textual.geometry import Offset, Size
 from textual.message import Message
 
 from multidrop.shell.prompt import raw_terminal
-from multidrop.shell.streams.output_streams import Lane, Loss
+from multidrop.shell.streams.output_streams import descriptor_writer
+from multidrop.shell.threads import Loss
 from multidrop.tui.frame_scheduler import Pace
 from multidrop.tui.terminal.canvas import Canvas, pieces_of
 from multidrop.tui.terminal.keystream import STOP, KeyStream
@@ -60,7 +61,7 @@ class ScreenWriter(LinuxDriver):
         stream = sys.__stdout__
         assert stream is not None, "there is a terminal"
         self._encoding, self._descriptor = stream.encoding, stream.fileno()
-        self._out = Lane(self._descriptor, self._takes_again, lambda problem: None)
+        self._out = descriptor_writer(self._descriptor, self._takes_again, lambda problem: None)
         self.pace = Pace(time.monotonic, self._handed_over)
         self._leaving = False
         self._mouse_on = True

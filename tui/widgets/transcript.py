@@ -12,7 +12,7 @@ from rich.cells import cell_len, chop_cells
 from textual import events
 from textual.geometry import Size
 
-from multidrop.shell.layout import laid_out
+from multidrop.shell.streams.event_printer import laid_out
 from multidrop.shell.transcripts import Filter
 from multidrop.tui.screen_model import Record
 from multidrop.tui.text import at_words, fit, visible

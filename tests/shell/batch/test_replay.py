@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from multidrop.dialects import Diagnostic, DriveError, Stopped
 from multidrop.shell.batch.replay import replay
-from multidrop.shell.log.entries import BEGIN, KINDS, Entry, line_of
+from multidrop.shell.log.files import BEGIN, KINDS, Entry, line_of
 from multidrop.shell.log.steps import compared, read
 from multidrop.shell.log.writer import SessionLog
 from tests.support.cell_session import CellSession, bus, party

@@ -14,9 +14,10 @@ from multidrop.dialects import Diagnostic, Priority
 from multidrop.drives.events import Ended, Sent, Traffic, Unsolicited
 from multidrop.shell.connect.settings import LogSettings, Settings, parse
 from multidrop.shell.events import By, Entered, Failed, Notified, OnBus, Output, Printed, StateChanged
-from multidrop.shell.log import disk, files
-from multidrop.shell.log.entries import KINDS, TRAFFIC, Entry, entry_of, line_of
+from multidrop.shell.log import files, writer
+from multidrop.shell.log.files import KINDS, TRAFFIC, Entry, entry_of, line_of
 from multidrop.shell.log.writer import SessionLog, begin
+from multidrop.shell.threads import BoundedWriter
 
 
 class FakeSession:
@@ -261,14 +262,14 @@ def test_two_sessions_that_write_one_file_follow_each_others_rotation(tmp_path):
 
 
 def test_a_disk_that_hangs_is_waited_for_once_and_what_has_no_room_is_counted(tmp_path, monkeypatch):
-    monkeypatch.setattr(disk, "HELD", 100)
-    monkeypatch.setattr(disk, "PATIENCE", 60.0)
-    made = disk.Disk(tmp_path / "a", 10**6, 2, lambda: b"head\n", lambda number: b"%d missing\n" % number)
+    monkeypatch.setattr(writer, "HELD", 100)
+    monkeypatch.setattr(writer, "PATIENCE", 60.0)
+    made = writer.Disk(tmp_path / "a", 10**6, 2, lambda: b"head\n", lambda number: b"%d missing\n" % number)
     made.put(b"first\n")
-    monkeypatch.setattr(disk, "PATIENCE", 0.001)
-    works, waits, write, wait = threading.Event(), [], os.write, made._done.wait_for
-    monkeypatch.setattr(disk.os, "write", lambda *given: works.wait(60) and write(*given))
-    monkeypatch.setattr(made._done, "wait_for", lambda *given: waits.append(given) or wait(*given))
+    monkeypatch.setattr(writer, "PATIENCE", 0.001)
+    works, waits, write, wait = threading.Event(), [], os.write, BoundedWriter.wait
+    monkeypatch.setattr(writer.os, "write", lambda *given: works.wait(60) and write(*given))
+    monkeypatch.setattr(BoundedWriter, "wait", lambda *given: waits.append(given) or wait(*given))
     for number in range(30):
         made.put(b"%09d\n" % number)
     assert len(waits) == 1

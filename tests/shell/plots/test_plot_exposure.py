@@ -4,9 +4,9 @@ import pytest
 
 from multidrop.shell.connect.settings import Settings
 from multidrop.shell.events import Notified
-from multidrop.shell.plots import feed
-from multidrop.shell.plots.plot import Plot
-from multidrop.shell.plots.target import parse_target
+from multidrop.shell.plots import plot
+from multidrop.shell.plots.plot import Plot, begin
+from multidrop.shell.plots.request import parse_target
 from multidrop.shell.workspace import Workspace
 
 
@@ -24,8 +24,8 @@ async def test_a_plot_that_other_computers_can_read_is_said_to_be_so(tmp_path, m
 
     monkeypatch.setattr(Plot, "open", open_)
     monkeypatch.setattr(Plot, "target", target, raising=False)
-    monkeypatch.setattr(feed, "attach", lambda *_: lambda: None)
-    await feed.begin(workspace, target, [("press", "a")])
+    monkeypatch.setattr(plot, "attach", lambda *_: lambda: None)
+    await begin(workspace, target, [("press", "a")])
     warnings = [event.text for event in said if isinstance(event, Notified) and event.warning]
     assert bool(warnings) is warned
     assert not warned or "other computers" in warnings[0]

@@ -11,9 +11,9 @@ from typing import Any
 import pytest
 
 from multidrop.drives.events import Sample, Valued
-from multidrop.shell.plots.layout import LINES, drives_of
 from multidrop.shell.plots.plot import Plot
-from multidrop.shell.plots.target import PlotTarget, parse_target
+from multidrop.shell.plots.request import PlotTarget, parse_target
+from multidrop.shell.plots.sink import LINES, drives_of
 from tests.support.plot_file import contents
 
 PATHS = {

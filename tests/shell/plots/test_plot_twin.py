@@ -14,11 +14,9 @@ from multidrop import read_rrd
 from multidrop.dialects import Diagnostic
 from multidrop.drives.events import Sample
 from multidrop.shell.events import Predicted
-from multidrop.shell.plots.feed import attach
-from multidrop.shell.plots.layout import DIFFERS, LINES, PALE, RUNS, TWIN, drives_of, layout
-from multidrop.shell.plots.plot import Plot
-from multidrop.shell.plots.series import parse_series, read_first
-from multidrop.shell.plots.target import PlotTarget
+from multidrop.shell.plots.plot import Plot, attach
+from multidrop.shell.plots.request import PlotTarget, parse_series, read_first
+from multidrop.shell.plots.sink import DIFFERS, LINES, PALE, RUNS, TWIN, drives_of, layout
 from multidrop.shell.roles import DIFFERENCE, Series
 from tests.support.cell_session import CellSession, bus, party
 from tests.support.plot_file import contents

@@ -12,8 +12,8 @@ from multidrop.dialects import Diagnostic, Refused
 from multidrop.drives.events import Sample, Valued
 from multidrop.drives.telemetry import Value
 from multidrop.shell.events import OnBus
-from multidrop.shell.plots.feed import attach
-from multidrop.shell.plots.series import parse_series
+from multidrop.shell.plots.plot import attach
+from multidrop.shell.plots.request import parse_series
 from multidrop.shell.roles import Series
 from tests.support.cell_session import ETHERNET, CellSession, bus, party, pmx
 

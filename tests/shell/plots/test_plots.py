@@ -19,7 +19,7 @@ import pytest
 from multidrop.dialects import Diagnostic
 from multidrop.drives.events import Sample
 from multidrop.shell.plots.plot import Plot
-from multidrop.shell.plots.target import PlotTarget, parse_target
+from multidrop.shell.plots.request import PlotTarget, parse_target
 from multidrop.transports import Unreachable
 from tests.support.paths import ROOT
 from tests.support.until import PATIENCE
@@ -35,7 +35,7 @@ def rerun() -> Iterator[Any]:
 
 @pytest.mark.process
 def test_rerun_is_not_loaded_before_a_plot_is_asked_for() -> None:
-    code = "import sys, shell.plots.feed; sys.exit('rerun' in sys.modules or 'pyarrow' in sys.modules)"
+    code = "import sys, multidrop.shell.plots.plot; sys.exit('rerun' in sys.modules or 'pyarrow' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code], cwd=ROOT, timeout=PATIENCE).returncode == 0
 
 
@@ -196,7 +196,7 @@ from datetime import UTC, datetime
 from multidrop.drives.events import Sample
 from multidrop.shell.plots import plot as plots, sink
 from multidrop.shell.plots.plot import Plot
-from multidrop.shell.plots.target import parse_target
+from multidrop.shell.plots.request import parse_target
 
 async def main(to, limit):
     if limit:

@@ -10,7 +10,7 @@ import pytest
 from multidrop.dialects import Diagnostic
 from multidrop.drives.events import BusEvent, Ended, Sample, Sent
 from multidrop.shell.events import OnBus
-from multidrop.shell.plots.rate import parse_rate
+from multidrop.shell.plots.request import parse_rate
 from tests.support.cell_session import CellSession, bus, party
 from tests.support.virtual import in_virtual_time
 

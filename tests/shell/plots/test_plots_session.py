@@ -13,8 +13,8 @@ from multidrop.dialects.values import Conditions, Lamp
 from multidrop.drives.events import Conditioned, Sample, Unsolicited, Valued
 from multidrop.drives.telemetry import Value
 from multidrop.shell.events import By, Entered, Failed, Notified, OnBus, Output, Printed, SessionEvent
-from multidrop.shell.plots.feed import attach
-from multidrop.shell.plots.target import parse_target
+from multidrop.shell.plots.plot import attach
+from multidrop.shell.plots.request import parse_target
 from multidrop.shell.roles import Series
 
 # What is typed

@@ -44,8 +44,8 @@ class Above(LinesAbove):
         def __init__(self):
             self.output = Output()
 
-    class Lane:
-        """A lane whose reader keeps up, or not."""
+    class Writer:
+        """A writer whose reader keeps up, or not."""
 
         behind = False
 
@@ -58,7 +58,7 @@ class Above(LinesAbove):
 
     def __init__(self):
         super().__init__(self.App())
-        self._lane = self.Lane()
+        self._writer = self.Writer()
         self._task = asyncio.create_task(self._show())
 
     @property
@@ -66,8 +66,8 @@ class Above(LinesAbove):
         return "".join(self.app.output.pieces).splitlines()
 
     @property
-    def lane(self):
-        return self._lane
+    def writer(self):
+        return self._writer
 
 
 @in_virtual_time
@@ -114,13 +114,13 @@ async def test_of_more_than_a_burst_the_oldest_are_counted_and_warnings_stay_in_
 @in_virtual_time
 async def test_few_lines_wait_for_a_terminal_that_takes_none():
     above = Above()
-    above.lane.behind = True
+    above.writer.behind = True
     above.add(["first"], keep=False)
     await asyncio.sleep(PATIENCE + 1)
     above.add(["x"] * (MOST + 5), keep=False)
     await asyncio.sleep(100)
     assert above.lines == []
-    above.lane.behind = False
+    above.writer.behind = False
     await asyncio.sleep(10)
     assert above.lines == ["6 lines are missing here: the terminal did not take them", *["x"] * MOST]
 
@@ -132,7 +132,7 @@ async def test_the_end_does_not_wait_for_a_flood_and_loses_no_warning():
     above.add(["x" * 62] * 5000, keep=False)
     above.add(["STOPPED"], keep=True)
     above._write_rest()
-    lines = above.lane.kept.decode().splitlines()
+    lines = above.writer.kept.decode().splitlines()
     missing = f"{5000 - (len(lines) - 3)} lines are missing here: the terminal did not take them"
     assert (lines[:3], lines[-1]) == (["STILL MOVING", missing, "x" * 62], "STOPPED")
-    assert len(above.lane.kept) < 2 * CHUNK
+    assert len(above.writer.kept) < 2 * CHUNK

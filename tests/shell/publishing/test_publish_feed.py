@@ -12,11 +12,9 @@ import pytest
 
 from multidrop.drives.events import Unsolicited
 from multidrop.shell.events import OnBus
-from multidrop.shell.publishing.backlog import Backlog, Message
-from multidrop.shell.publishing.feed import HEARTBEAT, Feed
-from multidrop.shell.publishing.limits import BURST, LINES
-from multidrop.shell.publishing.publisher import Publisher
-from multidrop.shell.publishing.topics import Topics
+from multidrop.shell.publishing.broker import Message
+from multidrop.shell.publishing.feed import BURST, HEARTBEAT, LINES, Feed, Topics
+from multidrop.shell.publishing.publisher import Backlog, Publisher
 from tests.support.cell_session import ETHERNET, CellSession, bus, party, pmx
 from tests.support.kept_broker import KeptBroker
 

@@ -9,8 +9,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from multidrop.shell.publishing.backlog import Backlog, Message
-from multidrop.shell.publishing.publisher import DRAIN, LONGEST, REMIND, Publisher
+from multidrop.shell.publishing.broker import Message
+from multidrop.shell.publishing.publisher import DRAIN, LONGEST, REMIND, Backlog, Publisher
 from multidrop.transports import Unreachable
 from tests.support.kept_broker import KeptBroker
 from tests.support.virtual import in_virtual_time

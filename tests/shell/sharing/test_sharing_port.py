@@ -20,9 +20,8 @@ import serial
 from multidrop.shell.connect.opening import open_port
 from multidrop.shell.connect.urls import parse
 from multidrop.shell.sharing import server
-from multidrop.shell.sharing.actions import Say
 from multidrop.shell.sharing.client import Client, Input, Request
-from multidrop.shell.sharing.exchange import NOT_REACHED, TURN
+from multidrop.shell.sharing.exchange import NOT_REACHED, TURN, Say
 from multidrop.shell.sharing.server import SharedPort
 from multidrop.shell.sharing.stop_bytes import stop_bytes
 from multidrop.transports import TransportLost, Unreachable, telnet

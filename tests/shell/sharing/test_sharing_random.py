@@ -5,8 +5,7 @@ from __future__ import annotations
 from hypothesis import given
 from hypothesis import strategies as st
 
-from multidrop.shell.sharing.actions import Close, Send, Stop, Write
-from multidrop.shell.sharing.exchange import SILENT, Exchange
+from multidrop.shell.sharing.exchange import SILENT, Close, Exchange, Send, Stop, Write
 from multidrop.shell.sharing.stop_bytes import stop_bytes
 from multidrop.transports import telnet
 from multidrop.transports.telnet import OPTION, Setting, message

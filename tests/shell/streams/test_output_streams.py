@@ -1,4 +1,4 @@
-"""Lanes and outlets on pipes of the test's own: order, bounds, words for what is missing, readers that go away."""
+"""Writers and outlets on pipes of the test's own: order, bounds, words for what is missing, readers that go away."""
 
 from __future__ import annotations
 
@@ -16,19 +16,20 @@ from datetime import datetime
 
 import pytest
 
+from multidrop.shell import threads
 from multidrop.shell.streams import output_streams, stdout
-from multidrop.shell.streams.output_streams import Lane
+from multidrop.shell.streams.output_streams import descriptor_writer
 from tests.support.served_cell import until
 from tests.support.until import PATIENCE
 
 
 class Pipe:
-    """A lane into a pipe that nobody reads yet. It holds back no byte less than the pipe and the limit."""
+    """A writer into a pipe that nobody reads yet. It holds back no byte less than the pipe and the limit."""
 
     def __init__(self, limit=10_000):
         self.reader, self.writer = os.pipe()
         self.problems, self.failed = [], threading.Event()
-        self.lane = Lane(self.writer, lambda loss: f"[{loss.count}]".encode(), self._failed, limit)
+        self.out = descriptor_writer(self.writer, lambda loss: f"[{loss.count}]".encode(), self._failed, limit)
 
     def _failed(self, problem):
         self.problems.append(problem.errno)
@@ -43,11 +44,11 @@ class Pipe:
     def fill(self, kilobytes):
         """Put so many lines of 1000 bytes; the pipe takes 64 of them at most."""
         for _ in range(kilobytes):
-            assert self.lane.put(b"x" * 999 + b"\n", keep=True)
-        until(lambda: self.lane.written > 48_000, "the pipe never filled")
+            assert self.out.put(b"x" * 999 + b"\n", keep=True)
+        until(lambda: self.out.written > 48_000, "the pipe never filled")
 
     def close(self):
-        self.lane.give_up()
+        self.out.give_up()
         for descriptor in (self.reader, self.writer):
             os.close(descriptor)
 
@@ -61,35 +62,35 @@ def pipe():
 
 def test_items_leave_in_their_order(pipe):
     for number in range(1000):
-        assert pipe.lane.put(b"%d " % number)
+        assert pipe.out.put(b"%d " % number)
     assert pipe.read(b"999 ") == b"".join(b"%d " % number for number in range(1000))
 
 
 def test_what_does_not_fit_is_dropped_and_told_in_its_place(pipe):
     pipe.fill(100)
-    assert pipe.lane.behind and not pipe.lane.idle
-    assert [pipe.lane.put(b"lost\n") for _ in range(5)] == [False] * 5
-    assert not pipe.lane.put(b"three\nlines\nmore\n", count=3)
-    assert pipe.lane.put(b"kept\n", keep=True)
+    assert pipe.out.behind and not pipe.out.idle
+    assert [pipe.out.put(b"lost\n") for _ in range(5)] == [False] * 5
+    assert not pipe.out.put(b"three\nlines\nmore\n", count=3)
+    assert pipe.out.put(b"kept\n", keep=True)
     got = pipe.read(b"kept\n")
     assert got.endswith(b"x\n[8]kept\n") and got.count(b"\n") == 101
-    assert pipe.lane.put(b"more\n")
+    assert pipe.out.put(b"more\n")
     assert pipe.read(b"more\n") == b"more\n"
 
 
 def test_a_reader_that_goes_away_is_told_once_and_nothing_is_waited_for(pipe):
     os.close(pipe.reader)
-    pipe.lane.put(b"one\n")
+    pipe.out.put(b"one\n")
     assert pipe.failed.wait(PATIENCE)
-    assert not pipe.lane.put(b"two\n", keep=True)
-    assert (pipe.problems, pipe.lane.idle, pipe.lane.behind) == ([errno.EPIPE], True, False)
+    assert not pipe.out.put(b"two\n", keep=True)
+    assert (pipe.problems, pipe.out.idle, pipe.out.behind) == ([errno.EPIPE], True, False)
     pipe.reader = os.dup(pipe.writer)
 
 
 def test_a_descriptor_that_somebody_else_made_non_blocking_loses_nothing(pipe):
     os.set_blocking(pipe.writer, False)
     for number in range(200):
-        assert pipe.lane.put(b"%06d" % number + b"x" * 993 + b"\n", keep=True)
+        assert pipe.out.put(b"%06d" % number + b"x" * 993 + b"\n", keep=True)
     got = pipe.read(b"000199")
     assert [line[:6] for line in got.split(b"\n")[:200]] == [b"%06d" % number for number in range(200)]
 
@@ -105,7 +106,7 @@ def streams(monkeypatch):
     with stdout.nonblocking() as made:
         yield made, *(reader for reader, _ in pipes)
     for each in made.outlets:
-        each.lane.give_up()
+        each.writer.give_up()
     for file in files:
         file.close()
     for reader, _ in pipes:
@@ -126,7 +127,7 @@ def test_the_standard_streams_are_replaced_and_put_back(monkeypatch):
         monkeypatch.setattr(sys, "stdout", file)
         monkeypatch.setattr(sys, "stderr", file)
         with stdout.nonblocking() as streams:
-            assert len({each.lane for each in streams.outlets}) == 1, "one place, one order"
+            assert len({each.writer for each in streams.outlets}) == 1, "one place, one order"
             print("half a ", end="")
             print("line")
             stdout.write(sys.stderr, "told")
@@ -147,7 +148,7 @@ async def test_a_terminal_that_is_not_read_loses_replies_and_no_warning(monkeypa
         with stdout.nonblocking() as made:
             for _ in range(500):
                 stdout.write(sys.stdout, "x" * 999)
-            assert made.outlets[0].lane.behind
+            assert made.outlets[0].writer.behind
             stdout.write(sys.stderr, "STILL MOVING")
             got = b""
             async with asyncio.timeout(PATIENCE):
@@ -189,12 +190,12 @@ async def test_a_file_loses_nothing_that_nobody_asked_for(monkeypatch, tmp_path)
 
 
 async def test_a_disk_that_hangs_loses_what_is_over_the_bound_and_it_is_told(monkeypatch):
-    monkeypatch.setattr(output_streams, "MOST", 300_000)
+    monkeypatch.setattr(threads, "MOST", 300_000)
     monkeypatch.setattr(output_streams.stat, "S_ISREG", lambda mode: True)  # a pipe that takes 64 kB and then nothing
     with streams(monkeypatch) as (made, reader, errors):
         for _ in range(1000):
             stdout.write(sys.stdout, "x" * 999, spare=True)
-        assert made.outlets[1].lane.behind, "a script waits"
+        assert made.outlets[1].writer.behind, "a script waits"
         got, told, lost = b"", b"", 0
         async with asyncio.timeout(PATIENCE):
             while not lost or got.count(b"\n") < 1000 - lost:

@@ -8,8 +8,8 @@ from contextlib import contextmanager
 import pytest
 
 from multidrop.dialects import Diagnostic
-from multidrop.shell.sweeps import cluster
-from multidrop.shell.sweeps.interruption import Interruption
+from multidrop.shell.signals import Interruption
+from multidrop.shell.sweeps import workers
 from multidrop.shell.sweeps.trial import Case, Job, Result
 from multidrop.transports import TransportLost
 
@@ -34,14 +34,14 @@ def test_a_scheduler_that_ends_in_the_middle_of_a_question_is_lost(monkeypatch: 
     def run(job: Job, cases: list[Case]) -> list[Result]:
         return [Result(number) for number, _ in cases]
 
-    monkeypatch.setattr(cluster, "_client", dying)
-    monkeypatch.setattr(cluster, "_check_workers", lambda *_: None)
-    monkeypatch.setattr(cluster.trial, "chunk", run)
+    monkeypatch.setattr(workers, "_client", dying)
+    monkeypatch.setattr(workers, "_check_workers", lambda *_: None)
+    monkeypatch.setattr(workers.trial, "chunk", run)
     cases: Iterator[Case] = iter([(number, ()) for number in (1, 2, 3)])
     found: list[Result] = []
     job = Job("", "", "", "", "", (), ())
     with Interruption() as interruption, pytest.raises(TransportLost, match=r"^tcp://h:1: the scheduler was lost$"):
-        for chunk in cluster.results(job, cases, "tcp://h:1", interruption, lambda: None):
+        for chunk in workers.cluster_results(job, cases, "tcp://h:1", interruption, lambda: None):
             found += chunk
     assert found == [Result(1)]
 
@@ -50,5 +50,5 @@ def test_an_address_with_a_password_is_refused_before_it_is_shown_or_agreed_to()
     asked: list[str] = []
     with Interruption() as interruption, pytest.raises(Diagnostic) as refused:
         job = Job("", "", "", "", "", (), ())
-        next(cluster.results(job, iter(()), "tcp://me:pw@h:1", interruption, lambda: asked.append("asked")))
+        next(workers.cluster_results(job, iter(()), "tcp://me:pw@h:1", interruption, lambda: asked.append("asked")))
     assert "pw" not in str(refused.value) and not asked

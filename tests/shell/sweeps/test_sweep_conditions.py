@@ -5,8 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from multidrop.dialects import Diagnostic
-from multidrop.shell.sweeps.conditions import parse
-from multidrop.shell.sweeps.outcome import Outcome
+from multidrop.shell.sweeps.conditions import Outcome, parse
 
 SEEN = Outcome(51198, (86, 81), ("at 51200", "7"), 1.5, "E")
 STAGE = Outcome((100, -200), ("?Moving",), (), 0.25, "until")

@@ -6,11 +6,11 @@ from collections.abc import Callable
 
 import pytest
 
-from multidrop.shell.sweeps.shrink import MOST, shrunk
+from multidrop.shell.sweeps.failures import RUNS, shrunk
 from multidrop.shell.sweeps.trial import HELD, REFUSED, Case, Result
-from multidrop.shell.sweeps.values import parse
+from multidrop.shell.sweeps.variation import parse_values
 
-LOAD, WALL, SPEED = parse("0..0.9:0.1"), parse("10000..90000:10000"), parse("1000..50000")
+LOAD, WALL, SPEED = parse_values("0..0.9:0.1"), parse_values("10000..90000:10000"), parse_values("1000..50000")
 OWN = [None, None, 20000]
 
 
@@ -50,10 +50,10 @@ def test_a_world_that_fails_in_another_way_is_not_taken() -> None:
 
 def test_the_search_is_bounded_and_ends_where_it_is_if_it_shall() -> None:
     runs: list[Case] = []
-    many = [parse("1..1000000000")] * 9
+    many = [parse_values("1..1000000000")] * 9
     values = (999_999_937,) * 9
     shrunk((1, values), 0, many, [None] * 9, failing(lambda *world: world == values, runs))
-    assert len(runs) == MOST
+    assert len(runs) == RUNS
     assert shrunk((1, (0.7, 80000)), 0, [LOAD, WALL], OWN[:2], lambda case: None) == (0.7, 80000)
 
 

@@ -8,12 +8,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from multidrop.dialects import Diagnostic
-from multidrop.shell.sweeps.values import parse, simpler, spelled
-from multidrop.shell.sweeps.variation import parse as parse_key
+from multidrop.shell.sweeps.variation import parse_key, parse_values, simpler, spelled
 
 
 def values(text: str, *, drawn: bool = False) -> list[object]:
-    found = parse(text, drawn=drawn)
+    found = parse_values(text, drawn=drawn)
     return [found.at(index) for index in range(found.count)]
 
 
@@ -57,7 +56,7 @@ def test_values_are_lists_and_inclusive_ranges(text: str, expected: list[object]
 )
 def test_wrong_values_are_one_line(text: str, what: str) -> None:
     with pytest.raises(Diagnostic, match=what) as problem:
-        parse(text)
+        parse_values(text)
     assert "\n" not in str(problem.value)
 
 
@@ -67,7 +66,7 @@ PLACES = st.decimals(-1000, 1000, places=2)
 @given(PLACES, PLACES, st.decimals("0.01", 500, places=2))
 def test_a_range_has_every_step_up_to_its_end_and_no_rounding(low: Decimal, high: Decimal, step: Decimal) -> None:
     low, high = sorted((low, high))
-    found = parse(f"{low}..{high}:{step}")
+    found = parse_values(f"{low}..{high}:{step}")
     listed = [Decimal(str(found.at(index))) for index in range(min(found.count, 50))]
     assert listed == [low + step * index for index in range(len(listed))]
     assert low + step * (found.count - 1) <= high < low + step * found.count
@@ -87,12 +86,12 @@ def test_what_is_spelled_is_read_again(value: object) -> None:
 
 
 def test_draws_are_of_all_values_and_repeatable() -> None:
-    whole, fractions = parse("1..6", drawn=True), parse("0..0.9", drawn=True)
+    whole, fractions = parse_values("1..6", drawn=True), parse_values("0..0.9", drawn=True)
     rng = Random(1)
     assert {whole.draw(rng) for _ in range(200)} == {1, 2, 3, 4, 5, 6}
     drawn = [fractions.draw(rng) for _ in range(200)]
     assert len(set(drawn)) > 150 and all(0 <= each <= 0.9 for each in drawn)  # type: ignore[operator]
-    assert [parse("1..1000").draw(Random(7)) for _ in range(2)] == [parse("1..1000").draw(Random(7))] * 2
+    assert [parse_values("1..1000").draw(Random(7)) for _ in range(2)] == [parse_values("1..1000").draw(Random(7))] * 2
 
 
 @pytest.mark.parametrize(
@@ -107,7 +106,7 @@ def test_draws_are_of_all_values_and_repeatable() -> None:
     ],
 )
 def test_simpler_values_are_nearer_to_the_cells_own(text, value, origin, expected) -> None:
-    assert list(simpler(parse(text), value, origin)) == expected
+    assert list(simpler(parse_values(text), value, origin)) == expected
 
 
 @pytest.mark.parametrize(

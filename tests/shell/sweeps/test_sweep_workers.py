@@ -10,8 +10,8 @@ from collections.abc import Callable, Sequence
 
 import pytest
 
+from multidrop.shell.signals import Interruption
 from multidrop.shell.sweeps import pools, workers
-from multidrop.shell.sweeps.interruption import Interruption
 from multidrop.shell.sweeps.trial import DIED, Case, Job, Result
 
 pytestmark = pytest.mark.process

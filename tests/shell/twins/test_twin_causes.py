@@ -8,8 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from multidrop.shell.twins.causes import Known, Pair, causes
-from multidrop.shell.twins.comparing import LASTING, LIMIT, Comparison, Verdict
+from multidrop.shell.twins.comparing import LASTING, LIMIT, Comparison, Pair, Verdict, causes
 
 STEP = 0.1
 Motion = Callable[[float], tuple[float, float]]
@@ -69,19 +68,19 @@ MOVE = ramp(100_000, 50_000)
     ],
 )
 def test_the_likeliest_cause_is_the_first(measured: Motion, predicted: Motion, first: str) -> None:
-    assert causes(pairs(measured, predicted), Known())[0] == first
+    assert causes(pairs(measured, predicted))[0] == first
 
 
 def test_where_two_readings_are_far_apart_a_drive_that_came_less_far_may_have_stalled() -> None:
     """Typed positions in a log: no velocity, and nothing in between."""
     found = [Pair(0.0, 2000, 0, 2000, 0), Pair(2.0, 31250, 40000, 50486, 40000)]
-    assert causes(found, Known())[0] == "stall"
+    assert causes(found)[0] == "stall"
 
 
 def test_a_limit_that_is_lit_and_a_doubtful_line_come_first() -> None:
     found = pairs(stopped(MOVE, 1.0), MOVE)
-    assert causes(found, Known(limits=("limit+",)))[0] == "a limit (limit+)"
-    assert causes(found, Known("MR 5"))[:2] == ("it is not known whether 'MR 5' was executed", "stall")
+    assert causes(found, limits=("limit+",))[0] == "a limit (limit+)"
+    assert causes(found, "MR 5")[:2] == ("it is not known whether 'MR 5' was executed", "stall")
 
 
 def verdicts(comparison: Comparison, found: list[Pair]) -> Iterator[tuple[float, Verdict]]:
@@ -114,5 +113,5 @@ def test_no_move_of_any_velocity_is_a_difference_because_of_a_delay(velocity: in
 @given(st.lists(st.tuples(*[st.integers(-(2**31), 2**31)] * 4), min_size=2, max_size=12))
 def test_any_pairs_have_a_cause(numbers: list[tuple[int, int, int, int]]) -> None:
     found = [Pair(n * LASTING, *each) for n, each in enumerate(numbers)]
-    named = causes(found, Known())
+    named = causes(found)
     assert named and len(set(named)) == len(named)
