@@ -24,7 +24,7 @@ from report import Row, absent, compared, main
 
 from multidrop.dialects.modbus.host import mapping
 from multidrop.dialects.modbus.host.codec import Modbus, ModbusState
-from multidrop.dialects.modbus.host.exchange import request
+from multidrop.dialects.modbus.host.operations import request
 from multidrop.dialects.modbus.manual.registers import REGISTERS
 from multidrop.drives.bus import Bus
 from multidrop.transports.sockets import open_tcp

@@ -12,17 +12,14 @@ from typing import TYPE_CHECKING, Any, Generic, NamedTuple, Protocol, TypeVar
 
 from multidrop.dialects.codec import Codec, Priority, Procedure
 from multidrop.dialects.files import SourceLine
-from multidrop.dialects.on_demand import imported_if
+from multidrop.dialects.on_demand import imported, imported_if
 from multidrop.dialects.state import DriveState, Owed, Remembered
 
 if TYPE_CHECKING:
     from multidrop.dialects.debugging import Debugging
-
-    pass
-    from multidrop.dialects.parameters import Parameters
     from multidrop.dialects.program_files import Difference, Held
     from multidrop.dialects.scanning import Scan
-    from multidrop.dialects.values import Controls, PolledValues, Reader, Snapshot
+    from multidrop.dialects.values import Values
 
 
 EVERYONE = "*"
@@ -243,26 +240,18 @@ class Family(Generic[S]):
     """The lines that move an axis to a position."""
     assign: Callable[[str, str], str | None]
     """The line that gives a word a value; None: its values are not assigned by a word."""
+    values_at: str
+    """The place of its `Values`, as of the programs below; few commands need these."""
     status: Callable[[S], Printed] | None = None
     """The drive's state in words, one line for each part; None: its drives do not report it."""
     programs_at: str = ""
-    """The place of its `Programs`, as of what follows; few commands need these. Empty: the family has none."""
+    """The place of its `Programs`; empty: the family has none. So of what follows."""
     no_programs: str = "the host loads no programs into drives of this family"
     """The reason to give a person where `programs` is None."""
-    parameters_at: str = ""
-    """The place of its `Parameters`."""
-    snapshot_at: str = ""
-    """The place of the conversation that reads a `Snapshot`. It raises Refused or NoAnswer."""
     debugging_at: str = ""
     """The place of its `Debugging`."""
     scan_at: str = ""
     """The place of its `Scan`."""
-    conditions_at: str = ""
-    """The place of its `Reader` of conditions."""
-    readings_at: str = ""
-    """The place of its `PolledValues`."""
-    controls_at: str = ""
-    """The place of the function that gives the `Controls` of an axis."""
     registers: Registers[S] | None = None
     baud: int = 9600
     """The default baud of a serial line."""
@@ -285,14 +274,8 @@ class Family(Generic[S]):
         return found
 
     @property
-    def parameters(self) -> Parameters[S] | None:
-        found: Parameters[S] | None = imported_if(self.parameters_at)
-        return found
-
-    @property
-    def snapshot(self) -> Callable[[S, Progress], Procedure[Snapshot]] | None:
-        """Reads everything of a drive that a cell file needs, and moves and clears nothing; None: it cannot."""
-        found: Callable[[S, Progress], Procedure[Snapshot]] | None = imported_if(self.snapshot_at)
+    def values(self) -> Values[S]:
+        found: Values[S] = imported(self.values_at)
         return found
 
     @property
@@ -306,20 +289,3 @@ class Family(Generic[S]):
         """Finds its drives; None: nothing shows them without harm, so no search tries them."""
         found: Scan[S] | None = imported_if(self.scan_at)
         return found
-
-    @property
-    def conditions(self) -> Reader[S] | None:
-        """Reads the conditions of its drives; None: it cannot."""
-        found: Reader[S] | None = imported_if(self.conditions_at)
-        return found
-
-    @property
-    def readings(self) -> PolledValues[S] | None:
-        """Values of its drives that may be polled; None: there are none."""
-        found: PolledValues[S] | None = imported_if(self.readings_at)
-        return found
-
-    def controls(self, state: S, axis: str) -> Controls:
-        """The controls of an axis; none where the family has none."""
-        found: Callable[[S, str], Controls] | None = imported_if(self.controls_at)
-        return {} if found is None else found(state, axis)

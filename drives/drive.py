@@ -24,8 +24,8 @@ from multidrop.dialects import (
 )
 from multidrop.dialects.families import family_of, program_languages
 from multidrop.dialects.family import Programs
-from multidrop.dialects.parameters import Value
 from multidrop.dialects.program_files import Held, ProgramFiles
+from multidrop.dialects.values import Value
 from multidrop.drives.conversations import ASKING, Conversation, Conversations, OnEnded, OnOver, awaited
 from multidrop.drives.events import Changed, Outcome, Transaction
 from multidrop.drives.link import Link

@@ -23,8 +23,7 @@ from typing import NamedTuple
 
 from multidrop.dialects import Codec, Decoded, End, Kind, Priority, Reply, Request, StopPiece
 from multidrop.drives.events import Transaction, Unsolicited
-from multidrop.drives.inbox import NEVER_QUIET, TAIL, Inbox
-from multidrop.drives.late_replies import Doubt
+from multidrop.drives.inbox import NEVER_QUIET, TAIL, Doubt, Inbox
 
 DEFAULT_TIMEOUT = 1.0
 """Longest wait for a reply after the last byte, s, unless a URL gives `timeout`."""

@@ -21,7 +21,7 @@ from multidrop.drives.events import (
     Unsolicited,
     isolated,
 )
-from multidrop.drives.late_replies import Debris, Leftovers
+from multidrop.drives.inbox import Debris, Leftovers
 from multidrop.drives.line import Finished, Line, Write
 from multidrop.drives.port_journal import GLOBAL, Departure, Keeper
 from multidrop.transports import Transport, TransportLost

@@ -17,7 +17,7 @@ from typing import Any
 
 from multidrop.dialects import DriveError, DriveState, Family, Hints, NoAnswer
 from multidrop.dialects.families import FAMILIES, family_of
-from multidrop.dialects.parameters import Value
+from multidrop.dialects.values import Value
 from multidrop.drives.conversations import Conversations
 from multidrop.drives.drive import Drive, still
 from multidrop.drives.events import isolated
@@ -117,12 +117,10 @@ class Restarts:
     @staticmethod
     async def _settings(drive: Drive, before: Before) -> Mapping[str, Value]:
         """Read the known settings again."""
-        reader = drive.family.conditions
         found: dict[str, Value] = {}
-        if reader is not None:
-            for part in reader.parts(drive.state, {}):
-                if part.slow and part.name in drive.settings:
-                    found |= await drive.run(part.read(drive.state))
+        for part in drive.family.values.parts(drive.state, {}):
+            if part.slow and part.name in drive.settings:
+                found |= await drive.run(part.read(drive.state))
         return {name: value for name, value in found.items() if name in before.settings}
 
     async def _to_its_end(self, drive: Drive, axis: str, sent: tuple[int, float]) -> None:

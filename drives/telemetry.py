@@ -24,8 +24,8 @@ from math import inf
 from typing import Any, Generic, NamedTuple, TypeVar
 
 from multidrop.dialects import DriveError, End, Motion, NoAnswer, Priority, Refused
-from multidrop.dialects.parameters import Value as Fact
-from multidrop.dialects.values import Part, Reader
+from multidrop.dialects.values import Part
+from multidrop.dialects.values import Value as Fact
 from multidrop.drives.conversations import Conversation, OnEnded, OnOver
 from multidrop.drives.drive import Drive, Running
 from multidrop.drives.events import Conditioned, Outcome, Sample, Silent, Transaction, Valued, isolated
@@ -315,13 +315,9 @@ class _ValuePoller(_Poller[Value]):
     def _drive(self, thing: Value) -> Drive:
         return self._roster.at(thing.address)
 
-    def _readable(self, thing: Value) -> bool:
-        return super()._readable(thing) and self._drive(thing).family.readings is not None
-
     def _begin(self, thing: Value, due: _Due) -> None:
         drive = self._drive(thing)
-        assert drive.family.readings is not None
-        procedure = drive.family.readings.again(drive.state, thing.word, Priority.POLL)
+        procedure = drive.family.values.again(drive.state, thing.word, Priority.POLL)
         self._converse(thing, due, partial(drive.start, procedure), self._took)
 
     def _took(self, value: Value, at: float, read: float) -> None:
@@ -405,12 +401,10 @@ class _ConditionPoller(_Poller[str]):
         drive, known = self._roster.drives[address], self._known.get(address)
         if known is None or known.drive is not drive:  # another drive is at this address
             known = self._known[address] = _Facts(drive)
-        reader: Reader[Any] | None = drive.family.conditions
-        if reader is None:
-            return
+        values = drive.family.values
         ready, begun, period = False, self._link.now(), self.periods[address]
-        for name in [part.name for part in reader.parts(drive.state, known.facts)]:
-            part = next((each for each in reader.parts(drive.state, known.facts) if each.name == name), None)
+        for name in [part.name for part in values.parts(drive.state, known.facts)]:
+            part = next((each for each in values.parts(drive.state, known.facts) if each.name == name), None)
             if part is None or not self._part_due(known, part, period):
                 continue
             # Nothing is read of a drive that stores lines, or whose settings are to be found out first.
@@ -420,7 +414,7 @@ class _ConditionPoller(_Poller[str]):
                 return
             ready = True
         if ready and known.facts:
-            conditions = reader.fold(drive.state, known.facts)
+            conditions = values.fold(drive.state, known.facts)
             if (runs := next((each.runs for each in conditions if each.runs is not None), None)) is not None:
                 drive.running = Running(begun, runs)
             self._link.publish(Conditioned(self._link.now(), drive.address, conditions))

@@ -11,7 +11,7 @@ from math import ceil
 from typing import NamedTuple
 
 from multidrop.dialects import Diagnostic, DriveError
-from multidrop.dialects.parameters import Readings
+from multidrop.dialects.values import Readings
 from multidrop.drives.events import BusEvent
 from multidrop.transports import TransportLost
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from multidrop.dialects import Diagnostic, DriveError, Inexpressible, Stopped
+from multidrop.dialects import Diagnostic, DriveError, Stopped
 from multidrop.dialects.program_files import Held, Stored
 from multidrop.shell import new_file, program_listing
 from multidrop.shell.channel import running, transferring
@@ -42,11 +42,8 @@ async def save(workspace: Workspace, file: str) -> None:
 
 async def read(workspace: Workspace, drive: Drive) -> Snapshot:
     """Read one drive. Raises DriveError."""
-    take = drive.family.snapshot
-    if take is None:
-        raise Inexpressible(f"{workspace.display_name(drive)}: the host takes no snapshot of a drive of its family")
     with running(workspace, f"{workspace.display_name(drive)}: snapshot") as progress:
-        found = await transferring(drive, take(drive.state, progress))
+        found = await transferring(drive, drive.family.values.snapshot(drive.state, progress))
     program = Held(tuple(Stored(at, text) for at, text in found.program))
     if not program.lines:
         return found

@@ -7,8 +7,7 @@ from dataclasses import dataclass
 from typing import Protocol
 
 from multidrop.dialects.family import Motion
-from multidrop.dialects.parameters import Value
-from multidrop.dialects.values import Snapshot
+from multidrop.dialects.values import Snapshot, Value
 from multidrop.simulator.cell.spec import DriveSpec
 from multidrop.simulator.cell.table import Folder, Table
 from multidrop.simulator.cell.writer import DriveText

@@ -9,8 +9,7 @@ from dataclasses import dataclass, field
 from enum import Enum
 from typing import NamedTuple
 
-from multidrop.dialects.parameters import Readings
-from multidrop.dialects.values import Conditions, Pace
+from multidrop.dialects.values import Conditions, Pace, Readings
 from multidrop.drives.events import Conditioned, Sample, Silent
 from multidrop.shell.events import Agreed, Diverged, Phase, Predicted, TwinEnded, TwinEvent
 from multidrop.tui.text import age

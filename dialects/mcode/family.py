@@ -10,7 +10,7 @@ from multidrop.dialects.mcode.host import classify, operations
 from multidrop.dialects.mcode.host.codec import STOP_BYTES, MCode
 from multidrop.dialects.mcode.host.identify import identify, remember
 from multidrop.dialects.mcode.host.state import MCodeState
-from multidrop.dialects.mcode.manual import guards, help, sentences
+from multidrop.dialects.mcode.manual import guards, help, points
 
 
 def guarded(state: MCodeState, text: str) -> Guard | None:
@@ -39,19 +39,15 @@ MCODE = Family(
     language=help,
     rests_in_place=False,
     question="PR {}".format,
-    move=sentences.move,
-    move_to=sentences.move_to,
-    assign=sentences.assign,
+    move=points.move,
+    move_to=points.move_to,
+    assign=points.assign,
     programs_at="multidrop.dialects.mcode.host.programs:PROGRAMS",
-    parameters_at="multidrop.dialects.mcode.host.parameters:PARAMETERS",
-    snapshot_at="multidrop.dialects.mcode.host.readings:take",
-    readings_at="multidrop.dialects.mcode.host.readings:READINGS",
     guards=Guards(guards.NAMES, guarded, guards.word_of, guards.only_ends),
     debugging_at="multidrop.dialects.mcode.host.debugging:DEBUGGING",
     repairs=True,
     remember=remember,
     scan_at="multidrop.dialects.mcode.host.scan:SCAN",
-    conditions_at="multidrop.dialects.mcode.host.readings:READER",
-    controls_at="multidrop.dialects.mcode.manual.sentences:controls",
+    values_at="multidrop.dialects.mcode.host.values:VALUES",
     stop_bytes=STOP_BYTES,
 )

@@ -7,7 +7,7 @@ from functools import partial
 from multidrop.dialects.codec import Procedure
 from multidrop.dialects.family import Family, Guard, Guards, Registers
 from multidrop.dialects.mcode.host.classify import referencing
-from multidrop.dialects.mcode.manual import guards, help, sentences
+from multidrop.dialects.mcode.manual import guards, help, points
 from multidrop.dialects.modbus.host import operations
 from multidrop.dialects.modbus.host.codec import Modbus, ModbusState, pdu_codec
 from multidrop.dialects.modbus.host.mapping import ALTERNATIVE, lines_of
@@ -43,13 +43,10 @@ MODBUS = Family(
     language=help,
     rests_in_place=False,
     question="PR {}".format,
-    move=sentences.move,
-    move_to=sentences.move_to,
-    assign=sentences.assign,
+    move=points.move,
+    move_to=points.move_to,
+    assign=points.assign,
     no_programs=f"programs are neither listed nor written over Modbus; {ALTERNATIVE} does both with the same drive",
-    parameters_at="multidrop.dialects.modbus.host.values:PARAMETERS",
-    snapshot_at="multidrop.dialects.modbus.host.values:take",
-    readings_at="multidrop.dialects.modbus.host.values:READINGS",
     registers=Registers(
         read=operations.read_registers,
         write=operations.write_registers,
@@ -60,6 +57,5 @@ MODBUS = Family(
     ),
     guards=Guards(guards.NAMES, guarded, guards.word_of, guards.only_ends),
     prepare=pdu_codec,
-    conditions_at="multidrop.dialects.modbus.host.values:READER",
-    controls_at="multidrop.dialects.mcode.manual.sentences:controls",
+    values_at="multidrop.dialects.modbus.host.values:VALUES",
 )

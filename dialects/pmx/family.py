@@ -13,7 +13,7 @@ from types import MappingProxyType
 from multidrop.dialects.family import ADDRESSES, EVERYONE, Family, Guard, Guards, to_all
 from multidrop.dialects.pmx.host import operations
 from multidrop.dialects.pmx.host.codec import STOP_BYTES, Pmx, PmxState
-from multidrop.dialects.pmx.host.identify import identify
+from multidrop.dialects.pmx.host.operations import identify
 from multidrop.dialects.pmx.manual import help
 from multidrop.dialects.pmx.manual.table import head, lookup, reads, starts_motion
 
@@ -87,13 +87,9 @@ PMX = Family(
     move_to=move_to,
     assign="{}={}".format,
     programs_at="multidrop.dialects.pmx.host.programs:PROGRAM_FILES",
-    parameters_at="multidrop.dialects.pmx.host.values:PARAMETERS",
-    snapshot_at="multidrop.dialects.pmx.host.values:take",
-    readings_at="multidrop.dialects.pmx.host.values:READINGS",
     guards=Guards(GUARDS, lambda state, text: guarded(text, state.address), word_of, only_ends),
-    scan_at="multidrop.dialects.pmx.host.identify:SCAN",
+    scan_at="multidrop.dialects.pmx.host.operations:SCAN",
     debugging_at="multidrop.dialects.pmx.host.programs:DEBUGGING",
-    conditions_at="multidrop.dialects.pmx.host.values:READER",
-    controls_at="multidrop.dialects.pmx.host.values:controls",
+    values_at="multidrop.dialects.pmx.host.values:VALUES",
     stop_bytes=STOP_BYTES,
 )

@@ -15,8 +15,7 @@ from multidrop.dialects.tmcl.host import codec, operations
 from multidrop.dialects.tmcl.host.codec import STOP_BYTES, Tmcl, TmclState
 from multidrop.dialects.tmcl.host.operations import identify
 from multidrop.dialects.tmcl.manual import commands, help
-from multidrop.dialects.tmcl.manual.commands import Command
-from multidrop.dialects.tmcl.manual.parameters import Global
+from multidrop.dialects.tmcl.manual.commands import Command, Global
 
 FIRST = "0"
 """The first motor."""
@@ -111,13 +110,9 @@ TMCL = Family(
     move_to=move_to,
     assign=lambda word, value: None,
     guards=Guards(GUARDS, lambda state, text: guarded(text, state.address), word_of, only_ends),
-    parameters_at="multidrop.dialects.tmcl.host.values:PARAMETERS",
-    snapshot_at="multidrop.dialects.tmcl.host.values:take",
-    readings_at="multidrop.dialects.tmcl.host.values:READINGS",
     no_programs="the host loads no programs into TMCL modules; 132 and 133 begin and end a download by hand",
     repairs=True,
-    conditions_at="multidrop.dialects.tmcl.host.values:READER",
-    controls_at="multidrop.dialects.tmcl.host.values:controls",
+    values_at="multidrop.dialects.tmcl.host.values:VALUES",
     stop_bytes=STOP_BYTES,
     message_moves=codec.moves,
 )

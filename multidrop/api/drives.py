@@ -24,7 +24,7 @@ from multidrop.shell.scripts.expression import Value, Word, written
 
 if TYPE_CHECKING:
     from multidrop.api.telemetry import AsyncTelemetry
-    from multidrop.dialects.parameters import Readings
+    from multidrop.dialects.values import Readings
     from multidrop.drives.drive import Drive
     from multidrop.drives.drive import Drive as Wire
 
@@ -92,7 +92,7 @@ class AsyncParameters:
         """Read every setting, and write them to a new file. Raises Diagnostic for a file that exists."""
         new_file.check(file)
         found = await self.read()
-        identity = files.identity(self._drive.state, files.parameters(self._drive).language)
+        identity = files.identity(self._drive.state, self._drive.family.values.parameters.language)
         new_file.write(file, files.formatted(identity, found))
         return found
 

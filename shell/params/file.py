@@ -10,9 +10,9 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from multidrop.dialects import Diagnostic, Inexpressible
+from multidrop.dialects import Diagnostic
 from multidrop.dialects.files import escaped_toml, text_of, toml_of
-from multidrop.dialects.parameters import SECTIONS, VARIABLES, Parameters, Readings, Value
+from multidrop.dialects.values import SECTIONS, VARIABLES, Readings, Value
 from multidrop.shell.channel import running, transferring
 from multidrop.shell.events import SettingsRead
 
@@ -30,18 +30,10 @@ LISTED = 8
 """The number of settings that a message names."""
 
 
-def parameters(drive: Drive) -> Parameters[Any]:
-    """The parameters of a drive's family. Raises Inexpressible where the host reads none."""
-    found = drive.family.parameters
-    if found is None:
-        raise Inexpressible(f"{drive.shown}: the host does not read the parameters of this family")
-    return found
-
-
 async def read(workspace: Workspace, drive: Drive, what: str) -> Readings:
     """Read every setting of a drive. Raises DriveError; nothing is changed."""
     with running(workspace, f"{workspace.display_name(drive)}: {what}") as progress:
-        found = await transferring(drive, parameters(drive).read(drive.state, progress))
+        found = await transferring(drive, drive.family.values.parameters.read(drive.state, progress))
     workspace.publish(SettingsRead(workspace.now(), drive.link.name, drive.address, found))
     return found
 

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from multidrop.dialects import Diagnostic
-from multidrop.dialects.parameters import (
+from multidrop.dialects.values import (
     ORDINARY,
     Parameters,
     Permission,

@@ -15,11 +15,11 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from multidrop.dialects import Diagnostic, DriveError, Inexpressible, Refused
-from multidrop.dialects.parameters import Permission, Plan, Readings, differing
 from multidrop.dialects.program_files import LOCKED
+from multidrop.dialects.values import Permission, Plan, Readings, differing
 from multidrop.shell import snapshots
 from multidrop.shell.channel import running, transferring
-from multidrop.shell.params.file import parameters, read, shown
+from multidrop.shell.params.file import read, shown
 from multidrop.shell.params.restore import Options, check_ready
 from multidrop.shell.programs import transfers
 from multidrop.simulator import cells
@@ -66,7 +66,7 @@ class _Replacement:
 
     def __init__(self, session: Session, drive: Drive, file: str, spec: DriveSpec, wanted: Options) -> None:
         self._session, self._drive, self._file = session, drive, file
-        self._spec, self._wanted, self._parameters = spec, wanted, parameters(drive)
+        self._spec, self._wanted, self._parameters = spec, wanted, drive.family.values.parameters
         self._settings = _tables(spec).wanted(spec)
         self._program = _tables(spec).program(spec)
         programs = drive.family.programs

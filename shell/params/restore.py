@@ -13,9 +13,9 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from multidrop.dialects import Diagnostic, DriveError, NoAnswer, Refused
-from multidrop.dialects.parameters import COMMUNICATION, IO, PARAMETERS, Change, Permission, Plan, Readings, Value, same
+from multidrop.dialects.values import COMMUNICATION, IO, PARAMETERS, Change, Permission, Plan, Readings, Value, same
 from multidrop.shell.channel import running, transferring
-from multidrop.shell.params.file import SettingsFile, listed, parameters, read, shown
+from multidrop.shell.params.file import SettingsFile, listed, read, shown
 
 if TYPE_CHECKING:
     from multidrop.drives.drive import Drive
@@ -55,7 +55,7 @@ class Wanted:
 
 async def restore(session: Session, drive: Drive, file: SettingsFile, options: Options) -> None:
     """Send what differs from a file. Raises Diagnostic or DriveError."""
-    who, family = session.display_name(drive), parameters(drive)
+    who, family = session.display_name(drive), drive.family.values.parameters
     if file.language and file.language != family.language:
         what = f"has settings of {file.product or 'a drive'} in {file.language}, and {who} has {family.language}"
         raise Diagnostic(f"{what}; nothing was sent", file.path)
@@ -140,7 +140,7 @@ def _show(workspace: Workspace, who: str, plan: Plan, wanted: Wanted) -> None:
 
 async def check_ready(drive: Drive) -> None:
     """Raise Refused where the drive is at work."""
-    if reason := await transferring(drive, parameters(drive).ready(drive.state)):
+    if reason := await transferring(drive, drive.family.values.parameters.ready(drive.state)):
         raise Refused(f"{reason} (nothing was sent)")
 
 
@@ -193,9 +193,9 @@ async def _finish(workspace: Workspace, drive: Drive, plan: Plan, goal: Mapping[
     unseen = sorted(name for name in written if name not in after)
     aside = f", without {', '.join(unseen)}, which cannot be read" if unseen else ""
     result = f"{who}: {len(written)} setting{'s' * (len(written) != 1)} restored and read back{aside}"
-    saving = parameters(drive).saving
+    saving = drive.family.values.parameters.saving
     if options.save:
-        await transferring(drive, parameters(drive).save(drive.state))
+        await transferring(drive, drive.family.values.parameters.save(drive.state))
         workspace.notify(f"{result}; saved ({saving})", outcome=True)
     else:
         workspace.notify(f"{result}; not saved, so lost at power-off: --save keeps it ({saving})", warning=True)

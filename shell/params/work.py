@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from multidrop.dialects import Diagnostic, DriveError, Stopped
-from multidrop.dialects.parameters import VARIABLES, Readings, Value, same
+from multidrop.dialects.values import VARIABLES, Readings, Value, same
 from multidrop.shell import new_file
 from multidrop.shell.channel import transferring
 from multidrop.shell.lines import split_target
@@ -103,7 +103,7 @@ async def backup(workspace: Workspace, name: str, target: str) -> None:
             Path(own).parent.mkdir(parents=True, exist_ok=True)
         new_file.check(own, printed=True)
         found, who = await files.read(workspace, drive, "backup"), workspace.display_name(drive)
-        text = files.formatted(files.identity(drive.state, files.parameters(drive).language), found)
+        text = files.formatted(files.identity(drive.state, drive.family.values.parameters.language), found)
         new_file.write(own, text, workspace.output)
         workspace.notify(f"{who}: {len(found.readings)} settings{new_file.place(own)}")
         if found.unread:
@@ -127,7 +127,7 @@ async def save(workspace: Workspace, target: str) -> None:
     """Have drives keep their present settings, after a question. Raises Diagnostic where it is not agreed to."""
 
     async def keep(drive: Drive) -> None:
-        family, who = files.parameters(drive), workspace.display_name(drive)
+        family, who = drive.family.values.parameters, workspace.display_name(drive)
         await workspace.confirm(f"'{family.saving}' keeps all present settings over power-off", who)
         await transferring(drive, family.save(drive.state))
         workspace.notify(f"{who}: its settings are saved")
@@ -170,11 +170,11 @@ async def diff(
 
 def _check_language(workspace: Workspace, drive: Drive, file: files.SettingsFile | None, other: Drive | None) -> None:
     """Raise Diagnostic for a file or a drive of another family: no setting has the same meaning there."""
-    own = files.parameters(drive).language
+    own = drive.family.values.parameters.language
     who = f"{workspace.display_name(drive)} has {own}; their settings cannot be compared"
     if file is not None and file.language and file.language != own:
         raise Diagnostic(f"has settings of {file.product or 'a drive'} in {file.language}, and {who}", file.path)
-    if other is not None and (theirs := files.parameters(other).language) != own:
+    if other is not None and (theirs := other.family.values.parameters.language) != own:
         raise Diagnostic(f"{workspace.display_name(other)} has {theirs}, and {who}")
 
 

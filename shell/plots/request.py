@@ -140,8 +140,7 @@ def _parse(workspace: Workspace, text: str) -> list[Series]:
     found = [_value(workspace, bus, address, word, text) for bus, address in drives]
     if not dot and found[0].word != DIFFERENCE:
         drive = workspace.buses[found[0].bus].drives[found[0].address]
-        readings = drive.family.readings
-        if readings is None or not readings.own(drive.state, found[0].word):  # a name that a person gave
+        if not drive.family.values.own(drive.state, found[0].word):  # a name that a person gave
             hint = f"{_valid(workspace, text)}; .{text} is a user's variable"
             raise Diagnostic(f"no drive and no value {text}", hint=hint)
     return found
@@ -170,7 +169,6 @@ def _valid(workspace: Workspace, target: str) -> str:
 
 def _value(workspace: Workspace, bus: str, address: str, word: str, text: str) -> Series:
     drive: Drive = workspace.buses[bus].drives[address]
-    readings = drive.family.readings
     if not word:
         raise Diagnostic(f"no value in {text!r}", hint=FORMS)
     if word.lower() == DIFFERENCE:
@@ -178,17 +176,15 @@ def _value(workspace: Workspace, bus: str, address: str, word: str, text: str) -
         if twins is None or not twins.running(workspace.buses[bus]):
             raise Diagnostic(f"{drive.shown}: no twin runs that it could differ from", hint="/twin on begins one")
         return Series(bus, address, DIFFERENCE)
-    if readings is None:
-        raise Diagnostic(f"{drive.shown}: its values are not plotted; position and velocity are", hint=FORMS)
-    return Series(bus, address, readings.check(drive.state, word))
+    return Series(bus, address, drive.family.values.check(drive.state, word))
 
 
 async def read_first(workspace: Workspace, series: Sequence[Series]) -> None:
     """Read each value once, as a person would, before it is polled. Raises the refusal of a drive that lacks it."""
     for bus, address, word in series:
         drive = workspace.buses[bus].drives[address]
-        if word != DIFFERENCE and word and drive.family.readings is not None:
-            await drive.run(drive.family.readings.first(drive.state, word))
+        if word != DIFFERENCE and word:
+            await drive.run(drive.family.values.first(drive.state, word))
 
 
 MAX = "max"

@@ -13,8 +13,7 @@ from typing import NamedTuple
 from multidrop.dialects import Diagnostic
 from multidrop.dialects.families import program_language_of, program_languages
 from multidrop.dialects.files import split_lines
-from multidrop.dialects.program_editing import Block, EditingLanguage, Offer, Span, UserName
-from multidrop.dialects.program_files import Entry, Part, Problem, errors
+from multidrop.dialects.program_files import Block, EditingLanguage, Entry, Offer, Part, Problem, Span, UserName, errors
 
 BYTE_ORDER_MARK = "\ufeff"
 

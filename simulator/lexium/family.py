@@ -15,8 +15,7 @@ from multidrop.dialects.family import Motion
 from multidrop.dialects.mcode.manual.grammar import LineError, is_name, parse
 from multidrop.dialects.mcode.manual.statements import UNNAMED, canonical, size_of
 from multidrop.dialects.mcode.manual.table import Mnemonic, lookup, words
-from multidrop.dialects.parameters import VARIABLES, Reading, Scalar, Value, same
-from multidrop.dialects.values import Snapshot
+from multidrop.dialects.values import VARIABLES, Reading, Scalar, Snapshot, Value, same
 from multidrop.simulator.cell.identities import read_identity, read_variables
 from multidrop.simulator.cell.reader import common_keys
 from multidrop.simulator.cell.settings import Check, read_settings

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from multidrop.dialects.files import split_lines
-from multidrop.dialects.parameters import VARIABLES, Value
 from multidrop.dialects.pmx.manual import program_file
 from multidrop.dialects.pmx.manual.program_file import Undecodable
 from multidrop.dialects.pmx.manual.script_compiler import ERASED
 from multidrop.dialects.program_files import errors
-from multidrop.dialects.values import Snapshot
+from multidrop.dialects.values import VARIABLES, Snapshot, Value
 from multidrop.simulator.cell.spec import DriveSpec
 from multidrop.simulator.cell.writer import DriveText, Entry, plain, remark
 from multidrop.simulator.family import Snapshots, StoredProgram

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 
 from multidrop.dialects.pmx.manual.script_compiler import COMPARISON, MOVES, OPERANDS, OPERATION
-from multidrop.dialects.pmx.manual.script_words import AXES, WORDS
+from multidrop.dialects.pmx.manual.script_parser import AXES, WORDS
 from multidrop.simulator.pmx.vm import IDLE, MASK, Fault, Thread, signed
 
 

@@ -16,7 +16,7 @@ from typing import Any
 from multidrop.dialects import Diagnostic
 from multidrop.dialects.files import SourceLine, split_lines
 from multidrop.dialects.pmx.manual import program_file, script_compiler
-from multidrop.dialects.pmx.manual.script_words import PROGRAMS, VARIABLES
+from multidrop.dialects.pmx.manual.script_parser import PROGRAMS, VARIABLES
 from multidrop.dialects.pmx.manual.table import lookup
 from multidrop.dialects.text import whole
 from multidrop.simulator.cell.spec import DriveSpec

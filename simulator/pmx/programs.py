@@ -16,7 +16,7 @@ from collections.abc import Callable
 from typing import Protocol
 
 from multidrop.dialects.pmx.manual.script_compiler import LINES
-from multidrop.dialects.pmx.manual.script_words import AXES, PROGRAMS, VARIABLES
+from multidrop.dialects.pmx.manual.script_parser import AXES, PROGRAMS, VARIABLES
 from multidrop.simulator.pmx import lines
 from multidrop.simulator.pmx.memory import Memory
 from multidrop.simulator.pmx.vm import CONTINUE, IDLE, PAUSE, RUNNING, START, STOP, Failure, Fault, Thread

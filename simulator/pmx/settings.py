@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import NamedTuple
 
-from multidrop.dialects.pmx.manual.script_words import KEPT_VARIABLES
+from multidrop.dialects.pmx.manual.script_parser import KEPT_VARIABLES
 
 AXES = ("X", "Y")
 INT32 = 2**31

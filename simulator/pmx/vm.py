@@ -8,7 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Protocol
 
-from multidrop.dialects.pmx.manual.script_words import HANDLER, WORDS
+from multidrop.dialects.pmx.manual.script_parser import HANDLER, WORDS
 from multidrop.simulator.pmx.memory import Memory
 
 STOP, START, PAUSE, CONTINUE = 0, 1, 2, 3

@@ -8,7 +8,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 
-from multidrop.dialects.tmcl.manual.parameters import AXIS, GLOBAL, Global, Parameter
+from multidrop.dialects.tmcl.manual.commands import AXIS, GLOBAL, Global, Parameter
 from multidrop.simulator.cell.identities import read_identity
 from multidrop.simulator.cell.reader import common_keys
 from multidrop.simulator.cell.settings import read_settings

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from multidrop.dialects.parameters import Value
-from multidrop.dialects.tmcl.manual.parameters import Global
-from multidrop.dialects.values import Snapshot
+from multidrop.dialects.tmcl.manual.commands import Global
+from multidrop.dialects.values import Snapshot, Value
 from multidrop.simulator.cell.spec import DriveSpec
 from multidrop.simulator.cell.writer import DriveText, Entry, remark
 from multidrop.simulator.family import Snapshots, StoredProgram

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from multidrop.dialects.family import Motion
-from multidrop.dialects.tmcl.manual.parameters import BAUDS, Axis
+from multidrop.dialects.tmcl.manual.commands import BAUDS, Axis
 from multidrop.simulator.cell.spec import DriveSpec
 from multidrop.simulator.family import Family, Place, Shadow, Unit
 from multidrop.simulator.tmcl import drive_text

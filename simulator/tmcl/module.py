@@ -12,8 +12,21 @@ from dataclasses import dataclass
 from math import inf
 from types import MappingProxyType
 
-from multidrop.dialects.tmcl.manual.commands import FACTORY_CODE, Call, Command, Move, Search, Status, Version
-from multidrop.dialects.tmcl.manual.parameters import AXIS, BAUDS, GLOBAL, Axis, Global, Parameter
+from multidrop.dialects.tmcl.manual.commands import (
+    AXIS,
+    BAUDS,
+    FACTORY_CODE,
+    GLOBAL,
+    Axis,
+    Call,
+    Command,
+    Global,
+    Move,
+    Parameter,
+    Search,
+    Status,
+    Version,
+)
 from multidrop.simulator.tmcl.motor import STORED, Motor
 from multidrop.simulator.tmcl.program import Program
 from multidrop.simulator.tmcl.search import ReferenceSearch

@@ -11,7 +11,7 @@ from collections.abc import Iterator
 from enum import Enum
 from math import inf
 
-from multidrop.dialects.tmcl.manual.parameters import AXIS, Axis
+from multidrop.dialects.tmcl.manual.commands import AXIS, Axis
 from multidrop.simulator.kinematics.profile import halt, move, slew
 from multidrop.simulator.shaft import Shaft
 from multidrop.simulator.world import World

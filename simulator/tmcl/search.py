@@ -10,7 +10,7 @@ from __future__ import annotations
 from enum import Enum
 from itertools import pairwise
 
-from multidrop.dialects.tmcl.manual.parameters import Axis
+from multidrop.dialects.tmcl.manual.commands import Axis
 from multidrop.simulator.tmcl.motor import Motor, wrapped
 
 HOME, RIGHT, LEFT = 0, 1, 2

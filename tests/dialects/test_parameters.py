@@ -8,11 +8,11 @@ from multidrop.dialects.mcode.manual import parameters as mcode
 from multidrop.dialects.modbus.family import MODBUS
 from multidrop.dialects.modbus.host.codec import Modbus, ModbusState
 from multidrop.dialects.modbus.manual.registers import REGISTERS
-from multidrop.dialects.parameters import COMMUNICATION, Permission, Reading, Readings, same
 from multidrop.dialects.pmx.host import values as pmx
 from multidrop.dialects.pmx.host.codec import Pmx, PmxState
 from multidrop.dialects.tmcl.host import values as tmcl
 from multidrop.dialects.tmcl.host.codec import Tmcl, TmclState
+from multidrop.dialects.values import COMMUNICATION, Permission, Reading, Readings, same
 from multidrop.simulator.pmx.settings import REGISTERS as PMX_REGISTERS
 from tests.dialects.modbus.test_talk import Far
 from tests.support.procedure import ProcedureRunner
@@ -108,7 +108,7 @@ def modbus_drive(**values):
 
 def test_registers_are_read_without_er_and_what_has_none_is_listed():
     state, far = modbus_drive(VM=512000, EF=1, ER=65)
-    found = talk(far, MODBUS.parameters.read(state, lambda done, total: None))
+    found = talk(far, MODBUS.values.parameters.read(state, lambda done, total: None))
     assert found.values["VM"] == 512000 and far.get("ER") == 65
     listed = dict(found.unread)
     assert all(name in found.values or name in listed for name in (each.name for each in mcode.settings("LMDCE")))
@@ -119,10 +119,10 @@ def test_a_plan_over_modbus_has_the_order_of_mcode_and_leaves_out_what_no_regist
     state, _ = modbus_drive()
     present = held(VI=1000, VM=768000, A=1000000, D5=0, MS=256)
     wanted = {"VM": 500, "VI": 100, "A": 70, "AJ": 5, "D5": 999}
-    made = MODBUS.parameters.plan(state, present, wanted, Permission())
+    made = MODBUS.values.parameters.plan(state, present, wanted, Permission())
     assert steps(made) == ["VI=100", "VM=500"]
     assert {name for name, _ in made.impossible} == {"A", "AJ", "D5"}
 
 
 def test_every_family_of_drives_reads_parameters():
-    assert all(family_of(each).parameters is not None for each in (Modbus(), MODBUS.codec))
+    assert all(family_of(each).values.parameters is not None for each in (Modbus(), MODBUS.codec))

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from multidrop.dialects import End, Kind, Priority, Request, StopPiece
 from multidrop.dialects.mcode.host.codec import MCode
 from multidrop.drives.events import Unsolicited
-from multidrop.drives.late_replies import LATE
+from multidrop.drives.inbox import LATE
 from multidrop.drives.line import LONGEST_LIST, NEVER_QUIET, Finished, Line, Write
 from tests.support.examples import examples
 

@@ -9,7 +9,7 @@ from multidrop.dialects.codec import Kind
 from multidrop.dialects.mcode.host.codec import MCode
 from multidrop.drives.bus import Bus
 from multidrop.drives.events import Unsolicited
-from multidrop.drives.late_replies import LASTS, Debris
+from multidrop.drives.inbox import LASTS, Debris
 from multidrop.simulator.cells import read
 from multidrop.simulator.floor import Floor
 from multidrop.simulator.serving.in_process import SimPipe

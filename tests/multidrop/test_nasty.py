@@ -23,7 +23,7 @@ from multidrop.dialects.files import toml_of
 from multidrop.dialects.mcode.host.classify import INTEGER
 from multidrop.dialects.mcode.host.codec import MCode
 from multidrop.dialects.mcode.host.state import MCodeState
-from multidrop.dialects.pmx.host.exchange import INTEGER as PMX_INTEGER
+from multidrop.dialects.pmx.host.operations import INTEGER as PMX_INTEGER
 from multidrop.dialects.text import whole
 from multidrop.macros import parse_macro
 from multidrop.shell.connect import settings, urls

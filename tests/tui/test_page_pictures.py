@@ -5,7 +5,7 @@ from collections.abc import Callable
 import pytest
 from textual.pilot import Pilot
 
-from multidrop.dialects.parameters import IO, VARIABLES, Reading, Readings
+from multidrop.dialects.values import IO, VARIABLES, Reading, Readings
 from multidrop.shell.events import SettingsRead
 from tests.support.fake_session import a_move, a_talk, demo_session, make_app, settle
 

@@ -11,7 +11,7 @@ from textual.pilot import Pilot
 
 from multidrop.dialects import Diagnostic
 from multidrop.dialects.families import FAMILIES
-from multidrop.dialects.parameters import IO, VARIABLES, Reading, Readings
+from multidrop.dialects.values import IO, VARIABLES, Reading, Readings
 from multidrop.shell.events import SettingsRead
 from multidrop.shell.params.page import edit, found_in, meanings_of, parsed, rows
 from multidrop.tui.screens.parameters import ParametersPage
@@ -76,13 +76,12 @@ def test_an_edit_is_planned_by_the_family() -> None:
     family = FAMILIES["mcode"]
     state = family.new_state(family.codec, "a")
     state.identified("LMDCM", "LMDCM 6.002")
-    assert family.parameters is not None
-    assert edit(family.parameters, state, FOUND, "VM", 500_000).lines == ("VM=500000",)
+    assert edit(family.values.parameters, state, FOUND, "VM", 500_000).lines == ("VM=500000",)
     with pytest.raises(Diagnostic, match="VM"):
-        edit(family.parameters, state, FOUND, "VM", 900)
+        edit(family.values.parameters, state, FOUND, "VM", 900)
     with pytest.raises(Diagnostic, match="already"):
-        edit(family.parameters, state, FOUND, "VM", 600_000)
-    assert "communication" in edit(family.parameters, state, FOUND, "DN", "b").warning
+        edit(family.values.parameters, state, FOUND, "VM", 600_000)
+    assert "communication" in edit(family.values.parameters, state, FOUND, "DN", "b").warning
 
 
 # The page

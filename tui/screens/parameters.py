@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, ClassVar
 from textual.binding import Binding, BindingType
 
 from multidrop.dialects import Diagnostic
-from multidrop.dialects.parameters import VARIABLES, Readings, Value
+from multidrop.dialects.values import VARIABLES, Readings, Value
 from multidrop.shell.params import file as files
 from multidrop.shell.params.page import Edit, edit, found_in, meanings_of, parsed, rows
 from multidrop.shell.params.page import Row as Setting
@@ -218,9 +218,6 @@ class ParametersPage(AskingPage):
     def _nothing(self) -> list[Row]:
         if self._glance is None:
             return [((" ^O chooses a drive", "dim"),)]
-        drive = self.host.session.selected
-        if drive is not None and drive.family.parameters is None:
-            return [((" the host does not read the parameters of this family", "dim"),)]
         if self._settings() is None:
             return [((" not read yet: r reads every setting; nothing is changed by it", "strong"),)]
         return [((" nothing differs" if self._table.only_differing else " no setting has that", "dim"),)]
@@ -321,7 +318,7 @@ class ParametersPage(AskingPage):
     def _file(self, name: str, text: str) -> None:
         loaded = files.load(text)
         drive = self.host.session.selected
-        parameters = drive.family.parameters if drive is not None else None
+        parameters = drive.family.values.parameters if drive is not None else None
         if parameters is not None and loaded.language and loaded.language != parameters.language:
             raise Diagnostic(f"has settings in {loaded.language}, this drive has {parameters.language}", text)
         self._table.compare(text.rpartition("/")[2], dict(loaded.named))
@@ -338,10 +335,9 @@ class ParametersPage(AskingPage):
 
     def _value(self, name: str, text: str) -> None:
         drive, present = self.host.session.selected, self._settings()
-        parameters = drive.family.parameters if drive is not None else None
-        if drive is None or parameters is None or present is None:
+        if drive is None or present is None:
             raise Diagnostic("the settings of the drive are not read", name, "/params read reads them")
-        planned: Edit = edit(parameters, drive.state, present, name, parsed(text))
+        planned: Edit = edit(drive.family.values.parameters, drive.state, present, name, parsed(text))
         self._close("")
         self._plan(planned.lines, planned.warning)
 

@@ -15,8 +15,7 @@ from multidrop.dialects.mcode.host import classify
 from multidrop.dialects.mcode.host.codec import MCode
 from multidrop.dialects.mcode.host.exchange import answered, question, read_error, refused, synchronise, value
 from multidrop.dialects.mcode.host.framing import NAK
-from multidrop.dialects.mcode.host.identity import find, find_in_text, pinged
-from multidrop.dialects.mcode.host.resync import activate_party, asked, look_in
+from multidrop.dialects.mcode.host.identity import activate_party, asked, find, find_in_text, look_in, pinged
 from multidrop.dialects.mcode.host.state import MCodeState, Place, described, unknown, who
 
 

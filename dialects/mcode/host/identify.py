@@ -25,9 +25,17 @@ from multidrop.dialects.codec import Kind, Procedure, Reply, Request
 from multidrop.dialects.errors import Inexpressible, NoAnswer
 from multidrop.dialects.family import Hints
 from multidrop.dialects.mcode.host.codec import NOBODY, MCode
-from multidrop.dialects.mcode.host.identity import SETTLE, TEXT, end_text, find, find_in_text, overflow, write_stop
+from multidrop.dialects.mcode.host.identity import (
+    BRIEF,
+    SETTLE,
+    TEXT,
+    end_text,
+    find,
+    find_in_text,
+    overflow,
+    write_stop,
+)
 from multidrop.dialects.mcode.host.program_mode import put_back_found
-from multidrop.dialects.mcode.host.resync import BRIEF
 from multidrop.dialects.mcode.host.state import MCodeState, Place, Unconfirmed, who
 from multidrop.dialects.mcode.manual.statements import UNNAMED
 from multidrop.dialects.state import Remembered

@@ -25,8 +25,8 @@ from multidrop.dialects.mcode.host.exchange import (
     signed,
     value,
 )
+from multidrop.dialects.mcode.host.identity import set_wire
 from multidrop.dialects.mcode.host.program_mode import enter_program, program_line, put_back
-from multidrop.dialects.mcode.host.resync import set_wire
 from multidrop.dialects.mcode.host.state import MCodeState, refuse_in_program, who
 from multidrop.dialects.mcode.manual import grammar
 from multidrop.dialects.mcode.manual.grammar import Number, Unary, parsed

@@ -17,7 +17,7 @@ from multidrop.dialects.mcode.host import classify
 from multidrop.dialects.mcode.host.before_request import before_request, find_again
 from multidrop.dialects.mcode.host.exchange import answered, ends_in_program_mode, question, value
 from multidrop.dialects.mcode.host.exchange import take_out as take_out
-from multidrop.dialects.mcode.host.resync import set_wire
+from multidrop.dialects.mcode.host.identity import set_wire
 from multidrop.dialects.mcode.host.state import MCodeState, who
 from multidrop.dialects.state import Owed
 

@@ -8,11 +8,9 @@ from dataclasses import dataclass, field
 
 from multidrop.dialects.codec import Kind, Procedure, Request
 from multidrop.dialects.errors import NoAnswer
-from multidrop.dialects.mcode.host.codec import NOBODY, MCode
+from multidrop.dialects.mcode.host.codec import NOBODY, MCode, pongs
 from multidrop.dialects.mcode.host.framing import NAK, sealed
-from multidrop.dialects.mcode.host.identity import find, overflow, write_stop
-from multidrop.dialects.mcode.host.quiet_end import pongs
-from multidrop.dialects.mcode.host.resync import BRIEF, PROGRAM_PROMPT
+from multidrop.dialects.mcode.host.identity import BRIEF, PROGRAM_PROMPT, find, overflow, write_stop
 from multidrop.dialects.mcode.host.state import MCodeState, Place
 from multidrop.dialects.mcode.manual.statements import NAMES
 from multidrop.dialects.scanning import Found, Outcome, Reach, Scan, Step

@@ -14,7 +14,7 @@ from multidrop.dialects.mcode.manual.mnemonic import EVERY, Mnemonic
 from multidrop.dialects.mcode.manual.program_file import LONGEST, MOVES, ProgramLine, bare, remark_at, scan
 from multidrop.dialects.mcode.manual.program_flow import AT_POWER_UP, PLACES
 from multidrop.dialects.mcode.manual.table import lookup
-from multidrop.dialects.program_editing import Block, Offer, Span, UserName, Word, replaced
+from multidrop.dialects.program_files import Block, Offer, Span, UserName, Word, replaced
 
 STATEMENT, NEW, LABEL, PRINTED, VALUE = "statement", "new", "label", "printed", "value"
 """A head; a name that is not there yet; the label of a place; an item of PR; any other argument."""

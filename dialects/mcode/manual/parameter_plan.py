@@ -15,7 +15,7 @@ from multidrop.dialects.mcode.manual import parameters as manual
 from multidrop.dialects.mcode.manual import parameters as rules
 from multidrop.dialects.mcode.manual.mnemonic import CLOSED_LOOP, EXPANDED, MDRIVE_PLUS
 from multidrop.dialects.mcode.manual.parameters import CLOCKS, COUNTED, SHARED, TORQUE, TRIPS, WIRE, writable
-from multidrop.dialects.parameters import Change, Permission, Plan, Readings, Value, number, reference_lost, same
+from multidrop.dialects.values import Change, Permission, Plan, Readings, Value, number, reference_lost, same
 
 IN_UNITS = COUNTED - {"MS"} | {"BL", "LS0", "LS1", "TP", "TR"}
 """Settings in the unit of motion: steps or encoder counts."""

@@ -28,7 +28,7 @@ from multidrop.dialects.mcode.manual.mnemonic import (
 )
 from multidrop.dialects.mcode.manual.table import lookup, words
 from multidrop.dialects.mcode.manual.table_system import COMMUNICATION_WORDS
-from multidrop.dialects.parameters import COMMUNICATION, IO, PARAMETERS, VARIABLES, Reading, Scalar, Value, number
+from multidrop.dialects.values import COMMUNICATION, IO, PARAMETERS, VARIABLES, Reading, Scalar, Value, number
 
 WIRE = frozenset(row.name for row in COMMUNICATION_WORDS)
 """Communication settings."""

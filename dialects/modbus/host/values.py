@@ -13,29 +13,41 @@ from functools import partial
 
 from multidrop.dialects.codec import Priority, Procedure
 from multidrop.dialects.errors import Diagnostic, Inexpressible, NoAnswer, Refused
-from multidrop.dialects.mcode.host.parameters import rows_of_list
-from multidrop.dialects.mcode.host.readings import SNAPSHOT_WORDS, snapshot_of
 from multidrop.dialects.mcode.host.state import who
+from multidrop.dialects.mcode.host.values import SNAPSHOT_WORDS, rows_of_list, snapshot_of
 from multidrop.dialects.mcode.manual import parameter_plan, points
 from multidrop.dialects.mcode.manual import parameters as manual
 from multidrop.dialects.mcode.manual.parameters import reading_of
 from multidrop.dialects.mcode.manual.table import EVERY, words
 from multidrop.dialects.modbus.host import framing, mapping
 from multidrop.dialects.modbus.host.codec import ModbusState, pdu_codec
-from multidrop.dialects.modbus.host.exchange import printed, request, sure, value
-from multidrop.dialects.modbus.host.operations import OUTPUTS, flag, identification, perform
+from multidrop.dialects.modbus.host.operations import (
+    OUTPUTS,
+    flag,
+    identification,
+    perform,
+    printed,
+    request,
+    sure,
+    value,
+)
 from multidrop.dialects.modbus.manual.registers import REGISTERS
-from multidrop.dialects.parameters import (
+from multidrop.dialects.values import (
+    Conditions,
+    Facts,
     Parameters,
+    Part,
     Permission,
     Plan,
     Progress,
     Readings,
+    Snapshot,
     Value,
+    Values,
     number,
+    printed_number,
     same,
 )
-from multidrop.dialects.values import Conditions, Facts, Part, PolledValues, Reader, Snapshot, printed_number
 
 OTHER_FORM = frozenset({"TS", "TA"})
 """Registers whose values are not those of the word."""
@@ -158,9 +170,6 @@ def fold(state: ModbusState, facts: Facts) -> tuple[Conditions, ...]:
     return (points.conditions(state.product, facts, None),)
 
 
-READER = Reader(parts=parts, fold=fold)
-
-
 _NO_NUMBER = mapping.IDENTITY.keys() | mapping.SETUPS
 
 
@@ -184,9 +193,6 @@ def again(state: ModbusState, word: str, priority: Priority) -> Procedure[float]
         raise Refused(str(wrong)) from None
 
 
-READINGS = PolledValues(check=check, first=lambda state, word: again(state, word, Priority.OPERATOR), again=again)
-
-
 SERIAL = 5
 """The object of the identification."""
 DIVIDED = 4
@@ -206,3 +212,15 @@ def take(state: ModbusState, progress: Progress) -> Procedure[Snapshot]:
     if "I5" in now:
         now["I5"] *= DIVIDED
     return snapshot_of(state, replace(readings, unread=(*readings.unread, NO_PROGRAM)), now)
+
+
+VALUES = Values(
+    parameters=PARAMETERS,
+    snapshot=take,
+    parts=parts,
+    fold=fold,
+    check=check,
+    first=lambda state, word: again(state, word, Priority.OPERATOR),
+    again=again,
+    controls=points.controls,
+)

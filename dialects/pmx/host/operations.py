@@ -1,16 +1,100 @@
-"""Conversations with a controller: typed commands, motion of both axes, programs, status in words."""
+"""Conversations with a controller: typed commands, motion of both axes, programs, status in"""
 
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
+from dataclasses import replace
 
-from multidrop.dialects.codec import Priority, Procedure, Request
-from multidrop.dialects.errors import Inexpressible, Refused
-from multidrop.dialects.family import Motion, Referencing
-from multidrop.dialects.pmx.host.codec import PmxState
-from multidrop.dialects.pmx.host.exchange import answered, beyond_doubt, number, who
-from multidrop.dialects.pmx.manual import status as words
-from multidrop.dialects.pmx.manual.table import AXES, grouped
+from multidrop.dialects.codec import End, Kind, Priority, Procedure, Reply, Request
+from multidrop.dialects.errors import Inexpressible, NoAnswer, Refused
+from multidrop.dialects.exchange import Exchange
+from multidrop.dialects.family import Hints, Motion, Referencing
+from multidrop.dialects.pmx.host.codec import FACTORY, Pmx, PmxState
+from multidrop.dialects.pmx.manual.help import suggestion
+from multidrop.dialects.pmx.manual.table import (
+    AXES,
+    LIMIT_ERROR,
+    LOOP_ERRORS,
+    MOVING,
+    grouped,
+    lookup,
+    loop_words,
+    meaning,
+    program_words,
+    status_words,
+    trouble_words,
+)
+from multidrop.dialects.scanning import WINDOW, Found, Outcome, Reach, Scan, Step
+
+# One request to a controller, and proof of its outcome.
+#
+# A controller replies to each command with one line: `OK`, a value, or `?` and a reason. A reply carries neither the
+# controller's number nor its command, except that `?` precedes an unknown word. So the sync mark is an unknown word
+# with the controller's number and a number of its own. (PMX-2ED-SA manual 6.2.3, 9; facts of real units.)
+
+
+MARK = "Q"
+"""The first letter of a sync mark; no command begins with it."""
+INTEGER = r"-?\d{1,19}"
+
+
+def who(state: PmxState) -> str:
+    return state.address or "the controller"
+
+
+def _mark(state: PmxState, request: Request, sent: bool) -> Procedure[tuple[str, ...] | None]:  # noqa: ARG001
+    """Send an unknown word with a fresh number, which precedes every reply to it."""
+    text = f"{MARK}{state.address}{state.next_sync_mark() % 1000:03}"
+    asked = replace(state.codec.request(state.address, text), kind=Kind.PRINT)
+    reply = yield replace(asked, expect=re.escape(f"?{text}"), gather=True, priority=request.priority)
+    if reply.end is not End.DONE:
+        state.reply_outstanding()
+        return None
+    state.synchronised()
+    return reply.lines[:-1]
+
+
+def number(
+    state: PmxState, text: str, priority: Priority = Priority.OPERATOR, doubts: list[Request] | None = None
+) -> Procedure[int]:
+    """Read a whole number for the host's own use. Raises Refused or NoAnswer."""
+    asked = replace(state.codec.request(state.address, text), expect=INTEGER, priority=priority)
+    reply = yield from answered(state, asked, doubts)
+    return int(reply.text)
+
+
+def refusal(state: PmxState, request: Request, reply: Reply) -> Refused:
+    """Describe a refusal: the reply where it says more than the command, its meaning, the remedy."""
+    received, text = reply.text, request.text
+    head = f"{who(state)} refused '{text}'"
+    if (found := meaning(received)) is not None:
+        return Refused(f"{head}: {received}: {found[0]} ({found[1]})")
+    if received != f"?{text}" and not text.startswith(received[1:]):
+        return Refused(f"{head}: it received {received[1:]!r}, or does not accept it so (was the line disturbed?)")
+    advice = _advice(text)
+    row = lookup(text)
+    moves = row is not None and text == text.upper() and {"place", "sign", "both"} & set(row.shapes)
+    if moves:
+        advice = "an axis with a limit error takes no move: /status shows it, CLRX and CLRY clear it"
+    what = "it does not take that now" if moves else "it does not know that command"
+    return Refused(f"{head}: {received}: {what}" + (f" ({advice})" if advice else ""))
+
+
+def _advice(text: str) -> str:
+    if text != text.upper() and lookup(text.upper()) is not None:
+        return f"it reads capitals only: {text.upper()}"
+    if " " in text and lookup(text.replace(" ", "")) is not None:
+        return f"no spaces: {text.replace(' ', '')}"
+    row = lookup(text)
+    if row is not None and "=" in text and "W" not in row.access:
+        return f"{row.name} cannot be set"
+    return suggestion(text) if row is None else ""
+
+
+_EXCHANGE = Exchange(who, _mark, lambda state, request: state.reply_outstanding(), refusal)
+answered, beyond_doubt = _EXCHANGE.answered, _EXCHANGE.beyond_doubt
+
 
 OK = "OK"
 LATER = ("DN", "DB")
@@ -45,9 +129,9 @@ def motion(known: PmxState, priority: Priority) -> Procedure[tuple[Motion, ...]]
         position = yield from number(known, f"P{axis}", priority, doubts)
         state = yield from number(known, f"MST{axis}", priority, doubts)
         speed = 0
-        if state & words.MOVING or priority is not Priority.POLL:
+        if state & MOVING or priority is not Priority.POLL:
             speed = yield from number(known, f"PS{axis}", priority, doubts)
-        found.append(Motion(position, speed, axis.lower(), words.trouble_words(state)))
+        found.append(Motion(position, speed, axis.lower(), trouble_words(state)))
     if doubts:
         yield from beyond_doubt(known, doubts[0])
     return tuple(found)
@@ -67,7 +151,7 @@ def homed(known: PmxState) -> Procedure[bool]:
 
 def moving(known: PmxState) -> Procedure[bool]:
     for axis in AXES:
-        if (yield from number(known, f"MST{axis}")) & words.MOVING:
+        if (yield from number(known, f"MST{axis}")) & MOVING:
             return True
     return False
 
@@ -84,9 +168,9 @@ def status(known: PmxState) -> Procedure[tuple[str, ...]]:
     for axis in AXES:
         state = yield from number(known, f"MST{axis}")
         loop = yield from number(known, f"SLS{axis}")
-        lines.append(f"{axis}: {', '.join(words.status_words(state))}; StepNLoop {words.loop_words(loop)}")
+        lines.append(f"{axis}: {', '.join(status_words(state))}; StepNLoop {loop_words(loop)}")
     for program in PROGRAMS:
-        lines.append(f"program {program}: {words.program_words((yield from number(known, f'SASTAT{program}')))}")
+        lines.append(f"program {program}: {program_words((yield from number(known, f'SASTAT{program}')))}")
     for word, what in POINTS:
         bits = yield from number(known, word)
         on = ", ".join(str(n + 1) for n in range(bits.bit_length()) if bits >> n & 1)
@@ -102,7 +186,144 @@ def troubles(known: PmxState) -> Procedure[None]:
             loop = yield from number(known, f"SLS{axis}")
         except Refused:
             continue
-        if state & words.LIMIT_ERROR:
-            known.note(f"{who(known)}: {axis} has a {words.trouble_words(state)}; CLR{axis} clears it")
-        if loop in words.LOOP_ERRORS:
-            known.note(f"{who(known)}: StepNLoop of {axis} is in {words.loop_words(loop)}; CLR{axis} clears it")
+        if state & LIMIT_ERROR:
+            known.note(f"{who(known)}: {axis} has a {trouble_words(state)}; CLR{axis} clears it")
+        if loop in LOOP_ERRORS:
+            known.note(f"{who(known)}: StepNLoop of {axis} is in {loop_words(loop)}; CLR{axis} clears it")
+
+
+# The controllers on a line: identification, and the search at one baud rate. Both only ask.
+#
+# The search asks every device number, then none, for `ID`. The first number is tried twice: the first question may
+# follow the rest of another line. (PMX-2ED-SA manual 6.2.3, 6.3.)
+
+
+PRODUCT = re.compile(r"(?i)performax-(\S+)")
+NAME = re.compile(r"\d[A-Za-z]+(\d\d)")
+SEARCH = "multidrop scan PORT --dialect pmx tries every number and baud rate"
+TRIES = 2
+"""The first question may follow the rest of another line."""
+
+
+def identify(hints: Hints) -> Procedure[list[PmxState]]:
+    """Find the controllers on a line, in the order of `hints.drives`. Raises NoAnswer where none replies.
+
+    Without numbers, try the factory's number, then none, as on a gateway.
+    """
+    if hints.checksum is not None or hints.em is not None:
+        raise Inexpressible("checksum= and em= are for MCode; this controller has neither")
+    if not hints.addressed:
+        alone = yield from find(PmxState(Pmx(addressed=False)))
+        if alone is None:
+            raise NoAnswer("no controller replies without an address; check power, wiring and the gateway")
+        return [alone]
+    if wrong := [name for name in hints.drives if not re.fullmatch(r"\d\d", name, re.ASCII)]:
+        raise Inexpressible(f"no device number '{wrong[0]}'; valid: 00 to 99, as in drives=00,01")
+    named = tuple(name for name in hints.tried if re.fullmatch(r"\d\d", name, re.ASCII))
+    found = []
+    for name in hints.drives or named or (FACTORY,):
+        state = PmxState(Pmx(), name)
+        if (yield from find(state)) is None:
+            state.note(f"{who(state)} does not reply")
+        found.append(state)
+    if any(state.product for state in found):
+        return found
+    if not hints.drives:
+        alone = yield from find(PmxState(Pmx(addressed=False)))
+        if alone is not None:
+            return [alone]
+    tried = ", ".join(state.address for state in found)
+    raise NoAnswer(f"no controller replies at {tried}; check power, baud and numbers (drives=00,01,...); {SEARCH}")
+
+
+def find(state: PmxState) -> Procedure[PmxState | None]:
+    """Identify one controller; None where it is silent."""
+    text = ""
+    for _ in range(TRIES):
+        text = yield from _ask(state, "ID")
+        if not text or PRODUCT.search(text):
+            break
+    if not text:
+        return None
+    product = PRODUCT.search(text)
+    if product is None:
+        if text.startswith("?"):
+            return None  # it does not understand the command, perhaps because of the number before it
+        state.note(f"{who(state)} says that it is {text!r}: its commands may mean other things")
+    state.identified(f"PMX-{product[1]}" if product else text, (yield from _ask(state, "VER", r"(?i)v.+")))
+    state.named((yield from _ask(state, "DN", NAME.pattern)))
+    number = NAME.fullmatch(state.name)
+    if state.address and number and number[1] != state.address:
+        state.note(f"{who(state)}: its DN is {state.name}, so it will answer at {number[1]} after a power cycle")
+    try:
+        yield from troubles(state)
+    except NoAnswer:
+        state.reply_outstanding()
+    return state
+
+
+def _ask(state: PmxState, text: str, expect: str | None = None) -> Procedure[str]:
+    """Return its reply, also a refusal; empty without a reply."""
+    reply = yield replace(state.codec.request(state.address, text), expect=expect)
+    return reply.text if reply.end in (End.DONE, End.REFUSED) else ""
+
+
+NUMBERS = tuple(f"{number:02}" for number in range(100))
+NOTHING = "~~~"
+"""A word that no controller knows."""
+NO_REPLY = b"\r\n\0"
+LATE = 4
+"""Numbers before the present one whose reply may come now."""
+CERTAIN = 5
+"""Windows in which a late reply comes."""
+BUSY = 2.5
+"""The longest wait, in windows, where something else arrives."""
+
+
+def search(reach: Reach, found: Found[PmxState], step: Step) -> Procedure[Outcome]:
+    """Search for every controller at one baud rate; report each as soon as it is identified."""
+    remarks: list[str] = []
+    seen = set(reach.known)
+    states = [PmxState(Pmx(addressed=bool(number)), number) for number in _numbers(reach)]
+    for at, state in enumerate(states):
+        if state.address not in seen and not (seen and not state.address):
+            heard = yield from _replies(state, reach.window)
+            if heard.strip(NO_REPLY) and not (yield from _identified(states[max(0, at - LATE) : at + 1], seen, found)):
+                remarks.append(f"{heard[:40]!r} was received at {state.address or 'no number'}: no controller's reply")
+        step()
+    yield from _identified([state for state in states if state.address == NUMBERS[-1]], seen, found)
+    return Outcome(tuple(remarks))
+
+
+def _numbers(reach: Reach) -> tuple[str, ...]:
+    """The device numbers to try; the empty one is for a unit that takes none."""
+    return ("",) if reach.alone else (*NUMBERS, FACTORY, "")
+
+
+def _identified(states: Sequence[PmxState], seen: set[str], found: Found[PmxState]) -> Procedure[bool]:
+    """Identify the controllers whose replies came: the last of these, or those before it. A reply bears no number."""
+    before = len(seen)
+    for state in reversed(states):
+        if state.address in seen or not (yield from _replies(state, CERTAIN * WINDOW)):
+            continue
+        if (yield from find(state)) is not None:
+            seen.add(state.address)
+            found(state)
+    return len(seen) > before
+
+
+def _replies(state: PmxState, quiet: float) -> Procedure[bytes]:
+    """Ask for the identification; return what was received until it was quiet."""
+    asked = state.codec.request(state.address, "ID")
+    reply = yield replace(asked, kind=Kind.QUIET, settle=quiet, timeout=BUSY * quiet)
+    return reply.raw
+
+
+def _clear() -> Procedure[None]:
+    """End a half-sent command, whose number no controller has."""
+    asked = Pmx(addressed=False).request("", NOTHING)
+    yield replace(asked, kind=Kind.QUIET, settle=WINDOW, timeout=BUSY * WINDOW)
+
+
+CLEARS = "ends half a command in a controller with a word that no controller knows. It moves and erases nothing"
+SCAN = Scan("PMX", (9600, 19200, 38400, 57600, 115200), lambda reach: len(_numbers(reach)), search, _clear, CLEARS)

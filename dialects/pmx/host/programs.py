@@ -17,12 +17,11 @@ from multidrop.dialects.errors import Diagnostic, DriveError, Inexpressible, NoA
 from multidrop.dialects.family import Programs, Progress
 from multidrop.dialects.files import SourceLine, split_lines
 from multidrop.dialects.pmx.host.codec import PmxState
-from multidrop.dialects.pmx.host.exchange import answered, number, who
-from multidrop.dialects.pmx.host.operations import OK, PROGRAMS, moving, perform
+from multidrop.dialects.pmx.host.operations import OK, PROGRAMS, answered, moving, number, perform, who
 from multidrop.dialects.pmx.manual import program_file, script_checker
 from multidrop.dialects.pmx.manual.program_file import RAW, Undecodable
 from multidrop.dialects.pmx.manual.script_compiler import EMPTY, ERASED, LINES
-from multidrop.dialects.pmx.manual.script_words import VARIABLES
+from multidrop.dialects.pmx.manual.script_parser import VARIABLES
 from multidrop.dialects.pmx.manual.table import PROBE, PROBED, lookup
 from multidrop.dialects.program_files import Difference, Held, Stored
 from multidrop.dialects.text import whole

@@ -19,38 +19,44 @@ from functools import partial
 
 from multidrop.dialects.codec import Priority, Procedure, Request
 from multidrop.dialects.errors import Diagnostic, Refused
-from multidrop.dialects.parameters import (
-    COMMUNICATION,
-    VARIABLES,
-    Change,
-    Parameters,
-    Permission,
-    Plan,
-    Progress,
-    Reading,
-    Readings,
-    Value,
-    read_each,
-    reference_lost,
-    same,
-)
-from multidrop.dialects.parameters import number as number_of
 from multidrop.dialects.pmx.host.codec import PmxState
-from multidrop.dialects.pmx.host.exchange import answered, beyond_doubt, number, who
-from multidrop.dialects.pmx.host.operations import LATER, PROGRAMS, busy, moving, perform
+from multidrop.dialects.pmx.host.operations import (
+    LATER,
+    PROGRAMS,
+    answered,
+    beyond_doubt,
+    busy,
+    moving,
+    number,
+    perform,
+    who,
+)
 from multidrop.dialects.pmx.host.programs import listing
-from multidrop.dialects.pmx.manual import status as words
 from multidrop.dialects.pmx.manual.program_file import RAW
-from multidrop.dialects.pmx.manual.table import AXES, COMMANDS, lookup
+from multidrop.dialects.pmx.manual.table import (
+    AXES,
+    COMMANDS,
+    LIMIT_ERROR,
+    LOOP_ERRORS,
+    MOVING,
+    lookup,
+    loop_words,
+    program_words,
+    status_words,
+    trouble_words,
+)
 from multidrop.dialects.state import DriveState
 from multidrop.dialects.values import (
     BY,
+    COMMUNICATION,
     DISABLE,
     ENABLE,
     HOME_MINUS,
     HOME_PLUS,
     STOP,
     TO,
+    VARIABLES,
+    Change,
     Conditions,
     Control,
     Controls,
@@ -58,12 +64,22 @@ from multidrop.dialects.values import (
     Lamp,
     Levels,
     Pace,
+    Parameters,
     Part,
-    PolledValues,
-    Reader,
+    Permission,
+    Plan,
+    Progress,
+    Reading,
+    Readings,
     Snapshot,
+    Value,
+    Values,
     printed_number,
+    read_each,
+    reference_lost,
+    same,
 )
+from multidrop.dialects.values import number as number_of
 
 WIRE = ("DN", "DB")
 LOOP = ("SLR", "SLT", "SLE", "SLA")
@@ -280,7 +296,7 @@ def fold(state: PmxState, facts: Facts) -> tuple[Conditions, ...]:
     one = replace(
         one,
         lamps=tuple(lamps),
-        program=", ".join(f"{n} {words.program_words(states[n] or 0)}" for n in active),
+        program=", ".join(f"{n} {program_words(states[n] or 0)}" for n in active),
         runs=None if None in states else RUNNING in states,  # a paused one moves nothing
         line=", ".join(str(facts.get(f"SPC{n}", "")) for n in active),
         more=(*one.more, *([("program", f"{failed} stopped by an error")] if failed else ())),
@@ -292,15 +308,15 @@ def _of_axis(axis: str, facts: Mapping[str, int]) -> Conditions:
     status, loop, on = facts.get(f"MST{axis}"), facts.get(f"SLS{axis}"), facts.get("EO")
     more = []
     if status is not None:
-        more.append(("status", ", ".join(words.status_words(status))))
+        more.append(("status", ", ".join(status_words(status))))
     if loop is not None:
-        more.append(("StepNLoop", words.loop_words(loop)))
+        more.append(("StepNLoop", loop_words(loop)))
     if f"DX{axis}" in facts:
         more.append(("delta", str(facts[f"DX{axis}"])))
-    code = (status or 0) & words.LIMIT_ERROR
-    text = words.trouble_words(code)
-    if loop is not None and loop in words.LOOP_ERRORS:
-        code, text = loop, f"StepNLoop {words.loop_words(loop)}"
+    code = (status or 0) & LIMIT_ERROR
+    text = trouble_words(code)
+    if loop is not None and loop in LOOP_ERRORS:
+        code, text = loop, f"StepNLoop {loop_words(loop)}"
     return Conditions(
         axis=axis.lower(),
         lamps=tuple(Lamp("", each, None if status is None else bool(status & bit)) for bit, each in ON_AXIS),
@@ -322,9 +338,6 @@ def _pace(axis: str, facts: Mapping[str, int]) -> Pace | None:
     return Pace(low, high, (high - low) / up * 1000, (high - low) / down * 1000)
 
 
-READER = Reader(parts=parts, fold=fold)
-
-
 def check(state: PmxState, word: str) -> str:
     row = lookup(word)
     if row is None or "R" not in row.access:
@@ -340,16 +353,13 @@ def again(state: PmxState, word: str, priority: Priority) -> Procedure[float]:
         raise Refused(str(wrong)) from None
 
 
-READINGS = PolledValues(check=check, first=lambda state, word: again(state, word, Priority.OPERATOR), again=again)
-
-
 def take(state: PmxState, progress: Progress) -> Procedure[Snapshot]:
     """Read a controller. Raises NoAnswer."""
     readings = yield from read_settings(state, progress)
     identity = yield from answered(state, state.codec.request(state.address, "ID"))
     remarks = []
     for axis in AXES:
-        if (yield from number(state, f"MST{axis}")) & words.MOVING:
+        if (yield from number(state, f"MST{axis}")) & MOVING:
             remarks.append(f"{axis} moved while it was read: its position is one of that moment")
     for program in PROGRAMS:
         if (yield from number(state, f"SASTAT{program}")) == RUNNING:
@@ -393,3 +403,15 @@ def controls(state: DriveState, axis: str) -> Controls:
         ENABLE: Control((f"EO{number}=1",), "current in the motor"),
         DISABLE: Control((f"EO{number}=0",), "no current: nothing holds the load"),
     }
+
+
+VALUES = Values(
+    parameters=PARAMETERS,
+    snapshot=take,
+    parts=parts,
+    fold=fold,
+    check=check,
+    first=lambda state, word: again(state, word, Priority.OPERATOR),
+    again=again,
+    controls=controls,
+)

@@ -11,18 +11,22 @@ from dataclasses import replace
 
 from multidrop.dialects.errors import Diagnostic
 from multidrop.dialects.files import split_lines
-from multidrop.dialects.pmx.manual import script_words
-from multidrop.dialects.pmx.manual.script_parser import MOVE, TARGET, Statement, Value, parse
-from multidrop.dialects.pmx.manual.script_words import (
+from multidrop.dialects.pmx.manual import script_parser
+from multidrop.dialects.pmx.manual.script_parser import (
     AXES,
     HANDLER,
     KEPT_VARIABLES,
+    MOVE,
     SUBROUTINES,
+    TARGET,
     VARIABLE_NAMES,
     VARIABLES,
     Register,
+    Statement,
+    Value,
+    parse,
 )
-from multidrop.dialects.program_editing import Block, Offer, Span, UserName, Word, replaced
+from multidrop.dialects.program_files import Block, Offer, Span, UserName, Word, replaced
 
 _NUMBERED = re.compile(r"\s*(PRG|SUB|GOSUB)\s*(\d{1,4})\s*", re.ASCII)
 _SETS = re.compile(r"\s*(V\d+)\s*=", re.ASCII)
@@ -63,7 +67,7 @@ def _found(code: str) -> Iterator[tuple[str, str, int, int]]:
     if MOVE.fullmatch(code.strip()):
         found = [(each[2], indent + each.start(2)) for each in TARGET.finditer(code.strip())]
     else:
-        found = [(word.text, word.start) for word in script_words.words(code)]
+        found = [(word.text, word.start) for word in script_parser.words(code)]
     yield from ((text, "variable", start, start + len(text)) for text, start in found if text in VARIABLE_NAMES)
 
 
@@ -133,8 +137,8 @@ _KINDS = {"PRG": "program", "SUB": "subroutine", "IF": "block", "WHILE": "block"
 def words(line: str, names: Container[str]) -> list[Word]:  # noqa: ARG001
     """Return the words of a line; each axis of a move is one."""
     found = []
-    for word in script_words.words(line):
-        if script_words.MOVE.fullmatch(word.text):
+    for word in script_parser.words(line):
+        if script_parser.MOVE_WORD.fullmatch(word.text):
             found += [
                 Word(word.start + at, word.start + at + 1, axis) for at, axis in enumerate(word.text) if axis in AXES
             ]
@@ -145,7 +149,7 @@ def words(line: str, names: Container[str]) -> list[Word]:  # noqa: ARG001
 
 def describe(word: str, product: str) -> list[str]:  # noqa: ARG001
     """Return the help on a word; empty where there is none."""
-    return script_words.describe(word)
+    return script_parser.describe(word)
 
 
 def typing(before: str) -> str:
@@ -169,8 +173,8 @@ def offers(before: str, names: Iterable[UserName], product: str) -> list[Offer]:
     first = not before[: len(before) - len(word)].strip()
     own = [Offer(each.word, each.about, each.kind) for each in names if each.kind == "variable"]
     known = [
-        Offer(text, script_words.meaning(text), "starts" if script_words.kind_of(text, first) == "starts" else "word")
-        for text, register in script_words.offered()
+        Offer(text, script_parser.meaning(text), "starts" if script_parser.kind_of(text, first) == "starts" else "word")
+        for text, register in script_parser.offered()
         if _fits(register, first)
     ]
     return [each for each in (*own, *known) if each.text.startswith(word)]

@@ -6,8 +6,7 @@ import difflib
 from dataclasses import replace
 
 from multidrop.dialects.errors import Diagnostic
-from multidrop.dialects.pmx.manual.status import meaning
-from multidrop.dialects.pmx.manual.table import COMMANDS, ELSEWHERE, ROWS, WORDS, Command, head, lookup
+from multidrop.dialects.pmx.manual.table import COMMANDS, ELSEWHERE, ROWS, WORDS, Command, head, lookup, meaning
 
 ACCESS = {"R": "read only", "W": "write only", "RW": "read and write"}
 EXAMPLES = {"X": ["X1000", "X1000Y2000"], "Y": ["Y1000"], "I": ["I1000:-1000"], "T": ["TX1000", "TY1000"]}

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from multidrop.dialects.files import SourceLine, program_text_of, split_lines, wrong_characters
-from multidrop.dialects.pmx.manual import script_checker, script_words
+from multidrop.dialects.pmx.manual import script_checker, script_parser
 from multidrop.dialects.pmx.manual.script_compiler import (
     COMPARISON,
     EMPTY,
@@ -24,8 +24,7 @@ from multidrop.dialects.pmx.manual.script_compiler import (
     looks_compiled,
     split,
 )
-from multidrop.dialects.pmx.manual.script_parser import parse
-from multidrop.dialects.pmx.manual.script_words import AXES, WORDS
+from multidrop.dialects.pmx.manual.script_parser import AXES, WORDS, parse
 from multidrop.dialects.program_files import Problem, errors, refuse, respelled
 
 _OPERATIONS = {code: op for op, code in OPERATION.items()}
@@ -221,8 +220,8 @@ def canonical(text: str, names: Container[str] = ()) -> str:  # noqa: ARG001
 LONGEST = 40
 """Characters of a compiled line, far more than the ten seen from units."""
 RAW = re.compile(r"SA(\d{1,4})=(\S*)", re.ASCII)
-parts = script_words.parts
-entries = script_words.entries
+parts = script_parser.parts
+entries = script_parser.entries
 
 
 @dataclass(frozen=True)

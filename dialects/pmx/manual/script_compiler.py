@@ -14,8 +14,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 
-from multidrop.dialects.pmx.manual.script_parser import Statement, Value
-from multidrop.dialects.pmx.manual.script_words import (
+from multidrop.dialects.pmx.manual.script_parser import (
     AXES,
     COMPARISONS,
     HANDLER,
@@ -24,6 +23,8 @@ from multidrop.dialects.pmx.manual.script_words import (
     PROGRAMS,
     VARIABLES,
     WORDS,
+    Statement,
+    Value,
 )
 
 LINES = 1275

@@ -11,43 +11,48 @@ from functools import partial
 
 from multidrop.dialects.codec import Priority, Procedure
 from multidrop.dialects.errors import Diagnostic, Refused
-from multidrop.dialects.parameters import (
-    COMMUNICATION,
-    Change,
-    Parameters,
-    Permission,
-    Plan,
-    Progress,
-    Reading,
-    Readings,
-    Value,
-    read_each,
-    reference_lost,
-    same,
-)
 from multidrop.dialects.tmcl.host.codec import TmclState
-from multidrop.dialects.tmcl.host.exchange import motors, read, who
-from multidrop.dialects.tmcl.host.operations import moving, perform
-from multidrop.dialects.tmcl.manual.commands import STARTING_PARAMETERS, Call, Command
-from multidrop.dialects.tmcl.manual.parameters import AXIS, BAUDS, GLOBAL, RELATIVE_FROM, Axis, Global
+from multidrop.dialects.tmcl.host.operations import motors, moving, perform, read, who
+from multidrop.dialects.tmcl.manual.commands import (
+    AXIS,
+    BAUDS,
+    GLOBAL,
+    RELATIVE_FROM,
+    STARTING_PARAMETERS,
+    Axis,
+    Call,
+    Command,
+    Global,
+)
 from multidrop.dialects.values import (
     BY,
+    COMMUNICATION,
     DISABLE,
     ENABLE,
     HOME_MINUS,
     HOME_PLUS,
     STOP,
     TO,
+    Change,
     Conditions,
     Control,
     Controls,
     Facts,
     Lamp,
     Pace,
+    Parameters,
     Part,
-    PolledValues,
-    Reader,
+    Permission,
+    Plan,
+    Progress,
+    Reading,
+    Readings,
     Snapshot,
+    Value,
+    Values,
+    read_each,
+    reference_lost,
+    same,
 )
 
 GLOBAL_PREFIX = "G"
@@ -235,9 +240,6 @@ def _conditions(state: TmclState, facts: Facts, motor: int) -> Conditions:
     )
 
 
-READER = Reader(parts=parts, fold=fold)
-
-
 _AXIS_WORD = re.compile(r"AP(\d{1,3})(?:/(\d))?", re.IGNORECASE | re.ASCII)
 
 
@@ -255,9 +257,6 @@ def again(state: TmclState, word: str, priority: Priority) -> Procedure[float]:
     found = _AXIS_WORD.fullmatch(word)
     assert found is not None
     return float((yield from read(state, Call(Command.GAP, int(found[1]), int(found[2] or 0)), priority)))
-
-
-READINGS = PolledValues(check=check, first=lambda state, word: again(state, word, Priority.OPERATOR), again=again)
 
 
 def take(state: TmclState, progress: Progress) -> Procedure[Snapshot]:
@@ -299,3 +298,15 @@ def controls(state: TmclState, axis: str) -> Controls:
         ENABLE: Control(absent=NO_ENABLE),
         DISABLE: Control(absent=NO_ENABLE),
     }
+
+
+VALUES = Values(
+    parameters=PARAMETERS,
+    snapshot=take,
+    parts=parts,
+    fold=fold,
+    check=check,
+    first=lambda state, word: again(state, word, Priority.OPERATOR),
+    again=again,
+    controls=controls,
+)

@@ -5,8 +5,16 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from multidrop.dialects.errors import Diagnostic
-from multidrop.dialects.tmcl.manual.commands import REFUSALS, WORDS, Command, Row
-from multidrop.dialects.tmcl.manual.parameters import AXIS, GLOBAL, RELATIVE_FROM, Parameter
+from multidrop.dialects.tmcl.manual.commands import (
+    AXIS,
+    GLOBAL,
+    REFUSALS,
+    RELATIVE_FROM,
+    WORDS,
+    Command,
+    Parameter,
+    Row,
+)
 
 ON_AXIS = frozenset({Command.SAP, Command.GAP, Command.STAP, Command.RSAP})
 ON_MODULE = frozenset({Command.SGP, Command.GGP, Command.STGP, Command.RSGP})

@@ -6,14 +6,14 @@ from hypothesis import strategies as st
 
 from multidrop.dialects import Diagnostic
 from multidrop.dialects.mcode.family import MCODE
-from multidrop.dialects.parameters import Permission, differing
+from multidrop.dialects.values import Permission, differing
 from tests.support.direct_drive import DirectDrive
 from tests.support.examples import examples
 from tests.support.random_settings import PROGRAM, lines
 
 pytestmark = pytest.mark.slow
 
-PARAMETERS = MCODE.parameters
+PARAMETERS = MCODE.values.parameters
 PRODUCTS = ("LMDOM", "LMDCM", "LMDCM", "LMDCE", "LMM", "MDI", "MDIE", "MDIX")
 
 

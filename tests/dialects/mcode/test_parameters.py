@@ -7,7 +7,7 @@ import pytest
 from multidrop.dialects.mcode.family import MCODE
 from multidrop.dialects.mcode.manual import parameters as manual
 from multidrop.dialects.mcode.manual.parameter_plan import types
-from multidrop.dialects.parameters import IO, VARIABLES, Permission
+from multidrop.dialects.values import IO, VARIABLES, Permission
 from multidrop.simulator.cell.spec import Faults
 from multidrop.simulator.lexium.state.models import MODELS
 from tests.support.direct_drive import DirectDrive
@@ -29,12 +29,12 @@ def desk_of(bench, product, em, party, check, **more):
 
 
 def read(desk, progress=nothing):
-    return desk.bench.run(MCODE.parameters.read(desk.state, progress), desk.state)
+    return desk.bench.run(MCODE.values.parameters.read(desk.state, progress), desk.state)
 
 
 def direct(product="LMDCM", *lines, program=""):
     one = DirectDrive(product, *lines, program=program)
-    return one, one.run(MCODE.parameters.read(one.state, nothing))
+    return one, one.run(MCODE.values.parameters.read(one.state, nothing))
 
 
 def _agrees_with_the_drive(product, em, party, check, bench):
@@ -118,7 +118,7 @@ def test_a_small_motor_is_not_asked_for_the_inputs_that_it_lacks():
 def test_a_refused_line_is_said_and_not_asked_in_pieces():
     one = DirectDrive("LMDOM")
     one.state.identified("LMDCM", "LMDCM 6.002", "")
-    found = one.run(MCODE.parameters.read(one.state, nothing))
+    found = one.run(MCODE.values.parameters.read(one.state, nothing))
     refused = [name for name, reason in found.unread if "refuses" in reason]
     assert "AS" in refused and len(set(one.refused)) == len(one.refused)
     assert one.device.memory.error_flag
@@ -134,16 +134,16 @@ def test_a_print_in_an_unknown_form_takes_no_other_setting_with_it():
         return SimpleNamespace(lines=("TI is odd",) if wrong else answer.lines, refused=answer.refused)
 
     one.device.execute = odd
-    found = one.run(MCODE.parameters.read(one.state, nothing))
+    found = one.run(MCODE.values.parameters.read(one.state, nothing))
     assert {"VM", "PF", "F1", "MS"} <= found.values.keys() and {"TI", "TR"} <= dict(found.unread).keys()
 
 
 def test_a_product_of_unknown_name_is_asked_for_what_every_lexium_has():
     one = DirectDrive("LMDCM")
     one.state.identified("LMDXX", "LMDXX 6.002", "")
-    found = one.run(MCODE.parameters.read(one.state, nothing))
+    found = one.run(MCODE.values.parameters.read(one.state, nothing))
     assert one.refused == [] and {"VM", "IS1"} <= found.values.keys() and "AS" not in found.values
-    plan = MCODE.parameters.plan(one.state, found, {"VM": 5000, "MS": 16}, Permission())
+    plan = MCODE.values.parameters.plan(one.state, found, {"VM": 5000, "MS": 16}, Permission())
     assert [change.text for change in plan] == ["MS=16", "VM=5000"]
 
 

@@ -5,8 +5,7 @@ import pytest
 from multidrop.dialects import Kind
 from multidrop.dialects.mcode.family import MCODE
 from multidrop.dialects.mcode.host import codec as codecs
-from multidrop.dialects.mcode.host.codec import MCode
-from multidrop.dialects.mcode.host.quiet_end import EXECUTED, EXECUTING, LIST_QUIET, PATIENT, SHORT
+from multidrop.dialects.mcode.host.codec import EXECUTED, EXECUTING, LIST_QUIET, PATIENT, SHORT, MCode
 from multidrop.dialects.mcode.host.state import MCodeState
 from multidrop.dialects.mcode.manual import program_file
 from multidrop.dialects.program_files import Held

@@ -26,8 +26,7 @@ def test_flags_points_settings_and_set_ups_make_the_conditions() -> None:
     device = drive("IS=1,1,0", "OS=2,18,1", "OS=1,16,1", "O1=1", "RC=60", personality="LMDCE")
     port = ModbusPort(device)
     state = ModbusState(Modbus(), product="LMDCE", version="LMDCE 6.002")
-    reader = MODBUS.conditions
-    assert reader is not None
+    reader = MODBUS.values
     facts: dict[str, Any] = {}
     for part in reader.parts(state, facts):
         facts |= carried(port, part.read(state))
@@ -42,8 +41,7 @@ def test_flags_points_settings_and_set_ups_make_the_conditions() -> None:
 def test_a_disabled_drive_is_read_with_its_flags() -> None:
     port = ModbusPort(drive("DE=0", personality="LMDCE"))
     state = ModbusState(Modbus(), product="LMDCE", version="LMDCE 6.002")
-    reader = MODBUS.conditions
-    assert reader is not None
+    reader = MODBUS.values
     quick = next(part for part in reader.parts(state, {}) if part.name == "flags")
     assert not quick.slow
     assert reader.fold(state, carried(port, quick.read(state)))[0].disabled == "DE=0"

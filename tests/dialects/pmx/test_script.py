@@ -11,8 +11,7 @@ from hypothesis import strategies as st
 
 from multidrop.dialects import Diagnostic
 from multidrop.dialects.pmx.manual import program_file, script_checker
-from multidrop.dialects.pmx.manual.script_parser import parse
-from multidrop.dialects.pmx.manual.script_words import BLOCKS, WORDS
+from multidrop.dialects.pmx.manual.script_parser import BLOCKS, WORDS, parse
 from multidrop.dialects.program_files import errors
 from tests.support.cases import for_each
 from tests.support.examples import examples

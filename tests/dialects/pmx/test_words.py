@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 from multidrop.dialects import Diagnostic, End, Hints, Inexpressible, NoAnswer, Priority, Refused
 from multidrop.dialects.pmx.family import PMX
 from multidrop.dialects.pmx.host.codec import Pmx, PmxState
-from multidrop.dialects.pmx.host.identify import identify
-from multidrop.dialects.pmx.manual import help, status, table
+from multidrop.dialects.pmx.host.operations import identify
+from multidrop.dialects.pmx.manual import help, table
 from tests.support.paths import FACTS
 from tests.support.procedure import ProcedureRunner
 
@@ -330,7 +330,7 @@ def test_every_command_and_every_refusal_of_the_manual_is_known():
             name = name.partition("[")[0] + name.partition("[")[2].partition("-")[0]
             assert table.lookup(name) is not None, row["command"]
     with open(FACTS / "pmx-errors.csv") as file:
-        assert {row["reply"] for row in csv.DictReader(file)} - set(status.MEANINGS) == {"?[Command]"}
+        assert {row["reply"] for row in csv.DictReader(file)} - set(table.MEANINGS) == {"?[Command]"}
 
 
 def test_help_names_syntax_value_and_place_in_the_manual():
@@ -343,6 +343,6 @@ def test_help_names_syntax_value_and_place_in_the_manual():
 
 
 def test_words_of_a_motor_status():
-    assert status.status_words(0) == ("at rest",)
-    assert status.status_words(0b1) == ("accelerating",)
-    assert status.status_words(1 << 7 | 1 << 4) == ("at rest", "plus limit error", "plus limit switch on")
+    assert table.status_words(0) == ("at rest",)
+    assert table.status_words(0b1) == ("accelerating",)
+    assert table.status_words(1 << 7 | 1 << 4) == ("at rest", "plus limit error", "plus limit switch on")

@@ -11,8 +11,7 @@ from multidrop.dialects.errors import Inexpressible, NoAnswer, Refused, Stopped
 from multidrop.dialects.family import Hints
 from multidrop.dialects.tmcl.family import TMCL
 from multidrop.dialects.tmcl.host.codec import Tmcl
-from multidrop.dialects.tmcl.manual.commands import Call, Command, Status
-from multidrop.dialects.tmcl.manual.parameters import AXIS, Axis
+from multidrop.dialects.tmcl.manual.commands import AXIS, Axis, Call, Command, Status
 from multidrop.dialects.values import BY
 from multidrop.drives.line import Line
 from multidrop.simulator.tmcl.module import Refused as Lacking
@@ -410,13 +409,13 @@ def test_a_harmed_frame_turns_no_module_otherwise_than_typed_and_gives_no_wrong_
 def test_the_host_says_from_where_a_relative_move_counts(option, counted):
     shop = Shop({"set": {"127": option}})
     (state,) = shop.open()
-    assert TMCL.controls(state, "")[BY].about == counted
+    assert TMCL.values.controls(state, "")[BY].about == counted
     shop.type(state, f"SAP 127, 0, {1 - option}")
-    assert TMCL.controls(state, "")[BY].about != counted
+    assert TMCL.values.controls(state, "")[BY].about != counted
     shop.delays = [None]
     with pytest.raises(NoAnswer):
         shop.type(state, "SAP 127, 0, 0")
-    assert "not known" in TMCL.controls(state, "")[BY].about
+    assert "not known" in TMCL.values.controls(state, "")[BY].about
 
 
 def test_a_module_without_parameter_127_counts_from_a_place_that_is_not_known(monkeypatch):
@@ -426,7 +425,7 @@ def test_a_module_without_parameter_127_counts_from_a_place_that_is_not_known(mo
     )
     (state,) = shop.open()
     assert state.motors == 1
-    assert "not known" in TMCL.controls(state, "")[BY].about
+    assert "not known" in TMCL.values.controls(state, "")[BY].about
 
 
 def interrupted(shop, state, procedure, delay):

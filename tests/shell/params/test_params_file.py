@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from multidrop.dialects import Diagnostic
-from multidrop.dialects.parameters import SECTIONS, Reading, Readings
+from multidrop.dialects.values import SECTIONS, Reading, Readings
 from multidrop.shell.params import file as files
 
 TEXTS = st.text(st.characters(codec="utf-8", exclude_categories=("Cc", "Cs")), max_size=8)

@@ -18,7 +18,7 @@ from multidrop.dialects.mcode.manual.program_file import scan
 from multidrop.dialects.mcode.manual.statements import canonical
 from multidrop.dialects.pmx.manual.program_file import compiled
 from multidrop.dialects.pmx.manual.program_file import read as read_script
-from multidrop.dialects.program_editing import Block, replaced
+from multidrop.dialects.program_files import Block, replaced
 from multidrop.shell.programs.program_text import Edit, ProgramGrammar, ProgramText
 from multidrop.simulator.cell.spec import DriveSpec, WorldSpec
 from multidrop.simulator.lexium.device import MCodeDevice

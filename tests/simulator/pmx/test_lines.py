@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from multidrop.dialects.pmx.manual import program_file, script_checker
 from multidrop.dialects.pmx.manual.script_compiler import LINES, OPERATION, looks_compiled, split
-from multidrop.dialects.pmx.manual.script_words import WORDS
+from multidrop.dialects.pmx.manual.script_parser import WORDS
 from multidrop.simulator.cell.spec import DriveSpec
 from multidrop.simulator.pmx.device import PmxDevice
 from multidrop.simulator.pmx.programs import Programs

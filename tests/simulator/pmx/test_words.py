@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from multidrop.dialects.pmx.manual.script_words import WORDS, Word
+from multidrop.dialects.pmx.manual.script_parser import WORDS, Word
 from multidrop.simulator.cell.spec import DriveSpec
 from multidrop.simulator.pmx.device import PmxDevice
 from tests.support.cases import for_each
