@@ -106,10 +106,6 @@ class Request:
         """The host asks by itself, at the lowest priority."""
         return self.priority is Priority.POLL
 
-    def numbered(self, tag: int) -> Request:
-        """Return a copy with a number; `replace` takes ten times as long, and the line numbers every request."""
-        return _with(self, tag=tag)
-
 
 @dataclass(frozen=True)
 class Reply:
@@ -141,10 +137,6 @@ class Reply:
         """The first printed line, or an empty string."""
         return self.lines[0] if self.lines else ""
 
-    def heard(self, raw: bytes, doubtful: bool) -> Reply:
-        """Return a copy with its bytes, and whether they may belong to another request."""
-        return _with(self, raw=raw, doubtful=doubtful)
-
 
 @dataclass(frozen=True)
 class Decoded:
@@ -156,7 +148,8 @@ class Decoded:
     """Lines in between that are not part of the reply: a running program's prints."""
 
 
-def _with(frozen: T, **changes: object) -> T:
+def copy_with(frozen: T, **changes: object) -> T:
+    """Return a copy of a request or a reply with other fields. `replace` takes ten times as long."""
     made = object.__new__(type(frozen))
     made.__dict__.update(frozen.__dict__, **changes)
     return made

@@ -22,6 +22,7 @@ from multidrop.drives.port_journal import Keeper
 from multidrop.transports import TransportLost
 
 T = TypeVar("T")
+A = TypeVar("A")
 OnEnded = Callable[[Transaction], None]
 """Called with each transaction of a conversation once it has ended."""
 ASKING = {Kind.PRINT, Kind.LIST, Kind.QUIET}
@@ -152,6 +153,8 @@ class Conversation(Generic[T]):
         """The ticket of the request that is queued or in flight; 0: none is."""
         self._keeping: asyncio.Task[None] | None = None
         self._outcome: Outcome[T] | None = None
+        self._first: Transaction | None = None
+        self._last: Transaction | None = None
         self._taken: list[Transaction] = []
         """Its transactions, where they are witnessed."""
         self._cleaning_up = self._interrupted = False
@@ -162,14 +165,14 @@ class Conversation(Generic[T]):
         self.begun = True
         if self._stops != self._all.stops(self._state):
             self._procedure.close()
-            return self._end(Outcome(error=Stopped(f"{self._name}: stopped before it was sent")))
+            return self._end(error=Stopped(f"{self._name}: stopped before it was sent"))
         try:
             self._request = next(self._procedure)
         except StopIteration as done:
-            return self._end(Outcome((done.value,)))
+            return self._end((done.value,))
         except BaseException as error:  # raised again by the outcome
-            return self._end(Outcome(error=error))
-        self._go_on()
+            return self._end(error=error)
+        self._send()
 
     def interrupt(self) -> None:
         """Stop it, with its clean-up, because its caller has gone."""
@@ -178,33 +181,27 @@ class Conversation(Generic[T]):
         if not self.begun:
             self.begun = True
             self._procedure.close()
-            self._end(Outcome(error=self._interruption()))
+            self._end(error=Stopped(f"{self._name}: interrupted"))
         elif self._ticket:
             ticket, self._ticket = self._ticket, 0
             self._link.withdraw(ticket)
             self._doubts()
             self._state.reply_outstanding()
-            self._fail(self._interruption())
+            self._fail(Stopped(f"{self._name}: interrupted"))
         else:
             self._interrupted = True
 
-    def _interruption(self) -> Stopped:
-        return Stopped(f"{self._name}: interrupted")
-
     # Steps
 
-    def _go_on(self) -> None:
-        if self._all.owes(self._state):
-            self._keep(self._send)
-        else:
-            self._send()
-
     def _send(self) -> None:
+        """Queue the request, once what is owed to the drive is written down."""
+        if self._all.owes(self._state):
+            return self._keep(self._send)
         request = self._request
         assert request is not None
         if not self._cleaning_up:
             if self._interrupted:
-                return self._fail(self._interruption())
+                return self._fail(Stopped(f"{self._name}: interrupted"))
             if self._stops != self._all.stops(self._state):  # between a reply and the next request
                 return self._fail(Stopped(f"{self._name}: stopped; '{request.text}' was not sent"))
         try:
@@ -218,26 +215,25 @@ class Conversation(Generic[T]):
         if isinstance(answer, TransportLost):
             self._lost(answer)
         else:
-            self._step(lambda: self._take(answer))
+            self._step(self._take, answer)
 
-    def _step(self, step: Callable[[], Request | None]) -> None:
+    def _step(self, step: Callable[[A], Request | None], given: A) -> None:
         """Step the procedure. Send the request that it yields, or end with what it returns or raises."""
-        ended: Outcome[T] | None = None
+        ended: tuple[T, ...] | None = None
         try:
-            self._request = step()
+            self._request = step(given)
         except StopIteration as done:
-            ended = Outcome((done.value,))
+            ended = (done.value,)
         except BaseException as error:  # raised again by the outcome
-            return self._end(Outcome(error=error))
+            return self._end(error=error)
+        if ended is not None:
+            return self._end(ended)
         self._all.publish_notes(self._state)
-        if ended is None:
-            self._go_on()
-        else:
-            self._end(ended)
+        self._send()
 
     def _fail(self, error: Exception) -> None:
         self._cleaning_up = True
-        self._step(lambda: self._procedure.throw(error))
+        self._step(self._procedure.throw, error)
 
     def _doubts(self) -> None:
         """Note that the command that is queued or in flight may be executed."""
@@ -257,15 +253,16 @@ class Conversation(Generic[T]):
 
     def _take(self, transaction: Transaction) -> Request | None:
         """Hand a reply or a stop to the procedure; return what it sends next."""
-        request, sent = transaction.request, transaction.sent
+        request, reply, sent = transaction.request, transaction.reply, transaction.sent
+        self._first, self._last = self._first or transaction, transaction
         if self._on_ended:
             self._on_ended(transaction)
         if self._all.witnesses:
             self._taken.append(transaction)
         if request.kind not in ASKING:
-            self._unproven = "" if transaction.reply.acknowledged else request.text
-        if transaction.reply.end is not End.STOPPED:
-            return self._procedure.send(transaction.reply)
+            self._unproven = "" if reply.acknowledged else request.text
+        if reply.end is not End.STOPPED:
+            return self._procedure.send(reply)
         if not self._cleaning_up:
             self._cleaning_up = True
             if sent:
@@ -273,20 +270,20 @@ class Conversation(Generic[T]):
             fate = "it is not known whether it was executed" if sent else "it was not sent"
             return self._procedure.throw(Stopped(f"{self._name}: '{request.text}' was stopped; {fate}"))
         if sent:  # a second stop in the middle of the clean-up, which goes on
-            return self._procedure.send(replace(transaction.reply, end=End.TIMEOUT))
+            return self._procedure.send(replace(reply, end=End.TIMEOUT))
         return self._request
 
     # The end
 
-    def _end(self, outcome: Outcome[T]) -> None:
-        self._outcome = outcome
-        if self._all.owes(self._state):
-            self._keep(self._leave)
-        else:
-            self._leave()
+    def _end(self, result: tuple[T, ...] = (), error: BaseException | None = None) -> None:
+        self._outcome = Outcome(result, error, self._first, self._last)
+        self._leave()
 
     def _leave(self) -> None:
+        """Publish the end, once what is owed to the drive is written down."""
         self._all.publish_notes(self._state)
+        if self._all.owes(self._state):
+            return self._keep(self._leave)
         self._all.leave(self, self._state)
         if not self.over.done():
             self.over.set_result(None)
@@ -297,7 +294,6 @@ class Conversation(Generic[T]):
         self._on_over(self._outcome)
 
     def _keep(self, then: Callable[[], None]) -> None:
-        """Go on once what is owed to the drive is written down."""
         self._keeping = asyncio.get_running_loop().create_task(self._all.keep(self._state))
         self._keeping.add_done_callback(lambda _: then())
 

@@ -22,11 +22,11 @@ from multidrop.dialects import (
     SourceLine,
     Stopped,
 )
-from multidrop.dialects.families import family_of, program_languages
+from multidrop.dialects.families import FAMILIES, program_languages
 from multidrop.dialects.family import Programs
 from multidrop.dialects.program_files import Held, ProgramFiles
 from multidrop.dialects.values import Value
-from multidrop.drives.conversations import ASKING, Conversation, Conversations, OnEnded, OnOver, awaited
+from multidrop.drives.conversations import ASKING, Conversation, Conversations, OnOver, awaited
 from multidrop.drives.events import Changed, Outcome, Transaction
 from multidrop.drives.link import Link
 from multidrop.drives.port_journal import GLOBAL
@@ -69,6 +69,8 @@ class Seen:
     """Velocity of the fastest axis, signed, per second; where it reads 0 on the way, as the positions show it."""
     velocities: tuple[int, ...] = ()
     """That of each axis."""
+    transmitted_at: float = float("-inf")
+    """When its last request had left."""
     confirms: float = float("-inf")
     """When the latest reading was requested that shows the same rest, and at least REST earlier; -inf: none does."""
 
@@ -85,7 +87,7 @@ class Judged:
         """When the last readings in a row were requested that show it at rest in one place."""
         self._last = (float("-inf"), tuple[int, ...]())
 
-    def reading(self, at: float, axes: Sequence[Motion], in_place: bool) -> Seen:
+    def reading(self, at: float, transmitted_at: float, axes: Sequence[Motion], in_place: bool) -> Seen:
         """Judge a reading. `in_place`: at rest the position must stay, too."""
         (before, places), here = self._last, tuple(axis.position for axis in axes)
         self._last = at, here
@@ -101,7 +103,7 @@ class Judged:
         earlier = [each for each in self.still if each <= at - REST]
         if not velocity:
             self.still = [*earlier[-1:], *self.still[len(earlier) :], at]
-        return Seen(at, velocity, tuple(velocities), earlier[-1] if earlier else float("-inf"))
+        return Seen(at, velocity, tuple(velocities), transmitted_at, earlier[-1] if earlier else float("-inf"))
 
 
 @dataclass(frozen=True)
@@ -160,7 +162,7 @@ class Drive:
 
     @property
     def family(self) -> Family[Any]:
-        return family_of(self.codec)
+        return FAMILIES[self.state.codec.family]
 
     @property
     def programs(self) -> Programs[Any]:
@@ -287,26 +289,18 @@ class Drive:
 
     # What is read
 
-    async def motion(
-        self, priority: Priority = Priority.OPERATOR, on_ended: OnEnded | None = None
-    ) -> tuple[Motion, ...]:
-        return await awaited(lambda over: self.start_motion(priority, over, on_ended))
+    async def motion(self, priority: Priority = Priority.OPERATOR) -> tuple[Motion, ...]:
+        return await awaited(lambda over: self.start_motion(priority, over))
 
-    def start_motion(
-        self, priority: Priority, on_over: OnOver[tuple[Motion, ...]], on_ended: OnEnded | None = None
-    ) -> Conversation[tuple[Motion, ...]]:
+    def start_motion(self, priority: Priority, on_over: OnOver[tuple[Motion, ...]]) -> Conversation[tuple[Motion, ...]]:
         """Begin to read position and velocity of each axis."""
-        transactions: list[Transaction] = []
-
-        def watch(transaction: Transaction) -> None:
-            transactions.append(transaction)
-            if on_ended:
-                on_ended(transaction)
+        family = self.family
 
         def over(outcome: Outcome[tuple[Motion, ...]]) -> None:
             if outcome.error is None:
-                axes, at = outcome.value(), transactions[0].sent_at
-                self.seen = self._judged.reading(at, axes, self.family.rests_in_place)
+                assert outcome.first is not None and outcome.last is not None
+                axes, at = outcome.result[0], outcome.first.sent_at
+                self.seen = self._judged.reading(at, outcome.last.transmitted_at, axes, family.rests_in_place)
                 if axes[0].program is not None:
                     self.running = Running(at, axes[0].program)
                 self.calm = not (self.state.running or (self.running is not None and self.running.runs))
@@ -314,7 +308,7 @@ class Drive:
                 self.resting = (at, self.commands, {axis.axis: axis.position for axis in axes} if at_rest else {})
             on_over(outcome)
 
-        return self.start(self.family.motion(self.state, priority), over, watch)
+        return self.start(family.motion(self.state, priority), over)
 
     async def rest(self) -> tuple[int, ...] | None:
         """Read whether it rests: None while it moves; else what a reading REST later must show again, too."""
@@ -331,10 +325,10 @@ class Drive:
         self.running = Running(at, runs)
         return runs
 
-    async def run(self, procedure: Procedure[T], on_ended: OnEnded | None = None) -> T:
-        return await awaited(lambda over: self.start(procedure, over, on_ended))
+    async def run(self, procedure: Procedure[T]) -> T:
+        return await awaited(lambda over: self.start(procedure, over))
 
-    def start(self, procedure: Procedure[T], on_over: OnOver[T], on_ended: OnEnded | None = None) -> Conversation[T]:
+    def start(self, procedure: Procedure[T], on_over: OnOver[T]) -> Conversation[T]:
         """Begin a conversation with this drive."""
         state = self.state
         address, *_ = before = (state.address, state.programming, state.codec)
@@ -344,22 +338,20 @@ class Drive:
             nonlocal commanded
             if transaction.request.kind not in ASKING:
                 commanded, self.commands = True, self.commands + transaction.sent
-            if on_ended:
-                on_ended(transaction)
 
         def over(outcome: Outcome[T]) -> None:
             self._neighbours.conversation_ended(self, address, commanded or isinstance(outcome.error, Stopped))
+            state, link = self.state, self._conversations.link
             if isinstance(outcome.error, NoAnswer):
                 self.missing = True
-            elif outcome.error is None and self.missing and not self.programming:
+            elif self.missing and outcome.error is None and not state.programming:
                 self.missing = False
                 self._neighbours.replied_again(self)
-            state = self.state
             if (state.address, state.programming, state.codec) != before:
-                self.link.publish(Changed(self.link.now(), self.address))
+                link.publish(Changed(link.now(), state.address))
             on_over(outcome)
 
-        return self._conversations.start(procedure, self.state, over, watch)
+        return self._conversations.start(procedure, state, over, watch)
 
 
 def _no_programs(drive: Drive) -> Inexpressible:

@@ -41,16 +41,13 @@ class isolated:  # noqa: N801
     ) -> bool:
         if not isinstance(failure, Exception):
             return False
-        if isinstance(failure, TransportLost | OSError):
-            self._note(str(failure))
-        else:  # a defect, of whatever kind
-            self._note(f"a defect: {type(failure).__name__}")
+        text = str(failure)
+        if not isinstance(failure, TransportLost | OSError):  # a defect, of whatever kind
+            text = f"a defect: {type(failure).__name__}"
             LOG.error("%s failed", self._what, exc_info=failure)
-        return True
-
-    def _note(self, text: str) -> None:
         if self._failed is not None:
             self._failed.append(text)
+        return True
 
 
 class Transaction(NamedTuple):
@@ -177,13 +174,15 @@ class EventQueue:
         self._isolated = isolated(f"a watcher of {name}")
 
     def watch(self, watcher: Watcher) -> Callable[[], None]:
+        """Add a watcher; the function returned removes it."""
         self._watchers = (*self._watchers, watcher)
-        return lambda: self._forget(watcher)
 
-    def _forget(self, watcher: Watcher) -> None:
-        if watcher in self._watchers:
-            at = self._watchers.index(watcher)
-            self._watchers = self._watchers[:at] + self._watchers[at + 1 :]
+        def forget() -> None:
+            if watcher in self._watchers:
+                at = self._watchers.index(watcher)
+                self._watchers = self._watchers[:at] + self._watchers[at + 1 :]
+
+        return forget
 
     def collect(self, event: BusEvent) -> None:
         """Add an event; `tell` publishes it."""
@@ -197,17 +196,20 @@ class EventQueue:
 
     def tell(self) -> None:
         """Publish what was collected; called by a watcher, it leaves that to the call under way."""
-        if self._telling:
+        if self._telling or not self._events:
             return
         self._telling = True
         try:
-            while self._events:
-                event, watchers, over = self._events.popleft(), iter(self._watchers), False
-                while not over:  # after a watcher that fails, the next one
-                    with self._isolated:
+            event, watchers, over = self._events.popleft(), iter(self._watchers), False
+            while not over:  # after a watcher that fails, the next one
+                with self._isolated:
+                    while True:
                         for watcher in watchers:
                             watcher(event)
-                        over = True
+                        if not self._events:
+                            break
+                        event, watchers = self._events.popleft(), iter(self._watchers)
+                    over = True
         finally:
             self._telling = False
 
@@ -217,10 +219,12 @@ T = TypeVar("T")
 
 @dataclass(frozen=True)
 class Outcome(Generic[T]):
-    """The end of a conversation: its result, or the error that it raised."""
+    """The end of a conversation: its result, or the error that it raised; its first and its last transaction."""
 
     result: tuple[T, ...] = ()
     error: BaseException | None = None
+    first: Transaction | None = None
+    last: Transaction | None = None
 
     def value(self) -> T:
         """Return the result, or raise the error."""

@@ -170,32 +170,26 @@ class Debris:
         self._asked = request
 
     def stop_written(self, data: bytes, transmitted: float) -> None:
-        """Note a stop. `transmitted`: when its last byte has left."""
+        """Note a stop; of a repeated one no bytes. `transmitted`: when its last byte has left."""
         self._sent += data.decode("latin-1")
-        self._until = transmitted + LASTS
-
-    def stop_repeated(self, transmitted: float) -> None:
         self._until = transmitted + LASTS
 
     def removed(self, lines: tuple[str, ...], known: re.Pattern[str] | None, now: float) -> tuple[str, ...]:
         """Unsolicited lines without debris. `known`: what only a stop leaves in this language."""
         if now > self._until:
             return lines
-        return tuple(text for text in lines if not self._holds(text, known))
-
-    def _holds(self, text: str, known: re.Pattern[str] | None) -> bool:
-        text = text.lstrip(">?").strip()
-        return (
-            (known is not None and known.fullmatch(text) is not None)
-            or text in self._sent
-            or GARBLED.search(text) is not None
-            or SCRAP.fullmatch(text) is not None
-            or self._answers(text)
-        )
-
-    def _answers(self, text: str) -> bool:
         expect = self._asked.expect if self._asked is not None else None
-        return expect is not None and re.fullmatch(expect, text) is not None
+
+        def is_debris(text: str) -> bool:
+            return (
+                (known is not None and known.fullmatch(text) is not None)
+                or text in self._sent
+                or GARBLED.search(text) is not None
+                or SCRAP.fullmatch(text) is not None
+                or (expect is not None and re.fullmatch(expect, text) is not None)
+            )
+
+        return tuple(text for text in lines if not is_debris(text.lstrip(">?").strip()))
 
 
 class Leftovers:
@@ -250,28 +244,24 @@ class LocalEcho:
     """Waits for the repetition of the last write."""
 
     def __init__(self) -> None:
-        self._own = b""
+        self.own = b""
         self.held = b""
         """Bytes received while the repetition is incomplete."""
 
-    @property
-    def awaited(self) -> bool:
-        return bool(self._own)
-
     def wrote(self, data: bytes) -> bytes:
         """Wait for these bytes from now on; return what was held for the write before."""
-        held, self._own, self.held = self.held, data, b""
+        held, self.own, self.held = self.held, data, b""
         return held
 
     def sift(self, data: bytes) -> tuple[bytes, bytes]:
         """Take received bytes; return what preceded the repetition and what followed, nothing while incomplete."""
-        if not self._own:
+        if not self.own:
             return b"", data
         self.held += data
-        at = self.held.find(self._own)
+        at = self.held.find(self.own)
         if at < 0:
             return b"", b""
-        before, after = self.held[:at], self.held[at + len(self._own) :]
+        before, after = self.held[:at], self.held[at + len(self.own) :]
         self.forget()
         return before, after
 
@@ -340,7 +330,7 @@ class Inbox:
 
     @property
     def awaits_echo(self) -> bool:
-        return self.echo is not None and self.echo.awaited
+        return self.echo is not None and self.echo.own != b""
 
     def wrote(self, data: bytes, now: float) -> None:
         """Expect the repetition of these bytes, if the adapter repeats them."""
@@ -354,15 +344,12 @@ class Inbox:
 
         `request` is the one in flight.
         """
-        if request is not None and self._can_interrupt(request):
+        readable = not self.echo and not self.codec.framed
+        if readable and request is not None and request.kind is Kind.PRINT and request.expect:
+            # The rest of the reply can be distinguished from program output.
             self._cut_off = request, len(self.buffer)
         elif self._cut_off is None and not self.codec.framed:
             self.buffer = b""
-
-    def _can_interrupt(self, request: Request) -> bool:
-        """Whether the rest of the reply can be distinguished from program output."""
-        readable = not self.echo and not self.codec.framed
-        return readable and request.kind is Kind.PRINT and bool(request.expect)
 
     def _awaits_cut_off(self, now: float) -> bool:
         """Whether the rest of an interrupted reply is still awaited; remove it once it is whole or overdue."""

@@ -22,6 +22,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from multidrop.dialects import Codec, Decoded, End, Kind, Priority, Reply, Request, StopPiece
+from multidrop.dialects.codec import copy_with
 from multidrop.drives.events import Transaction, Unsolicited
 from multidrop.drives.inbox import NEVER_QUIET, TAIL, Doubt, Inbox
 
@@ -89,10 +90,6 @@ class Flight:
         quiet, timeout = self.times(buffer, default)
         return timeout if not by_quiet or self.judged_length == len(buffer) else min(timeout, quiet)
 
-    def finished(self, reply: Reply, now: float) -> Finished:
-        ended = Transaction(self.request, reply, self.sent_at, now, self.transmitted_at, self.sent)
-        return Finished(self.ticket, ended)
-
 
 class Waiting(NamedTuple):
     """A queued request and its ticket, by which its end is reported. The least is next; no two tickets are equal."""
@@ -125,10 +122,6 @@ class Recovering:
     since: float
     held_up_since: float = float("inf")
     """When the wait of the next piece of a stop began, if further stops have interrupted that wait."""
-
-    def again(self, now: float) -> Recovering:
-        """Another stop came before the pieces of the last one were written."""
-        return Recovering(now, min(self.held_up_since, self.since))
 
 
 State = Flight | Recovering | None
@@ -228,7 +221,10 @@ class Line:
         added = [each for each in repeats if each.data]
         pending = self._repeats if only is not None else [each for each in self._repeats if _taken_from(added, each)]
         self._repeats = [*pending, *added]
-        self._state = self._state.again(now) if pending and isinstance(self._state, Recovering) else Recovering(now)
+        held_up = float("inf")
+        if pending and isinstance(self._state, Recovering):  # further stops interrupt the wait of the pieces
+            held_up = min(self._state.held_up_since, self._state.since)
+        self._state = Recovering(now, held_up)
         return self.half_sent(now)
 
     def cut_off(self, now: float, begun: bool) -> Flight | None:
@@ -265,7 +261,11 @@ class Line:
     def _advance(self, now: float) -> bool:
         """Make one transition; return whether another may follow."""
         if isinstance(self._state, Flight):
-            return self._answer(self._state, now)
+            flight = self._state
+            found = self._without_echo(flight, now) if self.inbox.awaits_echo else self._decoded(flight, now)
+            if found is not None:
+                self._finish(flight, found, now)
+            return found is not None
         self.inbox.sort(now)
         if not (self._queue or self._repeats):
             return False
@@ -274,58 +274,43 @@ class Line:
                 return False
             self.inbox.resume()
             self._state = None
-        if self._repeats:
-            self._repeat_stop(now)
+        if self._repeats:  # one piece of the stop
+            data = self._repeats.pop(0).data
+            self._state = Recovering(now)
+            self.wrote(data, now)
+            self._events.append(Write(data, None))
             return False
         if self.inbox.awaits_tail(now):
             return False
         self._launch(now)
         return bool(self.inbox.buffer)
 
-    def _take(self) -> Waiting:
-        """Remove and return the next request. A poll passed over once goes next, or typing would blind a plot."""
+    def _launch(self, now: float) -> None:
+        """Write the next request. A poll passed over once goes first, or typing would blind a plot."""
         poll_waits, at = self._queue[-1].priority is Priority.POLL, 0
         if poll_waits and self._poll_passed_over:
             at = next(at for at, each in enumerate(self._queue) if each.priority is Priority.POLL)
-        chosen = self._queue.pop(at)
-        self._poll_passed_over = poll_waits and chosen.priority is not Priority.POLL
-        return chosen
-
-    def _launch(self, now: float) -> None:
-        """None to Flight: write the next request. Nothing can follow before there is a reply."""
-        chosen = self._take()
-        request = chosen.request.numbered(chosen.ticket)
+        priority, ticket, request = self._queue.pop(at)
+        self._poll_passed_over = poll_waits and priority is not Priority.POLL
+        request = copy_with(request, tag=ticket)
         data = request.codec.encode(request)
         self.wrote(data, now, whole=True)
-        self._state = Flight(chosen.ticket, request, now, self.transmitted, now)
+        self._state = Flight(ticket, request, now, self.transmitted, now)
         self._events.append(Write(data, request))
-
-    def _answer(self, flight: Flight, now: float) -> bool:
-        """Flight to None or Recovering, if the reply is whole or time is up."""
-        found = self._without_echo(flight, now) if self.inbox.awaits_echo else self._decoded(flight, now)
-        if found is None:
-            return False
-        self._finish(flight, found, now)
-        return True
 
     def _finish(self, flight: Flight, found: Decoded, now: float) -> None:
         """End the flight with a reply."""
-        self._publish(now, found.strays)  # first: a proof forgets which replies are outstanding
+        if found.strays:  # first: a proof forgets which replies are outstanding
+            self._publish(now, found.strays)
         weight = self._doubt.weigh(flight.request, found.reply, now)
-        reply = found.reply.heard(self.inbox.buffer[: found.used], weight.doubtful)
+        reply = copy_with(found.reply, raw=self.inbox.buffer[: found.used], doubtful=weight.doubtful)
         reply = self._doubt.with_evidence(flight.request, reply)
-        self._events.append(flight.finished(reply, now))
+        ended = Transaction(flight.request, reply, flight.sent_at, now, flight.transmitted_at, flight.sent)
+        self._events.append(Finished(flight.ticket, ended))
         self.inbox.consume(found.used, now)
         # A mark that ends the wait for another reply recovers too: an ACK may follow it.
         troubled = weight.ends_wait or reply.end in (End.TIMEOUT, End.DAMAGED)
         self._state = Recovering(now) if troubled else None
-
-    def _repeat_stop(self, now: float) -> None:
-        """None to Recovering: write one piece of the stop again."""
-        data = self._repeats.pop(0).data
-        self._state = Recovering(now)
-        self.wrote(data, now)
-        self._events.append(Write(data, None))
 
     # Replies
 

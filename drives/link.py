@@ -72,6 +72,7 @@ class Link:
         self._orderly = False
         """The port was still open when it was shut."""
         self._loop = asyncio.get_running_loop()
+        self.now = self._loop.time
         self._waiting: dict[int, OnAnswer] = {}
         self._advancing = self._further = False
         self._news = EventQueue(name)
@@ -107,9 +108,6 @@ class Link:
         if self.lost:
             raise self.lost.again()
         self._held = None
-
-    def now(self) -> float:
-        return self._loop.time()
 
     # Events
 
@@ -208,15 +206,11 @@ class Link:
         finally:
             self._advancing = self._news.held = False
         if (deadline := self.line.deadline) is not None and not self.lost:
-            self._wake_by(deadline)
+            if self._timer is not None and self._timer.when() > deadline:
+                self._sleep()
+            if self._timer is None:  # one that fires too early costs less than many timers
+                self._timer = self._loop.call_at(deadline, self._wake)
         self._news.tell()
-
-    def _wake_by(self, deadline: float) -> None:
-        """Advance then at the latest. A call that comes too early costs less than many timers."""
-        if self._timer is not None and self._timer.when() > deadline:
-            self._sleep()
-        if self._timer is None:
-            self._timer = self._loop.call_at(deadline, self._wake)
 
     def _wake(self) -> None:
         self._timer = None
@@ -239,7 +233,7 @@ class Link:
             self.line.not_written(now)
             return
         if request is None:
-            self.debris.stop_repeated(self.line.transmitted)
+            self.debris.stop_written(b"", self.line.transmitted)
             self.publish(Traffic(now, True, data))
             return
         # A program's lines are stored and do nothing; a part of a setting or of a question moves nothing.

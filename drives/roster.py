@@ -231,9 +231,10 @@ class Roster:
 
     def conversation_begins(self, drive: Drive) -> bool:
         """List the drive for the stop; return whether it was addressed before without being listed."""
-        commanded = drive.address in self.unlisted
-        if drive.address not in GLOBAL and drive.address not in self.drives:
-            self.unlisted[drive.address] = drive
+        address = drive.state.address
+        commanded = address in self.unlisted
+        if address not in GLOBAL and address not in self.drives:
+            self.unlisted[address] = drive
         return commanded
 
     def replied_again(self, drive: Drive) -> None:
@@ -243,16 +244,18 @@ class Roster:
 
     def conversation_ended(self, drive: Drive, before: str, commanded: bool) -> None:
         """Update the list. `before`: the address at the start, which DN and PY change."""
-        if self.drives.get(before) is drive and drive.address != before:
+        address = drive.state.address
+        if self.drives.get(before) is drive and address != before:
             self.drives = {each.address: each for each in self.drives.values()}
-        if not commanded or self.drives.get(drive.address) is drive:
+        if not commanded or self.drives.get(address) is drive:
             self.unlisted.pop(before, None)
         self._follow()
 
     def _follow(self) -> None:
         """Have unsolicited lines parsed in the language of the first drive."""
-        inbox = self.link.line.inbox
-        inbox.codec = next((drive.codec for drive in self.drives.values()), inbox.codec)
+        for drive in self.drives.values():
+            self.conversations.link.line.inbox.codec = drive.state.codec
+            break
 
     def _unsolicited(self, lines: Sequence[str]) -> None:
         """Note and report a restart: the drive is set as it was saved; and a drive that stored a stop."""

@@ -18,9 +18,9 @@ from dataclasses import dataclass, field
 from enum import Enum
 from typing import NamedTuple
 
-from multidrop.dialects import Codec, DriveError, DriveState, Priority, Stopped, StopPiece
+from multidrop.dialects import Codec, DriveError, DriveState, Stopped, StopPiece
 from multidrop.drives.drive import Drive
-from multidrop.drives.events import Sample, Traffic, Transaction, isolated
+from multidrop.drives.events import Sample, Traffic, isolated
 from multidrop.drives.link import Link
 from multidrop.drives.port_journal import GLOBAL
 from multidrop.drives.roster import Roster
@@ -420,9 +420,10 @@ async def _read(drive: Drive, halt: Halt) -> Activity:
     """Read and publish what a drive does; NOTHING also where that cannot be read, which is a doubt of the stop."""
     if drive.programming and not drive.engaged:
         return _not_known(drive, halt, "its velocity cannot be read in program mode")
-    ended: list[Transaction] = []
     try:
-        axes = await drive.motion(Priority.OPERATOR, ended.append)
+        axes = await drive.motion()
+        assert drive.seen is not None
+        at = drive.seen.transmitted_at
         runs, why = axes[0].program, ""
         if runs is None and not any(axis.velocity for axis in axes):  # a drive that moves is stopped again
             try:
@@ -435,7 +436,6 @@ async def _read(drive: Drive, halt: Halt) -> Activity:
         return ENDLESS
     except (TimeoutError, DriveError, TransportLost) as error:
         return _not_known(drive, halt, f"its velocity could not be read: {error}")
-    at = ended[-1].transmitted_at
     for each in axes:
         drive.link.publish(Sample(at, drive.address, each.position, each.velocity, each.axis, each.trouble, runs))
     if why:

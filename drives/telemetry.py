@@ -26,9 +26,9 @@ from typing import Any, Generic, NamedTuple, TypeVar
 from multidrop.dialects import DriveError, End, Motion, NoAnswer, Priority, Refused
 from multidrop.dialects.values import Part
 from multidrop.dialects.values import Value as Fact
-from multidrop.drives.conversations import Conversation, OnEnded, OnOver
+from multidrop.drives.conversations import Conversation, OnOver
 from multidrop.drives.drive import Drive, Running
-from multidrop.drives.events import Conditioned, Outcome, Sample, Silent, Transaction, Valued, isolated
+from multidrop.drives.events import Conditioned, Outcome, Sample, Silent, Valued, isolated
 from multidrop.drives.roster import Roster
 from multidrop.transports import TransportLost
 
@@ -115,15 +115,15 @@ class _Poller(Generic[Thing]):
         """When prints began to hold up the next poll."""
 
     def subscribe(self, things: Sequence[Thing], period: float) -> Subscription[Thing]:
-        subscription = Subscription(things, max(period, self.shortest), self._end)
+        def end(subscription: Subscription[Thing]) -> None:
+            if subscription in self._open:
+                self._open.remove(subscription)
+                self._count()
+
+        subscription = Subscription(things, max(period, self.shortest), end)
         self._open.append(subscription)
         self._count()
         return subscription
-
-    def _end(self, subscription: Subscription[Thing]) -> None:
-        if subscription in self._open:
-            self._open.remove(subscription)
-            self._count()
 
     def close(self) -> None:
         self._open.clear()
@@ -169,11 +169,12 @@ class _Poller(Generic[Thing]):
             return self._set_timer(due.at)
         if left := self._held_up(now):
             return self._set_timer(now + left)
-        if not self._readable(thing):
+        drive = self._drive(thing)
+        if not self._readable(drive):
             due.at = now + self.retry
             return self._set_timer(now)
         due.at = max(due.at + self.periods[thing], now)
-        self._begin(thing, due)
+        self._begin(thing, due, drive)
 
     def _held_up(self, now: float) -> float:
         """Seconds for which the next poll of a party line waits after a print. What people ask for never waits.
@@ -193,11 +194,10 @@ class _Poller(Generic[Thing]):
     def _drive(self, thing: Thing) -> Drive:
         raise NotImplementedError
 
-    def _readable(self, thing: Thing) -> bool:
-        drive = self._drive(thing)
-        return not (drive.programming or drive.transferring)
+    def _readable(self, drive: Drive) -> bool:
+        return not (drive.state.programming or drive.transferring)
 
-    def _begin(self, thing: Thing, due: _Due) -> None:
+    def _begin(self, thing: Thing, due: _Due, drive: Drive) -> None:
         """Begin to read a thing, which is due."""
         raise NotImplementedError
 
@@ -205,23 +205,22 @@ class _Poller(Generic[Thing]):
         self,
         thing: Thing,
         due: _Due,
-        start: Callable[[OnOver[Read], OnEnded], Conversation[Read]],
+        start: Callable[[OnOver[Read]], Conversation[Read]],
         took: Callable[[Thing, float, Read], None],
     ) -> None:
         """Read a thing in one conversation; `took` is called with the time of its last request and what was read."""
-        ended: list[Transaction] = []
 
         def over(outcome: Outcome[Read]) -> None:
-            self._busy, self._under_way = False, None
+            self._busy, self._under_way, last = False, None, outcome.last
             if outcome.error is None:
                 due.silences = due.refusals = 0
-                took(thing, ended[-1].transmitted_at if ended else self._link.now(), outcome.value())
+                took(thing, last.transmitted_at if last is not None else self._link.now(), outcome.result[0])
             else:
-                due.refusals += bool(ended) and ended[-1].reply.end is End.NAK
+                due.refusals += last is not None and last.reply.end is End.NAK
                 self._failed(thing, due, outcome)
 
         self._busy = True
-        under_way = start(over, ended.append)
+        under_way = start(over)
         self._under_way = under_way if self._busy else None
 
     def _failed(self, thing: Thing, due: _Due, outcome: Outcome[Any]) -> None:
@@ -281,13 +280,13 @@ class _MotionPoller(_Poller[str]):
     def _drive(self, thing: str) -> Drive:
         return self._roster.at(thing)
 
-    def _begin(self, thing: str, due: _Due) -> None:
-        self._converse(thing, due, partial(self._drive(thing).start_motion, Priority.POLL), self._took)
+    def _begin(self, thing: str, due: _Due, drive: Drive) -> None:
+        self._converse(thing, due, partial(drive.start_motion, Priority.POLL), self._took)
 
     def _took(self, address: str, at: float, axes: Sequence[Motion]) -> None:
         """Begin the next poll; then publish what was read."""
         self._times.setdefault(address, deque(maxlen=1000)).append(at)
-        seen = self._drive(address).seen
+        seen = self._roster.at(address).seen
         velocities = seen.velocities if seen is not None else [axis.velocity for axis in axes]
         self._next()
         for axis, velocity in zip(axes, velocities, strict=True):
@@ -315,8 +314,7 @@ class _ValuePoller(_Poller[Value]):
     def _drive(self, thing: Value) -> Drive:
         return self._roster.at(thing.address)
 
-    def _begin(self, thing: Value, due: _Due) -> None:
-        drive = self._drive(thing)
+    def _begin(self, thing: Value, due: _Due, drive: Drive) -> None:
         procedure = drive.family.values.again(drive.state, thing.word, Priority.POLL)
         self._converse(thing, due, partial(drive.start, procedure), self._took)
 
@@ -381,10 +379,10 @@ class _ConditionPoller(_Poller[str]):
     def _drive(self, thing: str) -> Drive:
         return self._roster.at(thing)
 
-    def _readable(self, thing: str) -> bool:
-        return thing in self._roster.drives
+    def _readable(self, drive: Drive) -> bool:
+        return drive in self._roster.drives.values()
 
-    def _begin(self, thing: str, due: _Due) -> None:
+    def _begin(self, thing: str, due: _Due, drive: Drive) -> None:  # noqa: ARG002
         due.at = self._link.now() + self.periods[thing]
         self._busy = True
         self._task = asyncio.get_running_loop().create_task(self._read(thing, due))
