@@ -82,10 +82,6 @@ def frame(kind: Kind, payload: bytes | memoryview = b"") -> bytes:
     return bytes([kind]) + len(payload).to_bytes(2) + payload
 
 
-def data_frames(data: bytes) -> bytes:
-    return b"".join(frame(Kind.DATA, data[at : at + MOST]) for at in range(0, len(data), MOST))
-
-
 class Frames:
     """Divides the bytes that arrive into frames."""
 
@@ -144,7 +140,11 @@ class Relay:
             elif kind is Kind.BEAT:
                 self.out += frame(Kind.BEAT)
             elif kind is Kind.SET:
-                self._set(payload)
+                if len(payload) != 6:
+                    raise Garbled("a change of a setting that is not 6 bytes long")
+                self.out += frame(
+                    Kind.OUTCOME, payload[:1] + _changed(self.port.control, payload[1], payload[2:]).encode()
+                )
             else:
                 raise Garbled(f"a frame {kind.name}, which only the far side sends")
         self.push()
@@ -197,7 +197,7 @@ class Relay:
             return True
         if data is None:
             return False
-        self.out += data_frames(data)
+        self.out += b"".join(frame(Kind.DATA, data[at : at + MOST]) for at in range(0, len(data), MOST))
         return True
 
     def lost(self, error: OSError | None) -> str:
@@ -210,11 +210,6 @@ class Relay:
         self._settled += len(self.queue)
         self.queue.clear()
         self.port.drop()
-
-    def _set(self, payload: bytes) -> None:
-        if len(payload) != 6:
-            raise Garbled("a change of a setting that is not 6 bytes long")
-        self.out += frame(Kind.OUTCOME, payload[:1] + _changed(self.port.control, payload[1], payload[2:]).encode())
 
 
 def _changed(control: PortControl, setting: int, value: bytes) -> str:

@@ -165,24 +165,21 @@ class Rfc2217Pipe(Transport):
         for event in self._decoder.receive(data):
             if isinstance(event, telnet.Data):
                 self._farewell = ""
-                self._deliver(event.data)
+                if self._delivers and self._received is not None:
+                    self._received(event.data)
+                else:
+                    self._early += event.data
             elif isinstance(event, telnet.Option):
-                self._option(event)
+                # Take an option. What was offered above needs no reply, anything else that the server wants is
+                # refused.
+                if event.option == OPTION and event.verb in (telnet.DO, telnet.WILL):
+                    self._agreed.set()
+                elif event.verb in telnet.REFUSAL and event.option not in (
+                    _OURS if event.verb == telnet.DO else _THEIRS
+                ):
+                    self._inner.write(telnet.option(telnet.REFUSAL[event.verb], event.option))
             elif isinstance(event, telnet.Subnegotiation) and (found := parsed(event.body)):
                 self._confirmed(*found)
-
-    def _deliver(self, data: bytes) -> None:
-        if self._delivers and self._received is not None:
-            self._received(data)
-        else:
-            self._early += data
-
-    def _option(self, event: telnet.Option) -> None:
-        """Take an option. What was offered above needs no reply, anything else that the server wants is refused."""
-        if event.option == OPTION and event.verb in (telnet.DO, telnet.WILL):
-            self._agreed.set()
-        elif event.verb in telnet.REFUSAL and event.option not in (_OURS if event.verb == telnet.DO else _THEIRS):
-            self._inner.write(telnet.option(telnet.REFUSAL[event.verb], event.option))
 
     def _confirmed(self, number: int, value: bytes) -> None:
         setting = number - REPLY

@@ -186,18 +186,16 @@ if sys.platform != "win32":
             self.control = SerialControl(self._port)
             self._descriptor: int = self._port.fileno()
             try:
-                _ignore_breaks(self._descriptor)
+                # Clear BRKINT, which pyserial leaves as it was: a break on the line would empty both queues.
+                attributes = termios.tcgetattr(self._descriptor)
+                if attributes[0] & termios.BRKINT:
+                    attributes[0] &= ~termios.BRKINT
+                    termios.tcsetattr(self._descriptor, termios.TCSANOW, attributes)
             except termios.error as error:
                 self._port.close()
                 raise OSError(*error.args) from error
-            self._claim()
-
-        def _claim(self) -> None:
-            """Shut out programs that ignore pyserial's advisory lock.
-
-            A pseudo-terminal is not claimed: it keeps the mark while its other side is open, so a killed program would
-            leave a port that cannot be opened again.
-            """
+            # Shut out programs that ignore pyserial's advisory lock. A pseudo-terminal is not claimed: it keeps the
+            # mark while its other side is open, so a killed program would leave a port that cannot be opened again.
             if not os.path.realpath(self.name).startswith("/dev/pts/"):
                 self._exclusive(termios.TIOCEXCL)
 
@@ -235,10 +233,3 @@ if sys.platform != "win32":
             self._exclusive(termios.TIOCNXCL)
             with contextlib.suppress(OSError):
                 self._port.close()
-
-    def _ignore_breaks(descriptor: int) -> None:
-        """Clear BRKINT, which pyserial leaves as it was: a break on the line would empty both queues."""
-        attributes = termios.tcgetattr(descriptor)
-        if attributes[0] & termios.BRKINT:
-            attributes[0] &= ~termios.BRKINT
-            termios.tcsetattr(descriptor, termios.TCSANOW, attributes)

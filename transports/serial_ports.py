@@ -28,7 +28,11 @@ def list_ports(root: Path = Path("/")) -> list[PortInfo]:
 
     stable = _stable_names(root)
     found = [
-        PortInfo(port.device, stable.get(os.path.realpath(port.device), ""), _words(port.description))
+        PortInfo(
+            port.device,
+            stable.get(os.path.realpath(port.device), ""),
+            "" if port.description in (None, "n/a") else str(port.description),
+        )
         for port in pyserial.comports()
         if _has_hardware(port.device, root)
     ]
@@ -43,10 +47,6 @@ def stable_name(device: str, root: Path = Path("/")) -> str:
 def natural(name: str) -> list[tuple[int, str]]:
     """A sort key that puts COM9 before COM10."""
     return [(int(part), "") if part.isdigit() else (-1, part) for part in re.split(r"([0-9]+)", name)]
-
-
-def _words(description: str | None) -> str:
-    return "" if description in (None, "n/a") else str(description)
 
 
 def _has_hardware(device: str, root: Path) -> bool:

@@ -219,16 +219,8 @@ class SshSession:
     def close(self, lost: bool) -> None:
         with contextlib.suppress(OSError):
             self._socket.shutdown(socket.SHUT_WR)
-        self._drain(time.monotonic() + (0.0 if lost else _ENDING))
-        for number in (signal.SIGTERM, signal.SIGKILL):
-            if self._process.poll() is None:
-                os.killpg(self._process.pid, number)  # with the programs that it uses as its way
-                with contextlib.suppress(subprocess.TimeoutExpired):
-                    self._process.wait(1.0)
-        self._release()
-
-    def _drain(self, deadline: float) -> None:
-        """Read until the end, so that ssh never waits for a reader."""
+        # Read until the end, so that ssh never waits for a reader.
+        deadline = time.monotonic() + (0.0 if lost else _ENDING)
         with contextlib.suppress(OSError):
             while (left := deadline - time.monotonic()) > 0:
                 self._socket.settimeout(left)
@@ -236,8 +228,11 @@ class SshSession:
                     break
         with contextlib.suppress(subprocess.TimeoutExpired):
             self._process.wait(max(0.05, deadline - time.monotonic()))
-
-    def _release(self) -> None:
+        for number in (signal.SIGTERM, signal.SIGKILL):
+            if self._process.poll() is None:
+                os.killpg(self._process.pid, number)  # with the programs that it uses as its way
+                with contextlib.suppress(subprocess.TimeoutExpired):
+                    self._process.wait(1.0)
         self._socket.close()
         self._words.close()
 

@@ -77,36 +77,30 @@ class Decoder:
         if not (self._iac or self._verb or self._body is not None or IAC in data):
             return [Data(data)] if data else []
         for byte in data:
-            self._take(byte)
+            if self._verb:
+                self._event(Option(self._verb, byte))
+                self._verb = 0
+            elif self._iac:
+                self._iac = False
+                # Take the byte after IAC. Commands without a meaning on a line of drives are passed over.
+                if byte == IAC:
+                    self._keep(byte)
+                elif byte == SB:
+                    self._body = bytearray()
+                elif byte == SE and self._body is not None:
+                    self._event(Subnegotiation(bytes(self._body)))
+                    self._body = None
+                elif WILL <= byte <= DONT:
+                    self._verb = byte
+                elif byte == IP:
+                    self._event(Interrupt())
+            elif byte == IAC:
+                self._iac = True
+            else:
+                self._keep(byte)
         self._flush()
         events, self._events = self._events, []
         return events
-
-    def _take(self, byte: int) -> None:
-        if self._verb:
-            self._event(Option(self._verb, byte))
-            self._verb = 0
-        elif self._iac:
-            self._iac = False
-            self._command(byte)
-        elif byte == IAC:
-            self._iac = True
-        else:
-            self._keep(byte)
-
-    def _command(self, byte: int) -> None:
-        """Take the byte after IAC. Commands without a meaning on a line of drives are passed over."""
-        if byte == IAC:
-            self._keep(byte)
-        elif byte == SB:
-            self._body = bytearray()
-        elif byte == SE and self._body is not None:
-            self._event(Subnegotiation(bytes(self._body)))
-            self._body = None
-        elif WILL <= byte <= DONT:
-            self._verb = byte
-        elif byte == IP:
-            self._event(Interrupt())
 
     def _keep(self, byte: int) -> None:
         if self._body is None:
