@@ -186,11 +186,7 @@ if sys.platform != "win32":
             self.control = SerialControl(self._port)
             self._descriptor: int = self._port.fileno()
             try:
-                # Clear BRKINT, which pyserial leaves as it was: a break on the line would empty both queues.
-                attributes = termios.tcgetattr(self._descriptor)
-                if attributes[0] & termios.BRKINT:
-                    attributes[0] &= ~termios.BRKINT
-                    termios.tcsetattr(self._descriptor, termios.TCSANOW, attributes)
+                _ignore_breaks(self._descriptor)
             except termios.error as error:
                 self._port.close()
                 raise OSError(*error.args) from error
@@ -233,3 +229,10 @@ if sys.platform != "win32":
             self._exclusive(termios.TIOCNXCL)
             with contextlib.suppress(OSError):
                 self._port.close()
+
+    def _ignore_breaks(descriptor: int) -> None:
+        """Clear BRKINT, which pyserial leaves as it was: a break on the line would empty both queues."""
+        attributes = termios.tcgetattr(descriptor)
+        if attributes[0] & termios.BRKINT:
+            attributes[0] &= ~termios.BRKINT
+            termios.tcsetattr(descriptor, termios.TCSANOW, attributes)

@@ -240,7 +240,7 @@ def test_without_any_echo_nothing_piles_up():
         Run(line, 1.0)
         line.events(3.0 * (n + 1))
     assert line.inbox.echo is not None
-    assert len(line.inbox.echo._own) + len(line.inbox.echo.held) + len(line.inbox.buffer) < 20
+    assert len(line.inbox.echo.own) + len(line.inbox.echo.held) + len(line.inbox.buffer) < 20
 
 
 def test_the_echo_of_a_stop_is_swallowed_too():

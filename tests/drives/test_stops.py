@@ -18,6 +18,7 @@ from multidrop.dialects import (
     Stopped,
     StopPiece,
 )
+from multidrop.dialects.codec import copy_with
 from multidrop.dialects.mcode.manual import program_file
 from multidrop.drives.bus import Bus
 from multidrop.drives.drive import confirmed_motion
@@ -497,7 +498,7 @@ def test_what_was_stopped_says_whether_it_was_sent():
 
 
 def test_a_reply_keeps_what_it_was_read_from():
-    assert Reply(("5",)).heard(b"5\r\n", True) == Reply(("5",), raw=b"5\r\n", doubtful=True)
+    assert copy_with(Reply(("5",)), raw=b"5\r\n", doubtful=True) == Reply(("5",), raw=b"5\r\n", doubtful=True)
     assert DriveState.__hash__ is not None
     assert Unsolicited(0.0, ("x",)).lines == ("x",)
 

@@ -8,6 +8,7 @@ from typing import Any
 
 import pytest
 
+from multidrop.dialects import Procedure
 from multidrop.drives.bus import Bus
 from multidrop.drives.drive import Drive
 from multidrop.drives.events import Sample
@@ -21,6 +22,11 @@ LINE = bus("line", party("a"), party("b"))
 
 def defective(*_: Any) -> Any:
     raise KeyError("a defect")
+
+
+def failing() -> Procedure[Any]:
+    raise KeyError("a defect")
+    yield  # a procedure
 
 
 async def lost_and_back(shop: CellSession) -> None:
@@ -66,8 +72,8 @@ async def test_a_poll_that_a_defect_ends_is_said_and_the_others_go_on(
 ) -> None:
     async with CellSession(tmp_path, LINE) as shop:
         line = shop.session.buses["line"]
-        polled = line.drives["a"].start_motion
-        monkeypatch.setattr(line.drives["a"], "start_motion", lambda *given: polled(*given[:2], defective))
+        a = line.drives["a"]
+        monkeypatch.setattr(a, "start_motion", lambda priority, over: a.start(failing(), over))
         line.telemetry.subscribe(["a", "b"], 0.5)
         await asyncio.sleep(50)
         assert len(shop.warned()) == 1 and "Traceback" in caplog.text

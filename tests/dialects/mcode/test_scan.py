@@ -4,6 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from multidrop.dialects.codec import copy_with
 from multidrop.dialects.mcode.host import scan
 from multidrop.dialects.mcode.host.codec import MCode
 from multidrop.dialects.scanning import Outcome, Reach
@@ -181,7 +182,7 @@ def test_a_search_ends_whatever_is_received(random, hasty):
         codec = request.codec
         found = codec.decode(request, data) or codec.on_quiet(request, data) or codec.on_timeout(request, data)
         try:
-            request = conversation.send(found.reply.heard(data[: found.used], False))
+            request = conversation.send(copy_with(found.reply, raw=data[: found.used]))
         except StopIteration as end:
             assert isinstance(end.value, Outcome)
             return

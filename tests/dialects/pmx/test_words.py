@@ -7,6 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from multidrop.dialects import Diagnostic, End, Hints, Inexpressible, NoAnswer, Priority, Refused
+from multidrop.dialects.codec import copy_with
 from multidrop.dialects.pmx.family import PMX
 from multidrop.dialects.pmx.host.codec import Pmx, PmxState
 from multidrop.dialects.pmx.host.operations import identify
@@ -32,7 +33,7 @@ class Far:
         silent = request.address not in self.numbers or text is None
         heard = b"" if silent else text.encode("latin-1") + b"\r"
         found = request.codec.decode(request, heard) or request.codec.on_timeout(request, heard)
-        return found.reply.heard(heard, len(self.sent) in self.doubtful)
+        return copy_with(found.reply, raw=heard, doubtful=len(self.sent) in self.doubtful)
 
 
 def say(talk, far):
