@@ -10,7 +10,7 @@ from datetime import datetime, timedelta
 from typing import NamedTuple
 
 from multidrop.dialects import DriveError, Priority, Procedure, Request
-from multidrop.dialects.codec import Reply
+from multidrop.dialects.codec import Reply, copy_with
 from multidrop.dialects.family import Motion
 from multidrop.dialects.text import whole
 from multidrop.drives.drive import Drive
@@ -77,15 +77,15 @@ class Decoding:
         """Whether a request has these bytes. The number of one that has a number begins its bytes."""
         if request is None:
             return False
-        numbered = request.numbered(int.from_bytes(poll.sent[:2], "big"))
+        numbered = copy_with(request, tag=int.from_bytes(poll.sent[:2], "big"))
         return request.codec.encode(numbered) == poll.sent
 
     @staticmethod
     def _reply(request: Request, poll: Exchange) -> Reply | None:
-        numbered = request.numbered(int.from_bytes(poll.sent[:2], "big"))
+        numbered = copy_with(request, tag=int.from_bytes(poll.sent[:2], "big"))
         codec, received = request.codec, poll.received
         found = codec.decode(numbered, received) or codec.on_quiet(numbered, received)
-        return found.reply.heard(received[: found.used], False) if found is not None else None
+        return copy_with(found.reply, raw=received[: found.used]) if found is not None else None
 
 
 def printed(step: Step, drive: Drive) -> Iterator[Measured]:
