@@ -29,10 +29,10 @@ OWN_NAME = frozenset({"DN"})
 """What two drives on one line never share."""
 
 
-def targets(workspace: Workspace, target: str, what: str = "parameters") -> list[Drive]:
-    """The drives of a target: one, several (`a,b`), or `all` that are open. Raises Diagnostic for an unknown one.
+def targets(workspace: Workspace, target: str, having: str = "parameters") -> list[Drive]:
+    """The drives of a target: one, several (`a,b`), or `all` that are open and whose family has these.
 
-    `what`: what is read of them, for the message.
+    Raises Diagnostic for an unknown one.
     """
     found: dict[Drive, None] = {}
     for name in target.split(","):
@@ -41,9 +41,10 @@ def targets(workspace: Workspace, target: str, what: str = "parameters") -> list
             found[workspace.drive(bus, address or None)] = None
             continue
         buses = [workspace.bus(bus)] if bus else list(workspace.buses.values())
-        able = [drive for each in buses for drive in each.drives.values()]
+        drives = [drive for each in buses for drive in each.drives.values()]
+        able = [drive for drive in drives if having != "programs" or drive.family.programs is not None]
         if not able:
-            raise Diagnostic(f"no drive with {what} has replied", target)
+            raise Diagnostic(f"no drive with {having} has replied", target)
         found |= dict.fromkeys(able)
     return list(found)
 
