@@ -11,7 +11,7 @@ from multidrop.dialects.values import Snapshot, Value
 from multidrop.simulator.cell.spec import DriveSpec
 from multidrop.simulator.cell.table import Folder, Table
 from multidrop.simulator.cell.writer import DriveText
-from multidrop.simulator.wire.wire import Port
+from multidrop.simulator.wire import Port
 from multidrop.simulator.world import World
 
 

@@ -16,7 +16,7 @@ from multidrop.simulator.cell.spec import BusSpec, Cell, DriveSpec
 from multidrop.simulator.families import BY_PERSONALITY, family_of
 from multidrop.simulator.family import Connection, Device, Place, Unit
 from multidrop.simulator.sim_words import USAGES
-from multidrop.simulator.wire.wire import Wire
+from multidrop.simulator.wire import Wire
 from multidrop.simulator.world import World
 
 LEVELS: dict[str, int | None] = {"0": 0, "1": 1, "open": None}

@@ -18,7 +18,7 @@ from typing import Any
 
 from multidrop.dialects import Diagnostic
 from multidrop.dialects.files import toml_of
-from multidrop.simulator.cell.worlds import ENCODER_KEYS, KEYS
+from multidrop.simulator.cell.drive_keys import ENCODER_KEYS, WORLD_KEYS
 
 Value = int | float | str | list[Any]
 FINE = 5
@@ -253,12 +253,12 @@ def parse_key(text: str, names: Container[str]) -> tuple[str, Key]:
 
 def misplaced_hint(key: Key) -> str:
     """What a refused setting may have meant: a key of the world with a similar name; empty if none has."""
-    near = get_close_matches(key.name.lower(), (*KEYS, *ENCODER_KEYS), 1, 0.7) if key.part == SETTINGS else ()
+    near = get_close_matches(key.name.lower(), (*WORLD_KEYS, *ENCODER_KEYS), 1, 0.7) if key.part == SETTINGS else ()
     return f"did you mean the world's {near[0]}?" if near else ""
 
 
 def _in_world(name: str) -> bool:
-    return name.lower() in (*KEYS, *ENCODER_KEYS)
+    return name.lower() in (*WORLD_KEYS, *ENCODER_KEYS)
 
 
 def _table(table: Mapping[str, Any], key: str) -> Mapping[str, Any]:

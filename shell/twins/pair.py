@@ -38,7 +38,7 @@ from multidrop.simulator import cells
 from multidrop.simulator.cell.writer import BusText, write
 from multidrop.simulator.families import FAMILIES, family_of, snapshots_of
 from multidrop.simulator.family import Place, Shadow, Unit
-from multidrop.simulator.wire.wire import Transmission
+from multidrop.simulator.wire import Transmission
 
 NAME = "twin"
 

@@ -10,7 +10,7 @@ from typing import Any
 from multidrop.dialects.files import escaped_toml
 from multidrop.dialects.text import visible
 from multidrop.dialects.values import Reading, same
-from multidrop.simulator.cell.identities import LONGEST
+from multidrop.simulator.cell.drive_keys import LONGEST
 
 HEAD = "A machine as it was read. Open it with sim:FILE; `multidrop snapshot apply FILE URL` puts a drive onto a unit."
 

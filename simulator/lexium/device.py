@@ -21,10 +21,9 @@ from multidrop.simulator.lexium.language.instructions import Instructions
 from multidrop.simulator.lexium.motion.motor import Motor
 from multidrop.simulator.lexium.motion.outputs import Outputs
 from multidrop.simulator.lexium.power import Nvm, Power
-from multidrop.simulator.lexium.state.errors import Fault
+from multidrop.simulator.lexium.state.errors import CRLF, Fault
 from multidrop.simulator.lexium.state.interpreter import Core
 from multidrop.simulator.lexium.state.memory import Memory
-from multidrop.simulator.lexium.state.timeline import CRLF
 from multidrop.simulator.world import World
 
 WORDS = {"position": "P"}

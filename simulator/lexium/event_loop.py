@@ -19,9 +19,8 @@ from multidrop.dialects.mcode.manual.grammar import Number
 from multidrop.simulator.lexium.motion.inputs import GO, JOG_MINUS, JOG_PLUS, PAUSE, RESET, SOFT_STOP
 from multidrop.simulator.lexium.motion.motor import Motor
 from multidrop.simulator.lexium.power import Power
-from multidrop.simulator.lexium.state.errors import Fault
+from multidrop.simulator.lexium.state.errors import Event, Fault, nothing, when
 from multidrop.simulator.lexium.state.interpreter import Core
-from multidrop.simulator.lexium.state.timeline import Event, nothing, when
 
 JOGS = (JOG_PLUS, JOG_MINUS)
 GO_ADDRESS = Number(1)

@@ -16,12 +16,17 @@ from multidrop.dialects.mcode.manual.grammar import LineError, is_name, parse
 from multidrop.dialects.mcode.manual.statements import UNNAMED, canonical, size_of
 from multidrop.dialects.mcode.manual.table import Mnemonic, lookup, words
 from multidrop.dialects.values import VARIABLES, Reading, Scalar, Snapshot, Value, same
-from multidrop.simulator.cell.identities import read_identity, read_variables
-from multidrop.simulator.cell.reader import common_keys
-from multidrop.simulator.cell.settings import Check, read_settings
+from multidrop.simulator.cell.drive_keys import (
+    WORLD_KEYS,
+    Check,
+    common_keys,
+    read_identity,
+    read_settings,
+    read_variables,
+    read_world,
+)
 from multidrop.simulator.cell.spec import DriveSpec, WorldSpec
 from multidrop.simulator.cell.table import Folder, Table, quoted, shown
-from multidrop.simulator.cell.worlds import KEYS, read_world
 from multidrop.simulator.cell.writer import DriveText, Entry, plain, remark
 from multidrop.simulator.family import Family, Place, Shadow, Snapshots, StoredProgram, Unit
 from multidrop.simulator.lexium.device import MCodeDevice
@@ -46,7 +51,7 @@ def read_drive(table: Table, folder: Folder) -> DriveSpec:
     variables = table.table("variables", "[bus.drive.variables]")
     identity = table.table("identity", "[bus.drive.identity]")
     world = table.table("world", "[bus.drive.world]")
-    world.only(*KEYS)
+    world.only(*WORLD_KEYS)
     return DriveSpec(
         **common,
         name=name,

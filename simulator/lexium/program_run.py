@@ -27,11 +27,10 @@ from multidrop.dialects.program_files import Problem, errors
 from multidrop.dialects.text import whole
 from multidrop.simulator.cell.spec import DriveSpec
 from multidrop.simulator.lexium.device import MCodeDevice
-from multidrop.simulator.lexium.state.errors import Failure, Fault
+from multidrop.simulator.lexium.state.errors import CRLF, Failure, Fault
 from multidrop.simulator.lexium.state.expressions import Read
 from multidrop.simulator.lexium.state.models import MODELS
 from multidrop.simulator.lexium.state.program_memory import SPACE
-from multidrop.simulator.lexium.state.timeline import CRLF
 from multidrop.simulator.program_run import (
     LONGEST,
     MOST_LINES,

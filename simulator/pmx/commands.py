@@ -14,7 +14,7 @@ from decimal import ROUND_HALF_UP, Decimal
 from multidrop.simulator.pmx import motions
 from multidrop.simulator.pmx.axis import Axis
 from multidrop.simulator.pmx.controller import PmxController
-from multidrop.simulator.pmx.settings import AXES, INT32, REGISTERS, SCALE, Refusal
+from multidrop.simulator.pmx.settings import AXES, INT32, REGISTERS, SCALE, Refusal, wrapped
 
 MODEL = "2ED"
 OK, MOVING, INVALID, INDEX = "OK", "?Moving", "?Invalid Answer", "?Index out of Range"
@@ -23,25 +23,17 @@ _RATIO = re.compile(r"\d{1,3}(\.\d+)?", re.ASCII)
 _INDEXED = re.compile(r"([A-Z]{1,2})(\d{1,6})", re.ASCII)
 
 
-# -- words of the whole controller --------------------------------------------------------------------------------
-
-
 @dataclass(frozen=True)
 class Word:
-    """A word without axis: what it reads, what it sets, what it does."""
+    """A word: what it reads, what it sets, what it does; None: it has no such use.
 
-    get: Callable[[PmxController, float], object] | None = None
-    set: Callable[[PmxController, str, float], None] | None = None
-    do: Callable[[PmxController, float], None] | None = None
+    All are called with the controller, in `AXIS_WORDS` with the axis too, and the time last; `set` with the text of the
+    value before that.
+    """
 
-
-@dataclass(frozen=True)
-class AxisWord:
-    """A word with an axis, `PX`."""
-
-    get: Callable[[PmxController, Axis, float], object] | None = None
-    set: Callable[[PmxController, Axis, str, float], None] | None = None
-    do: Callable[[PmxController, Axis, float], None] | None = None
+    get: Callable[..., object] | None = None
+    set: Callable[..., None] | None = None
+    do: Callable[..., None] | None = None
 
 
 @dataclass(frozen=True)
@@ -60,7 +52,7 @@ def number(text: str, low: int = -INT32, high: int = INT32 - 1, error: str = INV
     return int(text)
 
 
-def _pair(read: Callable[[PmxController, Axis, float], int]) -> Callable[[PmxController, float], str]:
+def _both(read: Callable[[PmxController, Axis, float], int]) -> Callable[[PmxController, float], str]:
     return lambda pmx, t: ":".join(str(read(pmx, axis, t)) for axis in pmx.axes)
 
 
@@ -72,24 +64,12 @@ def _each(do: Callable[[PmxController, Axis, float], None]) -> Callable[[PmxCont
     return all_of_them
 
 
-def _status(pmx: PmxController, axis: Axis, t: float) -> int:
-    return pmx.status(axis, t)
-
-
 def _speed(pmx: PmxController, axis: Axis, t: float) -> int:
     return axis.speed(t)
 
 
-def _stop(pmx: PmxController, axis: Axis, t: float) -> None:
-    pmx.stop(axis, t)
-
-
-def _abort(pmx: PmxController, axis: Axis, t: float) -> None:
-    pmx.abort(axis, t)
-
-
-def _clear(pmx: PmxController, axis: Axis, t: float) -> None:
-    pmx.clear(axis, t)
+def _delta(pmx: PmxController, axis: Axis, t: float) -> int:
+    return round(axis.loop.delta(t))
 
 
 def _set_name(pmx: PmxController, text: str, t: float) -> None:
@@ -119,16 +99,16 @@ def _set_sticks(pmx: PmxController, text: str, t: float) -> None:
 
 def _steer(pmx: PmxController, mask: int, t: float) -> None:
     added = mask & ~pmx.settings["JO"]
-    if any(axis.pulses.moving(t) for n, axis in enumerate(pmx.axes) if added >> n & 1):
+    if any(axis.pulses.profile.moving(t) for n, axis in enumerate(pmx.axes) if added >> n & 1):
         raise Refusal(MOVING)
     pmx.set_joystick(mask, t)
 
 
 WORDS: dict[str, Word] = {
-    "ABORT": Word(do=_each(_abort)),
+    "ABORT": Word(do=_each(PmxController.abort)),
     "ABS": Word(do=_set_mode(False)),
-    "CLR": Word(do=_each(_clear)),
-    "CLRS": Word(do=_each(_clear)),
+    "CLR": Word(do=_each(PmxController.clear)),
+    "CLRS": Word(do=_each(PmxController.clear)),
     "DI": Word(get=lambda pmx, t: pmx.inputs(t)),
     "DN": Word(get=lambda pmx, t: MODEL + pmx.settings.wanted, set=_set_name),
     "DO": Word(get=lambda pmx, t: pmx.outputs, set=_set_outputs),
@@ -139,34 +119,32 @@ WORDS: dict[str, Word] = {
     "JO": Word(do=lambda pmx, t: _steer(pmx, 3, t), set=_set_sticks),
     "JOYENA": Word(set=_set_sticks),
     "MM": Word(get=lambda pmx, t: int(pmx.incremental)),
-    "MST": Word(get=_pair(_status)),
-    "PS": Word(get=_pair(_speed)),
-    "STOP": Word(do=_each(_stop)),
+    "MST": Word(get=_both(PmxController.status)),
+    "PS": Word(get=_both(_speed)),
+    "STOP": Word(do=_each(PmxController.stop)),
     "STORE": Word(do=lambda pmx, t: pmx.settings.store()),
     "VER": Word(get=lambda pmx, t: pmx.version),
 }
 
-_DELTA = AxisWord(get=lambda pmx, axis, t: round(axis.loop.delta(t)))
-
-AXIS_WORDS: dict[str, AxisWord] = {
-    "ABORT": AxisWord(do=_abort),
-    "CLR": AxisWord(do=_clear),
-    "CLRS": AxisWord(do=_clear),
-    "D": _DELTA,
-    "DX": _DELTA,
-    "E": AxisWord(
-        get=lambda pmx, axis, t: axis.encoder(t),
+AXIS_WORDS: dict[str, Word] = {
+    "ABORT": Word(do=PmxController.abort),
+    "CLR": Word(do=PmxController.clear),
+    "CLRS": Word(do=PmxController.clear),
+    "D": Word(get=_delta),
+    "DX": Word(get=_delta),
+    "E": Word(
+        get=lambda pmx, axis, t: wrapped(axis.rotor.encoder(t)),
         set=lambda pmx, axis, text, t: axis.set_encoder(number(text), t),
     ),
-    "MST": AxisWord(get=_status),
-    "P": AxisWord(
+    "MST": Word(get=PmxController.status),
+    "P": Word(
         get=lambda pmx, axis, t: axis.position(t),
         set=lambda pmx, axis, text, t: axis.set_position(number(text), t),
     ),
-    "PS": AxisWord(get=_speed),
-    "SLS": AxisWord(get=lambda pmx, axis, t: axis.loop.status),
-    "SSPD": AxisWord(set=lambda pmx, axis, text, t: motions.respeed(axis, number(text), t)),
-    "STOP": AxisWord(do=_stop),
+    "PS": Word(get=_speed),
+    "SLS": Word(get=lambda pmx, axis, t: axis.loop.status),
+    "SSPD": Word(set=lambda pmx, axis, text, t: motions.respeed(axis, number(text), t)),
+    "STOP": Word(do=PmxController.stop),
 }
 
 
@@ -195,43 +173,26 @@ def get_register(pmx: PmxController, name: str) -> str:
     return f"{value / SCALE:.3f}" if name[:-1] == "SLR" else str(value)
 
 
-def _thousandths(text: str) -> str:
-    """Convert a ratio to thousandths: clients send more decimals (`%f`). Empty for an invalid ratio."""
-    if not _RATIO.fullmatch(text):
-        return ""
-    return str(int((Decimal(text) * SCALE).to_integral_value(ROUND_HALF_UP)))
-
-
 def set_register(pmx: PmxController, name: str, text: str, t: float) -> None:
-    """Set a register. Raises Refusal."""
-    register = REGISTERS[name]
-    error = "?Low speed out of range" if name.startswith("LSPD") else INVALID
-    if name[:-1] == "SLR":
-        text = _thousandths(text)
-    value = number(text, error=INVALID)
+    """Set a register, and apply at once what follows from it. Raises Refusal."""
+    register, kind = REGISTERS[name], name[:-1]
+    if kind == "SLR":  # kept in thousandths; clients send more decimals (`%f`)
+        ratio = Decimal(text) * SCALE if _RATIO.fullmatch(text) else None
+        text = "" if ratio is None else str(int(ratio.to_integral_value(ROUND_HALF_UP)))
+    value = number(text)
     if not register.low <= value <= register.high:
-        raise Refusal(error)
+        raise Refusal("?Low speed out of range" if name.startswith("LSPD") else INVALID)
     axis = pmx.axis(name[-1]) if name[-1] in AXES else None
-    if register.idle and axis is not None and (axis.pulses.moving(t) or axis.homing):
+    if register.idle and axis is not None and (axis.pulses.profile.moving(t) or axis.homing):
         raise Refusal(MOVING)
-    before = pmx.settings[name]
+    if axis is not None and kind == "SL" and value and pmx.settings["JO"] >> AXES.index(axis.name) & 1:
+        raise Refusal
     pmx.settings[name] = value
-    try:
-        _apply(pmx, name, axis, t)
-    except Refusal:
-        pmx.settings[name] = before
-        raise
-
-
-def _apply(pmx: PmxController, name: str, axis: Axis | None, t: float) -> None:
-    """Apply what follows from a register at once."""
     if name == "TOC":
         pmx.heard(t)
-    elif axis is not None and name[:-1] == "SL":
-        if axis["SL"] and pmx.settings["JO"] >> AXES.index(axis.name) & 1:
-            raise Refusal
-        axis.loop.enable(bool(axis["SL"]), t)
-    elif axis is not None and name[:-1] == "SLR":
+    elif axis is not None and kind == "SL":
+        axis.loop.enable(bool(value), t)
+    elif axis is not None and kind == "SLR":
         axis.loop.rebase(t)
 
 
@@ -253,7 +214,7 @@ def _jog(pmx: PmxController, t: float, axis: str, sign: str) -> None:
 def _jog_both(pmx: PmxController, t: float, sign: str) -> None:
     for axis in pmx.axes:
         motions.check(axis, t)
-        motions.check_pace(axis)
+        axis.own_pace()
     for axis in pmx.axes:
         motions.jog(axis, _direction(sign), t)
 
@@ -289,36 +250,31 @@ _FORMS: tuple[tuple[re.Pattern[str], Callable[..., None]], ...] = tuple(
 # -- the path of a command ----------------------------------------------------------------------------------------
 
 
-def answer(pmx: PmxController, text: str, t: float) -> str:
-    """Carry out a command that is not about programs; give its reply."""
-    try:
-        reply = _answer(pmx, text, t)
-    except Refusal as refusal:
-        reply = str(refusal) or None
-    return f"?{text}" if reply is None else reply
+class CommandedController(PmxController):
+    """A controller that understands ASCII commands, but those about programs."""
+
+    def ask(self, text: str, now: float) -> str:
+        """Carry out one ASCII command; give its reply without CR."""
+        try:
+            reply = _answer(self, text, now)
+        except Refusal as refusal:
+            reply = str(refusal) or None
+        self.look(now)
+        return f"?{text}" if reply is None else reply
 
 
 def _answer(pmx: PmxController, text: str, t: float) -> str | None:
     head, sign, value = text.partition("=")
     given = value if sign else None
     if head in WORDS:
-        word = WORDS[head]
-        return _use(
-            given,
-            word.get and (lambda: word.get(pmx, t)),
-            word.set and (lambda: word.set(pmx, value, t)),
-            word.do and (lambda: word.do(pmx, t)),
-        )
+        return _use(WORDS[head], given, (pmx,), t)
     if head in REGISTERS and head != "JO":
-        return _use(given, lambda: get_register(pmx, head), lambda: set_register(pmx, head, value, t), None)
+        if given is None:
+            return get_register(pmx, head)
+        set_register(pmx, head, given, t)
+        return OK
     if head[:-1] in AXIS_WORDS and head[-1] in AXES:
-        each, axis = AXIS_WORDS[head[:-1]], pmx.axis(head[-1])
-        return _use(
-            given,
-            each.get and (lambda: each.get(pmx, axis, t)),
-            each.set and (lambda: each.set(pmx, axis, value, t)),
-            each.do and (lambda: each.do(pmx, axis, t)),
-        )
+        return _use(AXIS_WORDS[head[:-1]], given, (pmx, pmx.axis(head[-1])), t)
     indexed = _INDEXED.fullmatch(head)
     if indexed and indexed[1] in (*BIT_WORDS, "JL", "JV"):
         return _answer_bit(pmx, indexed[1], int(indexed[2]), given, t)
@@ -329,22 +285,15 @@ def _answer(pmx: PmxController, text: str, t: float) -> str | None:
     return None
 
 
-def _use(
-    value: str | None,
-    get: Callable[[], object] | None,
-    put: Callable[[], None] | None,
-    do: Callable[[], None] | None,
-) -> str | None:
+def _use(word: Word, value: str | None, whose: tuple[object, ...], t: float) -> str | None:
     """Read, set or execute a word; None if the word has no such use."""
-    if value is not None:
-        if put is None:
-            return None
-        put()
-        return OK
-    if do is not None:
-        do()
-        return OK
-    return None if get is None else str(get())
+    if value is not None and word.set is not None:
+        word.set(*whose, value, t)
+    elif value is None and word.do is not None:
+        word.do(*whose, t)
+    else:
+        return None if value is not None or word.get is None else str(word.get(*whose, t))
+    return OK
 
 
 def _answer_bit(pmx: PmxController, name: str, index: int, value: str | None, t: float) -> str | None:
@@ -361,35 +310,3 @@ def _answer_bit(pmx: PmxController, name: str, index: int, value: str | None, t:
         return None
     word.set(pmx, index - 1, number(value, 0, 1), t)
     return OK
-
-
-class CommandedController:
-    """A controller as its stored programs use it: see `programs.Controller`."""
-
-    def __init__(self, controller: PmxController) -> None:
-        self._controller = controller
-
-    @property
-    def deadline(self) -> float | None:
-        """Time of the controller's next event."""
-        return self._controller.deadline
-
-    def settle(self, now: float) -> None:
-        """Let the controller live up to `now`."""
-        self._controller.settle(now)
-
-    def ask(self, text: str, now: float) -> str:
-        """Carry out one ASCII command that is not about programs; give its reply without CR."""
-        reply = answer(self._controller, text, now)
-        self._controller.look(now)
-        return reply
-
-    def moving(self, axis: str) -> bool:
-        """Whether an axis moves: pulses, a homing that goes on, a correction."""
-        each = self._controller.axis(axis)
-        return each.pulses.moving(self._controller.now) or each.homing is not None
-
-    def troubled(self, axis: str) -> bool:
-        """Whether a limit error or a StepNLoop error is latched."""
-        each = self._controller.axis(axis)
-        return bool(each.trouble or each.loop.error)

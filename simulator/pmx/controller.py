@@ -9,11 +9,10 @@ from __future__ import annotations
 from math import inf
 
 from multidrop.simulator.cell.spec import WorldSpec
-from multidrop.simulator.pmx import motions
 from multidrop.simulator.pmx.axis import Axis
-from multidrop.simulator.pmx.motions import Line, Stick
+from multidrop.simulator.pmx.motions import Line, Stick, go
+from multidrop.simulator.pmx.pulses import JOYSTICK, TIMED_OUT, Doing
 from multidrop.simulator.pmx.settings import AXES, Settings
-from multidrop.simulator.pmx.states import JOYSTICK, TIMED_OUT, Doing
 from multidrop.simulator.world import World
 
 BAUDS = {1: 9600, 2: 19200, 3: 38400, 4: 57600, 5: 115200}
@@ -24,8 +23,6 @@ PRODUCT, VERSION = "Performax-2ED-SA", "V128BL"
 """The replies to ID and VER of a unit whose cell file gives no other."""
 MOST_EVENTS = 100_000
 """Events in one `settle`; more would be an endless loop."""
-
-
 BOTH = 3
 
 
@@ -44,7 +41,6 @@ class Watchdog:
         return self._heard_at + milliseconds / 1000 if milliseconds and self.alarms != BOTH else inf
 
     def look(self, t: float) -> None:
-        """Raise the alarm if its time has come."""
         if self.due <= t:
             self.alarms = BOTH
 
@@ -53,11 +49,9 @@ class Watchdog:
         self._heard_at = now
 
     def power_up(self, now: float) -> None:
-        """Begin without an alarm."""
         self._heard_at, self.alarms = now, 0
 
     def clear(self, n: int, t: float) -> None:
-        """Clear the alarm of an axis."""
         self.alarms &= ~(1 << n)
         if self.alarms != BOTH and self._settings["TOC"]:
             self._heard_at = max(self._heard_at, t)
@@ -87,13 +81,16 @@ class PmxController:
         self._due: float | None = None
         """What `deadline` found, until something changes."""
 
-    # -- time -----------------------------------------------------------------------------------------------------
-
     @property
     def deadline(self) -> float | None:
         """Time of its next event; None if only new input can cause one."""
         if self._due is None:
-            self._due = self._next(self.now) if self.powered else inf
+            self._due = inf
+            if self.powered:
+                times = [axis.next_event(self.now) for axis in self.axes]
+                times += [stick.due for stick in self.sticks if stick.due is not None]
+                times += [at for stick in self.sticks if (at := stick.fence(self.now)) > self.now]
+                self._due = min(*times, self.watchdog.due)
         return None if self._due == inf else self._due
 
     def settle(self, now: float) -> None:
@@ -107,12 +104,6 @@ class PmxController:
             self.now = max(at, self.now)
             self._happen(self.now)
         raise AssertionError("no end of events")
-
-    def _next(self, after: float) -> float:
-        times = [axis.next_event(after) for axis in self.axes]
-        times += [stick.due for stick in self.sticks if stick.due is not None]
-        times += [at for stick in self.sticks if (at := stick.fence(after)) > after]
-        return min(*times, self.watchdog.due)
 
     def _happen(self, t: float) -> None:
         self.look(t)
@@ -136,10 +127,7 @@ class PmxController:
         self.watchdog.restart(now)
         self._due = None
 
-    # -- power ----------------------------------------------------------------------------------------------------
-
     def power_off(self, now: float) -> None:
-        """Stop everything, without current."""
         self.powered = False
         for axis in self.axes:
             axis.abort(now)
@@ -169,8 +157,6 @@ class PmxController:
         self.supplied = on
         self.look(now)
 
-    # -- inputs and outputs ---------------------------------------------------------------------------------------
-
     def inputs(self, now: float) -> int:
         """`DI`: a bit is 1 if the input is at ground; with POL's bit 10, if it is not."""
         inverted = bool(self.settings["POLX"] & POLARITY_DI)
@@ -192,11 +178,9 @@ class PmxController:
         stick = self.sticks[n].due is not None
         return axis.status(t) | stick * JOYSTICK | (self.watchdog.alarms >> n & 1) * TIMED_OUT
 
-    # -- motions --------------------------------------------------------------------------------------------------
-
     def go(self, axis: Axis, value: int, t: float) -> None:
         """`X1000`: move to a position, or by a distance."""
-        motions.go(axis, value + (axis.position(t) if self.incremental else 0), t)
+        go(axis, value + (axis.position(t) if self.incremental else 0), t)
 
     def go_both(self, values: tuple[int, int], t: float) -> None:
         """`I1000:2000`: move in a straight line."""
@@ -231,7 +215,7 @@ class PmxController:
             if on:
                 self.settings["SL" + axis.name] = 0
                 axis.loop.enable(False, t)
-            elif axis.doing is Doing.STICK:
+            elif axis.pulses.doing is Doing.STICK:
                 axis.stop(t)
             stick.switch(on, t)
 
@@ -241,5 +225,14 @@ class PmxController:
         self.settings["JO"] &= ~(1 << n)
 
     def axis(self, name: str) -> Axis:
-        """X or Y."""
         return self.axes[AXES.index(name)]
+
+    def moving(self, axis: str) -> bool:
+        """Whether an axis moves: pulses, a homing that goes on, a correction."""
+        each = self.axis(axis)
+        return each.pulses.profile.moving(self.now) or each.homing is not None
+
+    def troubled(self, axis: str) -> bool:
+        """Whether a limit error or a StepNLoop error is latched."""
+        each = self.axis(axis)
+        return bool(each.trouble or each.loop.error)

@@ -1,17 +1,136 @@
-"""The family of the Arcus PMX-2ED-SA controllers."""
+"""The family of the Arcus PMX-2ED-SA controllers: their `[[bus.drive]]` table, read, built, written.
+
+A controller as it was read from a unit becomes such a table, and a table the settings to write to a unit.
+"""
 
 from __future__ import annotations
 
 from multidrop.dialects.family import Motion
+from multidrop.dialects.files import split_lines
+from multidrop.dialects.pmx.manual import program_file
+from multidrop.dialects.pmx.manual.program_file import Undecodable
+from multidrop.dialects.pmx.manual.script_compiler import ERASED
+from multidrop.dialects.program_files import errors
+from multidrop.dialects.values import VARIABLES as USERS
+from multidrop.dialects.values import Snapshot, Value
+from multidrop.simulator.cell.drive_keys import (
+    ENCODER_KEYS,
+    WORLD_KEYS,
+    common_keys,
+    read_identity,
+    read_settings,
+    read_variables,
+    read_worlds,
+)
 from multidrop.simulator.cell.spec import DriveSpec
-from multidrop.simulator.family import Family, Place, Shadow, Unit
-from multidrop.simulator.pmx import drive_table, drive_text
+from multidrop.simulator.cell.spec import Value as Setting
+from multidrop.simulator.cell.table import Folder, Table, quoted
+from multidrop.simulator.cell.writer import DriveText, Entry, plain, remark
+from multidrop.simulator.family import Family, Place, Shadow, Snapshots, StoredProgram, Unit
+from multidrop.simulator.pmx.commands import MODEL
 from multidrop.simulator.pmx.controller import BAUDS
-from multidrop.simulator.pmx.device import PmxDevice
-from multidrop.simulator.pmx.port import PmxPort
-from multidrop.simulator.pmx.program_commands import PROGRAMS
+from multidrop.simulator.pmx.device import PROGRAMS, PmxDevice, PmxPort
+from multidrop.simulator.pmx.settings import AXES, VARIABLES
 
-AXES = "xy"
+NAMES_OF_AXES = "xy"
+INPUTS, COUNTS = range(1, 9), 5000
+"""Digital inputs, and the end of scale of the analog inputs in millivolts."""
+NAMES = tuple(f"V{n}" for n in range(VARIABLES))
+"""The variables of its programs."""
+
+
+def read_drive(table: Table, folder: Folder) -> DriveSpec:
+    """Read the table of one controller. Raises Diagnostic."""
+    common = common_keys(table, folder)
+    name = table.text("name", "00")
+    if not (len(name) == 2 and name.isascii() and name.isdigit()):
+        raise table.wrong("name", f"cannot be {quoted(name)}", "valid: two digits, 00 to 99")
+    if table.boolean("party", False):
+        raise table.wrong("party", "is for MCode drives", "leave it out: a PMX always has an address")
+    world = table.table("world", "[bus.drive.world]")
+    x, y = read_worlds(world, ("x", "y"), (*WORLD_KEYS, *ENCODER_KEYS), INPUTS, COUNTS)
+    settings = read_settings(table.table("set", "set"), _check_setting)
+    variables = table.table("variables", "[bus.drive.variables]")
+    identity = table.table("identity", "[bus.drive.identity]")
+    return DriveSpec(
+        **common,
+        name=name,
+        set=settings,
+        variables=read_variables(variables, lambda name: name in NAMES, f"valid: {NAMES[0]} to {NAMES[-1]}"),
+        identity=read_identity(identity, ("part", "version"), {"position": len(AXES), "encoder": len(AXES)}),
+        world=x,
+        further=(y,),
+    )
+
+
+def _check_setting(table: Table, word: str, value: Setting) -> None:
+    if not (word.isascii() and word.isalnum()):
+        raise table.wrong(quoted(word), "is not a PMX command")
+
+
+def describe(snapshot: Snapshot) -> DriveText:
+    """Make the table of a controller."""
+    readings = [each for each in snapshot.readings.readings if each.name != "DN"]
+    return DriveText(
+        personality="PMX",
+        name=snapshot.name,
+        remarks=snapshot.remarks,
+        unread=snapshot.readings.unread,
+        program=_program(snapshot),
+        settings=[Entry(each.name, each.value, remark(each)) for each in readings if each.section != USERS],
+        variables=[Entry(each.name, each.value) for each in readings if each.section == USERS and each.value],
+        identity=[
+            *(
+                Entry(key, plain(text))
+                for key, text in (("part", snapshot.part), ("version", snapshot.version))
+                if text
+            ),
+            *(Entry(key, list(counts)) for key, counts in snapshot.counters.items()),
+        ],
+        worlds=_worlds(snapshot),
+        baud=snapshot.baud,
+    )
+
+
+def wanted(spec: DriveSpec) -> dict[str, Value]:
+    """The settings of a controller in a cell file; a variable that is left out is 0."""
+    settings = {name: held for name, held in spec.set.items() if not isinstance(held, tuple)}
+    return {"DN": f"{MODEL}{spec.name}", **settings, **{name: spec.variables.get(name, 0) for name in NAMES}}
+
+
+def program(spec: DriveSpec) -> StoredProgram:
+    """The program of a controller in a cell file."""
+    if not spec.program:
+        return StoredProgram()
+    return StoredProgram(
+        tuple(program_file.memory(spec.program, spec.program_name)), tuple(split_lines(spec.program.strip()))
+    )
+
+
+def _program(snapshot: Snapshot) -> list[str]:
+    """The program as its file, or as A-SCRIPT, where that gives the same memory; else as compiled lines."""
+    tokens = [token for _, token in snapshot.program]
+    for script in (list(snapshot.remarked), _script(snapshot)):
+        text = "\n".join(script)
+        if script and not errors(program_file.check(text)) and program_file.memory(text, "program") == tokens:
+            return script
+    return [f"SA{at}={token}" for at, token in snapshot.program if token != ERASED]
+
+
+def _script(snapshot: Snapshot) -> list[str]:
+    try:
+        return program_file.readable([f"SA{at}={token}" for at, token in snapshot.program])
+    except Undecodable:
+        return []
+
+
+def _worlds(snapshot: Snapshot) -> dict[str, dict[str, object]]:
+    worlds: dict[str, dict[str, object]] = {axis.lower(): {} for axis in AXES}
+    if snapshot.inputs:
+        worlds["x"]["inputs"] = [[0.0, n, level] for n, level in snapshot.inputs]
+    for axis, counts in zip(worlds, snapshot.analog, strict=False):
+        worlds[axis]["analog"] = [[0.0, counts]]
+    return {axis: keys for axis, keys in worlds.items() if keys}
 
 
 def build(spec: DriveSpec, place: Place) -> Unit:
@@ -20,15 +139,15 @@ def build(spec: DriveSpec, place: Place) -> Unit:
     return Unit(
         device=device,
         port=PmxPort(device, alone=place.alone, any_baud=place.baud not in BAUDS.values()),
-        worlds=dict(zip(AXES, device.worlds, strict=True)),
+        worlds=dict(zip(NAMES_OF_AXES, device.worlds, strict=True)),
         shadow=_shadow(device),
-        inputs=drive_table.INPUTS,
-        counts=drive_table.COUNTS,
+        inputs=INPUTS,
+        counts=COUNTS,
     )
 
 
 def _shadow(device: PmxDevice) -> Shadow:
-    axes = dict(zip(AXES, device.controller.axes, strict=True))
+    axes = dict(zip(NAMES_OF_AXES, device.controller.axes, strict=True))
 
     def rest() -> None:
         for program in range(PROGRAMS):
@@ -36,7 +155,7 @@ def _shadow(device: PmxDevice) -> Shadow:
 
     def motion(now: float) -> tuple[Motion, ...]:
         return tuple(
-            Motion(axis.position(now), axis.speed(now) if axis.pulses.moving(now) else 0, name)
+            Motion(axis.position(now), axis.speed(now) if axis.pulses.profile.moving(now) else 0, name)
             for name, axis in axes.items()
         )
 
@@ -49,8 +168,8 @@ def _shadow(device: PmxDevice) -> Shadow:
 
 PMX = Family(
     name="pmx",
-    read_drive=drive_table.read_drive,
+    read_drive=read_drive,
     build=build,
-    snapshots=drive_text.SNAPSHOTS,
+    snapshots=Snapshots(describe, wanted, program),
     addressed=True,
 )

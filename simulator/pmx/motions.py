@@ -1,24 +1,13 @@
-"""The commands that begin and change motions of one axis of a PMX: moves, jogs, homing, changes on the fly."""
+"""The commands that begin and change motions of a PMX: moves, lines, jogs, homing, the joystick, changes on the fly."""
 
 from __future__ import annotations
 
 from math import copysign, hypot, inf
 
-from multidrop.simulator.kinematics.profile import Profile, halt, slew
-from multidrop.simulator.pmx import motions
+from multidrop.simulator.kinematics import Profile, halt, slew
 from multidrop.simulator.pmx.axis import Axis
-from multidrop.simulator.pmx.homing import Homing
-from multidrop.simulator.pmx.pulses import planned
+from multidrop.simulator.pmx.pulses import Doing, Pace, paced, planned
 from multidrop.simulator.pmx.settings import AXES, WINDOWS, Refusal, Settings
-from multidrop.simulator.pmx.states import Doing, Pace, own_pace, paced
-
-# Joystick control of one axis (manual 7.15): an analog input commands the speed, within soft limits.
-#
-# The manual's figures 7.7 and 7.8 are lines: the speed grows in proportion from the edge of the zero zone to the ends
-# of the joystick, and between the inner and the outer soft limit it shrinks in proportion to the distance left. The
-# joystick is sampled every `PERIOD`. The speed changes by at most JV3 or JV4 a sample (0: without a limit), which is a
-# ramp of constant acceleration between two samples.
-
 
 PERIOD = 0.01
 """Seconds between two samples of the joystick (our choice: the manual does not give it)."""
@@ -28,8 +17,88 @@ SLOWEST = 1.0
 """Pulses/s; anything slower is rest."""
 
 
+def check(axis: Axis, t: float) -> None:
+    """Refuse a motion that may not begin."""
+    if axis.pulses.profile.moving(t) or axis.homing:
+        raise Refusal("?Moving")
+    if axis.loop.error:
+        raise Refusal("?Clear SNL Error")
+    if axis.trouble:
+        raise Refusal("?Clear SNL Error" if axis.loop.on else "")
+
+
+def aim(axis: Axis, target: float, t: float) -> float:
+    """Give the place of a target of the counter, pulses from power-up."""
+    if axis.loop.on:
+        here = axis.pulses.profile.position(t)
+        return axis.pulses.whole(here + (target - axis.loop.target(t)) * axis.loop.ratio)
+    return axis.pulses.place_of(target, t)
+
+
+def go(axis: Axis, target: int, t: float) -> None:
+    """`X1000`: move to a position of the counter (counts with StepNLoop)."""
+    check(axis, t)
+    pace = axis.own_pace()
+    axis.loop.attempts, axis.goal = 0, target
+    axis.start(Doing.MOVE, axis.pulses.to_place(aim(axis, target, t), t, pace), t, pace)
+
+
+def jog(axis: Axis, direction: float, t: float) -> None:
+    """`JX+`: turn until a stop."""
+    check(axis, t)
+    pace = axis.own_pace()
+    axis.loop.attempts = 0
+    axis.start(Doing.JOG, axis.pulses.to_speed(direction * pace.high, t, pace), t, pace)
+
+
+def home(axis: Axis, word: str, direction: float, t: float) -> None:
+    """`HX+`, `LX+`, ...: begin one of the homing routines (7.10)."""
+    check(axis, t)
+    pace = axis.own_pace()
+    axis.loop.attempts = 0
+    axis.home(word, direction, pace, t)
+
+
+def retarget(axis: Axis, target: int, t: float) -> None:
+    """`TX`: change the target on the fly, for a move of this axis alone."""
+    pulses = axis.pulses
+    if pulses.doing is not Doing.MOVE or not pulses.profile.moving(t):
+        raise Refusal("?ABS/INC is not in operation")
+    axis.goal = target
+    profile = pulses.to_place_on_the_fly(aim(axis, target, t), t, pulses.pace)
+    axis.start(Doing.MOVE, profile, t, pulses.pace)
+
+
+def respeed(axis: Axis, speed: int, t: float) -> None:
+    """`SSPDX=`: change the speed on the fly, for a move or a jog; at rest only the value is checked."""
+    pulses, wanted = axis.pulses, speed * axis.unit
+    if pulses.doing is Doing.LINE:
+        raise Refusal("?ICommandOn")
+    if axis["SCV"]:
+        raise Refusal("?S-curve on")
+    mode = axis["SSPDM"]
+    if not mode:
+        raise Refusal("?SSPD Mode not Initialized")
+    limits = WINDOWS[mode - 1]
+    if not max(limits.low, 1) <= wanted <= limits.high:
+        raise Refusal("?Speed out of range")
+    if not pulses.profile.moving(t) or pulses.doing not in (Doing.MOVE, Doing.JOG):
+        return
+    pace = pulses.pace._replace(high=wanted, low=min(pulses.pace.low, wanted))
+    if pulses.doing is Doing.JOG:
+        axis.start(Doing.JOG, pulses.to_speed(pulses.profile.direction(t) * wanted, t, pace), t, pace)
+    else:
+        axis.start(Doing.MOVE, pulses.to_place_on_the_fly(pulses.profile.target, t, pace), t, pace)
+
+
 class Stick:
-    """The joystick of one axis: the time of its next sample, and the motion that follows."""
+    """The joystick of one axis (manual 7.15): an analog input commands the speed, within soft limits.
+
+    The manual's figures 7.7 and 7.8 are lines: the speed grows in proportion from the edge of the zero zone to the ends
+    of the joystick, and between the inner and the outer soft limit it shrinks in proportion to the distance left. The
+    joystick is sampled every `PERIOD`. The speed changes by at most JV3 or JV4 a sample (0: without a limit), which is
+    a ramp of constant acceleration between two samples. `due` is the time of the next sample; None: it is off.
+    """
 
     def __init__(self, axis: Axis) -> None:
         self._axis = axis
@@ -48,15 +117,21 @@ class Stick:
         if out <= 0:
             return 0.0
         direction = copysign(1.0, millivolts - MIDDLE)
-        return direction * fastest * min(out / (MIDDLE - zone), 1.0) * self._room(direction, t)
+        outer, inner = self.edge(direction), settings[f"JL{n * 4 + (3 if direction > 0 else 2)}"]
+        place = self._axis.pulses.counter(t)
+        left = (outer - place) * direction
+        if left <= 0:
+            return 0.0
+        room = 1.0 if (place - inner) * direction <= 0 else left / max((outer - inner) * direction, left)
+        return direction * fastest * min(out / (MIDDLE - zone), 1.0) * room
 
     def steer(self, millivolts: int, t: float) -> None:
         """Sample the joystick, and move at the commanded speed."""
-        axis = self._axis
+        axis, profile = self._axis, self._axis.pulses.profile
         self.due = t + PERIOD
-        if axis.homing or axis.trouble or (axis.pulses.moving(t) and axis.doing is not Doing.STICK):
+        if axis.homing or axis.trouble or (profile.moving(t) and axis.pulses.doing is not Doing.STICK):
             return
-        now = axis.pulses.profile.velocity(t)
+        now = profile.velocity(t)
         change = self.wanted(millivolts, t) - now
         most = axis.settings[f"JV{3 + self.number}"] or abs(change)
         speed = now + copysign(min(abs(change), most), change)
@@ -64,7 +139,7 @@ class Stick:
             speed = 0.0
         if speed or now:
             rate = max(abs(speed - now), SLOWEST) / PERIOD
-            path = slew(t, axis.pulses.place(t), now, speed, vi=0.0, a=rate, d=rate)
+            path = slew(t, profile.position(t), now, speed, vi=0.0, a=rate, d=rate)
             axis.start(Doing.STICK, path, t, Pace(0.0, abs(speed), rate, max(rate, abs(speed) / PERIOD)))
 
     def fence(self, after: float) -> float:
@@ -81,28 +156,13 @@ class Stick:
         """The outer soft limit in a direction, as a count of the counter."""
         return self._axis.settings[f"JL{self.number * 4 + (4 if direction > 0 else 1)}"]
 
-    def _room(self, direction: float, t: float) -> float:
-        """The fraction of the speed that the soft limits allow."""
-        first = self.number * 4
-        outer = self.edge(direction)
-        inner = self._axis.settings[f"JL{first + (3 if direction > 0 else 2)}"]
-        place = self._axis.pulses.counter(t)
-        left = (outer - place) * direction
-        if left <= 0:
-            return 0.0
-        if (place - inner) * direction <= 0:
-            return 1.0
-        return left / max((outer - inner) * direction, left)
-
-
-# A straight line of both axes of a PMX (manual 7.8.2): one motion along the path, of which each axis makes its share.
-#
-# The global speeds are those along the path (the manual leaves that open), in pulses/s with StepNLoop too (7.17). What
-# ends the line for one axis ends it for the other.
-
 
 class Line:
-    """The line of two axes, during a motion. Raises Refusal for a line that cannot begin."""
+    """A straight line of both axes (manual 7.8.2): one motion along the path, of which each axis makes its share.
+
+    The global speeds are those along the path (the manual leaves that open), in pulses/s with StepNLoop too (7.17).
+    What ends the line for one axis ends it for the other. Raises Refusal for a line that cannot begin.
+    """
 
     def __init__(self, axes: tuple[Axis, Axis], settings: Settings) -> None:
         self._axes = axes
@@ -113,30 +173,31 @@ class Line:
         """Move both axes from rest to their targets."""
         axes, settings = self._axes, self._settings
         for axis in axes:
-            motions.check(axis, t)
+            check(axis, t)
         speeds, times = (settings["LSPD"], settings["HSPD"]), (settings["ACC"], settings["DEC"])
         pace = paced(settings, axes[0].name, speeds, times)
-        shares = [
-            motions.aim(axis, target, t) - axis.pulses.place(t) for axis, target in zip(axes, targets, strict=True)
-        ]
+        pairs = zip(axes, targets, strict=True)
+        shares = [aim(axis, target, t) - axis.pulses.profile.position(t) for axis, target in pairs]
         length = hypot(*shares)
         whole = planned(t, 0.0, length, pace)
         self._members = tuple(axis for axis, share in zip(axes, shares, strict=True) if share)
         for axis, target, share in zip(axes, targets, shares, strict=True):
             axis.loop.attempts, axis.goal = 0, target
-            part = _part(whole, axis.pulses.place(t), share, length)
-            axis.pulses.begin(Doing.LINE, part, t, _scaled(pace, abs(share) / length if length else 0.0))
+            part = _part(whole, axis.pulses.profile.position(t), share, length)
+            factor = abs(share) / length if length else 0.0
+            low, high, up, down = (each * factor for each in (pace.low, pace.high, pace.up, pace.down))
+            axis.pulses.begin(Doing.LINE, part, t, Pace(low, high, up, down, pace.shape))
         for axis in axes:
             axis.live(t)
         self.watch(t)
 
     def others(self, axis: Axis) -> tuple[Axis, ...]:
         """The axes that stop with this one: all axes of a line, or only this one."""
-        return self._members if axis in self._members and axis.doing is Doing.LINE else (axis,)
+        return self._members if axis in self._members and axis.pulses.doing is Doing.LINE else (axis,)
 
     def watch(self, t: float) -> None:
         """Stop the other axis if one was ended before its time."""
-        left = [axis for axis in self._members if axis.doing is Doing.LINE]
+        left = [axis for axis in self._members if axis.pulses.doing is Doing.LINE]
         if len(left) < len(self._members):
             for axis in left:
                 axis.abort(t)
@@ -150,98 +211,3 @@ def _part(whole: Profile, here: float, share: float, length: float) -> Profile:
     part = whole.scaled(share / length)
     segments = tuple(each._replace(position=each.position + here) for each in part.segments)
     return Profile(part.start, part.end, here, here + share, segments)
-
-
-def _scaled(pace: Pace, factor: float) -> Pace:
-    return Pace(pace.low * factor, pace.high * factor, pace.up * factor, pace.down * factor, pace.shape)
-
-
-def check(axis: Axis, t: float) -> None:
-    """Refuse a motion that may not begin."""
-    if axis.pulses.moving(t) or axis.homing:
-        raise Refusal("?Moving")
-    if axis.loop.error:
-        raise Refusal("?Clear SNL Error")
-    if axis.trouble:
-        raise Refusal("?Clear SNL Error" if axis.loop.on else "")
-
-
-def check_pace(axis: Axis) -> Pace:
-    """Work out the axis's own pace. Raises Refusal for a low speed that does not fit."""
-    return own_pace(axis.settings, axis.name, _scale(axis))
-
-
-def aim(axis: Axis, target: float, t: float) -> float:
-    """Give the place of a target of the counter, pulses from power-up."""
-    if axis.loop.on:
-        return axis.pulses.whole(axis.pulses.place(t) + (target - axis.loop.target(t)) * axis.loop.ratio)
-    return axis.pulses.place_of(target, t)
-
-
-def go(axis: Axis, target: int, t: float) -> None:
-    """`X1000`: move to a position of the counter (counts with StepNLoop)."""
-    check(axis, t)
-    pace = check_pace(axis)
-    axis.loop.attempts, axis.goal = 0, target
-    axis.start(Doing.MOVE, axis.pulses.to_place(aim(axis, target, t), t, pace), t, pace)
-
-
-def jog(axis: Axis, direction: float, t: float) -> None:
-    """`JX+`: turn until a stop."""
-    check(axis, t)
-    pace = check_pace(axis)
-    axis.loop.attempts = 0
-    axis.start(Doing.JOG, axis.pulses.to_speed(direction * pace.high, t, pace), t, pace)
-
-
-def home(axis: Axis, word: str, direction: float, t: float) -> None:
-    """`HX+`, `LX+`, ...: begin one of the homing routines (7.10)."""
-    check(axis, t)
-    pace = check_pace(axis)
-    axis.loop.attempts = 0
-    axis.homing = Homing(axis, word, direction, pace)
-    axis.homing.begin(t)
-    axis.live(t)
-
-
-def retarget(axis: Axis, target: int, t: float) -> None:
-    """`TX`: change the target on the fly, for a move of this axis alone."""
-    pulses = axis.pulses
-    if pulses.doing is not Doing.MOVE or not pulses.moving(t):
-        raise Refusal("?ABS/INC is not in operation")
-    axis.goal = target
-    profile = pulses.to_place_on_the_fly(aim(axis, target, t), t, pulses.pace)
-    axis.start(Doing.MOVE, profile, t, pulses.pace)
-
-
-def respeed(axis: Axis, speed: int, t: float) -> None:
-    """`SSPDX=`: change the speed on the fly, for a move or a jog; at rest only the value is checked."""
-    _check_respeed(axis, speed)
-    pulses = axis.pulses
-    if not pulses.moving(t) or pulses.doing not in (Doing.MOVE, Doing.JOG):
-        return
-    wanted = speed * _scale(axis)
-    pace = pulses.pace._replace(high=wanted, low=min(pulses.pace.low, wanted))
-    if pulses.doing is Doing.JOG:
-        axis.start(Doing.JOG, pulses.to_speed(pulses.profile.direction(t) * wanted, t, pace), t, pace)
-    else:
-        axis.start(Doing.MOVE, pulses.to_place_on_the_fly(pulses.profile.target, t, pace), t, pace)
-
-
-def _check_respeed(axis: Axis, speed: int) -> None:
-    """Refuse a speed that `SSPDX=` does not take."""
-    if axis.doing is Doing.LINE:
-        raise Refusal("?ICommandOn")
-    if axis["SCV"]:
-        raise Refusal("?S-curve on")
-    mode = axis["SSPDM"]
-    if not mode:
-        raise Refusal("?SSPD Mode not Initialized")
-    limits = WINDOWS[mode - 1]
-    if not max(limits.low, 1) <= speed * _scale(axis) <= limits.high:
-        raise Refusal("?Speed out of range")
-
-
-def _scale(axis: Axis) -> float:
-    """Pulses for a unit of position or speed: with StepNLoop units are encoder counts."""
-    return axis.loop.ratio if axis.loop.on else 1.0

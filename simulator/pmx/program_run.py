@@ -79,7 +79,8 @@ class Watcher(Recorder):
         values = self._variables if everything else partial(self._read, names)
         super().__init__(debugging, text, points, values)
 
-    def starts(self, t: float, program: int, line: int) -> bool:
+    def before(self, t: float, program: int, line: int) -> bool:
+        """Begin a line; return whether the run ends before it."""
         self._now = t
         number = self._lines.get(line, 0)
         if line and self._lines.get(line - 1) == number and program in self._open:
@@ -92,7 +93,7 @@ class Watcher(Recorder):
         del self._open[program]
         return True
 
-    def ends(self, t: float, program: int) -> None:
+    def executed(self, t: float, program: int) -> None:
         if not self.full:
             self._open[program].changed.update(self.changed())
 
@@ -122,7 +123,7 @@ class Watcher(Recorder):
         return {name: variables[_NAMES[name]] if name in _NAMES else self._register(name) for name in names}
 
     def _register(self, name: str) -> int:
-        return int(self._device.commanded.ask(name, self._now))
+        return int(self._device.controller.ask(name, self._now))
 
     def _check(self, name: str) -> None:
         """Refuse a name that reads no number: another command could move an axis."""
@@ -218,7 +219,7 @@ class ProgramRun:
         """Run program 0 or 1, or all; a Summary is the last event. Raises Diagnostic if there is nothing to run."""
         if debugging.wanted:
             self._watcher = Watcher(self._device, debugging, self._source, self._program_lines, self._name)
-            self._programs.observer = self._watcher
+            self._programs.watch(self._watcher.before, self._watcher.executed)
         for each in self._chosen(program):
             self._programs.control(each, 1, 0.0)
         limit = LONGEST if until is None else until
@@ -232,7 +233,7 @@ class ProgramRun:
             if self._broken:
                 self.now = self._programs.ended_at
             if self._watcher is not None and self._watcher.done:
-                self._programs.observer = None
+                self._programs.watch(None, None)
             yield from self._news()
         yield from self._news(last=True)
         yield self._summary(until, stuck)
@@ -281,7 +282,7 @@ class ProgramRun:
         standing = [self._programs.counter(n) for n in range(PROGRAMS) if self._programs.status(n) in (1, 2)]
         x, y = (int(self._device.execute(f"P{axis}", self.now)) for axis in "XY")
         moving, errors, lines = (
-            any(self._device.commanded.moving(axis) for axis in "XY"),
+            any(self._device.controller.moving(axis) for axis in "XY"),
             tuple(self._errors),
             self._programs.executed,
         )

@@ -23,7 +23,7 @@ from pathlib import Path
 from multidrop.dialects import Diagnostic
 from multidrop.simulator.serving.input_queue import InputQueue
 from multidrop.simulator.serving.running import RunningFloor
-from multidrop.simulator.wire.baud import resample
+from multidrop.simulator.wire import resample
 
 # The number of clients that have a pseudo-terminal open, counted without polling.
 #

@@ -12,7 +12,7 @@ from typing import Protocol
 
 from multidrop.simulator.family import Connection, Shadow
 from multidrop.simulator.floor import Floor
-from multidrop.simulator.wire.baud import BITS_A_BYTE
+from multidrop.simulator.wire import BITS_A_BYTE
 
 SHORTEST_SLEEP = 0.001
 LATEST = 0.1

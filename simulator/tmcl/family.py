@@ -1,16 +1,121 @@
-"""The family of the TMCL modules."""
+"""The family of the TMCL modules: built from a cell file's `[[bus.drive]]` table, which is read and written here.
+
+`set` has parameters in EEPROM by number: `4 = 51200` is an axis parameter, `G75 = 5` a global one of bank 0. A module
+as it was read from a unit becomes such a table, and a table the settings to write to a unit.
+"""
 
 from __future__ import annotations
 
+import re
+from collections.abc import Mapping
+
 from multidrop.dialects.family import Motion
-from multidrop.dialects.tmcl.manual.commands import BAUDS, Axis
+from multidrop.dialects.tmcl.manual.commands import AXIS, BAUDS, GLOBAL, Axis, Global, Parameter
+from multidrop.dialects.values import Snapshot, Value
+from multidrop.simulator.cell.drive_keys import common_keys, read_identity, read_settings, read_world
 from multidrop.simulator.cell.spec import DriveSpec
-from multidrop.simulator.family import Family, Place, Shadow, Unit
-from multidrop.simulator.tmcl import drive_text
-from multidrop.simulator.tmcl.drive_table import read_drive, split_settings
+from multidrop.simulator.cell.spec import Value as Setting
+from multidrop.simulator.cell.table import Folder, Table, quoted
+from multidrop.simulator.cell.writer import DriveText, Entry, remark
+from multidrop.simulator.family import Family, Place, Shadow, Snapshots, StoredProgram, Unit
 from multidrop.simulator.tmcl.module import VERSION, TmclModule
+from multidrop.simulator.tmcl.motor import STORED
 from multidrop.simulator.tmcl.port import TmclPort
 from multidrop.simulator.world import World
+
+VERSION_FORM = re.compile(r"\d{4}V\d{3}", re.ASCII)
+GLOBAL_PREFIX = "G"
+WORLD_KEYS = ("home", "limit_plus", "limit_minus", "stall_at", "load", "locked")
+NO_INPUTS = (1,)
+"""A range that `read_world` needs and no key uses: the module has no inputs but its switches."""
+
+
+def read_drive(table: Table, folder: Folder) -> DriveSpec:
+    """Read the table of one module. Raises Diagnostic."""
+    common = common_keys(table, folder)
+    if common["program"]:
+        raise table.wrong("program", "is for other drives", "leave it out: direct mode runs no program")
+    name = table.text("name", "1")
+    if not (
+        name.isascii() and name.isdigit() and str(int(name)) == name and int(name) in GLOBAL[Global.ADDRESS].limits
+    ):
+        raise table.wrong("name", f"cannot be {quoted(name)}", "valid: the address of a module, 1 to 255")
+    if table.boolean("party", False):
+        raise table.wrong("party", "is for MCode drives", "leave it out: a module always has an address")
+    world = table.table("world", "[bus.drive.world]")
+    world.only(*WORLD_KEYS)
+    settings = read_settings(table.table("set", "set"), _check_setting)
+    if table.table("variables", "[bus.drive.variables]").values:
+        raise table.wrong("variables", "is for other drives", "leave it out: direct mode has none")
+    rows = table.table("identity", "[bus.drive.identity]")
+    identity = read_identity(rows, ("version",), {"position": 1})
+    if identity.version and not VERSION_FORM.fullmatch(identity.version):
+        hint = "valid: module and firmware, as in 1241V115"
+        raise rows.wrong("version", f"cannot be {quoted(identity.version)}", hint)
+    return DriveSpec(
+        **common,
+        name=name,
+        set=settings,
+        identity=identity,
+        world=read_world(world, NO_INPUTS, 0),
+    )
+
+
+def split_settings(settings: Mapping[str, Setting]) -> tuple[dict[int, int], dict[int, int]]:
+    """Divide checked settings into axis parameters and global parameters, by number."""
+    axis = {int(name): int(value) for name, value in settings.items() if name.isdigit()}  # type: ignore[arg-type]
+    module = {int(name[1:]): int(value) for name, value in settings.items() if not name.isdigit()}  # type: ignore[arg-type]
+    return axis, module
+
+
+def _check_setting(table: Table, word: str, value: Setting) -> None:
+    row = _parameter(word.upper())
+    if row is None:
+        hint = "valid: axis parameters by number, such as 4 = 51200; global ones with a G, such as G75 = 5"
+        raise table.wrong(quoted(word), "is not a parameter in EEPROM", hint)
+    if not isinstance(value, int) or value not in row.limits:
+        raise table.wrong(quoted(word), f"cannot be {value}", f"valid: {row.limits[0]} to {row.limits[-1]}")
+
+
+def _parameter(word: str) -> Parameter | None:
+    """The parameter that a key names, of those that EEPROM holds; the address has a key of its own."""
+    number = word.removeprefix(GLOBAL_PREFIX)
+    if not (number.isascii() and number.isdigit() and len(number) < 4 and str(int(number)) == number):
+        return None
+    if word.startswith(GLOBAL_PREFIX):
+        return GLOBAL.get(int(number)) if int(number) not in (Global.ADDRESS, Global.PROGRAM_STATUS) else None
+    return AXIS[int(number)] if int(number) in STORED else None
+
+
+ADDRESS = f"{GLOBAL_PREFIX}{int(Global.ADDRESS)}"
+"""The parameter that has a key of its own."""
+BAUD = f"{GLOBAL_PREFIX}{int(Global.BAUD)}"
+
+
+def describe(snapshot: Snapshot) -> DriveText:
+    """Make the table of a module."""
+    readings = [each for each in snapshot.readings.readings if each.name != ADDRESS]
+    return DriveText(
+        personality="TMCM",
+        name=snapshot.name,
+        remarks=[
+            *snapshot.remarks,
+            *(f"not in set: {each.name} = {each.value}" for each in readings if _parameter(each.name) is None),
+        ],
+        unread=snapshot.readings.unread,
+        settings=[Entry(each.name, each.value, remark(each)) for each in readings if _parameter(each.name) is not None],
+        identity=[
+            *([Entry("version", snapshot.version)] if snapshot.version else []),
+            *(Entry(key, counts[0]) for key, counts in snapshot.counters.items()),
+        ],
+        baud=snapshot.baud,
+    )
+
+
+def wanted(spec: DriveSpec) -> dict[str, Value]:
+    """The settings of a module in a cell file, but not its baud rate, which would cut the line off at once."""
+    settings = {name: held for name, held in spec.set.items() if not isinstance(held, tuple) and name != BAUD}
+    return {ADDRESS: int(spec.name), **settings}
 
 
 def build(spec: DriveSpec, place: Place) -> Unit:
@@ -37,6 +142,6 @@ TMCL = Family(
     name="tmcl",
     read_drive=read_drive,
     build=build,
-    snapshots=drive_text.SNAPSHOTS,
+    snapshots=Snapshots(describe, wanted, lambda spec: StoredProgram()),
     addressed=True,
 )

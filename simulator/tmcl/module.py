@@ -27,9 +27,8 @@ from multidrop.dialects.tmcl.manual.commands import (
     Status,
     Version,
 )
-from multidrop.simulator.tmcl.motor import STORED, Motor
+from multidrop.simulator.tmcl.motor import STORED, Motor, Phase, ReferenceSearch
 from multidrop.simulator.tmcl.program import Program
-from multidrop.simulator.tmcl.search import ReferenceSearch
 from multidrop.simulator.world import World
 
 VERSION = "1241V115"
@@ -88,27 +87,8 @@ class TmclModule:
         self.power(True, 0.0)
         self.motor.stand_at(position, 0.0)
 
-    # -- what the port needs ----------------------------------------------------------------------------------------
-
-    @property
-    def address(self) -> int:
-        """The address to which it listens."""
-        return self._global[Global.ADDRESS]
-
-    @property
-    def host_address(self) -> int:
-        """The address of the host in its replies."""
-        return self._global[Global.HOST_ADDRESS]
-
-    @property
-    def baud(self) -> int:
-        """The baud rate of its port; 0 for a code without a known rate."""
-        return BAUDS.get(self._global[Global.BAUD], 0)
-
-    @property
-    def pause(self) -> float:
-        """Seconds before a reply."""
-        return self._global[Global.PAUSE] / 1000
+    def __getitem__(self, parameter: Global) -> int:
+        return self._global[parameter]
 
     @property
     def deadline(self) -> float | None:
@@ -150,10 +130,7 @@ class TmclModule:
         self._live(now)
         return answer
 
-    # -- what a hand in the world needs -----------------------------------------------------------------------------
-
     def power(self, on: bool, now: float) -> None:
-        """Switch it off or on."""
         self.advance(now)
         if on == self.powered:
             return
@@ -175,14 +152,21 @@ class TmclModule:
     def world_changed(self) -> None:
         """Do nothing: `advance` looks at all of the world."""
 
-    # -- commands ---------------------------------------------------------------------------------------------------
-
     def _execute(self, call: Call, now: float) -> Answer | None:
         match call.command:
             case Command.VERSION:
-                return self._version(call)
+                if call.type == Version.TEXT:
+                    return Answer(text=self._version_text)
+                if call.type == Version.BINARY:
+                    return Answer(value=_number_of(self._version_text))
+                raise Refused(Status.WRONG_TYPE)
             case Command.FACTORY:
-                self._factory_settings(call, now)
+                if call.value != FACTORY_CODE:
+                    raise Refused(Status.INVALID_VALUE)
+                self._axis = {number: AXIS[number].fresh for number in STORED}
+                self._global = {number: row.fresh for number, row in GLOBAL.items()}
+                self.power(False, now)
+                self.power(True, now)
                 return None
             case Command.SGP | Command.GGP | Command.STGP | Command.RSGP:
                 return Answer(value=self._global_parameter(call))
@@ -190,8 +174,11 @@ class TmclModule:
             raise Refused(Status.INVALID_COMMAND)
         if call.command in range(Command.STOP_PROGRAM, Command.VERSION):
             return Answer(value=self._program_command(call, now))
-        if call.command == Command.NOTIFY:
-            return self._watch(call)
+        if call.command == Command.NOTIFY:  # when the motor reaches its target (command 138)
+            if call.value not in (0, 1):
+                raise Refused(Status.INVALID_VALUE)
+            self._notify = call.value
+            return Answer(value=call.value)
         if call.motor != 0:
             raise Refused(Status.INVALID_VALUE)
         return Answer(value=self._motor_command(call, now))
@@ -294,30 +281,6 @@ class TmclModule:
             return call.value
         return self._global[call.type] if call.command == Command.GGP else 0
 
-    def _version(self, call: Call) -> Answer:
-        if call.type == Version.TEXT:
-            return Answer(text=self._version_text)
-        if call.type == Version.BINARY:
-            return Answer(value=_number_of(self._version_text))
-        raise Refused(Status.WRONG_TYPE)
-
-    def _factory_settings(self, call: Call, now: float) -> None:
-        if call.value != FACTORY_CODE:
-            raise Refused(Status.INVALID_VALUE)
-        self._axis = {number: AXIS[number].fresh for number in STORED}
-        self._global = {number: row.fresh for number, row in GLOBAL.items()}
-        self.power(False, now)
-        self.power(True, now)
-
-    def _watch(self, call: Call) -> Answer:
-        """Have the module say when its motor reaches its target (command 138)."""
-        if call.value not in (0, 1):
-            raise Refused(Status.INVALID_VALUE)
-        self._notify = call.value
-        return Answer(value=call.value)
-
-    # -- time -------------------------------------------------------------------------------------------------------
-
     def _next_event(self, after: float) -> float:
         return min((at for at in (*self.motor.events(after), self.program.due) if at > after), default=inf)
 
@@ -329,7 +292,7 @@ class TmclModule:
         else:
             self.motor.shaft.settle(t)
             self._search.live(t)
-            if not self._search.running:
+            if self._search.phase is Phase.DONE:
                 self._search = None
         if self._notify and self.motor.positioning and self.motor.reached(t):
             self._notices.append((t, self._notify))

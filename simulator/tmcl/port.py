@@ -7,11 +7,10 @@ Ruling: the pause is 0.5 s; the manuals give none.
 from __future__ import annotations
 
 from struct import Struct
-from typing import Protocol
 
-from multidrop.dialects.tmcl.manual.commands import Call, Command, Status
-from multidrop.simulator.tmcl.module import Answer
-from multidrop.simulator.wire.wire import Transmission
+from multidrop.dialects.tmcl.manual.commands import BAUDS, Call, Command, Global, Status
+from multidrop.simulator.tmcl.module import TmclModule
+from multidrop.simulator.wire import Port, Transmission
 
 LENGTH = 9
 PAUSE = 0.5
@@ -20,30 +19,10 @@ REQUEST = Struct(">BBBBi")
 REPLY = Struct(">BBBBi")
 
 
-class Device(Protocol):
-    """What the port needs of a module."""
-
-    @property
-    def deadline(self) -> float | None: ...  # noqa: D102
-    @property
-    def address(self) -> int: ...  # noqa: D102
-    @property
-    def host_address(self) -> int: ...  # noqa: D102
-    @property
-    def baud(self) -> int: ...  # noqa: D102
-    @property
-    def pause(self) -> float: ...  # noqa: D102
-    @property
-    def powered(self) -> bool: ...  # noqa: D102
-    def advance(self, now: float) -> None: ...  # noqa: D102
-    def execute(self, call: Call, now: float) -> Answer | None: ...  # noqa: D102
-    def notices(self) -> list[tuple[float, int]]: ...  # noqa: D102
-
-
-class TmclPort:
+class TmclPort(Port):
     """The serial port of one module. `any_baud`: the wire has no baud rate that the module can be set to."""
 
-    def __init__(self, device: Device, *, any_baud: bool = True) -> None:
+    def __init__(self, device: TmclModule, *, any_baud: bool = True) -> None:
         self._device = device
         self._any_baud = any_baud
         self._message = bytearray()
@@ -52,34 +31,14 @@ class TmclPort:
 
     @property
     def baud(self) -> int:
-        """See `wire.Port`."""
-        return 0 if self._any_baud else self._device.baud
+        return 0 if self._any_baud else BAUDS.get(self._device[Global.BAUD], 0)
 
     @property
     def deadline(self) -> float | None:
-        """See `wire.Port`."""
         times = (self._device.deadline, *(each.at for each in self._out))
         return min((at for at in times if at is not None), default=None)
 
-    def quiet(self, now: float) -> bool:
-        """See `wire.Port`."""
-        due = self.deadline
-        return due is None or due > now
-
-    def hears(self, byte: int) -> bool:
-        """It receives every byte."""
-        return True
-
-    def completes(self, data: bytes) -> bool:
-        """Never: its replies are as long as the requests, so they cannot pile up."""
-        return False
-
-    def urgent(self, data: bytes) -> bool:
-        """Return False: the language has no keys."""
-        return False
-
     def receive(self, data: bytes, now: float) -> None:
-        """See `wire.Port`."""
         if not self._device.powered:
             self._message.clear()
             return
@@ -94,7 +53,6 @@ class TmclPort:
                 self._take(message, now)
 
     def sent(self, now: float) -> list[Transmission]:
-        """See `wire.Port`."""
         self._device.advance(now)
         for at, motors in self._device.notices():
             self._say(at, self._frame(Status.TARGET_REACHED, Command.NOTIFY, motors))
@@ -102,15 +60,12 @@ class TmclPort:
         self._out = [each for each in self._out if each.at > now]
         return due
 
-    def overhear(self, data: bytes, now: float) -> None:
-        """It takes nothing from other modules."""
-
     def _take(self, message: bytes, now: float) -> None:
         address, command, kind, motor, value = REQUEST.unpack(message[:-1])
-        if address != self._device.address:
+        if address != self._device[Global.ADDRESS]:
             return
         self._device.advance(now)
-        host = self._device.host_address
+        host = self._device[Global.HOST_ADDRESS]
         if sum(message[:-1]) % 256 != message[-1]:
             self._say(now, self._frame(Status.WRONG_CHECKSUM, command, 0))
             return
@@ -126,10 +81,10 @@ class TmclPort:
         self, status: int, command: int, value: int, address: int | None = None, host: int | None = None
     ) -> bytes:
         """One reply; it names the address that the request was for, also where that has just been changed."""
-        host = self._device.host_address if host is None else host
-        address = self._device.address if address is None else address
+        host = self._device[Global.HOST_ADDRESS] if host is None else host
+        address = self._device[Global.ADDRESS] if address is None else address
         body = REPLY.pack(host, address, status, command, value)
         return body + bytes([sum(body) % 256])
 
     def _say(self, at: float, data: bytes) -> None:
-        self._out.append(Transmission(at + self._device.pause, data))
+        self._out.append(Transmission(at + self._device[Global.PAUSE] / 1000, data))

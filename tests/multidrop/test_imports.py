@@ -55,7 +55,7 @@ TABLE = {
         "multidrop.simulator.pmx",
         "multidrop.simulator.tmcl",
         "multidrop.simulator.lexium.ports",
-        "multidrop.simulator.wire.wire",
+        "multidrop.simulator.wire",
     },
     ("program", "check", "a.prg"): NO_LINE
     | {"multidrop.simulator.lexium", "multidrop.dialects.mcode", "multidrop.dialects.pmx.host"},

@@ -10,14 +10,14 @@ from struct import Struct
 import pytest
 
 from multidrop.dialects import Diagnostic
-from multidrop.simulator.cell.reader import Reader, common_keys
+from multidrop.simulator.cell.drive_keys import WORLD_KEYS, common_keys, read_worlds
 from multidrop.simulator.cell.spec import DriveSpec, WorldSpec
 from multidrop.simulator.cell.table import Table
-from multidrop.simulator.cell.worlds import KEYS, read_worlds
+from multidrop.simulator.cells import Reader
 from multidrop.simulator.families import BY_PERSONALITY, FAMILIES, PROGRAMS, TABLE, family_of
 from multidrop.simulator.family import Family, Place, Unit
 from multidrop.simulator.lexium.state.models import MODELS
-from multidrop.simulator.wire.wire import Transmission, Wire
+from multidrop.simulator.wire import Transmission, Wire
 from multidrop.simulator.world import World
 
 FRAME = Struct(">BBBBiB")
@@ -79,7 +79,7 @@ def read_drive(table: Table, folder: Traversable) -> DriveSpec:
     name = table.text("name", "1")
     if not (name.isascii() and name.isdigit() and 1 <= int(name) <= 255):
         raise table.wrong("name", "must be 1 to 255")
-    first, *rest = read_worlds(table.table("world", "[bus.drive.world]"), ("0", "1", "2"), KEYS, range(8), 4095)
+    first, *rest = read_worlds(table.table("world", "[bus.drive.world]"), ("0", "1", "2"), WORLD_KEYS, range(8), 4095)
     return DriveSpec(**common_keys(table, folder), name=name, world=first, further=tuple(rest))
 
 

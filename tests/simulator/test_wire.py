@@ -9,8 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from multidrop.simulator.cell.spec import Faults
-from multidrop.simulator.wire.baud import resample
-from multidrop.simulator.wire.wire import Transmission, Wire
+from multidrop.simulator.wire import Transmission, Wire, resample
 
 BYTE = 10 / 9600
 

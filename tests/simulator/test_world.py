@@ -5,7 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from multidrop.simulator.cell.spec import WorldSpec
-from multidrop.simulator.kinematics.profile import move, slew
+from multidrop.simulator.kinematics import move, slew
 from multidrop.simulator.world import REVOLUTION, World
 
 SCHEDULE = WorldSpec(inputs=((2.0, 1, 0), (2.5, 1, 1), (1.0, 3, 1)), analog=((0.5, 2048), (3.0, 100)))

@@ -46,7 +46,7 @@ class Bench:
     def still(self, axis: str = "X", within: float = 1000.0) -> Bench:
         """Let time pass until an axis stands, to the event at which it does."""
         end = self.now + within
-        while self.device.commanded.moving(axis):
+        while self.device.controller.moving(axis):
             at = self.wire.deadline
             assert at is not None and at <= end, "it goes on"
             self.now = at

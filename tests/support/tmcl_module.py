@@ -5,7 +5,7 @@ from __future__ import annotations
 from multidrop.dialects.tmcl.host import codec
 from multidrop.dialects.tmcl.manual import commands
 from multidrop.simulator.cell.spec import WorldSpec
-from multidrop.simulator.tmcl.drive_table import split_settings
+from multidrop.simulator.tmcl.family import split_settings
 from multidrop.simulator.tmcl.module import TmclModule
 from multidrop.simulator.tmcl.port import TmclPort
 from multidrop.simulator.world import World

@@ -14,7 +14,7 @@ from multidrop.shell.session import Session
 from multidrop.simulator.cells import read
 from multidrop.simulator.floor import Floor
 from multidrop.simulator.serving.running import RunningFloor
-from multidrop.simulator.wire.baud import resample
+from multidrop.simulator.wire import resample
 from multidrop.transports import Transport
 
 

@@ -16,10 +16,10 @@ from multidrop.dialects.mcode.manual.statements import device_name as device_nam
 from multidrop.dialects.mcode.manual.table import lookup
 from multidrop.simulator.lexium.event_loop import EventLoop
 from multidrop.simulator.lexium.language.variables import Compile, Variables, bare, is_place, missing, only
+from multidrop.simulator.lexium.motion.counters import BITS
 from multidrop.simulator.lexium.motion.inputs import ANALOG
 from multidrop.simulator.lexium.motion.motor import Motor
 from multidrop.simulator.lexium.motion.outputs import Outputs
-from multidrop.simulator.lexium.motion.trips import BITS
 from multidrop.simulator.lexium.state.errors import Fault
 from multidrop.simulator.lexium.state.expressions import whole
 from multidrop.simulator.lexium.state.interpreter import Action, Core

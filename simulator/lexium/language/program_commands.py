@@ -14,12 +14,11 @@ from multidrop.dialects.mcode.manual.table import lookup
 from multidrop.simulator.lexium.language.variables import Compile, Variables, bare, is_place, only, pair
 from multidrop.simulator.lexium.motion.motor import Motor
 from multidrop.simulator.lexium.power import Nvm
-from multidrop.simulator.lexium.state.errors import Fault
+from multidrop.simulator.lexium.state.errors import CRLF, Fault
 from multidrop.simulator.lexium.state.expressions import compile_condition, whole
 from multidrop.simulator.lexium.state.interpreter import Action, Core
 from multidrop.simulator.lexium.state.memory import within
 from multidrop.simulator.lexium.state.program_memory import FIRST, SPACE
-from multidrop.simulator.lexium.state.timeline import CRLF
 
 MOST_PASSES = 65535
 OPTIONS = (Number(0), Number(1))

@@ -13,8 +13,7 @@ from math import floor, inf
 from typing import Protocol, TypedDict
 
 from multidrop.dialects.mcode.manual.errors import ErrorNumber as E
-from multidrop.simulator.kinematics.profile import Profile, halt, move, slew
-from multidrop.simulator.kinematics.segments import LINEAR, Shape
+from multidrop.simulator.kinematics import LINEAR, Profile, Shape, halt, move, slew
 from multidrop.simulator.lexium.motion.counters import Counters
 from multidrop.simulator.lexium.motion.rotor import CATCHING, Rotor
 from multidrop.simulator.lexium.state.errors import Fault

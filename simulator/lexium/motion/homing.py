@@ -15,15 +15,13 @@ from collections.abc import Callable
 from math import inf
 
 from multidrop.dialects.mcode.manual.errors import ErrorNumber as E
-from multidrop.simulator.kinematics.profile import slew
-from multidrop.simulator.kinematics.segments import Shape
+from multidrop.simulator.kinematics import Shape, slew
 from multidrop.simulator.lexium.motion.axis import HOMING, TORQUE, Axis
 from multidrop.simulator.lexium.motion.counters import DIRECTIONS, ERRORS, Limits
 from multidrop.simulator.lexium.motion.inputs import HOME, Inputs
 from multidrop.simulator.lexium.motion.rotor import TOUCH
-from multidrop.simulator.lexium.state.errors import Fault
+from multidrop.simulator.lexium.state.errors import Event, Fault
 from multidrop.simulator.lexium.state.interpreter import Core
-from multidrop.simulator.lexium.state.timeline import Event
 
 SEEK, BRAKE, TURN, APPROACH = "seek", "brake", "turn", "approach"
 TYPES = {1: (-1, 1), 2: (-1, -1), 3: (1, -1), 4: (1, 1)}

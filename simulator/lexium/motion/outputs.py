@@ -13,7 +13,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 
 from multidrop.dialects.mcode.manual.errors import ErrorNumber as E
-from multidrop.simulator.lexium.motion.hmt import FIXED, HYBRID, LAG, LEAD, MOST, VARIABLE
+from multidrop.simulator.lexium.motion.feedback import FIXED, HYBRID, LAG, LEAD, MOST, VARIABLE
 from multidrop.simulator.lexium.motion.motor import Motor
 from multidrop.simulator.lexium.state.errors import Fault
 from multidrop.simulator.lexium.state.interpreter import Core

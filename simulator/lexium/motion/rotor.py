@@ -15,9 +15,9 @@ from __future__ import annotations
 
 from math import copysign, floor, inf
 
-from multidrop.simulator.kinematics.profile import Profile, halt, meeting, move, slew
+from multidrop.simulator.kinematics import Profile, halt, meeting, move, slew
+from multidrop.simulator.lexium.state.errors import Event, nothing, when
 from multidrop.simulator.lexium.state.interpreter import Core
-from multidrop.simulator.lexium.state.timeline import Event, nothing, when
 from multidrop.simulator.world import REVOLUTION, World
 
 TOUCH = 1e-6

@@ -14,17 +14,296 @@ length, a byte count or a count that does not fit) is exception 3. Nothing here 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from struct import pack, unpack
 
-from multidrop.simulator.lexium.device import MCodeDevice
-from multidrop.simulator.lexium.ports.registers import (
-    ILLEGAL_ADDRESS,
-    ILLEGAL_VALUE,
-    MOST_REGISTERS,
-    Refusal,
-    Registers,
-)
+from multidrop.dialects.mcode.manual.grammar import Name, Number
+from multidrop.dialects.modbus.manual.registers import AT, REGISTERS, Register
+from multidrop.simulator.lexium.device import Answer, MCodeDevice
+from multidrop.simulator.lexium.motion.counters import HMT, RELATIVE
+
+# The registers, inputs, coils and named functions of a simulated Ethernet drive: its state, seen from Modbus.
+#
+# Everything goes through the lines that MCode/TCP would send to the device. So a value has one range, one side effect
+# and one error by either way; a register has a range of its own as well, and a write must satisfy both. Exceptions: 2,
+# there is no such register in that direction; 3, a wrong value or count, or a part of a value; 4, the drive refuses
+# (ER says why). A value that the drive itself finds out of range is a 3 too, and sets ER as on MCode/TCP. (Modbus/TCP
+# manual 4 and 5; docs/rulings.md.)
+#
+# Decisions where the manual is silent (facts that a unit may correct):
+#
+# - IC and DC take the address of the variable's (first) register: they have room for one byte only. - TA holds the
+# mask in its low word and the address of the subroutine in its high word. - TS is the divider: the drive's speed is 10
+# MHz / (TS + 2). Each side has its own range for it; 0 is 0 on both. - S, IP, CF and SC have their effect with any
+# value. O1 to O3 can be read (4.2.2, note). - What a product does not support (an encoder's register in open loop) is
+# refused by the drive: exception 4, ER 37. - Registers are no lines: in program mode they are read and written, not
+# stored. - Two registers of one byte each are written one after the other, once both values are in range.
+
+
+ILLEGAL_ADDRESS, ILLEGAL_VALUE, FAILURE = 2, 3, 4
+VALUE_ERRORS = frozenset({21, 22, 23, 76, 77})
+"""Codes of ER that say that a number is out of range."""
+MOST_REGISTERS = 2
+"""Registers in one request (4.2.4)."""
+POINTS = 4
+"""Inputs; outputs are counted to four too, though there are three."""
+OUTPUTS = 3
+INPUT_REGISTERS = REGISTERS["I1"].address
+OSCILLATOR = 10_000_000
+MASKS = range(32)
+CRLF = "\r\n"
+READ_BY_NAME = ("IS", "OS", "TR", "MU", *(f"S{n}" for n in range(1, 6)))
+WRITTEN_BY_NAME = ("EX", "PS", "RS", *READ_BY_NAME)
+END = "E"
+"""Both functions take it (4.3.1)."""
+LONGEST_DATA = 28
+LONGEST_TEXT = 250
+
+
+class Refusal(Exception):
+    """An exception response with this code."""
+
+    def __init__(self, code: int) -> None:
+        super().__init__(code)
+        self.code = code
+
+
+class Registers:
+    """One drive's registers. Times are the drive's; raises Refusal."""
+
+    def __init__(self, device: MCodeDevice) -> None:
+        self._drive, self._errors, self._program = device, device.errors, device.program
+        self._inputs, self._trips, self._torque = device.motor.inputs, device.motor.trips, device.motor.torque
+
+    # Registers.
+
+    def read(self, start: int, count: int, now: float) -> list[int]:
+        """Read registers; one word of a value of two words is that word."""
+        rows = _rows(start, count)
+        if not all(row.readable or row.name in READ_ALSO for row in rows):
+            raise Refusal(ILLEGAL_ADDRESS)
+        if count == 2 and rows[0] is rows[1]:
+            return self._words(rows[0], now)
+        return [self._words(row, now)[address - row.address] for address, row in enumerate(rows, start)]
+
+    def write(self, start: int, words: Sequence[int], now: float) -> None:
+        """Write registers; a value of two words needs both."""
+        rows = _rows(start, len(words))
+        if not all(row.writable for row in rows):
+            raise Refusal(ILLEGAL_ADDRESS)
+        for line in [_line(row, value) for row, value in _values(start, rows, words)]:
+            if callable(line):
+                line(self, now)
+            else:
+                self.carry_out(line, now)
+
+    def _words(self, row: Register, now: float) -> list[int]:
+        value = READERS[row.name](self, now) if row.name in READERS else self.number(row.name, now)
+        if row.name in SHOWN:
+            value = SHOWN[row.name](value)
+        return [value >> 16 * place & 0xFFFF for place in range(row.count)]
+
+    def number(self, word: str, now: float) -> int:
+        """Read a number as PR does, with its side effects."""
+        return int(self.carry_out(f"PR {word}", now).lines[0])
+
+    # Inputs and coils.
+
+    def inputs(self, start: int, count: int, now: float) -> list[bool]:
+        """Read digital inputs: at 0 to 3, and at the addresses of their registers."""
+        first = start - INPUT_REGISTERS if start >= INPUT_REGISTERS else start
+        _check_points(first, count)
+        return [bool(self.number(f"I{n}", now)) for n in range(first + 1, first + count + 1)]
+
+    def coils(self, start: int, count: int, now: float) -> list[bool]:
+        """Read digital outputs, active or not; the fourth reads 0."""
+        _check_points(start, count)
+        self._drive.advance(now)
+        active = self._drive.outputs(self._drive.now)
+        return [active.get(n, False) for n in range(start + 1, start + count + 1)]
+
+    def write_coil(self, address: int, on: bool, now: float) -> None:
+        if not address < OUTPUTS:
+            raise Refusal(ILLEGAL_ADDRESS)
+        self.carry_out(f"O{address + 1}={int(on)}", now)
+
+    # Functions by name.
+
+    def read_named(self, name: str, now: float) -> str:
+        """Carry out function 65: give the text that PR prints, or carry out E."""
+        if name == END:
+            self.carry_out(END, now)
+            return ""
+        if name not in READ_BY_NAME:
+            raise Refusal(ILLEGAL_VALUE)
+        if name in POINT_OF:
+            self._drive.advance(now)
+            return ", ".join(str(each) for each in (*self._inputs.types[POINT_OF[name]], 0)[:3])
+        if name == "TR" and RELATIVE not in self._trips.defined:
+            return "0, 0, 0"
+        return CRLF.join(self.carry_out(f"PR {name}", now).lines)[:LONGEST_TEXT]
+
+    def write_named(self, name: str, data: bytes, now: float) -> None:
+        """Carry out function 66: a name and what follows it in the drive's own language."""
+        if name != END and name not in WRITTEN_BY_NAME:
+            raise Refusal(ILLEGAL_VALUE)
+        if len(data) > LONGEST_DATA or any(not 0x20 <= byte < 0x7F for byte in data):
+            raise Refusal(ILLEGAL_VALUE)
+        text = data.decode("ascii")
+        if name in POINT_OF:
+            kind, active, *_ = (*text.removeprefix("=").split(","), "", "")
+            name, text = "IS", f"={POINT_OF[name]},{kind},{active}".removesuffix(",")
+        self.carry_out(f"{name}{text}" if text.startswith("=") else f"{name} {text}", now)
+
+    # What no line gives.
+
+    def set_torque_speed(self, speed: int) -> None:
+        self._torque.set_speed(speed)
+
+    def trip(self, now: float) -> int:
+        """Read TA: its mask, and the address of its subroutine in the high word."""
+        self.carry_out("PR TA", now)
+        trip = self._trips.defined.get(HMT)
+        if trip is None:
+            return 0
+        place = 0
+        if isinstance(trip.target, Name):
+            place = self._program.labels.get(trip.target.word, 0)
+        elif isinstance(trip.target, Number):
+            place = int(trip.target.value)
+        return trip.value | place << 16
+
+    # Lines.
+
+    def text(self, word: str, now: float) -> str:
+        """Return the first line that PR prints of a word."""
+        return self.carry_out(f"PR {word}", now).lines[0]
+
+    def carry_out(self, line: str, now: float) -> Answer:
+        """Carry out one line at once, in program mode too. Raises Refusal (3, 4) if the drive refuses it."""
+        answer = self._drive.execute(line, now, immediate=True)
+        if answer.refused:
+            code = self._errors.code
+            raise Refusal(ILLEGAL_VALUE if code in VALUE_ERRORS else FAILURE)
+        return answer
+
+
+def _rows(start: int, count: int) -> list[Register]:
+    """Find the values of registers, one for each. Raises Refusal (2, 3)."""
+    if not 1 <= count <= MOST_REGISTERS:
+        raise Refusal(ILLEGAL_VALUE)
+    try:
+        return [AT[address] for address in range(start, start + count)]
+    except KeyError:
+        raise Refusal(ILLEGAL_ADDRESS) from None
+
+
+def _check_points(start: int, count: int) -> None:
+    if not 1 <= count <= POINTS:
+        raise Refusal(ILLEGAL_VALUE)
+    if not 0 <= start <= start + count <= POINTS:
+        raise Refusal(ILLEGAL_ADDRESS)
+
+
+def _values(start: int, rows: Sequence[Register], words: Sequence[int]) -> list[tuple[Register, int]]:
+    """Combine words to the values of registers. Raises Refusal (3) for a part of a value."""
+    if len(rows) == 2 and rows[0] is rows[1]:
+        value = words[0] | words[1] << 16
+        if rows[0].width == 4 and value >> 31:
+            value -= 1 << 32
+        return [(rows[0], value)]
+    if any(row.width > 2 or address != row.address for address, row in enumerate(rows, start)):
+        raise Refusal(ILLEGAL_VALUE)
+    return list(zip(rows, words, strict=True))
+
+
+Hand = Callable[[Registers, float], None]
+
+
+def _line(row: Register, value: int) -> str | Hand:
+    """Translate a write to a line of the drive. Raises Refusal (3) for a value that the register refuses."""
+    if not row.allows(value):
+        raise Refusal(ILLEGAL_VALUE)
+    name = row.name
+    if name in WRITERS:
+        return WRITERS[name](name, value)
+    return f"{name} {value}" if name in ORDERS else f"{name}={value}"
+
+
+def _bare(name: str, value: int) -> str:
+    return name
+
+
+def _clear(name: str, value: int) -> str:
+    if value:
+        raise Refusal(ILLEGAL_VALUE)
+    return f"{name}=0"
+
+
+def _stepped(name: str, value: int) -> str:
+    row = AT.get(value)
+    if row is None or row.address != value:
+        raise Refusal(ILLEGAL_VALUE)
+    return f"{name} {row.name}"
+
+
+def _trip(name: str, value: int) -> str:
+    mask, place = value & 0xFFFF, value >> 16 & 0xFFFF
+    if mask not in MASKS:
+        raise Refusal(ILLEGAL_VALUE)
+    return f"{name}={mask},{place}"
+
+
+def _divider(name: str, value: int) -> Hand:
+    """Set the speed of a divider, which can be beyond the range of MCode: no line can set it."""
+
+    def write(registers: Registers, now: float) -> None:
+        registers.carry_out("PR TS", now)
+        registers.set_torque_speed(round(OSCILLATOR / (value + 2)) if value else 0)
+
+    return write
+
+
+def _output(n: int) -> Callable[[Registers, float], int]:
+    return lambda registers, now: int(registers.coils(n - 1, 1, now)[0])
+
+
+ORDERS = frozenset({"MA", "MR", "SL", "HM", "HI"})
+"""Instructions with a value."""
+
+WRITERS: Mapping[str, Callable[[str, int], str | Hand]] = {
+    **dict.fromkeys(("S", "IP", "CF"), _bare),
+    "SC": lambda name, value: "SC 1",
+    "ER": _clear,
+    "IC": _stepped,
+    "DC": _stepped,
+    "OT": lambda name, value: f"OT={value & 7}",
+    "TA": _trip,
+    "TS": _divider,
+}
+"""What is more than an assignment."""
+
+READERS: Mapping[str, Callable[[Registers, float], int]] = {
+    **{f"O{n}": _output(n) for n in range(1, OUTPUTS + 1)},
+    "IT": lambda registers, now: registers.number("IT 1", now),
+    "TA": lambda registers, now: registers.trip(now),
+}
+"""What is more than PR."""
+READ_ALSO = frozenset({"O1", "O2", "O3"})
+"""Write only by name, but a note of 4.2.2 has them read."""
+
+SHOWN: Mapping[str, Callable[[int], int]] = {
+    "I5": lambda counts: counts // 4,
+    "AF": lambda status: status & 0xFF,
+    "OF": lambda faults: int(faults != 0),
+    "D5": lambda weight: min(weight, 255),
+    "TS": lambda speed: min(max(round(OSCILLATOR / speed) - 2, 0), 255) if speed else 0,
+}
+"""Where a register's form is another than MCode's."""
+
+POINT_OF: Mapping[str, int] = {f"S{n}": n for n in range(1, 6)}
+"""The inputs by the name that the manual's example has for their set-up (4.3.3), the older drives' own."""
+
 
 HEADER = 6
 """Bytes before those that the length counts."""

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from multidrop.simulator.kinematics.profile import Profile, halt, move, slew
+from multidrop.simulator.kinematics import Profile, halt, move, slew
 
 speeds = st.floats(0, 2_560_000, allow_subnormal=False).map(lambda v: v if v > 1e-3 else 0.0)
 velocities = st.tuples(speeds, st.sampled_from((-1, 1))).map(lambda pair: pair[0] * pair[1])

@@ -8,7 +8,7 @@ from multidrop.simulator.floor import Floor
 from multidrop.simulator.lexium.device import MCodeDevice
 from multidrop.simulator.lexium.ports.mcode import MCodePort
 from multidrop.simulator.lexium.power import ETHERNET_BOOT
-from multidrop.simulator.wire.wire import Wire
+from multidrop.simulator.wire import Wire
 from multidrop.simulator.world import World
 
 

@@ -8,9 +8,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from multidrop.simulator.lexium.ports.mcode import MCodePort
-from multidrop.simulator.lexium.ports.replies import checksum
-from multidrop.simulator.wire.wire import Transmission
+from multidrop.simulator.lexium.ports.mcode import MCodePort, checksum
+from multidrop.simulator.wire import Transmission
 from tests.support.cases import for_each
 
 

@@ -6,8 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from multidrop.simulator.kinematics.profile import meeting, move, slew
-from multidrop.simulator.kinematics.segments import SINUSOIDAL, TRIANGLE, Shape
+from multidrop.simulator.kinematics import SINUSOIDAL, TRIANGLE, Shape, meeting, move, slew
 from tests.support.lexium import at, drive, rotor, say
 
 PACE = {"vi": 1000.0, "vm": 768_000.0, "a": 1e6, "d": 1e6}

@@ -288,7 +288,7 @@ def test_no_bytes_ever_raise_and_every_addressed_line_is_answered(lines: list[by
     pmx = Bench("[bus.drive.world]\nhome = -100\nlimit_plus = 500\nstall_at = -700\nslip = 0.1")
     for each in lines:
         text = each.replace(b"@", b"").replace(b"\r", b"")
-        number = pmx.device.number.encode()
+        number = pmx.device.controller.settings.number.encode()
         assert pmx.send(b"@" + number + text + b"\r").endswith(b"\r")
         pmx.send(each)
         pmx.send(b"\r")

@@ -6,6 +6,7 @@ import pytest
 
 from multidrop.dialects.pmx.manual.script_checker import read
 from multidrop.dialects.pmx.manual.script_compiler import LINES
+from multidrop.simulator.pmx.commands import CommandedController
 from multidrop.simulator.pmx.programs import Programs
 from tests.support.pmx_programs import STEP_PER_EDGE, TEN_TIMES, TWO, WATCHDOG
 
@@ -14,8 +15,8 @@ SPEED = 10_000.0
 IDLE, RUNNING, PAUSED, ERROR = 0, 1, 2, 4
 
 
-class Stand:
-    """Axes that move at one speed; registers that hold what they are given. X cannot pass `wall`."""
+class Stand(CommandedController):
+    """A stand-in: axes that move at one speed; registers that hold what they are given. X cannot pass `wall`."""
 
     def __init__(self, wall: float = 1e9) -> None:
         self.now = 0.0

@@ -16,7 +16,7 @@ TAKEN = [(name, word) for name, word in WORDS.items() if name[0] != "V" and not 
 @for_each(("name", "word"), TAKEN)
 def test_a_word_is_read_set_or_carried_out(name: str, word: Word) -> None:
     spec = DriveSpec(personality="PMX", name="00")
-    controller = PmxDevice(spec).commanded
+    controller = PmxDevice(spec).controller
     assert controller.ask("EO=3", 0.0) == "OK"
     if word.readable:
         assert int(controller.ask(word.ascii, 0.0)) >= 0

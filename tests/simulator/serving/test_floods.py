@@ -24,7 +24,7 @@ from multidrop.simulator.floor import Floor
 from multidrop.simulator.serving import input_queue
 from multidrop.simulator.serving.endpoints import BACKLOG, serve_bus
 from multidrop.simulator.serving.running import RunningFloor
-from multidrop.simulator.wire.wire import Wire
+from multidrop.simulator.wire import Wire
 from tests.support.until import PATIENCE
 
 pytestmark = pytest.mark.slow

@@ -5,7 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from multidrop.dialects.tmcl.host import codec
-from multidrop.dialects.tmcl.manual.commands import Call, Command
+from multidrop.dialects.tmcl.manual.commands import Call, Command, Global
 from tests.support.tmcl_module import Module
 
 WORKED = [
@@ -98,7 +98,7 @@ def test_any_bytes_leave_a_module_that_replies_after_a_pause(pieces):
     for piece in pieces:
         module.send(piece)
     module.wait(1.0)
-    address = module.device.address
+    address = module.device[Global.ADDRESS]
     reply = codec.parse_reply(module.send(codec.frame_of(address, Call(Command.GGP, 66))))
     assert reply is not None and reply.value == address
 

@@ -22,13 +22,156 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Iterator, Sequence
 from heapq import heappop, heappush
-from math import inf
+from math import ceil, inf
 from random import Random
 from typing import NamedTuple, Protocol
 
 from multidrop.simulator.cell.spec import Faults
-from multidrop.simulator.wire.baud import BITS_A_BYTE, resample
-from multidrop.simulator.wire.collisions import Merger, Paced, Unpaced
+
+# Collisions: the transmissions of several drives merged on one wire.
+#
+# A drive's transmitter sends one byte after another, whatever the others do. On the wire, bytes that overlap become
+# one. Equal bytes give that byte, so a global ESC, to which all drives reply with the same characters, looks like one
+# reply. Different bytes give their AND, since a 0 wins over a 1. A byte that begins in the middle of another one is
+# lost in it: the receiver is busy with the first.
+#
+# On a paced wire, transmissions overlap in time. On an unpaced one bytes take no time, so two drives collide only if
+# the same byte from the host, or the same moment, made them send.
+
+
+class Paced:
+    """Merges what transmitters send on a wire on which each byte takes `byte_time` seconds.
+
+    `send` takes bytes at a time, or after what the transmitter sends already, and returns the time of their end;
+    `take` gives those that have arrived in full, `deadline` is when the next one will have. `backlog` counts bytes.
+    """
+
+    def __init__(self, byte_time: float) -> None:
+        self._time = byte_time
+        self._free: dict[int, float] = {}
+        self._pending: list[tuple[float, int, int]] = []
+
+    def send(self, who: int, at: float, data: bytes) -> float:
+        start = max(at, self._free.get(who, at))
+        for n, byte in enumerate(data):
+            heappush(self._pending, (start + n * self._time, who, byte))
+        self._free[who] = start + len(data) * self._time
+        return self._free[who]
+
+    def busy(self, who: int, at: float) -> bool:
+        return at < self._free.get(who, at)
+
+    def new_cause(self) -> None:
+        """Do nothing: where bytes take time, causes do not matter."""
+
+    def take(self, now: float) -> bytes:
+        pending, slack = self._pending, self._time / 16
+        out = bytearray()
+        while pending and pending[0][0] + self._time <= now:
+            start, _, value = heappop(pending)
+            while pending and pending[0][0] < start + self._time - slack:
+                value &= heappop(pending)[2]
+            out.append(value)
+        return bytes(out)
+
+    @property
+    def backlog(self) -> int:
+        return len(self._pending)
+
+    @property
+    def deadline(self) -> float | None:
+        return self._pending[0][0] + self._time if self._pending else None
+
+    def clear(self) -> None:
+        self._pending.clear()
+        self._free.clear()
+
+
+class Unpaced:
+    """The same for a wire on which bytes take no time. After `new_cause` what is sent has another cause."""
+
+    def __init__(self) -> None:
+        self._cause = 0
+        self._last: dict[int, tuple[float, int, int]] = {}
+        self._pending: list[tuple[float, int, int, bytes]] = []
+        self._waiting = 0
+
+    def send(self, who: int, at: float, data: bytes) -> float:
+        before, cause, n = self._last.get(who, (at, self._cause, 0))
+        at = max(at, before)
+        if (at, self._cause) != (before, cause):
+            n = 0
+        heappush(self._pending, (at, self._cause, n, data))
+        self._waiting += len(data)
+        self._last[who] = (at, self._cause, n + len(data))
+        return at
+
+    def busy(self, who: int, at: float) -> bool:
+        return who in self._last and at <= self._last[who][0]
+
+    def new_cause(self) -> None:
+        self._cause += 1
+
+    def take(self, now: float) -> bytes:
+        heard, moment = bytearray(), (0.0, -1)
+        begun = 0
+        while self._pending and self._pending[0][0] <= now:
+            at, cause, n, data = heappop(self._pending)
+            self._waiting -= len(data)
+            if moment != (at, cause):
+                moment, begun = (at, cause), len(heard) - n
+            start = begun + n
+            both = max(0, min(len(heard) - start, len(data)))
+            for k in range(both):
+                heard[start + k] &= data[k]
+            heard += data[both:]
+        return bytes(heard)
+
+    @property
+    def backlog(self) -> int:
+        return self._waiting
+
+    @property
+    def deadline(self) -> float | None:
+        return self._pending[0][0] if self._pending else None
+
+    def clear(self) -> None:
+        self._waiting = 0
+        self._pending.clear()
+        self._last.clear()
+
+
+# The bytes that a receiver samples from a signal of another baud rate.
+
+
+BITS_A_BYTE = 10
+"""A byte on the wire: a start bit, eight bits of data, a stop bit (8N1)."""
+
+
+def resample(data: bytes, sent: float, received: float) -> bytes:
+    """Sample bytes that are sent back to back at `sent` baud (8N1) with a receiver set to `received` baud.
+
+    The receiver starts at a falling edge and samples the middle of each of its own bit times. It delivers the byte even
+    if the stop bit is not one.
+    """
+    if sent == received:
+        return data
+    levels = [1]
+    for byte in data:
+        levels += [0, *((byte >> bit) & 1 for bit in range(8)), 1]
+    ratio = sent / received
+    out = bytearray()
+    at = 1
+    while at < len(levels):
+        if levels[at] or not levels[at - 1]:
+            at += 1
+            continue
+        middles = (int(at + (bit + 1.5) * ratio) for bit in range(8))
+        bits = [levels[each] if each < len(levels) else 1 for each in middles]  # idle after the last byte
+        out.append(sum(level << bit for bit, level in enumerate(bits)))
+        at = max(at + 1, ceil(at + 9.5 * ratio))
+    return bytes(out)
+
 
 # The faults of a wire: what they do to bytes, drawn from one seeded source in the order of the bytes.
 
@@ -84,7 +227,7 @@ class Transmission(NamedTuple):
 
 
 class Port(Protocol):
-    """The drive's side of the wire."""
+    """The drive's side of the wire. A port without keys and without a line for others inherits the answers to that."""
 
     @property
     def deadline(self) -> float | None:
@@ -96,15 +239,20 @@ class Port(Protocol):
 
     def quiet(self, now: float) -> bool:
         """Whether nothing waits to be sent, and nothing happens up to `now`: it need not be asked."""
+        due = self.deadline
+        return due is None or due > now
 
     def hears(self, byte: int) -> bool:
         """Whether a byte means anything to it now. It takes note of a byte that does not, which is not received."""
+        return True
 
     def completes(self, data: bytes) -> bool:
-        """Whether these bytes can complete a message that it replies to."""
+        """Whether these bytes can complete a message that it replies to with more bytes than the message has."""
+        return False
 
     def urgent(self, data: bytes) -> bool:
         """Whether these bytes contain a key that acts at once, such as a stop."""
+        return False
 
     def receive(self, data: bytes, now: float) -> None:
         """Take bytes whose last bit arrived at `now`."""
@@ -114,6 +262,7 @@ class Port(Protocol):
 
     def overhear(self, data: bytes, now: float) -> None:
         """Take bytes that another drive has sent, of those that drives overhear."""
+        return
 
 
 class Wire:
@@ -131,7 +280,7 @@ class Wire:
         self._coming: deque[tuple[float, bytes, int]] = deque()
         self._queued: dict[int, int] = {}
         self._held_until = 0.0
-        self._merger: Merger = Paced(self._byte_time) if baud else Unpaced()
+        self._merger: Paced | Unpaced = Paced(self._byte_time) if baud else Unpaced()
         self._overheard: list[tuple[float, int, bytes]] = []
         self._hang_up_at = self._faults.hangup_after
         self._ports_due = inf
@@ -190,24 +339,28 @@ class Wire:
     def advance(self, now: float) -> bytes:
         """Give the bytes that every endpoint has received by now, since it was last asked."""
         if self._hang_up_at is not None and now >= self._hang_up_at:
-            self._hang_up_or_plug(now)
+            after, lasts = self._faults.hangup_after, self._faults.hangup_for
+            if self.hung_up:
+                self.plug()
+                self._hang_up_at = None if after is None else now + after
+            else:
+                self.unplug()
+                self._hang_up_at = None if lasts is None else now + lasts
         received = self._carry(now)
         if not self._asleep(now):
-            self._ask_all(now)
+            for who, port in enumerate(self._ports):
+                if not port.quiet(now):
+                    self._collect(who, now)
+            self._ports_due, self._outdated = self._earliest(), False
         while self._overheard and self._overheard[0][0] <= now:
-            self._pass_on(*heappop(self._overheard)[1:], now)
+            _, source, data = heappop(self._overheard)
+            self._merger.new_cause()
+            for who, port in enumerate(self._ports):
+                if who != source:
+                    port.overhear(data, now)
+                    self._collect(who, now)
         received += self._merger.take(now)
         return b"" if self.hung_up else harmed(received, self._faults, self._rng)
-
-    def _hang_up_or_plug(self, now: float) -> None:
-        """Carry out a hang-up of the faults, or the plugging in after it."""
-        after, lasts = self._faults.hangup_after, self._faults.hangup_for
-        if self.hung_up:
-            self.plug()
-            self._hang_up_at = None if after is None else now + after
-        else:
-            self.unplug()
-            self._hang_up_at = None if lasts is None else now + lasts
 
     def _carry(self, now: float) -> bytes:
         """Bring the host's due bytes to the drives; give what endpoints receive meanwhile.
@@ -253,12 +406,6 @@ class Wire:
         """Whether no port has had an event up to `now`."""
         return now < self._ports_due and not self._outdated
 
-    def _ask_all(self, now: float) -> None:
-        for who, port in enumerate(self._ports):
-            if not port.quiet(now):
-                self._collect(who, now)
-        self._ports_due, self._outdated = self._earliest(), False
-
     def _earliest(self) -> float:
         """The earliest deadline of all ports."""
         return min((at for port in self._ports if (at := port.deadline) is not None), default=inf)
@@ -281,7 +428,6 @@ class Wire:
         self._merger.clear()
 
     def plug(self) -> None:
-        """Plug in again."""
         self.hung_up = False
 
     def retune(self, baud: int) -> None:
@@ -292,14 +438,6 @@ class Wire:
         self._queued.clear()
         self._overheard.clear()
         self._merger = Paced(self._byte_time) if baud else Unpaced()
-
-    def _pass_on(self, source: int, data: bytes, now: float) -> None:
-        """Pass what one drive sends to the others."""
-        self._merger.new_cause()
-        for who, port in enumerate(self._ports):
-            if who != source:
-                port.overhear(data, now)
-                self._collect(who, now)
 
     def _collect(self, who: int, now: float) -> None:
         low, high = self._faults.delay

@@ -1,1 +1,0 @@
-"""A wire with drives on it: pacing, collisions, faults, wrong baud rates."""
