@@ -173,6 +173,8 @@ def _number(text: str, allowed: Sequence[int], what: str, where: str) -> int:
 
 def _input(floor: Floor, words: list[str], now: float) -> None:
     placed, world = floor.place(words[0], "/sim input")
+    if not placed.unit.inputs:
+        raise Diagnostic(f'"{words[0]}" has no inputs', "/sim input")
     number = _number(words[1], sorted(placed.unit.inputs), "input", "/sim input")
     if words[2] not in LEVELS:
         raise Diagnostic(f'no level "{words[2]}"', "/sim input", "valid: 0 (ground), 1 (+V), open (neither)")

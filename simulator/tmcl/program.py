@@ -63,7 +63,7 @@ class Program:
 
     def run(self, t: float, place: int | None = None) -> None:
         """Run from a line, or from where it was halted."""
-        self._place = self._place if place is None else place
+        self._place = self._place if place is None else max(0, place)
         self.running, self.due, self._waits = True, t + LINE_TIME, None
 
     def halt(self, *, reset: bool = False) -> None:

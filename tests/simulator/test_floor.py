@@ -171,3 +171,9 @@ def test_the_axes_of_a_pmx_have_worlds_of_their_own() -> None:
         each.command("/sim push 00.z 1", 3.0)
     with pytest.raises(Diagnostic, match="1 to 8"):
         each.command("/sim input 00 9 0", 3.0)
+
+
+def test_a_module_without_inputs_refuses_an_input() -> None:
+    each = Floor(read('[[bus]]\nname = "axis"\n[[bus.drive]]\npersonality = "TMCM"\nname = "1"\n'))
+    with pytest.raises(Diagnostic, match='/sim input: "1" has no inputs'):
+        each.command("/sim input 1 1 0", 0.0)

@@ -73,3 +73,14 @@ def test_a_wait_gives_up_after_its_time():
     assert module.ask("GAP 3, 0") == 100_000
     module.wait(0.4)
     assert module.ask("GAP 3, 0") == 0
+
+
+def test_a_run_from_before_the_first_line_begins_with_the_first_line():
+    module = loaded("SAP 4, 0, 7", "28 0, 0, 0")
+    module.ask("129 1, 0, -5")
+    module.wait(1.0)
+    assert (module.ask("GAP 4, 0"), module.ask("135 0, 0, 0")) == (7, 0)
+    empty = Module()
+    empty.ask("129 1, 0, -5")
+    empty.wait(1.0)
+    assert empty.ask("135 0, 0, 0") == 0
