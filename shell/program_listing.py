@@ -108,8 +108,8 @@ async def upload(workspace: Workspace, drive: Drive, raw: bool = False) -> list[
     name = workspace.display_name(drive)
     held = await read(workspace, drive, "upload")
     held.check_program(name)
-    source = Sources(workspace.settings.state).find(held)
-    if raw or source is None or not _is_of(drive, source, held):
+    source = None if raw else _source(workspace, drive, held)
+    if source is None:
         return list(drive.programs.file(drive.state, held, raw))
     workspace.notify(f"{name}: remarks and layout are those of {source.file}, downloaded {source.at}", outcome=True)
     return list(drive.programs.refreshed(source.text, held))
@@ -117,20 +117,21 @@ async def upload(workspace: Workspace, drive: Drive, raw: bool = False) -> list[
 
 def remarked(workspace: Workspace, drive: Drive, held: Held) -> list[str]:
     """The listing with the remarks and the layout of the file that it came from; empty where that is not known."""
-    source = Sources(workspace.settings.state).find(held) if held.lines else None
-    if source is None or not _is_of(drive, source, held):
-        return []
-    return list(drive.programs.annotated(source.text, held))
+    source = _source(workspace, drive, held) if held.lines else None
+    return [] if source is None else list(drive.programs.annotated(source.text, held))
 
 
-def _is_of(drive: Drive, source: Copy, held: Held) -> bool:
-    """Whether a kept file has exactly the lines of the drive."""
+def _source(workspace: Workspace, drive: Drive, held: Held) -> Copy | None:
+    """The kept file that has exactly the lines of the drive; None without one."""
+    source, programs = Sources(workspace.settings.state).find(held), drive.programs
+    if source is None:
+        return None
     try:
         lines = drive.program_files.language.read(source.text, source.file)
     except Diagnostic:
-        return False
-    programs = drive.programs
-    return not programs.differences(drive.state, lines, held, None) and programs.size(lines) == len(held.lines)
+        return None
+    same = not programs.differences(drive.state, lines, held, None) and programs.size(lines) == len(held.lines)
+    return source if same else None
 
 
 async def read(workspace: Workspace, drive: Drive, what: str, lines: Sequence[SourceLine] = ()) -> Held:

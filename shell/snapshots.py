@@ -34,10 +34,21 @@ async def save(workspace: Workspace, file: str) -> None:
     buses = [await _bus(workspace, bus, failures) for bus in workspace.buses.values()]
     text = write(buses)
     new_file.write(file, text, workspace.output)
-    _say(workspace, buses, file)
+    for place, drive in ((f"{bus.name}:{drive.name}", drive) for bus in buses for drive in bus.drives):
+        for remark in drive.remarks:
+            workspace.notify(f"{place}: {remark}", warning=True)
+        if drive.unread:
+            names = ", ".join(name for name, _ in drive.unread)
+            workspace.notify(f"{place}: not read: {names}; the file says why", warning=True)
+    count = sum(len(bus.drives) for bus in buses)
+    opens = "" if file == new_file.STANDARD_OUTPUT else f"; sim:{file} opens it"
+    workspace.notify(f"{count} drive{'s' * (count != 1)}{new_file.place(file)}{opens}", outcome=True)
     if failures:
         raise failures[0]
-    _check(text, file)
+    try:
+        Floor(cells.read(text, file))  # as the simulator opens it
+    except Diagnostic as problem:
+        raise Diagnostic(f"it is written, but the simulator does not open it: {problem}", file) from None
 
 
 async def read(workspace: Workspace, drive: Drive) -> Snapshot:
@@ -68,26 +79,3 @@ async def _bus(workspace: Workspace, bus: Bus, failures: list[DriveError]) -> Bu
             missing.append(f"not in this file: {failure}")
     name = "".join("-" if each in FORBIDDEN or not each.isprintable() else each for each in bus.name)
     return BusText(name, drives, bus.line.baud, missing)
-
-
-def _say(workspace: Workspace, buses: list[BusText], file: str) -> None:
-    for bus in buses:
-        for drive in bus.drives:
-            place = f"{bus.name}:{drive.name}"
-            for remark in drive.remarks:
-                workspace.notify(f"{place}: {remark}", warning=True)
-            if drive.unread:
-                workspace.notify(
-                    f"{place}: not read: {', '.join(name for name, _ in drive.unread)}; the file says why", warning=True
-                )
-    count = sum(len(bus.drives) for bus in buses)
-    opens = "" if file == new_file.STANDARD_OUTPUT else f"; sim:{file} opens it"
-    workspace.notify(f"{count} drive{'s' * (count != 1)}{new_file.place(file)}{opens}", outcome=True)
-
-
-def _check(text: str, file: str) -> None:
-    """Open the file as the simulator does. Raises Diagnostic where it refuses a part of it."""
-    try:
-        Floor(cells.read(text, file))
-    except Diagnostic as problem:
-        raise Diagnostic(f"it is written, but the simulator does not open it: {problem}", file) from None

@@ -15,8 +15,7 @@ from multidrop.shell import new_file, program_listing, stop_report, waits
 from multidrop.shell.events import By
 from multidrop.shell.lines import join_target
 from multidrop.shell.params import file as files
-from multidrop.shell.params.restore import Options, restore
-from multidrop.shell.params.work import Difference, differences
+from multidrop.shell.params.work import Difference, Options, differences, restore
 from multidrop.shell.programs import transfers
 from multidrop.shell.programs.transfers import Wanted
 from multidrop.shell.scripts.execution import ask

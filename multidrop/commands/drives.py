@@ -18,8 +18,7 @@ from multidrop.shell.lines import split_target
 from multidrop.shell.new_file import STANDARD_OUTPUT
 from multidrop.shell.params import file as files
 from multidrop.shell.params import replacement, work
-from multidrop.shell.params.restore import Options
-from multidrop.shell.params.work import check_new, each, file_of, is_several, targets
+from multidrop.shell.params.work import Options, check_new, each, file_of, is_several, targets
 from multidrop.shell.programs import transfers
 from multidrop.simulator import cells
 

@@ -76,7 +76,11 @@ def parse(text: str, saved: Mapping[str, SavedConnection] | None = None) -> Conn
     """Parse a URL, a bare port or a saved name. Raises Diagnostic, which never holds a password."""
     text = text.strip()
     if saved and text in saved:
-        return _saved(saved[text])
+        found = saved[text]
+        try:
+            return replace(parse(found.url), name=found.name, labels=found.names)
+        except Diagnostic as problem:
+            raise Diagnostic(str(problem), f"connection {found.name}") from None
     try:
         return _parsed(text)
     except Diagnostic as problem:
@@ -88,7 +92,11 @@ def parse(text: str, saved: Mapping[str, SavedConnection] | None = None) -> Conn
 
 def _parsed(text: str) -> Connection:
     scheme, rest = _scheme(text)
-    body, query, fragment = _pieces(rest)
+    # The query and the fragment come in either order, as in `sim:#press?em=1`.
+    found = re.fullmatch(r"([^?#]*)(?:\?([^#]*))?(?:#([^?]*))?(?:\?(.*))?", rest, re.DOTALL)
+    if found is None or (found[2] is not None and found[4] is not None):
+        raise Diagnostic("more than one ? or #", rest)
+    body, query, fragment = found[1], found[2] or found[4] or "", found[3] or ""
     if fragment and scheme != "sim":
         raise Diagnostic(f"#{fragment} names a bus of a simulated cell", text, "valid only with sim:")
     base = Connection(scheme=scheme, text=text)
@@ -120,37 +128,16 @@ def _ssh(base: Connection, body: str) -> Connection:
     return replace(base, user=found[1] or "", host=found[2].strip("[]"), port=port, target=path)
 
 
-def _saved(saved: SavedConnection) -> Connection:
-    try:
-        connection = parse(saved.url)
-    except Diagnostic as problem:
-        raise Diagnostic(str(problem), f"connection {saved.name}") from None
-    return replace(connection, name=saved.name, labels=saved.names)
-
-
 def _scheme(text: str) -> tuple[str, str]:
     found = re.match(r"([A-Za-z][A-Za-z0-9+.-]+):", text)
     if found and found[1].lower() in SCHEMES:
         return found[1].lower(), text[found.end() :]
     if found and text[found.end() :].startswith("//"):
         raise Diagnostic(f"no kind of connection {found[1]}://", text, f"valid: {sentence()}")
-    if _is_port(text):
+    path = text.partition("?")[0]
+    if "/" in path or re.match(r"[.~]|COM\d+$", path, re.IGNORECASE):  # the path or the name of a serial port
         return "serial", text
     raise Diagnostic("neither a URL nor a saved connection", text or "empty URL", f"valid: {sentence()}")
-
-
-def _is_port(text: str) -> bool:
-    """Whether a text without a scheme is the path or the name of a serial port."""
-    path = text.partition("?")[0]
-    return "/" in path or re.match(r"[.~]|COM\d+$", path, re.IGNORECASE) is not None
-
-
-def _pieces(rest: str) -> tuple[str, str, str]:
-    """Body, query and fragment; the last two in either order, as in `sim:#press?em=1`."""
-    found = re.fullmatch(r"([^?#]*)(?:\?([^#]*))?(?:#([^?]*))?(?:\?(.*))?", rest, re.DOTALL)
-    if found is None or (found[2] is not None and found[4] is not None):
-        raise Diagnostic("more than one ? or #", rest)
-    return found[1], found[2] or found[4] or "", found[3] or ""
 
 
 def _host(body: str, scheme: str, text: str) -> tuple[str, int]:
@@ -218,9 +205,8 @@ def _with_query(connection: Connection, query: str) -> Connection:
             raise Diagnostic(f"{key} is given twice", connection.text)
         found = read(unquote(value))
         if found is None:
-            raise Diagnostic(
-                f"no {key} {value}" if value else f"no value for {key}", connection.text, f"valid: {allowed}"
-            )
+            what = f"no {key} {value}" if value else f"no value for {key}"
+            raise Diagnostic(what, connection.text, f"valid: {allowed}")
         values[name] = CONVERT.get(name, lambda same: same)(found)
     if not values.get("addressed", True) and len(values.get("drives", ())) > 1:
         raise Diagnostic("address=none allows one drive only", connection.text, "drop one of the keys")

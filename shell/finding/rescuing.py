@@ -70,8 +70,6 @@ class Rescue:
             await self._scanning.converse(drive.connection, procedure)
         self._say(f"{', '.join(lines)} is set; S saves it")
 
-    # Steps
-
     async def _search(self, stages: Sequence[Stage]) -> None:
         """Search where the drive is expected; nothing is changed."""
         self._say_step(f"search with {listed(stages[:1])}; this moves and changes nothing")
@@ -102,8 +100,6 @@ class Rescue:
         await self._scanning.converse(self._scanning.connection(stage), stage.scan.clear)
         self._say(f"cleared with {stage.words}; programs that ran are stopped until they are started again")
         await self._scanning.search([stage], False)
-
-    # Power
 
     async def _power_cycles(self, stages: Sequence[Stage]) -> None:
         """Have a person switch the drive off and on, and listen for its sign-on at each baud rate."""
@@ -151,8 +147,6 @@ class Rescue:
                 leave()
         return f"a sign-on with {stage.words}: the drive is outside of party mode"
 
-    # The last resort
-
     async def _erase(self, stages: Sequence[Stage], agreed: bool) -> None:
         """Set every drive to factory defaults, after a question of its own."""
         erasing = [each for each in stages if each.scan.erase is not None]
@@ -169,8 +163,6 @@ class Rescue:
             await self._scanning.search(list(dict.fromkeys([each, *defaults])), False)
             if self._scanning.found:
                 return
-
-    # Words
 
     def _say_step(self, text: str) -> None:
         self._step += 1

@@ -20,7 +20,7 @@ from multidrop.dialects.values import Permission, Plan, Readings, differing
 from multidrop.shell import snapshots
 from multidrop.shell.channel import running, transferring
 from multidrop.shell.params.file import read, shown
-from multidrop.shell.params.restore import Options, check_ready
+from multidrop.shell.params.work import Options, check_ready
 from multidrop.shell.programs import transfers
 from multidrop.simulator import cells
 from multidrop.simulator.cell.writer import BusText, write

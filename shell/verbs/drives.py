@@ -14,7 +14,7 @@ from multidrop.dialects.text import whole
 from multidrop.drives.drive import Drive
 from multidrop.shell.events import By
 from multidrop.shell.params import work
-from multidrop.shell.params.restore import Options
+from multidrop.shell.params.work import Options
 from multidrop.shell.plots.plot import begin
 from multidrop.shell.plots.request import DEFAULT, parse_rate, parse_series, parse_target, read_first
 from multidrop.shell.verbs.call import Call

@@ -12,7 +12,6 @@ from multidrop.drives.events import Traffic
 from multidrop.shell.connect.settings import Settings
 from multidrop.shell.events import Notified, OnBus, Output
 from multidrop.shell.params import file as files
-from multidrop.shell.params import restore
 from multidrop.shell.params.file import read
 from multidrop.shell.session import Session
 from multidrop.transports import TransportLost
@@ -343,7 +342,7 @@ async def test_a_setting_that_could_not_be_read_makes_the_restore_fail_at_its_en
         rows = tuple(each for each in found.readings if each.name != "RC")
         return replace(found, readings=rows, unread=(*found.unread, ("RC", "the drive refuses the line")))
 
-    monkeypatch.setattr(restore, "read", damaged)
+    monkeypatch.setattr(files, "read", damaged)
     with pytest.raises(NoAnswer, match="b: RC could not be read and is left alone; restore the file again"):
         await say(session, "/params restore kept.toml b")
     assert device(session).memory.values["VM"] == 512000

@@ -12,7 +12,7 @@ from multidrop.dialects import Diagnostic, DriveError, Refused, Stopped
 from multidrop.drives.events import Traffic
 from multidrop.shell import snapshots
 from multidrop.shell.params import replacement
-from multidrop.shell.params.restore import Options
+from multidrop.shell.params.work import Options
 from multidrop.simulator import cells
 from multidrop.transports import TransportLost
 from tests.support.cell_session import CellSession, bus
