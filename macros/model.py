@@ -72,7 +72,6 @@ class Parameter:
 
     @property
     def valid(self) -> str:
-        """The valid values, for a person."""
         if self.kind == "choice":
             return " or ".join(self.choices)
         if self.kind == "text":

@@ -74,7 +74,6 @@ class MacroStore:
         return {name for name in found if not name.startswith(".")}
 
     def load(self, name: str) -> Macro:
-        """Read the macro of that name."""
         path = self.path(name)
         try:
             data = _bytes(path)

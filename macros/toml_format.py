@@ -44,7 +44,6 @@ _KEY = re.compile(r"\s*[\"']?(?P<key>[A-Za-z_-]+)[\"']?\s*=")
 
 
 def format_macro(macro: Macro) -> str:
-    """Format a macro as the text of its file."""
     parts = [_HEAD, f"name = {quoted(macro.name)}\n", f"key = {quoted(macro.key)}\n"]
     if macro.page != FIRST_PAGE:
         parts.append(f"page = {quoted(macro.page)}\n")

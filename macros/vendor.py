@@ -53,7 +53,6 @@ class _Steps:
             raise self.wrong(1, f"more than {MOST} lines")
 
     def take(self, match: re.Match[str], column: int) -> None:
-        """Take a token."""
         if (text := match["text"]) is not None:
             if not self.text and text.lstrip().startswith(("/", "@")):
                 raise self.wrong(column, f"{text.lstrip()[0]} at the beginning of a line would be multidrop's own")

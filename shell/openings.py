@@ -83,9 +83,8 @@ class Openings:
         for number, url in enumerate(urls):
             try:
                 connection = parse(url, self._workspace.settings.connections)
-                opening = _Opening(self._workspace, self._reserved, next(self._places))
-                if connection.scheme != SIMULATED:
-                    opening.reserve(connection.short)
+                sole = connection.short if connection.scheme != SIMULATED else ""
+                opening = _Opening(self._workspace, self._reserved, next(self._places), sole=sole)
                 prepared.append((opening, connection))
                 numbers.append(number)
             except Diagnostic as problem:
@@ -165,7 +164,10 @@ class Openings:
 class _Opening:
     """One URL on its way: its place among the buses, and the names that are reserved for its own."""
 
-    def __init__(self, workspace: Workspace, reserved: set[str], place: int, name: str | None = None) -> None:
+    def __init__(
+        self, workspace: Workspace, reserved: set[str], place: int, name: str | None = None, sole: str = ""
+    ) -> None:
+        """`sole`: the base of the name of its only bus, which is chosen before other URLs choose theirs."""
         self._workspace = workspace
         self._reserved = reserved
         self.place = place
@@ -176,10 +178,7 @@ class _Opening:
         self.names: set[str] = set()
         self.bases: dict[str, str] = {}
         """The name that each was made of, which a cell gives to its bus."""
-
-    def reserve(self, base: str) -> None:
-        """Choose the name of its only bus now, before other URLs choose theirs."""
-        self._next = self.named(base)
+        self._next = self.named(sole) if sole else ""
 
     def named(self, base: str) -> str:
         """Return a free name for a bus: the requested one, to which further buses of a cell append their own.

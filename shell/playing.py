@@ -44,7 +44,6 @@ class Playing:
 
     @property
     def round(self) -> int:
-        """The round under way."""
         return self.rounds + 1
 
     @property
@@ -72,7 +71,6 @@ class StepProgress:
         self._timer: asyncio.TimerHandle | None = None
 
     def begins(self, step: int, line: str) -> None:
-        """Take the beginning of a step."""
         self._playing.step = step
         self._text = f"{self._playing.name}, {self._playing.at}: {line}"
         late = self._shown_at + PERIOD - self._channel.now()

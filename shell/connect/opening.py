@@ -131,7 +131,6 @@ def port_name(connection: Connection) -> str:
 
 
 def far_port(connection: Connection) -> FarPort:
-    """The port of a connection through ssh."""
     return FarPort(connection.host, connection.target, connection.user, connection.port)
 
 

@@ -141,7 +141,6 @@ class Stage(NamedTuple):
 
     @property
     def scan(self) -> Scan[Any]:
-        """The search of the family."""
         found = FAMILIES[self.family].scan
         assert found is not None
         return found

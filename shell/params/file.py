@@ -73,7 +73,6 @@ def identity(state: DriveState, language: str) -> dict[str, str]:
 
 
 def formatted(drive: Mapping[str, str], found: Readings) -> str:
-    """Return the text of a file."""
     import tomlkit  # takes 30 ms to import
 
     document = tomlkit.document()

@@ -9,18 +9,16 @@ that could are left alone until they are named.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from multidrop.dialects import Diagnostic, DriveError, Inexpressible, Refused
 from multidrop.dialects.program_files import LOCKED
-from multidrop.dialects.values import Permission, Plan, Readings, differing
+from multidrop.dialects.values import Change, Permission, Plan, Readings, differing
 from multidrop.shell import snapshots
-from multidrop.shell.channel import running, transferring
+from multidrop.shell.channel import transferring
 from multidrop.shell.params.file import read, shown
-from multidrop.shell.params.work import Options, check_ready
+from multidrop.shell.params.work import Options, check_ready, send
 from multidrop.shell.programs import transfers
 from multidrop.simulator import cells
 from multidrop.simulator.cell.writer import BusText, write
@@ -82,6 +80,7 @@ class _Replacement:
 
     async def run(self) -> None:
         """Read, show, ask, write, verify."""
+        spec = self._spec
         now = await snapshots.read(self._session, self._drive)
         here = _spec(now)
         self._check(now, here)
@@ -90,11 +89,18 @@ class _Replacement:
             return
         await check_ready(self._drive)
         steps = ", ".join(changes) if changes else f"nothing differs, {self._parameters.saving} saves it"
-        await self._session.confirm(f"it gets the state of {self._spec.name!r} in {self._file}: {steps}", self._name)
+        await self._session.confirm(f"it gets the state of {spec.name!r} in {self._file}: {steps}", self._name)
         await check_ready(self._drive)  # a person may have thought about it for long
-        with self._reporting():
+        try:
             await self._write(here)
             now = await snapshots.read(self._session, self._drive)
+        except BaseException:
+            text = f"{self._name}: cut off; done: {'; '.join(self._done) or 'nothing'}; run it again to go on"
+            if self._in_between and spec.party:
+                url = f"URL?drives={spec.name}&party=1"
+                text += f". It may be in party mode already ({url}); switched off and on it is as before"
+            self._session.notify(text, warning=True)
+            raise
         self._verify(_spec(now))
 
     # Before anything is sent
@@ -179,19 +185,6 @@ class _Replacement:
 
     # After the question
 
-    @contextmanager
-    def _reporting(self) -> Iterator[None]:
-        """Publish what was done, where it is cut off."""
-        try:
-            yield
-        except BaseException:
-            text = f"{self._name}: cut off; done: {'; '.join(self._done) or 'nothing'}; run it again to go on"
-            if self._in_between and self._spec.party:
-                url = f"URL?drives={self._spec.name}&party=1"
-                text += f". It may be in party mode already ({url}); switched off and on it is as before"
-            self._session.notify(text, warning=True)
-            raise
-
     async def _write(self, here: DriveSpec) -> None:
         if self._differs(here):  # the user's variables too; what was in the drive goes to a backup first
             clear = self._clearing and _tables(here).program(here).lines  # else an old program stays beside the new one
@@ -208,16 +201,13 @@ class _Replacement:
 
     async def _change(self, communication: bool) -> int:
         """Write the settings that differ now, those of communication in their order; return how many."""
-        drive, workspace = self._drive, self._session
-        workspace.addressed.add((drive.link.name, drive.address))
-        steps = self._plan(await read(workspace, drive, "apply"), communication)
-        with running(workspace, f"{self._name}: apply") as progress:
-            for number, each in enumerate(steps, 1):
-                if each.name in self._wanted.named and drive.starts(each.text):
-                    self._session.starting(drive)
-                await transferring(drive, self._parameters.write(drive.state, each))
-                self._done.append(each.text)
-                progress(number, len(steps))
+        session, drive, written = self._session, self._drive, list[Change]()
+        session.addressed.add((drive.link.name, drive.address))
+        steps = self._plan(await read(session, drive, "apply"), communication)
+        try:
+            await send(session, drive, steps, self._wanted, "apply", written)
+        finally:
+            self._done += [change.text for change in written]
         return len(steps)
 
     async def _save(self, what: str) -> None:

@@ -283,17 +283,25 @@ async def restore(session: Session, drive: Drive, file: files.SettingsFile, opti
     await _agree(session, drive, present, plan, file)
     aside = {*wanted.withheld, *dict(plan.withheld), *dict(plan.impossible)}
     goal = {name: value for name, value in wanted.values.items() if name not in aside}
-    session.addressed.add((drive.link.name, drive.address))
     with _accounted(session, who, plan) as written:
-        with running(session, f"{who}: restore") as progress:
-            for change in plan:  # a step that was named can start motion: an early end then stops the drive's line
-                if change.name in options.named and drive.starts(change.text):
-                    session.starting(drive)
-                await transferring(drive, family.write(drive.state, change))
-                written.append(change)
-                progress(len(written), len(plan))
+        await send(session, drive, plan, options, "restore", written)
         await _finish(session, drive, plan, goal, options)
     _check_complete(wanted, who)
+
+
+async def send(session: Session, drive: Drive, plan: Plan, options: Options, what: str, written: list[Change]) -> None:
+    """Send the steps, and note each that is done.
+
+    Only a step that a person has named can start motion: an early end then stops the drive, and with it its line.
+    """
+    session.addressed.add((drive.link.name, drive.address))
+    with running(session, f"{session.display_name(drive)}: {what}") as progress:
+        for number, change in enumerate(plan, 1):
+            if change.name in options.named and drive.starts(change.text):
+                session.starting(drive)
+            await transferring(drive, drive.family.values.parameters.write(drive.state, change))
+            written.append(change)
+            progress(number, len(plan))
 
 
 def _check_complete(wanted: Wanted, who: str) -> None:

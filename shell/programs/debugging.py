@@ -156,7 +156,6 @@ class Debugger:
                 return await self._stands(address)
 
     async def _look(self) -> Look:
-        """Read the state of the program."""
         look: Look = await self._run(self._debugging.look(self._drive.state, self._place))
         if not look.runs:
             await asyncio.sleep(PERIOD)  # its last lines may still be on the wire
@@ -202,7 +201,6 @@ class Debugger:
     # Break points
 
     async def break_at(self, place: str, passes: int) -> None:
-        """Set the break point."""
         await self._run(self._debugging.break_at(self._drive.state, place, passes))
         self.break_point = place.upper()
         self._sight.breaks(self.break_point)
@@ -212,7 +210,6 @@ class Debugger:
         )
 
     async def break_off(self) -> None:
-        """Remove the break point."""
         await self._run(self._debugging.break_off(self._drive.state))
         self.break_point = ""
         self._sight.breaks("")
@@ -315,7 +312,6 @@ class Debugger:
                 self._commands = self._drive.commands
 
     def say(self, text: str, *, warning: bool = False) -> None:
-        """Publish a notice about the drive."""
         self._session.notify(
             f"{self._session.display_name(self._drive)}: {text}", bus=self._drive.link.name, warning=warning
         )

@@ -186,7 +186,6 @@ def lately(folder: Path) -> list[Opened]:
 
 
 def note(folder: Path, url: str) -> None:
-    """Note that a URL was opened now."""
     rows = [Opened(url, time.time()), *(each for each in lately(folder) if each.url != url)][:MOST_OPENED]
     with contextlib.suppress(OSError):
         Store(folder).write(OPENED, {"opened": list(map(asdict, rows))}, 1)
