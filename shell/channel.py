@@ -10,6 +10,7 @@ from collections.abc import Awaitable, Callable, Coroutine, Iterator, Mapping, S
 from contextlib import contextmanager
 from dataclasses import dataclass
 from datetime import datetime, timedelta
+from functools import partial
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from multidrop.dialects import Diagnostic, Procedure, Stopped
@@ -18,6 +19,7 @@ from multidrop.shell.events import By, Notified, Output, Progressed, SessionEven
 
 if TYPE_CHECKING:
     from multidrop.drives.drive import Drive
+    from multidrop.shell.transcripts import Transcripts
 
 
 T = TypeVar("T")
@@ -87,6 +89,8 @@ class Channel:
     """Publishes events to its subscribers, in the order of subscription. A failing subscriber delays no other."""
 
     def __init__(self) -> None:
+        self.front = Front()
+        """What the front end can be asked."""
         self._callbacks: tuple[Callback, ...] = ()
         self._apart = isolated("a front end")
 
@@ -160,22 +164,40 @@ Fill = Callable[[str, Sequence[Field]], Awaitable[Mapping[str, str] | None]]
 """Puts a form to a person; returns the answers by name, None where the person gives up. A stop cancels it."""
 
 
-class Asking(Channel):
-    """A channel with questions, one at a time."""
+@dataclass
+class Front:
+    """What a session can ask of its front end. None: the front end cannot do that."""
 
-    def __init__(self) -> None:
-        super().__init__()
+    ask: Ask | None = None
+    """Asks its person; None: it has none."""
+    fill: Fill | None = None
+    """Asks its person for values."""
+    way: str = "--yes"
+    """The way to agree to every question beforehand."""
+    beforehand: str = ""
+    """The way to agree to the questions of this front end beforehand, for the message after a no."""
+    ready: Callable[[], Awaitable[None]] | None = None
+    """Awaited before each line: it holds back lines while its output is not read."""
+    before_quit: Callable[[], Awaitable[bool]] | None = None
+    """Asked by `/quit` at a terminal: True ends now."""
+    renamed: Callable[[str, str], None] | None = None
+    """Called when a bus gets another name, with the name before and the name now."""
+    edit: Callable[[str], Awaitable[None]] | None = None
+    """Its editor of files, in which Ctrl+X stops."""
+    screen: Callable[[str], Awaitable[None]] | None = None
+    """Shows a page of the screen by its name, or `tour`, or raises Diagnostic."""
+    transcripts: Transcripts | None = None
+    """The transcripts on its screen."""
+
+
+class Questions:
+    """The questions of a session to the person at its front end, one at a time."""
+
+    def __init__(self, channel: Channel) -> None:
+        self._channel = channel
         self.agreed = False
         """Every question is answered with yes beforehand (`--yes`)."""
-        self.ask: Ask | None = None
-        """The front end's way to ask; None: it has no person to ask."""
-        self.fill: Fill | None = None
-        """The front end's way to ask for values; None: it has no person to ask."""
-        self.way = "--yes"
-        """The way to agree to every question beforehand."""
-        self.beforehand = ""
-        """How to agree to the questions of this front end beforehand, for the message after a no."""
-        self.questions = Tasks(self.changed)
+        self.open = Tasks(channel.changed)
         """The open questions. A stop ends them."""
         self._turn = asyncio.Lock()
 
@@ -187,48 +209,47 @@ class Asking(Channel):
         """
         if self.agreed:
             return
+        front = self._channel.front
         if by is not By.OPERATOR:
-            hint = f"{self.way} agrees beforehand, or type the line"
+            hint = f"{front.way} agrees beforehand, or type the line"
             raise Diagnostic(f"{what}; a {by.value} cannot ask, {so_far}", where, hint)
-        if self.ask is None:
-            raise Diagnostic(f"{what}; {so_far}", where, f"{self.way} agrees to it")
+        if front.ask is None:
+            raise Diagnostic(f"{what}; {so_far}", where, f"{front.way} agrees to it")
         question = f"{where}: {what}" if where else what
         try:
-            agreed = await self.questions.run(self._answer(self.ask, question))
+            agreed = await self.open.run(self._in_turn(partial(front.ask, question)))
         except Stopped:
             raise Stopped(f"{where}: not done, as a stop came before the answer".removeprefix(": ")) from None
         if not agreed:
-            raise Diagnostic("the answer was no, so it was not done", where, self.beforehand)
-        self.notify(f"{question}: the answer was yes")
+            raise Diagnostic("the answer was no, so it was not done", where, self._channel.front.beforehand)
+        self._channel.notify(f"{question}: the answer was yes")
 
     async def agrees(self, what: str) -> bool:
         """Ask a person about a change that can be left. False without a person; `--yes` does not answer it."""
-        if self.ask is None:
+        ask = self._channel.front.ask
+        if ask is None:
             return False
         try:
-            return await self.questions.run(self._answer(self.ask, what))
+            return await self.open.run(self._in_turn(partial(ask, what)))
         except Stopped:
             return False
 
     async def fill_in(self, title: str, fields: Sequence[Field]) -> Mapping[str, str]:
         """Ask a person for values. Raises Diagnostic without answers or a person, Stopped after a stop."""
-        if self.fill is None:
+        fill = self._channel.front.fill
+        if fill is None:
             raise Diagnostic("values are needed, and no person can be asked", title, "give them as NAME=VALUE")
         try:
-            answers = await self.questions.run(self._filled(self.fill, title, fields))
+            answers = await self.open.run(self._in_turn(partial(fill, title, fields)))
         except Stopped:
             raise Stopped(f"{title}: not done, as a stop came before the answer") from None
         if answers is None:
             raise Diagnostic("no values were given; nothing was sent", title)
         return answers
 
-    async def _filled(self, fill: Fill, title: str, fields: Sequence[Field]) -> Mapping[str, str] | None:
+    async def _in_turn(self, ask: Callable[[], Awaitable[T]]) -> T:
         async with self._turn:
-            return await fill(title, fields)
-
-    async def _answer(self, ask: Ask, question: str) -> bool:
-        async with self._turn:
-            return await ask(question)
+            return await ask()
 
 
 PERIOD = 0.1

@@ -34,12 +34,12 @@ async def settled(
         if role not in roles:
             take = partial(check_bus, workspace, macro, role)
             fields.append(Field(role, f"an open bus: {' or '.join(buses)}", None, take, buses))
-    if not fields or workspace.fill is not None:
+    if not fields or workspace.front.fill is not None:
         examples = {each.name: each.example for each in missing(macro, values)}
         checked_values(macro, {**examples, **values})  # what is given is right
-    if (fields or missing(macro, values)) and workspace.fill is not None:
+    if (fields or missing(macro, values)) and workspace.front.fill is not None:
         fields += value_fields(macro, values)
-        answers = await workspace.fill_in(f"macro {macro.name}", fields)
+        answers = await workspace.questions.fill_in(f"macro {macro.name}", fields)
         roles |= {name: text for name, text in answers.items() if name in macro.roles}
         values |= {name: text for name, text in answers.items() if name not in macro.roles}
     elif fields:

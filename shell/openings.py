@@ -95,9 +95,12 @@ class Openings:
         await side_by_side([self._run(*each, self._raw) for each in prepared], self._select_first, on_failure)
 
     def _select_first(self, opened: list[Bus]) -> None:
-        for bus in opened:
-            self._workspace.select_first(bus)
-        self._workspace.changed()
+        """Select the first of these buses that is still open where no bus is selected."""
+        first = next((bus.name for bus in opened if bus.name in self._workspace.buses), "")
+        if first and not self._workspace.selected_bus:
+            self._workspace.select("", first)
+        else:
+            self._workspace.changed()
 
     def url_of(self, bus: Bus) -> str:
         """The URL of an open bus, without the name of a saved connection, and with the stable name of its port."""

@@ -37,7 +37,7 @@ if TYPE_CHECKING:
     from multidrop.shell.raw import RawLine
 
 _published: ContextVar[list[BaseException] | None] = ContextVar("published", default=None)
-"""The failures published so far in this task's outermost `run`."""
+"""The failures published in this task's outermost `run`."""
 CALL = "multidrop.shell.verbs.call:Call"
 """One use of a verb; it knows this class, so this module has only its name."""
 
@@ -63,7 +63,8 @@ class Session(Workspace):
         """
         super().__init__(settings or Settings(), reconnect)
         self.automations, self.twins = Automations(self), Twins(self)
-        self._openings = Openings(self, opener or partial(open_buses, state=self.settings.state), lazy, raw, tried)
+        self.path = LinePath(self)
+        self.openings = Openings(self, opener or partial(open_buses, state=self.settings.state), lazy, raw, tried)
         self._background: set[asyncio.Task[Any]] = set()
 
     # Buses
@@ -76,7 +77,7 @@ class Session(Workspace):
         Raises Diagnostic for a wrong URL, Unreachable (a TransportLost) where there is no connection, DriveError
         where drives that the URL names do not reply.
         """
-        return await self._openings.open(url, name, raw=raw)
+        return await self.openings.open(url, name, raw=raw)
 
     async def open_all(self, urls: Sequence[str], failed: OpeningFailed | None = None) -> None:
         """Open several URLs side by side; the buses keep their order, and the first of them is selected.
@@ -84,16 +85,7 @@ class Session(Workspace):
         A failure goes to `failed` with the number of its URL, and the others go on. Without `failed` it ends the
         others and is raised.
         """
-        await self._openings.open_all(urls, failed)
-
-    def url_of(self, bus: Bus) -> str:
-        """The URL that opens a bus again."""
-        return self._openings.url_of(bus)
-
-    async def close_bus(self, name: str) -> None:
-        """Close one bus; moves nothing, stops nothing. Raises Diagnostic for a name that is not open."""
-        await self.forget(self.bus(name))
-        self.changed()
+        await self.openings.open_all(urls, failed)
 
     async def close(self) -> None:
         """Close everything: tasks, plots, log, buses. Moves nothing, stops no drive. May be called again."""
@@ -113,14 +105,6 @@ class Session(Workspace):
         for bus in list(self.buses.values()):
             await self.forget(bus)
 
-    async def raw_on(self, bus: Bus) -> None:
-        """Put an open bus into raw mode: from here on a person's own bytes go there, and nothing else."""
-        await self._openings.raw_on(bus)
-
-    async def raw_off(self, bus: Bus) -> None:
-        """End raw mode, and find the drives of a bus. Raises NoAnswer where none replies; it stays raw then."""
-        await self._openings.raw_off(bus)
-
     # The path of a command
 
     async def run(self, line: str | TypedLine, by: By = By.OPERATOR, since: int | None = None) -> None:
@@ -129,10 +113,10 @@ class Session(Workspace):
         `since` is the value of `stops` when the line was typed; a line older than the last stop is refused with
         Stopped. Raises DriveError, Diagnostic or TransportLost, after one Failed event.
         """
-        if self.ready is not None:
-            await self.ready()
+        if self.front.ready is not None:
+            await self.front.ready()
         target, place = DriveLine(""), self.place
-        with _failures_published_once():
+        with _published_failures() as published:
             try:
                 if since is not None and since != self.stops:
                     typed = line if isinstance(line, str) else line.typed
@@ -140,145 +124,44 @@ class Session(Workspace):
                 parsed = _raw_line(self, line) or (parse(line) if isinstance(line, str) else line)
                 if isinstance(parsed, DriveLine):
                     target = parsed
-                    await self._run_text(parsed, by)
+                    await self.path.text(parsed, by)
                 elif parsed is not None:
-                    await self._run_verb(parsed, by)
+                    await self.path.verb(parsed, by)
             except FAILURES as failure:
                 bus, address = _place_of(target, place)
-                self._publish_failure(failure, bus, address, by)
+                if (
+                    failure not in published
+                ):  # once, whatever lines (a macro's, the `/play` around it) it passes through
+                    code = failure.code if isinstance(failure, Refused) else None
+                    self.publish(Failed(self.now(), str(failure), bus, address, by, code))
+                published.append(failure)
                 if isinstance(failure, DriveError) and target.text and len(self.buses) > 1:
                     failure.add_note(bus)
                 raise
-
-    async def _run_verb(self, parsed: VerbLine, by: By) -> None:
-        self.publish(Entered(self.now(), parsed.typed.strip(), by))
-        verb = find(parsed.name)
-        call = imported(CALL)(self, verb, parsed.rest, by)
-        self._allow(by)
-        if verb.recorded and by is not By.MACRO:
-            self.recorder.record(call.recorded(), self.now())
-        work = call.work()
-        await (work if verb.immediate else self.tasks.run(work))
 
     def enter_alone(self) -> str:
         """The line that Enter alone stands for: in raw mode the end of a line, which wakes many a device."""
         raw = self.raw.get(self.selected_bus)
         return f"/bytes {raw.end.hex(' ').upper()}" if raw is not None and raw.end else ""
 
-    async def send_bytes(self, bus: Bus, data: bytes, by: By, starts: bool = True) -> None:
-        """Write bytes on a bus in raw mode: once, unchanged. Raises Diagnostic where it is not in raw mode.
-
-        `starts`: they can start motion or a program.
-        """
-        raw = self.of(bus).raw
-        if raw is None:
-            raise Diagnostic(f"{bus.name} is not in raw mode; nothing was sent", "", "/raw on begins it")
-        self._allow(by)
-        if starts:
-            self.automations.starts(raw.everyone)
-        raw.send(data)
-
-    async def _run_raw(self, raw: RawLine, parsed: DriveLine, by: By) -> None:
-        """Send a typed text with its terminator."""
-        if by is By.MACRO:
-            raise Diagnostic(
-                f"{raw.bus.name} is raw: a macro's lines are for drives", parsed.typed.strip(), "/raw off finds them"
-            )
-        if parsed.address is not None:
-            hint = f"@{raw.bus.name}: TEXT sends text; /raw off finds the drives"
-            raise Diagnostic(f"{raw.bus.name} is raw: it has no address {parsed.address}", parsed.typed.strip(), hint)
-        self.publish(Entered(self.now(), parsed.typed.strip(), by, raw.bus.name))
-        self._allow(by)
-        await self.guard(raw.bus.at(""), parsed.text, by)
-        starts = raw.bus.roster.family.codec.starts_motion(parsed.text)
-        await self.send_bytes(raw.bus, raw.encoded(parsed.text), by, starts)
-        if self.recording and by is By.OPERATOR:
-            self.notify("text in raw mode is not recorded", warning=True)
-
-    async def _run_text(self, parsed: DriveLine, by: By) -> None:
-        bus = self.bus(parsed.bus)
-        if (raw := self.of(bus).raw) is not None:
-            return await self._run_raw(raw, parsed, by)
-        drive = self.drive(bus.name, parsed.address)
-        self.publish(Entered(self.now(), parsed.typed.strip(), by, bus.name, drive.address))
-        self._allow(by)
-        await self.guard(drive, parsed.text, by)
-        recorded, starts = None, drive.starts(parsed.text)
-        if by is not By.MACRO:
-            target = self.qualified_address(drive)
-            typed = f"@{target} {parsed.text}" if target else parsed.text
-            recorded = self.recorder.record(typed, self.now(), join_target(bus.name, drive.address), starts)
-        if self.recording:
-            self.changed()
-        self.addressed.add((bus.name, drive.address))
-        self.lately.begin()
-        try:
-            printed = await self._send(drive, parsed.text, starts)
-        except FAILURES as failure:
-            if recorded is not None:
-                recorded.came_back([f"failed: {failure}"])
-            raise
-        if recorded is not None:
-            recorded.came_back(printed)
-        if drive.address not in (*EVERYONE, *bus.drives):
-            bus.drives[drive.address] = drive  # it replied, so it exists: a stop and a wait must know it
-            self.changed()
-        for text in printed:
-            self.publish(Printed(self.now(), bus.name, drive.address, text, by))
-
-    async def guard(self, drive: Drive, text: str, by: By = By.OPERATOR) -> None:
-        """Ask before a guarded line. Raises Diagnostic where it is not agreed to, and by a script or a macro."""
-        what = self.settings.guards.what(drive.family, drive.state, text)
-        if not what:
-            return
-        await self.confirm(what, self.display_name(drive), by=by)
-
-    async def _send(self, drive: Drive, text: str, starts: bool) -> tuple[str, ...]:
-        """Send a line and return what it printed. The automation records first what the line may start."""
-        before = drive.commands
-        recorded = starts and self.automations.starts(drive, only_ends(drive, text))
-        try:
-            return await drive.send(text)
-        except DriveError:
-            if recorded and drive.commands == before and drive.address not in EVERYONE:
-                self.automations.spares(drive)
-            raise
-
-    def starting(self, drive: Drive) -> None:
-        """Note that the next request can start motion or a program of a drive."""
-        self.addressed.add((drive.link.name, drive.address))
-        self.automations.starts(drive)
-        drive.starts_now()
-
-    def _allow(self, by: By) -> None:
-        if self.latched and by is not By.OPERATOR:
-            raise Stopped(LATCHED)
-
-    def _publish_failure(self, failure: BaseException, bus: str, address: str, by: By) -> None:
-        """Publish a failure once, however many lines (a macro's, the `/play` around it) it passes through."""
-        published = _published.get()
-        if published is None or failure not in published:
-            code = failure.code if isinstance(failure, Refused) else None
-            self.publish(Failed(self.now(), str(failure), bus, address, by, code))
-        if published is not None:
-            published.append(failure)
-
     def start(self, line: str | TypedLine, by: By = By.OPERATOR, since: int | None = None) -> asyncio.Task[bool]:
         """Run one line in the background; the task returns whether it succeeded. A failure is published only.
 
         `since` as for `run`; by default the line counts as typed now.
         """
-        task = asyncio.get_running_loop().create_task(self._succeeds(line, by, self.stops if since is None else since))
+        typed = self.stops if since is None else since
+
+        async def succeeds() -> bool:
+            try:
+                await self.run(line, by, typed)
+            except FAILURES:
+                return False  # published as a Failed event
+            return True
+
+        task = asyncio.get_running_loop().create_task(succeeds())
         self._background.add(task)
         task.add_done_callback(self._background.discard)
         return task
-
-    async def _succeeds(self, line: str | TypedLine, by: By, since: int) -> bool:
-        try:
-            await self.run(line, by, since)
-        except FAILURES:
-            return False  # published as a Failed event
-        return True
 
     # The end
 
@@ -286,7 +169,7 @@ class Session(Workspace):
         """End everything that runs, and stop at once the drives that automation started. Does not latch."""
         self.automations.interrupt()
         self.tasks.cancel()
-        self.questions.cancel()
+        self.questions.open.cancel()
 
     async def in_motion(self) -> list[str]:
         """A line for each drive that moves or may move; takes two seconds at most, once what was stopped has ended."""
@@ -297,6 +180,107 @@ class Session(Workspace):
         """Ask the front end to end; drives go on as they are."""
         self.quitting = True
         self.changed()
+
+
+class LinePath:
+    """The way of one line of a session to its verb, to a drive, or to a port in raw mode."""
+
+    def __init__(self, session: Session) -> None:
+        self._session = session
+
+    async def verb(self, parsed: VerbLine, by: By) -> None:
+        """Run a verb, as a task that a stop ends."""
+        session = self._session
+        session.publish(Entered(session.now(), parsed.typed.strip(), by))
+        verb = find(parsed.name)
+        call = imported(CALL)(session, verb, parsed.rest, by)
+        self._allow(by)
+        if verb.recorded and by is not By.MACRO:
+            session.recorder.record(call.recorded(), session.now())
+        work = call.work()
+        await (work if verb.immediate else session.tasks.run(work))
+
+    async def text(self, parsed: DriveLine, by: By) -> None:
+        """Send a text to its drive and publish what it prints; on a bus in raw mode send it with its terminator."""
+        session = self._session
+        bus = session.bus(parsed.bus)
+        if (raw := session.of(bus).raw) is not None:
+            return await self._raw_text(raw, parsed, by)
+        drive = session.drive(bus.name, parsed.address)
+        session.publish(Entered(session.now(), parsed.typed.strip(), by, bus.name, drive.address))
+        self._allow(by)
+        await self.guard(drive, parsed.text, by)
+        recorded, starts = None, drive.starts(parsed.text)
+        if by is not By.MACRO:
+            target = session.qualified_address(drive)
+            typed = f"@{target} {parsed.text}" if target else parsed.text
+            recorded = session.recorder.record(typed, session.now(), join_target(bus.name, drive.address), starts)
+        if session.recording:
+            session.changed()
+        session.addressed.add((bus.name, drive.address))
+        session.lately.begin()
+        before, started = drive.commands, False
+        try:
+            started = starts and session.automations.starts(drive, only_ends(drive, parsed.text))
+            printed = await drive.send(parsed.text)
+        except FAILURES as failure:
+            unsent = started and drive.commands == before and drive.address not in EVERYONE
+            if unsent and isinstance(failure, DriveError):
+                session.automations.spares(drive)
+            if recorded is not None:
+                recorded.came_back([f"failed: {failure}"])
+            raise
+        if recorded is not None:
+            recorded.came_back(printed)
+        if drive.address not in (*EVERYONE, *bus.drives):
+            bus.drives[drive.address] = drive  # it replied, so it exists: a stop and a wait must know it
+            session.changed()
+        for text in printed:
+            session.publish(Printed(session.now(), bus.name, drive.address, text, by))
+
+    async def _raw_text(self, raw: RawLine, parsed: DriveLine, by: By) -> None:
+        session, name, typed = self._session, raw.bus.name, parsed.typed.strip()
+        if by is By.MACRO:
+            raise Diagnostic(f"{name} is raw: a macro's lines are for drives", typed, "/raw off finds them")
+        if parsed.address is not None:
+            hint = f"@{name}: TEXT sends text; /raw off finds the drives"
+            raise Diagnostic(f"{name} is raw: it has no address {parsed.address}", typed, hint)
+        session.publish(Entered(session.now(), typed, by, name))
+        self._allow(by)
+        await self.guard(raw.bus.at(""), parsed.text, by)
+        starts = raw.bus.roster.family.codec.starts_motion(parsed.text)
+        await self.send_bytes(raw.bus, raw.encoded(parsed.text), by, starts)
+        if session.recording and by is By.OPERATOR:
+            session.notify("text in raw mode is not recorded", warning=True)
+
+    async def send_bytes(self, bus: Bus, data: bytes, by: By, starts: bool = True) -> None:
+        """Write bytes on a bus in raw mode: once, unchanged. Raises Diagnostic where it is not in raw mode.
+
+        `starts`: they can start motion or a program.
+        """
+        raw = self._session.of(bus).raw
+        if raw is None:
+            raise Diagnostic(f"{bus.name} is not in raw mode; nothing was sent", "", "/raw on begins it")
+        self._allow(by)
+        if starts:
+            self._session.automations.starts(raw.everyone)
+        raw.send(data)
+
+    async def guard(self, drive: Drive, text: str, by: By = By.OPERATOR) -> None:
+        """Ask before a guarded line. Raises Diagnostic where it is not agreed to, and by a script or a macro."""
+        what = self._session.settings.guards.what(drive.family, drive.state, text)
+        if what:
+            await self._session.questions.confirm(what, self._session.display_name(drive), by=by)
+
+    def starting(self, drive: Drive) -> None:
+        """Note that the next request can start motion or a program of a drive."""
+        self._session.addressed.add((drive.link.name, drive.address))
+        self._session.automations.starts(drive)
+        drive.starts_now()
+
+    def _allow(self, by: By) -> None:
+        if self._session.latched and by is not By.OPERATOR:
+            raise Stopped(LATCHED)
 
 
 def _raw_line(workspace: Workspace, line: str | TypedLine) -> DriveLine | None:
@@ -322,11 +306,14 @@ def _place_of(target: DriveLine, selected: tuple[str, str]) -> tuple[str, str]:
 
 
 @contextlib.contextmanager
-def _failures_published_once() -> Iterator[None]:
-    """Collect the published failures of the outermost `run` of this task."""
-    token = None if _published.get() is not None else _published.set([])
+def _published_failures() -> Iterator[list[BaseException]]:
+    """The failures published so far in the outermost `run` of this task."""
+    found = _published.get()
+    if found is not None:
+        yield found
+        return
+    token = _published.set(found := [])
     try:
-        yield
+        yield found
     finally:
-        if token is not None:
-            _published.reset(token)
+        _published.reset(token)

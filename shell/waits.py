@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING
 
 from multidrop.dialects import Diagnostic, DriveError
 from multidrop.drives.drive import REST, confirmed_motion
+from multidrop.shell.lines import EVERYONE
 from multidrop.shell.stop_report import UNCONFIRMED, last_seen
 from multidrop.transports import TransportLost
 
@@ -84,13 +85,17 @@ async def sleep(duration: float) -> None:
 
 
 async def wait(workspace: Workspace, limit: float, *, idle: bool, drives: Sequence[Drive] | None = None) -> None:
-    """Wait until every addressed drive is at rest in two readings; with `idle`, also until no program runs.
+    """Wait until every drive is at rest in two readings; with `idle`, also until no program runs.
 
-    `drives`: wait for these instead. Raises DriveError after `limit` seconds, and for a drive in program mode (it would
-    store the question).
+    `drives` None: those that this session sent a line to, else the selected one. Raises DriveError after `limit`
+    seconds, and for a drive in program mode (it would store the question).
     """
     deadline = workspace.now() + limit
-    drives = workspace.addressed_drives() if drives is None else drives
+    if drives is None:
+        addressed = [(workspace.buses[bus].drives, address) for bus, address in sorted(workspace.addressed)]
+        each_of = [(known, known if address in EVERYONE else [address]) for known, address in addressed]
+        found = [known[address] for known, addresses in each_of for address in addresses if address in known]
+        drives = list(dict.fromkeys(found)) or [workspace.drive()]
     while moving := await _moving(workspace, drives, idle):
         if workspace.now() >= deadline:
             verb = "/wait idle" if idle else "/wait stopped"

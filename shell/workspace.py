@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import asyncio
 import re
-from collections.abc import Awaitable, Callable
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import partial
 from typing import TYPE_CHECKING
@@ -19,7 +19,7 @@ from multidrop.dialects import Diagnostic, NoAnswer
 from multidrop.drives.events import BusEvent, Changed, Lost, Notice, Unsolicited, isolated
 from multidrop.macros import MacroStore, Recorder
 from multidrop.shell import stop_report
-from multidrop.shell.channel import Asking, Tasks
+from multidrop.shell.channel import Channel, Questions, Tasks
 from multidrop.shell.connect.reconnect import Reconnections
 from multidrop.shell.connect.settings import Settings
 from multidrop.shell.events import Failed, Notified, OnBus, StateChanged
@@ -35,7 +35,6 @@ if TYPE_CHECKING:
     from multidrop.shell.connect.urls import Connection
     from multidrop.shell.raw import RawLine, Watched
     from multidrop.shell.roles import Observer, OpenLog, RunningPlot, RunningTwins, Series
-    from multidrop.shell.transcripts import Transcripts
     from multidrop.simulator.serving.running import RunningFloor
 
 
@@ -78,7 +77,7 @@ class OpenBus:
     """The observation of a drive's program, for the verbs that do that."""
 
 
-class Workspace(Asking):
+class Workspace(Channel):
     """What is open. Needs a running event loop, and belongs to its thread."""
 
     twins: RunningTwins
@@ -101,7 +100,7 @@ class Workspace(Asking):
         """The time of the last stop, s of the session's clock."""
         self.opening: list[BeingOpened] = []
         """What is being opened, and no stop reaches yet."""
-        self.tasks = Tasks(self.changed)
+        self.tasks, self.questions = Tasks(self.changed), Questions(self)
         self.addressed: set[tuple[str, str]] = set()
         """(bus, address) of every drive that this session sent a line to; `/wait` waits for them."""
         self.macros = MacroStore(settings.macros, settings.project_macros)
@@ -122,18 +121,6 @@ class Workspace(Asking):
         """The macros whose `on_stop` lines a stop dropped; `/resume` says so."""
         self.quitting = False
         """After `/quit`: front ends end, scripts too."""
-        self.ready: Callable[[], Awaitable[None]] | None = None
-        """Awaited before each line: a front end holds back lines while its output is not read."""
-        self.before_quit: Callable[[], Awaitable[bool]] | None = None
-        """Asked by `/quit` at a terminal: True ends now."""
-        self.renamed: Callable[[str, str], None] | None = None
-        """Called when a bus gets another name, with the name before and the name now."""
-        self.edit: Callable[[str], Awaitable[None]] | None = None
-        """The front end's editor of files, in which Ctrl+X stops; None: it has none."""
-        self.screen: Callable[[str], Awaitable[None]] | None = None
-        """Shows a page of the screen by its name, or `tour`, or raises Diagnostic; None: there is no screen."""
-        self.transcripts: Transcripts | None = None
-        """The transcripts on a screen; None: there is no screen."""
         self.reconnections = Reconnections(lambda bus, text: self.notify(text, bus=bus, warning=True), reconnect)
         """The buses that are tried again when they are lost."""
         self._closing: set[asyncio.Future[None]] = set()
@@ -145,15 +132,11 @@ class Workspace(Asking):
         bus = opened.bus
         unwatch = bus.watch(partial(self._on_bus, bus))
         record = self._open[bus] = OpenBus(bus, opened, connection, in_cell or bus.name, place, unwatch)
-        self._in_order()
+        self._open, self.buses = _in_order(self._open)
         for text in opened.warnings:
             self.notify(f"{bus.name}: {text}", bus=bus.name, warning=True)
         bus.start()
         return record
-
-    def _in_order(self) -> None:
-        self._open = dict(sorted(self._open.items(), key=lambda each: each[1].place))
-        self.buses = {bus.name: bus for bus in self._open}
 
     async def forget(self, bus: Bus) -> None:
         """Close a bus and drop everything known of it. A stop that ends the caller does not leave the port open."""
@@ -201,15 +184,6 @@ class Workspace(Asking):
             raise Diagnostic(f"no bus {name}", hint=f"open: {', '.join(self.buses)}")
         return found
 
-    @property
-    def cell(self) -> RunningFloor | None:
-        """The simulated cell of the selected bus, or the only one that is open."""
-        cells = self.cells
-        if self.selected_bus in cells:
-            return cells[self.selected_bus]
-        different = {id(cell): cell for cell in cells.values()}
-        return next(iter(different.values())) if len(different) == 1 else None
-
     def of_demo(self, bus: str) -> str:
         """The name under which a bus of the demo cell is open; empty: it is not."""
         return next((name for name, each in self.buses.items() if each.link.transport.name == f"sim:#{bus}"), "")
@@ -223,7 +197,7 @@ class Workspace(Asking):
         order[at], order[at + by] = order[at + by], order[at]
         for number, each in enumerate(order):
             each.place = number / len(order)  # below 1, and so before what opens later
-        self._in_order()
+        self._open, self.buses = _in_order(self._open)
         self.changed()
 
     def rename_bus(self, bus: Bus, name: str) -> None:
@@ -233,33 +207,28 @@ class Workspace(Asking):
             raise Diagnostic(f"{name!r} is not a name", "/rename", "valid: letters, digits, -, _ and . (32 at most)")
         if name in self.buses:
             raise Diagnostic(f"a bus {name} is open already", "/rename", "give another name")
-        if holds := self._holder(bus):
-            raise Diagnostic(f"{before} keeps its name while {holds}", "/rename", "rename it after that")
+        holds = (
+            (bus.lost is not None, "it is lost"),
+            (self._open[bus].raw is not None, "it is raw"),
+            (self.busy or bool(self.playing), "a macro, a wait or a transfer runs"),
+            (bool(self.plots), "a plot runs"),
+            (bool(self._open[bus].debuggers), "its program is watched"),
+            (bool(self.recording), "a macro is recorded"),
+        )
+        for held, why in holds:
+            if held:
+                raise Diagnostic(f"{before} keeps its name while {why}", "/rename", "rename it after that")
         bus.link.name = name
-        self._in_order()
+        self._open, self.buses = _in_order(self._open)
         self.addressed = {(name if each == before else each, address) for each, address in self.addressed}
         self.plotted = tuple(each._replace(bus=name) if each.bus == before else each for each in self.plotted)
         self.reconnections.rename(before, name)
         if self.selected_bus == before:
             self.selected_bus = name
-        if self.renamed is not None:
-            self.renamed(before, name)
+        if self.front.renamed is not None:
+            self.front.renamed(before, name)
         self.notify(f"{before} is {name} now", bus=name)
         self.changed()
-
-    def _holder(self, bus: Bus) -> str:
-        """The reason for which a bus keeps its name now; empty: it may change."""
-        if bus.lost is not None:
-            return "it is lost"
-        if self._open[bus].raw is not None:
-            return "it is raw"
-        if self.busy or self.playing:
-            return "a macro, a wait or a transfer runs"
-        if self.plots:
-            return "a plot runs"
-        if self._open[bus].debuggers:
-            return "its program is watched"
-        return "a macro is recorded" if self.recording else ""
 
     # Selection and addresses
 
@@ -297,10 +266,6 @@ class Workspace(Asking):
         self.changed()
         self.twins.identified(bus)
 
-    def select_first(self, bus: Bus) -> None:
-        """Select a bus where no other one is selected."""
-        self.selected_bus = self.selected_bus or bus.name
-
     def drive(self, bus: str = "", address: str | None = None) -> Drive:
         """Find the drive at an address (or label) of a bus, known or not; by default the selected one."""
         chosen = self.bus(bus)
@@ -317,16 +282,6 @@ class Workspace(Asking):
             hint = f"@{chosen.name}: TEXT goes to it"
             raise Diagnostic(f"no address {address}: the drive on {chosen.name} takes none", hint=hint)
         return found or chosen.at(address)
-
-    def addressed_drives(self) -> list[Drive]:
-        """The drives that this session sent a line to, else the selected one; `*` means all of a bus."""
-        found: dict[tuple[str, str], Drive] = {}
-        for bus, address in sorted(self.addressed):
-            drives = self.buses[bus].drives
-            for each in drives if address in EVERYONE else [address]:
-                if each in drives:
-                    found[bus, each] = drives[each]
-        return list(found.values()) or [self.drive()]
 
     def qualified_address(self, drive: Drive) -> str:
         """The drive's address, valid whatever is selected later; empty where only one drive can be meant."""
@@ -347,33 +302,32 @@ class Workspace(Asking):
     def stop(self, why: str = "stop") -> None:
         """Stop every drive and everything that runs, and latch. Synchronous; at any time, any number of times."""
         self.stops, self.stopped_at = self.stops + 1, self.now()
-        halts = _write_stops(list(self.buses.values()))
+        halts: list[Halt] = []
+        for bus in list(self.buses.values()):  # each wire by itself
+            with isolated(f"the stop of {bus.name}"):
+                halts.append(bus.halt())
         self.latched = True
         self.tasks.stop()
-        self.questions.stop()
+        self.questions.open.stop()
         for halt in halts:
             with isolated(f"the stop of {halt.link.name}"):
                 self.buses[halt.link.name].halted(halt)
         with isolated("the notice of a stop"):
-            self._publish_stop(why, halts)
-
-    def _publish_stop(self, why: str, halts: list[Halt]) -> None:
-        unreached = stop_report.unreached(halts, self.now())
-        opening = _still_opening(self.opening, self.stops)
-        sent = "stop" if not (unreached or opening) and len(halts) == len(self.buses) else "stop not"
-        to_all = f"{sent} sent to every drive" if halts or unreached or opening else "no drive is open"
-        self.notify(f"{why}: {to_all}; macros and scripts wait for /resume")
-        for text in (*unreached, *map(stop_report.not_open, opening)):
-            self.notify(text, warning=True)
-        for name, raw in self.raw.items():
-            family = raw.bus.roster.family.name
-            self.notify(
-                f"{name}: raw, so the stop of {family} was sent, and no drive was asked", bus=name, warning=True
-            )
-        for name, bus in self.buses.items():
-            if name in self.reconnections.trying and bus.link.lost is not None:
-                self.notify(f"{name}: the stop is the first to be sent when the line is back", bus=name, warning=True)
-        self.changed()
+            unreached = stop_report.unreached(halts, self.now())
+            opening = _still_opening(self.opening, self.stops)
+            sent = "stop" if not (unreached or opening) and len(halts) == len(self.buses) else "stop not"
+            to_all = f"{sent} sent to every drive" if halts or unreached or opening else "no drive is open"
+            self.notify(f"{why}: {to_all}; macros and scripts wait for /resume")
+            for text in (*unreached, *map(stop_report.not_open, opening)):
+                self.notify(text, warning=True)
+            for name, raw in self.raw.items():
+                text = f"{name}: raw, so the stop of {raw.bus.roster.family.name} was sent, and no drive was asked"
+                self.notify(text, bus=name, warning=True)
+            for name, bus in self.buses.items():
+                if name in self.reconnections.trying and bus.link.lost is not None:
+                    text = f"{name}: the stop is the first to be sent when the line is back"
+                    self.notify(text, bus=name, warning=True)
+            self.changed()
 
     def resume(self) -> None:
         """Let automation run again."""
@@ -392,12 +346,6 @@ class Workspace(Asking):
     def busy(self) -> bool:
         """Whether anything runs that a stop would end: a script, a macro, a wait, a download."""
         return self.tasks.busy
-
-    @property
-    def at_rest(self) -> bool:
-        """Whether nothing runs, and the last reading of every drive showed velocity 0."""
-        readings = [drive.seen for bus in self.buses.values() for drive in bus.all_drives if drive.seen is not None]
-        return not self.busy and not any(reading.velocity for reading in readings)
 
     @property
     def recording(self) -> str:
@@ -426,13 +374,10 @@ class Workspace(Asking):
             self.twins.changed(bus)
 
 
-def _write_stops(buses: list[Bus]) -> list[Halt]:
-    """Write the stop onto every wire, each wire by itself."""
-    halts: list[Halt] = []
-    for bus in buses:
-        with isolated(f"the stop of {bus.name}"):
-            halts.append(bus.halt())
-    return halts
+def _in_order(opened: dict[Bus, OpenBus]) -> tuple[dict[Bus, OpenBus], dict[str, Bus]]:
+    """The open buses in the order of their places, by bus and by name."""
+    ordered = dict(sorted(opened.items(), key=lambda each: each[1].place))
+    return ordered, {bus.name: bus for bus in ordered}
 
 
 def _still_opening(opening: list[BeingOpened], number: int) -> list[str]:

@@ -43,7 +43,7 @@ from multidrop.tui.screens.main_screen import MainScreen, Reading
 from multidrop.tui.screens.page import PAGES, Framed, Page
 from multidrop.tui.screens.questions import Questions
 from multidrop.tui.screens.start import Opener, Start
-from multidrop.tui.session_hooks import Hooks, Transcripts
+from multidrop.tui.session_hooks import Hooks
 from multidrop.tui.terminal.keyboard import Keyboard
 from multidrop.tui.texts import Texts
 from multidrop.tui.tour import Tour
@@ -115,9 +115,6 @@ class MultidropApp(App[int]):
         )
         self.unsent = Unsent(self.main, self.model, session.now, self.assist.keep, self._warn)
         self.questions = Questions(self, session)
-        session.transcripts = Transcripts(
-            self.main, session, self.outbox, self.questions.paste, self.keyboard.turn_deaf
-        )
         self.tour = Tour(session, self.keymap, lambda: getattr(self.screen, "heading", type(self.screen).__name__))
         self.opener = Opener(self, session, self.assist, self.keyboard, self.show_line, self.tour.begin)
         self.typist = Typist(

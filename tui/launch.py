@@ -7,6 +7,7 @@ import os
 import signal
 import sys
 from collections.abc import Sequence
+from functools import partial
 from typing import TYPE_CHECKING
 
 from textual.driver import Driver
@@ -42,13 +43,13 @@ def run(urls: Sequence[str], reconnect: bool = True, raw: bool = False, twin: bo
 async def _run(urls: Sequence[str], settings: Settings, reconnect: bool, raw: bool, twin: bool) -> int:
     with importing():
         from multidrop.shell.log.writer import begin
-        from multidrop.shell.prompt.collector import collected_at_rest
+        from multidrop.shell.prompt.collector import at_rest, collected_at_rest
         from multidrop.shell.session import Session
 
     session = Session(settings, reconnect=reconnect, raw=raw)
     session.twins.wanted = twin
     try:
-        with collected_at_rest(lambda: session.at_rest):
+        with collected_at_rest(partial(at_rest, session)):
             app = MultidropApp(session, urls, ShellAssist(session, settings), driver(), settings.look)
             begin(session)
             return await show(app)

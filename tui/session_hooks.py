@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 from multidrop.dialects import Diagnostic
 from multidrop.dialects.text import visible
 from multidrop.shell import new_file
-from multidrop.shell.channel import Field
+from multidrop.shell.channel import Field, Front
 from multidrop.shell.transcripts import Filter
 from multidrop.tui.actions import Actions, Parts
 from multidrop.tui.outbox import Outbox
@@ -85,14 +85,21 @@ def _write(path: str, records: Sequence[Record], zero: datetime) -> None:
 
 
 class Hooks:
-    """Sets the functions of a session that need the screen. `closed` is called after each dialog."""
+    """The answers of the screen to what a session asks of its front end. `closed` is called after each dialog."""
 
     def __init__(self, parts: Parts, actions: Actions, presenter: Presenter, closed: Callable[[], None]) -> None:
         self._parts, self._actions, self._presenter, self._closed = parts, actions, presenter, closed
-        session = parts.session
-        session.ask, session.fill = self._go_on, self._fill_in
-        session.screen, session.edit = self._show_page, self._edit
-        session.before_quit, session.renamed = self._before_quit, parts.selection.rename
+        parts.session.front = Front(
+            self._go_on,
+            self._fill_in,
+            before_quit=self._before_quit,
+            renamed=parts.selection.rename,
+            edit=self._edit,
+            screen=self._show_page,
+            transcripts=Transcripts(
+                parts.main, parts.session, parts.outbox, parts.questions.paste, parts.host.keyboard.turn_deaf
+            ),
+        )
 
     async def _go_on(self, question: str) -> bool:
         self._parts.host.keyboard.turn_deaf()

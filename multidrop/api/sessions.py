@@ -17,6 +17,7 @@ from multidrop.api.telemetry import RATE, AsyncTelemetry
 from multidrop.dialects import Diagnostic
 from multidrop.shell import stop_report
 from multidrop.shell.automation import settled
+from multidrop.shell.channel import Front
 from multidrop.shell.connect.settings import load
 from multidrop.shell.events import By, Notified, SessionEvent
 from multidrop.shell.session import Session as Shell
@@ -101,7 +102,7 @@ class AsyncSession:
         from multidrop.shell.log.writer import begin as begin_log
 
         shell = Shell(load())
-        shell.agreed, shell.way = self._yes, "connect(URL, yes=True)"
+        shell.questions.agreed, shell.front = self._yes, Front(way="connect(URL, yes=True)")
         shell.subscribe(self._take)
         self._calls.open(shell)
         begin_log(shell)

@@ -170,10 +170,10 @@ class Replay:
             self._session.notify(f"not replayed: {self._found.unsent} lines that were not sent then", outcome=True)
         if not self._simulated:
             moving = self._announced()
-            await self._session.confirm(
+            await self._session.questions.confirm(
                 f"{len(self.steps)} lines are sent; {moving} of them can start motion or ask first"
             )
-        self._session.agreed = True
+        self._session.questions.agreed = True
 
     def _announced(self) -> int:
         """List the drives, and the lines that can start motion or need a yes; return the number of those."""

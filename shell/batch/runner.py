@@ -14,6 +14,7 @@ from functools import partial
 
 from multidrop.shell import stop_report
 from multidrop.shell.automation import outcome, settled
+from multidrop.shell.channel import Front
 from multidrop.shell.connect import settings
 from multidrop.shell.events import FAILURES
 from multidrop.shell.log.writer import begin as begin_log
@@ -77,7 +78,7 @@ def run(
 
 def _session(make: Callable[[], Session], agreed: bool) -> Session:
     made = make()
-    made.agreed = agreed
+    made.questions.agreed = agreed
     return made
 
 
@@ -92,15 +93,15 @@ async def _run(
 ) -> int:
     with nonblocking() as streams:
         session = make()
-        session.ready = streams.ready
+        session.front = Front(ready=streams.ready)
         session.subscribe(printer.show)
         begin_log(session)
         host = _Host(session, printer, interrupted)
         stop = partial(session.stop, "Ctrl+X")
         keys = on_stop_key(session.stop_ahead, stop, host.interrupt) if watch_keys else nullcontext()
         with on_signals(host.interrupt), keys as keyboard:
-            session.ask = asker(keyboard) if asks else None
-            session.beforehand = "--yes agrees beforehand"
+            ask = asker(keyboard) if asks else None
+            session.front = Front(ask, ready=streams.ready, beforehand="--yes agrees beforehand")
             try:
                 code = await host.result(urls, body)
             finally:

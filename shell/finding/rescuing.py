@@ -60,7 +60,7 @@ class Rescue:
         if not lines:
             return
         what = f"{', '.join(lines)} is set in {drive.state.address or 'the drive'}, and is lost at power-off without S"
-        await self._workspace.confirm(what, drive.port, SO_FAR)
+        await self._workspace.questions.confirm(what, drive.port, SO_FAR)
 
         def procedure() -> Procedure[None]:
             for line in lines:
@@ -79,7 +79,7 @@ class Rescue:
         """Clear what keeps a drive from replying, and search again."""
         first = stages[0]
         self._say_step(f"clear the line at {first.words} and search again")
-        await self._workspace.confirm(
+        await self._workspace.questions.confirm(
             f"no drive replies; the next step {first.scan.clears}", self._scanning.port, SO_FAR
         )
         await self._cleared(first)
@@ -90,7 +90,7 @@ class Rescue:
             return
         self._say_step(f"search, clear and search again with {listed(others)}")
         hazards = f"the next step goes on with {listed(others)}; {HAZARD}; it stops every drive, and erases nothing"
-        await self._workspace.confirm(hazards, self._scanning.port, SO_FAR)
+        await self._workspace.questions.confirm(hazards, self._scanning.port, SO_FAR)
         await self._scanning.search(others, False, hasty=True)
         for each in others:
             if not self._scanning.found:
@@ -107,7 +107,7 @@ class Rescue:
             "switch the drive off and on: it begins with its saved settings, and outside of party mode it sends a "
             "sign-on; nothing is sent while this listens"
         )
-        if self._workspace.ask is None or self._workspace.agreed:
+        if self._workspace.front.ask is None or self._workspace.questions.agreed:
             self._say("this step needs a person at a terminal, without --yes; it is left out")
             return
         for stage in stages:
@@ -117,7 +117,9 @@ class Rescue:
                 what = (
                     f"listen with {stage.words} for {LISTENS:g} s; a program labelled SU may start and move the drive"
                 )
-                await self._workspace.confirm(f"{what}; switch the drive off and on after the answer", "power", SO_FAR)
+                await self._workspace.questions.confirm(
+                    f"{what}; switch the drive off and on after the answer", "power", SO_FAR
+                )
             except Diagnostic:
                 return
             self._say(await self._listened(stage))
@@ -150,12 +152,12 @@ class Rescue:
     async def _erase(self, stages: Sequence[Stage], agreed: bool) -> None:
         """Set every drive to factory defaults, after a question of its own."""
         erasing = [each for each in stages if each.scan.erase is not None]
-        asks = self._workspace.ask is not None and not self._workspace.agreed
+        asks = self._workspace.front.ask is not None and not self._workspace.questions.agreed
         if not erasing or not (agreed or asks):
             self._say("nothing short of erasing is left; multidrop rescue --erase goes as far as FD")
             return
         self._say_step("FD: factory defaults")
-        await self._workspace.confirm(ERASES, self._scanning.port, SO_FAR)
+        await self._workspace.questions.confirm(ERASES, self._scanning.port, SO_FAR)
         defaults = [each for each in erasing if each.baud in (None, FAMILIES[each.family].baud)]
         for each in erasing:
             assert each.scan.erase is not None

@@ -195,9 +195,9 @@ class Scanning:
                 on = f"the search goes on with {listed(others)} (about {round(seconds)} s)"
                 try:
                     what = f"{so_far} with {listed([first])}; {on}; {HAZARD}"
-                    await self._workspace.confirm(what, self.port, SO_FAR)
+                    await self._workspace.questions.confirm(what, self.port, SO_FAR)
                 except Diagnostic:
-                    if not self.found or self._workspace.ask is None:
+                    if not self.found or self._workspace.front.ask is None:
                         raise
                     return  # a no ends the search where a drive was found
                 await self.search(others, everything)

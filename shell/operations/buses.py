@@ -24,6 +24,7 @@ from multidrop.simulator import sim_words
 
 if TYPE_CHECKING:
     from multidrop.shell.workspace import Workspace
+    from multidrop.simulator.serving.running import RunningFloor
 
 SHOWN: Arguments = {
     "[URL ...]": WHAT,
@@ -41,8 +42,17 @@ SEARCHED: Arguments = {
 }
 
 
+def simulated_cell(workspace: Workspace) -> RunningFloor | None:
+    """The cell of the selected bus, or the only one that is open."""
+    cells = workspace.cells
+    if workspace.selected_bus in cells:
+        return cells[workspace.selected_bus]
+    different = {id(cell): cell for cell in cells.values()}
+    return next(iter(different.values())) if len(different) == 1 else None
+
+
 def is_simulated(workspace: Workspace) -> bool:
-    return workspace.cell is not None
+    return simulated_cell(workspace) is not None
 
 
 def is_raw(workspace: Workspace) -> bool:

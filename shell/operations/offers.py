@@ -12,6 +12,7 @@ from multidrop.dialects.families import DEFAULT, FAMILIES
 from multidrop.macros import KEYS
 from multidrop.shell.connect.url_forms import URL_FORMS
 from multidrop.shell.lines import DriveLine, join_target
+from multidrop.shell.operations.buses import simulated_cell
 from multidrop.shell.operations.table import VERBS
 from multidrop.simulator.families import PROGRAMS, TABLE
 
@@ -72,7 +73,8 @@ def offered(workspace: Workspace, placeholder: str, word: str) -> Found:
         case "@ADDR":
             yield from ((f"@{name}", meaning) for name, meaning in drives)
         case "DRIVE":
-            for each in workspace.cell.floor.drives if workspace.cell else ():
+            cell = simulated_cell(workspace)
+            for each in cell.floor.drives if cell else ():
                 name = each.spec.name if each.bus == workspace.selected_bus else f"{each.bus}:{each.spec.name}"
                 yield name, each.spec.personality
         case "F2..F12":

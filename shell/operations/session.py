@@ -20,11 +20,11 @@ ENTRIES: Arguments = {
 
 
 def has_screen(workspace: Workspace) -> bool:
-    return workspace.screen is not None
+    return workspace.front.screen is not None
 
 
 def has_transcript(workspace: Workspace) -> bool:
-    return workspace.transcripts is not None
+    return workspace.front.transcripts is not None
 
 
 HELP = Operation(

@@ -89,7 +89,9 @@ class _Replacement:
             return
         await check_ready(self._drive)
         steps = ", ".join(changes) if changes else f"nothing differs, {self._parameters.saving} saves it"
-        await self._session.confirm(f"it gets the state of {spec.name!r} in {self._file}: {steps}", self._name)
+        await self._session.questions.confirm(
+            f"it gets the state of {spec.name!r} in {self._file}: {steps}", self._name
+        )
         await check_ready(self._drive)  # a person may have thought about it for long
         try:
             await self._write(here)

@@ -147,7 +147,7 @@ async def save(workspace: Workspace, target: str) -> None:
 
     async def keep(drive: Drive) -> None:
         family, who = drive.family.values.parameters, workspace.display_name(drive)
-        await workspace.confirm(f"'{family.saving}' keeps all present settings over power-off", who)
+        await workspace.questions.confirm(f"'{family.saving}' keeps all present settings over power-off", who)
         await transferring(drive, family.save(drive.state))
         workspace.notify(f"{who}: its settings are saved")
 
@@ -298,7 +298,7 @@ async def send(session: Session, drive: Drive, plan: Plan, options: Options, wha
     with running(session, f"{session.display_name(drive)}: {what}") as progress:
         for number, change in enumerate(plan, 1):
             if change.name in options.named and drive.starts(change.text):
-                session.starting(drive)
+                session.path.starting(drive)
             await transferring(drive, drive.family.values.parameters.write(drive.state, change))
             written.append(change)
             progress(number, len(plan))
@@ -353,8 +353,8 @@ async def check_ready(drive: Drive) -> None:
 async def _agree(workspace: Workspace, drive: Drive, present: Readings, plan: Plan, file: files.SettingsFile) -> None:
     """Ask, and make sure that the drive has not changed while a person thought about it."""
     names = list(dict.fromkeys(change.name for change in plan if not change.temporary))
-    who, agreed = workspace.display_name(drive), workspace.agreed
-    await workspace.confirm(
+    who, agreed = workspace.display_name(drive), workspace.questions.agreed
+    await workspace.questions.confirm(
         f"{len(names)} setting{'s' * (len(names) != 1)} of {file.path} will be written: {files.listed(names)}", who
     )
     if agreed:

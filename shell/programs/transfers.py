@@ -166,9 +166,9 @@ class _Download:
         if not found:
             return
         what = f"{self._file}, outside of its program, {'; '.join(found)}"
-        if self._session.agreed:
+        if self._session.questions.agreed:
             self._say(what, warning=True)
-        await self._session.confirm(what, self._name, by=by)
+        await self._session.questions.confirm(what, self._name, by=by)
 
     def _outside(self, lines: Sequence[SourceLine]) -> list[SourceLine]:
         """The lines of a file that the drive executes as they come, without declarations."""
@@ -214,7 +214,7 @@ class _Download:
         drive, workspace = self._drive, self._session
         workspace.addressed.add((drive.link.name, drive.address))
         if any(drive.codec.starts_motion(line.text) for line in self._programs.executed(lines)):
-            self._session.starting(drive)
+            self._session.path.starting(drive)
         try:
             with running(workspace, f"{self._name}: download") as job:
                 sent = await drive.download(lines, held, job)
@@ -268,7 +268,7 @@ class _Download:
 
     async def _start(self, line: str) -> None:
         drive, workspace = self._drive, self._session
-        workspace.starting(drive)
+        workspace.path.starting(drive)
         for text in await drive.send(line):
             workspace.publish(Printed(workspace.now(), drive.link.name, drive.address, text))
         self._say(f"started ({line})")

@@ -13,6 +13,10 @@ import asyncio
 import contextlib
 import gc
 from collections.abc import Callable, Iterator
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from multidrop.shell.workspace import Workspace
 
 FREEZE = 1.0
 """The time between two freezes, s."""
@@ -24,43 +28,34 @@ YOUNG = 1
 """The oldest generation collected before each freeze."""
 
 
+def at_rest(workspace: Workspace) -> bool:
+    """Whether nothing runs, and the last reading of every drive showed velocity 0."""
+    readings = [drive.seen for bus in workspace.buses.values() for drive in bus.all_drives if drive.seen is not None]
+    return not workspace.busy and not any(reading.velocity for reading in readings)
+
+
 @contextlib.contextmanager
 def collected_at_rest(resting: Callable[[], bool]) -> Iterator[None]:
     """Freeze survivors each second; collect everything only while `resting()`. Needs a running event loop."""
-    collector = _Collector(resting)
-    collector.begin()
-    try:
-        yield
-    finally:
-        collector.end()
+    loop = asyncio.get_running_loop()
+    full_at = loop.time()
+    gc.freeze()  # what the imports made is no garbage, and a collection would delay the first frame
 
-
-class _Collector:
-    def __init__(self, resting: Callable[[], bool]) -> None:
-        self._resting = resting
-        self._loop = asyncio.get_running_loop()
-        self._full_at = self._loop.time()
-        self._timer: asyncio.TimerHandle | None = None
-
-    def begin(self) -> None:
-        """Freeze what the imports made: none of it is garbage, and a collection would delay the first frame."""
-        self._freeze()
-
-    def end(self) -> None:
-        if self._timer is not None:
-            self._timer.cancel()
-        gc.unfreeze()
-
-    def _freeze(self) -> None:
-        gc.freeze()
-        self._timer = self._loop.call_later(FREEZE, self._again)
-
-    def _again(self) -> None:
-        waited = self._loop.time() - self._full_at
-        if waited >= LONGEST or (waited >= FULL and self._resting()):
-            self._full_at = self._loop.time()
+    def again() -> None:
+        nonlocal full_at, timer
+        waited = loop.time() - full_at
+        if waited >= LONGEST or (waited >= FULL and resting()):
+            full_at = loop.time()
             gc.unfreeze()
             gc.collect()
         else:
             gc.collect(YOUNG)
-        self._freeze()
+        gc.freeze()
+        timer = loop.call_later(FREEZE, again)
+
+    timer = loop.call_later(FREEZE, again)
+    try:
+        yield
+    finally:
+        timer.cancel()
+        gc.unfreeze()

@@ -29,10 +29,11 @@ from prompt_toolkit.search import stop_search
 from multidrop.dialects import Diagnostic
 from multidrop.dialects.files import lines_of
 from multidrop.shell.automation import outcome, settled
+from multidrop.shell.channel import Front
 from multidrop.shell.connect import settings
 from multidrop.shell.events import FAILURES, Progressed, SessionEvent, StateChanged
 from multidrop.shell.log.writer import begin as begin_log
-from multidrop.shell.prompt.collector import collected_at_rest
+from multidrop.shell.prompt.collector import at_rest, collected_at_rest
 from multidrop.shell.prompt.keyboard import Keyboard, on_signals, terminal
 from multidrop.shell.prompt.keys import KeyboardInput, PromptQuestion
 from multidrop.shell.prompt.terminal_input import filled
@@ -70,10 +71,10 @@ def run(
 async def _run(make: Callable[[], Session], urls: Sequence[str], agreed: bool, twin: bool) -> int:
     with nonblocking() as streams, ExitStack() as stack:
         session = make()
-        session.agreed, session.twins.wanted = agreed, twin
+        session.questions.agreed, session.twins.wanted = agreed, twin
         session.subscribe(Printer(talkative=True).show)
         begin_log(session)
-        stack.enter_context(collected_at_rest(lambda: session.at_rest))
+        stack.enter_context(collected_at_rest(partial(at_rest, session)))
         descriptor, input_ = terminal(), None
         if descriptor is not None:
             keyboard = Keyboard(descriptor, signals=False)
@@ -110,8 +111,8 @@ class Prompt:
         self._toolbar = Toolbar(session, self._lines, self._prompt)
         self._question = PromptQuestion(self._prompt.app, self._ask_alone)
         self._prompt.key_bindings = self._bindings()
-        session.before_quit, session.ask = self._may_quit, self._question.ask
-        session.fill = partial(filled, self._question.ask_text, partial(session.notify, warning=True))
+        fill = partial(filled, self._question.ask_text, partial(session.notify, warning=True))
+        session.front = Front(self._question.ask, fill, before_quit=self._may_quit)
         self._accept = self._prompt.default_buffer.accept_handler
         self._prompt.default_buffer.accept_handler = self._accepted
         if input_ is not None:

@@ -111,7 +111,7 @@ async def ask(session: Session, word: Word, by: By, place: Place | None = None) 
     """Read the value of a word. Raises Diagnostic, DriveError or TransportLost."""
     drive = drive_of(session, word, place)
     line = _question(session, drive, word)
-    await session.guard(drive, line, by)
+    await session.path.guard(drive, line, by)
     printed = await drive.send(line)
     if len(printed) != 1:
         raise DriveError(f"{session.display_name(drive)}: {line} printed {len(printed)} lines; a value is one")
@@ -345,8 +345,8 @@ class Execution:
         with self._reporting(line, frame, counts=counts) as reported:
             reported.sent = text = fill(line.text, frame.names)
             workspace = self.session
-            if workspace.ready is not None:
-                await workspace.ready()
+            if workspace.front.ready is not None:
+                await workspace.front.ready()
             if counts:
                 workspace.notify(f"{line.where}: {text}")  # for the session log; only what can be replayed is `Entered`
             try:

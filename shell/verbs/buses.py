@@ -34,7 +34,8 @@ async def open_(call: Call) -> None:
 
 async def close(call: Call) -> None:
     (name,) = call.words()
-    await call.session.close_bus(name)
+    await call.session.forget(call.session.bus(name))
+    call.session.changed()
     call.session.notify(f"{name} is closed")
 
 
@@ -111,7 +112,7 @@ async def tab(call: Call) -> None:
 
 async def keep(call: Call) -> None:
     name, *bus = call.words()
-    url = call.session.url_of(call.session.bus("".join(bus)))
+    url = call.session.openings.url_of(call.session.bus("".join(bus)))
     path = settings.save(name, url)
     call.session.notify(f"{path}: connection {name} is saved: {url}", outcome=True)
 
@@ -132,7 +133,8 @@ async def raw(call: Call) -> None:
             if (word == "on") == (bus.name in call.session.raw):
                 state = "already" if word == "on" else "not"
                 raise Diagnostic(f"{bus.name} is {state} in raw mode", call.verb.name)
-            await (call.session.raw_on(bus) if word == "on" else call.session.raw_off(bus))
+            openings = call.session.openings
+            await (openings.raw_on(bus) if word == "on" else openings.raw_off(bus))
         case ["open", url]:
             before = {*call.session.buses}
             await call.session.open(url, raw=True)
@@ -228,4 +230,4 @@ async def bytes_(call: Call) -> None:
     line, data = _raw(call), parse_bytes(call.rest)
     if not data:
         raise call.wrong()
-    await call.session.send_bytes(line.bus, data, call.by)
+    await call.session.path.send_bytes(line.bus, data, call.by)

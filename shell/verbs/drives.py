@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 import shlex
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from multidrop.dialects import Diagnostic, Inexpressible, Procedure
 from multidrop.dialects.families import FAMILIES, TABLE
@@ -13,15 +13,12 @@ from multidrop.dialects.family import Registers
 from multidrop.dialects.text import whole
 from multidrop.drives.drive import Drive
 from multidrop.shell.events import By
+from multidrop.shell.operations.buses import simulated_cell
 from multidrop.shell.params import work
 from multidrop.shell.params.work import Options
 from multidrop.shell.plots.plot import begin
 from multidrop.shell.plots.request import DEFAULT, parse_rate, parse_series, parse_target, read_first
 from multidrop.shell.verbs.call import Call
-
-if TYPE_CHECKING:
-    pass
-
 
 FLAGS = ("--dry-run", "--save", "--communication", "--other-product", "--defaults")
 VALUES = {"--with": "a value", "--against": "a value"}
@@ -120,14 +117,15 @@ async def _plot_to(call: Call, options: Mapping[str, str], texts: list[str]) -> 
 async def _plot_on_screen(call: Call, texts: list[str]) -> None:
     """Show a plot on the screen; other plots go on."""
     workspace = call.session
-    if workspace.screen is None:
+    screen = workspace.front.screen
+    if screen is None:
         raise Diagnostic("no screen to plot on", "/plot", "valid here: --to FILE.rrd or --serve [HOST:]PORT")
     series = parse_series(workspace, texts)
     await read_first(workspace, series)
     workspace.plotted = series
     workspace.changed()
     if call.by is By.OPERATOR:  # a page that a macro or a script opens would take the keys of a person who types
-        await workspace.screen("plot")
+        await screen("plot")
 
 
 def _plotted(call: Call, words: list[str]) -> tuple[dict[str, str], list[str]]:
@@ -167,7 +165,7 @@ def _registered(call: Call) -> tuple[Drive, Registers[Any]]:
 
 async def _show(call: Call, drive: Drive, talk: Procedure[tuple[str, ...]], *, writes: bool = False) -> None:
     if writes:
-        call.session.starting(drive)
+        call.session.path.starting(drive)
     for line in await drive.run(talk):
         call.session.output(line)
 
@@ -192,7 +190,7 @@ async def register(call: Call) -> None:
         return
     values = [_number(call, text.strip()) for text in found[2].split(",")]
     for line in registers.lines(address, values):
-        await call.session.guard(drive, line, call.by)
+        await call.session.path.guard(drive, line, call.by)
     await _show(call, drive, registers.write(drive.state, address, values), writes=True)
 
 
@@ -259,7 +257,7 @@ async def twin(call: Call) -> None:
 
 
 async def sim(call: Call) -> None:
-    cell = call.session.cell
+    cell = simulated_cell(call.session)
     if cell is None:
         raise Diagnostic("no simulated bus is selected", "/sim", "/open sim: opens the demo cell")
     remark = cell.command(f"/sim {call.rest}")

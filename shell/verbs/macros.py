@@ -73,7 +73,7 @@ async def macro(call: Call) -> None:
         case ["import", file] if not file.startswith("--"):
             done = macro_changes.import_(store, file)
         case ["delete", name]:
-            await workspace.confirm(macro_changes.deletion(store, name), so_far="nothing was deleted")
+            await workspace.questions.confirm(macro_changes.deletion(store, name), so_far="nothing was deleted")
             done = macro_changes.delete(store, name)
         case ["export", file, *names]:
             done = macro_changes.export(store, call.output_file(file), names, workspace.output)
@@ -87,8 +87,8 @@ async def macro(call: Call) -> None:
 async def _edit(workspace: Workspace, name: str) -> None:
     """Open the screen's editor. Elsewhere name the command: an editor on this terminal would take the stop key."""
     macro_changes.check(workspace.macros, name)
-    if workspace.edit is not None:
-        return await workspace.edit(str(workspace.macros.path(name)))
+    if workspace.front.edit is not None:
+        return await workspace.front.edit(str(workspace.macros.path(name)))
     hint = f"in another terminal: multidrop macro edit {shlex.quote(name)}"
     raise Diagnostic("an editor would take Ctrl+X, which must stop the drives", f"/macro edit {name}", hint)
 
@@ -166,7 +166,7 @@ async def _offer(workspace: Workspace, macro: Macro, found: list[Offer]) -> None
     """Ask whether waits go in place of the pauses; say how where no person can be asked, and after a no."""
     store, saved = workspace.macros, workspace.macros.contents(macro.name)
     changes = "; ".join(offer.text for offer in found)
-    if await workspace.agrees(f"macro {macro.name}: put waits in place of pauses: {changes}"):
+    if await workspace.questions.agrees(f"macro {macro.name}: put waits in place of pauses: {changes}"):
         store.save(with_waits(macro, found), saved)
         workspace.notify(f"macro {macro.name}: {len(found)} {'pause' if len(found) == 1 else 'pauses'} replaced")
         return

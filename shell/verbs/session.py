@@ -66,7 +66,7 @@ async def log(call: Call) -> None:
 
 async def quit_(call: Call) -> None:
     call.words()
-    ask = call.session.before_quit
+    ask = call.session.front.before_quit
     if ask is None or await ask():
         call.session.quit()
 
@@ -145,14 +145,14 @@ async def tour(call: Call) -> None:
 
 
 async def _show(call: Call, name: str) -> None:
-    if call.session.screen is None:
+    if call.session.front.screen is None:
         raise Diagnostic("this front end has no screen", call.verb.name, "multidrop tui opens it")
-    await call.session.screen(name)
+    await call.session.front.screen(name)
 
 
 def _transcripts(call: Call) -> Transcripts:
     """The transcripts of the screen. Raises Diagnostic where there is none."""
-    found = call.session.transcripts
+    found = call.session.front.transcripts
     if found is None:
         raise Diagnostic("only the screen has a transcript", call.verb.name, "multidrop tui opens it")
     return found

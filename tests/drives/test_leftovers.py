@@ -25,7 +25,7 @@ class Left(CellSession):
         super().__init__(folder, bus("line", *(party(name, **settings) for name in "ab")))
         self.stale, self.owed = stale, owed
         self.session = Session(Settings({}, folder / "config", folder / "state"), self.open)
-        self.session.agreed = True
+        self.session.questions.agreed = True
         self.session.subscribe(self.events.append)
 
     async def open(self, connection, naming):

@@ -370,7 +370,7 @@ def test_a_nasty_line_is_carried_out_or_told(
             except FAILURES as failure:
                 assert "\n" not in report(failure) and len(report(failure)) <= LONGEST + 2
             for name in [each for each in session.buses if each != "l"]:
-                await session.close_bus(name)
+                await session.forget(session.bus(name))
         await session.close()
 
     typed()

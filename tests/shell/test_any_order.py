@@ -161,7 +161,7 @@ class AnyOrder(RuleBasedStateMachine):
             self.shop.world("/sim plug w")
             await asyncio.sleep(2.0)
             for name in list(self.session.buses):
-                await self.session.close_bus(name)
+                await self.session.forget(self.session.bus(name))
             await self.session.open(self.shop.url)
 
         self.plugged = True

@@ -23,7 +23,7 @@ class Person:
 
     def __init__(self, session):
         self.asked, self.answers, self.open = [], asyncio.Queue(), 0
-        session.ask = self
+        session.front.ask = self
 
     async def __call__(self, question):
         self.asked.append(question)
@@ -39,13 +39,13 @@ async def test_yes_goes_on_and_no_names_yes_on_a_command_line(made):
     session = made()
     person = Person(session)
     person.answers.put_nowait(True)
-    await session.confirm(WHAT, "a")
-    session.beforehand = "--yes agrees beforehand"
+    await session.questions.confirm(WHAT, "a")
+    session.front.beforehand = "--yes agrees beforehand"
     for beforehand in ("; --yes agrees beforehand", ""):  # of a command, of the prompt
         person.answers.put_nowait(False)
         with pytest.raises(Diagnostic, match=f"^a: the answer was no, so it was not done{beforehand}$"):
-            await session.confirm(WHAT, "a")
-        session.beforehand = ""
+            await session.questions.confirm(WHAT, "a")
+        session.front.beforehand = ""
     assert person.asked == [f"a: {WHAT}"] * 3
 
 
@@ -53,11 +53,11 @@ async def test_yes_goes_on_and_no_names_yes_on_a_command_line(made):
 async def test_nobody_there_is_no_and_agreed_asks_nobody(made):
     session = made()
     with pytest.raises(Diagnostic, match=f"^{WHAT}; nothing was sent; --yes agrees to it$"):
-        await session.confirm(WHAT)
+        await session.questions.confirm(WHAT)
     with pytest.raises(Diagnostic, match=f"^{WHAT}; nothing more was sent; --yes agrees to it$"):
-        await session.confirm(WHAT, so_far="nothing more was sent")
-    person, session.agreed = Person(session), True
-    await session.confirm(WHAT)
+        await session.questions.confirm(WHAT, so_far="nothing more was sent")
+    person, session.questions.agreed = Person(session), True
+    await session.questions.confirm(WHAT)
     assert person.asked == []
 
 
@@ -65,7 +65,7 @@ async def test_nobody_there_is_no_and_agreed_asks_nobody(made):
 async def test_a_stop_ends_the_open_question_and_those_that_wait(made):
     session = made()
     person = Person(session)
-    asking = [asyncio.create_task(session.confirm(f"{n}")) for n in range(3)]
+    asking = [asyncio.create_task(session.questions.confirm(f"{n}")) for n in range(3)]
     await asyncio.sleep(0.1)
     assert person.asked == ["0"] and not session.busy
     session.stop()
@@ -79,7 +79,7 @@ async def test_a_stop_ends_the_open_question_and_those_that_wait(made):
 async def test_an_interruption_ends_the_question(made):
     session = made()
     person = Person(session)
-    asking = asyncio.create_task(session.confirm(WHAT))
+    asking = asyncio.create_task(session.questions.confirm(WHAT))
     await asyncio.sleep(0.1)
     session.interrupt()
     assert isinstance((await asyncio.gather(asking, return_exceptions=True))[0], asyncio.CancelledError)

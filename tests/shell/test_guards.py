@@ -22,7 +22,7 @@ class Person:
 
     def __init__(self, shop, answer):
         self.asked, self.answer = [], answer
-        shop.session.ask, shop.session.agreed = self, False
+        shop.session.front.ask, shop.session.questions.agreed = self, False
 
     async def __call__(self, question):
         self.asked.append(question)
@@ -36,7 +36,7 @@ async def opened(folder, *buses):
     async with CellSession(folder, *(buses or (PRESS, STAGES))) as shop:
         await asyncio.sleep(1.0)
         shop.events.clear()
-        shop.session.agreed = False
+        shop.session.questions.agreed = False
         yield shop
 
 
@@ -90,7 +90,7 @@ async def test_a_script_and_a_macro_ask_nobody(tmp_path):
         with pytest.raises(Diagnostic, match="a macro cannot ask"):
             await play(shop.session, Macro("wipe", (Step(0.0, "@a CP"),)), {})
         assert person.asked == [] and silent(shop)
-        shop.session.agreed = True
+        shop.session.questions.agreed = True
         await shop.session.run("@a CP", By.SCRIPT)
         assert b"CP" in shop.written("press") and person.asked == []
 

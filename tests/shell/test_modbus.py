@@ -46,7 +46,7 @@ async def session(tmp_path):
         served = [each for bus in floor.floor.cell.buses for each in await serve_bus(floor, bus, stack)]
         made = Session(Settings({}, tmp_path / "config", tmp_path / "state"))
         stack.push_async_callback(made.close)
-        made.agreed = True
+        made.questions.agreed = True
         made.events = []
         made.subscribe(made.events.append)
         urls = {each.endpoint.partition(":")[0]: each.endpoint for each in served}
@@ -312,7 +312,7 @@ async def test_the_state_in_words_is_the_same_over_both(session):
 
 
 async def test_a_raw_write_of_a_guarded_register_needs_a_yes(session):
-    session.agreed = False
+    session.questions.agreed = False
     await session.run("/use modbus")
     for line in ("/register 0x3C =1", "/register 0x8D =84,3", "IP", "AS=3"):
         with pytest.raises(Diagnostic, match="nothing was sent; --yes agrees to it"):

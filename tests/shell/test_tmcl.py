@@ -41,7 +41,7 @@ personality = "LMDCM"
 async def session(tmp_path):
     (tmp_path / "cell.toml").write_text(CELL)
     made = Session(Settings({}, tmp_path / "config", tmp_path / "state"))
-    made.agreed = True
+    made.questions.agreed = True
     made.events = []
     made.subscribe(made.events.append)
     await made.open(f"sim:{tmp_path / 'cell.toml'}")

@@ -49,7 +49,7 @@ class Shelf:
 @in_virtual_time
 async def test_a_filter_is_understood(line: str, wanted: Filter, tmp_path: Path) -> None:
     async with CellSession(tmp_path, CELL) as cell:
-        shelf = cell.session.transcripts = Shelf()
+        shelf = cell.session.front.transcripts = Shelf()
         await cell.session.run(line)
         assert shelf.wanted == wanted
 
@@ -71,7 +71,7 @@ async def test_a_filter_is_understood(line: str, wanted: Filter, tmp_path: Path)
 @in_virtual_time
 async def test_a_wrong_line_changes_nothing(line: str, why: str, tmp_path: Path) -> None:
     async with CellSession(tmp_path, CELL) as cell:
-        shelf = cell.session.transcripts = Shelf()
+        shelf = cell.session.front.transcripts = Shelf()
         with pytest.raises(Diagnostic, match=why):
             await cell.session.run(line)
         assert (shelf.wanted, shelf.times, shelf.offered) == (EVERYTHING, "clock", 0)
@@ -83,7 +83,7 @@ async def test_times_go_round_and_are_kept(tmp_path: Path, monkeypatch: pytest.M
     file = tmp_path / "multidrop.toml"
     file.write_text('# mine\n[screen]\ntheme = "multidrop-light"\n')
     async with CellSession(tmp_path, CELL) as cell:
-        shelf = cell.session.transcripts = Shelf()
+        shelf = cell.session.front.transcripts = Shelf()
         await cell.session.run("/times")
         assert (shelf.times, settings.load().look.times) == ("start", "start")
         await cell.session.run("/times last")

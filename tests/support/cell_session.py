@@ -47,7 +47,7 @@ class CellSession:
         (folder / "cell.toml").write_text("".join(buses))
         self.url = f"sim:{folder / 'cell.toml'}"
         self.session = Session(Settings({}, folder / "config", folder / "state"), reconnect=reconnect)
-        self.session.agreed = True
+        self.session.questions.agreed = True
         self.events: list[Any] = []
         self.session.subscribe(self.events.append)
 

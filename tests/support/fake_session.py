@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import asyncio
 import math
-from collections.abc import Awaitable, Callable, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from datetime import datetime, timedelta
 from types import SimpleNamespace
@@ -21,12 +21,11 @@ from multidrop.dialects.values import UNREAD, Conditions, Lamp, Pace
 from multidrop.drives.events import Conditioned, Sample, Silent, Unsolicited
 from multidrop.drives.stopping import Fate
 from multidrop.drives.telemetry import Value
-from multidrop.shell.channel import Fill
+from multidrop.shell.channel import Front
 from multidrop.shell.events import By, Entered, Failed, Notified, OnBus, Printed, SessionEvent, StateChanged
 from multidrop.shell.lines import TypedLine
 from multidrop.shell.roles import RunningPlot, Series
 from multidrop.shell.stop_report import Found, Tally
-from multidrop.shell.transcripts import Transcripts
 from multidrop.transports import TransportLost, Unreachable
 from multidrop.tui.app import MultidropApp
 from multidrop.tui.assist import Assist, StartEntry
@@ -154,15 +153,9 @@ class FakeSession:
         self.fates: dict[str, Fate] = {}
         self.moves: list[str] = []
         """The result of `in_motion`."""
-        self.before_quit: Callable[[], Awaitable[bool]] | None = None
-        self.ask: Callable[[str], Awaitable[bool]] | None = None
+        self.front = Front()
         self.plots: list[RunningPlot] = []
         self.plotted: tuple[Series, ...] = ()
-        self.fill: Fill | None = None
-        self.renamed: Callable[[str, str], None] | None = None
-        self.edit: Callable[[str], Awaitable[None]] | None = None
-        self.screen: Callable[[str], Awaitable[None]] | None = None
-        self.transcripts: Transcripts | None = None
         self.openable: dict[str, FakeBus] = {}
         self._callbacks: list[Callable[[SessionEvent], None]] = []
         self._tasks: set[asyncio.Task[bool]] = set()
@@ -203,8 +196,8 @@ class FakeSession:
             self.stop(line)
         elif line.startswith("/use ") and line.split()[1] in self.buses:
             self.select("", line.split()[1])
-        elif line.startswith("/page ") and self.screen is not None:
-            await self.screen(line.split()[1])
+        elif line.startswith("/page ") and self.front.screen is not None:
+            await self.front.screen(line.split()[1])
         address = self.selected.address if self.selected else ""
         self.emit(Entered(self.time, line, by, self.selected_bus, address))
         self.lines.append((line, by))

@@ -450,7 +450,7 @@ async def test_quit_as_a_line_asks_like_the_key() -> None:
     session.moves = ["press:a moves at 5 a second"]
     app = make_app(session)
     async with app.run_test(size=(80, 24)) as pilot:
-        assert session.before_quit is not None and await session.before_quit() is False
+        assert session.front.before_quit is not None and await session.front.before_quit() is False
         await pilot.pause()
         assert app.screen.lines == session.moves  # type: ignore[attr-defined]
         await pilot.press("down", "enter")
@@ -522,8 +522,8 @@ async def test_a_renamed_bus_keeps_its_transcript_its_values_and_the_line_that_i
         session.buses = {("gantry" if name == "press" else name): bus for name, bus in session.buses.items()}
         session.buses["gantry"].name = session.selected_bus = "gantry"
         session.addresses["gantry"] = "a"
-        assert session.renamed is not None
-        session.renamed("press", "gantry")
+        assert session.front.renamed is not None
+        session.front.renamed("press", "gantry")
         session.emit(StateChanged(session.time))
         await settle(pilot)
         assert "1 gantry" in app.main.lines("top").plain and "press" not in app.main.lines("top").plain

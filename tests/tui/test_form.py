@@ -32,8 +32,8 @@ async def asked() -> AsyncIterator[tuple[Pilot[int], Any, asyncio.Future[Mapping
     session = demo_session()
     app = make_app(session)
     async with app.run_test(size=(80, 24)) as pilot:
-        assert session.fill is not None
-        answer = asyncio.ensure_future(session.fill("macro m", value_fields(MACRO, {})))
+        assert session.front.fill is not None
+        answer = asyncio.ensure_future(session.front.fill("macro m", value_fields(MACRO, {})))
         await settle(pilot)
         assert isinstance(app.screen, Form)
         await pilot.press(*"lost", "enter")  # typed ahead

@@ -23,8 +23,8 @@ async def test_a_wrong_macro_is_not_saved_and_a_right_one_is(tmp_path: Path, mon
     app = make_app(session)
     async with app.run_test(size=(100, 30)) as pilot:
         await settle(pilot)
-        assert session.edit is not None
-        await session.edit(str(path))
+        assert session.front.edit is not None
+        await session.front.edit(str(path))
         async with asyncio.timeout(PATIENCE):
             while not isinstance(app.screen, ProgramPage) or app.screen.text is None:
                 await pilot.pause(0.01)

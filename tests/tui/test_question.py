@@ -29,8 +29,8 @@ async def asked() -> AsyncIterator[tuple[Pilot[int], FakeSession, asyncio.Future
     session = demo_session()
     app = make_app(session)
     async with app.run_test(size=(80, 24)) as pilot:
-        assert session.ask is not None
-        answer = asyncio.ensure_future(session.ask(WHAT))
+        assert session.front.ask is not None
+        answer = asyncio.ensure_future(session.front.ask(WHAT))
         await settle(pilot)
         assert isinstance(app.screen, GoOn)
         yield pilot, session, answer
@@ -48,8 +48,8 @@ async def test_a_letter_or_the_list_answers() -> None:
             readable(pilot)
             await pilot.press(*keys.split())
             assert await answer is expected
-            assert session.ask is not None
-            answer = asyncio.ensure_future(session.ask(WHAT))
+            assert session.front.ask is not None
+            answer = asyncio.ensure_future(session.front.ask(WHAT))
             await pilot.pause()
         answer.cancel()
         await pilot.pause()
@@ -93,8 +93,8 @@ def test_snapshot_of_a_question(snap_compare: Callable[..., bool]) -> None:
 
     async def ask(pilot: Pilot[int]) -> None:
         await pilot.pause()
-        assert session.ask is not None
-        open_.append(asyncio.ensure_future(session.ask(WHAT)))
+        assert session.front.ask is not None
+        open_.append(asyncio.ensure_future(session.front.ask(WHAT)))
         await settle(pilot)
 
     act: Callable[[Pilot[int]], Awaitable[None]] = ask
@@ -108,8 +108,8 @@ async def test_the_lines_that_lead_to_the_question_are_in_it_and_can_be_read_to_
         app.show_line("/params restore kept.toml", ">")
         for number in range(20):
             app.show_line(f"a: Q{number}=1", "")
-        assert session.ask is not None
-        answer = asyncio.ensure_future(session.ask(WHAT))
+        assert session.front.ask is not None
+        answer = asyncio.ensure_future(session.front.ask(WHAT))
         await settle(pilot)
         assert isinstance(app.screen, GoOn) and app.screen.before == [f"a: Q{number}=1" for number in range(20)]
         readable(pilot)
@@ -128,8 +128,8 @@ async def test_a_low_screen_shows_the_answers_first() -> None:
     app = make_app(session)
     async with app.run_test(size=(60, 15)) as pilot:
         app.show_line("a: Q1=1", "")
-        assert session.ask is not None
-        answer = asyncio.ensure_future(session.ask(WHAT))
+        assert session.front.ask is not None
+        answer = asyncio.ensure_future(session.front.ask(WHAT))
         await settle(pilot)
         assert app.screen.query_one(".keys").region.bottom < app.screen.query_one(".box").region.bottom <= 15
         answer.cancel()

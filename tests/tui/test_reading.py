@@ -76,8 +76,8 @@ async def test_an_answer_is_found_among_a_thousand_prints_of_a_program() -> None
     app = make_app(session)
     async with app.run_test(size=(80, 24)) as pilot:
         await begun(pilot, session)
-        assert session.transcripts is not None
-        session.transcripts.choose(Filter(mine=True))
+        assert session.front.transcripts is not None
+        session.front.transcripts.choose(Filter(mine=True))
         for n in range(12):
             session.emit(OnBus("press", Unsolicited(session.time, tuple(f"tick {n}" for _ in range(90)))))
             if n == 5:
@@ -154,7 +154,7 @@ async def test_the_shown_lines_are_saved_with_their_times_and_replace_no_file(tm
     app = make_app(session)
     async with app.run_test(size=(80, 24)) as pilot:
         await begun(pilot, session)
-        shelf = session.transcripts
+        shelf = session.front.transcripts
         assert shelf is not None
         file = tmp_path / "talk.txt"
         session.now = lambda: asyncio.get_running_loop() and session.time  # type: ignore[method-assign]
@@ -170,7 +170,7 @@ async def test_times_are_those_that_were_asked_for_on_every_page() -> None:
     app = make_app(session)
     async with app.run_test(size=(80, 24)) as pilot:
         await begun(pilot, session)
-        shelf = session.transcripts
+        shelf = session.front.transcripts
         assert shelf is not None
         shelf.set_times("last")
         assert [row[:9].strip() for row in plain(app).split("\n")[:4]] == ["", "+0.400", "+3.600", "+0.000"]
@@ -211,8 +211,8 @@ async def test_lines_that_were_not_sent_are_offered_and_keys_typed_ahead_agree_t
         await pilot.pause(BURST + 0.1)
         await settle(pilot)
         assert "offers them again" in plain(app)
-        assert session.transcripts is not None
-        await session.transcripts.offer_unsent()
+        assert session.front.transcripts is not None
+        await session.front.transcripts.offer_unsent()
         await pilot.press("enter")
         assert isinstance(app.screen, Confirm) and [line for line, _ in session.lines] == ["BAD"]
         app.keyboard._deaf_until = 0.0
@@ -220,4 +220,4 @@ async def test_lines_that_were_not_sent_are_offered_and_keys_typed_ahead_agree_t
         await settle(pilot)
         assert [line for line, _ in session.lines] == ["BAD", "MR 1", "MR 2"]
         with pytest.raises(Diagnostic, match="every line was sent"):
-            await session.transcripts.offer_unsent()
+            await session.front.transcripts.offer_unsent()

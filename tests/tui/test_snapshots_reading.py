@@ -30,8 +30,8 @@ def colours(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def only_errors(session: FakeSession) -> None:
-    assert session.transcripts is not None
-    session.transcripts.choose(Filter(errors=True))
+    assert session.front.transcripts is not None
+    session.front.transcripts.choose(Filter(errors=True))
 
 
 def a_flood(session: FakeSession) -> None:
@@ -41,8 +41,8 @@ def a_flood(session: FakeSession) -> None:
 def the_bytes(session: FakeSession) -> None:
     shown = ((True, "aPR P\\n                  61 50 52 20 50 0A"), (False, "\\x0651200\\r\\n           06 35 31"))
     session.emit(*(Bytes(session.time, "press", way, "", (row,), watched=True) for way, row in shown))
-    assert session.transcripts is not None
-    session.transcripts.set_times("last")
+    assert session.front.transcripts is not None
+    session.front.transcripts.set_times("last")
 
 
 SCREENS: dict[str, tuple[Callable[[FakeSession], None] | None, Sequence[str]]] = {

@@ -156,7 +156,7 @@ async def test_a_stop_of_a_person_ends_it_for_good(tmp_path):
 async def asked(tmp_path, answer, *entries):
     """What is asked and announced before a real drive, and the lines that were run."""
     async with Cell(tmp_path, PRESS) as cell:
-        cell.session.agreed = False
+        cell.session.questions.agreed = False
         record = cell.session.of(cell.session.bus())
         opened, record.opened = record.opened, replace(record.opened, floor=None)
         questions = []
@@ -165,7 +165,7 @@ async def asked(tmp_path, answer, *entries):
             questions.append(question)
             return answer
 
-        cell.session.ask = ask
+        cell.session.front.ask = ask
         try:
             await taken(cell, tmp_path, *entries)
         except Diagnostic as problem:

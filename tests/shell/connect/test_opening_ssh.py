@@ -90,7 +90,7 @@ class Shop:
     def __init__(self, folder: Path, kind: type[FakeSsh]) -> None:
         self.kind, self.said = kind, list[str]()
         self.session = Session(Settings({}, folder / "config", folder / "state"), self.opener)
-        self.session.agreed = True
+        self.session.questions.agreed = True
         self.session.subscribe(lambda event: self.said.append(event.text) if isinstance(event, Notified) else None)
 
     async def opener(self, connection: Connection, _: object) -> list[Opened]:

@@ -29,7 +29,7 @@ async def printed(session, line):
 
 async def test_a_renamed_bus_is_known_by_its_new_name_everywhere(session):
     told = []
-    session.renamed = lambda before, now: told.append((before, now))
+    session.front.renamed = lambda before, now: told.append((before, now))
     await session.run("/use press:b")
     await session.run("/rename gantry")
     assert list(session.buses) == ["gantry", "eth", "pmx"] and told == [("press", "gantry")]

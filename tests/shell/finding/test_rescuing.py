@@ -37,7 +37,7 @@ def rescue(port, url="/dev/ttyUSB9"):
 @in_virtual_time
 async def test_a_drive_in_any_mode_under_any_name_at_any_baud_rate_is_free(tmp_path, em, py, ck, name, baud):
     port = Port(tmp_path, bus("b", drive(name, em, py, ck), baud=baud))
-    port.session.agreed = True
+    port.session.questions.agreed = True
     found, work, _ = rescue(port)
     await work.run([], everything=False, erase=False)
     assert [(each["baud"], each["address"], each["em"], each["party"], each["checksum"]) for each in found] == [
@@ -56,7 +56,7 @@ async def test_a_drive_in_any_mode_under_any_name_at_any_baud_rate_is_free(tmp_p
 @in_virtual_time
 async def test_a_controller_of_the_other_family_is_found(tmp_path):
     port = Port(tmp_path, bus("b", pmx("42"), baud=38400))
-    port.session.agreed = True
+    port.session.questions.agreed = True
     found, work, _ = rescue(port)
     await work.run([], everything=False, erase=False)
     assert [(each["dialect"], each["address"], each["baud"]) for each in found] == [("pmx", "42", 38400)]
@@ -77,7 +77,7 @@ async def test_nothing_that_may_do_harm_is_sent_before_a_yes(tmp_path):
 async def test_nothing_is_erased_without_a_word_for_it(tmp_path):
     port = Port(tmp_path, bus("b", drive(more='program_text = "PG 1\\nLB G1\\nE\\nPG"')))
     port.devices[0].power(False, 0.0)
-    port.session.agreed = True
+    port.session.questions.agreed = True
     _, work, _ = rescue(port)
     with pytest.raises(NothingFound, match="no drive replies on /dev/ttyUSB9"):
         await work.run([9600], everything=False, erase=False)
@@ -93,7 +93,7 @@ async def test_factory_defaults_come_last_and_after_a_question_of_their_own(tmp_
         questions.append(question)
         return "erases their programs" not in question and "listen" not in question
 
-    port.session.ask = ask
+    port.session.front.ask = ask
     _, work, _ = rescue(port, "/dev/ttyUSB9?dialect=mcode")
     with pytest.raises(Diagnostic, match="the answer was no"):
         await work.run([9600], everything=False, erase=False)
@@ -119,7 +119,7 @@ async def test_a_power_cycle_is_listened_to_and_nothing_is_sent_meanwhile(tmp_pa
         return True
 
     switching, before = [], []
-    port.session.ask = ask
+    port.session.front.ask = ask
     found, work, _ = rescue(port, "/dev/ttyUSB9?dialect=mcode")
     await work.run([9600], everything=False, erase=False)
     assert [each["name"] for each in found] == ["a"]
@@ -134,7 +134,7 @@ async def test_plain_sets_the_modes_after_a_question(tmp_path):
     await work.run([], everything=False, erase=False)
     with pytest.raises(Diagnostic, match="EM=0, CK=0, PY=0 is set in k"):
         await work.make_plain(scanning.found[0])
-    port.session.agreed = True
+    port.session.questions.agreed = True
     await work.make_plain(scanning.found[0])
     [device] = port.devices
     assert (device.memory.echo_mode, device.memory.party, device.memory.checksum) == (0, False, 0)
@@ -144,7 +144,7 @@ async def test_plain_sets_the_modes_after_a_question(tmp_path):
 @in_virtual_time
 async def test_a_stop_ends_a_rescue(tmp_path):
     port = Port(tmp_path, bus("b"))
-    port.session.agreed = True
+    port.session.questions.agreed = True
     _, work, _ = rescue(port)
     running = asyncio.create_task(port.session.tasks.run(work.run([], everything=False, erase=True)))
     await asyncio.sleep(6.0)
@@ -166,7 +166,7 @@ async def test_a_stop_while_it_listens_reaches_every_rate_that_was_agreed_to(tmp
             listens.set()
         return True
 
-    port.session.ask = ask
+    port.session.front.ask = ask
     _, work, _ = rescue(port, "/dev/ttyUSB9?dialect=mcode")
     running = asyncio.create_task(port.session.tasks.run(work.run([], everything=False, erase=False)))
     await listens.wait()

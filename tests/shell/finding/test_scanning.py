@@ -53,7 +53,7 @@ async def test_before_another_baud_rate_a_person_is_asked_and_told_why(tmp_path)
 @in_virtual_time
 async def test_a_drive_at_any_baud_rate_is_found_after_a_yes(tmp_path, baud):
     port = Port(tmp_path, bus("b", party("a"), baud=baud))
-    port.session.agreed = True
+    port.session.questions.agreed = True
     found, search = scanning(port)
     await search.run([], False)
     assert [(each["baud"], each["address"]) for each in found] == [(baud, "a")]
@@ -63,7 +63,7 @@ async def test_a_drive_at_any_baud_rate_is_found_after_a_yes(tmp_path, baud):
 @in_virtual_time
 async def test_a_controller_of_the_other_family_is_found_last(tmp_path):
     port = Port(tmp_path, bus("b", pmx("07"), baud=19200))
-    port.session.agreed = True
+    port.session.questions.agreed = True
     found, search = scanning(port)
     await search.run([], False)
     assert [(each["dialect"], each["address"], each["em"]) for each in found] == [("pmx", "07", None)]
@@ -93,7 +93,7 @@ async def test_a_no_to_the_rest_keeps_what_was_found(tmp_path):
         return False
 
     port = Port(tmp_path, bus("b", party("a")))
-    port.session.ask = no
+    port.session.front.ask = no
     found, search = scanning(port)
     await search.run([], True)
     assert len(found) == 1 and port.opened == [("mcode", 9600)]
@@ -102,7 +102,7 @@ async def test_a_no_to_the_rest_keeps_what_was_found(tmp_path):
 @in_virtual_time
 async def test_all_goes_on_and_takes_no_longer_than_its_bound(tmp_path):
     port = Port(tmp_path, bus("b"))
-    port.session.agreed = True
+    port.session.questions.agreed = True
     _, search = scanning(port)
     begun = asyncio.get_running_loop().time()
     with pytest.raises(NothingFound):
@@ -230,7 +230,7 @@ ALL += [("pmx", baud) for baud in (9600, 19200, 38400, 57600, 115200)]
 
 async def stopped_at(port, search, opened):
     """Search all, stop at this opening, and return the openings after the stop."""
-    port.session.agreed = True
+    port.session.questions.agreed = True
     running = asyncio.create_task(port.session.tasks.run(search.run([], True)))
     while len(port.opened) < opened:
         await asyncio.sleep(0.1)
@@ -286,7 +286,7 @@ async def test_a_stop_at_the_question_reaches_what_was_searched(tmp_path):
         asked.set()
         await asyncio.sleep(1000)
 
-    port.session.ask = ask
+    port.session.front.ask = ask
     _, search = scanning(port)
     running = asyncio.create_task(port.session.tasks.run(search.run([], True)))
     await asked.wait()
@@ -304,7 +304,7 @@ async def test_a_stop_at_the_question_reaches_what_was_searched(tmp_path):
 async def test_a_second_stop_key_does_not_end_the_first_stop(tmp_path):
     port = Port(tmp_path, bus("b", party("a")))
     _, search = scanning(port)
-    port.session.agreed = True
+    port.session.questions.agreed = True
     running = asyncio.create_task(port.session.tasks.run(search.run([], True)))
     while len(port.opened) < 3:
         await asyncio.sleep(0.1)

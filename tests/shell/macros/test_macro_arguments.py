@@ -39,7 +39,7 @@ class Person:
 
     def __init__(self, session: Session, **answers: str) -> None:
         self.answers, self.fields = answers, list[Field]()
-        session.fill = self.fill
+        session.front.fill = self.fill
 
     async def fill(self, title: str, fields: Sequence[Field]) -> Mapping[str, str] | None:
         self.fields += fields

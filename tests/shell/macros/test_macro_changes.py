@@ -108,7 +108,7 @@ async def test_a_deletion_is_asked_for(session: Session, folder: Path) -> None:
 
     with pytest.raises(Diagnostic, match="nothing was deleted; --yes agrees to it"):
         await session.run("/macro delete m")
-    session.ask = ask
+    session.front.ask = ask
     with pytest.raises(Diagnostic, match="the answer was no"):
         await session.run("/macro delete m")
     assert (folder / "m.toml").exists()
@@ -145,7 +145,7 @@ async def test_the_screen_has_an_editor_of_its_own(session: Session, folder: Pat
     async def edit(path: str) -> None:
         opened.append(path)
 
-    session.edit = edit
+    session.front.edit = edit
     await run(session, "/macro edit m")
     assert opened == [str(folder / "m.toml")]
 

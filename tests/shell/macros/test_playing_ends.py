@@ -294,7 +294,7 @@ async def test_a_lost_connection_that_it_does_not_use_is_nothing_to_it(tmp_path:
 @in_virtual_time
 async def test_nothing_is_asked_of_a_drive_to_which_nothing_was_sent(tmp_path: Path) -> None:
     async with Shop(tmp_path) as shop:
-        shop.session.agreed = False
+        shop.session.questions.agreed = False
         with pytest.raises(Diagnostic, match="a macro cannot ask"):
             await shop.play(shop.save("m", "@press:a CP"))
         assert not [each for each in shop.events if isinstance(each, OnBus) and isinstance(each.event, Traffic)]

@@ -97,7 +97,7 @@ async def test_waits_are_offered_and_a_yes_puts_them_in(session: Session) -> Non
         assert len(session.macros.load("m").steps) == 2  # it is saved already
         return True
 
-    session.ask = ask
+    session.front.ask = ask
     told = await typed(session, "/record m", "MR 51200", 4.0, "PR P", "/record stop")
     assert asked[0].startswith("macro m: put waits in place of pauses: before step 2, /wait stopped 1")
     assert told[-1] == "macro m: 1 pause replaced"
@@ -113,7 +113,7 @@ async def test_after_a_no_and_without_a_person_the_pauses_stay_and_the_way_is_to
     async def ask(question: str) -> bool:
         return False
 
-    session.ask, session.agreed = ask if person else None, not person
+    session.front.ask, session.questions.agreed = ask if person else None, not person
     told = await typed(session, "/record m", "MR 51200", 4.0, "PR P", "/record stop")
     assert told[-1].endswith("would fit; /macro edit m changes it")
     assert [step.after > 3 for step in session.macros.load("m").steps] == [False, True]

@@ -53,7 +53,7 @@ personality = "MDIX"
 async def opened(tmp_path, text):
     (tmp_path / "cell.toml").write_text(text)
     made = Session(Settings({}, tmp_path / "config", tmp_path / "state"))
-    made.agreed, made.events = True, []
+    made.questions.agreed, made.events = True, []
     made.subscribe(made.events.append)
     await made.open(f"sim:{tmp_path / 'cell.toml'}")
     return made
@@ -156,7 +156,7 @@ async def test_what_moves_the_motor_waits_for_its_name(session):
 
 async def test_without_a_yes_nothing_is_sent(session):
     await say(session, "/params backup kept.toml b", "@b VM=9000")
-    session.agreed = False
+    session.questions.agreed = False
     with pytest.raises(Diagnostic, match="1 setting of kept.toml will be written: VM; nothing was sent; --yes"):
         await say(session, "/params restore kept.toml b")
     assert device(session).memory.values["VM"] == 9000
@@ -164,13 +164,13 @@ async def test_without_a_yes_nothing_is_sent(session):
 
 async def test_a_change_while_the_question_is_open_is_seen(session):
     await say(session, "/params backup kept.toml b", "@b VM=9000")
-    session.agreed = False
+    session.questions.agreed = False
 
     async def answer(question):
         device(session).execute("RC=77", device(session).now)
         return True
 
-    session.ask = answer
+    session.front.ask = answer
     with pytest.raises(Refused, match="its settings changed meanwhile"):
         await say(session, "/params restore kept.toml b")
     assert device(session).memory.values["VM"] == 9000

@@ -32,11 +32,11 @@ async def test_a_save_asks_first_and_each_family_does_it_its_way(tmp_path):
             asked.append(question)
             return False
 
-        cell.session.agreed, cell.session.ask = False, no
+        cell.session.questions.agreed, cell.session.front.ask = False, no
         with pytest.raises(Diagnostic):
             await cell.session.run("/params save line:a")
         assert len(asked) == 1 and b"aS" not in cell.written("line")
-        cell.session.agreed = True
+        cell.session.questions.agreed = True
         await cell.session.run("/params save line:a")
         await cell.session.run("/params save pmx:00")
         assert b"aS" in cell.written("line") and b"@00STORE\r" in cell.written("pmx")

@@ -54,7 +54,7 @@ async def applied(cell: CellSession, folder: Path, source: str = "b", **wanted: 
     """Apply a drive of the machine to the drive of a cell, without a question."""
     (folder / "machine.toml").write_text(MACHINE)
     machine = cells.load(folder / "machine.toml")
-    cell.session.agreed = True
+    cell.session.questions.agreed = True
     drive = cell.session.drive()
     spec = replacement.chosen(machine, "machine.toml", drive, source)
     asked = Options(**wanted)  # type: ignore[arg-type]
@@ -102,7 +102,7 @@ async def test_without_a_yes_nothing_is_sent(tmp_path):
         (tmp_path / "machine.toml").write_text(MACHINE)
         drive = cell.session.drive()
         spec = replacement.chosen(cells.load(tmp_path / "machine.toml"), "m", drive, "b")
-        cell.session.agreed = False
+        cell.session.questions.agreed = False
         with pytest.raises(Diagnostic, match="nothing was sent; --yes agrees to it"):
             await replacement.apply(cell.session, drive, "m", spec, Options())
         assert drive.commands == 0
@@ -138,7 +138,7 @@ async def test_what_could_move_the_motor_is_left_alone_and_said(tmp_path):
     text = MACHINE.replace("EM = 1,", "EM = 1, AS = 1, DE = 1,")
     async with CellSession(tmp_path, unit(FRESH)) as cell:
         (tmp_path / "m.toml").write_text(text)
-        cell.session.agreed = True
+        cell.session.questions.agreed = True
         drive = cell.session.drive()
         spec = replacement.chosen(cells.load(tmp_path / "m.toml"), "m.toml", drive, "b")
         with pytest.raises(DriveError, match="is not as 'b' in m.toml: AS 0, in the file 1"):
@@ -213,7 +213,7 @@ async def becomes(folder: Path, machine: str, present: str, name: str, **named: 
     (folder / "machine.toml").write_text(bus("stages", machine, baud=0))
     cell = CellSession(folder, unit(present))
     await cell.__aenter__()
-    cell.session.agreed = True
+    cell.session.questions.agreed = True
     drive = cell.session.drive()
     spec = replacement.chosen(cells.load(folder / "machine.toml"), "machine.toml", drive, name)
     asked = Options(**named)  # type: ignore[arg-type]

@@ -35,7 +35,7 @@ class Screen:
 
     def __init__(self, cell: CellSession) -> None:
         self.shown: list[str] = []
-        cell.session.screen = self.show
+        cell.session.front.screen = self.show
 
     async def show(self, name: str) -> None:
         self.shown.append(name)

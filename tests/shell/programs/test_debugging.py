@@ -211,7 +211,7 @@ async def test_the_lines_have_the_remarks_of_the_downloaded_file(tmp_path: Path)
     file = tmp_path / "turn.mxt"
     file.write_text("PG 1\nLB Z1\n MR 100   'a small turn\n H\n E\nPG\n")
     async with cell(tmp_path, ethernet()) as it:
-        it.session.agreed = True
+        it.session.questions.agreed = True
         await run(it, f"/download {file}")
         rows = await run(it, "/trace Z1")
         assert [row.split()[1:] for row in rows] == [["MR", "100", "'a", "small", "turn"], ["H"], ["E"]]

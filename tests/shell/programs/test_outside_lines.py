@@ -40,7 +40,7 @@ async def test_nothing_is_sent_of_a_file_with_a_line_that_acts(tmp_path: Path) -
             async with shop_with(tmp_path, text) as shop:
                 await asyncio.sleep(1.0)
                 shop.events.clear()
-                shop.session.agreed = False
+                shop.session.questions.agreed = False
                 with pytest.raises(Diagnostic, match=f"line [17]: .*'{line}'.*nothing was sent"):
                     await load(shop, tmp_path)
                 for by in (By.SCRIPT, By.MACRO):
@@ -59,7 +59,7 @@ async def test_a_person_agrees_to_the_listed_lines_once(tmp_path: Path) -> None:
             asked.append(question)
             return len(asked) > 1
 
-        shop.session.ask, shop.session.agreed = ask, False
+        shop.session.front.ask, shop.session.questions.agreed = ask, False
         with pytest.raises(Diagnostic, match="the answer was no"):
             await load(shop, tmp_path)
         assert b"VM" not in shop.written("line") and not kept(tmp_path)
@@ -74,7 +74,7 @@ async def test_a_person_agrees_to_the_listed_lines_once(tmp_path: Path) -> None:
 @in_virtual_time
 async def test_settings_and_the_closing_s_need_no_yes(tmp_path: Path) -> None:
     async with shop_with(tmp_path, f"VM=500000\n{PROGRAM}S\n") as shop:
-        shop.session.agreed = False
+        shop.session.questions.agreed = False
         told = await load(shop, tmp_path)
         assert "a: p.mxt downloaded, 8 lines; executed at once: VM=500000, S" in told
 
@@ -84,6 +84,6 @@ async def test_a_cp_that_the_download_needs_is_not_asked_about(tmp_path: Path) -
     async with shop_with(tmp_path, PROGRAM) as shop:
         await load(shop, tmp_path)
         (tmp_path / "p.mxt").write_text(PROGRAM.replace("MR 100", "MR 7"))
-        shop.session.agreed = False
+        shop.session.questions.agreed = False
         await load(shop, tmp_path)
         assert b"CP" in shop.written("line")

@@ -6,6 +6,7 @@ import pytest
 from multidrop import cli
 from multidrop.dialects.families import FAMILIES
 from multidrop.dialects.on_demand import imported
+from multidrop.shell.channel import Front
 from multidrop.shell.connect.url_forms import URL_FORMS
 from multidrop.shell.connect.urls import KEYS
 from multidrop.shell.operations.offers import PLACEHOLDERS
@@ -32,11 +33,10 @@ def session():
         selected=press.drives["a"],
         macros=SimpleNamespace(names=lambda: ["home", "shuttle"]),
         settings=SimpleNamespace(connections={"lathe": SimpleNamespace(url="tcp://10.0.0.5")}),
-        cell=None,
+        cells={},
         raw={},
-        transcripts=None,
         names=SimpleNamespace(offered=lambda drive, line: ()),
-        screen=None,
+        front=Front(),
     )
 
 
@@ -44,7 +44,7 @@ def session():
 def simulated(session):
     placed = [SimpleNamespace(bus=bus, spec=SimpleNamespace(name=name, personality="LMDCM")) for bus, name in BOTH]
     floor = SimpleNamespace(floor=SimpleNamespace(drives=placed))
-    session.cell = floor
+    session.cells = {"press": floor}
     return session
 
 
@@ -138,7 +138,7 @@ def test_the_hint_tells_of_what_is_being_typed(session, text, has):
 def test_the_hands_of_the_simulator_are_offered_where_there_is_one(session, simulated, text, offered):
     found = [each.text for each in complete(simulated, text)]
     assert offered in found if offered else found == []
-    session.cell = None
+    session.cells = {}
     assert "/sim" not in [each.text for each in complete(session, "/si")]
 
 

@@ -40,7 +40,7 @@ async def asked(folder: Path) -> AsyncIterator[tuple[Callable[[str], None], asyn
         run = asyncio.create_task(prompt.run())
         while not prompt._prompt.app.is_running:
             await asyncio.sleep(0.01)
-        answers = asyncio.create_task(session.tasks.run(session.fill_in("macro m", FIELDS)))
+        answers = asyncio.create_task(session.tasks.run(session.questions.fill_in("macro m", FIELDS)))
         await asyncio.sleep(0.01)
         try:
             yield keys.send_text, answers, prompt, told

@@ -30,7 +30,7 @@ async def asked(folder):
         run = asyncio.create_task(prompt.run())
         while not prompt._prompt.app.is_running:
             await asyncio.sleep(0.01)
-        question = asyncio.create_task(session.confirm("CP erases the program", "a"))
+        question = asyncio.create_task(session.questions.confirm("CP erases the program", "a"))
         await asyncio.sleep(0.01)
         assert prompt._message() == "a: CP erases the program. Go on? [y/N] "
         try:
