@@ -210,7 +210,7 @@ class Actions(Target):
             await self.action_run_line(f"/play {name}")
         else:
             page = f" --page {macros.page}" if macros.place else ""
-            host.show_line(f"{key} plays nothing; /key {key} NAME{page} puts a macro on it")
+            host.show_line(f"{key} plays nothing; /key {key} NAME{page} puts a macro on it", ".")
 
     def action_macro_page(self) -> None:
         macros = self._parts.macros
@@ -218,7 +218,8 @@ class Actions(Target):
         if len(macros.pages) > 1:
             macros.turn()
         else:
-            self._parts.host.show_line("the macros are on one page of keys; /key F3 NAME --page 2 begins another")
+            text = "the macros are on one page of keys; /key F3 NAME --page 2 begins another"
+            self._parts.host.show_line(text, ".")
         self._parts.model.changed = True
 
     async def action_record(self) -> None:

@@ -40,7 +40,7 @@ from multidrop.tui.presenter import Presenter
 from multidrop.tui.screen_model import Record, ScreenModel
 from multidrop.tui.screens.dialogs import LEAST, Over, TooSmall
 from multidrop.tui.screens.main_screen import MainScreen, Reading
-from multidrop.tui.screens.page import PAGES, Framed, Page
+from multidrop.tui.screens.page import PAGES, Framed, Host, Page
 from multidrop.tui.screens.questions import Questions
 from multidrop.tui.screens.start import Opener, Start
 from multidrop.tui.session_hooks import Hooks
@@ -138,9 +138,21 @@ class MultidropApp(App[int]):
         self._signs = SignFilter(signs_for(look.signs, os.environ))
         dress(self, look)
         self.model.look.ink = ink_of(self._signs.font)
+        host = Host(
+            session,
+            self.model,
+            self.outbox,
+            self.texts,
+            self.macros,
+            self.frames,
+            self.keyboard,
+            self.selection.select,
+            self.show_line,
+            self.last_records,
+        )
         parts = Parts(
             self,
-            self,
+            host,
             session,
             self.model,
             self.main,
@@ -387,9 +399,6 @@ class MultidropApp(App[int]):
     def last_records(self, number: int) -> Sequence[Record]:
         records = self.main.page(self.main.current).records
         return [records[each] for each in range(max(records.first, records.taken - number), records.taken)]
-
-    def select(self, address: str, bus: str = "") -> None:
-        self.selection.select(address, bus)
 
     def show_line(self, text: str, mark: str = ".") -> None:
         """Append a line of the app's own to the transcript that is shown."""

@@ -7,7 +7,7 @@ import time
 from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple, Protocol
+from typing import TYPE_CHECKING, NamedTuple
 
 from multidrop.dialects.on_demand import imported
 from multidrop.shell.state.store import Drafts
@@ -15,6 +15,7 @@ from multidrop.tui.text import ago
 
 if TYPE_CHECKING:
     from multidrop.shell.connect.settings import Settings
+    from multidrop.shell.prompt.complete import Completion
     from multidrop.shell.session import Session
 
 
@@ -22,22 +23,6 @@ ANY_LETTER = "P"
 """A text to complete and to explain, which imports what that needs."""
 LATELY = 5
 """Number of URLs opened lately that are offered."""
-
-
-class CompletionView(Protocol):
-    """A completion: `text` replaces what was typed from character `start` on."""
-
-    @property
-    def text(self) -> str:
-        """The text to put in."""
-
-    @property
-    def meaning(self) -> str:
-        """The meaning in one line."""
-
-    @property
-    def start(self) -> int:
-        """Index of the first character that it replaces."""
 
 
 class StartEntry(NamedTuple):
@@ -52,7 +37,7 @@ class StartEntry(NamedTuple):
 class Assist:
     """No help: the base of all helpers."""
 
-    def complete(self, text: str, learned: Callable[[], None] | None = None) -> Sequence[CompletionView]:
+    def complete(self, text: str, learned: Callable[[], None] | None = None) -> Sequence[Completion]:
         """Complete the typed text. `learned`: a person asks; it is called when a drive has reported its names."""
         return ()
 
@@ -106,7 +91,7 @@ class ShellAssist(Assist):
         self._session, self._settings = session, settings
         self._history = History(settings.history)
 
-    def complete(self, text: str, learned: Callable[[], None] | None = None) -> Sequence[CompletionView]:
+    def complete(self, text: str, learned: Callable[[], None] | None = None) -> Sequence[Completion]:
         """Complete the typed text. `learned`: a person asks; it is called when a drive has reported its names."""
         from multidrop.shell.prompt.complete import complete, names_of
 

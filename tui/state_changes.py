@@ -6,11 +6,12 @@ the cause is for a person to find.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from typing import NamedTuple, Protocol
+from collections.abc import Iterator
+from typing import NamedTuple
 
 from multidrop.dialects.values import UNREAD, Conditions
 from multidrop.drives.events import Conditioned, Sample, Silent
+from multidrop.tui.readout import Readout
 from multidrop.tui.text import digits
 
 LIMITS = {"lim+": "limit+", "lim-": "limit-"}
@@ -27,39 +28,11 @@ class Happening(NamedTuple):
     help: str = ""
 
 
-class Place(Protocol):
-    """A position and a velocity that were read."""
-
-    @property
-    def position(self) -> int:
-        """Steps."""
-
-    @property
-    def velocity(self) -> int:
-        """Steps/s."""
+SILENT = Happening("does not reply to polls", warning=True)
+BACK = Happening("replies again")
 
 
-class Known(Protocol):
-    """The readings of an axis of a drive so far."""
-
-    axis: str
-    trouble: str
-    silent_since: float | None
-    conditions: Conditions | None
-    conditioned_at: float
-    failed_at: float
-    """When a typed line for the drive last failed: its error is known."""
-
-    @property
-    def last(self) -> Place | None:
-        """The last position."""
-
-    @property
-    def axes(self) -> Sequence[Known]:
-        """All axes of the drive, the first one first."""
-
-
-def changes_of(known: Known, event: Sample | Silent | Conditioned) -> Iterator[Happening]:
+def changes_of(known: Readout, event: Sample | Silent | Conditioned) -> Iterator[Happening]:
     """Compare an event of a drive with what was read before it."""
     if isinstance(event, Silent):
         if known.silent_since is None:
@@ -69,73 +42,46 @@ def changes_of(known: Known, event: Sample | Silent | Conditioned) -> Iterator[H
             yield BACK
         axis = next((each for each in known.axes if each.axis == event.axis), None)
         if axis is not None and axis.last is not None and axis.trouble != event.trouble:
-            yield from _troubled(axis.trouble, event.trouble, event.axis)
+            text = event.trouble or f"no more: {axis.trouble}"
+            yield Happening(_named(text, event.axis), warning=bool(event.trouble))
     else:
         for each, after in zip(known.axes, event.conditions, strict=False):
             yield from _conditioned(each, after, known.failed_at)
 
 
-def _troubled(before: str, after: str, axis: str) -> Iterator[Happening]:
-    if after:
-        yield Happening(_named(after, axis), warning=True)
-    else:
-        yield Happening(_named(f"no more: {before}", axis))
-
-
-def _conditioned(known: Known, after: Conditions, failed_at: float) -> Iterator[Happening]:
-    """The changes between two readings of an axis, most urgent first."""
-    before = known.conditions
+def _conditioned(known: Readout, after: Conditions, failed_at: float) -> Iterator[Happening]:
+    """The changes between two readings of an axis, most urgent first: limits, error, alarms, program, current."""
+    before, last = known.conditions, known.last
     if before is None:
         return
-    yield from _limits(before, after, known.last)
-    told = failed_at >= known.conditioned_at or (after.error_text and after.error_text == known.trouble)
-    if after.error and not before.error and not told:
-        yield _error(after)
-    yield from _alarms(before, after)
-    yield from _state(before, after)
-
-
-def _state(before: Conditions, after: Conditions) -> Iterator[Happening]:
-    """The beginning and the end of a program, current off and on again, and an error that is gone."""
-    if before.program and not after.program:
-        which = "" if before.program == "running" else f" {before.program}"
-        yield Happening(_named(f"the program{which} has ended", after.axis))
-    if after.program and not before.program:
-        yield Happening(
-            _named("a program runs" if after.program == "running" else f"program {after.program}", after.axis)
-        )
-    if after.no_current and not before.no_current:
-        yield Happening(_named(f"no current in the motor ({after.no_current}): nothing holds the load", after.axis))
-    if before.no_current and not after.no_current:
-        yield Happening(_named("current in the motor again", after.axis))
-    if before.error and not after.error:
-        yield Happening(_named("the error is cleared", after.axis))
-
-
-SILENT = Happening("does not reply to polls", warning=True)
-BACK = Happening("replies again")
-
-
-def _limits(before: Conditions, after: Conditions, last: Place | None) -> Iterator[Happening]:
     lit = {(lamp.name, lamp.function) for lamp in before.lamps if lamp.on}
     for lamp in after.lamps:
         if lamp.on and lamp.function in LIMITS and not lamp.output and (lamp.name, lamp.function) not in lit:
             place = "" if last is None else f" at {digits(last.position)}"
             stands = "; it stands" if last is not None and last.velocity == 0 else ""
             yield Happening(_named(f"{LIMITS[lamp.function]} reached{place}{stands}", after.axis), warning=True)
-
-
-def _error(after: Conditions) -> Happening:
-    if after.error == UNREAD:
-        return Happening(_named("an error is set", after.axis), True, after.error_text)
-    return Happening(_named(f"error {after.error}: {after.error_text}", after.axis), True)
-
-
-def _alarms(before: Conditions, after: Conditions) -> Iterator[Happening]:
-    known = dict(before.more)
+    told = failed_at >= known.conditioned_at or (after.error_text and after.error_text == known.trouble)
+    if after.error and not before.error and not told:
+        if after.error == UNREAD:
+            yield Happening(_named("an error is set", after.axis), True, after.error_text)
+        else:
+            yield Happening(_named(f"error {after.error}: {after.error_text}", after.axis), True)
+    values = dict(before.more)
     for name, value in after.more:
-        if value != known.get(name, "") and any(word in value for word in ALARMS):
+        if value != values.get(name, "") and any(word in value for word in ALARMS):
             yield Happening(_named(f"{name}: {value}", after.axis), warning=True)
+    if before.program and not after.program:
+        which = "" if before.program == "running" else f" {before.program}"
+        yield Happening(_named(f"the program{which} has ended", after.axis))
+    if after.program and not before.program:
+        text = "a program runs" if after.program == "running" else f"program {after.program}"
+        yield Happening(_named(text, after.axis))
+    if after.no_current and not before.no_current:
+        yield Happening(_named(f"no current in the motor ({after.no_current}): nothing holds the load", after.axis))
+    if before.no_current and not after.no_current:
+        yield Happening(_named("current in the motor again", after.axis))
+    if before.error and not after.error:
+        yield Happening(_named("the error is cleared", after.axis))
 
 
 def _named(text: str, axis: str) -> str:

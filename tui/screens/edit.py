@@ -283,7 +283,7 @@ class EditPage(Page):
             self.notify(str(problem), timeout=6)
             return False
         self.host.texts.drop_draft(text)
-        self.host.show_line(f"saved {text.name}")
+        self.host.show_line(f"saved {text.name}", ".")
         self.host.model.changed = True  # it may be a macro
         return True
 

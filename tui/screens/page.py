@@ -6,8 +6,9 @@ that the transcript shows what was sent.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, ClassVar, NamedTuple, Protocol
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, ClassVar, NamedTuple
 
 from textual.app import ComposeResult
 from textual.binding import Binding, BindingType
@@ -50,8 +51,9 @@ class Framed(Screen[None]):
         return self._parts[name]
 
 
-class Host(Protocol):
-    """The part of the app that pages use."""
+@dataclass
+class Host:
+    """The parts of the app that pages use."""
 
     session: Session
     model: ScreenModel
@@ -60,15 +62,12 @@ class Host(Protocol):
     macros: FunctionKeys
     frames: Frames
     keyboard: Keyboard
-
-    def last_records(self, number: int) -> Sequence[Record]:
-        """The last records of the transcript that is shown."""
-
-    def show_line(self, text: str, mark: str = ".") -> None:
-        """Append a line of the app's own to the transcript that is shown."""
-
-    def select(self, address: str, bus: str = "") -> None:
-        """Select a drive or a bus."""
+    select: Callable[[str, str], None]
+    """Selects a drive (address) on a bus; an empty name is the selected one."""
+    show_line: Callable[[str, str], None]
+    """Appends a line of the app's own to the transcript that is shown, with its mark."""
+    last_records: Callable[[int], Sequence[Record]]
+    """The last records of the transcript that is shown."""
 
 
 class Begun(NamedTuple):

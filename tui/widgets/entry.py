@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Awaitable, Callable, Sequence
 from dataclasses import dataclass, field
-from typing import ClassVar, Protocol
+from typing import TYPE_CHECKING, ClassVar, Protocol
 
 from textual import events
 from textual.binding import Binding, BindingType
@@ -23,9 +23,11 @@ from textual.widgets.input import Selection
 
 from multidrop.dialects import Diagnostic
 from multidrop.dialects.files import lines_of
-from multidrop.tui.assist import CompletionView
 from multidrop.tui.text import fit
 from multidrop.tui.widgets.lines import Lines, Row
+
+if TYPE_CHECKING:
+    from multidrop.shell.prompt.complete import Completion
 
 LISTED = 8
 """Number of completions in view."""
@@ -37,7 +39,7 @@ LONGEST = 200
 class Complete(Protocol):
     """Completes a text."""
 
-    def __call__(self, text: str, learned: Callable[[], None] | None = None) -> Sequence[CompletionView]:
+    def __call__(self, text: str, learned: Callable[[], None] | None = None) -> Sequence[Completion]:
         """Return the completions. `learned`: a person asks for them; it is called when there are more."""
 
 
@@ -84,7 +86,7 @@ class Listing:
     """The completions of the typed text, and the one that is in the line."""
 
     typed: str = ""
-    found: Sequence[CompletionView] = ()
+    found: Sequence[Completion] = ()
     chosen: int = -1
 
     @property
