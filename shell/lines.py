@@ -53,7 +53,16 @@ def parse(line: str) -> TypedLine | None:
         name, _, rest = line.partition(" ")
         return VerbLine(name, rest.strip(), typed)
     if line.startswith("@"):
-        return _addressed(line, typed)
+        target, _, text = line[1:].partition(" ")
+        bus, address = split_target(target)
+        if not target:
+            raise Diagnostic("no address after the @", line, "valid: @ADDR TEXT or @BUS:ADDR TEXT")
+        text = text.strip()
+        if not text:
+            raise Diagnostic(f"nothing to send to {target}", f"@{target}", f"/use {target} selects it")
+        if text.startswith("/"):
+            raise Diagnostic(f"{text.split()[0]} is a verb and takes no @{target}", line, f"/help {text.split()[0]}")
+        return DriveLine(Command(text), bus, address or None, typed)
     return DriveLine(Command(line), typed=typed)
 
 
@@ -81,19 +90,6 @@ def targets(lines: Iterable[str]) -> tuple[str, ...]:
     if any(each.address is None or each.address in EVERYONE for each in parsed):
         return ()
     return tuple(dict.fromkeys(f"{each.bus}:{each.address}" if each.bus else str(each.address) for each in parsed))
-
-
-def _addressed(line: str, typed: str) -> DriveLine:
-    target, _, text = line[1:].partition(" ")
-    bus, address = split_target(target)
-    if not target:
-        raise Diagnostic("no address after the @", line, "valid: @ADDR TEXT or @BUS:ADDR TEXT")
-    text = text.strip()
-    if not text:
-        raise Diagnostic(f"nothing to send to {target}", f"@{target}", f"/use {target} selects it")
-    if text.startswith("/"):
-        raise Diagnostic(f"{text.split()[0]} is a verb and takes no @{target}", line, f"/help {text.split()[0]}")
-    return DriveLine(Command(text), bus, address or None, typed)
 
 
 def uncommented(line: str) -> str:

@@ -131,27 +131,24 @@ class Observing:
             return
         found, observed = event.event, self._recorder.observed
         if isinstance(found, Conditioned):
-            self._inputs_of(event.bus, found)
+            # Note each input that has changed and that can be asked for.
+            for conditions in found.conditions:
+                for lamp in conditions.lamps:
+                    key = (event.bus, found.address, f"I{lamp.name}")
+                    if lamp.output or lamp.on is None:
+                        continue
+                    before, self._inputs[key] = self._inputs.get(key), lamp.on
+                    if self._recorder.name and before not in (None, lamp.on) and self._has(*key):
+                        target = join_target(event.bus if len(self._buses()) > 1 else "", found.address)
+                        condition = f"{key[2]}={int(lamp.on)}"
+                        text = f"@{target} {condition}" if target else condition
+                        self._recorder.observed.inputs.append((found.at, text))
         elif not self._recorder.name:
             return
         elif isinstance(found, Unsolicited):
             observed.texts.extend((found.at, line) for line in found.lines)
         elif isinstance(found, Sample):
             observed.moving.append((found.at, found.velocity != 0))
-
-    def _inputs_of(self, bus: str, found: Conditioned) -> None:
-        """Note each input that has changed and that can be asked for."""
-        for conditions in found.conditions:
-            for lamp in conditions.lamps:
-                key = (bus, found.address, f"I{lamp.name}")
-                if lamp.output or lamp.on is None:
-                    continue
-                before, self._inputs[key] = self._inputs.get(key), lamp.on
-                if self._recorder.name and before not in (None, lamp.on) and self._has(*key):
-                    target = join_target(bus if len(self._buses()) > 1 else "", found.address)
-                    condition = f"{key[2]}={int(lamp.on)}"
-                    text = f"@{target} {condition}" if target else condition
-                    self._recorder.observed.inputs.append((found.at, text))
 
     def _has(self, bus: str, address: str, word: str) -> bool:
         """Whether a drive can be asked for a word."""

@@ -117,12 +117,9 @@ class Editor(TextArea):
         self.notify_style_update()
         self.refresh()
         if moved and current is not None and current < self.document.line_count:
-            self._bring_into_view(current)
-
-    def _bring_into_view(self, line: int) -> None:
-        top, height = self.scroll_offset.y, self.size.height
-        if not top <= line < top + height - 1:
-            self.scroll_to(y=max(0, line - height // 2), animate=False)
+            top, height = self.scroll_offset.y, self.size.height
+            if not top <= current < top + height - 1:
+                self.scroll_to(y=max(0, current - height // 2), animate=False)
 
     # Painting
 

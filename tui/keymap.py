@@ -84,7 +84,17 @@ def keymap(bindings: Iterable[BindingType], wanted: Mapping[str, str]) -> Keymap
             found.troubles.append(f"keys.{visible(name)}: {trouble}")
         else:
             found.keys[name] = found.changed[name] = ",".join(spelled)
-    _refuse_clashes(found, {each.id or "": each.key for each in own})
+    default = {each.id or "": each.key for each in own}
+    for name in list(found.changed):
+        holders = {each: other for other, keys in found.keys.items() if other != name for each in keys.split(",")}
+        taken = [each for each in found.keys[name].split(",") if each in holders]
+        if taken:
+            found.keys[name] = default[name]
+            del found.changed[name]
+            shown = key_words(taken[0])
+            found.troubles.append(
+                f"keys.{name}: {shown} is the key of {holders[taken[0]]}; set another for one of them"
+            )
     return found
 
 
@@ -101,20 +111,6 @@ def _trouble(found: Keymap, name: str, text: str, spelled: list[str]) -> str:
         if each in FIXED:
             return f"{key_words(each)} cannot be given away"
     return ""
-
-
-def _refuse_clashes(found: Keymap, own: Mapping[str, str]) -> None:
-    """Take back each setting whose key another function has."""
-    for name in list(found.changed):
-        holders = {each: other for other, keys in found.keys.items() if other != name for each in keys.split(",")}
-        taken = [each for each in found.keys[name].split(",") if each in holders]
-        if taken:
-            found.keys[name] = own[name]
-            del found.changed[name]
-            shown = key_words(taken[0])
-            found.troubles.append(
-                f"keys.{name}: {shown} is the key of {holders[taken[0]]}; set another for one of them"
-            )
 
 
 HELD = 0.2

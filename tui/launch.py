@@ -84,7 +84,12 @@ async def _leave(session: Session) -> None:
 
 async def show(app: MultidropApp) -> int:
     """Run an app until it ends; return its exit code, 1 if it crashed."""
-    _watch_signals(app)
+    # On a hang-up, or another signal that ends a process, stop what automation moves, then end the app.
+    if sys.platform != "win32":
+        loop = asyncio.get_running_loop()
+        for number in SIGNALS:
+            loop.add_signal_handler(number, app.interrupted)
+        loop.add_signal_handler(signal.SIGHUP, _hung_up, app)
     await app.run_async()
     return 1 if app.return_value is None else app.return_value
 
@@ -97,15 +102,6 @@ def driver() -> type[Driver] | None:
         from multidrop.tui.terminal.driver import Terminal
 
         return Terminal
-
-
-def _watch_signals(app: MultidropApp) -> None:
-    """On a hang-up, or another signal that ends a process, stop what automation moves, then end the app."""
-    if sys.platform != "win32":
-        loop = asyncio.get_running_loop()
-        for number in SIGNALS:
-            loop.add_signal_handler(number, app.interrupted)
-        loop.add_signal_handler(signal.SIGHUP, _hung_up, app)
 
 
 def _hung_up(app: MultidropApp) -> None:

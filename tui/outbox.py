@@ -163,17 +163,15 @@ class Outbox:
             self._hold(lane, f"'{line.text}' failed")
             return None
         if line is not None and line.verb == "/use":
-            self._follow(lane, line.place)
+            now = selected_place(self._session)
+            lane.waiting = deque(
+                replace(each, place=now) if each.place == line.place else each for each in lane.waiting
+            )
         if lane.waiting:
             return self._next(lane)
         if lane in self._lanes:
             self._lanes.remove(lane)
         return None
-
-    def _follow(self, lane: Lane, before: tuple[str, str]) -> None:
-        """Bind the lines after a `/use` to the drive that it selected."""
-        now = selected_place(self._session)
-        lane.waiting = deque(replace(each, place=now) if each.place == before else each for each in lane.waiting)
 
     def _hold(self, lane: Lane, why: str) -> None:
         """Hold the lines that wait; report them when no more arrive."""

@@ -82,7 +82,11 @@ def all_commands(
         f"of this session: {session.log.path}" if session.log is not None else "of this session, in the state folder"
     )
     yield Command(log, about, "act.log", keys.shown("log") or "/log")
-    yield from _pages_and_panels(keys)
+    for page in PAGES:
+        yield Command(page.title, page.about, _call("act.page", page.name), keys.shown(f"page-{page.name}"))
+    for panel in PANELS:
+        title = f"Panel {panel.name} on or off"
+        yield Command(title, panel.about, _call("view.panel", panel.name), keys.shown(f"panel-{panel.name}"))
     yield from _choices(session, macros, keys)
     about = "simulated drives that run beside those of this line; every difference shows"
     yield Command(f"Twin {_other(switches.twin)}", about, "act.twin", keys.shown("twin"))
@@ -92,14 +96,6 @@ def all_commands(
         yield Command(name, meaning, _call("act.begin_line", f"{name} "))
 
 
-def _pages_and_panels(keys: Keymap) -> Iterator[Command]:
-    for page in PAGES:
-        yield Command(page.title, page.about, _call("act.page", page.name), keys.shown(f"page-{page.name}"))
-    for panel in PANELS:
-        title = f"Panel {panel.name} on or off"
-        yield Command(title, panel.about, _call("view.panel", panel.name), keys.shown(f"panel-{panel.name}"))
-
-
 def _view(keys: Keymap, switches: Switches) -> Iterator[Command]:
     """The commands of the screen itself."""
     yield Command(f"Polling {_other(switches.polling)}", "reading of position and velocity", "view.polling")
@@ -107,17 +103,7 @@ def _view(keys: Keymap, switches: Switches) -> Iterator[Command]:
     yield Command("Split the screen", "a second transcript; again: type to it", "view.split", keys.shown("split"))
     yield Command("One half", "end the split of the screen", "view.unsplit")
     yield Command("Tour", "two minutes through the product, on a demo cell", _line("/tour"), "/tour")
-    yield from _transcript(keys)
-    yield Command(f"Mouse {_other(switches.mouse)}", "off: the terminal's own selection works", "view.mouse")
-    yield Command("Repaint", "the whole screen, where another program wrote on it", "view.repaint")
-    yield Command("Theme", "colours; multidrop-ansi uses the terminal's own", "view.choose_theme")
-    yield Command("Signs", "all, boxes without braille, or ASCII alone", "view.choose_signs")
-    yield Command("Help", "keys and signs, for where you are", "view.help", keys.shown("help"))
-    yield Command("Quit", "drives go on as they are", "app.quit", keys.shown("quit"))
-
-
-def _transcript(keys: Keymap) -> Iterator[Command]:
-    """The commands of the transcript that is shown."""
+    # The commands of the transcript that is shown.
     yield Command("Search the transcript", "as you type; Tab shows only what is found", "find", keys.shown("find"))
     yield Command("Pause the scrolling", "or let it go on", "pause", keys.shown("pause"))
     yield Command("Copy lines", "pick lines of the transcript, and copy them", "pick(0)", keys.shown("pick"))
@@ -131,6 +117,12 @@ def _transcript(keys: Keymap) -> Iterator[Command]:
     yield Command("Newest line", "follow the transcript again", "look_end(True)", keys.shown("newest"))
     yield Command("Oldest line", "the beginning of the transcript", "look_end(False)", keys.shown("oldest"))
     yield Command("Clear the transcript", "of the bus that is shown", "view.clear")
+    yield Command(f"Mouse {_other(switches.mouse)}", "off: the terminal's own selection works", "view.mouse")
+    yield Command("Repaint", "the whole screen, where another program wrote on it", "view.repaint")
+    yield Command("Theme", "colours; multidrop-ansi uses the terminal's own", "view.choose_theme")
+    yield Command("Signs", "all, boxes without braille, or ASCII alone", "view.choose_signs")
+    yield Command("Help", "keys and signs, for where you are", "view.help", keys.shown("help"))
+    yield Command("Quit", "drives go on as they are", "app.quit", keys.shown("quit"))
 
 
 def _choices(session: Session, macros: FunctionKeys, keymap: Keymap) -> Iterator[Command]:

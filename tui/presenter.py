@@ -117,10 +117,6 @@ class Presenter:
         playing = " ".join(each.short for each in self.session.playing)
         row = top_row(self.tabs(now), self.session.recording, clock, width, self.session.log is not None, playing)
         screen.lines("top").put([row])
-        screen.lines("footer").put([self._footer(screen, width)])
-
-    def _footer(self, screen: Framed, width: int) -> Row:
-        """The keys that work on a screen; on a page, how to leave it comes first."""
         page = screen if isinstance(screen, Page) else None
         keys = [("Esc", "back"), *page.KEYS, ("palette", "everything")] if page is not None else screen.FOOTER
         shown = [(self.keymap.shown(name) if name in self.keymap.keys else name, word) for name, word in keys]
@@ -130,7 +126,7 @@ class Presenter:
         )
         first = [(self.keymap.shown("help"), "help"), *page_of_keys, *macros]
         recording, latched = bool(self.session.recording), self.session.latched
-        return footer_row([*first, *shown], recording, latched, width, self.model.progress)
+        screen.lines("footer").put([footer_row([*first, *shown], recording, latched, width, self.model.progress)])
 
     def _play_key(self, key: str) -> str:
         """The key that plays what is on a function key; a person may have given it another one."""

@@ -73,7 +73,32 @@ class TrafficStore:
     def take(self, event: BusEvent) -> bool:
         """Take an event of the bus; return whether it is one of traffic."""
         if isinstance(event, Traffic):
-            self._add(event)
+            request = self._departing if event.outgoing else self._in_flight
+            if event.outgoing:
+                self._departing = None
+            poll = request is not None and request.priority is Priority.POLL
+            address = request.address if request is not None else ""
+            self._bytes += min(len(event.data), MOST_BYTES)
+            if len(self.pieces) == MOST:
+                self._bytes -= len(self.pieces.popleft().data)
+            while self.pieces and self._bytes > MOST_BYTES:
+                self._bytes -= len(self.pieces.popleft().data)
+            piece = Piece(event.at, event.outgoing, event.data[-MOST_BYTES:], address, poll)
+            last = self.pieces[-1] if self.pieces else None
+            if (
+                last is not None
+                and not piece.outgoing
+                and (last.outgoing, last.address, last.poll) == (False, piece.address, piece.poll)
+                and not last.data.endswith(b"\n")
+                and len(last.data) < LONGEST
+                and piece.at - self._last_at < GAP
+            ):
+                last = self.pieces.pop()
+                piece = last._replace(data=last.data + piece.data)
+            else:
+                self.taken += 1
+            self.pieces.append(piece)
+            self._last_at = event.at
         elif isinstance(event, Sent):
             self._departing = self._in_flight = event.request
         elif isinstance(event, Ended):
@@ -81,41 +106,6 @@ class TrafficStore:
         else:
             return False
         return True
-
-    def _add(self, event: Traffic) -> None:
-        request = self._departing if event.outgoing else self._in_flight
-        if event.outgoing:
-            self._departing = None
-        poll = request is not None and request.priority is Priority.POLL
-        address = request.address if request is not None else ""
-        self._make_room(len(event.data))
-        piece = Piece(event.at, event.outgoing, event.data[-MOST_BYTES:], address, poll)
-        if self._continues(piece):
-            last = self.pieces.pop()
-            piece = last._replace(data=last.data + piece.data)
-        else:
-            self.taken += 1
-        self.pieces.append(piece)
-        self._last_at = event.at
-
-    def _continues(self, piece: Piece) -> bool:
-        """Whether received bytes belong to the line that began with the piece before."""
-        last = self.pieces[-1] if self.pieces else None
-        return (
-            last is not None
-            and not piece.outgoing
-            and (last.outgoing, last.address, last.poll) == (False, piece.address, piece.poll)
-            and not last.data.endswith(b"\n")
-            and len(last.data) < LONGEST
-            and piece.at - self._last_at < GAP
-        )
-
-    def _make_room(self, size: int) -> None:
-        self._bytes += min(size, MOST_BYTES)
-        if len(self.pieces) == MOST:
-            self._bytes -= len(self.pieces.popleft().data)
-        while self.pieces and self._bytes > MOST_BYTES:
-            self._bytes -= len(self.pieces.popleft().data)
 
 
 KEPT = 50_000

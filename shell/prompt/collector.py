@@ -39,6 +39,7 @@ def collected_at_rest(resting: Callable[[], bool]) -> Iterator[None]:
     """Freeze survivors each second; collect everything only while `resting()`. Needs a running event loop."""
     loop = asyncio.get_running_loop()
     full_at = loop.time()
+    timer: asyncio.TimerHandle
     gc.freeze()  # what the imports made is no garbage, and a collection would delay the first frame
 
     def again() -> None:

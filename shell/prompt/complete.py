@@ -39,7 +39,23 @@ def complete(workspace: Workspace, text: str) -> list[Completion]:
     elif not head.strip() and word.startswith("@"):
         found = ((f"@{target} ", meaning) for target, meaning in targets(workspace))
     else:
-        return _mnemonics(workspace, text)
+        # The labels and variables of the drive that may end a line, then the words of its language.
+        try:
+            line = parse(text)
+        except Diagnostic:
+            return []
+        if not isinstance(line, DriveLine):
+            return []
+        language, product = spoken(workspace, line)
+        typed = line.text + text[len(text.rstrip()) :]
+        word = language.typing(typed)
+        if not text.endswith(word):
+            return []
+        start = len(text) - len(word)
+        drive = names_of(workspace, text)
+        named = workspace.names.offered(drive, typed) if drive is not None else ()
+        words = language.complete(word, product) if word else ()
+        return [Completion(name, meaning, start) for name, meaning in [*named, *words][:MOST]]
     folded = word.lower()
     fitting = dict(
         (each, Completion(each, meaning, start)) for each, meaning in found if each.lower().startswith(folded)
@@ -76,26 +92,6 @@ def names_of(workspace: Workspace, text: str) -> Drive | None:
     except Diagnostic:
         return None
     return meant(workspace, line) if isinstance(line, DriveLine) and line.address not in EVERYONE else None
-
-
-def _mnemonics(workspace: Workspace, text: str) -> list[Completion]:
-    """The labels and variables of the drive that may end a line, then the words of its language."""
-    try:
-        line = parse(text)
-    except Diagnostic:
-        return []
-    if not isinstance(line, DriveLine):
-        return []
-    language, product = spoken(workspace, line)
-    typed = line.text + text[len(text.rstrip()) :]
-    word = language.typing(typed)
-    if not text.endswith(word):
-        return []
-    start = len(text) - len(word)
-    drive = names_of(workspace, text)
-    named = workspace.names.offered(drive, typed) if drive is not None else ()
-    words = language.complete(word, product) if word else ()
-    return [Completion(name, meaning, start) for name, meaning in [*named, *words][:MOST]]
 
 
 def _arguments(workspace: Workspace, typed: list[str], word: str) -> Found:

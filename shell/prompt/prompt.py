@@ -141,7 +141,10 @@ class Prompt:
             try:
                 await self._opening
             except FAILURES:
-                self._nothing_opened()
+                self._prompt.app.erase_when_done = True  # it leaves no trace; what was typed meanwhile is shown
+                typed = self._typing() + (self._input.keyboard.typed if self._input else "")
+                self._lines.drop("nothing was opened")
+                self._lines.show_unsent("nothing was opened", typed.splitlines())
                 raise
             finally:
                 self._opening, self._lines.opening = None, False
@@ -159,13 +162,6 @@ class Prompt:
         with contextlib.suppress(TimeoutError):
             await asyncio.wait_for(drawn.wait(), FIRST_FRAME)
         app.after_render -= rendered
-
-    def _nothing_opened(self) -> None:
-        """Show what was typed while nothing could be opened; the prompt leaves no trace."""
-        self._prompt.app.erase_when_done = True
-        typed = self._typing() + (self._input.keyboard.typed if self._input else "")
-        self._lines.drop("nothing was opened")
-        self._lines.show_unsent("nothing was opened", typed.splitlines())
 
     async def _open_all(self, urls: Sequence[str]) -> None:
         for url in urls:

@@ -39,7 +39,14 @@ def hold(descriptor: int, signals: bool, continued: Continued = in_loop) -> Iter
     """
     with contextlib.suppress(termios.error):  # else it has hung up; the next read reports that
         before = termios.tcgetattr(descriptor)
-        held = _raw(before, signals, os.fpathconf(descriptor, "PC_VDISABLE"))
+        held = [*before[:6], list(before[6])]  # without flow control, echo, line editing and suspension
+        held[0] &= ~(termios.IXON | termios.IXOFF | termios.ICRNL | termios.INLCR | termios.IGNCR)
+        held[3] &= ~(termios.ECHO | termios.ICANON | termios.IEXTEN)
+        if not signals:
+            held[3] &= ~termios.ISIG
+        held[6][termios.VMIN], held[6][termios.VTIME] = 1, 0
+        for key in (termios.VSUSP, termios.VQUIT):  # a process that is suspended or dumps core stops no drive
+            held[6][key] = bytes([os.fpathconf(descriptor, "PC_VDISABLE")])
 
     def put(settings: list[Any], anywhere: bool) -> None:
         with contextlib.suppress(termios.error):
@@ -60,19 +67,6 @@ def _waiting(descriptor: int) -> int:
     with contextlib.suppress(OSError):
         return int(struct.unpack("i", fcntl.ioctl(descriptor, termios.FIONREAD, bytes(4)))[0])
     return 0
-
-
-def _raw(before: list[Any], signals: bool, disabled: int) -> list[Any]:
-    """A terminal's settings without flow control, echo, line editing and suspension; with Ctrl+C where asked for."""
-    made = [*before[:6], list(before[6])]
-    made[0] &= ~(termios.IXON | termios.IXOFF | termios.ICRNL | termios.INLCR | termios.IGNCR)
-    made[3] &= ~(termios.ECHO | termios.ICANON | termios.IEXTEN)
-    if not signals:
-        made[3] &= ~termios.ISIG
-    made[6][termios.VMIN], made[6][termios.VTIME] = 1, 0
-    for key in (termios.VSUSP, termios.VQUIT):  # a process that is suspended or dumps core stops no drive
-        made[6][key] = bytes([disabled])
-    return made
 
 
 def in_foreground(descriptor: int) -> bool:

@@ -151,7 +151,12 @@ class LinesAbove:
     async def _show(self) -> None:
         while True:
             await self._something.wait()
-            await self._taken()
+            # Wait until the terminal has taken what was written, and the prompt may be hidden.
+            since = self._loop.time()
+            while self._behind or (self.app.is_running and self.app.is_done):
+                self._stuck = self._behind and self._loop.time() > since + PATIENCE
+                await asyncio.sleep(0.01)
+            self._stuck = False
             self._something.clear()
             if self._damaged and self.app.is_running:
                 self._damaged = False
@@ -159,28 +164,17 @@ class LinesAbove:
                 self.app.renderer.reset()
             many = len(self._lines) >= MANY
             async with in_terminal():
-                await self._write_some()
+                # Write chunks until nothing waits, or the prompt must be drawn again.
+                until = self._loop.time() + SLICE
+                while self._waits and self._loop.time() < until:
+                    if self._behind:
+                        await asyncio.sleep(0.001)
+                    else:
+                        self._write(self._next())
+                        await asyncio.sleep(0)
+                if self._waits:
+                    self._something.set()
             await asyncio.sleep(BREATH if self._lines else LONG_PAUSE if many else PAUSE)
-
-    async def _taken(self) -> None:
-        """Wait until the terminal has taken what was written, and the prompt may be hidden."""
-        since = self._loop.time()
-        while self._behind or (self.app.is_running and self.app.is_done):
-            self._stuck = self._behind and self._loop.time() > since + PATIENCE
-            await asyncio.sleep(0.01)
-        self._stuck = False
-
-    async def _write_some(self) -> None:
-        """Write chunks until nothing waits, or the prompt must be drawn again."""
-        until = self._loop.time() + SLICE
-        while self._waits and self._loop.time() < until:
-            if self._behind:
-                await asyncio.sleep(0.001)
-            else:
-                self._write(self._next())
-                await asyncio.sleep(0)
-        if self._waits:
-            self._something.set()
 
     @property
     def _waits(self) -> bool:

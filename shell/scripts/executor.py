@@ -16,7 +16,6 @@ from typing import TYPE_CHECKING
 from multidrop.dialects import Diagnostic, NoAnswer, Stopped
 from multidrop.drives.drive import Drive
 from multidrop.drives.events import Lost
-from multidrop.drives.stopping import Halt
 from multidrop.macros import Macro
 from multidrop.shell.automation import outcome, settled
 from multidrop.shell.events import FAILURES, By, OnBus, SessionEvent
@@ -190,8 +189,18 @@ class _Aftermath:
         self._execution.is_over = True
         found: tuple[Standing, ...] = ()
         try:
-            await self._stopping(halts)
-            await self._on_stop()
+            # Report the place and the last lines, and then the outcome of the stops.
+            for text in self._story():
+                self._warn(text)
+            await settled(self._session)
+            for text in outcome(self._session, halts):
+                self._warn(text)
+            # Execute the lines of each macro, the innermost first; none after a stop of everything.
+            if self.stopped:
+                self._drop()
+            while self._left:
+                await self._lines_of(self._left[0])
+                self._left.pop(0)
             found = await standings(self._session, self._drives())
             if found:
                 self._warn("; ".join(each.text for each in found))
@@ -202,14 +211,6 @@ class _Aftermath:
         finally:
             outermost = self._execution.unfinished[-1].playing
             ended(Ending(outermost.name, outermost.rounds, self.at, found))
-
-    async def _stopping(self, halts: list[Halt]) -> None:
-        """Report the place and the last lines, and then the outcome of the stops."""
-        for text in self._story():
-            self._warn(text)
-        await settled(self._session)
-        for text in outcome(self._session, halts):
-            self._warn(text)
 
     @property
     def stopped(self) -> bool:
@@ -253,14 +254,6 @@ class _Aftermath:
                     f"macro {each.playing.name}: on_stop is not executed after a stop: {' · '.join(lines)}; {hint}"
                 )
         self._left.clear()
-
-    async def _on_stop(self) -> None:
-        """Execute the lines of each macro, the innermost first; none after a stop of everything."""
-        if self.stopped:
-            self._drop()
-        while self._left:
-            await self._lines_of(self._left[0])
-            self._left.pop(0)
 
     async def _lines_of(self, each: Unfinished) -> None:
         """Execute each line of a macro, whatever became of the one before it."""

@@ -252,7 +252,8 @@ class _Checker:
         before = dict(self._names)
         body, end = self._block()
         self._close(line, end)
-        if not _surely(line):
+        text = words.rest_of(line.text)
+        if not (text.isdecimal() and int(text) > 0):
             self._names = before
         return Repeat(line, body)
 
@@ -342,9 +343,3 @@ class _Checker:
 
 def _stood_in(values: Names) -> dict[str, str]:
     return {name: UNKNOWN if value is None else value for name, value in values.items()}
-
-
-def _surely(line: ScriptLine) -> bool:
-    """Whether a `/repeat` surely executes its body."""
-    text = words.rest_of(line.text)
-    return text.isdecimal() and int(text) > 0

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 import shlex
-from collections.abc import Mapping
 from typing import Any
 
 from multidrop.dialects import Diagnostic, Inexpressible, Procedure
@@ -95,23 +94,19 @@ async def plot(call: Call) -> None:
         case words:
             options, texts = _plotted(call, words)
             if options:
-                await _plot_to(call, options, texts)
+                workspace = call.session
+                target = parse_target(options.get("--to"), options.get("--serve"))
+                if target.file is not None:
+                    call.output_file(str(target.file))
+                period = parse_rate(options.get("--rate", DEFAULT))
+                series = parse_series(workspace, texts)
+                await read_first(workspace, series)
+                begun = await begin(workspace, target, series, period)
+                workspace.notify(f"plotting to {begun.where}, {begun.rate}")
+                if begun.desk:
+                    workspace.notify(f"at your desk: {begun.desk}, then rerun {begun.where}")
             else:
                 await _plot_on_screen(call, texts)
-
-
-async def _plot_to(call: Call, options: Mapping[str, str], texts: list[str]) -> None:
-    workspace = call.session
-    target = parse_target(options.get("--to"), options.get("--serve"))
-    if target.file is not None:
-        call.output_file(str(target.file))
-    period = parse_rate(options.get("--rate", DEFAULT))
-    series = parse_series(workspace, texts)
-    await read_first(workspace, series)
-    begun = await begin(workspace, target, series, period)
-    workspace.notify(f"plotting to {begun.where}, {begun.rate}")
-    if begun.desk:
-        workspace.notify(f"at your desk: {begun.desk}, then rerun {begun.where}")
 
 
 async def _plot_on_screen(call: Call, texts: list[str]) -> None:

@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 from multidrop.dialects.values import UNREAD, Conditions, Lamp, Pace
 from multidrop.tui.panels.view import NOT_REFERENCED, Glance, View, firmware_of, name_of
-from multidrop.tui.readout import READ, SWITCHES, Point, Readout
+from multidrop.tui.readout import READ, SWITCHES, Readout
 from multidrop.tui.text import age, at_words, digits, fit
 from multidrop.tui.widgets.lines import Row, Span, spread, width_of
 
@@ -49,12 +49,6 @@ def lamp_span(lamp: Lamp, old: bool) -> list[Span]:
     return [(f"{name} ", "dim" if old or not lamp.function else "text"), (sign, role)]
 
 
-def _row_of(lamps: Sequence[Lamp], old: bool) -> list[Span]:
-    """`1-8 ○○●○○○○○`: many lamps without functions."""
-    signs = "".join("·" if lamp.on is None else "●" if lamp.on else "○" for lamp in lamps)
-    return [(f"{lamps[0].name}-{lamps[-1].name} ", "dim"), (signs, "dim" if old or "●" not in signs else "strong")]
-
-
 def lamp_groups(conditions: Conditions, old: bool) -> tuple[list[list[Span]], list[list[Span]]]:
     """The lamps of inputs, and those of outputs, each with its heading before the first one."""
     found: list[list[list[Span]]] = []
@@ -64,7 +58,9 @@ def lamp_groups(conditions: Conditions, old: bool) -> tuple[list[list[Span]], li
         plain = plain if len(plain) >= MANY else []
         groups = [lamp_span(lamp, old) for lamp in lamps if lamp not in plain]
         if plain:
-            groups.append(_row_of(plain, old))
+            signs = "".join("·" if lamp.on is None else "●" if lamp.on else "○" for lamp in plain)
+            role = "dim" if old or "●" not in signs else "strong"
+            groups.append([(f"{plain[0].name}-{plain[-1].name} ", "dim"), (signs, role)])
         if groups:
             groups[0].insert(0, (head, "dim"))
         found.append(groups)
@@ -172,7 +168,8 @@ def bar(readout: Readout, width: int) -> str:
     target = readout.conditions.target if readout.conditions is not None else None
     if target is not None and last.velocity:
         cells[_cell(target, travel, width)] = "◇"
-    cells[_cell(last.position, travel, width)] = _sign(last.position, travel)
+    beyond = "◀" if last.position < travel.low else "▶" if last.position > travel.high else ""
+    cells[_cell(last.position, travel, width)] = beyond or "●"
     return "".join(cells)
 
 
@@ -181,28 +178,18 @@ def _cell(position: int, travel: Travel, width: int) -> int:
     return 1 + round(min(1.0, max(0.0, share)) * (width - 3))
 
 
-def _sign(position: int, travel: Travel) -> str:
-    """The place; an arrow beyond an end."""
-    return "◀" if position < travel.low else "▶" if position > travel.high else "●"
-
-
 def phase(readout: Readout) -> str:
     """`accelerates`, `cruises` or `slows down`; empty at rest, and where one reading is all there is."""
     if readout.last is None or not readout.last.velocity:
         return ""
-    before = _earlier(readout)
+    at = readout.last.at
+    before = next((each for each in reversed(readout.points) if at - each.at >= LOOK_BACK), None)
     if before is None:
         return ""
     now, then = abs(readout.last.velocity), abs(before.velocity)
     if abs(now - then) <= STEADY * max(now, then):
         return "cruises"
     return "accelerates" if now > then else "slows down"
-
-
-def _earlier(readout: Readout) -> Point | None:
-    assert readout.last is not None
-    points = reversed(readout.points)
-    return next((each for each in points if readout.last.at - each.at >= LOOK_BACK), None)
 
 
 def seconds_to_go(readout: Readout, now: float) -> float | None:

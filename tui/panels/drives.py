@@ -64,7 +64,16 @@ def narrow_rows(view: View, width: int) -> list[Row]:
     shown = kept(view.glances, MOST)
     rows = [row for glance in shown for row in _drive_rows(glance, now, width)]
     others = len(view.glances) - len(shown)
-    return [*rows, _lamp_row(chosen, now, width, others, poll_words(chosen, now, view.polling))]
+    more = f"+{others} ^A   " if others else ""
+    twin = difference_words(chosen.readout)
+    right: list[Span] = [(f"{more}{twin}{'   ' if twin else ''}{poll_words(chosen, now, view.polling)} ", "dim")]
+    groups: list[list[Span]] = []
+    for axis in chosen.readout.axes:
+        if axis.conditions is not None:
+            inputs, outputs = lamp_groups(axis.conditions, axis.aged(now))
+            groups += [*inputs, *outputs]
+    rows = flowing(groups, width - width_of(right) - 2)
+    return [*rows, spread(list(rows[0]) if rows else [], right, width)]
 
 
 def kept(glances: Sequence[Glance], most: int) -> list[Glance]:
@@ -136,20 +145,6 @@ def _besides(glance: Glance, axis: Readout, now: float, room: int, *, live: bool
     if live and target is not None and axis.last is not None and axis.last.velocity:
         return f"→ {digits(target)}  {to_go_words(axis, now)}".rstrip(), "text"
     return program_words(axis, now), "dim" if axis.program_aged(now) else "motion"
-
-
-def _lamp_row(glance: Glance, now: float, width: int, others: int, rate: str) -> Row:
-    """The lamps of the selected drive, as many as there is room for; drives that are not shown, and the rate."""
-    more = f"+{others} ^A   " if others else ""
-    twin = difference_words(glance.readout)
-    right: list[Span] = [(f"{more}{twin}{'   ' if twin else ''}{rate} ", "dim")]
-    groups: list[list[Span]] = []
-    for axis in glance.readout.axes:
-        if axis.conditions is not None:
-            inputs, outputs = lamp_groups(axis.conditions, axis.aged(now))
-            groups += [*inputs, *outputs]
-    rows = flowing(groups, width - width_of(right) - 2)
-    return spread(list(rows[0]) if rows else [], right, width)
 
 
 def drives_rows(view: View, width: int, height: int) -> list[Row]:

@@ -281,15 +281,6 @@ def plot_title(view: View) -> Row:
     return ((" plot ", "strong"), (f"{_span_words(look)} {rate_words(view)} {hidden}{zoomed}", "dim"))
 
 
-def _title(view: View, group: Group, width: int) -> list[Span]:
-    """The title of a chart: its quantity and unit; pieces of its lines with their names, unless those end the lines."""
-    unit = group.lines[0].unit
-    row: list[Span] = [(f" {group.title} ", "strong"), (f"{unit} " if unit else "", "dim")]
-    if len(group.lines) > 1 and not gutter(width):
-        row += _legend(view.model.look.ink, group)
-    return row
-
-
 def _legend(ink: Ink, group: Group) -> list[Span]:
     """Pieces of the lines with their names; under a title that names the only drive: `drive` and `twin`."""
     own = [line for line in group.lines if not line.twin]
@@ -331,22 +322,7 @@ def plot_rows(view: View, width: int, height: int) -> list[Row]:
     columns = columns_of(width)
     look = view.model.look
     window = look.window(view.now, columns, look.ink.wide)
-    shown = _with_words(view, [_take(view, group, window) for group in found])
-    return _stacked(view, shown, window, width, height)
-
-
-def _take(view: View, group: Group, window: Window) -> tuple[Group, Chart, dict[Line, Extent]]:
-    charts = view.model.look.charts
-    key = (group.word, group.key, window.columns)
-    if key not in charts and len(charts) > 32:
-        charts.clear()
-    chart = charts.setdefault(key, Chart())
-    extents = chart.take(view.model.traces, [line.quantity for line in group.lines], window)
-    return group, chart, {line: extents[line.quantity] for line in group.lines if line.quantity in extents}
-
-
-def _with_words(view: View, taken: Sequence[tuple[Group, Chart, dict[Line, Extent]]]) -> list[Shown]:
-    """Words for what does not move. A velocity of 0 is said by the position."""
+    taken = [_take(view, group, window) for group in found]
     velocities = {
         line.quantity[:3]: extent for group, _, extents in taken for line, extent in extents.items()
         if group.word == "velocity" and not line.twin
@@ -369,7 +345,17 @@ def _with_words(view: View, taken: Sequence[tuple[Group, Chart, dict[Line, Exten
         if len(words) > SAID:
             words[SAID - 1 :] = [((f" and {len(words) - SAID + 1} more that do not change", "dim"),)]
         shown.append(Shown(group, chart, moving, tuple(words)))
-    return shown
+    return _stacked(view, shown, window, width, height)
+
+
+def _take(view: View, group: Group, window: Window) -> tuple[Group, Chart, dict[Line, Extent]]:
+    charts = view.model.look.charts
+    key = (group.word, group.key, window.columns)
+    if key not in charts and len(charts) > 32:
+        charts.clear()
+    chart = charts.setdefault(key, Chart())
+    extents = chart.take(view.model.traces, [line.quantity for line in group.lines], window)
+    return group, chart, {line: extents[line.quantity] for line in group.lines if line.quantity in extents}
 
 
 def _agree(twin: Line, extents: Mapping[Line, Extent]) -> bool:
@@ -419,7 +405,13 @@ def _stacked(view: View, shown: Sequence[Shown], window: Window, width: int, hei
     for each in kept:
         rows += each.words
         if each.moving:
-            rows.append(_head(view, each.group, width))
+            unit = each.group.lines[0].unit
+            title: list[Span] = [(f" {each.group.title} ", "strong"), (f"{unit} " if unit else "", "dim")]
+            if len(each.group.lines) > 1 and not gutter(width):  # else the names end the lines
+                title += _legend(view.model.look.ink, each.group)
+            while width_of(title) > width and len(title) > 1:
+                title.pop()
+            rows.append(tuple(title))
             rows += chart_rows(view, each, window, width, shares.pop(0))
     if timed:
         rows.append(time_row(view, window))
@@ -452,11 +444,3 @@ def _is_switch(shown: Shown) -> bool:
 
 def _least(shown: Sequence[Shown]) -> int:
     return sum(len(each.words) + (1 + LOW if each.moving else 0) for each in shown)
-
-
-def _head(view: View, group: Group, width: int) -> Row:
-    """The title of a chart as a row; only panels have rules."""
-    title = _title(view, group, width)
-    while width_of(title) > width and len(title) > 1:
-        title.pop()
-    return tuple(title)

@@ -151,7 +151,17 @@ class ControlsPage(AskingPage):
     def show(self, view: View) -> None:
         """Paint the drive, and the controls with the lines that they send now."""
         self._view = view
-        self._follow(view)
+        # Forget a number that was begun before a stop, or for another drive.
+        place = selected_place(view.session)
+        if place != self._place:
+            self._place, self._axis, self._jog = place, 0, Jog()
+        asked = self._asked
+        if asked is not None and self.overtaken(asked):
+            self._close("stopped; the number was not used" if asked.place == place else "another drive is selected")
+        begun = self._begun
+        if begun is not None and self.overtaken(begun):
+            self._begun = None
+            self.say("stopped; nothing was sent" if begun.place == place else "another drive is selected")
         if view.model.trouble:
             self.say(f"✗ {view.model.trouble}")
             view.model.trouble, self._begun = "", None
@@ -169,19 +179,6 @@ class ControlsPage(AskingPage):
         self.lines("controls").put(self._rows(view, glance, width))
         self.lines("said").put([((" ", "text"), (fit(self.said[0], width - 2), self.said[1]))])
         self._painted = self._begun is not None and (self._painted or self.host.keyboard.idle)
-
-    def _follow(self, view: View) -> None:
-        """Forget a number that was begun before a stop, or for another drive."""
-        place = selected_place(view.session)
-        if place != self._place:
-            self._place, self._axis, self._jog = place, 0, Jog()
-        asked = self._asked
-        if asked is not None and self.overtaken(asked):
-            self._close("stopped; the number was not used" if asked.place == place else "another drive is selected")
-        begun = self._begun
-        if begun is not None and self.overtaken(begun):
-            self._begun = None
-            self.say("stopped; nothing was sent" if begun.place == place else "another drive is selected")
 
     def _rows(self, view: View, glance: Glance | None, width: int) -> list[Row]:
         controls = self._controls()

@@ -134,14 +134,6 @@ class EditPage(Page):
         lines, product = self._compared
         if (self.program.lines is not lines or product_of(self.host.session) != product) and self._edited_at is None:
             self._edited_at = 0.0
-        self._show_below(width)
-
-    @property
-    def program(self) -> ProgramFacts:
-        chosen = self.view.chosen if self.view is not None else None
-        return chosen.readout.program if chosen is not None else NO_FACTS
-
-    def _show_below(self, width: int) -> None:
         clock = self.host.session.wall
         rows = problem_rows(self.findings.problems, self.editor.cursor_location[0] + 1, width)
         rows = [rule(self.findings.words[0].strip(), width), *rows] if rows else []
@@ -151,6 +143,11 @@ class EditPage(Page):
         if below.styles.height is None or below.styles.height.value != len(rows):
             below.styles.height = len(rows)
         below.put(rows)
+
+    @property
+    def program(self) -> ProgramFacts:
+        chosen = self.view.chosen if self.view is not None else None
+        return chosen.readout.program if chosen is not None else NO_FACTS
 
     def state_words(self) -> str:
         return ""

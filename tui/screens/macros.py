@@ -152,9 +152,6 @@ class MacrosPage(Page):
         rows = [macro_row(each, playing.get(each.name), width, each is chosen) for _, each in shown]
         self.lines("macros").put(rows or (NOTHING if self._known else []))
         self._show_steps(playing, width, height - room)
-        self._show_news(view, width)
-
-    def _show_news(self, view: View, width: int) -> None:
         wall = view.session.wall
         records = news_rows(self.host.last_records(NEWS), lambda at: f"{wall(at):%H:%M:%S}", width)
         self.lines("news").put([rule("transcript", width), *records])

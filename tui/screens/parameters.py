@@ -184,7 +184,14 @@ class ParametersPage(AskingPage):
 
     def show(self, view: View) -> None:
         self._glance = view.chosen
-        self._follow(view)
+        # Forget what was begun before a stop, or for another drive.
+        place = selected_place(view.session)
+        if place != self._place:
+            self._place, self._table = place, SettingsTable()
+            self._close("")
+        begun = [each for each in (self._asked, self._pending) if each is not None]
+        if any(each.stops != view.session.stops for each in begun):
+            self._close("stopped; nothing was sent")
         if view.model.trouble:
             self.say(f"✗ {view.model.trouble}")
             view.model.trouble = ""
@@ -201,16 +208,6 @@ class ParametersPage(AskingPage):
         self.lines("meaning").put([((f" {fit(self._table.about(drive), width - 2)}", "dim"),)])
         self.lines("said").put([((f" {fit(self.said[0], width - 2)}", self.said[1]),)])
         self._painted = self._pending is not None
-
-    def _follow(self, view: View) -> None:
-        """Forget what was begun before a stop, or for another drive."""
-        place = selected_place(view.session)
-        if place != self._place:
-            self._place, self._table = place, SettingsTable()
-            self._close("")
-        begun = [each for each in (self._asked, self._pending) if each is not None]
-        if any(each.stops != view.session.stops for each in begun):
-            self._close("stopped; nothing was sent")
 
     def _settings(self) -> Readings | None:
         return self._glance.readout.settings if self._glance is not None else None

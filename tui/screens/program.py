@@ -62,7 +62,13 @@ class ProgramPage(EditPage):
     def show(self, view: View) -> None:
         """Paint signs and panels, too."""
         super().show(view)
-        self._show_marks(self.program)
+        chosen = self.view.chosen if self.view is not None else None
+        spot = spot_of(chosen.readout) if chosen is not None else None
+        number = index_of(self.program.lines, spot.address) if spot is not None else None
+        line = None if number is None else dict(self.findings.addresses).get(self.program.lines[number][0])
+        current = (line, SIGNS[spot.phase]) if spot is not None and line is not None else None
+        marks = marks_of(self.findings.problems, self._break_line(self.program), current)
+        self.editor.show_marks(marks, line)
         side = self.lines("program-side")
         if side.display:
             panels = [panel(name) for name in ("drive", "program")]
@@ -75,15 +81,6 @@ class ProgramPage(EditPage):
             return ""
         words = state_words(chosen, self.view.now)
         return f"program: {words}" if words else ""
-
-    def _show_marks(self, program: ProgramFacts) -> None:
-        chosen = self.view.chosen if self.view is not None else None
-        spot = spot_of(chosen.readout) if chosen is not None else None
-        number = index_of(program.lines, spot.address) if spot is not None else None
-        line = None if number is None else dict(self.findings.addresses).get(program.lines[number][0])
-        current = (line, SIGNS[spot.phase]) if spot is not None and line is not None else None
-        marks = marks_of(self.findings.problems, self._break_line(program), current)
-        self.editor.show_marks(marks, line)
 
     def _break_line(self, program: ProgramFacts) -> int | None:
         """The line of the text, from 0, at which the break point is."""

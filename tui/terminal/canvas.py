@@ -46,21 +46,17 @@ class FrontCompositor(Compositor):
                 strips = widget.render_lines(shown.translate(-region.offset))
                 for y, strip in zip(shown.line_range, strips, strict=False):
                     if y in open_:
-                        _fill(rows[y], strip, shown, self.cuts[y], open_[y])
+                        # Put the pieces of a widget's row into its visible places; a strip may be too short for some.
+                        ends = [cut for cut in self.cuts[y] if shown.x < cut <= shown.right]
+                        pieces = strip.divide([end - shown.x for end in ends])
+                        for place, piece in zip([shown.x, *ends], pieces, strict=False):
+                            if place in open_[y]:
+                                rows[y][place] = piece
         return cast("Sequence[Mapping[int, Strip]]", rows)
 
 
 def _free(rows: Sequence[Row], y: int, shown: Region) -> list[int]:
     return [x for x, strip in rows[y].items() if strip is None and shown.x <= x < shown.right]
-
-
-def _fill(row: Row, strip: Strip, shown: Region, cuts: Sequence[int], free: Sequence[int]) -> None:
-    """Put the pieces of a widget's row into its visible places; a strip may be too short for some."""
-    ends = [cut for cut in cuts if shown.x < cut <= shown.right]
-    pieces = strip.divide([end - shown.x for end in ends])
-    for place, piece in zip([shown.x, *ends], pieces, strict=False):
-        if place in free:
-            row[place] = piece
 
 
 # Styles of cells as the shortest escape sequences: a pen is a number, and a table says how one becomes another.
@@ -123,7 +119,10 @@ class Pens:
         if found is None:
             if len(self._of) >= MOST_STYLES:
                 self._of.clear()
-            found = self._of[style] = self._number(self._look(style))
+            attributes = frozenset(on for name, on, _ in ATTRIBUTES if getattr(style, name))
+            found = self._of[style] = self._number(
+                Look(self._codes(style.color, True), self._codes(style.bgcolor, False), attributes)
+            )
         return found
 
     def blank(self, pen: int) -> int:
@@ -149,10 +148,6 @@ class Pens:
             found = self._numbers[look] = len(self._looks)
             self._looks.append(look)
         return found
-
-    def _look(self, style: Style) -> Look:
-        attributes = frozenset(on for name, on, _ in ATTRIBUTES if getattr(style, name))
-        return Look(self._codes(style.color, True), self._codes(style.bgcolor, False), attributes)
 
     def _codes(self, colour: Color | None, letters: bool) -> str:
         """The codes of a colour, the shortest that are exact."""

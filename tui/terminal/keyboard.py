@@ -152,7 +152,11 @@ class Keyboard:
         elif isinstance(field, TextArea) and not field.read_only and _plain(key):
             field.replace(self._run(key), *field.selection, maintain_selection_offset=False)
         else:
-            await self._bound(key.key)
+            found = self._binding(key.key)
+            if found is not None:
+                binding, node, enabled = found
+                if enabled:
+                    await self._app.run_action(binding.action, node)
 
     def _run(self, key: events.Key) -> str:
         """Join a character with those that wait after it."""
@@ -164,13 +168,6 @@ class Keyboard:
             run.append(following.character or "")
             self._waiting.popleft()
         return "".join(run)
-
-    async def _bound(self, key: str) -> None:
-        found = self._binding(key)
-        if found is not None:
-            binding, node, enabled = found
-            if enabled:
-                await self._app.run_action(binding.action, node)
 
     def _binding(self, key: str) -> tuple[Binding, DOMNode, bool] | None:
         """The binding of a key, and whether its action is possible now.

@@ -233,7 +233,10 @@ class KeyStream:
     def take(self, data: bytes) -> None:
         """Take bytes that were read; of a read with a stop, use only those after the last stop."""
         if self._stalled and data == LEAVE:
-            self._leave_paste()
+            self._splitter.leave()
+            self._old_paste = False
+            self._watch_paste()
+            self._warn("the paste that did not end was dropped")
             return
         if STOP in data:
             before, _, data = data.rpartition(STOP)
@@ -277,12 +280,6 @@ class KeyStream:
     def _stalls(self) -> None:
         self._stalled = True
         self._warn("a paste has not ended; until it does, keys belong to it. Ctrl+C drops it")
-
-    def _leave_paste(self) -> None:
-        self._splitter.leave()
-        self._old_paste = False
-        self._watch_paste()
-        self._warn("the paste that did not end was dropped")
 
     # Parsing
 

@@ -107,15 +107,13 @@ class Lines(Widget):
             self._strips_for = width
         found = self._strips.get(row)
         if found is None:
-            found = self._strips[row] = self._make_strip(row, width)
+            segments = [Segment(visible(text), self.style_of(role)) for text, role in row]
+            room = width - sum(cell_len(segment.text) for segment in segments)
+            if room > 0:
+                segments.append(Segment(" " * room, self.style_of("text")))
+            found = Strip(segments).crop(0, width) if room < 0 else Strip(segments, width)
+            self._strips[row] = found
         return found
-
-    def _make_strip(self, row: Row, width: int) -> Strip:
-        segments = [Segment(visible(text), self.style_of(role)) for text, role in row]
-        room = width - sum(cell_len(segment.text) for segment in segments)
-        if room < 0:
-            return Strip(segments).crop(0, width)
-        return Strip([*segments, Segment(" " * room, self.style_of("text"))] if room else segments, width)
 
     def shown(self) -> Sequence[Row]:
         """The rows, from the top of the widget. Other rows are another object."""
@@ -127,20 +125,17 @@ class Lines(Widget):
             return super().render_lines(crop)
         rows = self.shown()
         if self._done is None or self._done[0] is not rows or self._done[1] != (crop, self.size):
-            self._done = rows, (crop, self.size), self._make_strips(rows, crop)
+            width, nothing = self.size.width, ()
+            count = len(rows)
+            strips = [self.strip(rows[y] if y < count else nothing, width) for y in range(crop.y, crop.bottom)]
+            if (crop.x, crop.width) != (0, width):
+                strips = [strip.crop(crop.x, crop.right) for strip in strips]
+            if filters := self.get_line_filters():
+                ground = self.background_colors[1]
+                for each in filters:
+                    strips = [strip.apply_filter(each, ground) for strip in strips]
+            self._done = rows, (crop, self.size), strips
         return self._done[2]
-
-    def _make_strips(self, rows: Sequence[Row], crop: Region) -> list[Strip]:
-        width, nothing = self.size.width, ()
-        count = len(rows)
-        strips = [self.strip(rows[y] if y < count else nothing, width) for y in range(crop.y, crop.bottom)]
-        if (crop.x, crop.width) != (0, width):
-            strips = [strip.crop(crop.x, crop.right) for strip in strips]
-        if filters := self.get_line_filters():
-            ground = self.background_colors[1]
-            for each in filters:
-                strips = [strip.apply_filter(each, ground) for strip in strips]
-        return strips
 
     def render_line(self, y: int) -> Strip:
         rows = self.shown()

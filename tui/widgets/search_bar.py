@@ -168,7 +168,12 @@ class Reader(Horizontal):
         if transcript is None or what == "close":
             self.close()
         elif what == "only" and transcript.search is not None:
-            self._show_only(transcript, transcript.search.text)
+            # Show only the records that hold the text.
+            text = transcript.search.text
+            self.close()
+            if text:
+                transcript.choose(transcript.sight.filter._replace(text=text), typed=True)
+                transcript.look_end(newest=True)
         elif what == "copy" and transcript.picked is not None:
             self._copy(transcript.picked)
         elif what == "extend":
@@ -177,13 +182,6 @@ class Reader(Horizontal):
         elif transcript.search is not None:
             transcript.search.step(-1 if what == "older" else 1)
             self._reveal(transcript, transcript.search.at)
-
-    def _show_only(self, transcript: Transcript, text: str) -> None:
-        """Show only the records that hold the text."""
-        self.close()
-        if text:
-            transcript.choose(transcript.sight.filter._replace(text=text), typed=True)
-            transcript.look_end(newest=True)
 
     def _copy(self, picked: Picked) -> None:
         """Send the picked lines to the clipboard of the terminal, which says nothing about it."""

@@ -10,7 +10,6 @@ from typing import NamedTuple
 
 from rich.cells import cell_len, chop_cells
 from textual import events
-from textual.geometry import Size
 
 from multidrop.shell.streams.event_printer import laid_out
 from multidrop.shell.transcripts import Filter
@@ -240,31 +239,28 @@ class Transcript(Lines, can_focus=False):
 
     def _rows(self) -> list[Row]:
         if self._view is None:
-            self._view = self._make(self.size)
+            sight = self.sight
+            sight.height = self.size.height
+            foot = self._foot(self.size.width)
+            height = self.size.height - len(foot)
+            numbers, place = sight.numbers, sight.end
+            valid = (self.size.width, self.clocks.form, sight.filter)
+            before, self._made = self._made if self._made_for == valid else {}, {}
+            self._made_for = valid
+            rows: list[Row] = []
+            while place > 0 and len(rows) < height:
+                place -= 1
+                number = numbers[place]
+                above = self.records[numbers[place - 1]] if place else None
+                made = before.get(number) or self.rows_of(self.records[number], above, self.size.width)
+                self._made[number] = made
+                rows.extend(reversed(self._decorated(number, made)))
+            sight.top = numbers[min(place, len(numbers) - 1)] if len(numbers) else 0  # a view without rows shows none
+            rows.reverse()
+            rows = rows[max(0, len(rows) - height) :]
+            blank: list[Row] = [()] * (height - len(rows)) if foot else []
+            self._view = rows + blank + foot
         return self._view
-
-    def _make(self, size: Size) -> list[Row]:
-        sight = self.sight
-        sight.height = size.height
-        foot = self._foot(size.width)
-        height = size.height - len(foot)
-        numbers, place = sight.numbers, sight.end
-        valid = (size.width, self.clocks.form, sight.filter)
-        before, self._made = self._made if self._made_for == valid else {}, {}
-        self._made_for = valid
-        rows: list[Row] = []
-        while place > 0 and len(rows) < height:
-            place -= 1
-            number = numbers[place]
-            above = self.records[numbers[place - 1]] if place else None
-            made = before.get(number) or self.rows_of(self.records[number], above, size.width)
-            self._made[number] = made
-            rows.extend(reversed(self._decorated(number, made)))
-        sight.top = numbers[min(place, len(numbers) - 1)] if len(numbers) else 0  # a view without rows shows none
-        rows.reverse()
-        rows = rows[max(0, len(rows) - height) :]
-        blank: list[Row] = [()] * (height - len(rows)) if foot else []
-        return rows + blank + foot
 
     def rows_of(self, record: Record, before: Record | None, width: int) -> list[Row]:
         """A record as rows of the view; `before` is the one above it."""
@@ -300,15 +296,11 @@ class Transcript(Lines, can_focus=False):
             return []
         if width_of(left) + width_of(right) + 1 > width:
             left = left[:1] if right else left
-        return [_ends(left, right, width)]
+        fits = width_of(left) + width_of(right) <= width
+        return [spread(left, right, width) if fits else spread(right, (), width)]
 
     def on_mouse_scroll_up(self, event: events.MouseScrollUp) -> None:
         self.look(-3)
 
     def on_mouse_scroll_down(self, event: events.MouseScrollDown) -> None:
         self.look(3)
-
-
-def _ends(left: list[Span], right: list[Span], width: int) -> Row:
-    """Two texts at the ends of a row; the right one alone where both have no room."""
-    return spread(left, right, width) if width_of(left) + width_of(right) <= width else spread(right, (), width)

@@ -171,16 +171,13 @@ class Index:
             del self._numbers[: bisect_left(self._numbers, first)]
         if self._seen < self._records.taken:
             for number, record in self._records.since(self._seen):
-                self._add(self._choose(number, record), first)
+                for each in self._choose(number, record):
+                    if not self._numbers or each > self._numbers[-1]:
+                        self._numbers.append(each)
+                    elif each >= first and self._numbers[bisect_left(self._numbers, each)] != each:
+                        insort(self._numbers, each)
             self._seen = self._records.taken
         return self._numbers
-
-    def _add(self, chosen: tuple[int, ...], first: int) -> None:
-        for number in chosen:
-            if not self._numbers or number > self._numbers[-1]:
-                self._numbers.append(number)
-            elif number >= first and self._numbers[bisect_left(self._numbers, number)] != number:
-                insort(self._numbers, number)
 
 
 class Sight:

@@ -152,7 +152,7 @@ async def test_a_terminal_that_is_not_read_loses_replies_and_no_warning(monkeypa
             stdout.write(sys.stderr, "STILL MOVING")
             got = b""
             async with asyncio.timeout(PATIENCE):
-                await made.front.ready()  # a terminal is not waited for
+                await made.ready()  # a terminal is not waited for
                 while b"the terminal did not take them\r\n" not in got:
                     got += taken(master)
                     await asyncio.sleep(0.001)
@@ -166,7 +166,7 @@ async def test_automation_waits_while_a_pipe_is_behind_and_no_reply_is_dropped(m
         lines, got = 200, b""
         for _ in range(lines):
             stdout.write(sys.stdout, "x" * 999)
-        waiting = asyncio.create_task(made.front.ready())
+        waiting = asyncio.create_task(made.ready())
         await asyncio.sleep(0.05)
         assert not waiting.done()
         async with asyncio.timeout(PATIENCE):
