@@ -22,12 +22,9 @@ from multidrop.tui.screens.page import Framed, Host, Page, page_entry
 from multidrop.tui.widgets.theme import SignFilter, Signs, ink_of
 
 if TYPE_CHECKING:
-    from multidrop.shell.session import Session
     from multidrop.tui.assist import Assist
-    from multidrop.tui.keymap import FunctionKeys, Keymap
-    from multidrop.tui.outbox import Outbox
+    from multidrop.tui.keymap import Keymap
     from multidrop.tui.polling import Polling
-    from multidrop.tui.screen_model import ScreenModel
     from multidrop.tui.screens.main_screen import MainScreen
     from multidrop.tui.screens.questions import Questions
     from multidrop.tui.screens.start import Opener
@@ -39,18 +36,13 @@ CTRL_C = "Ctrl+Q quits, Ctrl+X stops all drives"
 
 
 @dataclass
-class Parts:
+class Parts(Host):
     """The parts of one app that its actions work on."""
 
     app: App[int]
-    host: Host
-    session: Session
-    model: ScreenModel
     main: MainScreen
     assist: Assist
-    outbox: Outbox
     polling: Polling
-    macros: FunctionKeys
     selection: Selection
     questions: Questions
     keymap: Keymap
@@ -197,20 +189,20 @@ class Actions(Target):
 
     async def action_play(self, key: str) -> None:
         """Play the macro on a key, once a press."""
-        macros, host = self._parts.macros, self._parts.host
+        macros, parts = self._parts.macros, self._parts
         if macros.held(key, self._parts.session.now()):
             return
         macros.read(self._parts.session.macros)
         if macros.trouble:
-            host.show_line(macros.trouble, "x")
+            parts.show_line(macros.trouble, "x")
         name = macros.keys.get(key)
         if clash := macros.clash(key):
-            host.show_line(clash, "x")
+            parts.show_line(clash, "x")
         elif name is not None:
             await self.action_run_line(f"/play {name}")
         else:
             page = f" --page {macros.page}" if macros.place else ""
-            host.show_line(f"{key} plays nothing; /key {key} NAME{page} puts a macro on it", ".")
+            parts.show_line(f"{key} plays nothing; /key {key} NAME{page} puts a macro on it", ".")
 
     def action_macro_page(self) -> None:
         macros = self._parts.macros
@@ -219,7 +211,7 @@ class Actions(Target):
             macros.turn()
         else:
             text = "the macros are on one page of keys; /key F3 NAME --page 2 begins another"
-            self._parts.host.show_line(text, ".")
+            self._parts.show_line(text, ".")
         self._parts.model.changed = True
 
     async def action_record(self) -> None:
@@ -281,11 +273,11 @@ class Actions(Target):
         page = page_entry(name).page()
         shown = next((each for each in app.screen_stack if isinstance(each, Page)), None)
         if shown is None:
-            await app.push_screen(page(parts.host))
+            await app.push_screen(page(parts))
         elif shown is app.screen and type(shown) is not page:
-            await app.switch_screen(page(parts.host))
+            await app.switch_screen(page(parts))
         parts.model.changed = True
-        parts.host.frames.wake()
+        parts.frames.wake()
 
     async def action_open(self) -> None:
         await self._parts.opener.ask()

@@ -40,7 +40,7 @@ from multidrop.tui.presenter import Presenter
 from multidrop.tui.screen_model import Record, ScreenModel
 from multidrop.tui.screens.dialogs import LEAST, Over, TooSmall
 from multidrop.tui.screens.main_screen import MainScreen, Reading
-from multidrop.tui.screens.page import PAGES, Framed, Host, Page
+from multidrop.tui.screens.page import PAGES, Framed, Page
 from multidrop.tui.screens.questions import Questions
 from multidrop.tui.screens.start import Opener, Start
 from multidrop.tui.session_hooks import Hooks
@@ -118,14 +118,7 @@ class MultidropApp(App[int]):
         self.tour = Tour(session, self.keymap, lambda: getattr(self.screen, "heading", type(self.screen).__name__))
         self.opener = Opener(self, session, self.assist, self.keyboard, self.show_line, self.tour.begin)
         self.typist = Typist(
-            session,
-            self.main,
-            self.assist,
-            self.outbox,
-            self.selection,
-            self.unsent,
-            self.keyboard,
-            self.questions,
+            session, self.main, self.assist, self.outbox, self.selection, self.unsent, self.keyboard, self.questions
         )
         self.texts = Texts(self.assist.drafts())
         self._inbox: list[SessionEvent] = []
@@ -138,8 +131,14 @@ class MultidropApp(App[int]):
         self._signs = SignFilter(signs_for(look.signs, os.environ))
         dress(self, look)
         self.model.look.ink = ink_of(self._signs.font)
-        host = Host(
-            session,
+        self._set_actions()
+        self.set_keymap(self.keymap.changed)
+        self._troubles = [f"{look.where}: {trouble}" for trouble in [*self.keymap.troubles, *wrong_theme(look.theme)]]
+
+    def _set_actions(self) -> None:
+        """Make what keys, the palette and the session ask of the screen."""
+        parts = Parts(
+            self.session,
             self.model,
             self.outbox,
             self.texts,
@@ -149,17 +148,10 @@ class MultidropApp(App[int]):
             self.selection.select,
             self.show_line,
             self.last_records,
-        )
-        parts = Parts(
             self,
-            host,
-            session,
-            self.model,
             self.main,
             self.assist,
-            self.outbox,
             self.polling,
-            self.macros,
             self.selection,
             self.questions,
             self.keymap,
@@ -170,8 +162,6 @@ class MultidropApp(App[int]):
         self.act, self.view = Actions(parts), ViewActions(parts)
         self._action_targets |= {"act", "view"}
         Hooks(parts, self.act, self.presenter, lambda: self._check_size(self.size))
-        self.set_keymap(self.keymap.changed)
-        self._troubles = [f"{look.where}: {trouble}" for trouble in [*self.keymap.troubles, *wrong_theme(look.theme)]]
 
     def get_default_screen(self) -> Screen[Any]:
         """The main screen, below all others."""

@@ -97,19 +97,19 @@ class Hooks:
             edit=self._edit,
             screen=self._show_page,
             transcripts=Transcripts(
-                parts.main, parts.session, parts.outbox, parts.questions.paste, parts.host.keyboard.turn_deaf
+                parts.main, parts.session, parts.outbox, parts.questions.paste, parts.keyboard.turn_deaf
             ),
         )
 
     async def _go_on(self, question: str) -> bool:
-        self._parts.host.keyboard.turn_deaf()
+        self._parts.keyboard.turn_deaf()
         main = self._parts.main
         self._presenter.take_records(main)
         return await self._parts.questions.go_on(question, main.transcript.since_typed(), self._closed)
 
     async def _fill_in(self, title: str, fields: Sequence[Field]) -> dict[str, str] | None:
         """Put a form of the session. Keys typed ahead are not for it."""
-        self._parts.host.keyboard.turn_deaf()
+        self._parts.keyboard.turn_deaf()
         return await self._parts.questions.fill(title, fields, self._closed)
 
     async def _show_page(self, name: str) -> None:
@@ -121,11 +121,11 @@ class Hooks:
         before = app.screen
         await self._actions.action_page(name)
         if app.screen is not before:
-            self._parts.host.keyboard.turn_deaf()  # what was typed after the line was not meant for the page
+            self._parts.keyboard.turn_deaf()  # what was typed after the line was not meant for the page
 
     async def _edit(self, path: str) -> None:
         """Show a file in the editor. Raises Diagnostic."""
-        self._parts.host.texts.open(path)
+        self._parts.texts.open(path)
         await self._actions.action_page("program")
 
     async def _before_quit(self) -> bool:

@@ -201,7 +201,17 @@ class Raster:
 
     def draw(self, curves: Sequence[Curve], frame: Frame) -> list[list[Run]]:
         """Draw a window, from top to bottom."""
-        self._forget_changed(curves, frame)
+        valid = (frame.rows, frame.scale, frame.ink, *((each.columns, each.number) for each in curves))
+        if valid != self._valid:
+            self._kept.clear()
+            self._valid = valid
+        else:
+            now = [each.columns.taken for each in curves]
+            changed = [last for taken, (before, last) in zip(now, self._seen, strict=True) if taken != before]
+            if changed:
+                first = min(changed) // frame.ink.wide
+                self._kept = {x: column for x, column in self._kept.items() if x < first}
+        self._seen = [(each.columns.taken, each.columns.last) for each in curves]
         for x in range(frame.first, frame.last + 1):
             if x not in self._kept:
                 self._kept[x] = self._column(curves, frame, x)
@@ -214,19 +224,6 @@ class Raster:
         same = len(before) == len(self._rows)
         self._runs = [self._runs[y] if same and row == before[y] else _runs(*row) for y, row in enumerate(self._rows)]
         return self._runs
-
-    def _forget_changed(self, curves: Sequence[Curve], frame: Frame) -> None:
-        valid = (frame.rows, frame.scale, frame.ink, *((each.columns, each.number) for each in curves))
-        if valid != self._valid:
-            self._kept.clear()
-            self._valid = valid
-        else:
-            now = [each.columns.taken for each in curves]
-            changed = [last for taken, (before, last) in zip(now, self._seen, strict=True) if taken != before]
-            if changed:
-                first = min(changed) // frame.ink.wide
-                self._kept = {x: column for x, column in self._kept.items() if x < first}
-        self._seen = [(each.columns.taken, each.columns.last) for each in curves]
 
     def _column(self, curves: Sequence[Curve], frame: Frame, x: int) -> _Drawn:
         """Draw one column of cells; where curves meet, the cell shows the dots of all, and belongs to the first."""

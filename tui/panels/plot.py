@@ -78,7 +78,10 @@ def groups(view: View) -> list[Group]:
         axes = view.model.traces.axes(bus, address) if word in ("", DIFFERENCE) else []
         for axis in axes or [""]:
             number = numbers.setdefault((bus, address, axis), len(numbers)) % len(SERIES)
-            name = _name(view, bus, address, axis)
+            drive = view.session.buses[bus].drives[address]
+            several = len({each.bus for each in plotted(view.session)}) > 1
+            where = ":".join(filter(None, (bus if several or not address else "", address)))
+            name = " ".join(filter(None, (where, drive.label, axis)))
             for each in [word] if word else PLOTTED:
                 unit = _unit(view, bus, address, axis) + PLOTTED.get(each, "") if word in ("", DIFFERENCE) else ""
                 lines = found.setdefault((each, name if view.model.look.apart else ""), [])
@@ -96,14 +99,6 @@ def _recent(view: View, predicted: Quantity) -> bool:
     look, trace = view.model.look, view.model.traces.get(predicted)
     end = view.now if look.paused_at is None else look.paused_at
     return trace is not None and trace.at[-1] >= end - look.span
-
-
-def _name(view: View, bus: str, address: str, axis: str) -> str:
-    """`a gantry`, with the bus if several are plotted."""
-    drive = view.session.buses[bus].drives[address]
-    several = len({each.bus for each in plotted(view.session)}) > 1
-    where = ":".join(filter(None, (bus if several or not address else "", address)))
-    return " ".join(filter(None, (where, drive.label, axis)))
 
 
 def _unit(view: View, bus: str, address: str, axis: str) -> str:
