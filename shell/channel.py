@@ -106,7 +106,6 @@ class Channel:
         return leave
 
     def publish(self, event: SessionEvent) -> None:
-        """Pass an event to every subscriber."""
         callbacks, over = iter(self._callbacks), False
         while not over:  # after a subscriber that fails, the next one
             with self._apart:
@@ -284,7 +283,6 @@ class Job:
         return took / steps * (self._total - done) if steps and took >= EARLIEST else None
 
     def end(self) -> None:
-        """Publish the end, if anything was published."""
         if self._shown_at > float("-inf"):
             total = self._total
             self._channel.publish(Progressed(self._channel.now(), self._what, total, total, 0.0))

@@ -176,7 +176,6 @@ class Progressed:
 
     @property
     def over(self) -> bool:
-        """Whether the job has ended."""
         return self.done >= self.total
 
     @property

@@ -13,11 +13,22 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 from multidrop.dialects import Command, Diagnostic
 
 EVERYONE = ("*", "^")
 WAITS = ("/wait", "/sleep")
+
+
+class Place(NamedTuple):
+    """A drive on a bus, by their names; empty where none is meant."""
+
+    bus: str = ""
+    address: str = ""
+
+
+NOWHERE = Place()
 
 
 @dataclass(frozen=True)

@@ -32,7 +32,6 @@ class KnownNames:
         self._asking: WeakKeyDictionary[Drive, asyncio.Task[None]] = WeakKeyDictionary()
 
     def learn(self, drive: Drive, held: Held) -> None:
-        """Note what was read of a drive."""
         self._held[drive] = held, drive.commands
 
     def offered(self, drive: Drive, line: str) -> Sequence[tuple[str, str]]:
@@ -82,7 +81,6 @@ class Lately:
         self._changed = asyncio.Event()
 
     def take(self, event: SessionEvent) -> None:
-        """Take a session's event."""
         if isinstance(event, Printed):
             self._add(event.text)
         elif isinstance(event, OnBus) and isinstance(event.event, Unsolicited):
@@ -126,7 +124,6 @@ class Observing:
         """The last state of each input, by bus, address and word."""
 
     def take(self, event: SessionEvent) -> None:
-        """Take a session's event."""
         if not isinstance(event, OnBus):
             return
         found, observed = event.event, self._recorder.observed

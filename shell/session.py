@@ -21,7 +21,7 @@ from multidrop.shell.automation import ENDING, Automations, only_ends
 from multidrop.shell.connect.opening import open_buses
 from multidrop.shell.connect.settings import Settings
 from multidrop.shell.events import FAILURES, By, Entered, Failed, Printed
-from multidrop.shell.lines import EVERYONE, DriveLine, TypedLine, VerbLine, join_target, parse, split_target
+from multidrop.shell.lines import EVERYONE, DriveLine, Place, TypedLine, VerbLine, join_target, parse, split_target
 from multidrop.shell.openings import Openings
 from multidrop.shell.operations.table import find
 from multidrop.shell.playing import played_by
@@ -298,11 +298,11 @@ def _raw_line(workspace: Workspace, line: str | TypedLine) -> DriveLine | None:
     return DriveLine(typed.rstrip("\r\n"), typed=typed)
 
 
-def _place_of(target: DriveLine, selected: tuple[str, str]) -> tuple[str, str]:
+def _place_of(target: DriveLine, selected: Place) -> Place:
     """The bus and the address that a line was for; `selected`: those that were selected when it was typed."""
-    bus = played_by(target.bus) or selected[0]
-    plain = target.text and target.address is None and bus == selected[0]
-    return bus, selected[1] if plain else target.address or ""
+    bus = played_by(target.bus) or selected.bus
+    plain = target.text and target.address is None and bus == selected.bus
+    return Place(bus, selected.address if plain else target.address or "")
 
 
 @contextlib.contextmanager

@@ -80,7 +80,6 @@ def seconds(text: str, wrong: Callable[[str], Diagnostic]) -> float:
 
 
 async def sleep(duration: float) -> None:
-    """Wait for a time, s."""
     await asyncio.sleep(duration)
 
 

@@ -23,7 +23,7 @@ from multidrop.shell.channel import Channel, Questions, Tasks
 from multidrop.shell.connect.reconnect import Reconnections
 from multidrop.shell.connect.settings import Settings
 from multidrop.shell.events import Failed, Notified, OnBus, StateChanged
-from multidrop.shell.lines import EVERYONE, join_target
+from multidrop.shell.lines import EVERYONE, Place, join_target
 from multidrop.shell.playing import Playing, played_by
 from multidrop.shell.remembered import KnownNames, Lately, Observing
 
@@ -239,10 +239,10 @@ class Workspace(Channel):
         return _present(bus, self._open[bus].selected) if bus is not None else None
 
     @property
-    def place(self) -> tuple[str, str]:
-        """The names of the selected bus and of the selected drive on it; empty where there is none."""
+    def place(self) -> Place:
+        """The selected bus, and the selected drive on it."""
         selected = self.selected
-        return self.selected_bus, selected.address if selected is not None else ""
+        return Place(self.selected_bus, selected.address if selected is not None else "")
 
     def select(self, address: str, bus: str = "") -> None:
         """Select a drive by address or label on a bus (by default the selected one).

@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING
 from textual.app import App
 from textual.widgets import Input, TextArea
 
-from multidrop.tui.outbox import selected_place
 from multidrop.tui.palette import PADDING, PALETTE, Command, Recent, Switches, all_commands, commands_like, entries
 from multidrop.tui.palette import found as help_on
 from multidrop.tui.panels.view import glances_of
@@ -102,11 +101,9 @@ class ViewActions(Target):
         await self._parts.questions.theme()
 
     async def action_choose_signs(self) -> None:
-        """Choose the signs that the terminal's font holds."""
         await self._parts.questions.signs(self.show_signs)
 
     def show_signs(self, signs: Signs) -> None:
-        """Show only these signs from now on."""
         parts = self._parts
         parts.signs.font = signs
         parts.model.look.ink = ink_of(signs)
@@ -138,7 +135,7 @@ class ViewActions(Target):
         if not beside.display:
             await parts.questions.half(partial(glances_of, parts.session, parts.model), self._show_half)
             return
-        place, (bus, address) = selected_place(parts.session), (beside.bus, beside.address)
+        place, (bus, address) = parts.session.place, (beside.bus, beside.address)
         self._show_half(place.address, place.bus)
         parts.selection.select(address, bus)
 
@@ -215,7 +212,6 @@ class Actions(Target):
         self._parts.model.changed = True
 
     async def action_record(self) -> None:
-        """Begin a recording, or end the current one."""
         if self._parts.session.recording:
             await self.action_run_line("/record stop")
         else:
@@ -226,7 +222,6 @@ class Actions(Target):
         self._parts.outbox.type("/twin off" if self._parts.model.bus("").twinned else "/twin on")
 
     async def action_log(self) -> None:
-        """Begin the session log, or end it."""
         await self.action_run_line("/log off" if self._parts.session.log is not None else "/log on")
 
     async def action_search_history(self) -> None:

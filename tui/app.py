@@ -164,7 +164,6 @@ class MultidropApp(App[int]):
         Hooks(parts, self.act, self.presenter, lambda: self._check_size(self.size))
 
     def get_default_screen(self) -> Screen[Any]:
-        """The main screen, below all others."""
         return self.main
 
     # The stop
@@ -407,7 +406,6 @@ class MultidropApp(App[int]):
         self.stop_all()
 
     async def action_quit(self) -> None:
-        """Quit; ask if that would leave something unfinished."""
         unsaved = [text.name for text in self.texts.unsaved()]
         await self.questions.quit(
             lambda: self.outbox.waiting, self.stop_all, lambda: self._check_size(self.size), unsaved

@@ -71,7 +71,6 @@ class Assist:
         return url
 
     def verbs(self) -> Sequence[tuple[str, str, str]]:
-        """The host's commands: name, usage, meaning."""
         return ()
 
     def drafts(self) -> Drafts | None:
@@ -150,7 +149,6 @@ class ShellAssist(Assist):
         return url_of(alike) if alike else url
 
     def verbs(self) -> Sequence[tuple[str, str, str]]:
-        """The host's commands: name, usage, meaning."""
         from multidrop.shell.operations.table import VERBS
 
         return [(verb.name, verb.usage, verb.lines[0]) for verb in VERBS.values()]

@@ -121,7 +121,6 @@ class Pace:
         """The terminal has replied at some time."""
 
     def ready(self) -> bool:
-        """True if a frame may go out."""
         if not self._handed_over():
             return False
         if self._asked_at is None:

@@ -16,26 +16,13 @@ import asyncio
 from collections import deque
 from collections.abc import Callable, Coroutine, Sequence
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
-from multidrop.shell.lines import pinned
+from multidrop.shell.lines import Place, pinned
 from multidrop.shell.prompt.typed_lines import BURST, Line
 
 if TYPE_CHECKING:
     from multidrop.shell.session import Session
-
-
-class Place(NamedTuple):
-    """A drive on a bus, as selected."""
-
-    bus: str
-    address: str
-
-
-def selected_place(session: Session) -> Place:
-    """The selected drive; an empty address if no drive is selected."""
-    selected = session.selected
-    return Place(session.selected_bus, selected.address if selected is not None else "")
 
 
 NAMED = 4
@@ -70,7 +57,6 @@ class Outbox:
 
     @property
     def idle(self) -> bool:
-        """True if no line runs or waits."""
         return not any(lane.running or lane.waiting for lane in self._lanes)
 
     @property
@@ -119,7 +105,7 @@ class Outbox:
             self._report("stopped", lines)
 
     def _line(self, text: str) -> Line:
-        return Line.entered(text, self._session.stops, selected_place(self._session))
+        return Line.entered(text, self._session.stops, self._session.place)
 
     def _talking(self, bus: str) -> Lane | None:
         return next((lane for lane in self._lanes if bus and lane.running and lane.running.bus == bus), None)
@@ -148,7 +134,7 @@ class Outbox:
         """Start the next line of a lane; None if it may not be sent."""
         line = lane.waiting[0]
         typed = line.sent
-        if line.place != selected_place(self._session):
+        if line.place != self._session.place:
             if line.verb:
                 self._hold(lane, f"another drive was selected than {':'.join(filter(None, line.place))}")
                 return None
@@ -163,7 +149,7 @@ class Outbox:
             self._hold(lane, f"'{line.text}' failed")
             return None
         if line is not None and line.verb == "/use":
-            now = selected_place(self._session)
+            now = self._session.place
             lane.waiting = deque(
                 replace(each, place=now) if each.place == line.place else each for each in lane.waiting
             )
@@ -196,7 +182,7 @@ class Outbox:
 
     def unsent_lines(self) -> list[str]:
         """The lines that were last reported as not sent, each for the drive that it was typed for."""
-        now = selected_place(self._session)
+        now = self._session.place
         return [
             line.text if line.verb or line.place == now else pinned(line.text, *line.place) for line in self._unsent
         ]

@@ -46,7 +46,6 @@ class Presenter:
         return View(self.session, self.model, glances, now, self.polling.on)
 
     def tabs(self, now: float) -> list[Tab]:
-        """A tab for each bus."""
         return [
             Tab(
                 number,

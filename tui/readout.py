@@ -51,7 +51,6 @@ class State(Enum):
 
     @property
     def sign(self) -> str:
-        """The sign, one cell wide."""
         return self.value[0]
 
     @property
@@ -244,7 +243,6 @@ class Readout:
             self.no_answer(event.at)
 
     def compare(self, event: TwinEvent) -> None:
-        """Take an event of the drive's twin."""
         if isinstance(event, TwinEnded):
             for each in self.axes:
                 each.twin = None
@@ -311,7 +309,6 @@ class Readout:
 
     @property
     def own_state(self) -> State:
-        """The state of this axis alone, as last read."""
         if self.last is not None and self.last.velocity != 0:
             return State.MOVING
         if self.program.runs and not (self.conditions is not None and self.conditions.disabled):
@@ -323,7 +320,6 @@ class Readout:
         return any(each.last is not None and each.last.velocity != 0 for each in self.axes)
 
     def rate(self, now: float) -> float:
-        """Samples per second over the last two seconds."""
         recent = 0
         for point in reversed(self.points):
             if point.at < now - 2:
@@ -332,7 +328,6 @@ class Readout:
         return recent / 2
 
     def state(self, *, storing: bool = False) -> State:
-        """The state that was last read."""
         if storing:
             return State.STORING
         if self.silent_since is not None:

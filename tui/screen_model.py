@@ -136,7 +136,6 @@ class BusFacts:
     traffic: TrafficStore = field(default_factory=TrafficStore)
 
     def readout(self, address: str) -> Readout:
-        """The readout of a drive, empty at first."""
         return self.readouts.setdefault(address, Readout())
 
     @property

@@ -45,7 +45,6 @@ class Transcripts:
         return self._main.times
 
     def set_times(self, form: str) -> None:
-        """Show times in another form, on every page."""
         self._main.times = form
         for page in (*self._main.pages.values(), self._main.beside.transcript):
             page.set_times(form)

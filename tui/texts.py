@@ -24,12 +24,10 @@ class OpenText:
 
     @property
     def name(self) -> str:
-        """The path as it was given."""
         return str(self.file.path)
 
     @property
     def changed(self) -> bool:
-        """Whether the text is not what the file held."""
         return self.text != self.file.text
 
 

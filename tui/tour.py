@@ -81,7 +81,6 @@ class Tour:
 
     @property
     def on(self) -> bool:
-        """True while it is shown."""
         return bool(self.bus)
 
     async def begin(self) -> None:

@@ -15,8 +15,9 @@ from typing import TYPE_CHECKING
 
 from multidrop.dialects.files import split_lines
 from multidrop.shell.events import FAILURES
+from multidrop.shell.lines import Place
 from multidrop.tui.assist import Assist
-from multidrop.tui.outbox import Outbox, Place, not_sent, selected_place
+from multidrop.tui.outbox import Outbox, not_sent
 from multidrop.tui.screen_model import Record, ScreenModel
 from multidrop.tui.screens.main_screen import MainScreen
 from multidrop.tui.screens.questions import Questions
@@ -62,7 +63,7 @@ class Selection:
     @property
     def changed(self) -> bool:
         """True if another drive is selected than the one that is shown."""
-        return self.shown != selected_place(self._session)
+        return self.shown != self._session.place
 
     @property
     def unexpected(self) -> bool:
@@ -82,7 +83,7 @@ class Selection:
     def follow(self) -> None:
         """Show the page of the selected bus with its line, and the label of the selected drive."""
         main, current = self._main, self._session.selected_bus
-        self.shown = selected_place(self._session)
+        self.shown = self._session.place
         if current != main.current or current not in main.pages:
             if main.current == "" and "" in main.pages and current:
                 self._model.bus(current).fresh.extendleft(reversed(main.pages[""].records))

@@ -64,7 +64,6 @@ class Operation(NamedTuple):
 
     @property
     def name(self) -> str:
-        """The name of the verb, with its slash."""
         return self.usage.partition(" ")[0]
 
     @property
@@ -86,7 +85,6 @@ class Operation(NamedTuple):
             self.imported(self.checked)(self, rest)
 
     def imported(self, place: str) -> Any:
-        """Import a function of the verb's work."""
         return imported(f"multidrop.shell.verbs.{place}")
 
     def wrong(self, message: str = "") -> Diagnostic:
@@ -103,7 +101,6 @@ def typed(help: str | None, **options: Any) -> Mapping[str, Any]:
 
 
 def add_arguments(parser: argparse._ActionsContainer, arguments: Arguments) -> None:
-    """Add the arguments to a parser."""
     for notation, about in arguments.items():
         if " | " in notation:
             group = parser.add_mutually_exclusive_group(required=not notation.startswith("["))

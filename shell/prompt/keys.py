@@ -57,7 +57,6 @@ class KeyboardInput(Input):
         self._stalled = False
 
     def fileno(self) -> int:
-        """The terminal's descriptor."""
         return self.keyboard.descriptor
 
     def typeahead_hash(self) -> str:
@@ -66,7 +65,6 @@ class KeyboardInput(Input):
 
     @property
     def closed(self) -> bool:
-        """Whether the terminal is gone."""
         return self.keyboard.closed
 
     def read_keys(self) -> list[KeyPress]:
@@ -149,7 +147,6 @@ class KeyboardInput(Input):
 
     @contextlib.contextmanager
     def attach(self, input_ready_callback: Callable[[], None]) -> Iterator[None]:
-        """Call back while there are keys."""
         self._resting = False
         before = self.keyboard.listen(input_ready_callback)
         try:
@@ -159,7 +156,6 @@ class KeyboardInput(Input):
 
     @contextlib.contextmanager
     def detach(self) -> Iterator[None]:
-        """Suspend the callback."""
         before = self.keyboard.listen(None)
         try:
             yield
@@ -188,7 +184,6 @@ class PromptQuestion:
         app.key_processor.before_key_press += lambda _: self._ahead()
 
     async def ask(self, question: str) -> bool:
-        """Put a question; return the answer."""
         try:
             await self._quiet(f"{question}. {GO_ON} ")
             self._given = asyncio.get_running_loop().create_future()

@@ -221,7 +221,6 @@ class Prompt:
             write(sys.stderr, line)
 
     def _accepted(self, buffer: Buffer) -> bool:
-        """Handle Enter."""
         if self._question.takes(buffer.text):
             buffer.reset()  # an answer is not a line: the history does not keep it
             return True
@@ -231,7 +230,6 @@ class Prompt:
         return self._accept(buffer) if self._accept is not None else False
 
     def _typing(self) -> str:
-        """The line that is being typed."""
         app = self._prompt.app
         return self._prompt.default_buffer.text if app.is_running and not app.is_done else ""
 

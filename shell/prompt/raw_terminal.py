@@ -63,7 +63,6 @@ def hold(descriptor: int, signals: bool, continued: Continued = in_loop) -> Iter
 
 
 def _waiting(descriptor: int) -> int:
-    """Count the bytes that wait to be read."""
     with contextlib.suppress(OSError):
         return int(struct.unpack("i", fcntl.ioctl(descriptor, termios.FIONREAD, bytes(4)))[0])
     return 0

@@ -25,7 +25,7 @@ from multidrop.dialects.files import lines_of
 from multidrop.dialects.text import visible
 from multidrop.macros.atomic import write_atomically
 from multidrop.shell.events import FAILURES
-from multidrop.shell.lines import DriveLine, TypedLine, VerbLine, parse
+from multidrop.shell.lines import NOWHERE, DriveLine, Place, TypedLine, VerbLine, parse
 
 if sys.platform != "win32":
     import fcntl
@@ -133,13 +133,13 @@ class Line:
 
     text: str
     since: int
-    place: tuple[str, str] = ("", "")
-    """The selected bus and drive; empty where that does not matter."""
+    place: Place = NOWHERE
+    """The selected drive; empty where that does not matter."""
     parsed: TypedLine | None = None
     """None: it cannot be parsed, which the session reports at its turn."""
 
     @classmethod
-    def entered(cls, text: str, since: int, place: tuple[str, str] = ("", "")) -> Line:
+    def entered(cls, text: str, since: int, place: Place = NOWHERE) -> Line:
         try:
             return cls(text, since, place, parse(text))
         except Diagnostic:
@@ -153,7 +153,7 @@ class Line:
     @property
     def bus(self) -> str:
         """The bus that the text is for; empty for a verb."""
-        return (self.parsed.bus or self.place[0]) if isinstance(self.parsed, DriveLine) else ""
+        return (self.parsed.bus or self.place.bus) if isinstance(self.parsed, DriveLine) else ""
 
     @property
     def sent(self) -> str | TypedLine:
@@ -231,7 +231,6 @@ class LineQueue:
         self.drop("a stop came")
 
     def drop(self, why: str) -> None:
-        """Drop the waiting lines and show them."""
         self.show_unsent(why, [self._waiting.get_nowait().text for _ in range(self._waiting.qsize())])
 
     def close(self) -> None:

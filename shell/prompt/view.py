@@ -61,7 +61,6 @@ class Stream(LineStream):
 
     @property
     def encoding(self) -> str:  # type: ignore[override]
-        """The terminal's encoding."""
         return self._lines.app.output.encoding()
 
     def isatty(self) -> bool:
@@ -263,7 +262,6 @@ class SessionCompleter(Completer):
         self._workspace = workspace
 
     def get_completions(self, document: Document, complete_event: CompleteEvent) -> Iterable[Completion]:
-        """The completions of the text before the cursor."""
         text = document.text_before_cursor
         if not text.strip():
             return

@@ -78,7 +78,6 @@ class Hearing:
 
 @contextlib.contextmanager
 def hearing(subscribe: Callable[[Callback], Callable[[], None]]) -> Iterator[Hearing]:
-    """Hear a session's events while the body runs."""
     heard = Hearing()
     leave = subscribe(heard.take)
     token = _current.set(heard)

@@ -151,7 +151,6 @@ class Result:
 
     @property
     def ok(self) -> bool:
-        """Whether the line succeeded."""
         return not self.error
 
     @property

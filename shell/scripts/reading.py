@@ -194,7 +194,6 @@ class _Checker:
         self._names: dict[str, str | None] = {n: None if n in changing else v for n, v in values.items()}
 
     def script(self) -> list[Node]:
-        """Check all lines."""
         body, end = self._block()
         while end is not None:
             self._wrong(end, f"{end.word} without {'/if' if end.word == '/else' else '/if or /repeat'}")

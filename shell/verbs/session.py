@@ -107,7 +107,6 @@ def wanted_wait(verb: Operation, rest: str) -> Wait:
 
 
 def _limit(verb: Operation, text: str | None) -> float:
-    """The time limit, s."""
     return waits.LIMIT if text is None else waits.seconds(text, verb.wrong)
 
 

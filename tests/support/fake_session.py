@@ -23,7 +23,7 @@ from multidrop.drives.stopping import Fate
 from multidrop.drives.telemetry import Value
 from multidrop.shell.channel import Front
 from multidrop.shell.events import By, Entered, Failed, Notified, OnBus, Printed, SessionEvent, StateChanged
-from multidrop.shell.lines import TypedLine
+from multidrop.shell.lines import Place, TypedLine
 from multidrop.shell.roles import RunningPlot, Series
 from multidrop.shell.stop_report import Found, Tally
 from multidrop.transports import TransportLost, Unreachable
@@ -164,6 +164,11 @@ class FakeSession:
     def selected(self) -> FakeDrive | None:
         bus = self.buses.get(self.selected_bus)
         return bus.drives.get(self.addresses.get(self.selected_bus, "")) if bus else None
+
+    @property
+    def place(self) -> Place:
+        selected = self.selected
+        return Place(self.selected_bus, selected.address if selected is not None else "")
 
     def of_demo(self, bus: str) -> str:
         return bus if bus in self.buses else ""

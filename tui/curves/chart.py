@@ -134,7 +134,6 @@ class Look:
 
     @property
     def span(self) -> float:
-        """Seconds shown."""
         return SPANS[self._span]
 
     def window(self, now: float, columns: int, wide: int) -> Window:

@@ -166,7 +166,6 @@ class Frame(NamedTuple):
 
     @property
     def last(self) -> int:
-        """The newest column of cells."""
         return self.first + self.columns - 1
 
 

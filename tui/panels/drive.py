@@ -68,7 +68,6 @@ def lamp_groups(conditions: Conditions, old: bool) -> tuple[list[list[Span]], li
 
 
 def error_span(conditions: Conditions, old: bool) -> Span:
-    """The error with its text, or `error none`."""
     if not conditions.error:
         return "error none", "dim"
     number = "" if conditions.error == UNREAD else f" {conditions.error}"

@@ -239,7 +239,6 @@ def _time_words(view: View, look: Look, ago: float, *, minutes: bool) -> str:
 
 
 def cursor_row(view: View, width: int) -> Row:
-    """The time at the cursor, and the values there."""
     at = view.model.look.cursor
     if at is None:
         return ()

@@ -46,7 +46,6 @@ class Place(NamedTuple):
 
     @property
     def trouble(self) -> str:
-        """The trouble of its axes, in words."""
         return "; ".join(filter(None, map(trouble_of, self.glance.readout.axes)))
 
     def alarm(self, room: int = 200) -> str:

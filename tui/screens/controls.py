@@ -19,7 +19,6 @@ from typing import ClassVar
 from textual.binding import Binding, BindingType
 
 from multidrop.dialects.values import BY, DISABLE, ENABLE, HIGH, HOME_MINUS, HOME_PLUS, LOW, STOP, TO, Control, Controls
-from multidrop.tui.outbox import selected_place
 from multidrop.tui.panels.drive import drive_rows, unit_of
 from multidrop.tui.panels.view import Glance, View, name_of
 from multidrop.tui.readout import READ, Readout, State
@@ -138,7 +137,7 @@ class ControlsPage(AskingPage):
         """The control that Enter would send."""
         self._painted = False
         """The line of that control was shown, and no key waited then that was typed before."""
-        self._place = selected_place(host.session)
+        self._place = host.session.place
         self._view: View | None = None
 
     def on_mount(self) -> None:
@@ -152,7 +151,7 @@ class ControlsPage(AskingPage):
         """Paint the drive, and the controls with the lines that they send now."""
         self._view = view
         # Forget a number that was begun before a stop, or for another drive.
-        place = selected_place(view.session)
+        place = view.session.place
         if place != self._place:
             self._place, self._axis, self._jog = place, 0, Jog()
         asked = self._asked
@@ -228,7 +227,7 @@ class ControlsPage(AskingPage):
     def _chosen(self) -> tuple[Glance, Readout] | None:
         """The selected drive and its chosen axis, as they are now."""
         glance = self._view.chosen if self._view is not None else None
-        if glance is None or self._place != selected_place(self.host.session):
+        if glance is None or self._place != self.host.session.place:
             return None
         axes = glance.readout.axes
         return glance, axes[min(self._axis, len(axes) - 1)]
@@ -311,7 +310,6 @@ class ControlsPage(AskingPage):
             self.say("nothing was sent")
 
     def action_ask(self, key: str) -> None:
-        """Ask for a number."""
         self._begun = None
         if not self._controls() or self._nothing():
             self.say(self._nothing() or NO_CONTROLS)
@@ -326,7 +324,6 @@ class ControlsPage(AskingPage):
             self.action_do(SPACE)
 
     def typed(self, text: str) -> None:
-        """Take a number on Enter."""
         asked = self._asked
         if asked is None or self.overtaken(asked):
             self._close("the number was not used")

@@ -74,7 +74,6 @@ class Over(ModalScreen[T], Generic[T]):
     ]
 
     def on_mount(self) -> None:
-        """Show the stop, which is never dimmed."""
         if self.is_attached:  # else it is closed already, as the app ends
             self.mount(StopSign())
 
@@ -124,7 +123,6 @@ class Confirm(Dialog[str]):
         self.heading, self.lines, self.answers = title, list(lines), list(answers)
 
     def compose(self) -> ComposeResult:
-        """Make the question, its details and the answers."""
         with Vertical(classes="box"):
             yield Static(self.heading, classes="title", markup=False)
             yield Static("\n".join(self.lines), classes="about", markup=False)
@@ -181,7 +179,6 @@ class GoOn(Dialog[bool]):
             yield Static(f"y yes   n no   ↑↓ choose   {read}Enter take   Esc no", classes="keys")
 
     def on_mount(self) -> None:
-        """Highlight no."""
         self.query_one(Options).highlighted = 0
         self.set_focus(self.query_one(Options))
 
@@ -198,7 +195,6 @@ class GoOn(Dialog[bool]):
             before.scroll_relative(y=pages * before.size.height, animate=False)
 
     def action_refuse(self) -> None:
-        """Play no macro."""
         self.notify("Answer the question first: y or n", timeout=4)
 
 
@@ -226,7 +222,6 @@ class Search(Dialog[str]):
         self.found: Sequence[Match] = ()
 
     def compose(self) -> ComposeResult:
-        """Make the line, the results and the keys."""
         with Vertical(classes="box wide"):
             yield Static(self.heading, classes="title", markup=False)
             yield Field(self._entered, edited=self._narrow)
@@ -343,7 +338,6 @@ class Form(Dialog[dict[str, str]]):
             yield Static("Enter next, at the end go on   ↑↓ another value   Esc play nothing", classes="keys")
 
     def on_mount(self) -> None:
-        """Begin with the first value that has no default."""
         super().on_mount()
         needed = [number for number, each in enumerate(self.wanted) if each.default is None]
         self._go(needed[0] if needed else 0)
@@ -359,7 +353,6 @@ class Form(Dialog[dict[str, str]]):
         self._go((self._at + by) % len(self.wanted))
 
     def action_refuse(self) -> None:
-        """Play no macro."""
         self.notify("Fill in the form first, or close it with Esc", timeout=4)
 
     def _entered(self, text: str) -> None:

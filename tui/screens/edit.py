@@ -190,7 +190,6 @@ class EditPage(Page):
             self._taking_in = False
 
     def _warn(self, text: str) -> None:
-        """Show a warning, each once."""
         if text != self._warned:
             self._warned = text
             self.host.show_line(text, "!")
@@ -314,13 +313,11 @@ class EditPage(Page):
             self.editor.move_cursor((each.line - 1, each.column - 1), center=True)
 
     def action_leave(self) -> None:
-        """Go back; the text stays."""
         self.take_text()
         super().action_leave()
 
 
 def product_of(session: Session) -> str:
-    """The product of the selected drive; empty without one."""
     return session.selected.product if session.selected is not None else ""
 
 

@@ -186,7 +186,6 @@ class MacrosPage(Page):
         self._at = min(max(self._at + by, 0), max(0, len(self._macros) - 1))
 
     def action_unchoose(self) -> None:
-        """Choose no macro."""
         self._typed = True
 
     def _type(self, *words: str) -> None:
@@ -219,7 +218,6 @@ class MacrosPage(Page):
         await self.app.run_action("act.page('program')")
 
     async def action_key(self) -> None:
-        """Ask for the key of the chosen macro."""
         chosen = self._chosen()
         if chosen is None:
             return

@@ -206,7 +206,6 @@ class MainScreen(Reading):
         self._parts |= {name: Lines(id=name) for name in PLAIN}
 
     def compose(self) -> ComposeResult:
-        """Make all parts, from top to bottom."""
         yield Roles()
         yield self.lines("top")
         yield self.lines("rule-above")
@@ -232,7 +231,6 @@ class MainScreen(Reading):
 
     @property
     def wide(self) -> bool:
-        """True if panels are beside the transcript."""
         return self.size.width >= WIDE[0] and self.size.height >= WIDE[1]
 
     def columns(self) -> list[tuple[str, list[Panel]]]:
@@ -251,7 +249,6 @@ class MainScreen(Reading):
         return below.union(*(panel.wants for panel in shown))
 
     def make_room(self) -> None:
-        """Divide the room among the parts."""
         wide, width = self.wide, self.size.width
         columns = dict(self.columns())
         for name in ("panel", "far", "side"):
@@ -277,7 +274,6 @@ class MainScreen(Reading):
         tour.put(rows)
 
     def toggle_panel(self, name: str) -> None:
-        """Show a panel, or hide it."""
         self.panels.toggle(name, self.wide)
         self.make_room()
 
@@ -352,7 +348,6 @@ class MainScreen(Reading):
     # The input line
 
     def set_label(self, row: Row) -> None:
-        """Set the row before the input line."""
         label = self.lines("label")
         if label.rows != [row]:
             label.styles.width = width_of(row)

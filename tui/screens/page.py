@@ -17,9 +17,10 @@ from textual.screen import Screen
 
 from multidrop.dialects import Diagnostic
 from multidrop.dialects.on_demand import imported
+from multidrop.shell.lines import Place
 from multidrop.tui.frame_scheduler import Frames
 from multidrop.tui.keymap import FunctionKeys, named_key
-from multidrop.tui.outbox import Outbox, Place, selected_place
+from multidrop.tui.outbox import Outbox
 from multidrop.tui.panels.view import View
 from multidrop.tui.screen_model import Record, ScreenModel
 from multidrop.tui.screens.dialogs import Field
@@ -171,16 +172,14 @@ class AskingPage(Page):
         self.set_focus(None)
 
     def say(self, text: str, role: str = "strong") -> None:
-        """Say something in the last row."""
         self.said = (text, role)
 
     def begin(self, kind: str, name: str = "", lines: tuple[str, ...] = ()) -> Begun:
-        """Note what begins now."""
-        return Begun(kind, self.host.session.stops, selected_place(self.host.session), name, lines)
+        return Begun(kind, self.host.session.stops, self.host.session.place, name, lines)
 
     def overtaken(self, begun: Begun) -> bool:
         """Whether a stop, or another drive, came since something was begun."""
-        return begun[1:3] != (self.host.session.stops, selected_place(self.host.session))
+        return begun[1:3] != (self.host.session.stops, self.host.session.place)
 
 
 class PageEntry(NamedTuple):

@@ -16,7 +16,6 @@ from multidrop.dialects.values import VARIABLES, Readings, Value
 from multidrop.shell.params import file as files
 from multidrop.shell.params.page import Edit, edit, found_in, meanings_of, parsed, rows
 from multidrop.shell.params.page import Row as Setting
-from multidrop.tui.outbox import selected_place
 from multidrop.tui.panels.view import Glance, View, name_of
 from multidrop.tui.screens.page import AskingPage, Begun, Host
 from multidrop.tui.text import age, fit
@@ -173,7 +172,7 @@ class ParametersPage(AskingPage):
         """The pending lines were shown."""
         self._reading = False
         """The settings are to be read again once no line runs or waits."""
-        self._place = selected_place(host.session)
+        self._place = host.session.place
         self._glance: Glance | None = None
 
     def on_mount(self) -> None:
@@ -185,7 +184,7 @@ class ParametersPage(AskingPage):
     def show(self, view: View) -> None:
         self._glance = view.chosen
         # Forget what was begun before a stop, or for another drive.
-        place = selected_place(view.session)
+        place = view.session.place
         if place != self._place:
             self._place, self._table = place, SettingsTable()
             self._close("")

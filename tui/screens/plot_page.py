@@ -98,7 +98,6 @@ class PlotPage(Page):
         self.host.outbox.type(line)
 
     def action_pause(self) -> None:
-        """Stop the picture, or let it go on."""
         self._look.pause(self.host.session.now())
 
     def action_cursor(self, columns: int) -> None:
@@ -106,7 +105,6 @@ class PlotPage(Page):
         self._look.move_cursor(columns, self.host.session.now(), self._columns)
 
     def action_shorter(self, by: int) -> None:
-        """Show less time, or more."""
         self._look.shorter(by)
 
     def action_closer(self, by: int) -> None:

@@ -60,7 +60,6 @@ class ProgramPage(EditPage):
     # Painting
 
     def show(self, view: View) -> None:
-        """Paint signs and panels, too."""
         super().show(view)
         chosen = self.view.chosen if self.view is not None else None
         spot = spot_of(chosen.readout) if chosen is not None else None

@@ -45,7 +45,6 @@ class Findings:
 
     @property
     def words(self) -> Span:
-        """The result in a few words."""
         wrong = len(errors(self.problems))
         warned = len(self.problems) - wrong
         if self.pending:
@@ -154,7 +153,6 @@ def with_target(verb: str, target: str, *words: str) -> str:
 
 
 def quoted(file: str) -> str:
-    """A file as a word of a typed line."""
     return shlex.quote(file)
 
 

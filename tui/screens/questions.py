@@ -57,7 +57,6 @@ class Questions:
         return await self._answer(Form(title, fields), closed)
 
     async def _answer(self, screen: Dialog[T], closed: Callable[[], None]) -> T | None:
-        """Show a dialog; return its answer."""
         app = self._app
         given: asyncio.Future[T | None] = asyncio.get_running_loop().create_future()
 
@@ -105,7 +104,6 @@ class Questions:
         await self._app.push_screen(Search("Everything", find, hint), taken)
 
     async def drive(self, glances: Callable[[Bus], list[Glance]], select: Callable[[str, str], None]) -> None:
-        """Choose the drive that plain text goes to."""
         options, current = drive_choices(self._session, glances)
         if not options:
             self._app.notify("No drive is known: /open URL opens a line of drives", timeout=4)
@@ -141,7 +139,6 @@ class Questions:
         await self._app.push_screen(Choose("Theme", themes, self._app.theme), chosen)
 
     async def signs(self, show: Callable[[Signs], None]) -> None:
-        """Choose the signs."""
 
         def chosen(name: str | None) -> None:
             if name is not None:
@@ -185,7 +182,6 @@ class Questions:
         await app.push_screen(Confirm("Quit?", lines, answers), answered)
 
     async def help(self, find: Callable[[str], list[Match]]) -> None:
-        """Search keys, lines and signs."""
         await self._app.push_screen(Search("Help", find, "type to search   ↑↓ PgUp PgDn read   Esc close"))
 
 

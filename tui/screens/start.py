@@ -86,7 +86,6 @@ class Start(Over[None]):
         self._opening = self._done = False
 
     def compose(self) -> ComposeResult:
-        """Make the line, the list, and the outcome."""
         yield Banner()
         with Vertical(id="start"):
             yield Static("multidrop", classes="title")

@@ -87,7 +87,6 @@ class TrafficPage(Page):
         self._bottom = None
 
     def action_pause(self) -> None:
-        """Stop the scrolling, or let it go on."""
         self._bottom = self._store().taken - 1 if self._bottom is None else None
 
     def action_polls(self) -> None:

@@ -57,7 +57,6 @@ class ScreenWriter(LinuxDriver):
     """A Textual driver whose `write` never waits. `pace` gets the terminal's replies."""
 
     def start_application_mode(self) -> None:
-        """Start writing."""
         stream = sys.__stdout__
         assert stream is not None, "there is a terminal"
         self._encoding, self._descriptor = stream.encoding, stream.fileno()

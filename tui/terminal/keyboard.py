@@ -52,7 +52,6 @@ class Keyboard:
 
     @property
     def idle(self) -> bool:
-        """True if nothing waits and nothing is in progress."""
         return not self._waiting and not self._turning
 
     def take(self, event: Message) -> bool:
@@ -66,7 +65,6 @@ class Keyboard:
         return True
 
     def start(self) -> None:
-        """Start: the main screen exists."""
         self._awake = True
         self._wake()
 

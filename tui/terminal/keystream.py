@@ -125,7 +125,6 @@ class Splitter:
             self._rest = ""
 
     def leave(self) -> None:
-        """End a paste, and forget it."""
         self.pasting, self._rest, self._paste, self._size = False, "", [], 0
 
     def _typed(self, text: str) -> tuple[list[Piece], str]:
@@ -214,7 +213,6 @@ class KeyStream:
 
     @property
     def idle(self) -> bool:
-        """True if nothing waits to be parsed."""
         return not self._scheduled
 
     def drop(self) -> None:

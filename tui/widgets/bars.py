@@ -102,7 +102,6 @@ class Footer(Lines):
 
     @staticmethod
     def is_stop(x: int) -> bool:
-        """True if a column belongs to the stop."""
         return 0 < x <= len(STOP) + 2
 
     async def on_click(self, event: events.Click) -> None:
@@ -140,7 +139,6 @@ class Tab:
 
     @property
     def in_trouble(self) -> bool:
-        """True if the tab stays in view."""
         return self.state in TROUBLE or bool(self.mark)
 
     @property

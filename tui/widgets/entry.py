@@ -91,7 +91,6 @@ class Listing:
 
     @property
     def open(self) -> bool:
-        """True if there is anything to show."""
         return bool(self.found)
 
     @property
@@ -182,7 +181,6 @@ class Entry(Input):
 
     @property
     def unsent(self) -> str:
-        """The text that was not submitted."""
         return "" if self._submitted else self.value
 
     def exchange(self, draft: Draft | None = None) -> Draft:

@@ -31,7 +31,6 @@ ROLES = ("text", "strong", "dim", "accent", "focus", "found", "motion", "error",
 
 
 def width_of(row: Sequence[Span]) -> int:
-    """Width of a row in cells."""
     return sum(cell_len(text) for text, _ in row)
 
 
@@ -143,5 +142,4 @@ class Lines(Widget):
 
     @property
     def plain(self) -> str:
-        """The shown text without styles."""
         return "\n".join("".join(text for text, _ in row) for row in self.rows)

@@ -92,7 +92,6 @@ class Reader(Horizontal):
         self._extends = False
 
     def compose(self) -> ComposeResult:
-        """Make both rows, of which one is shown."""
         yield self._label
         yield self._field
         yield self._words
@@ -100,7 +99,6 @@ class Reader(Horizontal):
 
     @property
     def open(self) -> bool:
-        """True while lines are searched or picked."""
         return self._transcript is not None
 
     def find(self, transcript: Transcript) -> None:

@@ -120,7 +120,6 @@ def _split(part: str, plain: str, text: str, role: str) -> list[Span]:
 
 
 def chosen(row: Row) -> Row:
-    """A row as part of a selection."""
     return marked(tuple((text, "focus") for text, _ in row), "▌", "focus")
 
 
@@ -156,7 +155,6 @@ class Transcript(Lines, can_focus=False):
     # Taking in
 
     def extend(self, records: Iterable[Record]) -> None:
-        """Take in records, oldest first, and show them."""
         self.take(records)
         self.show_new()
 
@@ -195,7 +193,6 @@ class Transcript(Lines, can_focus=False):
         self.changed()
 
     def pause(self) -> None:
-        """Stop the scrolling, or let it go on."""
         self.sight.pause()
         self.changed()
 
@@ -234,7 +231,6 @@ class Transcript(Lines, can_focus=False):
 
     @property
     def plain(self) -> str:
-        """The text in view, without styles."""
         return "\n".join("".join(text for text, _ in row).rstrip() for row in self._rows())
 
     def _rows(self) -> list[Row]:

@@ -264,7 +264,6 @@ class Sight:
             self._bottom = numbers[min(max(end, self._least(numbers)), len(numbers)) - 1]
 
     def pause(self) -> None:
-        """Stop the scrolling, or let it go on."""
         if self.paused:
             self.look_end(newest=True)
         else:
@@ -367,7 +366,6 @@ class Picked:
 
     @property
     def records(self) -> list[Record]:
-        """The picked records, oldest first."""
         numbers = self._sight.numbers
         low, high = sorted((self._anchor, self.cursor))
         kept = numbers[bisect_left(numbers, low) : bisect_right(numbers, high)]
