@@ -72,8 +72,8 @@ def narrow_rows(view: View, width: int) -> list[Row]:
         if axis.conditions is not None:
             inputs, outputs = lamp_groups(axis.conditions, axis.aged(now))
             groups += [*inputs, *outputs]
-    rows = flowing(groups, width - width_of(right) - 2)
-    return [*rows, spread(list(rows[0]) if rows else [], right, width)]
+    lamps = flowing(groups, width - width_of(right) - 2)  # as many as there is room for
+    return [*rows, spread(list(lamps[0]) if lamps else [], right, width)]
 
 
 def kept(glances: Sequence[Glance], most: int) -> list[Glance]:
