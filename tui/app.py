@@ -89,13 +89,13 @@ class MultidropApp(App[int]):
         self,
         session: Session,
         urls: Sequence[str],
-        assist: Assist | None = None,
+        assist: Assist,
         driver: type[Driver] | None = None,
         look: Look = DEFAULT_LOOK,
     ) -> None:
         # With NO_COLOR, only this makes Textual take colours away altogether; else it makes greys of them.
         super().__init__(driver_class=driver, ansi_color=True if "NO_COLOR" in os.environ else None)
-        self.session, self.urls, self.assist = session, list(urls), assist or Assist()
+        self.session, self.urls, self.assist = session, list(urls), assist
         self.model = ScreenModel(lambda: session.selected_bus, lambda: session.buses)
         self.polling, self.macros = Polling(), FunctionKeys()
         self.keymap = keymap(bindings(), look.keys)

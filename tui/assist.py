@@ -35,53 +35,6 @@ class StartEntry(NamedTuple):
 
 
 class Assist:
-    """No help: the base of all helpers."""
-
-    def complete(self, text: str, learned: Callable[[], None] | None = None) -> Sequence[Completion]:
-        """Complete the typed text. `learned`: a person asks; it is called when a drive has reported its names."""
-        return ()
-
-    def hint(self, text: str) -> str:
-        """Usage and meaning of the typed text, in one line."""
-        return ""
-
-    def history(self) -> Sequence[str]:
-        """Lines typed before, oldest first."""
-        return ()
-
-    def keep(self, line: str) -> None:
-        """Keep a typed line for the history."""
-
-    def saved(self) -> Sequence[StartEntry]:
-        return ()
-
-    async def ports(self) -> Sequence[StartEntry]:
-        """Serial ports of this machine: who holds each, or which drives answered there last."""
-        return ()
-
-    def lately(self) -> Sequence[StartEntry]:
-        """URLs opened lately, the newest first."""
-        return ()
-
-    async def opened(self, url: str) -> None:
-        """Keep a URL that was opened."""
-
-    async def scan(self, url: str, found: Callable[[str], None]) -> str:
-        """Search a port for drives; `found` gets each. Return the URL of those found. Raises Diagnostic."""
-        return url
-
-    def verbs(self) -> Sequence[tuple[str, str, str]]:
-        return ()
-
-    def drafts(self) -> Drafts | None:
-        """The copies of texts that were not saved; None: none are kept."""
-        return None
-
-    async def prepare(self) -> None:
-        """Import what the first typed letter needs, before it is typed."""
-
-
-class ShellAssist(Assist):
     """The help that the prompt gives, too."""
 
     def __init__(self, session: Session, settings: Settings) -> None:
@@ -109,13 +62,14 @@ class ShellAssist(Assist):
         return self._history.lines()
 
     def keep(self, line: str) -> None:
+        """Keep a typed line for the history."""
         self._history.append(line)
 
     def saved(self) -> Sequence[StartEntry]:
         return [StartEntry("saved", each.name, each.name, each.url) for each in self._settings.connections.values()]
 
     async def ports(self) -> Sequence[StartEntry]:
-        """Serial ports of this machine, searched in a thread because the search may be slow."""
+        """Serial ports of this machine: who holds each, or which drives replied there last. The search may be slow."""
         return await asyncio.to_thread(_ports, self._settings.state)
 
     def lately(self) -> Sequence[StartEntry]:
@@ -127,12 +81,16 @@ class ShellAssist(Assist):
         return [StartEntry("lately", each.url, each.url, f"opened {ago(now - each.at)}") for each in found[:LATELY]]
 
     async def opened(self, url: str) -> None:
+        """Keep a URL that was opened."""
         from multidrop.shell.state.store import note
 
         await asyncio.to_thread(note, self._settings.state, url)
 
     async def scan(self, url: str, found: Callable[[str], None]) -> str:
-        """Search a port for drives, without a question: at its own baud rate, then at the others. Raises Diagnostic."""
+        """Search a port for drives, without a question: at its own baud rate, then at the others. Raises Diagnostic.
+
+        `found` gets each. Return the URL of those found.
+        """
         from multidrop.shell.connect.opening import open_buses
         from multidrop.shell.connect.urls import parse
         from multidrop.shell.finding.scanning import FoundDrive, Scanning, url_of
@@ -154,10 +112,11 @@ class ShellAssist(Assist):
         return [(verb.name, verb.usage, verb.lines[0]) for verb in VERBS.values()]
 
     def drafts(self) -> Drafts | None:
+        """The copies of texts that were not saved; None: none are kept."""
         return Drafts(self._settings.state)
 
     async def prepare(self) -> None:
-        """Import it in a thread; the rest depends on the drive and is less."""
+        """Import what the first typed letter needs, in a thread; the rest depends on the drive and is less."""
         await asyncio.to_thread(imported, "multidrop.shell.prompt.complete:complete")
         await asyncio.to_thread(imported("multidrop.shell.operations.table:load"))
         self.hint(ANY_LETTER)

@@ -16,7 +16,7 @@ from multidrop.dialects import Diagnostic
 from multidrop.dialects.on_demand import importing
 from multidrop.shell.signals import SIGNALS, early_ends
 from multidrop.tui.app import MultidropApp
-from multidrop.tui.assist import ShellAssist
+from multidrop.tui.assist import Assist
 
 if TYPE_CHECKING:
     from multidrop.shell.connect.settings import Settings
@@ -50,7 +50,7 @@ async def _run(urls: Sequence[str], settings: Settings, reconnect: bool, raw: bo
     session.twins.wanted = twin
     try:
         with collected_at_rest(partial(at_rest, session)):
-            app = MultidropApp(session, urls, ShellAssist(session, settings), driver(), settings.look)
+            app = MultidropApp(session, urls, Assist(session, settings), driver(), settings.look)
             begin(session)
             return await show(app)
     finally:

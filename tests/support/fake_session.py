@@ -24,7 +24,9 @@ from multidrop.drives.telemetry import Value
 from multidrop.shell.channel import Front
 from multidrop.shell.events import By, Entered, Failed, Notified, OnBus, Printed, SessionEvent, StateChanged
 from multidrop.shell.lines import Place, TypedLine
+from multidrop.shell.prompt.complete import Completion
 from multidrop.shell.roles import RunningPlot, Series
+from multidrop.shell.state.store import Drafts
 from multidrop.shell.stop_report import Found, Tally
 from multidrop.transports import TransportLost, Unreachable
 from multidrop.tui.app import MultidropApp
@@ -288,13 +290,6 @@ class FakeSession:
                 callback(event)
 
 
-@dataclass(frozen=True)
-class FakeCompletion:
-    text: str
-    meaning: str
-    start: int
-
-
 WORDS = {
     "MA": "move to an absolute position",
     "MR": "move relative to where it stands",
@@ -309,10 +304,10 @@ class FakeAssist(Assist):
         self.kept = ["VM=600000", "MR 512000", "PR P"]
         self.found_ports = [StartEntry("port", "/dev/ttyUSB0", "/dev/ttyUSB0", "FTDI USB-RS422")]
 
-    def complete(self, text: str, learned: Callable[[], None] | None = None) -> Sequence[FakeCompletion]:
+    def complete(self, text: str, learned: Callable[[], None] | None = None) -> Sequence[Completion]:
         head, _, word = text.rpartition(" ")
         start = len(text) - len(word)
-        return [FakeCompletion(each, WORDS[each], start) for each in WORDS if word and each.startswith(word.upper())]
+        return [Completion(each, WORDS[each], start) for each in WORDS if word and each.startswith(word.upper())]
 
     def hint(self, text: str) -> str:
         return "MR distance   move relative to where it stands" if text.startswith("MR") else ""
@@ -328,6 +323,24 @@ class FakeAssist(Assist):
 
     async def ports(self) -> Sequence[StartEntry]:
         return self.found_ports
+
+    def lately(self) -> Sequence[StartEntry]:
+        return ()
+
+    async def opened(self, url: str) -> None:
+        pass
+
+    async def scan(self, url: str, found: Callable[[str], None]) -> str:
+        return url
+
+    def verbs(self) -> Sequence[tuple[str, str, str]]:
+        return ()
+
+    def drafts(self) -> Drafts | None:
+        return None
+
+    async def prepare(self) -> None:
+        pass
 
 
 MOVING_TO = Conditions(

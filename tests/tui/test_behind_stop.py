@@ -16,7 +16,7 @@ from multidrop.shell.events import Entered, OnBus, SessionEvent
 from multidrop.shell.session import Session
 from multidrop.simulator.lexium.device import MCodeDevice
 from multidrop.tui.app import MultidropApp
-from multidrop.tui.assist import ShellAssist
+from multidrop.tui.assist import Assist
 from multidrop.tui.screens.dialogs import Confirm, Search
 from multidrop.tui.screens.start import Start
 from tests.support.fake_session import FakeAssist, FakeSession, demo_session
@@ -66,7 +66,7 @@ async def press(folder: Path) -> AsyncIterator[Press]:
     session = Session(settings)
     try:
         async with on_a_pty(
-            lambda driver: MultidropApp(session, ["sim:#press"], ShellAssist(session, settings), driver)
+            lambda driver: MultidropApp(session, ["sim:#press"], Assist(session, settings), driver)
         ) as screen:
             await screen.until(lambda: session.selected is not None)
             await screen.rest()

@@ -14,7 +14,7 @@ from tests.support.until import PATIENCE
 CHILD = """
 import asyncio, sys
 from multidrop.tui.app import MultidropApp
-from multidrop.tui.assist import ShellAssist
+from multidrop.tui.assist import Assist
 from multidrop.tui.launch import driver
 from multidrop.shell.connect.settings import load
 from multidrop.shell.prompt.collector import collected_at_rest
@@ -40,7 +40,7 @@ async def main():
     settings = load()
     session = Session(settings)
     with collected_at_rest(lambda: True):
-        app = MultidropApp(session, ["sim:"], ShellAssist(session, settings))
+        app = MultidropApp(session, ["sim:"], Assist(session, settings))
         begin(session)
         await app.run_async(headless=True, size=(120, 40))
     await session.open("sim:#press")

@@ -16,7 +16,7 @@ from multidrop.shell.connect.settings import Settings
 from multidrop.shell.events import Failed, OnBus, StateChanged
 from multidrop.shell.session import Session
 from multidrop.tui.app import MultidropApp
-from multidrop.tui.assist import ShellAssist
+from multidrop.tui.assist import Assist
 from multidrop.tui.screens.dialogs import Search
 from multidrop.tui.screens.start import Start
 from multidrop.tui.terminal.keyboard import PAUSE
@@ -150,7 +150,7 @@ async def test_a_line_or_a_macro_for_a_bus_that_is_not_open_says_so(tmp_path: ob
     (settings.macros / "go.toml").write_text('name = "go"\nkey = "F3"\n[[step]]\nline = "@there:a MR 5"\n')
     try:
         async with on_a_pty(
-            lambda driver: MultidropApp(session, ["sim:#press"], ShellAssist(session, settings), driver)
+            lambda driver: MultidropApp(session, ["sim:#press"], Assist(session, settings), driver)
         ) as screen:
             await screen.until(lambda: session.selected is not None)
             await screen.type(b"@here:a MR 5\r")

@@ -13,7 +13,7 @@ from textual.pilot import Pilot
 from multidrop.shell.connect.settings import Settings
 from multidrop.shell.session import Session
 from multidrop.tui.app import MultidropApp
-from multidrop.tui.assist import ShellAssist
+from multidrop.tui.assist import Assist
 from multidrop.tui.screens.dialogs import Confirm, Search
 from multidrop.tui.screens.program import ProgramPage
 from tests.support.until import PATIENCE
@@ -44,7 +44,7 @@ async def test_a_program_is_mended_downloaded_traced_and_stopped(
     (tmp_path / "long.mxt").write_text(TEXT)
     settings = Settings(folder=tmp_path / "config", state=tmp_path / "state")
     session = Session(settings)
-    app = MultidropApp(session, ["sim:#eth"], ShellAssist(session, settings))
+    app = MultidropApp(session, ["sim:#eth"], Assist(session, settings))
     try:
         async with app.run_test(size=(80, 24)) as pilot:
             await until(pilot, lambda: session.selected is not None)

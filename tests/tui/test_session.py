@@ -16,7 +16,7 @@ from multidrop.dialects.mcode.host.framing import sealed
 from multidrop.shell.connect.settings import Settings
 from multidrop.shell.session import Session
 from multidrop.tui.app import MultidropApp
-from multidrop.tui.assist import ShellAssist
+from multidrop.tui.assist import Assist
 from tests.support.until import PATIENCE
 
 pytestmark = pytest.mark.tui
@@ -28,7 +28,7 @@ NAMED = frozenset({"enter", "ctrl+p", "ctrl+x", "f4"})
 async def press(tmp_path: Path, size: tuple[int, int] = (80, 24), reconnect: bool = False) -> AsyncIterator[Pilot[int]]:
     settings = Settings(folder=tmp_path / "config", state=tmp_path / "state")
     session = Session(settings, reconnect=reconnect)
-    app = MultidropApp(session, ["sim:#press"], ShellAssist(session, settings))
+    app = MultidropApp(session, ["sim:#press"], Assist(session, settings))
     try:
         async with app.run_test(size=size) as pilot:
             await until(pilot, lambda: "■ stopped" in status(pilot))
@@ -138,7 +138,7 @@ async def test_a_lost_bus_comes_back_in_its_tab(tmp_path: Path) -> None:
 async def test_a_controller_shows_both_axes_and_ctrl_x_stops_them(tmp_path: Path) -> None:
     settings = Settings(folder=tmp_path / "config", state=tmp_path / "state")
     session = Session(settings)
-    app = MultidropApp(session, ["sim:#pmx"], ShellAssist(session, settings))
+    app = MultidropApp(session, ["sim:#pmx"], Assist(session, settings))
     try:
         async with app.run_test(size=(120, 40)) as pilot:
             await until(pilot, lambda: "■ stopped" in status(pilot))

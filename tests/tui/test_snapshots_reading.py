@@ -6,10 +6,10 @@ import pytest
 from textual.pilot import Pilot
 
 from multidrop.shell.events import Bytes, Printed
+from multidrop.shell.prompt.complete import Completion
 from multidrop.shell.transcripts import Filter
 from tests.support.fake_session import (
     FakeAssist,
-    FakeCompletion,
     FakeSession,
     a_move,
     a_talk,
@@ -82,10 +82,10 @@ def test_snapshot_of_reading_back(snap_compare: Compare, name: str, size: str) -
 class Named(FakeAssist):
     """Knows the labels and variables of the drive."""
 
-    def complete(self, text: str, learned: Callable[[], None] | None = None) -> Sequence[FakeCompletion]:
+    def complete(self, text: str, learned: Callable[[], None] | None = None) -> Sequence[Completion]:
         """Offer them after PR."""
         names = {"Q1": "variable, 5 when it was read", "GO": "label at 100"}
-        return [FakeCompletion(name, about, 3) for name, about in names.items()] if text == "PR " else []
+        return [Completion(name, about, 3) for name, about in names.items()] if text == "PR " else []
 
     def hint(self, text: str) -> str:
         """The meaning of PR."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Awaitable, Callable, Sequence
+from functools import partial
 from typing import TYPE_CHECKING, TypeVar
 
 from rich.text import Text
@@ -33,6 +34,15 @@ class Questions:
 
     def __init__(self, app: App[int], session: Session) -> None:
         self._app, self._session = app, session
+
+    async def _open(self, dialog: Dialog[T], take: Callable[[T], Awaitable[object] | None]) -> None:
+        """Open a dialog; `take` is given its answer, if there is one."""
+
+        async def answered(answer: T | None) -> None:
+            if answer is not None and (taking := take(answer)) is not None:
+                await taking
+
+        await self._app.push_screen(dialog, answered)
 
     async def paste(self, lines: list[str], send: Callable[[list[str]], None]) -> None:
         """Ask before several pasted lines are sent."""
@@ -75,81 +85,50 @@ class Questions:
             closed()
 
     async def macro_name(self, record: Callable[[str], Awaitable[None]]) -> None:
-        async def named(name: str | None) -> None:
+        async def named(name: str) -> None:
             if name:
                 await record(name)
 
         hint = "Enter begins   /record stop ends it   Esc close"
-        await self._app.push_screen(Ask("Record what is typed as a macro named", hint=hint), named)
+        await self._open(Ask("Record what is typed as a macro named", hint=hint), named)
 
     async def history(self, lines: Sequence[str], take: Callable[[str], None]) -> None:
         """Search the lines typed before, oldest first in `lines`."""
-
-        def taken(line: str | None) -> None:
-            if line is not None:
-                take(line)
-
         kept = list(dict.fromkeys(reversed(lines)))
         hint = "type to narrow   ^R ↓ older   Enter into the line   Esc close"
-        await self._app.push_screen(Search("Lines typed before", lambda text: lines_like(kept, text), hint), taken)
+        await self._open(Search("Lines typed before", lambda text: lines_like(kept, text), hint), take)
 
     async def palette(self, find: Callable[[str], list[Match]], run: Callable[[int], Awaitable[object]]) -> None:
         """Search all commands; `run` is given the number of the one that was taken."""
-
-        async def taken(key: str | None) -> None:
-            if key is not None:
-                await run(int(key))
-
         hint = "type to narrow   ↑↓ choose   Enter do it   Esc close"
-        await self._app.push_screen(Search("Everything", find, hint), taken)
+        await self._open(Search("Everything", find, hint), lambda key: run(int(key)))
 
     async def drive(self, glances: Callable[[Bus], list[Glance]], select: Callable[[str, str], None]) -> None:
         options, current = drive_choices(self._session, glances)
         if not options:
             self._app.notify("No drive is known: /open URL opens a line of drives", timeout=4)
             return
-
-        def chosen(key: str | None) -> None:
-            if key is not None:
-                bus, _, address = key.partition("\n")
-                select(address, bus)
-
-        await self._app.push_screen(Choose("Plain text goes to", options, current), chosen)
+        await self._open(Choose("Plain text goes to", options, current), lambda key: select(*_place_of(key)))
 
     async def half(self, glances: Callable[[Bus], list[Glance]], show: Callable[[str, str], None]) -> None:
         """Choose the drive or the line for the other half of the screen."""
         drives, _ = drive_choices(self._session, glances)
         lines = [Offer(f"{name}\n", f" {name:<8} all of the line") for name in self._session.buses]
-
-        def chosen(key: str | None) -> None:
-            if key is not None:
-                bus, _, address = key.partition("\n")
-                show(address, bus)
-
         if lines:
-            await self._app.push_screen(Choose("The other half shows", [*drives, *lines]), chosen)
+            await self._open(Choose("The other half shows", [*drives, *lines]), lambda key: show(*_place_of(key)))
 
     async def theme(self) -> None:
-        def chosen(name: str | None) -> None:
-            if name is not None:
-                self._app.theme = name
-
         ours = [theme.name for theme in THEMES]
         themes = [Offer(name, name) for name in [*ours, *sorted(set(self._app.available_themes) - set(ours))]]
-        await self._app.push_screen(Choose("Theme", themes, self._app.theme), chosen)
+        await self._open(Choose("Theme", themes, self._app.theme), partial(setattr, self._app, "theme"))
 
     async def signs(self, show: Callable[[Signs], None]) -> None:
-
-        def chosen(name: str | None) -> None:
-            if name is not None:
-                show(Signs(name))
-
         answers = [
             Offer(Signs.FULL.value, "full     ⣀⠔⠉ ▶ ■ ✗ ● ○   all signs"),
             Offer(Signs.BOXES.value, "boxes    no braille: Linux console, PuTTY"),
             Offer(Signs.ASCII.value, "ascii    nothing but ASCII"),
         ]
-        await self._app.push_screen(Choose("Signs", answers), chosen)
+        await self._open(Choose("Signs", answers), lambda name: show(Signs(name)))
 
     async def quit(
         self,
@@ -183,6 +162,12 @@ class Questions:
 
     async def help(self, find: Callable[[str], list[Match]]) -> None:
         await self._app.push_screen(Search("Help", find, "type to search   ↑↓ PgUp PgDn read   Esc close"))
+
+
+def _place_of(key: str) -> tuple[str, str]:
+    """The address and the bus of a key of `drive_choices`."""
+    bus, _, address = key.partition("\n")
+    return address, bus
 
 
 def drive_choices(session: Session, glances: Callable[[Bus], list[Glance]]) -> tuple[list[Offer], str]:
