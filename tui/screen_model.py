@@ -8,11 +8,12 @@ reply, and unknown until the first poll. A state that may be outdated stays, wit
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable, Container
+from collections.abc import Callable, Container, Iterator
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
 from multidrop.dialects import Priority, Request
+from multidrop.dialects.values import UNREAD, Conditions
 from multidrop.drives.events import BusEvent, Conditioned, Ended, Sample, Sent, Silent, Traffic, Unsolicited, Valued
 from multidrop.shell.events import (
     By,
@@ -36,7 +37,87 @@ from multidrop.shell.lines import EVERYONE
 from multidrop.tui.curves.chart import Look
 from multidrop.tui.curves.samples import Traces
 from multidrop.tui.readout import READ, Readout, State
-from multidrop.tui.state_changes import changes_of
+from multidrop.tui.text import digits
+
+# Changes of a drive between two readings, in words: a limit, an error, the end of a program, silence.
+#
+# Only readings that are made anyway are compared, and the first one is the start. A line says what was read and no
+# more: the cause is for a person to find.
+
+
+LIMITS = {"lim+": "limit+", "lim-": "limit-"}
+"""Lamps whose lighting is reported, by function."""
+ALARMS = ("fault", "failed", "locked", "error", "overflow", "stall")
+"""Words in a drive's own values that are reported when they appear."""
+
+
+class Happening(NamedTuple):
+    """One line; `warning` where it needs a person, and the line that shows more of it."""
+
+    text: str
+    warning: bool = False
+    help: str = ""
+
+
+SILENT = Happening("does not reply to polls", warning=True)
+BACK = Happening("replies again")
+
+
+def changes_of(known: Readout, event: Sample | Silent | Conditioned) -> Iterator[Happening]:
+    """Compare an event of a drive with what was read before it."""
+    if isinstance(event, Silent):
+        if known.silent_since is None:
+            yield SILENT
+    elif isinstance(event, Sample):
+        if known.silent_since is not None:
+            yield BACK
+        axis = next((each for each in known.axes if each.axis == event.axis), None)
+        if axis is not None and axis.last is not None and axis.trouble != event.trouble:
+            text = event.trouble or f"no more: {axis.trouble}"
+            yield Happening(_named(text, event.axis), warning=bool(event.trouble))
+    else:
+        for each, after in zip(known.axes, event.conditions, strict=False):
+            yield from _conditioned(each, after, known.failed_at)
+
+
+def _conditioned(known: Readout, after: Conditions, failed_at: float) -> Iterator[Happening]:
+    """The changes between two readings of an axis, most urgent first: limits, error, alarms, program, current."""
+    before, last = known.conditions, known.last
+    if before is None:
+        return
+    lit = {(lamp.name, lamp.function) for lamp in before.lamps if lamp.on}
+    for lamp in after.lamps:
+        if lamp.on and lamp.function in LIMITS and not lamp.output and (lamp.name, lamp.function) not in lit:
+            place = "" if last is None else f" at {digits(last.position)}"
+            stands = "; it stands" if last is not None and last.velocity == 0 else ""
+            yield Happening(_named(f"{LIMITS[lamp.function]} reached{place}{stands}", after.axis), warning=True)
+    told = failed_at >= known.conditioned_at or (after.error_text and after.error_text == known.trouble)
+    if after.error and not before.error and not told:
+        if after.error == UNREAD:
+            yield Happening(_named("an error is set", after.axis), True, after.error_text)
+        else:
+            yield Happening(_named(f"error {after.error}: {after.error_text}", after.axis), True)
+    values = dict(before.more)
+    for name, value in after.more:
+        if value != values.get(name, "") and any(word in value for word in ALARMS):
+            yield Happening(_named(f"{name}: {value}", after.axis), warning=True)
+    if before.program and not after.program:
+        which = "" if before.program == "running" else f" {before.program}"
+        yield Happening(_named(f"the program{which} has ended", after.axis))
+    if after.program and not before.program:
+        text = "a program runs" if after.program == "running" else f"program {after.program}"
+        yield Happening(_named(text, after.axis))
+    if after.no_current and not before.no_current:
+        yield Happening(_named(f"no current in the motor ({after.no_current}): nothing holds the load", after.axis))
+    if before.no_current and not after.no_current:
+        yield Happening(_named("current in the motor again", after.axis))
+    if before.error and not after.error:
+        yield Happening(_named("the error is cleared", after.axis))
+
+
+def _named(text: str, axis: str) -> str:
+    return f"{axis}: {text}" if axis else text
+
 
 MOST = 4000
 """Pieces that are kept."""
@@ -160,23 +241,52 @@ class ScreenModel:
         self.progress = ""
         """The progress of the job that runs, in words."""
         self._current, self._opened = current, opened
-        self._takers: dict[type, Callable[..., None]] = {
-            Entered: self._entered,
-            Printed: self._printed,
-            Output: self._output,
-            Notified: self._narrated,
-            Failed: self._failed,
-            OnBus: self._on_bus,
-            Bytes: self._bytes,
-            Progressed: self._progressed,
-            ProgramRead: self._program_read,
-            SettingsRead: self._settings_read,
-            ProgramSeen: self._program_seen,
-            StateChanged: self._state_changed,
-        }
 
     def take(self, event: SessionEvent) -> None:
-        self._takers[type(event)](event)
+        match event:
+            case OnBus():
+                self._on_bus(event)
+            case StateChanged():
+                self.changed = True
+            case Entered():
+                if event.bus:
+                    self._touch(self.bus(event.bus), event.address, event.at)
+                mine = event.by is By.OPERATOR
+                record = Record(event.at, event.address, ">" if mine else "»", event.line, mine=mine)
+                self.page(event.bus).append(record)
+            case Printed():
+                record = Record(event.at, event.address, "", event.text, mine=event.by is By.OPERATOR)
+                self.page(event.bus).append(record)
+            case Output():
+                self.page("").append(Record(event.at, "", "", event.text, columns=event.columns))
+            case Notified():
+                if event.warning:
+                    self.trouble = event.text
+                self.page(event.bus).append(Record(event.at, "", "!" if event.warning else ".", event.text))
+            case Failed():
+                self.trouble = event.text
+                if event.bus and event.address:
+                    self.bus(event.bus).readout(event.address).failed_at = event.at
+                explained = "" if event.code is None else f"/help {event.code}"
+                mine = event.by is By.OPERATOR
+                record = Record(event.at, event.address, "x", event.text, mine=mine, help=explained)
+                self.page(event.bus).append(record)
+            case Bytes():
+                mark = "↑" if event.outgoing else "↓"
+                rows = [Record(event.at, "", mark, row, columns=True, mine=False) for row in event.rows]
+                self.page(event.bus).extend(rows)
+            case Progressed():
+                self.progress = "" if event.over else event.text
+            case ProgramRead():
+                program = self.bus(event.bus).readout(event.address).program
+                program.lines, program.read_at = event.lines, event.at
+            case ProgramSeen():
+                program = self.bus(event.bus).readout(event.address).program
+                program.line, program.phase, program.seen_at = event.line, event.phase, event.at
+                program.break_point = event.break_point
+            case SettingsRead():
+                readout = self.bus(event.bus).readout(event.address)
+                readout.settings, readout.settings_at = event.readings, event.at
 
     def quiet(self, event: SessionEvent) -> bool:
         """True if an event alone is not a reason to paint: bytes on the wire, or values that are those before."""
@@ -207,12 +317,6 @@ class ScreenModel:
         self.buses.pop(name, None)
         self.traces.forget(name)
 
-    def _entered(self, event: Entered) -> None:
-        if event.bus:
-            self._touch(self.bus(event.bus), event.address, event.at)
-        mark = ">" if event.by is By.OPERATOR else "»"
-        self.page(event.bus).append(Record(event.at, event.address, mark, event.line, mine=event.by is By.OPERATOR))
-
     def stopped(self, at: float) -> None:
         """Mark all values as possibly outdated after a stop, so that all drives are polled."""
         for facts in self.buses.values():
@@ -226,26 +330,6 @@ class ScreenModel:
         touched = facts.readouts.values() if address in EVERYONE else [facts.readout(address)]
         for readout in touched:
             readout.touched = at
-
-    def _printed(self, event: Printed) -> None:
-        self.page(event.bus).append(Record(event.at, event.address, "", event.text, mine=event.by is By.OPERATOR))
-
-    def _output(self, event: Output) -> None:
-        self.page("").append(Record(event.at, "", "", event.text, columns=event.columns))
-
-    def _narrated(self, event: Notified) -> None:
-        if event.warning:
-            self.trouble = event.text
-        mark = "!" if event.warning else "."
-        self.page(event.bus).append(Record(event.at, "", mark, event.text))
-
-    def _failed(self, event: Failed) -> None:
-        self.trouble = event.text
-        if event.bus and event.address:
-            self.bus(event.bus).readout(event.address).failed_at = event.at
-        explained = "" if event.code is None else f"/help {event.code}"
-        mine = event.by is By.OPERATOR
-        self.page(event.bus).append(Record(event.at, event.address, "x", event.text, mine=mine, help=explained))
 
     def _on_bus(self, event: OnBus) -> None:
         inner = event.event
@@ -266,29 +350,6 @@ class ScreenModel:
             return
         elif isinstance(inner, Unsolicited):
             self.page(event.bus).extend([Record(inner.at, "", "<", text, mine=False) for text in inner.lines])
-
-    def _bytes(self, event: Bytes) -> None:
-        mark = "↑" if event.outgoing else "↓"
-        self.page(event.bus).extend([Record(event.at, "", mark, row, columns=True, mine=False) for row in event.rows])
-
-    def _progressed(self, event: Progressed) -> None:
-        self.progress = "" if event.over else event.text
-
-    def _program_read(self, event: ProgramRead) -> None:
-        program = self.bus(event.bus).readout(event.address).program
-        program.lines, program.read_at = event.lines, event.at
-
-    def _settings_read(self, event: SettingsRead) -> None:
-        readout = self.bus(event.bus).readout(event.address)
-        readout.settings, readout.settings_at = event.readings, event.at
-
-    def _program_seen(self, event: ProgramSeen) -> None:
-        program = self.bus(event.bus).readout(event.address).program
-        program.line, program.phase, program.seen_at = event.line, event.phase, event.at
-        program.break_point = event.break_point
-
-    def _state_changed(self, event: StateChanged) -> None:
-        self.changed = True
 
 
 def bus_state(facts: BusFacts | None, addresses: list[str], lost: bool) -> State:
