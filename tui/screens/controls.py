@@ -26,14 +26,6 @@ from multidrop.tui.screens.page import AskingPage, Begun, Host
 from multidrop.tui.text import fit
 from multidrop.tui.widgets.lines import Row, Span, spread, width_of
 
-# Whether a key press may start a move of an axis, and how many presses were dropped. It sends nothing.
-#
-# A terminal sends no key-up, and repeats a held key. So one press is one bounded move, and it counts only while the
-# axis is known to rest: a reading that is newer than the last line says so, and no line runs or waits. A press right
-# after another one is the keyboard's repetition. What does not count is dropped and counted, and nothing of it is
-# kept.
-
-
 REPETITION = 0.2
 """Seconds between two presses below which the second is the repetition of a held key."""
 SETTLE = 0.05

@@ -7,7 +7,7 @@ top narrows the list, and takes a URL. Enter opens what is highlighted.
 from __future__ import annotations
 
 from collections.abc import Awaitable, Callable, Sequence
-from typing import TYPE_CHECKING, ClassVar, Protocol
+from typing import TYPE_CHECKING, ClassVar
 
 from rich.text import Text
 from textual.app import App, ComposeResult
@@ -40,27 +40,10 @@ Connect = Callable[[str, bool], Awaitable[str]]
 """Opens a URL, raw or not; returns an empty string, or one line with the reason of the failure."""
 
 
-class Places(Protocol):
-    """The connections that the start page knows."""
-
-    def saved(self) -> Sequence[StartEntry]:
-        """Saved connections."""
-
-    def lately(self) -> Sequence[StartEntry]:
-        """URLs opened lately, the newest first."""
-
-    async def ports(self) -> Sequence[StartEntry]:
-        """Serial ports of this machine."""
-
-    async def scan(self, url: str, found: Callable[[str], None]) -> str:
-        """Search a port for drives; return the URL of those found. Raises Diagnostic."""
-
-
 class Start(Over[None]):
     """Choose a connection. It closes when one is open; otherwise it stays and shows the reason.
 
-    It calls `opening` with True when an opening begins and with False when it ends. Until then the meaning of later
-    keys is unknown.
+    Keys wait while a connection opens, as their meaning is unknown until then.
     """
 
     BINDINGS: ClassVar[list[BindingType]] = [
@@ -74,11 +57,9 @@ class Start(Over[None]):
         named_key("palette", "ctrl+p", "act.palette", "everything by name: type some letters of it"),
     ]
 
-    def __init__(
-        self, connect: Connect, places: Places, opening: Callable[[bool], None], *, only: bool, trouble: str = ""
-    ) -> None:
+    def __init__(self, connect: Connect, assist: Assist, keyboard: Keyboard, *, only: bool, trouble: str = "") -> None:
         super().__init__()
-        self._connect, self._known, self._tell_opening = connect, places, opening
+        self._connect, self._assist, self._keyboard = connect, assist, keyboard
         self.only, self._trouble = only, trouble
         self._found: Sequence[StartEntry] | None = None
         """The ports; None while they are looked for."""
@@ -114,12 +95,12 @@ class Start(Over[None]):
         self.run_worker(self._look(), exclusive=True, group="ports")
 
     async def _look(self) -> None:
-        self._found = await self._known.ports()
+        self._found = await self._assist.ports()
         self._fill()
 
     def _listed(self, typed: str) -> list[StartEntry]:
         """The offers that contain the typed words, and the typed text itself as a URL."""
-        all_ = [*self._known.saved(), *self._known.lately(), *(self._found or ()), DEMO, TOUR]
+        all_ = [*self._assist.saved(), *self._assist.lately(), *(self._found or ()), DEMO, TOUR]
         words = typed.casefold().split()
         fitting = [each for each in all_ if all(word in " ".join(each).casefold() for word in words)]
         is_url = bool(typed) and (any(sign in typed for sign in ":/?") or not fitting)
@@ -213,7 +194,7 @@ class Start(Over[None]):
             self.show(f"found {len(words)}: {text}")
 
         try:
-            url = await self._known.scan(url, found)
+            url = await self._assist.scan(url, found)
         except FAILURES as failure:
             self.show(f"✗ {failure}", bad=True)
             return
@@ -237,14 +218,14 @@ class Start(Over[None]):
             return False
         self._opening = True
         if keys:
-            self._tell_opening(True)
+            self._keyboard.hold()
         self.show(text)
         return True
 
     def _end(self, keys: bool = True) -> None:
         self._opening = False
         if keys:
-            self._tell_opening(False)
+            self._keyboard.release()
 
     def on_screen_resume(self) -> None:
         """Close if something is open and no other screen covers this one."""
@@ -325,13 +306,6 @@ class Opener:
         return ""
 
     async def ask(self, trouble: str = "") -> None:
-        """Show what can be opened. Keys wait while a connection opens, as their meaning is unknown until then."""
-
-        def opening(begun: bool) -> None:
-            if begun:
-                self._keyboard.hold()
-            else:
-                self._keyboard.release()
-
+        """Show what can be opened."""
         only = not self._session.buses
-        await self._app.push_screen(Start(self.connect, self._assist, opening, only=only, trouble=trouble))
+        await self._app.push_screen(Start(self.connect, self._assist, self._keyboard, only=only, trouble=trouble))
