@@ -45,7 +45,6 @@ class Form(Enum):
     BOTH = ("both", 16)
 
     def rows(self, data: bytes) -> Iterator[str]:
-        """Show bytes in rows."""
         width = self.value[1]
         for at in range(0, len(data), width):
             piece = data[at : at + width]
@@ -61,7 +60,6 @@ def text_of(data: bytes) -> str:
 
 
 def hex_of(data: bytes) -> str:
-    """Bytes in hex, `0D 0A`."""
     return data.hex(" ").upper()
 
 
@@ -80,11 +78,9 @@ class ByteView:
         self._leave: Callable[[], None] = lambda: None
 
     def open(self) -> None:
-        """Begin to show what is sent and received."""
         self._leave = self.bus.watch(self._take)
 
     def close(self) -> None:
-        """Show the rest, and then no more."""
         self._leave()
         self._flush()
 

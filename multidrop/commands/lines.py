@@ -93,7 +93,6 @@ def run(chosen: argparse.Namespace) -> int:
 
 
 def start(chosen: argparse.Namespace) -> int:
-    """Show the start page."""
     return _screen([])
 
 

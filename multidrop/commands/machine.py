@@ -131,7 +131,6 @@ def report(chosen: argparse.Namespace) -> int:
 
 
 def _keep(path: Path, text: str, agreed: bool, asked: bool) -> int:
-    """Write the report to a new file. Raises Diagnostic."""
     if not agreed and not asked:
         raise Diagnostic("not written: this is not a terminal", str(path), "read the report above, then add --yes")
     if not agreed and not _agrees(path):
@@ -253,7 +252,6 @@ def _state() -> Iterator[str]:
 
 
 def _contents(path: Path) -> Iterator[str]:
-    """The lines of a file; the reason where it cannot be read."""
     try:
         with opened(path) as file:
             text = bounded(file, str(path)).decode("utf-8", "backslashreplace")

@@ -39,7 +39,6 @@ T = TypeVar("T")
 
 
 def result_of(end: BaseException, file: str, number: int) -> Result:
-    """The result of the line at which a program ended."""
     line = ScriptLine(file, number, getline(file, number).strip() or file)
     error = str(end) if isinstance(end, FAILURES) else f"{type(end).__name__}: {end}".removesuffix(": ")
     failed = isinstance(end, AssertionError)
@@ -153,7 +152,6 @@ def replaced(name: str, stream: object) -> Iterator[None]:
 
 
 def run(chosen: argparse.Namespace, report: Report) -> int:
-    """Execute a Python program; return its exit code."""
     file = chosen.script
     try:
         code = _compiled(file)
@@ -187,7 +185,6 @@ class _Execution:
         """The result of the call with whose failure the program ended."""
 
     def run(self) -> int:
-        """Open, execute, close; return the exit code. What goes wrong is said."""
         with contextlib.ExitStack() as around:
             around.enter_context(self._signals())
             try:
@@ -308,7 +305,6 @@ def _say(text: str, warning: bool) -> None:
 
 
 def _interrupt() -> None:
-    """Raise in the main thread, whatever it does."""
     os.kill(os.getpid(), signal.SIGINT)
 
 
@@ -316,7 +312,6 @@ class _NoInput(io.TextIOBase):
     """Standard input while the terminal belongs to the stop key."""
 
     def readline(self, size: int | None = -1, /) -> str:  # type: ignore[override]
-        """Raise Diagnostic."""
         raise Diagnostic("the terminal belongs to the stop key here", "input", "give values with --set NAME=VALUE")
 
     read = readline

@@ -30,7 +30,6 @@ from multidrop.transports import TransportLost
 
 
 def run(chosen: argparse.Namespace) -> int:
-    """Check everything, run the cases, report; return the exit code."""
     asked = Asked(
         chosen.file,
         chosen.cell,

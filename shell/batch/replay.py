@@ -64,7 +64,6 @@ class ReplayReport:
     def summary(
         self, channel: Channel, lines: int, differences: int, uncompared: int, positions: Positions | None
     ) -> None:
-        """Report the counts, and the largest difference of each axis."""
         moved = f"; {uncompared} in motion printed another number" if uncompared else ""
         channel.notify(f"{lines} lines replayed, {differences} differ{moved}", outcome=True)
         fact: dict[str, object] = {"lines": lines, "differ": differences}
@@ -114,7 +113,6 @@ class VirtualLoop(asyncio.SelectorEventLoop):
         super().__init__(self._impatient)
 
     def time(self) -> float:
-        """Virtual seconds, from 0."""
         return self._impatient.skipped
 
     def run_in_executor(  # type: ignore[override]
@@ -252,7 +250,6 @@ class Replay:
         return True
 
     async def _sent(self, step: Step, drive: Drive | None) -> str:
-        """Send a line or run a verb; the failure in words."""
         self._printed = []
         target = f"@{join_target(drive.link.name, drive.address)} " if drive is not None else ""
         try:
@@ -293,7 +290,6 @@ async def _beside(positions: Positions | None, began: float) -> AsyncIterator[No
 
 
 def _name(drive: Drive) -> str:
-    """The bus and the address; the bus alone where its drive has none."""
     return join_target(drive.link.name, drive.address) if drive.address else drive.link.name
 
 

@@ -82,7 +82,6 @@ def junit(name: str, cases: Sequence[Case], begun: datetime, seconds: float) -> 
 
 
 def _shown(text: str) -> str:
-    """The text without the characters that XML cannot have."""
     return visible(text).translate({0xFFFE: "\\ufffe", 0xFFFF: "\\uffff"})
 
 
@@ -112,7 +111,6 @@ class JUnitFile:
             raise
 
     def write(self, cases: Sequence[Case], seconds: float = 0.0) -> None:
-        """Write the report. Raises Diagnostic."""
         if self._path is None:
             return
         try:
@@ -166,13 +164,11 @@ class Report:
         self._ending = ending
 
     def wrong(self, problems: tuple[Diagnostic, ...]) -> None:
-        """Report a script that was not executed."""
         for each in problems:
             self._cases.append(Case(each.where or self._name, self._name, error=str(each)))
         self.finish(2)
 
     def finish(self, code: int) -> int:
-        """Write the summary and the JUnit file; return the exit code."""
         seconds = (datetime.now().astimezone() - self._begun).total_seconds()
         if self._json:
             summary = {"lines": self._lines, "failed": self._failed, "seconds": round(seconds, 3)}

@@ -119,7 +119,6 @@ class _Host:
         self.interrupted = False
 
     def interrupt(self) -> None:
-        """End the work after a signal."""
         self.interrupted = True
         self._session.interrupt()
         if self._work is not None:

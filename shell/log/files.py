@@ -69,7 +69,6 @@ class Entry:
 
 
 def line_of(entry: Entry) -> bytes:
-    """Encode an entry as a line, with its end."""
     fields: dict[str, Any] = {"time": entry.time.isoformat(timespec="microseconds"), "kind": entry.kind}
     if entry.bus:
         fields["bus"] = entry.bus
@@ -121,12 +120,10 @@ class Line(NamedTuple):
 
     @property
     def where(self) -> str:
-        """`file:line`."""
         return f"{self.path}:{self.number}"
 
 
 def folder(settings: Settings) -> Path:
-    """The folder of the logs that have no name of their own."""
     return settings.state / "logs"
 
 

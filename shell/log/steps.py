@@ -135,7 +135,6 @@ class _Reader:
             self._skipped[verb] = None
 
     def _traffic(self, where: str, entry: Entry) -> None:
-        """Note a poll, and the bytes received after it."""
         data = entry.text.encode("latin-1")
         if entry.kind == "received":
             if (poll := self._polled.get(entry.bus)) is not None:

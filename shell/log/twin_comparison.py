@@ -117,7 +117,6 @@ class Divergence:
 
     @property
     def text(self) -> str:
-        """The difference in one line."""
         steps = f"{abs(self.difference)} steps from the simulated drive since {self.at:%H:%M:%S.%f}"[:-5]
         return f"{self.drive}: {steps} (limit {self.limit}): {', '.join(self.causes)}"
 
@@ -169,7 +168,6 @@ class _Place:
         yield from (each for each in self.compared.sample(sample, LIMIT) if isinstance(each, Diverged))
 
     def end(self) -> Iterator[Diverged]:
-        """Report the differences with which the log ends."""
         for axis, comparison in self.compared.axes.items():
             if comparison.settle() is Verdict.DIVERGED:
                 news = self.compared.news(Verdict.DIVERGED, comparison, self.address, axis, LIMIT)
@@ -177,7 +175,6 @@ class _Place:
                 yield news
 
     def shown(self, axis: str) -> str:
-        """The name of an axis."""
         return f"{self.name}.{axis}" if axis else self.name
 
 
@@ -232,7 +229,6 @@ class Positions:
             self._report(place, place.take(found, at))
 
     def _report(self, place: _Place, news: Iterator[Diverged]) -> None:
-        """Report the first divergence of an axis."""
         for each in news:
             name = place.shown(each.axis)
             if name not in self.diverged:
@@ -242,12 +238,10 @@ class Positions:
 
     @property
     def compared(self) -> dict[str, int]:
-        """The number of positions that were compared, by axis."""
         return {place.shown(axis): n for place in self._places.values() for axis, n in place.counts.items()}
 
     @property
     def largest(self) -> dict[str, int]:
-        """The largest difference of each axis, steps."""
         return {
             place.shown(axis): abs(comparison.furthest.difference)
             for place in self._places.values()

@@ -75,7 +75,6 @@ class SessionLog:
         files.note(workspace.settings, self.path)
 
     def close(self) -> None:
-        """End the log. May be called again."""
         self._leave()
         self._disk.close()
 
@@ -139,7 +138,6 @@ class SessionLog:
             yield self._entry(event.at, kind, event.text, bus, drive, warning=warning)
 
     def _changes(self, at: float) -> Iterator[Entry]:
-        """The buses that were opened, closed, or have other drives than before."""
         now = {name: _described(bus) for name, bus in self._workspace.buses.items()}
         for name in self._buses.keys() - now.keys():
             yield self._entry(at, "bus", "closed", name)

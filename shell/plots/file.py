@@ -100,7 +100,6 @@ class RecordingFile:
         self.offset = end + GAP
 
     def mark(self) -> None:
-        """Note that the file is complete up to here."""
         with contextlib.suppress(OSError):
             self._good = self.writes.stat().st_size
 

@@ -99,7 +99,6 @@ class Plot:
         self._on_failure.append(callback)
 
     def label(self, bus: str, address: str, label: str) -> None:
-        """Note the name that a person gave to a drive, before its first sample."""
         self._batch.labels[bus, address] = label
 
     def sample(self, bus: str, sample: Sample) -> None:
@@ -317,7 +316,6 @@ def attach(workspace: Workspace, plot: Plot, series: Sequence[Series], period: f
 
 
 def _take(plot: Plot, wanted: set[Series], buses: set[str], event: SessionEvent) -> None:
-    """Plot an event of a wanted series, or of one of the buses."""
     if not isinstance(event, OnBus):
         return _log(plot, buses, event)
     bus, inner = event
@@ -367,7 +365,6 @@ def _sparing(telemetry: Telemetry, addresses: Sequence[str]) -> Iterator[Callabl
 
 
 def _twin(plot: Plot, wanted: set[Series], bus: str, event: TwinEvent) -> None:
-    """Plot the predictions of a wanted drive's twin, or only the difference, and whether they agree."""
     whole = Series(bus, event.address) in wanted
     if not whole and Series(bus, event.address, DIFFERENCE) not in wanted:
         return

@@ -40,12 +40,10 @@ class PlotTarget:
 
     @property
     def serves(self) -> bool:
-        """Whether viewers connect to us."""
         return self.file is None and not self.url
 
     @property
     def text(self) -> str:
-        """The file, or the address that a viewer opens."""
         if self.file is not None:
             return str(self.file)
         return self.url or f"rerun+http://{bracketed(self.host)}:{self.port}/proxy"

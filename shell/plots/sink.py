@@ -78,7 +78,6 @@ def layout(paths: Set[str], names: Mapping[str, str]) -> Any:
 
 
 def _charts(rrb: Any, paths: Set[str], names: Mapping[str, str]) -> Any:
-    """The charts of one drive; of several, each drive beside the others, and all together."""
     drives = drives_of(paths)
     if len(drives) == 1:
         return _column(rrb, _curves(paths), names.get(drives[0], drives[0]))
@@ -111,12 +110,10 @@ def _column(rrb: Any, curves: Iterable[str], drive: str) -> Any:
 
 
 def _linked(rrb: Any) -> Any:
-    """A time axis that moves with all others."""
     return rrb.TimeAxis(link="LinkToGlobal")
 
 
 def is_state(path: str) -> bool:
-    """Whether a path is that of a lane of states."""
     return path.split("/")[-2:-1] == [STATE]
 
 
@@ -130,7 +127,6 @@ def _drive(path: str) -> str:
 
 
 def drives_of(paths: Set[str]) -> list[str]:
-    """The paths of the axes of drives that have curves."""
     return sorted({_drive(path) for path in _curves(paths)})
 
 
@@ -160,7 +156,6 @@ class Curve(NamedTuple):
 
     @property
     def drive(self) -> tuple[str, ...]:
-        """The parts that name the drive's axis; one colour belongs to them."""
         return tuple(part for part in self[:3] if part)
 
 
@@ -306,7 +301,6 @@ class Sink:
             self._file.cut()
 
     def why(self, error: Exception) -> str:
-        """The error in one line."""
         if self._file:
             return self._file.why(error)
         return f"the viewer at {self.target.text} is gone" if self.target.url else f"cannot serve: {error}"
@@ -369,7 +363,6 @@ class Sink:
 
 
 def _place(state: State) -> tuple[str, ...]:
-    """The parts of the path of a lane."""
     return (*state[:3], STATE, state.name)
 
 
@@ -381,7 +374,6 @@ viewer is connected, so it stays, and the next plot at that port continues it.""
 
 
 def _numeric(target: PlotTarget) -> PlotTarget:
-    """The numeric address to serve at."""
     try:
         found = socket.getaddrinfo(target.host, target.port, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE)
     except (OSError, UnicodeError) as error:

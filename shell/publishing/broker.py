@@ -48,7 +48,6 @@ class Target:
 
     @property
     def text(self) -> str:
-        """The broker for a person, without the user."""
         host = f"[{self.host}]" if ":" in self.host else self.host
         return f"{'mqtts' if self.encrypted else 'mqtt'}://{host}:{self.port}/{self.prefix}"
 
@@ -119,7 +118,6 @@ def load() -> Any:
 
 
 def fresh_name() -> str:
-    """A name for a client, of at most 23 characters."""
     return f"multidrop-{os.urandom(6).hex()}"
 
 
@@ -237,7 +235,6 @@ class Connection:
         return self._sent
 
     def in_flight(self) -> list[Message]:
-        """The messages that the broker has not acknowledged, oldest first."""
         return [message for message, _ in self._unacknowledged()]
 
     async def close(self) -> None:
@@ -251,7 +248,6 @@ class Connection:
 
 
 def _reason(where: str, error: OSError | UnicodeError) -> str:
-    """The reason of a failed connection, in a line for a person."""
     if isinstance(error, TimeoutError):
         return f"the broker at {where} does not answer"
     if isinstance(error, ssl.SSLCertVerificationError):
@@ -268,7 +264,6 @@ def _leave(client: Client) -> None:
 
 
 def _log_in(client: Client, target: Target, settings: MqttSettings) -> None:
-    """Give a client its login and certificates. Raises Diagnostic."""
     user, secret = target.user or settings.username, settings.secret()
     if secret and not user:
         raise Diagnostic("mqtt.password needs mqtt.username", hint="or --to mqtt://USER@BROKER/PREFIX")

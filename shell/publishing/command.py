@@ -65,7 +65,6 @@ async def open_lines(session: Session, urls: Sequence[str], later: bool) -> list
 
 
 async def open_later(session: Session, url: str, add: Callable[[Bus], None]) -> None:
-    """Try a line until it is there, and add its buses."""
     while True:
         await asyncio.sleep(AGAIN)
         try:
@@ -133,7 +132,6 @@ def _summary(publisher: Publisher) -> str:
 
 
 async def _all_lost(workspace: Workspace) -> None:
-    """Wait until every line is lost for good. Raises the last loss."""
     broken = asyncio.Event()
 
     def noticed(event: SessionEvent) -> None:

@@ -65,19 +65,15 @@ class Topics:
 
     @property
     def status(self) -> str:
-        """The topic of this program's state: `online`, `lost` or `bye`."""
         return f"{self.prefix}/status"
 
     def bus_status(self, bus: str) -> str:
-        """The topic of a line's state: `online` or `lost`."""
         return f"{self.prefix}/{escape(bus)}/status"
 
     def transcript(self, bus: str) -> str:
-        """The topic of the lines that are typed and printed on a bus."""
         return f"{self.prefix}/{escape(bus)}/transcript"
 
     def drive(self, bus: str, address: str, what: str) -> str:
-        """The topic of a drive's `state`, `position`, `velocity` or `error`."""
         return f"{self.prefix}/{escape(bus)}/{escape(address)}/{what}"
 
 
@@ -105,7 +101,6 @@ def error_of(conditions: Iterable[Conditions]) -> Fields:
 
 
 def program_of(conditions: Iterable[Conditions]) -> str:
-    """The label of the program that runs; empty: none."""
     return next((each.program for each in conditions if each.program), "")
 
 
@@ -243,7 +238,6 @@ class DriveFeed:
             self._conditions(event)
 
     def lost(self, at: float) -> None:
-        """Publish the state LOST, and no values, while the line is away."""
         self._program = None
         self._moving.clear()
         self._say_state(at, LOST)
@@ -306,7 +300,6 @@ class Feed:
         """The time of the last value on both clocks: all values of one sample have the same time."""
 
     def begin(self) -> None:
-        """Publish from now on."""
         self._leave = self._workspace.subscribe(self._take)
         for bus in self._workspace.buses.values():
             self.add(bus)
@@ -316,7 +309,6 @@ class Feed:
         self._lines[bus.name] = _Line(self, bus)
 
     def end(self) -> None:
-        """End publishing and polling. May be called again."""
         self._leave()
         for line in self._lines.values():
             line.close()
@@ -324,7 +316,6 @@ class Feed:
             self._task.cancel()
 
     def dropped(self, numbers: Counter[str]) -> None:
-        """Say in the transcripts that messages of their lines are missing."""
         for bus in self._lines:
             if number := numbers[bus]:
                 self._missing(
@@ -418,7 +409,6 @@ class _Line:
             self._ends.pop()()
 
     def _look(self) -> None:
-        """Publish whether the line is there; poll the drives that it has now."""
         word = ONLINE if self._bus.lost is None else LOST
         if word != self._word:
             self._word = word

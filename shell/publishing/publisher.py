@@ -33,22 +33,18 @@ class Backlog:
         return len(self._waiting)
 
     def put(self, message: Message) -> None:
-        """Add a message; a full queue drops its oldest one."""
         if message.retain:
             self._retained[message.topic] = message
         self._waiting.append(message)
         self._bound()
 
     def first(self) -> Message | None:
-        """The oldest message; it stays until `sent`."""
         return self._waiting[0] if self._waiting else None
 
     def sent(self) -> None:
-        """Remove the oldest message."""
         self._waiting.popleft()
 
     def give_back(self, messages: Sequence[Message]) -> None:
-        """Put messages before all others."""
         self._waiting.extendleft(reversed(messages))
         self._bound()
 
@@ -61,7 +57,6 @@ class Backlog:
 
     @property
     def dropped(self) -> int:
-        """The number of messages that were dropped since `take_dropped`."""
         return self._dropped.total()
 
     def take_dropped(self) -> Counter[str]:
@@ -116,12 +111,10 @@ class Publisher:
         self._task = asyncio.get_running_loop().create_task(self._keep(connection))
 
     def put(self, message: Message) -> None:
-        """Send a message as soon as possible. Never blocks."""
         self._backlog.put(message)
         self.pump()
 
     def pump(self) -> None:
-        """Send what the connection takes."""
         connection = self._connection
         while connection is not None and (message := self._backlog.first()) is not None:
             if not connection.publish(message):
@@ -161,12 +154,10 @@ class Publisher:
 
     @property
     def connected(self) -> bool:
-        """Whether a broker is connected."""
         return self._connection is not None
 
     @property
     def waiting(self) -> int:
-        """The number of messages that are not sent."""
         return len(self._backlog)
 
     async def _drained(self) -> None:
@@ -180,7 +171,6 @@ class Publisher:
         return connection
 
     def _begun(self, connection: Connection) -> None:
-        """Use a new connection."""
         connection.on_room = self.pump
         self.sent += connection.publish(self._online)
         self._backlog.renew()

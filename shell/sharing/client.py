@@ -138,11 +138,9 @@ class Client:
     # To the client
 
     def reply(self, setting: int, value: int) -> None:
-        """Reply to a request with the value that holds now."""
         self.replies += message(setting + REPLY, value)
 
     def taken(self) -> bytes:
-        """Take the replies to its negotiation."""
         replies = bytes(self.replies)
         self.replies.clear()
         return replies

@@ -132,7 +132,6 @@ class Exchange:
         return self._done()
 
     def leave(self, client: int) -> list[Action]:
-        """Forget a client whose connection has ended."""
         if client in self.clients:
             if self.writer in (None, client):
                 for each in self.clients[client].waiting:
@@ -144,7 +143,6 @@ class Exchange:
         return self._done()
 
     def close(self, client: int, event: str, reason: str) -> list[Action]:
-        """Close a client's connection, with the reason."""
         self._close(client, event, reason)
         return self._done()
 
@@ -314,7 +312,6 @@ class Exchange:
         self._say(client, "writes")
 
     def dropped(self, count: int) -> list[Action]:
-        """Note the number of bytes of the writer that a stop or a purge has dropped."""
         if count:
             self._line.dropped()
             who = self.clients[self.writer].name if self.writer is not None else ""

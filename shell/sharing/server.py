@@ -129,7 +129,6 @@ class SharedPort:
     # Clients
 
     def connected(self, connection: Connection, name: str) -> int:
-        """Take a client; return its number."""
         self._number += 1
         self._connections[self._number] = connection
         self._left.clear()
@@ -246,7 +245,6 @@ class SharedPort:
 
 
 def _change(control: PortControl, action: Set) -> Callable[[], None]:
-    """The call that changes a setting."""
     if action.setting == Setting.BAUD:
         return partial(control.set_baud, action.value)
     lines: dict[int, Callable[[bool], None]] = {
@@ -322,7 +320,6 @@ EXPOSED = "other computers can move the drives at {}; they need no password. 127
 
 
 def run(url: str, address: str, *, as_json: bool) -> int:
-    """Lend the port until a signal, which ends it well; return the exit code."""
     return asyncio.run(_run(url, address, as_json))
 
 

@@ -48,7 +48,6 @@ class Printer:
         self._progress = StatusLine()
 
     def show(self, event: SessionEvent) -> None:
-        """Print an event if it is for this output."""
         if isinstance(event, Progressed):
             self._progressed(event)
         elif isinstance(event, Bytes | Output | Printed | OnBus) and not self._replies:

@@ -39,7 +39,6 @@ READER_GONE = 141
 
 
 def exit_code(failure: BaseException) -> int:
-    """The exit code of a failure."""
     return next(code for kind, code in CODES if isinstance(failure, kind))
 
 
@@ -107,7 +106,6 @@ def lose(stream: TextIO, problem: OSError | ValueError) -> None:
 
 
 def nonblocking() -> contextlib.AbstractContextManager[output_streams.Streams]:
-    """Make `sys.stdout` and `sys.stderr` never wait for their readers, around the work of an event loop."""
     return output_streams.outlets(lose)
 
 
@@ -152,7 +150,6 @@ class ReaderWatch:
             self._descriptor = sys.stdout.fileno()
 
     def begin(self) -> None:
-        """Watch, if there is a reader."""
         if sys.platform != "win32" and self._has_reader():
             threading.Thread(target=self._run, daemon=True, name=WATCHER).start()
 
@@ -164,7 +161,6 @@ class ReaderWatch:
         return stat.S_ISFIFO(mode) or stat.S_ISSOCK(mode) or is_terminal
 
     def watches(self, stream: TextIO) -> bool:
-        """Whether a stream is the watched standard output."""
         with contextlib.suppress(OSError, ValueError):
             return stream.fileno() == self._descriptor and self._has_reader()
         return False
@@ -222,7 +218,6 @@ def work_done() -> None:
 
 
 def reader_left() -> bool:
-    """Whether the reader of standard output left too early."""
     return watch is not None and watch.left
 
 
@@ -234,7 +229,6 @@ def lost_reader(end: BaseException) -> bool:
 
 
 def why_interrupted() -> str:
-    """Why the work was interrupted, for a person."""
     return "the reader of standard output is gone" if reader_left() else "interrupted"
 
 

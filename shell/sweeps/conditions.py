@@ -92,7 +92,6 @@ class Condition:
         return _compared(self.tree.sign, left, right, number(evaluate(self.tree.within, known)))
 
     def seen(self, outcome: Outcome) -> str:
-        """Describe the results that it is about, as `errors == [86]`."""
         found = (each.name for each in unknowns(self.tree) if isinstance(each, Name))
         values = {each: getattr(outcome, each) for each in found if each in NAMES}
         shown = {
@@ -167,14 +166,12 @@ def _compared(sign: str, left: Side, right: Side, within: float) -> bool:
 
 
 def _alike(left: Value, right: Value, within: float) -> bool:
-    """Whether two items are equal; a text equals a number that it is."""
     if isinstance(left, str) != isinstance(right, str):
         left, right = (value_of(each) if isinstance(each, str) else each for each in (left, right))
     return compared("==", left, right, within)
 
 
 def _items(text: str) -> List:
-    """Read the items of a list. Raises Diagnostic."""
     found: list[Value] = []
     at = 0
     while at < len(text):

@@ -100,7 +100,6 @@ class Failures:
 
 
 def grouped(plan: Plan, failures: Iterable[Result], run: Run) -> Failures:
-    """Put failures into groups. `run` runs a case in search of a simpler world."""
     groups: list[Group] = []
     more = 0
     for result in failures:

@@ -134,7 +134,6 @@ def _values(key: str, text: str, asked: Asked) -> Values:
 
 
 def _names(drive: Placed) -> tuple[str, ...]:
-    """The ways to write a drive in a key."""
     name = drive.spec.name
     return (name, f"{drive.bus}:{name}") if drive.bus else (name,)
 

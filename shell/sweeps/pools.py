@@ -45,7 +45,6 @@ class Pools:
         """Whether processes can begin at all; otherwise this one runs the cases."""
 
     def results(self, todo: Iterator[list[Case]]) -> Iterator[list[Result]]:
-        """Run chunks; yield the results of each as it ends."""
         yield from self._in_a_pool(todo)
         while self._suspects:
             suspects, self._suspects = self._suspects, []
@@ -57,7 +56,6 @@ class Pools:
             yield self._here(case)
 
     def _in_a_pool(self, todo: Iterator[list[Case]]) -> Iterator[list[Result]]:
-        """Run chunks to the end, or until a process dies."""
         running: dict[Future[list[Result]], list[Case]] = {}
         with self._pool(self._jobs) as pool:
             self._submit(pool, todo, running)
@@ -120,7 +118,6 @@ class Pools:
 
     @contextmanager
     def _pool(self, size: int) -> Iterator[ProcessPoolExecutor]:
-        """A pool of processes; they are ended where the block is."""
         before = multiprocessing.active_children()
         pool = ProcessPoolExecutor(size, mp_context=self._context, initializer=_begin)
         try:

@@ -59,7 +59,6 @@ class Result(NamedTuple):
 
     @property
     def ok(self) -> bool:
-        """Whether all conditions hold in the case."""
         return self.failed == HELD
 
 
@@ -97,7 +96,6 @@ class Bench:
 
 @lru_cache(maxsize=4)
 def bench(job: Job) -> Bench:
-    """Read a job. Raises Diagnostic."""
     load = PROGRAMS[job.language].read(job.program, job.file)
     drive: Drive = json.loads(job.drive)
     example = outcome_of(load(read_drive(drive, job.where)).run(job.run, 0.0))
@@ -120,6 +118,5 @@ def chunk(job: Job, cases: Sequence[Case]) -> list[Result]:
 
 
 def version() -> str:
-    """The version of multidrop in this process."""
     found: str = imported("multidrop:__version__")
     return found

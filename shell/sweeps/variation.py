@@ -86,7 +86,6 @@ class Values:
         return self.at(rng.randrange(self.count))
 
     def samples(self) -> Iterator[Value]:
-        """Yield each single value, and the two ends of each range."""
         for piece in self.pieces:
             yield piece.at(0)
             if piece.count > 1:

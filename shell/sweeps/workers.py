@@ -38,7 +38,6 @@ Run = Callable[[Job, Sequence[Case]], list[Result]]
 
 
 def cores() -> int:
-    """The number of cores that this process may use."""
     if sys.platform == "linux":
         return len(os.sched_getaffinity(0))
     return os.cpu_count() or 1
@@ -68,7 +67,6 @@ def results(
 
 
 def chunks(cases: Iterator[Case], size: int) -> Iterator[list[Case]]:
-    """Divide cases into chunks."""
     while found := list(islice(cases, size)):
         yield found
 

@@ -50,22 +50,18 @@ class Pair(NamedTuple):
 
     @property
     def difference(self) -> int:
-        """Measured minus predicted, steps."""
         return self.position - self.predicted
 
     @property
     def fastest(self) -> int:
-        """The larger of both speeds."""
         return max(abs(self.velocity), abs(self.expected))
 
     @property
     def at_rest(self) -> bool:
-        """Whether both report velocity 0."""
         return not (self.velocity or self.expected)
 
     @property
     def equally_fast(self) -> bool:
-        """Whether both velocities are equal."""
         return abs(abs(self.velocity) - abs(self.expected)) <= EQUAL * self.fastest
 
 

@@ -76,7 +76,6 @@ class Twin:
         self.live(at)
 
     def overhear(self, data: bytes, at: float) -> None:
-        """Take bytes that another drive has sent."""
         self._unit.port.overhear(data, self.live(at))
 
     def printed(self) -> list[bytes]:
@@ -98,11 +97,9 @@ class Twin:
         return changed
 
     def motion(self, at: float) -> dict[str, Motion]:
-        """Position and velocity of each axis at a time, by the axis."""
         return {each.axis: each for each in self._shadow.motion(self.live(at))}
 
     def align(self, axis: str, position: int, at: float) -> None:
-        """Set the position of an axis at rest."""
         self._shadow.align(axis, position, self.live(at))
         self.live(at)
 
@@ -283,7 +280,6 @@ class Beside(Compared[Twin]):
     # What reaches the twin
 
     def concluded(self, concluded: Concluded) -> None:
-        """Take a conversation with the drive, or with all drives."""
         if (took := reading_took(concluded)) is not None:
             last = concluded.transactions[-1]
             self._quickest = min(self._quickest, last.ended_at - last.transmitted_at)
@@ -377,7 +373,6 @@ class BusTwins:
             self._publish(TwinEnded(self.bus.now(), beside.drive.address))
 
     def close(self) -> None:
-        """End all twins and their readings."""
         for drive in list(self.besides):
             self.remove(drive)
         self._poll()
@@ -385,7 +380,6 @@ class BusTwins:
             self._ends.pop()()
 
     def _poll(self) -> None:
-        """Read position, velocity and inputs of the drives with a twin."""
         telemetry, before = self.bus.telemetry, (self._samples, self._inputs)
         addresses = self._polled = [each.address for each in self.besides]
         words = [

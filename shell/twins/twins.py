@@ -44,7 +44,6 @@ class Twins:
             each.set_limit(steps)
 
     def running(self, bus: Bus) -> bool:
-        """Whether a drive of a bus has a twin."""
         return bus in self._buses and bool(self._buses[bus].besides)
 
     async def start(self, bus: Bus, addresses: Sequence[str] | None = None) -> None:
@@ -140,7 +139,6 @@ class Twins:
             self._begin(bus, None)
 
     def changed(self, bus: Bus) -> None:
-        """Note that a bus has changed: the drives of a lost one that is back are read again."""
         if bus.lost is None and bus in self._paused:
             found = [each for each in self._paused.pop(bus) if each in bus.drives]
             self._begin(bus, found)
@@ -167,7 +165,6 @@ class Twins:
     # Messages
 
     def rows(self) -> Iterator[str]:
-        """A line for each twin that runs."""
         for twins in self._buses.values():
             for drive, beside in twins.besides.items():
                 apart = [f"{axis} {steps}".strip() for axis, steps in beside.differences.items()]
