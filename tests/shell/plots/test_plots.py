@@ -27,12 +27,6 @@ from tests.support.until import PATIENCE
 EPOCH = 1_800_000_000.0
 
 
-@pytest.fixture
-def rerun() -> Iterator[Any]:
-    os.environ["RUST_LOG"] = "off"
-    yield pytest.importorskip("rerun")
-
-
 @pytest.mark.process
 def test_rerun_is_not_loaded_before_a_plot_is_asked_for() -> None:
     code = "import sys, multidrop.shell.plots.plot; sys.exit('rerun' in sys.modules or 'pyarrow' in sys.modules)"

@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import asyncio
 from pathlib import Path
+from random import Random
 
 import pytest
 
+from multidrop.dialects import DriveError
 from multidrop.shell.events import Agreed, Diverged, Predicted
+from multidrop.simulator.serving.in_process import SimPipe
 from tests.support.cell_session import CellSession, bus, party
 from tests.support.twin_cell import encoder, of, run
 
@@ -91,3 +94,93 @@ async def test_another_acceleration_is_named_a_setting(tmp_path: Path) -> None:
         diverged, *more = of(cell, Diverged)
         assert diverged.causes[0] == "settings changed"
         assert more == [] and len(of(cell, Agreed)) == 1
+
+
+async def nothing_is_read(cell: CellSession) -> None:
+    assert list(cell.session.twins.rows()) == []
+    cell.events.clear()
+    await asyncio.sleep(2)
+    assert cell.written("press") == b"" and not cell.session.buses["press"].witnesses
+
+
+async def test_off_while_drives_are_read_begins_no_twin_more(tmp_path: Path) -> None:
+    async with CellSession(tmp_path, bus("press", party("a"), party("b"))) as cell:
+        task = cell.session.start("/twin on")
+        await asyncio.sleep(2.5)
+        assert len(list(cell.session.twins.rows())) == 1, "the second is being read"
+        await run(cell, "/twin off")
+        assert not await task
+        assert not any(each.startswith("b: a twin runs") for each in cell.told())
+        await nothing_is_read(cell)
+
+
+async def test_off_ends_twins_that_each_drive_was_to_get(tmp_path: Path) -> None:
+    async with CellSession(tmp_path, bus("press", party("a"))) as cell:
+        cell.session.twins.wanted = True
+        cell.session.twins.identified(cell.session.buses["press"])
+        await asyncio.sleep(0.5)
+        await run(cell, "/twin off")
+        cell.session.twins.identified(cell.session.buses["press"])
+        await asyncio.sleep(5)
+        await nothing_is_read(cell)
+
+
+async def test_off_while_the_line_is_lost_counts_once_it_is_back(tmp_path: Path) -> None:
+    async with CellSession(tmp_path, bus("press", party("a")), reconnect=True) as cell:
+        await run(cell, "/twin on")
+        cell.world("unplug press")
+        await asyncio.sleep(1)
+        await run(cell, "/twin off")
+        cell.world("plug press")
+        await asyncio.sleep(8)
+        await nothing_is_read(cell)
+
+
+async def test_each_drive_that_gets_no_twin_is_said(tmp_path: Path) -> None:
+    async with CellSession(tmp_path, bus("press", party("a"), party("b"), party("c"))) as cell:
+        await run(cell, "@a SL 500", "@b SL 500")
+        with pytest.raises(DriveError, match="^a: it moves"):
+            await cell.session.run("/twin on")
+        assert [each[:21] for each in cell.warned()] == ["press: no twin: b: it"]
+        assert len(list(cell.session.twins.rows())) == 1
+
+
+async def test_a_drive_may_get_another_name_while_others_are_read(tmp_path: Path) -> None:
+    async with CellSession(tmp_path, bus("press", party("a"), party("b"))) as cell:
+        task = cell.session.start("/twin on")
+        await asyncio.sleep(0.5)
+        await run(cell, '@b DN="k"')
+        assert await task
+        assert [each[:2] for each in cell.session.twins.rows()] == ["a:", "k:"]
+
+
+LATE = 0.15
+SHARE = 0.2
+"""The part of the requests that are late."""
+
+
+class Way:
+    """The way to a simulated bus: some requests come late, none overtakes another."""
+
+    def __init__(self, seed: int) -> None:
+        self._random, self._last, self._write = Random(seed), 0.0, SimPipe.write
+
+    def write(self, pipe: SimPipe, data: bytes) -> bool:
+        loop = asyncio.get_running_loop()
+        late = self._random.uniform(0, LATE) if self._random.random() < SHARE else 0.0
+        self._last = max(self._last, loop.time() + late)
+        loop.call_at(self._last, self._write, pipe, data)
+        return True
+
+
+async def test_requests_that_come_late_are_no_difference(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    async with CellSession(tmp_path, bus("press", party("a", VM=300000), baud=0)) as cell:
+        way = Way(4)
+        monkeypatch.setattr(SimPipe, "write", lambda pipe, data: way.write(pipe, data))
+        await run(cell, "/twin on", "/sleep 1")
+        for n in range(12):
+            await run(cell, f"MR {300000 * (-1) ** n}", "/sleep 0.7")
+            if n % 2:
+                cell.session.stop()
+            await run(cell, "/sleep 1.5", "/resume")
+        assert of(cell, Diverged) == []
