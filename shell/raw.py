@@ -66,6 +66,9 @@ def hex_of(data: bytes) -> str:
 class ByteView:
     """Shows the bytes of a bus. `publish` takes what is sent and received; `wall` is the clock for the time of day."""
 
+    watched = False
+    """The drives of the bus are talked to."""
+
     def __init__(self, bus: Bus, publish: Callable[[Bytes], None], wall: Callable[[float], datetime]) -> None:
         self.bus = bus
         self.form = Form.BOTH
@@ -125,18 +128,15 @@ class ByteView:
     def _show(self, at: float, outgoing: bool, lines: Sequence[bytes]) -> None:
         clock = f"{self._wall(at):%H:%M:%S.%f}"[:-3]
         rows = tuple(row for line in lines for row in self.form.rows(line))
-        self._publish(self._shown(at, outgoing, clock, rows))
-
-    def _shown(self, at: float, outgoing: bool, clock: str, rows: tuple[str, ...]) -> Bytes:
-        return Bytes(at, self.bus.name, outgoing, clock, rows)
+        self._publish(Bytes(at, self.bus.name, outgoing, clock, rows, watched=self.watched))
 
 
 class Watched(ByteView):
     """The bytes of a bus whose drives are talked to, without those of our polls."""
 
-    def __init__(self, bus: Bus, publish: Callable[[Bytes], None], wall: Callable[[float], datetime]) -> None:
-        super().__init__(bus, publish, wall)
-        self._polls = False
+    watched = True
+    _polls = False
+    """A poll is in flight."""
 
     def _take(self, event: BusEvent) -> None:
         if isinstance(event, Sent):
@@ -145,9 +145,6 @@ class Watched(ByteView):
             self._polls = False
         elif not self._polls:
             super()._take(event)
-
-    def _shown(self, at: float, outgoing: bool, clock: str, rows: tuple[str, ...]) -> Bytes:
-        return Bytes(at, self.bus.name, outgoing, clock, rows, watched=True)
 
 
 class RawLine(ByteView):

@@ -3,11 +3,23 @@
 from __future__ import annotations
 
 import sys
+from typing import TYPE_CHECKING
 
 from multidrop.shell.streams.stdout import exit_code, report, write
+
+if TYPE_CHECKING:
+    from multidrop.dialects import Diagnostic
+    from multidrop.shell.batch.report import Report
 
 
 def fail(failure: BaseException) -> int:
     """Print one line about a failure; return its exit code."""
     write(sys.stderr, report(failure))
     return exit_code(failure)
+
+
+def refused(reports: Report, failure: Diagnostic) -> int:
+    """Report a script that is not executed, with each of its errors; return the exit code."""
+    problems: tuple[Diagnostic, ...] = getattr(failure, "problems", (failure,))
+    reports.wrong(problems)
+    return max(map(fail, problems))

@@ -7,7 +7,7 @@ import sys
 from functools import partial
 from typing import TYPE_CHECKING
 
-from multidrop.commands import fail
+from multidrop.commands import refused
 from multidrop.dialects import Diagnostic
 from multidrop.dialects.on_demand import importing
 
@@ -58,7 +58,7 @@ def run(chosen: argparse.Namespace) -> int:
     from multidrop.macros import MacroStore
     from multidrop.shell.batch.report import Report
     from multidrop.shell.connect.settings import Settings
-    from multidrop.shell.scripts.reading import WrongScript, read_script
+    from multidrop.shell.scripts.reading import read_script
 
     if not (chosen.on or chosen.role):
         raise Diagnostic("nothing to open", "multidrop run", "--on URL, or --role NAME=URL")
@@ -72,12 +72,8 @@ def run(chosen: argparse.Namespace) -> int:
         settings = Settings()
         macros = MacroStore(settings.macros, settings.project_macros)
         script = read_script(chosen.script, dict(chosen.set), macros)
-    except WrongScript as wrong:
-        report.wrong(wrong.problems)
-        return max(map(fail, wrong.problems))
     except Diagnostic as problem:
-        report.wrong((problem,))
-        return fail(problem)
+        return refused(report, problem)
     from multidrop.shell.batch import runner
     from multidrop.shell.lines import targets
     from multidrop.shell.scripts.executor import run_script

@@ -8,7 +8,7 @@ import sys
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
-from multidrop.commands import fail
+from multidrop.commands import fail, refused
 from multidrop.dialects import Diagnostic
 from multidrop.dialects.files import bounded, utf8, why
 from multidrop.macros import Macro, MacroStore, format_macro, missing
@@ -43,7 +43,7 @@ def show(chosen: argparse.Namespace) -> int:
 def play(chosen: argparse.Namespace) -> int:
     """Play a macro; report wrong values and lines before anything is opened."""
     from multidrop.shell.batch.report import Report
-    from multidrop.shell.scripts.reading import WrongScript, read_macro
+    from multidrop.shell.scripts.reading import read_macro
 
     if not (chosen.on or chosen.role):
         raise Diagnostic("nothing to open", "multidrop macro play", "--on URL, or --role NAME=URL")
@@ -56,12 +56,8 @@ def play(chosen: argparse.Namespace) -> int:
         if hides := store.hides(macro.name):
             write(sys.stderr, hides)
         read_macro(macro, values, store)
-    except WrongScript as wrong:
-        report.wrong(wrong.problems)
-        return max(map(fail, wrong.problems))
     except Diagnostic as problem:
-        report.wrong((problem,))
-        return fail(problem)
+        return refused(report, problem)
     except KeyboardInterrupt:
         return INTERRUPTED
     from multidrop.shell.batch import runner
@@ -140,7 +136,12 @@ def _changed(chosen: argparse.Namespace, store: MacroStore) -> list[str]:
             return macro_changes.import_(store, chosen.file, chosen.force)
         case "macro delete":
             what = macro_changes.deletion(store, chosen.name)
-            if not chosen.yes and not _agreed(what):
+            agreed = chosen.yes
+            if not agreed and sys.stdin.isatty() and sys.stderr.isatty():
+                sys.stderr.write(f"macro delete {what}. Go on? [y/N] ")
+                sys.stderr.flush()
+                agreed = sys.stdin.readline().strip() in ("y", "Y")
+            if not agreed:
                 raise Diagnostic(f"{what}; nothing was deleted", "macro delete", "--yes agrees to it")
             return macro_changes.delete(store, chosen.name)
         case _:
@@ -155,11 +156,3 @@ def _edited(name: str, store: MacroStore) -> list[str]:
         write(sys.stderr, draft.remark)
     _run([*command, str(draft.file)], f"{name} is as it was")
     return [finish_draft(store, draft)]
-
-
-def _agreed(what: str) -> bool:
-    if not (sys.stdin.isatty() and sys.stderr.isatty()):
-        return False
-    sys.stderr.write(f"macro delete {what}. Go on? [y/N] ")
-    sys.stderr.flush()
-    return sys.stdin.readline().strip() in ("y", "Y")

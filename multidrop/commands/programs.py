@@ -9,7 +9,7 @@ from __future__ import annotations
 import argparse
 import sys
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 from multidrop.commands import fail
@@ -22,7 +22,6 @@ from multidrop.shell.streams.stdout import reader_left, shortened, write
 
 if TYPE_CHECKING:
     from multidrop.simulator.cell.spec import DriveSpec
-    from multidrop.simulator.program_run import Line
 
 WRONG = 1
 MOST = 100
@@ -42,7 +41,12 @@ def _check_file(file: str, chosen: argparse.Namespace) -> int:
             rewrite(checked)
     except Diagnostic as problem:
         return fail(problem)
-    _summarize(checked, chosen)
+    if chosen.json:
+        fact = {"file": checked.file, "errors": len(errors(checked.problems)), "summary": checked.facts}
+        _write_fact({**fact, "formatted": checked.respelled} if chosen.format else fact)
+    elif checked.right:
+        count = f"{checked.respelled} line{'' if checked.respelled == 1 else 's'}"
+        write(sys.stdout, f"{checked.file}: {checked.facts}" + (f"; {count} formatted" if chosen.format else ""))
     return 0 if checked.right else WRONG
 
 
@@ -57,15 +61,6 @@ def _report(checked: Checked, json: bool) -> None:
             write(sys.stderr, shortened(each.line_for(checked.file)))
     if not json and (more := len(checked.problems) - MOST) > 0:
         write(sys.stderr, f"{checked.file}: {more} more problem{'' if more == 1 else 's'}, not shown")
-
-
-def _summarize(checked: Checked, chosen: argparse.Namespace) -> None:
-    if chosen.json:
-        fact = {"file": checked.file, "errors": len(errors(checked.problems)), "summary": checked.facts}
-        _write_fact({**fact, "formatted": checked.respelled} if chosen.format else fact)
-    elif checked.right:
-        count = f"{checked.respelled} line{'' if checked.respelled == 1 else 's'}"
-        write(sys.stdout, f"{checked.file}: {checked.facts}" + (f"; {count} formatted" if chosen.format else ""))
 
 
 def _write_fact(fact: Mapping[str, object]) -> None:
@@ -118,7 +113,8 @@ def _test(file: str, chosen: argparse.Namespace, given: DriveSpec | None, severa
             if chosen.json:
                 _write_fact(head | event.fact(real))
             else:
-                _write_lines(event.lines(file, real))
+                for line in event.lines(file, real):
+                    write(sys.stderr if line.problem else sys.stdout, line.text)
     except Diagnostic as problem:
         return fail(problem)
     except KeyboardInterrupt:
@@ -126,8 +122,3 @@ def _test(file: str, chosen: argparse.Namespace, given: DriveSpec | None, severa
             write(sys.stderr, f"{file}: interrupted")
         raise
     return FAILED if failed else 0
-
-
-def _write_lines(lines: Iterator[Line]) -> None:
-    for line in lines:
-        write(sys.stderr if line.problem else sys.stdout, line.text)

@@ -25,7 +25,7 @@ import multidrop
 from multidrop import script
 from multidrop.api.blocking import Session
 from multidrop.api.sessions import Notice
-from multidrop.commands import fail
+from multidrop.commands import fail, refused
 from multidrop.dialects import Diagnostic, Stopped
 from multidrop.dialects.files import bytes_of
 from multidrop.shell.batch.report import Report
@@ -110,15 +110,11 @@ class ReportedSession(Session):
     def _result(self, error: str, begun: datetime) -> Result:
         first, text = self._sent[0], "; ".join(each.line for each in self._sent)
         seconds = (datetime.now().astimezone() - begun).total_seconds()
-        line = ScriptLine(self._file, _called_at(self._file), text)
+        frame: FrameType | None = sys._getframe()
+        while frame is not None and frame.f_code.co_filename != self._file:
+            frame = frame.f_back
+        line = ScriptLine(self._file, frame.f_lineno if frame is not None else 0, text)
         return Result(line, text, begun, seconds, tuple(self._printed), first.bus, first.address, error)
-
-
-def _called_at(file: str) -> int:
-    frame: FrameType | None = sys._getframe()
-    while frame is not None and frame.f_code.co_filename != file:
-        frame = frame.f_back
-    return frame.f_lineno if frame is not None else 0
 
 
 def place(end: BaseException, file: str) -> int:
@@ -154,21 +150,16 @@ def replaced(name: str, stream: object) -> Iterator[None]:
 def run(chosen: argparse.Namespace, report: Report) -> int:
     file = chosen.script
     try:
-        code = _compiled(file)
-    except Diagnostic as problem:
-        report.wrong((problem,))
-        return fail(problem)
-    return report.finish(_Execution(chosen, report, code).run())
-
-
-def _compiled(file: str) -> CodeType:
-    """Compile a program whole, before anything is opened. Raises Diagnostic with `file:line`."""
-    try:
-        return compile(bytes_of(file), file, "exec", dont_inherit=True)
-    except SyntaxError as problem:
-        raise Diagnostic(f"{problem.msg}", f"{file}:{problem.lineno or 1}") from None
-    except ValueError as problem:  # a NUL
-        raise Diagnostic(f"is not Python: {problem}", file) from None
+        code = compile(bytes_of(file), file, "exec", dont_inherit=True)  # before anything is opened
+    except SyntaxError as error:
+        problem = Diagnostic(f"{error.msg}", f"{file}:{error.lineno or 1}")
+    except ValueError as error:  # a NUL
+        problem = Diagnostic(f"is not Python: {error}", file)
+    except Diagnostic as error:
+        problem = error
+    else:
+        return report.finish(_Execution(chosen, report, code).run())
+    return refused(report, problem)
 
 
 class _Execution:
@@ -284,7 +275,10 @@ class _Execution:
     def _ended(self, end: BaseException) -> int:
         """Say why a program ended; return its exit code."""
         if isinstance(end, SystemExit):
-            return _exit_code(end)
+            if end.code is None or isinstance(end.code, int):
+                return end.code or 0
+            write(sys.stderr, str(end.code))
+            return 1
         if isinstance(end, KeyboardInterrupt) or lost_reader(end):
             write(sys.stderr, why_interrupted())
             return INTERRUPTED
@@ -327,10 +321,3 @@ def _main(module: ModuleType, file: str) -> Iterator[None]:
         yield
     finally:
         sys.modules["__main__"], sys.argv, sys.path[:] = main, arguments, path
-
-
-def _exit_code(end: SystemExit) -> int:
-    if end.code is None or isinstance(end.code, int):
-        return end.code or 0
-    write(sys.stderr, str(end.code))
-    return 1

@@ -11,12 +11,13 @@ import sys
 from collections.abc import Awaitable, Callable, Sequence
 from contextlib import nullcontext
 from functools import partial
+from typing import TYPE_CHECKING
 
 from multidrop.shell import stop_report
 from multidrop.shell.automation import outcome, settled
 from multidrop.shell.channel import Front
 from multidrop.shell.connect import settings
-from multidrop.shell.events import FAILURES
+from multidrop.shell.events import FAILURES, SessionEvent, StateChanged
 from multidrop.shell.log.writer import begin as begin_log
 from multidrop.shell.prompt.keyboard import on_signals, on_stop_key
 from multidrop.shell.prompt.terminal_input import asker
@@ -33,6 +34,9 @@ from multidrop.shell.streams.stdout import (
     work_done,
     write,
 )
+
+if TYPE_CHECKING:
+    from multidrop.shell.workspace import Workspace
 
 Body = Callable[[Session], Awaitable[None]]
 
@@ -156,3 +160,19 @@ class _Host:
         async with self._session.automations.run():
             await self._session.open_all(urls)
             await body(self._session)
+
+
+async def until(workspace: Workspace, holds: Callable[[], object]) -> None:
+    """Wait until something holds, which can change only when the state of the session does."""
+    came = asyncio.Event()
+
+    def look(event: SessionEvent | None = None) -> None:
+        if (event is None or isinstance(event, StateChanged)) and holds():
+            came.set()
+
+    leave = workspace.subscribe(look)
+    try:
+        look()
+        await came.wait()
+    finally:
+        leave()

@@ -10,7 +10,7 @@ from datetime import datetime, timedelta
 from typing import NamedTuple
 
 from multidrop.dialects import DriveError, Priority, Procedure, Request
-from multidrop.dialects.codec import Reply, copy_with
+from multidrop.dialects.codec import copy_with
 from multidrop.dialects.family import Motion
 from multidrop.dialects.text import whole
 from multidrop.drives.drive import Drive
@@ -64,9 +64,11 @@ class Decoding:
                 self._procedure = self._drive.family.motion(copy(self._drive.state), Priority.POLL)
                 self._request = next(self._procedure)
             request, self._request = self._request, None
-            reply = self._reply(request, poll) if self._fits(request, poll) else None
-            if reply is not None and self._procedure is not None:
-                self._request = self._procedure.send(reply)
+            if self._fits(request, poll) and self._procedure is not None:
+                numbered = copy_with(request, tag=int.from_bytes(poll.sent[:2], "big"))
+                codec, received = request.codec, poll.received
+                if (found := codec.decode(numbered, received) or codec.on_quiet(numbered, received)) is not None:
+                    self._request = self._procedure.send(copy_with(found.reply, raw=received[: found.used]))
         except StopIteration as done:
             motion: tuple[Motion, ...] = done.value
             return motion
@@ -79,13 +81,6 @@ class Decoding:
             return False
         numbered = copy_with(request, tag=int.from_bytes(poll.sent[:2], "big"))
         return request.codec.encode(numbered) == poll.sent
-
-    @staticmethod
-    def _reply(request: Request, poll: Exchange) -> Reply | None:
-        numbered = copy_with(request, tag=int.from_bytes(poll.sent[:2], "big"))
-        codec, received = request.codec, poll.received
-        found = codec.decode(numbered, received) or codec.on_quiet(numbered, received)
-        return copy_with(found.reply, raw=received[: found.used]) if found is not None else None
 
 
 def printed(step: Step, drive: Drive) -> Iterator[Measured]:
@@ -218,15 +213,12 @@ class Positions:
             for (bus, _), place in self._places.items():
                 if each.bus in ("", bus):
                     place.disturbed(at, each.text)
-        elif (found := self._places.get((each.bus, each.drive))) is not None:
-            self._take_of(found, each, at)
-
-    def _take_of(self, place: _Place, each: Exchange | Step, at: float) -> None:
-        measured = list(place.decoding.take(each) if isinstance(each, Exchange) else printed(each, place.drive))
-        if isinstance(each, Step) and not measured:
-            place.disturbed(at, each.text)
-        for found in measured:
-            self._report(place, place.take(found, at))
+        elif (own := self._places.get((each.bus, each.drive))) is not None:
+            measured = list(own.decoding.take(each) if isinstance(each, Exchange) else printed(each, own.drive))
+            if isinstance(each, Step) and not measured:
+                own.disturbed(at, each.text)
+            for found in measured:
+                self._report(own, own.take(found, at))
 
     def _report(self, place: _Place, news: Iterator[Diverged]) -> None:
         for each in news:

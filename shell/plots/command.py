@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING
 
 from multidrop.dialects import Diagnostic, DriveError
 from multidrop.shell.batch import runner
-from multidrop.shell.events import SessionEvent, StateChanged
 from multidrop.shell.plots.plot import Plot, begin
 from multidrop.shell.plots.request import PlotTarget, parse_rate, parse_series, parse_target, read_first
 from multidrop.shell.streams.stdout import report, write
@@ -48,18 +47,11 @@ async def _until_ended(workspace: Workspace, target: PlotTarget, drives: Sequenc
 
 async def _ended(workspace: Workspace, plot: Plot) -> None:
     """Wait until the plot fails, or a bus is lost for good. Raises that failure."""
-    broken = asyncio.Event()
-
-    def noticed(event: SessionEvent) -> None:
-        if isinstance(event, StateChanged) and _lost(workspace):
-            broken.set()
-
-    leave = workspace.subscribe(noticed)
-    waits = [asyncio.create_task(plot.ended.wait()), asyncio.create_task(broken.wait())]
+    lost = runner.until(workspace, lambda: _lost(workspace))
+    waits: list[asyncio.Task[object]] = [asyncio.create_task(plot.ended.wait()), asyncio.create_task(lost)]
     try:
         await asyncio.wait(waits, return_when=asyncio.FIRST_COMPLETED)
     finally:
-        leave()
         for each in waits:
             each.cancel()
     raise _lost(workspace) or DriveError(plot.failure)

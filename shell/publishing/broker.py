@@ -211,10 +211,7 @@ class Connection:
         """Note an acknowledgement, in paho's thread; wake the loop only where it waits for room."""
         if self._full:
             self._full = False
-            self._call(self._room)
-
-    def _room(self) -> None:
-        self.on_room()
+            self._call(lambda: self.on_room())  # which another function may be by then
 
     def publish(self, message: Message) -> bool:
         """Send a message; False while the connection is full or lost. Never blocks."""

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from multidrop.dialects import Diagnostic
 from multidrop.shell.batch import runner
-from multidrop.shell.events import FAILURES, SessionEvent, StateChanged
+from multidrop.shell.events import FAILURES
 from multidrop.shell.publishing import broker
 from multidrop.shell.publishing.broker import Message, Target, parse_target
 from multidrop.shell.publishing.feed import BYE, LOST, ONLINE, Feed, Topics, parse_rate
@@ -20,7 +20,6 @@ from multidrop.shell.streams.stdout import report, write
 
 if TYPE_CHECKING:
     from multidrop.drives.bus import Bus
-    from multidrop.shell.connect.settings import MqttSettings
     from multidrop.shell.session import Session
     from multidrop.shell.workspace import Workspace
     from multidrop.transports import TransportLost
@@ -79,8 +78,9 @@ async def open_later(session: Session, url: str, add: Callable[[Bus], None]) -> 
 
 async def _until_ended(workspace: Session, target: Target, period: float, absent: Sequence[str]) -> None:
     topics, settings, name = Topics(target.prefix), workspace.settings.mqtt, broker.fresh_name()
-    if warning := _readable(target, settings):
-        workspace.notify(warning, warning=True)
+    if not target.encrypted and (settings.password or settings.password_file) and not _here(target.host):
+        warning = f"the password goes to {target.host} unencrypted; mqtts:// encrypts it"
+        workspace.notify(warning, warning=True)  # others on the way to the broker can read it
     publisher = Publisher(
         lambda: broker.Connection(target, settings, Message(topics.status, LOST, retain=True), name),
         Message(topics.status, ONLINE, retain=True),
@@ -89,24 +89,25 @@ async def _until_ended(workspace: Session, target: Target, period: float, absent
     )
     feed = Feed(workspace, publisher, topics, period)
     await publisher.begin()
-    write(sys.stderr, f"publishing {_counted(workspace)} to {target.text}; Ctrl+C ends it")
+    drives, lines = sum(len(bus.drives) for bus in workspace.buses.values()), len(workspace.buses)
+    counted = f"{drives} {'drive' if drives == 1 else 'drives'} on {lines} {'line' if lines == 1 else 'lines'}"
+    write(sys.stderr, f"publishing {counted} to {target.text}; Ctrl+C ends it")
     feed.begin()
     waits = [asyncio.create_task(open_later(workspace, url, feed.add)) for url in absent]
     try:
-        await _all_lost(workspace)
+        await runner.until(workspace, lambda: _lost(workspace))
+        loss = _lost(workspace)
+        assert loss is not None
+        raise loss
     finally:
         for each in waits:
             each.cancel()
         feed.end()
         await publisher.end(Message(topics.status, BYE, retain=True))
-        write(sys.stderr, _summary(publisher))
-
-
-def _readable(target: Target, settings: MqttSettings) -> str:
-    """A warning where others on the way to the broker can read the password."""
-    if target.encrypted or not (settings.password or settings.password_file) or _here(target.host):
-        return ""
-    return f"the password goes to {target.host} unencrypted; mqtts:// encrypts it"
+        parts = [f"{publisher.sent} messages published"]
+        parts += [f"{publisher.lost} dropped, as they had no room"] if publisher.lost else []
+        parts += [f"{publisher.waiting} not sent: the broker is away"] if publisher.waiting else []
+        write(sys.stderr, "; ".join(parts))
 
 
 def _here(host: str) -> bool:
@@ -114,38 +115,6 @@ def _here(host: str) -> bool:
         return ip_address(host).is_loopback
     except ValueError:
         return host == "localhost"
-
-
-def _counted(workspace: Workspace) -> str:
-    drives = sum(len(bus.drives) for bus in workspace.buses.values())
-    lines = len(workspace.buses)
-    return f"{drives} {'drive' if drives == 1 else 'drives'} on {lines} {'line' if lines == 1 else 'lines'}"
-
-
-def _summary(publisher: Publisher) -> str:
-    parts = [f"{publisher.sent} messages published"]
-    if publisher.lost:
-        parts.append(f"{publisher.lost} dropped, as they had no room")
-    if publisher.waiting:
-        parts.append(f"{publisher.waiting} not sent: the broker is away")
-    return "; ".join(parts)
-
-
-async def _all_lost(workspace: Workspace) -> None:
-    broken = asyncio.Event()
-
-    def noticed(event: SessionEvent) -> None:
-        if isinstance(event, StateChanged) and _lost(workspace):
-            broken.set()
-
-    leave = workspace.subscribe(noticed)
-    try:
-        await broken.wait()
-    finally:
-        leave()
-    loss = _lost(workspace)
-    assert loss is not None
-    raise loss
 
 
 def _lost(workspace: Workspace) -> TransportLost | None:
