@@ -44,13 +44,9 @@ def url_without_secrets(url: str) -> str:
     if "@" in place:
         rest = f"{HIDDEN}@{rest[place.rindex('@') + 1 :]}"
     body, mark_of_query, query = rest.partition("?")
-    items = (_without_value(item) for item in query.split("&"))
-    return f"{scheme}://{body}{mark_of_query}{'&'.join(items)}"
-
-
-def _without_value(item: str) -> str:
-    key, mark, _ = item.partition("=")
-    return f"{key}={HIDDEN}" if mark and _is_secret(key) else item
+    items = (item.partition("=") for item in query.split("&"))
+    shown = (f"{key}={HIDDEN}" if mark and _is_secret(key) else f"{key}{mark}{value}" for key, mark, value in items)
+    return f"{scheme}://{body}{mark_of_query}{'&'.join(shown)}"
 
 
 def holds_password(url: str) -> bool:
@@ -97,7 +93,14 @@ def toml_without_secrets(text: str) -> str:
             return without_secrets(clean)  # comments
     except (ValueError, TypeError, RecursionError, TOMLKitError):
         pass
-    return "\n".join(map(_without_any_value, text.split("\n")))
+    lines = []
+    for line in text.split("\n"):  # of a line its key, or all of it where it is a header
+        key, mark, _ = line.partition("=")
+        if mark and re.fullmatch(r"[\s\w.\"'-]+", key):
+            lines.append(f"{key}= {HIDDEN}")
+        else:
+            lines.append(line if _HEADER.fullmatch(line) else HIDDEN)
+    return "\n".join(lines)
 
 
 def _hide(part: Any, secret: bool) -> None:
@@ -119,11 +122,3 @@ def _leaks(part: Any, secret: bool) -> bool:
     if isinstance(part, list):
         return any(_leaks(value, secret) for value in part)
     return part != HIDDEN if secret else isinstance(part, str) and url_without_secrets(part) != part
-
-
-def _without_any_value(line: str) -> str:
-    """Of a line in a file that is not TOML: its key, or all of it where it is a header."""
-    key, mark, _ = line.partition("=")
-    if mark and re.fullmatch(r"[\s\w.\"'-]+", key):
-        return f"{key}= {HIDDEN}"
-    return line if _HEADER.fullmatch(line) else HIDDEN

@@ -33,7 +33,7 @@ def pmx(number: str) -> str:
 def moves(device: Any, now: float) -> bool:
     """Whether a simulated drive moves, an axis of it where it has several."""
     if hasattr(device, "controller"):
-        return any(axis.pulses.moving(now) or axis.homing is not None for axis in device.controller.axes)
+        return any(axis.pulses.profile.moving(now) or axis.homing is not None for axis in device.controller.axes)
     return bool(device.moving(now))
 
 

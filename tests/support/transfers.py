@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import AsyncIterator
-from contextlib import asynccontextmanager
 from pathlib import Path
 
 from tests.support.cell_session import CellSession, bus, party
@@ -13,11 +11,9 @@ FILE = "VA Q1=7   ' times\n' the main program\nPG 1\nLB G1\n  MR 100  ' there\n 
 LISTED = ["1  LB G1", "6  MR 100", "10  H", "12  E"]
 
 
-@asynccontextmanager
-async def shop_with(folder: Path, text: str = FILE, *buses: str, reconnect: bool = False) -> AsyncIterator[CellSession]:
+def shop_with(folder: Path, text: str = FILE, *buses: str, reconnect: bool = False) -> CellSession:
     (folder / "p.mxt").write_text(text)
-    async with CellSession(folder, *(buses or (LINE,)), reconnect=reconnect) as shop:
-        yield shop
+    return CellSession(folder, *(buses or (LINE,)), reconnect=reconnect)
 
 
 def kept(folder: Path) -> list[Path]:

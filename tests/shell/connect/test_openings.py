@@ -12,7 +12,8 @@ from multidrop.shell.session import Session
 from multidrop.transports import Unreachable
 from tests.shell.test_session import FakeBus
 from tests.support.cell_session import CellSession, bus, party
-from tests.support.virtual import in_virtual_time
+
+pytestmark = pytest.mark.virtual
 
 
 class Floor:
@@ -36,7 +37,6 @@ class Floor:
         return [Opened(bus, Hints())]
 
 
-@in_virtual_time
 async def test_the_buses_stand_in_the_order_of_their_urls_and_take_as_long_as_the_slowest(tmp_path):
     floor = Floor(tmp_path, slow=3.0, fast=0.5, middle=1.0)
     loop = asyncio.get_running_loop()
@@ -52,7 +52,6 @@ async def test_the_buses_stand_in_the_order_of_their_urls_and_take_as_long_as_th
     await floor.session.close()
 
 
-@in_virtual_time
 async def test_nothing_is_selected_before_the_first_url_is_open_unless_a_person_selects(tmp_path):
     floor = Floor(tmp_path, slow=3.0, fast=0.5, dead=-1.0)
     opening = asyncio.create_task(floor.session.open_all(["/slow", "/fast"]))
@@ -68,7 +67,6 @@ async def test_nothing_is_selected_before_the_first_url_is_open_unless_a_person_
     await floor.session.close()
 
 
-@in_virtual_time
 async def test_a_dead_url_holds_back_no_other_and_is_reported(tmp_path):
     floor, failures = Floor(tmp_path, dead=-30.0, fast=0.5), []
     opening = asyncio.create_task(
@@ -83,7 +81,6 @@ async def test_a_dead_url_holds_back_no_other_and_is_reported(tmp_path):
     await floor.session.close()
 
 
-@in_virtual_time
 async def test_without_a_receiver_the_first_failure_ends_the_others_and_closes_what_is_open(tmp_path):
     floor = Floor(tmp_path, fast=0.5, dead=-1.0, slow=60.0)
     with pytest.raises(Unreachable, match="no such port"):
@@ -93,7 +90,6 @@ async def test_without_a_receiver_the_first_failure_ends_the_others_and_closes_w
     assert all(bus.closed for bus in floor.buses.values())
 
 
-@in_virtual_time
 async def test_a_wrong_url_is_an_error_before_anything_is_opened(tmp_path):
     floor = Floor(tmp_path, fast=0.5)
     with pytest.raises(Diagnostic):
@@ -101,7 +97,6 @@ async def test_a_wrong_url_is_an_error_before_anything_is_opened(tmp_path):
     assert floor.buses == {} and floor.session.buses == {}
 
 
-@in_virtual_time
 async def test_an_interruption_ends_every_opening(tmp_path):
     floor = Floor(tmp_path, one=30.0, two=30.0, fast=0.5)
     opening = asyncio.create_task(floor.session.open_all(["/one", "/fast", "/two"]))
@@ -113,7 +108,6 @@ async def test_an_interruption_ends_every_opening(tmp_path):
     await floor.session.close()
 
 
-@in_virtual_time
 async def test_a_stop_while_others_are_being_opened_reaches_the_open_ones(tmp_path):
     floor = Floor(tmp_path, slow=30.0, fast=0.5)
     opening = asyncio.create_task(floor.session.open_all(["/slow", "/fast"]))
@@ -125,7 +119,6 @@ async def test_a_stop_while_others_are_being_opened_reaches_the_open_ones(tmp_pa
     await floor.session.close()
 
 
-@in_virtual_time
 async def test_a_stop_before_a_line_is_open_is_not_said_to_reach_it_and_is_the_first_to_be_sent_there(tmp_path):
     cell = CellSession(tmp_path, bus("press", party("a", ES=1), party("b", ES=3)))
     real = cell.session.openings._opener
@@ -154,7 +147,6 @@ async def test_a_stop_before_a_line_is_open_is_not_said_to_reach_it_and_is_the_f
     await cell.session.close()
 
 
-@in_virtual_time
 async def test_a_stop_before_an_opening_is_not_for_it(tmp_path):
     floor = Floor(tmp_path, late=3.0, never=-3.0)
     floor.session.stop()
@@ -170,7 +162,6 @@ async def test_a_stop_before_an_opening_is_not_for_it(tmp_path):
     await floor.session.close()
 
 
-@in_virtual_time
 async def test_equal_names_are_given_in_the_order_of_the_urls_and_again_after_a_failure(tmp_path):
     floor = Floor(tmp_path, **{"a/x": 2.0, "b/x": 1.0})
     await floor.session.open_all(["/a/x", "/b/x"])
@@ -184,7 +175,6 @@ async def test_equal_names_are_given_in_the_order_of_the_urls_and_again_after_a_
     await floor.session.close()
 
 
-@in_virtual_time
 async def test_drives_that_do_not_reply_close_their_bus_only(tmp_path):
     floor, failures = Floor(tmp_path, mute=0.5, fast=0.5), []
 

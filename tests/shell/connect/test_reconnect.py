@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import AsyncIterator
-from contextlib import asynccontextmanager
 from pathlib import Path
 from typing import Any
 
@@ -19,18 +18,21 @@ from multidrop.transports import TransportLost
 from tests.support.cell_session import ETHERNET, CellSession, bus, party, pmx
 from tests.support.mcode_drives import Witness
 from tests.support.until import until
-from tests.support.virtual import in_virtual_time
 
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.virtual, pytest.mark.slow]
 
 LINE = bus("line", party("a"), party("b"))
 PROGRAM = "".join(f"R1=R1+{number}\n" for number in range(40))
 WAITING = pytest.raises(TransportLost)
 
 
-@asynccontextmanager
-async def opened(folder: Path, *buses: str, reconnect: bool = True) -> AsyncIterator[CellSession]:
-    async with CellSession(folder, *(buses or (LINE,)), reconnect=reconnect) as shop:
+def opened(folder: Path, *buses: str, reconnect: bool = True) -> CellSession:
+    return CellSession(folder, *(buses or (LINE,)), reconnect=reconnect)
+
+
+@pytest.fixture
+async def shop(tmp_path: Path) -> AsyncIterator[CellSession]:
+    async with opened(tmp_path) as shop:
         yield shop
 
 
@@ -45,30 +47,25 @@ async def back(shop: CellSession, name: str = "line") -> float:
     return await until(lambda: not shop.session.buses[name].lost and not shop.session.reconnections.trying)
 
 
-@in_virtual_time
-async def test_a_bus_comes_back_as_it_was(tmp_path: Path) -> None:
-    async with opened(tmp_path) as shop:
-        line, drives = shop.session.buses["line"], dict(shop.session.buses["line"].drives)
-        shop.session.select("b")
-        await shop.session.run("@b VM 300000")
-        await lost(shop)
-        with WAITING:
-            await shop.session.run("PR P")
-        await asyncio.sleep(3.0)
-        assert shop.session.buses["line"].lost and list(shop.session.reconnections.trying) == ["line"]
-        assert await back(shop) < 1.5
-        assert shop.session.buses["line"] is line and dict(line.drives) == drives
-        assert shop.session.place == ("line", "b") and not shop.session.latched
-        await shop.session.run("PR VM")
-        assert shop.printed() == ["300000"]
-        said = [text for text in shop.warned() if "line" in text]
-        assert [text.split(": ")[0] for text in said][0] == "line" and said[0].endswith(
-            "was lost: unplugged; trying again"
-        )
-        assert said[1:] and said[-1].startswith("line is back after 3.") and len(said) == 2
+async def test_a_bus_comes_back_as_it_was(shop: CellSession) -> None:
+    line, drives = shop.session.buses["line"], dict(shop.session.buses["line"].drives)
+    shop.session.select("b")
+    await shop.session.run("@b VM 300000")
+    await lost(shop)
+    with WAITING:
+        await shop.session.run("PR P")
+    await asyncio.sleep(3.0)
+    assert shop.session.buses["line"].lost and list(shop.session.reconnections.trying) == ["line"]
+    assert await back(shop) < 1.5
+    assert shop.session.buses["line"] is line and dict(line.drives) == drives
+    assert shop.session.place == ("line", "b") and not shop.session.latched
+    await shop.session.run("PR VM")
+    assert shop.printed() == ["300000"]
+    said = [text for text in shop.warned() if "line" in text]
+    assert [text.split(": ")[0] for text in said][0] == "line" and said[0].endswith("was lost: unplugged; trying again")
+    assert said[1:] and said[-1].startswith("line is back after 3.") and len(said) == 2
 
 
-@in_virtual_time
 async def test_a_port_that_is_back_is_noticed_within_a_second_however_long_it_was_away(tmp_path: Path) -> None:
     async with opened(tmp_path, bus("line", ETHERNET)) as shop:
         for away in (0.01, 0.3, 5.0, 3000.0):
@@ -80,86 +77,75 @@ async def test_a_port_that_is_back_is_noticed_within_a_second_however_long_it_wa
             await back(shop)
 
 
-@in_virtual_time
-async def test_a_command_that_was_in_flight_is_not_known_and_not_sent_again(tmp_path: Path) -> None:
-    async with opened(tmp_path) as shop:
-        witness = Witness(shop.device("line:a"))
-        moving = asyncio.create_task(shop.session.run("@a MR 51200"))
-        await until(lambda: b"MR 51200" in shop.written("line"))
-        await lost(shop)
-        with pytest.raises(TransportLost, match="it is not known whether 'MR 51200' was executed"):
-            await moving
-        shop.events.clear()
-        await back(shop)
-        assert b"MR" not in shop.written("line") and shop.written("line").startswith(b"\x1b")
-        assert any("'aMR 51200' was cut off by the loss" in text for text in shop.warned())
-        await asyncio.sleep(1.0)
-        assert not shop.moving() and len(witness.executed("MR 51200")) <= 1
-        await shop.session.run("@a PR P")
+async def test_a_command_that_was_in_flight_is_not_known_and_not_sent_again(shop: CellSession) -> None:
+    witness = Witness(shop.device("line:a"))
+    moving = asyncio.create_task(shop.session.run("@a MR 51200"))
+    await until(lambda: b"MR 51200" in shop.written("line"))
+    await lost(shop)
+    with pytest.raises(TransportLost, match="it is not known whether 'MR 51200' was executed"):
+        await moving
+    shop.events.clear()
+    await back(shop)
+    assert b"MR" not in shop.written("line") and shop.written("line").startswith(b"\x1b")
+    assert any("'aMR 51200' was cut off by the loss" in text for text in shop.warned())
+    await asyncio.sleep(1.0)
+    assert not shop.moving() and len(witness.executed("MR 51200")) <= 1
+    await shop.session.run("@a PR P")
 
 
-@in_virtual_time
-async def test_a_question_that_was_in_flight_leaves_nothing_open(tmp_path: Path) -> None:
-    async with opened(tmp_path) as shop:
-        asking = asyncio.create_task(shop.session.run("@a PR P"))
-        await until(lambda: b"PR P" in shop.written("line"))
-        await lost(shop)
-        with pytest.raises(TransportLost) as failed:
-            await asking
-        shop.events.clear()
-        await back(shop)
-        assert "not known" not in str(failed.value) and b"\x1b" not in shop.written("line")
+async def test_a_question_that_was_in_flight_leaves_nothing_open(shop: CellSession) -> None:
+    asking = asyncio.create_task(shop.session.run("@a PR P"))
+    await until(lambda: b"PR P" in shop.written("line"))
+    await lost(shop)
+    with pytest.raises(TransportLost) as failed:
+        await asking
+    shop.events.clear()
+    await back(shop)
+    assert "not known" not in str(failed.value) and b"\x1b" not in shop.written("line")
 
 
-@in_virtual_time
-async def test_a_download_ends_and_the_drive_is_put_right(tmp_path: Path) -> None:
+async def test_a_download_ends_and_the_drive_is_put_right(tmp_path: Path, shop: CellSession) -> None:
     (tmp_path / "long.mxt").write_text(PROGRAM.join(("PG 1\n", "E\nPG\n")))
-    async with opened(tmp_path) as shop:
-        device = shop.device("line:a")
-        loading = asyncio.create_task(shop.session.run(f"/download {tmp_path / 'long.mxt'} a"))
-        await until(lambda: device.programming is not None and device.programming > 20)
-        assert device.memory.echo_mode == 0
-        await lost(shop)
-        with WAITING:
-            await loading
-        await back(shop)
-        assert device.programming is None and device.memory.echo_mode == 1
-        assert not shop.session.buses["line"].drives["a"].programming
-        assert any("was in program mode and was taken out with PG" in text for text in shop.warned())
-        await shop.session.run("@b PR P")
+    device = shop.device("line:a")
+    loading = asyncio.create_task(shop.session.run(f"/download {tmp_path / 'long.mxt'} a"))
+    await until(lambda: device.programming is not None and device.programming > 20)
+    assert device.memory.echo_mode == 0
+    await lost(shop)
+    with WAITING:
+        await loading
+    await back(shop)
+    assert device.programming is None and device.memory.echo_mode == 1
+    assert not shop.session.buses["line"].drives["a"].programming
+    assert any("was in program mode and was taken out with PG" in text for text in shop.warned())
+    await shop.session.run("@b PR P")
 
 
-@in_virtual_time
-async def test_program_mode_that_a_person_left_open_is_ended(tmp_path: Path) -> None:
-    async with opened(tmp_path) as shop:
-        await shop.session.run("@a PG 1")
-        await lost(shop)
-        await back(shop)
-        assert shop.device("line:a").programming is None and shop.device("line:a").memory.echo_mode == 1
-        await shop.session.run("@a PR P")
+async def test_program_mode_that_a_person_left_open_is_ended(shop: CellSession) -> None:
+    await shop.session.run("@a PG 1")
+    await lost(shop)
+    await back(shop)
+    assert shop.device("line:a").programming is None and shop.device("line:a").memory.echo_mode == 1
+    await shop.session.run("@a PR P")
 
 
-@in_virtual_time
-async def test_a_stop_during_the_loss_is_the_first_to_leave(tmp_path: Path) -> None:
-    async with opened(tmp_path) as shop:
-        await shop.session.run("@a SL 20000")
-        await lost(shop)
-        shop.session.stop()
-        assert shop.session.latched and any("stop not sent (lost)" in text for text in shop.warned())
-        assert shop.warned()[-1] == "line: the stop is the first to be sent when the line is back"
-        await asyncio.sleep(2.0)
-        assert shop.moving() == {"line:a"}
-        shop.events.clear()
-        shop.world("/sim plug line")
-        await until(lambda: shop.written("line"))
-        assert shop.written("line").startswith(b"\x1b")
-        await back(shop)
-        await shop.session.buses["line"].stopped()
-        assert not shop.moving() and shop.session.latched and shop.session.tally().stand
-        assert "line: the stop of a, b was sent first (the loss kept it from the drives)" in shop.warned()
+async def test_a_stop_during_the_loss_is_the_first_to_leave(shop: CellSession) -> None:
+    await shop.session.run("@a SL 20000")
+    await lost(shop)
+    shop.session.stop()
+    assert shop.session.latched and any("stop not sent (lost)" in text for text in shop.warned())
+    assert shop.warned()[-1] == "line: the stop is the first to be sent when the line is back"
+    await asyncio.sleep(2.0)
+    assert shop.moving() == {"line:a"}
+    shop.events.clear()
+    shop.world("/sim plug line")
+    await until(lambda: shop.written("line"))
+    assert shop.written("line").startswith(b"\x1b")
+    await back(shop)
+    await shop.session.buses["line"].stopped()
+    assert not shop.moving() and shop.session.latched and shop.session.tally().stand
+    assert "line: the stop of a, b was sent first (the loss kept it from the drives)" in shop.warned()
 
 
-@in_virtual_time
 async def test_the_stop_on_return_is_for_drives_as_they_were_saved_too(tmp_path: Path) -> None:
     """A power cycle during the loss gives a drive its saved ES and name again."""
     async with opened(tmp_path, bus("line", party("a", ES=1), party("b", ES=3))) as shop:
@@ -182,21 +168,18 @@ async def test_the_stop_on_return_is_for_drives_as_they_were_saved_too(tmp_path:
         await back(shop)
 
 
-@in_virtual_time
-async def test_a_stop_that_the_loss_kept_from_being_confirmed_is_sent_again(tmp_path: Path) -> None:
-    async with opened(tmp_path) as shop:
-        await shop.session.run("@a SL 20000")
-        shop.session.stop()
-        shop.world("/sim unplug line")
-        await until(lambda: shop.session.buses["line"].lost)
-        await asyncio.sleep(1.0)
-        shop.events.clear()
-        await back(shop)
-        await shop.session.buses["line"].stopped()
-        assert shop.written("line").startswith(b"\x1b") and shop.session.tally().stand
+async def test_a_stop_that_the_loss_kept_from_being_confirmed_is_sent_again(shop: CellSession) -> None:
+    await shop.session.run("@a SL 20000")
+    shop.session.stop()
+    shop.world("/sim unplug line")
+    await until(lambda: shop.session.buses["line"].lost)
+    await asyncio.sleep(1.0)
+    shop.events.clear()
+    await back(shop)
+    await shop.session.buses["line"].stopped()
+    assert shop.written("line").startswith(b"\x1b") and shop.session.tally().stand
 
 
-@in_virtual_time
 async def test_a_line_that_the_outage_refused_takes_no_drive_from_the_stop(tmp_path: Path) -> None:
     async with opened(tmp_path, bus("line", party("a", ES=3), party("b", ES=3))) as shop:
         for name in "ab":
@@ -212,182 +195,157 @@ async def test_a_line_that_the_outage_refused_takes_no_drive_from_the_stop(tmp_p
         assert not shop.moving() and b"MR" not in shop.written("line")
 
 
-@in_virtual_time
-async def test_a_stop_that_was_confirmed_is_not_sent_again(tmp_path: Path) -> None:
-    async with opened(tmp_path) as shop:
-        shop.session.stop()
-        await shop.session.buses["line"].stopped()
-        await shop.session.run("@a SL 20000")
+async def test_a_stop_that_was_confirmed_is_not_sent_again(shop: CellSession) -> None:
+    shop.session.stop()
+    await shop.session.buses["line"].stopped()
+    await shop.session.run("@a SL 20000")
+    await lost(shop)
+    shop.events.clear()
+    await back(shop)
+    assert b"\x1b" not in shop.written("line") and shop.moving() == {"line:a"}
+
+
+async def test_what_moved_at_the_loss_is_named_and_read_on_return(shop: CellSession) -> None:
+    await shop.session.run("@a SL 20000")
+    await lost(shop)
+    await back(shop)
+    said = shop.warned()
+    assert any("cannot be stopped from here" in text and "a started 0 s ago" in text for text in said)
+    assert "line: a moves at 20000 a second" in said and not any("b moves" in text for text in said)
+
+
+async def test_a_bus_that_is_lost_while_its_motion_is_read_comes_back_again(shop: CellSession) -> None:
+    await shop.session.run("@a SL 20000")
+    await lost(shop)
+    shop.world("/sim plug line")
+    await until(lambda: not shop.session.buses["line"].lost)
+    shop.events.clear()
+    await lost(shop)
+    await asyncio.sleep(2.0)
+    assert list(shop.session.reconnections.trying) == ["line"]
+    assert not any("could not be read" in text for text in shop.warned())
+    await back(shop)
+    await shop.session.run("@a PR V")
+    assert shop.printed()[-1] == "20000"
+
+
+async def test_a_stop_during_the_search_begins_the_search_again(shop: CellSession) -> None:
+    await shop.session.run("@b SL 20000")
+    await lost(shop)
+    shop.events.clear()
+    shop.world("/sim plug line")
+    await until(lambda: b"PR VR" in shop.written("line"))
+    shop.session.stop()
+    assert b"\x1b" in shop.written("line").rpartition(b"PR VR")[2]
+    assert not any("first to be sent" in text for text in shop.warned())  # it was sent
+    await until(lambda: not shop.session.buses["line"].lost)
+    await shop.session.buses["line"].stopped()
+    assert not shop.moving() and shop.session.tally().stand
+    await shop.session.run("@b PR P")
+
+
+async def test_a_bus_that_is_lost_again_during_the_search_comes_back_later(shop: CellSession) -> None:
+    await lost(shop)
+    shop.events.clear()
+    shop.world("/sim plug line")
+    await until(lambda: b"PR VR" in shop.written("line"))
+    shop.world("/sim unplug line")
+    await asyncio.sleep(5.0)
+    assert shop.session.buses["line"].lost
+    await back(shop)
+    assert sum("was lost" in text for text in shop.warned()) == 0  # one loss, said once
+    await shop.session.run("@a PR P")
+
+
+async def test_nothing_is_sent_between_the_return_and_the_end_of_the_search(shop: CellSession) -> None:
+    telemetry = shop.session.buses["line"].telemetry.subscribe(["a", "b"], 0.02)
+    await lost(shop)
+    shop.events.clear()
+    shop.world("/sim plug line")
+    await until(lambda: shop.written("line"))
+    with pytest.raises(TransportLost, match="was lost"):
+        await shop.session.run("@a MR 100")
+    await until(lambda: not shop.session.buses["line"].lost)
+    searched = shop.written("line").rpartition(b"~b")[0]
+    assert b"MR 100" not in shop.written("line") and searched and b"PR P," not in searched
+    telemetry.close()
+
+
+async def test_a_drive_that_was_switched_off_meanwhile_is_found_as_it_was_saved(shop: CellSession) -> None:
+    await shop.session.run("@b EM=2")
+    await shop.session.run("@b CK=0")
+    await lost(shop)
+    shop.world("/sim power b off")
+    shop.world("/sim power b on")
+    await asyncio.sleep(1.0)
+    await back(shop)
+    codec: Any = shop.session.buses["line"].drives["b"].codec
+    assert (codec.em, codec.checksum, codec.party) == (1, 1, True)
+    assert any("b: its settings are not those of before the loss" in text for text in shop.warned())
+    await shop.session.run("@b PR P")
+
+
+async def test_a_drive_that_was_renamed_is_found_by_its_present_name(shop: CellSession) -> None:
+    drive = shop.session.buses["line"].drives["b"]
+    await shop.session.run('@b DN="z"')
+    await lost(shop)
+    await back(shop)
+    assert list(shop.session.buses["line"].drives) == ["a", "z"] and shop.session.buses["line"].drives["z"] is drive
+    await shop.session.run("@z PR P")
+
+
+async def test_another_drive_on_the_same_port_is_said_in_one_line(shop: CellSession) -> None:
+    shop.session.buses["line"].drives["a"].state.identified("LMDOM", "LMDOM 5.010, Hw: 3.2")
+    await lost(shop)
+    await back(shop)
+    (said,) = [text for text in shop.warned() if "another drive" in text]
+    assert "product LMDOM before, LMDCM now" in said
+
+
+async def test_a_silent_line_is_said_once_and_asked_until_a_drive_replies(shop: CellSession) -> None:
+    await lost(shop)
+    for name in "ab":
+        shop.world(f"/sim power {name} off")
+    shop.world("/sim plug line")
+    await asyncio.sleep(60.0)
+    assert shop.session.buses["line"].lost
+    assert sum("still lost: none of the drives a, b replies" in text for text in shop.warned()) == 1
+    for name in "ab":
+        shop.world(f"/sim power {name} on")
+    await until(lambda: not shop.session.buses["line"].lost)
+    await shop.session.run("@a PR P")
+
+
+async def test_a_bus_that_never_comes_back_is_given_up_by_close(shop: CellSession) -> None:
+    before = len(asyncio.all_tasks())
+    await lost(shop)
+    await asyncio.sleep(3600.0)
+    assert len(shop.told()) == 1 and len(asyncio.all_tasks()) <= before + 1
+    await shop.session.run("/close line")
+    assert not shop.session.reconnections.trying and not shop.session.buses
+    shop.events.clear()
+    await asyncio.sleep(10.0)
+    assert not shop.told() and len(asyncio.all_tasks()) <= before
+
+
+async def test_plugged_out_and_in_ten_times_nothing_is_left_behind(shop: CellSession) -> None:
+    line = shop.session.buses["line"]
+    subscription = line.telemetry.subscribe(["a"], 0.1)
+    await asyncio.sleep(1.0)
+    tasks = len(asyncio.all_tasks())
+    listeners = len(shop.session.cells["line"]._listeners["line"])
+    for _ in range(10):
         await lost(shop)
-        shop.events.clear()
+        await asyncio.sleep(0.5)
         await back(shop)
-        assert b"\x1b" not in shop.written("line") and shop.moving() == {"line:a"}
-
-
-@in_virtual_time
-async def test_what_moved_at_the_loss_is_named_and_read_on_return(tmp_path: Path) -> None:
-    async with opened(tmp_path) as shop:
-        await shop.session.run("@a SL 20000")
-        await lost(shop)
-        await back(shop)
-        said = shop.warned()
-        assert any("cannot be stopped from here" in text and "a started 0 s ago" in text for text in said)
-        assert "line: a moves at 20000 a second" in said and not any("b moves" in text for text in said)
-
-
-@in_virtual_time
-async def test_a_bus_that_is_lost_while_its_motion_is_read_comes_back_again(tmp_path: Path) -> None:
-    async with opened(tmp_path) as shop:
-        await shop.session.run("@a SL 20000")
-        await lost(shop)
-        shop.world("/sim plug line")
-        await until(lambda: not shop.session.buses["line"].lost)
         shop.events.clear()
-        await lost(shop)
-        await asyncio.sleep(2.0)
-        assert list(shop.session.reconnections.trying) == ["line"]
-        assert not any("could not be read" in text for text in shop.warned())
-        await back(shop)
-        await shop.session.run("@a PR V")
-        assert shop.printed()[-1] == "20000"
-
-
-@in_virtual_time
-async def test_a_stop_during_the_search_begins_the_search_again(tmp_path: Path) -> None:
-    async with opened(tmp_path) as shop:
-        await shop.session.run("@b SL 20000")
-        await lost(shop)
-        shop.events.clear()
-        shop.world("/sim plug line")
-        await until(lambda: b"PR VR" in shop.written("line"))
-        shop.session.stop()
-        assert b"\x1b" in shop.written("line").rpartition(b"PR VR")[2]
-        assert not any("first to be sent" in text for text in shop.warned())  # it was sent
-        await until(lambda: not shop.session.buses["line"].lost)
-        await shop.session.buses["line"].stopped()
-        assert not shop.moving() and shop.session.tally().stand
-        await shop.session.run("@b PR P")
-
-
-@in_virtual_time
-async def test_a_bus_that_is_lost_again_during_the_search_comes_back_later(tmp_path: Path) -> None:
-    async with opened(tmp_path) as shop:
-        await lost(shop)
-        shop.events.clear()
-        shop.world("/sim plug line")
-        await until(lambda: b"PR VR" in shop.written("line"))
-        shop.world("/sim unplug line")
-        await asyncio.sleep(5.0)
-        assert shop.session.buses["line"].lost
-        await back(shop)
-        assert sum("was lost" in text for text in shop.warned()) == 0  # one loss, said once
-        await shop.session.run("@a PR P")
-
-
-@in_virtual_time
-async def test_nothing_is_sent_between_the_return_and_the_end_of_the_search(tmp_path: Path) -> None:
-    async with opened(tmp_path) as shop:
-        telemetry = shop.session.buses["line"].telemetry.subscribe(["a", "b"], 0.02)
-        await lost(shop)
-        shop.events.clear()
-        shop.world("/sim plug line")
-        await until(lambda: shop.written("line"))
-        with pytest.raises(TransportLost, match="was lost"):
-            await shop.session.run("@a MR 100")
-        await until(lambda: not shop.session.buses["line"].lost)
-        searched = shop.written("line").rpartition(b"~b")[0]
-        assert b"MR 100" not in shop.written("line") and searched and b"PR P," not in searched
-        telemetry.close()
-
-
-@in_virtual_time
-async def test_a_drive_that_was_switched_off_meanwhile_is_found_as_it_was_saved(tmp_path: Path) -> None:
-    async with opened(tmp_path) as shop:
-        await shop.session.run("@b EM=2")
-        await shop.session.run("@b CK=0")
-        await lost(shop)
-        shop.world("/sim power b off")
-        shop.world("/sim power b on")
         await asyncio.sleep(1.0)
-        await back(shop)
-        codec: Any = shop.session.buses["line"].drives["b"].codec
-        assert (codec.em, codec.checksum, codec.party) == (1, 1, True)
-        assert any("b: its settings are not those of before the loss" in text for text in shop.warned())
-        await shop.session.run("@b PR P")
+        assert sum(isinstance(e, OnBus) and isinstance(e.event, Sample) for e in shop.events) >= 8
+    subscription.close()
+    assert len(asyncio.all_tasks()) <= tasks
+    assert len(shop.session.cells["line"]._listeners["line"]) == listeners
 
 
-@in_virtual_time
-async def test_a_drive_that_was_renamed_is_found_by_its_present_name(tmp_path: Path) -> None:
-    async with opened(tmp_path) as shop:
-        drive = shop.session.buses["line"].drives["b"]
-        await shop.session.run('@b DN="z"')
-        await lost(shop)
-        await back(shop)
-        assert list(shop.session.buses["line"].drives) == ["a", "z"] and shop.session.buses["line"].drives["z"] is drive
-        await shop.session.run("@z PR P")
-
-
-@in_virtual_time
-async def test_another_drive_on_the_same_port_is_said_in_one_line(tmp_path: Path) -> None:
-    async with opened(tmp_path) as shop:
-        shop.session.buses["line"].drives["a"].state.identified("LMDOM", "LMDOM 5.010, Hw: 3.2")
-        await lost(shop)
-        await back(shop)
-        (said,) = [text for text in shop.warned() if "another drive" in text]
-        assert "product LMDOM before, LMDCM now" in said
-
-
-@in_virtual_time
-async def test_a_silent_line_is_said_once_and_asked_until_a_drive_replies(tmp_path: Path) -> None:
-    async with opened(tmp_path) as shop:
-        await lost(shop)
-        for name in "ab":
-            shop.world(f"/sim power {name} off")
-        shop.world("/sim plug line")
-        await asyncio.sleep(60.0)
-        assert shop.session.buses["line"].lost
-        assert sum("still lost: none of the drives a, b replies" in text for text in shop.warned()) == 1
-        for name in "ab":
-            shop.world(f"/sim power {name} on")
-        await until(lambda: not shop.session.buses["line"].lost)
-        await shop.session.run("@a PR P")
-
-
-@in_virtual_time
-async def test_a_bus_that_never_comes_back_is_given_up_by_close(tmp_path: Path) -> None:
-    async with opened(tmp_path) as shop:
-        before = len(asyncio.all_tasks())
-        await lost(shop)
-        await asyncio.sleep(3600.0)
-        assert len(shop.told()) == 1 and len(asyncio.all_tasks()) <= before + 1
-        await shop.session.run("/close line")
-        assert not shop.session.reconnections.trying and not shop.session.buses
-        shop.events.clear()
-        await asyncio.sleep(10.0)
-        assert not shop.told() and len(asyncio.all_tasks()) <= before
-
-
-@in_virtual_time
-async def test_plugged_out_and_in_ten_times_nothing_is_left_behind(tmp_path: Path) -> None:
-    async with opened(tmp_path) as shop:
-        line = shop.session.buses["line"]
-        subscription = line.telemetry.subscribe(["a"], 0.1)
-        await asyncio.sleep(1.0)
-        tasks = len(asyncio.all_tasks())
-        listeners = len(shop.session.cells["line"]._listeners["line"])
-        for _ in range(10):
-            await lost(shop)
-            await asyncio.sleep(0.5)
-            await back(shop)
-            shop.events.clear()
-            await asyncio.sleep(1.0)
-            assert sum(isinstance(e, OnBus) and isinstance(e.event, Sample) for e in shop.events) >= 8
-        subscription.close()
-        assert len(asyncio.all_tasks()) <= tasks
-        assert len(shop.session.cells["line"]._listeners["line"]) == listeners
-
-
-@in_virtual_time
 async def test_several_buses_come_back_side_by_side(tmp_path: Path) -> None:
     module = 'personality = "TMCM"\nname = "1"'
     cell = [LINE, bus("eth", ETHERNET, baud=0), bus("pmx", pmx("00")), bus("tmcl", module)]
@@ -402,7 +360,6 @@ async def test_several_buses_come_back_side_by_side(tmp_path: Path) -> None:
             await shop.session.run(line)
 
 
-@in_virtual_time
 async def test_an_ethernet_drive_that_was_switched_off_comes_back_once_it_has_booted(tmp_path: Path) -> None:
     async with opened(tmp_path, bus("eth", ETHERNET, baud=0)) as shop:
         await shop.session.run("SL 20000")
@@ -420,7 +377,6 @@ async def test_an_ethernet_drive_that_was_switched_off_comes_back_once_it_has_bo
     [("EM = 0, CK = 0", ["EM=1"]), ("EM = 1, CK = 1", ["CK=0"]), ("EM = 1, CK = 1", ['DN="q"', "PY=1"])],
     ids=["EM", "CK", "PY"],
 )
-@in_virtual_time
 async def test_a_drive_that_is_restarted_is_said_and_found_as_it_was_saved(
     tmp_path: Path, saved: str, changed: list[str], polled: bool
 ) -> None:
@@ -441,7 +397,6 @@ async def test_a_drive_that_is_restarted_is_said_and_found_as_it_was_saved(
         assert any("has other settings now" in text for text in shop.warned())
 
 
-@in_virtual_time
 async def test_a_macro_ends_with_the_loss_and_its_drive_is_stopped_on_return(tmp_path: Path) -> None:
     async with opened(tmp_path, bus("line", party("a", ES=3), party("b", ES=3))) as shop:
         macro = Macro("go", (Step(0.0, "@a SL 20000"), Step(0.0, "/wait stopped 60")))
@@ -459,7 +414,6 @@ async def test_a_macro_ends_with_the_loss_and_its_drive_is_stopped_on_return(tmp
         assert any("the stop of a was sent first" in text for text in shop.warned())
 
 
-@in_virtual_time
 async def test_without_reconnection_a_lost_bus_stays_lost(tmp_path: Path) -> None:
     async with opened(tmp_path, reconnect=False) as shop:
         await lost(shop)
@@ -468,7 +422,6 @@ async def test_without_reconnection_a_lost_bus_stays_lost(tmp_path: Path) -> Non
         assert shop.session.buses["line"].lost and len(shop.told()) == 1 and not shop.warned()
 
 
-@in_virtual_time
 async def test_a_bus_that_is_lost_while_it_is_opened_is_not_tried_again(tmp_path: Path) -> None:
     shop = CellSession(tmp_path, LINE, reconnect=True)
     opening = asyncio.create_task(shop.session.open(shop.url))

@@ -11,9 +11,8 @@ from multidrop.shell.finding.rescuing import Rescue
 from multidrop.shell.finding.scanning import NothingFound, Scanning
 from tests.support.cell_session import bus, pmx
 from tests.support.tuned_ports import Port
-from tests.support.virtual import in_virtual_time
 
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.virtual, pytest.mark.slow]
 
 BAUDS = (4800, 9600, 19200, 38400, 115200)
 QUICK = [(0, 0, 0, "!", 9600), (2, 1, 1, "P", 115200), (3, 1, 2, "9", 4800), (1, 0, 1, "a", 19200)]
@@ -34,7 +33,6 @@ def rescue(port, url="/dev/ttyUSB9"):
 @pytest.mark.parametrize(
     ("em", "py", "ck", "name", "baud"), [*QUICK, *(pytest.param(*each, marks=pytest.mark.nightly) for each in ALL)]
 )
-@in_virtual_time
 async def test_a_drive_in_any_mode_under_any_name_at_any_baud_rate_is_free(tmp_path, em, py, ck, name, baud):
     port = Port(tmp_path, bus("b", drive(name, em, py, ck), baud=baud))
     port.session.questions.agreed = True
@@ -53,7 +51,6 @@ async def test_a_drive_in_any_mode_under_any_name_at_any_baud_rate_is_free(tmp_p
 
 
 @pytest.mark.nightly
-@in_virtual_time
 async def test_a_controller_of_the_other_family_is_found(tmp_path):
     port = Port(tmp_path, bus("b", pmx("42"), baud=38400))
     port.session.questions.agreed = True
@@ -62,7 +59,6 @@ async def test_a_controller_of_the_other_family_is_found(tmp_path):
     assert [(each["dialect"], each["address"], each["baud"]) for each in found] == [("pmx", "42", 38400)]
 
 
-@in_virtual_time
 async def test_nothing_that_may_do_harm_is_sent_before_a_yes(tmp_path):
     port = Port(tmp_path, bus("b", drive(em=2)))
     port.devices[0].execute("PG 1", 0.0)
@@ -73,7 +69,6 @@ async def test_nothing_that_may_do_harm_is_sent_before_a_yes(tmp_path):
     assert any(text.startswith("step 2: clear the line") for text in port.told())
 
 
-@in_virtual_time
 async def test_nothing_is_erased_without_a_word_for_it(tmp_path):
     port = Port(tmp_path, bus("b", drive(more='program_text = "PG 1\\nLB G1\\nE\\nPG"')))
     port.devices[0].power(False, 0.0)
@@ -84,7 +79,6 @@ async def test_nothing_is_erased_without_a_word_for_it(tmp_path):
     assert any("--erase" in text for text in port.told())
 
 
-@in_virtual_time
 async def test_factory_defaults_come_last_and_after_a_question_of_their_own(tmp_path):
     port = Port(tmp_path, bus("b"))
     questions = []
@@ -100,7 +94,6 @@ async def test_factory_defaults_come_last_and_after_a_question_of_their_own(tmp_
     assert len(questions) == 3 and "erases their programs" in questions[-1]
 
 
-@in_virtual_time
 async def test_a_power_cycle_is_listened_to_and_nothing_is_sent_meanwhile(tmp_path):
     port = Port(tmp_path, bus("b", drive("a", em=0, py=0)))
     [device] = port.devices
@@ -127,7 +120,6 @@ async def test_a_power_cycle_is_listened_to_and_nothing_is_sent_meanwhile(tmp_pa
     assert any("a sign-on with MCode at 9600 baud" in text for text in port.told())
 
 
-@in_virtual_time
 async def test_plain_sets_the_modes_after_a_question(tmp_path):
     port = Port(tmp_path, bus("b", drive("k", em=2, py=1, ck=1)))
     _, work, scanning = rescue(port)
@@ -141,7 +133,6 @@ async def test_plain_sets_the_modes_after_a_question(tmp_path):
     assert scanning.found[0].url == "serial:/dev/ttyUSB9?baud=9600&party=0"
 
 
-@in_virtual_time
 async def test_a_stop_ends_a_rescue(tmp_path):
     port = Port(tmp_path, bus("b"))
     port.session.questions.agreed = True
@@ -154,7 +145,6 @@ async def test_a_stop_ends_a_rescue(tmp_path):
     assert port.session.buses == {} and not any(text.endswith("factory defaults") for text in port.told())
 
 
-@in_virtual_time
 async def test_a_stop_while_it_listens_reaches_every_rate_that_was_agreed_to(tmp_path):
     port = Port(tmp_path, bus("b", drive("a", em=0, py=0)))
     device = port.devices[0]

@@ -12,9 +12,8 @@ from multidrop.shell.state.port_state import PortState
 from multidrop.transports import TransportLost
 from tests.support.cell_session import CellSession, bus, party, pmx
 from tests.support.tuned_ports import Port
-from tests.support.virtual import in_virtual_time
 
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.virtual, pytest.mark.slow]
 
 MOVES = 'program_text = """PG 1\nLB Q1\nMR 5000\nRT\nE\nPG\nOE Q1\n"""'
 
@@ -24,7 +23,6 @@ def scanning(port, url="/dev/ttyUSB9"):
     return found, Scanning(port.session, port.opener, parse(url), lambda drive: found.append(drive.facts()))
 
 
-@in_virtual_time
 async def test_the_search_ends_at_the_first_answer_and_lists_every_drive_of_that_line(tmp_path):
     port = Port(tmp_path, bus("b", party("a", CK=0), party("k", EM=2)))
     found, search = scanning(port)
@@ -38,7 +36,6 @@ async def test_the_search_ends_at_the_first_answer_and_lists_every_drive_of_that
     assert port.session.buses == {}
 
 
-@in_virtual_time
 async def test_before_another_baud_rate_a_person_is_asked_and_told_why(tmp_path):
     port = Port(tmp_path, bus("b", party("a"), baud=19200))
     found, search = scanning(port)
@@ -50,7 +47,6 @@ async def test_before_another_baud_rate_a_person_is_asked_and_told_why(tmp_path)
 @pytest.mark.parametrize(
     "baud", [115200, *(pytest.param(baud, marks=pytest.mark.nightly) for baud in (4800, 19200, 38400))]
 )
-@in_virtual_time
 async def test_a_drive_at_any_baud_rate_is_found_after_a_yes(tmp_path, baud):
     port = Port(tmp_path, bus("b", party("a"), baud=baud))
     port.session.questions.agreed = True
@@ -60,7 +56,6 @@ async def test_a_drive_at_any_baud_rate_is_found_after_a_yes(tmp_path, baud):
     assert port.opened[0] == ("mcode", 9600) and port.opened[-1] == ("mcode", baud)
 
 
-@in_virtual_time
 async def test_a_controller_of_the_other_family_is_found_last(tmp_path):
     port = Port(tmp_path, bus("b", pmx("07"), baud=19200))
     port.session.questions.agreed = True
@@ -71,7 +66,6 @@ async def test_a_controller_of_the_other_family_is_found_last(tmp_path):
     assert found[0]["url"] == "serial:/dev/ttyUSB9?baud=19200&dialect=pmx&drives=07"
 
 
-@in_virtual_time
 async def test_only_what_is_given_is_searched_without_a_question(tmp_path):
     port = Port(tmp_path, bus("b", pmx("07"), baud=19200))
     found, search = scanning(port, "/dev/ttyUSB9?dialect=pmx")
@@ -79,7 +73,6 @@ async def test_only_what_is_given_is_searched_without_a_question(tmp_path):
     assert port.opened == [("pmx", 19200)] and len(found) == 1
 
 
-@in_virtual_time
 async def test_nothing_found_names_what_was_tried(tmp_path):
     port = Port(tmp_path, bus("b"))
     _, search = scanning(port, "/dev/ttyUSB9?dialect=mcode")
@@ -87,7 +80,6 @@ async def test_nothing_found_names_what_was_tried(tmp_path):
         await search.run([4800], False)
 
 
-@in_virtual_time
 async def test_a_no_to_the_rest_keeps_what_was_found(tmp_path):
     async def no(question):
         return False
@@ -99,7 +91,6 @@ async def test_a_no_to_the_rest_keeps_what_was_found(tmp_path):
     assert len(found) == 1 and port.opened == [("mcode", 9600)]
 
 
-@in_virtual_time
 async def test_all_goes_on_and_takes_no_longer_than_its_bound(tmp_path):
     port = Port(tmp_path, bus("b"))
     port.session.questions.agreed = True
@@ -114,7 +105,6 @@ async def test_all_goes_on_and_takes_no_longer_than_its_bound(tmp_path):
     assert port.progress[-1].over and any(each.left for each in port.progress)
 
 
-@in_virtual_time
 async def test_an_adapter_that_repeats_what_it_sends_is_noticed(tmp_path):
     port = Port(tmp_path, bus("b", party("a", EM=0), party("k", EM=1)), repeats=True)
     found, search = scanning(port)
@@ -124,7 +114,6 @@ async def test_an_adapter_that_repeats_what_it_sends_is_noticed(tmp_path):
     assert any("echo=local" in text for text in port.told())
 
 
-@in_virtual_time
 async def test_an_adapter_that_repeats_is_noticed_by_a_drive_that_does_not(tmp_path):
     port = Port(tmp_path, bus("b", 'personality = "LMDCM"\nset = { EM = 1 }'), repeats=True)
     found, search = scanning(port)
@@ -132,7 +121,6 @@ async def test_an_adapter_that_repeats_is_noticed_by_a_drive_that_does_not(tmp_p
     assert [(each["address"], each["em"]) for each in found] == [("", 1)] and found[0]["url"].endswith("echo=local")
 
 
-@in_virtual_time
 async def test_a_stop_ends_the_search_and_keeps_what_was_found(tmp_path):
     port = Port(tmp_path, bus("b", party("a"), party("z")))
     found, search = scanning(port)
@@ -150,7 +138,6 @@ async def test_a_stop_ends_the_search_and_keeps_what_was_found(tmp_path):
 
 @pytest.mark.parametrize("escape", [2, 3])
 @pytest.mark.parametrize("rate", [4800, 9600])
-@in_virtual_time
 async def test_a_stop_reaches_a_drive_that_has_not_replied_and_needs_its_name_before_the_key(tmp_path, escape, rate):
     port = Port(tmp_path, bus("b", party("Z"), baud=rate))
     [device] = port.devices
@@ -167,7 +154,6 @@ async def test_a_stop_reaches_a_drive_that_has_not_replied_and_needs_its_name_be
     assert not device.moving(port.floor.now())
 
 
-@in_virtual_time
 async def test_a_stop_of_a_search_says_what_the_drives_that_replied_were_read_at(tmp_path):
     port = Port(tmp_path, bus("b", party("a"), party("z")))
     found, search = scanning(port)
@@ -180,14 +166,12 @@ async def test_a_stop_of_a_search_says_what_the_drives_that_replied_were_read_at
     assert "; a reads velocity 0. It was not confirmed for drives that have not replied" in text
 
 
-@in_virtual_time
 async def test_a_stop_with_no_drive_open_does_not_say_that_it_was_sent(tmp_path):
     port = Port(tmp_path, bus("b", party("a")))
     port.session.stop("Ctrl+X")
     assert port.told()[-1] == "Ctrl+X: no drive is open; macros and scripts wait for /resume"
 
 
-@in_virtual_time
 async def test_no_drive_that_hears_its_own_language_and_baud_rate_moves(tmp_path):
     drives = [party(name, EM=em) + f"\n{MOVES}" for em, name in enumerate("PRa")]
     port = Port(tmp_path, bus("b", *drives))
@@ -197,7 +181,6 @@ async def test_no_drive_that_hears_its_own_language_and_baud_rate_moves(tmp_path
     assert not any(device.position(port.floor.now()) or device.memory.error_flag for device in port.devices)
 
 
-@in_virtual_time
 async def test_the_verb_lists_drives_that_an_open_line_did_not_know(tmp_path):
     async with CellSession(tmp_path, bus("b", party("a"), party("k"))) as cell:
         device = cell.device("b:k")
@@ -215,7 +198,6 @@ async def test_the_verb_lists_drives_that_an_open_line_did_not_know(tmp_path):
         (bus("b", party("a")), "@a PG 1", "in program mode"),
     ],
 )
-@in_virtual_time
 async def test_the_verb_refuses_a_line_on_which_a_search_would_do_harm(tmp_path, cell, line, why):
     async with CellSession(tmp_path, cell) as open_:
         if line != "/scan":
@@ -243,7 +225,6 @@ async def stopped_at(port, search, opened):
     return port.opened[opened:]
 
 
-@in_virtual_time
 async def test_a_stop_is_sent_first_where_drives_may_be_then_as_far_as_was_agreed_then_again_where_they_may_be(
     tmp_path,
 ):
@@ -258,7 +239,6 @@ async def test_a_stop_is_sent_first_where_drives_may_be_then_as_far_as_was_agree
     assert "not with" not in text and all(str(baud) in text for _, baud in ALL)
 
 
-@in_virtual_time
 async def test_a_stop_before_any_agreement_reaches_the_remembered_rate_and_no_other(tmp_path):
     port = Port(tmp_path, bus("b", party("a"), baud=19200))
     state = PortState(port.session.settings.state, "/dev/ttyUSB9", 19200)
@@ -277,7 +257,6 @@ async def test_a_stop_before_any_agreement_reaches_the_remembered_rate_and_no_ot
     assert not device.moving(port.floor.now())
 
 
-@in_virtual_time
 async def test_a_stop_at_the_question_reaches_what_was_searched(tmp_path):
     port = Port(tmp_path, bus("b", party("a")))
     asked = asyncio.Event()
@@ -300,7 +279,6 @@ async def test_a_stop_at_the_question_reaches_what_was_searched(tmp_path):
     assert not device.moving(port.floor.now())
 
 
-@in_virtual_time
 async def test_a_second_stop_key_does_not_end_the_first_stop(tmp_path):
     port = Port(tmp_path, bus("b", party("a")))
     _, search = scanning(port)
@@ -316,7 +294,6 @@ async def test_a_second_stop_key_does_not_end_the_first_stop(tmp_path):
     assert port.opened[3:] == [ALL[0], ALL[1], *ALL[3:], *ALL[:3]]
 
 
-@in_virtual_time
 async def test_a_rate_at_which_the_port_cannot_be_opened_is_named_and_the_others_get_the_stop(tmp_path):
     port = Port(tmp_path, bus("b", party("a")))
     opener = port.opener

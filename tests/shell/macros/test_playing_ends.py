@@ -15,8 +15,9 @@ from multidrop.shell.scripts.model import Ending
 from multidrop.shell.scripts.reading import read_script
 from multidrop.shell.streams.stdout import report
 from multidrop.transports import TransportLost
-from tests.shell.macros.test_playing import Shop
-from tests.support.virtual import in_virtual_time
+from tests.support.macro_shop import Shop
+
+pytestmark = pytest.mark.virtual
 
 
 def short(texts: list[str], shop: Shop) -> list[str]:
@@ -24,244 +25,210 @@ def short(texts: list[str], shop: Shop) -> list[str]:
     return [text.replace(f"{shop.session.macros.folder}/", "") for text in texts]
 
 
-@in_virtual_time
 async def test_a_failure_names_macro_step_and_file_and_the_report_what_was_sent_and_where_drives_stand(
-    tmp_path: Path,
+    shop: Shop,
 ) -> None:
-    async with Shop(tmp_path) as shop:
-        macro = shop.save("m", "@a MA 500", "/wait stopped", "@a PR P", "@press:b SL 3000", "@b QQ 1", "@a MR 9000")
-        with pytest.raises(Refused) as caught:
-            await shop.play(macro, times=2)
-        assert report(caught.value).replace(f"{shop.session.macros.folder}/", "") == (
-            "macro m, step 5 (m.toml:24): press: b refused 'QQ 1': error 60: unknown command (check the spelling; "
-            "/help NAME explains a word)"
-        )
-        assert short(shop.warned(), shop)[:6] == [
-            "macro m, step 5 of 6, round 1 of 2: ended early; its last lines:",
-            "  step 1: @a MA 500",
-            "  step 2: /wait stopped",
-            "  step 3: @a PR P -> 500",
-            "  step 4: @press:b SL 3000",
-            "  step 5: @b QQ 1 -> FAILED: b refused 'QQ 1': error 60: unknown command (check the spelling; /help NAME "
-            "explains a word)",
-        ]
-        assert shop.warned()[6].startswith("stopped press:a, press:b: all 2 read velocity 0")
-        assert shop.warned()[-1].startswith("press:a stands at 500; press:b stands at ")
-        assert shop.moving() == set() and not shop.session.latched
-        assert b"9000" not in shop.written("press")
-        (ending,) = shop.endings
-        assert (ending.macro, ending.rounds, ending.at) == ("m", 0, "macro m, step 5 of 6, round 1 of 2")
-        assert ending.fact()["drives"]["press:a"] == {"position": 500, "velocity": 0}
+    macro = shop.save("m", "@a MA 500", "/wait stopped", "@a PR P", "@press:b SL 3000", "@b QQ 1", "@a MR 9000")
+    with pytest.raises(Refused) as caught:
+        await shop.play(macro, times=2)
+    assert report(caught.value).replace(f"{shop.session.macros.folder}/", "") == (
+        "macro m, step 5 (m.toml:24): press: b refused 'QQ 1': error 60: unknown command (check the spelling; "
+        "/help NAME explains a word)"
+    )
+    assert short(shop.warned(), shop)[:6] == [
+        "macro m, step 5 of 6, round 1 of 2: ended early; its last lines:",
+        "  step 1: @a MA 500",
+        "  step 2: /wait stopped",
+        "  step 3: @a PR P -> 500",
+        "  step 4: @press:b SL 3000",
+        "  step 5: @b QQ 1 -> FAILED: b refused 'QQ 1': error 60: unknown command (check the spelling; /help NAME "
+        "explains a word)",
+    ]
+    assert shop.warned()[6].startswith("stopped press:a, press:b: all 2 read velocity 0")
+    assert shop.warned()[-1].startswith("press:a stands at 500; press:b stands at ")
+    assert shop.moving() == set() and not shop.session.latched
+    assert b"9000" not in shop.written("press")
+    (ending,) = shop.endings
+    assert (ending.macro, ending.rounds, ending.at) == ("m", 0, "macro m, step 5 of 6, round 1 of 2")
+    assert ending.fact()["drives"]["press:a"] == {"position": 500, "velocity": 0}
 
 
-@in_virtual_time
-async def test_the_failure_in_a_called_macro_names_both_and_stops_what_either_moved(tmp_path: Path) -> None:
-    async with Shop(tmp_path) as shop:
-        shop.save("inner", "@gantry:c SL 100", "/assert 1 == 2", on_stop=("/print inner",))
-        macro = shop.save("outer", "@press:a SL 100", "/play inner", on_stop=("/print outer",))
-        with pytest.raises(DriveError) as caught:
-            await shop.play(macro)
-        assert short([report(caught.value)], shop) == [
-            "macro outer, step 2 (outer.toml:13): macro inner, step 2 (inner.toml:13): "
-            "/assert 1 == 2: wanted == 2, seen 1"
-        ]
-        assert shop.moving() == set()
-        assert shop.printed() == ["inner", "outer"]
-        assert shop.endings[0].at == "macro outer, step 2 of 2: macro inner, step 2 of 2"
+async def test_the_failure_in_a_called_macro_names_both_and_stops_what_either_moved(shop: Shop) -> None:
+    shop.save("inner", "@gantry:c SL 100", "/assert 1 == 2", on_stop=("/print inner",))
+    macro = shop.save("outer", "@press:a SL 100", "/play inner", on_stop=("/print outer",))
+    with pytest.raises(DriveError) as caught:
+        await shop.play(macro)
+    assert short([report(caught.value)], shop) == [
+        "macro outer, step 2 (outer.toml:13): macro inner, step 2 (inner.toml:13): /assert 1 == 2: wanted == 2, seen 1"
+    ]
+    assert shop.moving() == set()
+    assert shop.printed() == ["inner", "outer"]
+    assert shop.endings[0].at == "macro outer, step 2 of 2: macro inner, step 2 of 2"
 
 
 # -- on_stop
 
 
-@in_virtual_time
-async def test_on_stop_runs_after_a_failure_each_line_whatever_became_of_the_one_before(tmp_path: Path) -> None:
-    async with Shop(tmp_path) as shop:
-        after = ("@a VM=-1", "@a PR {n}", "/if 1", "/print yes", "/end")
-        macro = shop.save("m", "@a PR {n:int=7}", "/assert 1 == 2", on_stop=after)
-        with pytest.raises(DriveError, match="/assert 1 == 2"):
-            await shop.play(macro)
-        assert shop.printed() == ["7", "7", "yes"]
-        assert any(
-            each.startswith("macro m, on_stop (m.toml:5): a refused 'VM=-1'") for each in short(shop.warned(), shop)
-        )
+async def test_on_stop_runs_after_a_failure_each_line_whatever_became_of_the_one_before(shop: Shop) -> None:
+    after = ("@a VM=-1", "@a PR {n}", "/if 1", "/print yes", "/end")
+    macro = shop.save("m", "@a PR {n:int=7}", "/assert 1 == 2", on_stop=after)
+    with pytest.raises(DriveError, match="/assert 1 == 2"):
+        await shop.play(macro)
+    assert shop.printed() == ["7", "7", "yes"]
+    assert any(each.startswith("macro m, on_stop (m.toml:5): a refused 'VM=-1'") for each in short(shop.warned(), shop))
 
 
 @pytest.mark.parametrize("moves", [True, False])
-@in_virtual_time
-async def test_on_stop_moves_only_where_the_file_says_so(moves: bool, tmp_path: Path) -> None:
-    async with Shop(tmp_path) as shop:
-        after = ("@press:a MA 0", "/wait stopped")
-        macro = shop.save("m", "@press:a MA 5000", "/sleep 1", "XX 1", on_stop=after, on_stop_moves=moves)
-        if moves:
-            with pytest.raises(Refused):
-                await shop.play(macro)
-            assert shop.warned()[-1].startswith("press:a stands at 0")
-            return
-        with pytest.raises(
-            Diagnostic, match=r"a: @press:a MA 0 can start motion; on_stop_moves = true in its file"
-        ) as no:
-            await shop.play(macro)
-        assert no.value.where.startswith("macro m, on_stop (") and shop.written("press") == b""
-
-
-@in_virtual_time
-async def test_on_stop_that_is_seen_to_move_only_then_is_refused_then(tmp_path: Path) -> None:
-    async with Shop(tmp_path) as shop:
-        macro = shop.save("m", "XX 1", on_stop=("/use gantry", "MA 7000", "PR P"))
+async def test_on_stop_moves_only_where_the_file_says_so(moves: bool, shop: Shop) -> None:
+    after = ("@press:a MA 0", "/wait stopped")
+    macro = shop.save("m", "@press:a MA 5000", "/sleep 1", "XX 1", on_stop=after, on_stop_moves=moves)
+    if moves:
         with pytest.raises(Refused):
             await shop.play(macro)
-        assert "on_stop of macro m would start it, and on_stop_moves is false" in "".join(shop.warned())
-        assert b"7000" not in shop.written("gantry") and shop.printed() == ["0"]
+        assert shop.warned()[-1].startswith("press:a stands at 0")
+        return
+    with pytest.raises(Diagnostic, match=r"a: @press:a MA 0 can start motion; on_stop_moves = true in its file") as no:
+        await shop.play(macro)
+    assert no.value.where.startswith("macro m, on_stop (") and shop.written("press") == b""
 
 
-@in_virtual_time
-async def test_a_velocity_of_0_is_no_motion(tmp_path: Path) -> None:
-    async with Shop(tmp_path) as shop:
-        macro = shop.save("m", "VM=-1", on_stop=("@press:a SL 0", "/use b", "SL 0", "SL {v:int=0}", "@press:a PR 5"))
+async def test_on_stop_that_is_seen_to_move_only_then_is_refused_then(shop: Shop) -> None:
+    macro = shop.save("m", "XX 1", on_stop=("/use gantry", "MA 7000", "PR P"))
+    with pytest.raises(Refused):
+        await shop.play(macro)
+    assert "on_stop of macro m would start it, and on_stop_moves is false" in "".join(shop.warned())
+    assert b"7000" not in shop.written("gantry") and shop.printed() == ["0"]
+
+
+async def test_a_velocity_of_0_is_no_motion(shop: Shop) -> None:
+    macro = shop.save("m", "VM=-1", on_stop=("@press:a SL 0", "/use b", "SL 0", "SL {v:int=0}", "@press:a PR 5"))
+    with pytest.raises(Refused):
+        await shop.play(macro)
+    assert shop.printed() == ["5"] and "on_stop_moves" not in "".join(shop.warned())
+
+
+async def test_what_on_stop_moves_goes_on_unless_a_line_of_it_fails(shop: Shop) -> None:
+    for after, moving in (("@press:a SL 100",), {"press:a"}), (("@press:a SL 100", "XX 2"), set()):
+        macro = shop.save(f"m{len(after)}", "XX 1", on_stop=after, on_stop_moves=True)
         with pytest.raises(Refused):
             await shop.play(macro)
-        assert shop.printed() == ["5"] and "on_stop_moves" not in "".join(shop.warned())
-
-
-@in_virtual_time
-async def test_what_on_stop_moves_goes_on_unless_a_line_of_it_fails(tmp_path: Path) -> None:
-    async with Shop(tmp_path) as shop:
-        for after, moving in (("@press:a SL 100",), {"press:a"}), (("@press:a SL 100", "XX 2"), set()):
-            macro = shop.save(f"m{len(after)}", "XX 1", on_stop=after, on_stop_moves=True)
-            with pytest.raises(Refused):
-                await shop.play(macro)
-            assert shop.moving() == moving
+        assert shop.moving() == moving
 
 
 # -- Stops
 
 
-@in_virtual_time
-async def test_after_the_stop_key_on_stop_is_not_executed_then_or_later_and_that_is_said(tmp_path: Path) -> None:
-    async with Shop(tmp_path) as shop:
-        shop.save("m", "@press:a SL 900", "/sleep 9", on_stop=("@press:a PR 77",))
-        playing = asyncio.create_task(shop.session.run("/play m"))
-        await asyncio.sleep(1)
-        shop.session.stop("Ctrl+X")
-        with pytest.raises(Stopped):
-            await playing
-        assert shop.moving() == set()
-        assert "macro m, step 2 of 2: stopped; its last lines:" in shop.warned()
-        dropped = "macro m: on_stop is not executed after a stop: @press:a PR 77; type them if the machine needs them"
-        assert dropped in shop.warned()
-        assert shop.warned()[-1].startswith("press:a stands at ")
-        await shop.session.run("/resume")
-        assert shop.warned()[-1] == "on_stop of m was not executed and will not be; type its lines if needed"
-        await asyncio.sleep(9)
-        assert b"77" not in shop.written("press")
-        await shop.session.run("/resume")
-        assert shop.told()[-1].startswith("macros and scripts may run again")
+async def test_after_the_stop_key_on_stop_is_not_executed_then_or_later_and_that_is_said(shop: Shop) -> None:
+    shop.save("m", "@press:a SL 900", "/sleep 9", on_stop=("@press:a PR 77",))
+    playing = asyncio.create_task(shop.session.run("/play m"))
+    await asyncio.sleep(1)
+    shop.session.stop("Ctrl+X")
+    with pytest.raises(Stopped):
+        await playing
+    assert shop.moving() == set()
+    assert "macro m, step 2 of 2: stopped; its last lines:" in shop.warned()
+    dropped = "macro m: on_stop is not executed after a stop: @press:a PR 77; type them if the machine needs them"
+    assert dropped in shop.warned()
+    assert shop.warned()[-1].startswith("press:a stands at ")
+    await shop.session.run("/resume")
+    assert shop.warned()[-1] == "on_stop of m was not executed and will not be; type its lines if needed"
+    await asyncio.sleep(9)
+    assert b"77" not in shop.written("press")
+    await shop.session.run("/resume")
+    assert shop.told()[-1].startswith("macros and scripts may run again")
 
 
 @pytest.mark.parametrize("ended", ["interrupt", "/play stop"])
-@in_virtual_time
-async def test_ended_by_a_person_it_stops_its_drives_and_on_stop_is_executed(ended: str, tmp_path: Path) -> None:
-    async with Shop(tmp_path) as shop:
-        await shop.session.run("@gantry:c SL 50")
-        shop.save("m", "@press:a SL 900", "/sleep 9", on_stop=("@press:a PR 77",))
-        playing = asyncio.create_task(shop.session.run("/play m"))
-        await asyncio.sleep(1)
-        if ended == "interrupt":
-            shop.session.interrupt()
-        else:
-            await shop.session.run(ended)
-        with pytest.raises(asyncio.CancelledError if ended == "interrupt" else Stopped):
-            await playing
-        assert shop.moving() == {"gantry:c"} and not shop.session.latched
-        assert shop.printed() == ["77"] and shop.session.playing == []
-
-
-@in_virtual_time
-async def test_on_stop_is_executed_when_a_person_quits(tmp_path: Path) -> None:
-    async with Shop(tmp_path) as shop:
-        shop.save(
-            "m",
-            "@press:a SL 900",
-            "/sleep 9",
-            on_stop=("@press:a PR 77", "/sleep 3", "/repeat 2", "@press:a PR 78", "/end"),
-        )
-        shop.session.start("/play m")
-        await asyncio.sleep(1)
-        shop.session.quit()
+async def test_ended_by_a_person_it_stops_its_drives_and_on_stop_is_executed(ended: str, shop: Shop) -> None:
+    await shop.session.run("@gantry:c SL 50")
+    shop.save("m", "@press:a SL 900", "/sleep 9", on_stop=("@press:a PR 77",))
+    playing = asyncio.create_task(shop.session.run("/play m"))
+    await asyncio.sleep(1)
+    if ended == "interrupt":
         shop.session.interrupt()
-        said: list[str] = []
-        await shop.session.automations.over(said.append)
-        assert shop.printed() == ["77", "78", "78"] and shop.moving() == set()
-        assert said == ["waiting 10 s at most for the end of macro m"]
+    else:
+        await shop.session.run(ended)
+    with pytest.raises(asyncio.CancelledError if ended == "interrupt" else Stopped):
+        await playing
+    assert shop.moving() == {"gantry:c"} and not shop.session.latched
+    assert shop.printed() == ["77"] and shop.session.playing == []
 
 
-@in_virtual_time
-async def test_a_stop_before_on_stop_drops_it_and_says_so(tmp_path: Path) -> None:
-    async with Shop(tmp_path) as shop:
-        shop.save("m", "@press:a SL 900", "/sleep 1", "XX 1", on_stop=("@press:a PR 77",))
-        playing = asyncio.create_task(shop.session.run("/play m"))
-        while not any("ended early" in text for text in shop.warned()):
-            await asyncio.sleep(0.001)
-        shop.session.stop("Ctrl+X")
-        with pytest.raises(Stopped):
-            await playing
-        assert shop.moving() == set() and shop.printed() == []
-        assert any(text.startswith("macro m: on_stop is not executed after a stop") for text in shop.warned())
-        with pytest.raises(Stopped, match="/resume"):
-            await shop.play(shop.session.macros.load("m"))
-        assert len(shop.endings) == 0 and shop.printed() == []
+async def test_on_stop_is_executed_when_a_person_quits(shop: Shop) -> None:
+    shop.save(
+        "m",
+        "@press:a SL 900",
+        "/sleep 9",
+        on_stop=("@press:a PR 77", "/sleep 3", "/repeat 2", "@press:a PR 78", "/end"),
+    )
+    shop.session.start("/play m")
+    await asyncio.sleep(1)
+    shop.session.quit()
+    shop.session.interrupt()
+    said: list[str] = []
+    await shop.session.automations.over(said.append)
+    assert shop.printed() == ["77", "78", "78"] and shop.moving() == set()
+    assert said == ["waiting 10 s at most for the end of macro m"]
 
 
-@in_virtual_time
-async def test_a_stop_ends_on_stop_and_what_it_moved(tmp_path: Path) -> None:
-    async with Shop(tmp_path) as shop:
-        after = ("@press:a SL 500", "/sleep 9", "@press:a PR 77")
-        shop.save("m", "XX 1", on_stop=after, on_stop_moves=True)
-        playing = asyncio.create_task(shop.session.run("/play m"))
-        await asyncio.sleep(3)
-        assert shop.moving() == {"press:a"}
-        shop.session.stop("Ctrl+X")
-        with pytest.raises(Stopped):
-            await playing
-        assert shop.moving() == set() and shop.printed() == []
-        assert any(text.startswith("macro m: on_stop is not executed after a stop") for text in shop.warned())
+async def test_a_stop_before_on_stop_drops_it_and_says_so(shop: Shop) -> None:
+    shop.save("m", "@press:a SL 900", "/sleep 1", "XX 1", on_stop=("@press:a PR 77",))
+    playing = asyncio.create_task(shop.session.run("/play m"))
+    while not any("ended early" in text for text in shop.warned()):
+        await asyncio.sleep(0.001)
+    shop.session.stop("Ctrl+X")
+    with pytest.raises(Stopped):
+        await playing
+    assert shop.moving() == set() and shop.printed() == []
+    assert any(text.startswith("macro m: on_stop is not executed after a stop") for text in shop.warned())
+    with pytest.raises(Stopped, match="/resume"):
+        await shop.play(shop.session.macros.load("m"))
+    assert len(shop.endings) == 0 and shop.printed() == []
 
 
-@in_virtual_time
-async def test_a_second_interruption_ends_on_stop_and_stops_what_it_moved(tmp_path: Path) -> None:
-    async with Shop(tmp_path) as shop:
-        shop.save("m", "/sleep 5", on_stop=("@press:a SL 500", "/sleep 9", "@press:a PR 77"), on_stop_moves=True)
-        playing = asyncio.create_task(shop.session.run("/play m"))
-        await asyncio.sleep(1)
-        shop.session.interrupt()
-        await asyncio.sleep(3)
-        assert shop.moving() == {"press:a"}
-        shop.session.interrupt()
-        with pytest.raises(asyncio.CancelledError):
-            await playing
-        await asyncio.sleep(1)
-        assert shop.moving() == set() and shop.printed() == []
+async def test_a_stop_ends_on_stop_and_what_it_moved(shop: Shop) -> None:
+    after = ("@press:a SL 500", "/sleep 9", "@press:a PR 77")
+    shop.save("m", "XX 1", on_stop=after, on_stop_moves=True)
+    playing = asyncio.create_task(shop.session.run("/play m"))
+    await asyncio.sleep(3)
+    assert shop.moving() == {"press:a"}
+    shop.session.stop("Ctrl+X")
+    with pytest.raises(Stopped):
+        await playing
+    assert shop.moving() == set() and shop.printed() == []
+    assert any(text.startswith("macro m: on_stop is not executed after a stop") for text in shop.warned())
 
 
-@in_virtual_time
-async def test_a_lost_connection_ends_it_and_on_stop_reaches_the_other_line(tmp_path: Path) -> None:
-    async with Shop(tmp_path) as shop:
-        after = ("@gantry:c PR 1", "@press:a PR 2")
-        lines = ("@gantry:c SL 50", "@press:a SL 70", "/sleep 0.6", "@gantry:c PR P")
-        shop.save("m", *lines, on_stop=after)
-        playing = asyncio.create_task(shop.session.run("/play m"))
-        await asyncio.sleep(0.5)
-        shop.world("/sim unplug gantry")
-        with pytest.raises(TransportLost) as caught:
-            await playing
-        assert short(caught.value.__notes__, shop) == ["macro m, step 4 (m.toml:24)"]
-        assert shop.moving() == {"gantry:c"} and shop.printed() == ["2"]
-        assert "gantry:c not known (the connection is lost); press:a stands at " in shop.warned()[-1]
-        assert any("gantry: stop not sent" in text and "E-stop" in text for text in shop.warned())
+async def test_a_second_interruption_ends_on_stop_and_stops_what_it_moved(shop: Shop) -> None:
+    shop.save("m", "/sleep 5", on_stop=("@press:a SL 500", "/sleep 9", "@press:a PR 77"), on_stop_moves=True)
+    playing = asyncio.create_task(shop.session.run("/play m"))
+    await asyncio.sleep(1)
+    shop.session.interrupt()
+    await asyncio.sleep(3)
+    assert shop.moving() == {"press:a"}
+    shop.session.interrupt()
+    with pytest.raises(asyncio.CancelledError):
+        await playing
+    await asyncio.sleep(1)
+    assert shop.moving() == set() and shop.printed() == []
+
+
+async def test_a_lost_connection_ends_it_and_on_stop_reaches_the_other_line(shop: Shop) -> None:
+    after = ("@gantry:c PR 1", "@press:a PR 2")
+    lines = ("@gantry:c SL 50", "@press:a SL 70", "/sleep 0.6", "@gantry:c PR P")
+    shop.save("m", *lines, on_stop=after)
+    playing = asyncio.create_task(shop.session.run("/play m"))
+    await asyncio.sleep(0.5)
+    shop.world("/sim unplug gantry")
+    with pytest.raises(TransportLost) as caught:
+        await playing
+    assert short(caught.value.__notes__, shop) == ["macro m, step 4 (m.toml:24)"]
+    assert shop.moving() == {"gantry:c"} and shop.printed() == ["2"]
+    assert "gantry:c not known (the connection is lost); press:a stands at " in shop.warned()[-1]
+    assert any("gantry: stop not sent" in text and "E-stop" in text for text in shop.warned())
 
 
 @pytest.mark.parametrize(("reconnect", "kind"), [(False, "macro"), (True, "macro"), (False, "script")])
-@in_virtual_time
 async def test_a_connection_that_is_lost_while_no_line_uses_it_ends_it_at_once(
     reconnect: bool, kind: str, tmp_path: Path
 ) -> None:
@@ -281,21 +248,17 @@ async def test_a_connection_that_is_lost_while_no_line_uses_it_ends_it_at_once(
         assert shop.moving() == set() and shop.printed() == ["0"] + ["2"] * (kind == "macro")
 
 
-@in_virtual_time
-async def test_a_lost_connection_that_it_does_not_use_is_nothing_to_it(tmp_path: Path) -> None:
-    async with Shop(tmp_path) as shop:
-        playing = asyncio.create_task(shop.play(shop.save("m", "@press:a PR P", "/sleep 5")))
-        await asyncio.sleep(0.5)
-        shop.world("/sim unplug gantry")
-        await playing
-        assert shop.endings == [Ending("m", 1)]
+async def test_a_lost_connection_that_it_does_not_use_is_nothing_to_it(shop: Shop) -> None:
+    playing = asyncio.create_task(shop.play(shop.save("m", "@press:a PR P", "/sleep 5")))
+    await asyncio.sleep(0.5)
+    shop.world("/sim unplug gantry")
+    await playing
+    assert shop.endings == [Ending("m", 1)]
 
 
-@in_virtual_time
-async def test_nothing_is_asked_of_a_drive_to_which_nothing_was_sent(tmp_path: Path) -> None:
-    async with Shop(tmp_path) as shop:
-        shop.session.questions.agreed = False
-        with pytest.raises(Diagnostic, match="a macro cannot ask"):
-            await shop.play(shop.save("m", "@press:a CP"))
-        assert not [each for each in shop.events if isinstance(each, OnBus) and isinstance(each.event, Traffic)]
-        assert shop.endings == [Ending("m", 0, "macro m, step 1 of 1")]
+async def test_nothing_is_asked_of_a_drive_to_which_nothing_was_sent(shop: Shop) -> None:
+    shop.session.questions.agreed = False
+    with pytest.raises(Diagnostic, match="a macro cannot ask"):
+        await shop.play(shop.save("m", "@press:a CP"))
+    assert not [each for each in shop.events if isinstance(each, OnBus) and isinstance(each.event, Traffic)]
+    assert shop.endings == [Ending("m", 0, "macro m, step 1 of 1")]

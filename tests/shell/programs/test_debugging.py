@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from multidrop.dialects import Diagnostic, Inexpressible, Refused, Stopped
+from tests.support.cell_session import CellSession
 from tests.support.debugged import ROUND, cell, ethernet, keys, run, serial, shown
 
 pytestmark = [pytest.mark.virtual, pytest.mark.slow]
@@ -59,45 +60,41 @@ async def test_a_traced_program_waits_at_its_break_point(tmp_path: Path, drive: 
         assert (await run(it, "/step"))[0].startswith("19  MR 51200") and it.moving()
 
 
-async def test_a_hold_is_no_break_point(tmp_path: Path) -> None:
+async def test_a_hold_is_no_break_point(it: CellSession) -> None:
     """H 5000 stands before the line of the break point; its 5 s count as a hold."""
-    async with cell(tmp_path, ethernet()) as it:
-        at = next(line for line in await run(it, "/list") if line.endswith("SL 0")).split()[0]
-        await run(it, f"/break {at}")
-        began = it.session.now()
-        rows = await run(it, "/trace K2")
-        assert any(row.startswith("->") and row.endswith("SL 0") for row in rows)
-        assert it.session.now() - began > 5
+    at = next(line for line in await run(it, "/list") if line.endswith("SL 0")).split()[0]
+    await run(it, f"/break {at}")
+    began = it.session.now()
+    rows = await run(it, "/trace K2")
+    assert any(row.startswith("->") and row.endswith("SL 0") for row in rows)
+    assert it.session.now() - began > 5
 
 
-async def test_no_key_is_sent_while_a_hold_is_under_way(tmp_path: Path) -> None:
-    async with cell(tmp_path, ethernet()) as it:
-        await run(it, "/step K2", "/step", "/step")
-        it.events.clear()
-        with pytest.raises(Refused, match="'H 5000' holds for another .* no key was sent"):
-            await it.session.run("/step")
-        await run(it, "/sleep 5")
-        assert (await run(it, "/step"))[0].endswith("SL 0")
-        assert keys(it) == 1
+async def test_no_key_is_sent_while_a_hold_is_under_way(it: CellSession) -> None:
+    await run(it, "/step K2", "/step", "/step")
+    it.events.clear()
+    with pytest.raises(Refused, match="'H 5000' holds for another .* no key was sent"):
+        await it.session.run("/step")
+    await run(it, "/sleep 5")
+    assert (await run(it, "/step"))[0].endswith("SL 0")
+    assert keys(it) == 1
 
 
-async def test_no_key_is_sent_while_a_motion_is_waited_for(tmp_path: Path) -> None:
-    async with cell(tmp_path, ethernet()) as it:
-        await run(it, "/step G1", "/step", "/step", "/step")
-        it.events.clear()
-        with pytest.raises(Refused, match="'H' waits for the end of the motion; no key was sent"):
-            await it.session.run("/step")
-        assert keys(it) == 0
-        assert await run(it, "/wait stopped", "/step") == shown(28)
+async def test_no_key_is_sent_while_a_motion_is_waited_for(it: CellSession) -> None:
+    await run(it, "/step G1", "/step", "/step", "/step")
+    it.events.clear()
+    with pytest.raises(Refused, match="'H' waits for the end of the motion; no key was sent"):
+        await it.session.run("/step")
+    assert keys(it) == 0
+    assert await run(it, "/wait stopped", "/step") == shown(28)
 
 
-async def test_enter_runs_on_and_a_break_shows_where_it_is(tmp_path: Path) -> None:
-    async with cell(tmp_path, ethernet()) as it:
-        await run(it, "/step K3", "/step", "/continue")
-        assert it.device("line:!").running and not it.device("line:!").stepping
-        await run(it, "/sleep 1", "/break now")
-        assert it.device("line:!").stepping
-        assert (await run(it, "/step"))[0].split("  ")[1] in ("IC R1", "BR K3")
+async def test_enter_runs_on_and_a_break_shows_where_it_is(it: CellSession) -> None:
+    await run(it, "/step K3", "/step", "/continue")
+    assert it.device("line:!").running and not it.device("line:!").stepping
+    await run(it, "/sleep 1", "/break now")
+    assert it.device("line:!").stepping
+    assert (await run(it, "/step"))[0].split("  ")[1] in ("IC R1", "BR K3")
 
 
 @pytest.mark.parametrize(
@@ -113,19 +110,17 @@ async def test_enter_runs_on_and_a_break_shows_where_it_is(tmp_path: Path) -> No
         (("/step K3", "/continue"), "/continue"),
     ],
 )
-async def test_no_key_without_proof_that_the_drive_waits(tmp_path: Path, before: tuple[str, ...], line: str) -> None:
-    async with cell(tmp_path, ethernet()) as it:
-        await run(it, *before)
-        it.events.clear()
-        with pytest.raises(Refused, match="no key was sent|none was sent"):
-            await it.session.run(line)
-        assert keys(it) == keys(it, b"\r") == 0
+async def test_no_key_without_proof_that_the_drive_waits(it: CellSession, before: tuple[str, ...], line: str) -> None:
+    await run(it, *before)
+    it.events.clear()
+    with pytest.raises(Refused, match="no key was sent|none was sent"):
+        await it.session.run(line)
+    assert keys(it) == keys(it, b"\r") == 0
 
 
-async def test_a_value_that_a_person_sets_does_not_end_single_step(tmp_path: Path) -> None:
-    async with cell(tmp_path, ethernet()) as it:
-        await run(it, "/step G1", "/step", "Q1=2", "PR Q1")
-        assert await run(it, "/step") == shown(19)
+async def test_a_value_that_a_person_sets_does_not_end_single_step(it: CellSession) -> None:
+    await run(it, "/step G1", "/step", "Q1=2", "PR Q1")
+    assert await run(it, "/step") == shown(19)
 
 
 @pytest.mark.parametrize("settings", [{"CK": 1}, {"CK": 2}])
@@ -155,56 +150,51 @@ async def test_a_drive_named_by_a_digit_bars_the_trace(tmp_path: Path) -> None:
         assert not it.device("line:a").running
 
 
-async def test_a_program_that_runs_is_not_started_again(tmp_path: Path) -> None:
-    async with cell(tmp_path, ethernet()) as it:
-        await run(it, "EX K3")
-        for line in ("/trace", "/step G1"):
-            with pytest.raises(Refused, match="a program runs already; not started"):
-                await it.session.run(line)
+async def test_a_program_that_runs_is_not_started_again(it: CellSession) -> None:
+    await run(it, "EX K3")
+    for line in ("/trace", "/step G1"):
+        with pytest.raises(Refused, match="a program runs already; not started"):
+            await it.session.run(line)
 
 
-async def test_a_stop_ends_program_and_single_step_and_says_so(tmp_path: Path) -> None:
-    async with cell(tmp_path, ethernet()) as it:
-        await run(it, "/break K1", "/step G1", "/step", "/step")
-        it.session.stop()
-        await asyncio.sleep(2)
-        assert not it.moving() and not it.device("line:!").stepping
-        assert any("no program runs, and single step is over" in text for text in it.told())
-        it.events.clear()
-        with pytest.raises(Refused, match="none was sent|no key was sent"):
-            await it.session.run("/step")
-        assert keys(it) == 0
+async def test_a_stop_ends_program_and_single_step_and_says_so(it: CellSession) -> None:
+    await run(it, "/break K1", "/step G1", "/step", "/step")
+    it.session.stop()
+    await asyncio.sleep(2)
+    assert not it.moving() and not it.device("line:!").stepping
+    assert any("no program runs, and single step is over" in text for text in it.told())
+    it.events.clear()
+    with pytest.raises(Refused, match="none was sent|no key was sent"):
+        await it.session.run("/step")
+    assert keys(it) == 0
 
 
-async def test_a_stop_ends_a_trace_and_names_the_break_point_that_is_left(tmp_path: Path) -> None:
-    async with cell(tmp_path, ethernet()) as it:
-        await run(it, "/break K1 3")
-        trace = asyncio.ensure_future(it.session.run("/trace"))
-        await asyncio.sleep(0.3)
-        it.session.stop()
-        with pytest.raises(Stopped):
-            await trace
-        await asyncio.sleep(2)
-        assert not it.moving() and not it.device("line:!").running
-        assert any("the break point at K1 stays in the drive until /break off" in text for text in it.told())
+async def test_a_stop_ends_a_trace_and_names_the_break_point_that_is_left(it: CellSession) -> None:
+    await run(it, "/break K1 3")
+    trace = asyncio.ensure_future(it.session.run("/trace"))
+    await asyncio.sleep(0.3)
+    it.session.stop()
+    with pytest.raises(Stopped):
+        await trace
+    await asyncio.sleep(2)
+    assert not it.moving() and not it.device("line:!").running
+    assert any("the break point at K1 stays in the drive until /break off" in text for text in it.told())
 
 
-async def test_a_bus_that_is_closed_says_what_waits(tmp_path: Path) -> None:
-    async with cell(tmp_path, ethernet()) as it:
-        await run(it, "/break K1", "/trace", "/close line")
-        assert [text for text in it.warned() if "waiting for /step" in text or "stays in the drive" in text] == [
-            "line: its program may go on waiting for /step or /continue; a stop ends it",
-            "line: the break point at K1 stays in the drive until /break off or power-off",
-        ]
+async def test_a_bus_that_is_closed_says_what_waits(it: CellSession) -> None:
+    await run(it, "/break K1", "/trace", "/close line")
+    assert [text for text in it.warned() if "waiting for /step" in text or "stays in the drive" in text] == [
+        "line: its program may go on waiting for /step or /continue; a stop ends it",
+        "line: the break point at K1 stays in the drive until /break off or power-off",
+    ]
 
 
-async def test_a_locked_program_is_refused_before_the_drive_could(tmp_path: Path) -> None:
-    async with cell(tmp_path, ethernet()) as it:
-        await run(it, "LK=1")
-        for line in ("/trace", "/step G1"):
-            with pytest.raises(Refused, match="locked"):
-                await it.session.run(line)
-        assert await run(it, "PR EF") == ["0"]
+async def test_a_locked_program_is_refused_before_the_drive_could(it: CellSession) -> None:
+    await run(it, "LK=1")
+    for line in ("/trace", "/step G1"):
+        with pytest.raises(Refused, match="locked"):
+            await it.session.run(line)
+    assert await run(it, "PR EF") == ["0"]
 
 
 async def test_the_lines_have_the_remarks_of_the_downloaded_file(tmp_path: Path) -> None:
@@ -218,15 +208,14 @@ async def test_the_lines_have_the_remarks_of_the_downloaded_file(tmp_path: Path)
 
 
 @pytest.mark.parametrize("line", ["/step", "/continue", "/step ZZ;", "/trace", "/break now"])
-async def test_what_is_refused_before_it_is_sent_counts_as_no_start(tmp_path: Path, line: str) -> None:
+async def test_what_is_refused_before_it_is_sent_counts_as_no_start(it: CellSession, line: str) -> None:
     """Else a stop before it would be said to be undone, and a script would stop a drive that a person has started."""
-    async with cell(tmp_path, ethernet()) as it:
-        drive = it.session.drive()
-        await run(it, "EX K3" if line == "/trace" else "PR P")
-        before = drive.started_at, drive.commanded_at
-        with pytest.raises((Refused, Diagnostic)):
-            await it.session.run(line)
-        assert (drive.started_at, drive.commanded_at) == before
+    drive = it.session.drive()
+    await run(it, "EX K3" if line == "/trace" else "PR P")
+    before = drive.started_at, drive.commanded_at
+    with pytest.raises((Refused, Diagnostic)):
+        await it.session.run(line)
+    assert (drive.started_at, drive.commanded_at) == before
 
 
 @pytest.mark.parametrize(
@@ -243,19 +232,17 @@ async def test_what_is_refused_before_it_is_sent_counts_as_no_start(tmp_path: Pa
         ("/trace a b c", "usage: /trace"),
     ],
 )
-async def test_wrong_words_are_one_line_and_nothing_is_sent(tmp_path: Path, line: str, told: str) -> None:
-    async with cell(tmp_path, ethernet()) as it:
-        await run(it, "/list")
-        witness = it.device("line:!").interpreter.executed
-        with pytest.raises(Diagnostic, match=told):
+async def test_wrong_words_are_one_line_and_nothing_is_sent(it: CellSession, line: str, told: str) -> None:
+    await run(it, "/list")
+    witness = it.device("line:!").interpreter.executed
+    with pytest.raises(Diagnostic, match=told):
+        await it.session.run(line)
+    assert it.device("line:!").interpreter.executed == witness and not it.device("line:!").running
+
+
+async def test_a_label_that_is_not_there_is_refused_by_the_drive(it: CellSession) -> None:
+    for line in ("/trace ZZ", "/step ZZ", "/break ZZ"):
+        with pytest.raises(Refused, match="error 30"):
             await it.session.run(line)
-        assert it.device("line:!").interpreter.executed == witness and not it.device("line:!").running
-
-
-async def test_a_label_that_is_not_there_is_refused_by_the_drive(tmp_path: Path) -> None:
-    async with cell(tmp_path, ethernet()) as it:
-        for line in ("/trace ZZ", "/step ZZ", "/break ZZ"):
-            with pytest.raises(Refused, match="error 30"):
-                await it.session.run(line)
-        await run(it, "/break")
-        assert any("no break point of this session" in text for text in it.told())
+    await run(it, "/break")
+    assert any("no break point of this session" in text for text in it.told())

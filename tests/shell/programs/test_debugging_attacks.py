@@ -225,11 +225,10 @@ async def test_a_restart_ends_the_proof(tmp_path: Path) -> None:
         assert keys(it) == 0
 
 
-async def test_raw_bytes_end_the_proof(tmp_path: Path) -> None:
-    async with cell(tmp_path, ethernet()) as it:
-        await run(it, "/step K3", "/raw on", " ", "/raw off")
-        with pytest.raises(Refused, match="it is not known that it waits for a key"):
-            await it.session.run("/step")
+async def test_raw_bytes_end_the_proof(it: CellSession) -> None:
+    await run(it, "/step K3", "/raw on", " ", "/raw off")
+    with pytest.raises(Refused, match="it is not known that it waits for a key"):
+        await it.session.run("/step")
 
 
 async def test_a_lost_line_after_a_key_is_not_repeated(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

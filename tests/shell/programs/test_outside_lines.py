@@ -12,7 +12,8 @@ from multidrop.dialects.mcode.manual import program_checker
 from multidrop.shell.events import By
 from tests.support.cases import for_each
 from tests.support.transfers import kept, load, shop_with
-from tests.support.virtual import in_virtual_time
+
+pytestmark = pytest.mark.virtual
 
 PROGRAM = "PG 1\nLB G1\nMR 100\nH\nE\nPG\n"
 ACTING = ("SL 5000", "MA 200", "MR -5", "HM 1", "EX G1", 'DN="q"', "FD", "CP", "BD=96", "AS=3", "LK=1", "IP", "TE=1")
@@ -33,7 +34,6 @@ def test_a_check_warns_of_no_setting(line: str) -> None:
     assert not any("outside of PG" in each.what for each in program_checker.check(text)), line
 
 
-@in_virtual_time
 async def test_nothing_is_sent_of_a_file_with_a_line_that_acts(tmp_path: Path) -> None:
     for line in ("SL 5000", "EX G1", 'DN="q"', "FD", "CP"):
         for text in (f"{line}\n{PROGRAM}", f"{PROGRAM}{line}\nS\n"):
@@ -50,7 +50,6 @@ async def test_nothing_is_sent_of_a_file_with_a_line_that_acts(tmp_path: Path) -
                 assert not kept(tmp_path) and not shop.moving()
 
 
-@in_virtual_time
 async def test_a_person_agrees_to_the_listed_lines_once(tmp_path: Path) -> None:
     async with shop_with(tmp_path, f"VM=500000\n{PROGRAM}EX G1\n") as shop:
         asked = []
@@ -71,7 +70,6 @@ async def test_a_person_agrees_to_the_listed_lines_once(tmp_path: Path) -> None:
         assert sent.index(b"PG 1") < sent.index(b"EX G1") and shop.moving() == {"line:a"}
 
 
-@in_virtual_time
 async def test_settings_and_the_closing_s_need_no_yes(tmp_path: Path) -> None:
     async with shop_with(tmp_path, f"VM=500000\n{PROGRAM}S\n") as shop:
         shop.session.questions.agreed = False
@@ -79,7 +77,6 @@ async def test_settings_and_the_closing_s_need_no_yes(tmp_path: Path) -> None:
         assert "a: p.mxt downloaded, 8 lines; executed at once: VM=500000, S" in told
 
 
-@in_virtual_time
 async def test_a_cp_that_the_download_needs_is_not_asked_about(tmp_path: Path) -> None:
     async with shop_with(tmp_path, PROGRAM) as shop:
         await load(shop, tmp_path)

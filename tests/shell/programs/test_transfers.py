@@ -9,55 +9,48 @@ import pytest
 from multidrop.dialects import Diagnostic
 from multidrop.shell.events import Progressed
 from multidrop.shell.state.store import write_backup
-from tests.support.cell_session import bus, pmx
+from tests.support.cell_session import CellSession, bus, pmx
 from tests.support.transfers import FILE, LISTED, LONG, SLOW, kept, load, shop_with
-from tests.support.virtual import in_virtual_time
 
-pytestmark = pytest.mark.slow
-
-
-@in_virtual_time
-async def test_a_download_says_what_it_has_done(tmp_path: Path) -> None:
-    async with shop_with(tmp_path) as shop:
-        told = await load(shop, tmp_path)
-        (path,) = kept(tmp_path)
-        assert told == [
-            f"backup: state/backups/{path.name}",
-            "a: p.mxt downloaded, 7 lines",
-            "a: not saved: what is not saved is lost at power-off; --save sends S",
-            "a: verified, 4 lines",
-        ]
-        assert shop.device("line:a").program.listing() == LISTED
+pytestmark = [pytest.mark.virtual, pytest.mark.slow]
 
 
-@in_virtual_time
-async def test_the_backup_is_a_file_that_brings_back_what_was_there(tmp_path: Path) -> None:
-    async with shop_with(tmp_path) as shop:
-        await load(shop, tmp_path)
-        for line in ("@a VA Z1=5", "@a Q1=-3", "@a EX G1", "/wait idle"):
-            await shop.session.run(line)
-        (tmp_path / "p.mxt").write_text("PG 1\nLB G7\nE\nPG\n")
-        await load(shop, tmp_path)
-        path = kept(tmp_path)[-1]
-        lines = path.read_text().splitlines()
-        assert lines[0].startswith("' multidrop backup of line, drive a, ") and "LMDCM" in lines[1]
-        assert "'   G1 = 1" in lines and "'   Q1 = G -3" in lines
-        assert lines[-9:] == ["VA Q1=-3", "VA Z1=5", "PG 1", "LB G1", "MR 100", "H", "E", "PG", "S"]
-        await shop.session.run("@a Q1=1")
-        await shop.session.run(f"/download {path} a")
-        assert shop.device("line:a").program.listing() == LISTED
-        await shop.session.run("@a PR Q1")
-        assert shop.printed() == ["-3"]
+async def test_a_download_says_what_it_has_done(tmp_path: Path, shop: CellSession) -> None:
+    told = await load(shop, tmp_path)
+    (path,) = kept(tmp_path)
+    assert told == [
+        f"backup: state/backups/{path.name}",
+        "a: p.mxt downloaded, 7 lines",
+        "a: not saved: what is not saved is lost at power-off; --save sends S",
+        "a: verified, 4 lines",
+    ]
+    assert shop.device("line:a").program.listing() == LISTED
 
 
-@in_virtual_time
-async def test_an_empty_drive_has_a_backup_too_and_none_replaces_another(tmp_path: Path) -> None:
-    async with shop_with(tmp_path) as shop:
-        for _ in range(3):
-            await load(shop, tmp_path, "--no-verify")
-        first, *others = kept(tmp_path)
-        assert "holds no program" in first.read_text() and len(others) == 2
-        assert all("LB G1" in each.read_text() for each in others)
+async def test_the_backup_is_a_file_that_brings_back_what_was_there(tmp_path: Path, shop: CellSession) -> None:
+    await load(shop, tmp_path)
+    for line in ("@a VA Z1=5", "@a Q1=-3", "@a EX G1", "/wait idle"):
+        await shop.session.run(line)
+    (tmp_path / "p.mxt").write_text("PG 1\nLB G7\nE\nPG\n")
+    await load(shop, tmp_path)
+    path = kept(tmp_path)[-1]
+    lines = path.read_text().splitlines()
+    assert lines[0].startswith("' multidrop backup of line, drive a, ") and "LMDCM" in lines[1]
+    assert "'   G1 = 1" in lines and "'   Q1 = G -3" in lines
+    assert lines[-9:] == ["VA Q1=-3", "VA Z1=5", "PG 1", "LB G1", "MR 100", "H", "E", "PG", "S"]
+    await shop.session.run("@a Q1=1")
+    await shop.session.run(f"/download {path} a")
+    assert shop.device("line:a").program.listing() == LISTED
+    await shop.session.run("@a PR Q1")
+    assert shop.printed() == ["-3"]
+
+
+async def test_an_empty_drive_has_a_backup_too_and_none_replaces_another(tmp_path: Path, shop: CellSession) -> None:
+    for _ in range(3):
+        await load(shop, tmp_path, "--no-verify")
+    first, *others = kept(tmp_path)
+    assert "holds no program" in first.read_text() and len(others) == 2
+    assert all("LB G1" in each.read_text() for each in others)
 
 
 def test_a_backup_never_takes_the_name_of_another(tmp_path: Path) -> None:
@@ -68,7 +61,6 @@ def test_a_backup_never_takes_the_name_of_another(tmp_path: Path) -> None:
     assert names == [f"2026-11-22-100537-bus%2Fx-a{more}.mxt" for more in ("", "-2", "-3")]
 
 
-@in_virtual_time
 async def test_a_wrong_file_ends_it_before_anything_is_sent(tmp_path: Path) -> None:
     async with shop_with(tmp_path, "PG 1\nLB G1\nFROB 7\nE\nPG\n") as shop:
         with pytest.raises(Diagnostic, match=r"p.mxt:3:1: unknown name FROB"):
@@ -76,31 +68,26 @@ async def test_a_wrong_file_ends_it_before_anything_is_sent(tmp_path: Path) -> N
         assert shop.written("line") == b"" and not kept(tmp_path)
 
 
-@in_virtual_time
-async def test_saving_lasts_and_is_said(tmp_path: Path) -> None:
-    async with shop_with(tmp_path) as shop:
-        (tmp_path / "p.mxt").write_text(f"{FILE}S\n")
-        assert "a: saved (S in the file)" in await load(shop, tmp_path, "--save")
-        (tmp_path / "p.mxt").write_text(FILE.replace("100", "200"))
-        assert "a: saved (S)" in await load(shop, tmp_path, "--save")
-        shop.device("line:a").reset(shop.session.now())
-        assert "6  MR 200" in shop.device("line:a").program.listing()
+async def test_saving_lasts_and_is_said(tmp_path: Path, shop: CellSession) -> None:
+    (tmp_path / "p.mxt").write_text(f"{FILE}S\n")
+    assert "a: saved (S in the file)" in await load(shop, tmp_path, "--save")
+    (tmp_path / "p.mxt").write_text(FILE.replace("100", "200"))
+    assert "a: saved (S)" in await load(shop, tmp_path, "--save")
+    shop.device("line:a").reset(shop.session.now())
+    assert "6  MR 200" in shop.device("line:a").program.listing()
 
 
-@in_virtual_time
-async def test_a_program_is_started_after_it_was_verified(tmp_path: Path) -> None:
-    async with shop_with(tmp_path) as shop:
-        with pytest.raises(Diagnostic, match=r"no label G9 in the file \(nothing was sent\); labels: G1"):
-            await load(shop, tmp_path, "--run G9")
-        assert shop.written("line") == b""
-        told = await load(shop, tmp_path, "--run g1")
-        assert told[-2:] == ["a: verified, 4 lines", "a: started (EX G1)"]
-        await shop.session.run("/wait idle")
-        await shop.session.run("@a PR P")
-        assert shop.printed()[-1] == "100"
+async def test_a_program_is_started_after_it_was_verified(tmp_path: Path, shop: CellSession) -> None:
+    with pytest.raises(Diagnostic, match=r"no label G9 in the file \(nothing was sent\); labels: G1"):
+        await load(shop, tmp_path, "--run G9")
+    assert shop.written("line") == b""
+    told = await load(shop, tmp_path, "--run g1")
+    assert told[-2:] == ["a: verified, 4 lines", "a: started (EX G1)"]
+    await shop.session.run("/wait idle")
+    await shop.session.run("@a PR P")
+    assert shop.printed()[-1] == "100"
 
 
-@in_virtual_time
 async def test_what_the_drive_holds_already_is_not_sent_again(tmp_path: Path) -> None:
     text = f"VM=400000\nIS=1,0,0\n{FILE}"
     async with shop_with(tmp_path, text) as shop:
@@ -121,43 +108,36 @@ async def test_what_the_drive_holds_already_is_not_sent_again(tmp_path: Path) ->
 
 
 @pytest.mark.parametrize("personality", ["LMDOM", "LMM", "MDI", "MDIE", "MDIX"])
-def test_every_product_takes_an_edited_file_again_and_again(tmp_path: Path, personality: str) -> None:
-    @in_virtual_time
-    async def body() -> None:
-        drive = f'personality = "{personality}"\nname = "a"\nparty = true'
-        async with shop_with(tmp_path, FILE, bus("line", drive, baud=0)) as shop:
-            for number in (100, 200, 300):
-                (tmp_path / "p.mxt").write_text(
-                    FILE.replace("100", str(number)).replace("H\n", "H\n" * (4 - number // 100))
-                )
-                told = await load(shop, tmp_path, "--save", "--run G1")
-                assert told[-1] == "a: started (EX G1)" and any("a: verified, " in text for text in told)
-                await shop.session.run("/wait idle")
-            await shop.session.run("@a PR P")
-            assert shop.printed() == ["600"]
-
-    body()
+async def test_every_product_takes_an_edited_file_again_and_again(tmp_path: Path, personality: str) -> None:
+    drive = f'personality = "{personality}"\nname = "a"\nparty = true'
+    async with shop_with(tmp_path, FILE, bus("line", drive, baud=0)) as shop:
+        for number in (100, 200, 300):
+            (tmp_path / "p.mxt").write_text(
+                FILE.replace("100", str(number)).replace("H\n", "H\n" * (4 - number // 100))
+            )
+            told = await load(shop, tmp_path, "--save", "--run G1")
+            assert told[-1] == "a: started (EX G1)" and any("a: verified, " in text for text in told)
+            await shop.session.run("/wait idle")
+        await shop.session.run("@a PR P")
+        assert shop.printed() == ["600"]
 
 
-@in_virtual_time
-async def test_remarks_and_layout_come_back_with_the_present_values(tmp_path: Path) -> None:
-    async with shop_with(tmp_path) as shop:
-        await load(shop, tmp_path)
-        await shop.session.run("@a Q1=9")
-        await shop.session.run("@a VA Z1=1")
-        await shop.session.run(f"/upload {tmp_path / 'up.mxt'} a")
-        made = FILE.replace("VA Q1=7 ", "VA Q1=9 ").replace("PG 1\n", "VA Z1=1\nPG 1\n")
-        assert (tmp_path / "up.mxt").read_text() == made
-        await shop.session.run("/list a")
-        assert shop.printed() == ["1   LB G1", "6     MR 100  ' there", "10    H", "12  E"]
-        await shop.session.run("@a PG 10")
-        await shop.session.run("@a R1=5")
-        await shop.session.run("@a PG")
-        await shop.session.run(f"/upload {tmp_path / 'changed.mxt'} a")
-        assert (tmp_path / "changed.mxt").read_text().splitlines()[2:-2] == ["PG 1", "LB G1", "MR 100", "R1=5"]
+async def test_remarks_and_layout_come_back_with_the_present_values(tmp_path: Path, shop: CellSession) -> None:
+    await load(shop, tmp_path)
+    await shop.session.run("@a Q1=9")
+    await shop.session.run("@a VA Z1=1")
+    await shop.session.run(f"/upload {tmp_path / 'up.mxt'} a")
+    made = FILE.replace("VA Q1=7 ", "VA Q1=9 ").replace("PG 1\n", "VA Z1=1\nPG 1\n")
+    assert (tmp_path / "up.mxt").read_text() == made
+    await shop.session.run("/list a")
+    assert shop.printed() == ["1   LB G1", "6     MR 100  ' there", "10    H", "12  E"]
+    await shop.session.run("@a PG 10")
+    await shop.session.run("@a R1=5")
+    await shop.session.run("@a PG")
+    await shop.session.run(f"/upload {tmp_path / 'changed.mxt'} a")
+    assert (tmp_path / "changed.mxt").read_text().splitlines()[2:-2] == ["PG 1", "LB G1", "MR 100", "R1=5"]
 
 
-@in_virtual_time
 async def test_progress_ends_with_each_part(tmp_path: Path) -> None:
     async with shop_with(tmp_path, LONG, SLOW) as shop:
         await load(shop, tmp_path)
@@ -166,27 +146,26 @@ async def test_progress_ends_with_each_part(tmp_path: Path) -> None:
         assert any(event.left and event.what == "a: download" for event in seen)
 
 
-@in_virtual_time
-async def test_what_the_drive_holds_already_is_saved_and_executed_where_that_is_wanted(tmp_path: Path) -> None:
-    async with shop_with(tmp_path) as shop:
-        await load(shop, tmp_path)
-        assert await load(shop, tmp_path, "--only-changed --save") == [
-            "a: holds p.mxt already; the program is not sent again",
-            "a: saved (S)",
-        ]
-        assert b"PG" not in shop.written("line") and len(kept(tmp_path)) == 1
-        shop.device("line:a").reset(shop.session.now())
-        assert shop.device("line:a").program.listing() == LISTED
-        with pytest.raises(Diagnostic, match=r"no label G9 in the file"):
-            await load(shop, tmp_path, "--only-changed --run G9")
-        told = await load(shop, tmp_path, "--only-changed --run G1")
-        assert told[-2:] == ["a: holds p.mxt already; the program is not sent again", "a: started (EX G1)"]
-        await shop.session.run("/wait idle")
-        await shop.session.run("@a PR P")
-        assert shop.printed()[-1] == "100"
+async def test_what_the_drive_holds_already_is_saved_and_executed_where_that_is_wanted(
+    tmp_path: Path, shop: CellSession
+) -> None:
+    await load(shop, tmp_path)
+    assert await load(shop, tmp_path, "--only-changed --save") == [
+        "a: holds p.mxt already; the program is not sent again",
+        "a: saved (S)",
+    ]
+    assert b"PG" not in shop.written("line") and len(kept(tmp_path)) == 1
+    shop.device("line:a").reset(shop.session.now())
+    assert shop.device("line:a").program.listing() == LISTED
+    with pytest.raises(Diagnostic, match=r"no label G9 in the file"):
+        await load(shop, tmp_path, "--only-changed --run G9")
+    told = await load(shop, tmp_path, "--only-changed --run G1")
+    assert told[-2:] == ["a: holds p.mxt already; the program is not sent again", "a: started (EX G1)"]
+    await shop.session.run("/wait idle")
+    await shop.session.run("@a PR P")
+    assert shop.printed()[-1] == "100"
 
 
-@in_virtual_time
 async def test_a_held_program_that_runs_is_ended_before_it_is_executed_again(tmp_path: Path) -> None:
     async with shop_with(tmp_path, "PG 1\nLB G1\nH 100\nBR G1\nE\nPG\n") as shop:
         await load(shop, tmp_path, "--run G1")
@@ -197,7 +176,6 @@ async def test_a_held_program_that_runs_is_ended_before_it_is_executed_again(tmp
 PMX_FILE = "; ten times\nPRG 0\n  V1=1   ; from one\n  WHILE V1<1000\n    V1=V1*10\n  ENDWHILE\nEND\n"
 
 
-@in_virtual_time
 async def test_a_controller_has_the_same_options_as_far_as_its_words_go(tmp_path: Path) -> None:
     async with shop_with(tmp_path, FILE, bus("pmx", pmx("07"), baud=0)) as shop:
         file = tmp_path / "p.prg"

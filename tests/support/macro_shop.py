@@ -1,0 +1,40 @@
+"""A cell in a session that plays macros, with the results of what was played last."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from multidrop.macros import Macro, Step
+from multidrop.shell.events import Entered
+from multidrop.shell.scripts.executor import play
+from multidrop.shell.scripts.model import Ending, Result
+from tests.support.cell_session import CellSession, bus, party
+
+FLOOR = (bus("press", party("a"), party("b", VM=700000), baud=0), bus("gantry", party("c"), baud=0))
+
+
+class Shop(CellSession):
+    """A cell with macros, and the results of what was played last."""
+
+    def __init__(self, folder: Path, reconnect: bool = False) -> None:
+        super().__init__(folder, *FLOOR, reconnect=reconnect)
+        self.results: list[Result] = []
+        self.endings: list[Ending] = []
+
+    def save(self, name: str, *lines: str, after: float = 0.0, **more: object) -> Macro:
+        macro = Macro(name, tuple(Step(after, line) for line in lines), **more)  # type: ignore[arg-type]
+        self.session.macros.save(macro)
+        return macro
+
+    async def play(self, macro: Macro, values: dict[str, str] | None = None, **manner: object) -> None:
+        await play(self.session, macro, values or {}, watcher=self, **manner)  # type: ignore[arg-type]
+
+    def executed(self, result: Result) -> None:
+        self.results.append(result)
+
+    def ended(self, ending: Ending) -> None:
+        self.endings.append(ending)
+
+    def begun(self) -> list[tuple[float, str]]:
+        """When each line began."""
+        return [(round(event.at, 1), event.line) for event in self.events if isinstance(event, Entered)]
