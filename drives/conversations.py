@@ -257,7 +257,7 @@ class Conversation(Generic[T]):
         self._first, self._last = self._first or transaction, transaction
         if self._on_ended:
             self._on_ended(transaction)
-        if self._all.witnesses:
+        if self._all.witnesses.all:
             self._taken.append(transaction)
         if request.kind not in ASKING:
             self._unproven = "" if reply.acknowledged else request.text
@@ -288,7 +288,7 @@ class Conversation(Generic[T]):
         if not self.over.done():
             self.over.set_result(None)
         assert self._outcome is not None
-        if self._all.witnesses:
+        if self._all.witnesses.all:
             unproven = self._unproven if self._outcome.error is not None else ""
             self._all.witnesses.report(Concluded(self._state, tuple(self._taken), self._outcome, unproven))
         self._on_over(self._outcome)
@@ -312,7 +312,7 @@ async def awaited(start: Callable[[OnOver[T]], Conversation[T]]) -> T:
         if outcome.error is not None:
             future.set_exception(outcome.error)
         else:
-            future.set_result(outcome.value())
+            future.set_result(outcome.result[0])
 
     conversation = start(settle)
     try:

@@ -142,13 +142,10 @@ class Drive:
         """Number of lines under way that can start it, and that it may still refuse."""
         self.commands = 0
         """Number of requests sent to it that may do more than ask."""
+        self.link: Link = conversations.link
         self._conversations = conversations
         self._neighbours = neighbours
         self._judged = Judged()
-
-    @property
-    def link(self) -> Link:
-        return self._conversations.link
 
     @property
     def address(self) -> str:
@@ -225,7 +222,7 @@ class Drive:
             self.starting -= 1
 
     async def _send(self, text: str) -> tuple[str, ...]:
-        to_all = self.address in GLOBAL
+        to_all = self.state.address in GLOBAL
         if to_all and not self.codec.broadcasts:
             drives = self._neighbours.all_drives
             _refuse_while_stored(drives, "end that mode first")
@@ -233,7 +230,7 @@ class Drive:
         procedure = self.family.perform(self.state, text)
         if to_all:
             return await self.run(self._to_all(procedure))
-        stored = self.programming
+        stored = self.state.programming
         printed = await self.run(procedure)
         found = self.family.referencing(self.state, text) if self.state.unreferenced and not stored else None
         if found is not None and found.homing:
@@ -244,7 +241,7 @@ class Drive:
 
     def starts(self, text: str) -> bool:
         """Whether a line can start motion or a program in it; in program mode the line is stored."""
-        return not self.programming and self.codec.starts_motion(text)
+        return not self.state.programming and self.state.codec.starts_motion(text)
 
     def starts_now(self) -> None:
         """Note that something that can start it is being sent; with a global address, note it for all drives."""
@@ -255,7 +252,7 @@ class Drive:
 
     @property
     def _meant(self) -> list[Drive]:
-        return [self, *self._neighbours.all_drives] if self.address in GLOBAL else [self]
+        return [self, *self._neighbours.all_drives] if self.state.address in GLOBAL else [self]
 
     def _to_all(self, procedure: Procedure[T]) -> Procedure[T]:
         """Run a command to all; refuse it if a drive stores a program when it goes out, not when it is typed."""
@@ -341,7 +338,7 @@ class Drive:
 
         def over(outcome: Outcome[T]) -> None:
             self._neighbours.conversation_ended(self, address, commanded or isinstance(outcome.error, Stopped))
-            state, link = self.state, self._conversations.link
+            state, link = self.state, self.link
             if isinstance(outcome.error, NoAnswer):
                 self.missing = True
             elif self.missing and outcome.error is None and not state.programming:

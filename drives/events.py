@@ -248,26 +248,23 @@ Witness = Callable[[Concluded], None]
 
 
 class Witnesses:
-    """The functions called at the end of every conversation of a link, before its caller goes on; false without any."""
+    """The functions called at the end of every conversation of a link, before its caller goes on."""
 
     def __init__(self, name: str) -> None:
-        self._all: tuple[Witness, ...] = ()
+        self.all: tuple[Witness, ...] = ()
         self._isolated = isolated(f"a witness of {name}")
-
-    def __bool__(self) -> bool:
-        return bool(self._all)
 
     def add(self, witness: Witness) -> Callable[[], None]:
         """Add one; the function returned removes it."""
-        self._all = (*self._all, witness)
+        self.all = (*self.all, witness)
 
         def leave() -> None:
-            self._all = tuple(each for each in self._all if each is not witness)
+            self.all = tuple(each for each in self.all if each is not witness)
 
         return leave
 
     def report(self, concluded: Concluded) -> None:
         """Call each with a conversation that is over."""
-        for witness in self._all:
+        for witness in self.all:
             with self._isolated:
                 witness(concluded)

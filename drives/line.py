@@ -201,11 +201,10 @@ class Line:
 
     # Stops
 
-    def stop(self, now: float, *repeats: StopPiece, only: Container[str] | None = None) -> bool:
+    def stop(self, now: float, *repeats: StopPiece, only: Container[str] | None = None) -> None:
         """Fail what is queued (for `only` these addresses) and in flight; write each of `repeats` once it is quiet.
 
-        Pieces of the last stop that are not written yet go first, so that each drive has its turn. Return whether a
-        line was half sent.
+        Pieces of the last stop that are not written yet go first, so that each drive has its turn.
         """
         flight = self._state if isinstance(self._state, Flight) else None
         if flight is not None:
@@ -225,7 +224,6 @@ class Line:
         if pending and isinstance(self._state, Recovering):  # further stops interrupt the wait of the pieces
             held_up = min(self._state.held_up_since, self._state.since)
         self._state = Recovering(now, held_up)
-        return self.half_sent(now)
 
     def cut_off(self, now: float, begun: bool) -> Flight | None:
         """Note that the wire broke: forget what is queued. Return the flight that this ended.

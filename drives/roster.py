@@ -164,6 +164,7 @@ class Roster:
 
     def __init__(self, conversations: Conversations, family: Family[Any]) -> None:
         self.conversations = conversations
+        self.link = conversations.link
         self.family = family
         self.drives: dict[str, Drive] = {}
         """The drives found, by address."""
@@ -178,10 +179,6 @@ class Roster:
         self.on_stored_stop: Callable[[Drive], None] = lambda drive: None
         """Called with a drive that has stored a stop instead of executing it."""
         self.link.on_unsolicited = self._unsolicited
-
-    @property
-    def link(self) -> Link:
-        return self.conversations.link
 
     @property
     def all_drives(self) -> list[Drive]:

@@ -238,9 +238,11 @@ class Stopping:
                 link.transport.yielded()
             forms, halt.data, whole = ahead or self._write_now(halt)
             halt.missed.update(forms.missed)
-            if not halt.whole:
-                halt.others = self._also_stopped(halt)
-            only = None if halt.whole else {*GLOBAL, *(drive.address for drive in halt.affected)}
+            only = None
+            if not halt.whole:  # the bytes may stop other drives as well
+                others = [drive for drive in self._roster.all_drives if drive not in halt.drives]
+                halt.others = tuple(drive for drive in others if _hears(drive.state, halt.data))
+                only = {*GLOBAL, *(drive.address for drive in halt.affected)}
             link.line.stop(at, *forms.repeats, only=only)
             link.line.wrote(halt.data, at, whole=whole)
             link.debris.stop_written(halt.data, link.line.transmitted)
@@ -258,11 +260,6 @@ class Stopping:
         data, whole = forms.written(bool(dropped or link.line.half_sent(link.now())))
         link.transport.write(data)
         return forms, data, whole
-
-    def _also_stopped(self, halt: Halt) -> tuple[Drive, ...]:
-        """The other drives that the bytes of a stop of some drives stop as well."""
-        others = [drive for drive in self._roster.all_drives if drive not in halt.drives]
-        return tuple(drive for drive in others if _hears(drive.state, halt.data))
 
     # What follows
 

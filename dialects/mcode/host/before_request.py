@@ -32,7 +32,7 @@ def before_request(state: MCodeState, request: Request) -> Procedure[Request]:
         if not (yield from synchronise(state, request.priority)):
             yield from find_again(state, request)
         state.synchronised()
-    if request.kind is not Kind.PRINT:
+    if request.kind is not Kind.PRINT and (state.error or state.running):
         yield from _old_error(state, request)
     if request.codec == state.codec and request.address == state.address:
         return request

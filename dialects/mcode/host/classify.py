@@ -49,6 +49,7 @@ class Setting:
     value: str | None = None
 
 
+@lru_cache(maxsize=256)
 def word_of(text: str) -> tuple[str, str]:
     """Split a line into its mnemonic, in capitals, and the rest."""
     found = WORD.match(text)
@@ -63,6 +64,7 @@ def referencing(state: DriveState, text: str) -> Referencing | None:
     return None
 
 
+@lru_cache(maxsize=256)
 def setting_of(text: str) -> Setting | None:
     """Find the communication setting that a line makes; None for any other line and for a value that drives refuse."""
     statement = parsed(text)
@@ -88,6 +90,7 @@ def _literal(word: str, argument: Argument | None) -> str | None:
     return str(int(argument.value)) if isinstance(argument, Number) else None
 
 
+@lru_cache(maxsize=256)
 def kind_of(text: str) -> Kind:
     word, rest = word_of(text)
     if word[:2] == "PR":
@@ -116,6 +119,7 @@ def leaves_program(text: str) -> bool:
     return word_of(text) == ("PG", "")
 
 
+@lru_cache(maxsize=256)
 def acts_on_program(text: str) -> bool:
     """Whether a line may start or end a program, or its single step: anything but a value that is set, or a print."""
     statement = parsed(text)
@@ -126,6 +130,7 @@ def acts_on_program(text: str) -> bool:
     return not sets or (row is not None and row.starts)
 
 
+@lru_cache(maxsize=256)
 def starts_motion(text: str) -> bool:
     """Whether a line that is executed at once can start motion or a program; an unknown word can."""
     try:

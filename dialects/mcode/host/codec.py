@@ -87,45 +87,6 @@ LAST_LINE = re.compile(rb"\d+ +(?:E|RT) *[\x80-\xff]?\r\n\Z", re.I)
 """A listed line that is often the last one of a program."""
 
 
-def quiet_time(request: Request, buffer: bytes, em: int, checksum: int) -> float:
-    """Seconds of quiet that end the reply to a request, by the bytes received so far."""
-    if request.settle is not None:
-        return request.settle
-    if request.kind is Kind.QUIET:
-        # The time that ends a collection: none once it holds the expected print and the end that belongs to it.
-        found = request.expect and re.search(request.expect.encode("latin-1"), buffer)
-        if found:
-            return 0.0 if _is_whole(request, found, buffer, checksum) else SHORT
-        if buffer:
-            pinged = request.address and not (request.body or request.text)
-            return 0.0 if pinged and any(buffer in pongs(request.address, each) for each in (False, True)) else BETWEEN
-        return max(FIRST, len(request.text) / SLOWEST) if request.text else PONG
-    if request.kind is Kind.LIST:
-        # The time after a list. With EM=0 its prompt ends it.
-        if em == 0:
-            return LIST_QUIET
-        if classify.word_of(request.text)[0] == "L":
-            return SHORT if LAST_LINE.search(buffer[-16:]) else LIST_QUIET
-        return EXECUTED if _ends_in_empty_line(buffer, em, checksum) else LIST_QUIET
-    if em == 0 and buffer[-1:] == b"?":
-        return SHORT
-    if checksum and NAK in buffer:
-        return PATIENT
-    if request.kind in SILENT:
-        if classify.word_of(request.text)[0] in classify.SLOW:
-            return FLASH
-        return SHORT if em == 2 else PATIENT
-    if request.kind is Kind.SETTING and _is_echo_mode(request.text):
-        # The time after `EM=`. The next question shows the mode and ignores what is left of this reply.
-        if em == 2 and not buffer:
-            return EXECUTING
-        executed = ACK in buffer if checksum else b"\n" in buffer
-        if not executed:
-            return PATIENT
-        return 0.0 if buffer[-1:] == b">" else EXECUTED
-    return SHORT if checksum == 2 and buffer[-1:] == b"\n" else PATIENT
-
-
 @lru_cache(maxsize=64)
 def _is_echo_mode(text: str) -> bool:
     setting = classify.setting_of(text)
@@ -309,7 +270,45 @@ class MCode(Codec):
         return strays, (*got.collided, *own)
 
     def quiet_time(self, request: Request, buffer: bytes) -> float:
-        return quiet_time(request, buffer, self.em, self.checksum)
+        """Seconds of quiet that end the reply to a request, by the bytes received so far."""
+        em, checksum = self.em, self.checksum
+        if request.settle is not None:
+            return request.settle
+        if request.kind is Kind.QUIET:
+            # The time that ends a collection: none once it holds the expected print and the end that belongs to it.
+            found = request.expect and re.search(request.expect.encode("latin-1"), buffer)
+            if found:
+                return 0.0 if _is_whole(request, found, buffer, checksum) else SHORT
+            if buffer:
+                pinged = request.address and not (request.body or request.text)
+                return (
+                    0.0 if pinged and any(buffer in pongs(request.address, each) for each in (False, True)) else BETWEEN
+                )
+            return max(FIRST, len(request.text) / SLOWEST) if request.text else PONG
+        if request.kind is Kind.LIST:
+            # The time after a list. With EM=0 its prompt ends it.
+            if em == 0:
+                return LIST_QUIET
+            if classify.word_of(request.text)[0] == "L":
+                return SHORT if LAST_LINE.search(buffer[-16:]) else LIST_QUIET
+            return EXECUTED if _ends_in_empty_line(buffer, em, checksum) else LIST_QUIET
+        if em == 0 and buffer[-1:] == b"?":
+            return SHORT
+        if checksum and NAK in buffer:
+            return PATIENT
+        if request.kind in SILENT:
+            if classify.word_of(request.text)[0] in classify.SLOW:
+                return FLASH
+            return SHORT if em == 2 else PATIENT
+        if request.kind is Kind.SETTING and _is_echo_mode(request.text):
+            # The time after `EM=`. The next question shows the mode and ignores what is left of this reply.
+            if em == 2 and not buffer:
+                return EXECUTING
+            executed = ACK in buffer if checksum else b"\n" in buffer
+            if not executed:
+                return PATIENT
+            return 0.0 if buffer[-1:] == b">" else EXECUTED
+        return SHORT if checksum == 2 and buffer[-1:] == b"\n" else PATIENT
 
     def parse_unsolicited(self, buffer: bytes) -> tuple[tuple[str, ...], int]:
         return unasked(buffer, self.em, self.checksum)

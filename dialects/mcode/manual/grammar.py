@@ -211,10 +211,8 @@ def _read(line: str, names: Container[str] = ()) -> Statement | LineError | None
 
 def parsed(line: str, names: Container[str] = ()) -> Statement | None:
     """Parse a line; None also for one that no drive accepts."""
-    try:
-        return parse(line, names)
-    except LineError:
-        return None
+    found = line.read_by(_read) if isinstance(line, Command) and not names else _read(line, names)
+    return None if isinstance(found, LineError) else found
 
 
 def check_groups(line: str, names: Container[str] = ()) -> None:
@@ -280,12 +278,13 @@ class _Parser:
     """Recursive descent over the tokens of a line."""
 
     def __init__(self, found: list[Token], width: int, names: Container[str]) -> None:
-        self.found, self.at, self.width, self.names = found, 0, width, names
+        self.found: list[Token | None] = [*found, None]
+        self.head, self.at, self.width, self.names = found[0], 0, width, names
         self.side = SUMS
         """The operators that belong to the right side of a comparison."""
 
     def statement(self) -> Statement:
-        head = self.found[0]
+        head = self.head
         if head.kind == "number" or head.text in "+-":
             value = self.expression(OPERATORS)
             self.finish()
@@ -309,31 +308,31 @@ class _Parser:
 
     def device_name(self) -> Text | None:
         """Return a letter without quotation marks in its own case; None for any other argument of DN."""
-        token = self.peek()
+        token = self.found[self.at]
         if token is None:
             return None
         if token.unclosed or token.kind in ("op", "bad"):
             raise LineError(ErrorNumber.OUT_OF_RANGE, token.start, "a device name needs quotation marks")
-        if token.kind != "word" or len(token.text) > 1 or self.at + 1 < len(self.found):
+        if token.kind != "word" or len(token.text) > 1 or self.found[self.at + 1] is not None:
             return None
         self.at += 1
         return Text(token.text, quoted=False)
 
     def prints(self) -> tuple[tuple[Argument | None, ...], bool]:
         items: list[Argument | None] = []
-        while (token := self.peek()) is not None and token.kind != "end":
+        while (token := self.found[self.at]) is not None and token.kind != "end":
             if items and token.kind == "comma":
                 self.at += 1
             items.append(self.printed())
         return tuple(items), self.take(";")
 
     def printed(self) -> Argument:
-        token = self.peek()
+        token = self.found[self.at]
         if token is None or token.kind in ("comma", "end"):
             column = self.width if token is None else token.start
             raise LineError(ErrorNumber.ILLEGAL_DATA, column, "a comma must stand between two items")
         item = self.text() if token.kind == "text" else self.operand()
-        after = self.peek()
+        after = self.found[self.at]
         if after is not None and after.kind == "op":
             raise LineError(ErrorNumber.ILLEGAL_DATA, after.start, "PR prints values, not what is computed from them")
         return item
@@ -341,16 +340,15 @@ class _Parser:
     def arguments(self, unseparated: int) -> tuple[Argument | None, ...]:
         """Parse the arguments; `unseparated` is the error of two without a comma between them."""
         items: list[Argument | None] = []
-        while self.peek() is not None:
-            token = self.found[self.at]
+        while (token := self.found[self.at]) is not None:
             if token.kind == "comma":
                 items.append(None)
             else:
                 items.append(self.text() if token.kind == "text" else self.condition())
-            token_after = self.peek()
+            token_after = self.found[self.at]
             if token_after is None:
                 break
-            if token_after.kind == "comma" and self.at + 1 == len(self.found):
+            if token_after.kind == "comma" and self.found[self.at + 1] is None:
                 raise LineError(ErrorNumber.ILLEGAL_DATA, token_after.start, "nothing follows the comma")
             if token_after.kind != "comma":
                 if token_after.kind in ("word", "number", "text"):
@@ -364,7 +362,7 @@ class _Parser:
     def condition(self) -> Expression:
         """Parse a value, or comparisons and logic from left to right."""
         value = self.expression(OPERATORS)
-        while (token := self.peek()) is not None and token.kind == "op":
+        while (token := self.found[self.at]) is not None and token.kind == "op":
             op = _SWAPPED.get(token.text, token.text)
             if op not in COMPARISONS | OPERATORS:
                 break
@@ -377,13 +375,14 @@ class _Parser:
 
     def expression(self, operators: Container[str]) -> Expression:
         value = self.operand()
-        while (token := self.peek()) is not None and token.text in operators:
+        while (token := self.found[self.at]) is not None and token.text in operators:
             self.at += 1
             value = Binary(token.text, value, self.operand())
         return value
 
     def operand(self) -> Expression:
-        token = self.advance()
+        token = self.found[self.at]
+        self.at += 1
         if token is None:
             raise LineError(ErrorNumber.ILLEGAL_DATA, self.width, "something is missing at the end")
         if token.kind == "number":
@@ -408,34 +407,27 @@ class _Parser:
 
     def at_operand(self) -> bool:
         """Whether an operand follows: a function's word alone is a name on drives without functions."""
-        token = self.peek()
+        token = self.found[self.at]
         return token is not None and (token.kind in ("number", "word") or token.text in ("-", "+", "!"))
 
     def text(self) -> Text:
         token = self.found[self.at]
+        assert token is not None
         self.at += 1
         if token.unclosed:
             raise LineError(ErrorNumber.ILLEGAL_DATA, token.start, "the text has no closing quotation mark")
         return Text(token.text[1:-1])
 
     def finish(self) -> None:
-        if (token := self.peek()) is not None:
+        if (token := self.found[self.at]) is not None:
             raise LineError(ErrorNumber.ILLEGAL_DATA, token.start, _misplaced(token))
 
     def take(self, text: str) -> bool:
-        token = self.peek()
+        token = self.found[self.at]
         if token is None or token.text != text:
             return False
         self.at += 1
         return True
-
-    def peek(self) -> Token | None:
-        return self.found[self.at] if self.at < len(self.found) else None
-
-    def advance(self) -> Token | None:
-        token = self.peek()
-        self.at += 1
-        return token
 
 
 def _misplaced(token: Token) -> str:
