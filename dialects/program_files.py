@@ -1,4 +1,4 @@
-"""Programs of a family: files by their names, their language, problems and canonical spelling; what a drive holds.
+"""Programs of a family: files, their language, problems, canonical spelling and editing; what a drive holds.
 
 The language is imported at its first use. In canonical spelling indents, remarks and their columns stay.
 """

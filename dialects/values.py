@@ -1,7 +1,7 @@
-"""What a family reads of its drives for a person: conditions, values to poll, a snapshot; and the controls of an axis.
+"""Settings, conditions and other values of drives, a snapshot, the controls of an axis; the record of a family for them.
 
-A reading has no side effect: it starts and clears nothing, and asks no word that the product refuses. Conditions beyond
-position and velocity are read in parts, each a short conversation: a typed line for a drive waits for one part at most.
+A reading has no side effect: it starts and clears nothing, and asks no word that the product refuses. A plan of changes
+is computed from the present values, so that the drive refuses none of its steps. Conditions beyond position and velocity are read in parts, each a short conversation: a typed line for a drive waits for one part at most.
 A part that is `slow` reads settings, which change only when a line was sent. Every move among the controls is bounded:
 it ends by itself. A line of a control holds `{by}` for a distance and `{to}` for a position.
 """
@@ -18,11 +18,7 @@ from multidrop.dialects.codec import Priority, Procedure
 from multidrop.dialects.errors import Refused
 from multidrop.dialects.state import DriveState
 
-# The record of a drive's parameters: what a drive reports of its settings, and the steps that change them.
-#
-# A reading has no side effect: it starts and clears nothing, and sends no word that the product refuses. A plan is
-# computed from the present values, so that the drive refuses none of its steps.
-
+# Settings, and the steps that change them
 
 Scalar = int | float | str
 Value = Scalar | tuple[Scalar, ...]

@@ -1,4 +1,4 @@
-"""Received bytes on their way to a reply or to an unsolicited line.
+"""Received bytes on their way to a reply or to an unsolicited line, and what they must not be taken for.
 
 An unsolicited line is published once it is whole, and an unterminated one once the wire has been quiet. Until then it
 may still be arriving, so nothing is written. Times are seconds.
@@ -19,7 +19,7 @@ from typing import NamedTuple
 
 from multidrop.dialects import Codec, End, Kind, Reply, Request
 
-# What is on the wire and is not what it seems: late replies, debris of a stop, and what a session before left.
+# Late replies, debris of a stop, and what a session before left.
 #
 # On a line whose language does not number replies, a drive that timed out may be slow, and its reply be taken for the
 # reply to a later request. So each reply is weighed against those that are outstanding, until the slow drive has

@@ -29,9 +29,6 @@ from multidrop.dialects.mcode.host.reply_parser import ENDLESS, ReplyLines, Repl
 from multidrop.dialects.mcode.manual.program_file import LONGEST, bare, unsendable
 from multidrop.dialects.mcode.manual.statements import UNNAMED
 
-# The end of a reply that has no end of its own: a collected reply's form, or a quiet time.
-
-
 _PROMPTS = (">", "?")
 _ACK = "\x06"
 
@@ -59,7 +56,7 @@ def ends_by_itself(request: Request, buffer: bytes, checksum: bool) -> bool:
     return after in _PROMPTS if "PR " in before else not after
 
 
-# The quiet time after which a reply without an end of its own is taken as it is.
+# The quiet time after which a reply without an end of its own is taken as it is (`MCode.quiet_time`).
 #
 # Theory of operation. A prompt, an ACK or an expected line ends most replies. Lists, settings and collections have no
 # such end, and in some modes silence is the reply. The time is long where a late reply could be taken for another

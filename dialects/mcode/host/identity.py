@@ -1,4 +1,4 @@
-"""A drive at a place, and what it is: a ping, then one print of identity and settings.
+"""A drive at a place: what it is and how it is set.
 
 Theory of operation. An Ethernet product refuses questions about name, party mode and checksum. A drive that replies to
 a name or to a checksum is none, so one print asks it everything. Any other drive first prints its version, part number
@@ -26,7 +26,7 @@ from multidrop.dialects.mcode.host.state import MCodeState, Place, who
 from multidrop.dialects.mcode.manual.program_file import LONGEST
 from multidrop.dialects.mcode.manual.statements import UNNAMED
 
-# Finding a drive whose settings may have changed, and clearing what earlier requests left.
+# The settings of a drive that may have changed.
 #
 # Theory of operation. A drive that was restarted has its saved settings. A lost reply to `EM=1` leaves the setting
 # unknown. So before the next request the drive prints its settings (`PR EM,ES,EF` and a mark), which the host can read

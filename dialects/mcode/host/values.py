@@ -1,4 +1,4 @@
-"""The values of an MCode drive that the host reads for a person: its conditions, values for plots, a snapshot."""
+"""What is read of an MCode drive for a person: settings, conditions, values for plots, and all of it for a snapshot."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ from multidrop.dialects.values import (
     printed_number,
 )
 
-# Reading every setting of an MCode drive in few bytes.
+# Settings, read in few bytes.
 #
 # Theory of operation. One PR prints as many settings as its line can hold, signed as every question of the host is.
 # Settings of one digit need no separator. The set-ups of inputs, outputs and software limits, and the user's
@@ -128,9 +128,6 @@ def _readings(
     return Readings(tuple(rows), tuple(unread), tuple(row[1].upper() for row in named if not row[2]))
 
 
-# Lines of settings
-
-
 def _batches(state: MCodeState, wanted: Sequence[Mnemonic]) -> Iterator[list[Mnemonic]]:
     """Divide the settings into lines that the drive's buffer holds.
 
@@ -191,9 +188,6 @@ def _value(form: Form, text: str) -> Value:
     return numbers if len(numbers) > 1 else numbers[0]
 
 
-# Lists
-
-
 def _numbered(state: MCodeState, word: str, numbers: Sequence[int]) -> Procedure[tuple[str, ...]]:
     """Print a list of known length, which ends with its last number; where that does not come, with a mark.
 
@@ -246,9 +240,6 @@ def rows_of_list(word: str, numbers: Sequence[int], lines: Sequence[str]) -> dic
     return found
 
 
-# Writing settings of an MCode drive: the moment for it, one step, and S.
-
-
 def conflict(plan: Plan, others: Collection[str]) -> str:
     """Return the reason for which a name or party mode would disturb other drives of the line; empty: none."""
     final = {change.name: change.after for change in plan}
@@ -283,7 +274,7 @@ def save(state: MCodeState) -> Procedure[None]:
     yield from perform(state, "S")
 
 
-# The conditions of an MCode drive: one print for its state; settings and set-ups once, and after each line.
+# Conditions: one print for the state; settings and set-ups once, and after each line.
 #
 # Theory of operation. The state is one signed PR of flags and values. ER is never read, since that clears it. Nothing
 # is asked with EM=3, whose prints wait in a queue. A set-up prints a list, whose last line ends it. The target is
@@ -361,7 +352,7 @@ def fold(state: MCodeState, facts: Facts) -> tuple[Conditions, ...]:
     return (replace(points.conditions(state.product, facts, state.heading), modes=modes),)
 
 
-# Values of MCode drives for plots: one signed print each, and never a word whose reading clears it.
+# Values for plots: one signed print each, and never a word whose reading clears it.
 
 
 NUMBER = r"-?\d{1,10}(?:\.\d+)?"
@@ -404,9 +395,7 @@ def own(state: MCodeState, word: str) -> bool:
     return lookup(word.upper(), state.product) is not None
 
 
-# Reading everything of an MCode drive: settings, program, counters and inputs. Nothing moves, and nothing is cleared.
-#
-# A locked program is not asked for, as the refusal would run a resident OE subroutine (MCode reference 5.1.75).
+# A snapshot. A locked program is not asked for, as the refusal would run a resident OE subroutine (5.1.75).
 
 
 BAUDS = {48: 4800, 96: 9600, 19: 19200, 38: 38400, 11: 115200}

@@ -1,4 +1,4 @@
-"""A drive's state in words, from the values of P, V, MV, BY, EF and IN."""
+"""A drive's state in words and as lamps, and the lines that the product writes by itself: moves, controls."""
 
 from __future__ import annotations
 
@@ -136,7 +136,7 @@ def _outputs(facts: Facts) -> Iterator[Lamp]:
         yield Lamp(str(n), FUNCTIONS.get(setup[0], f"type {setup[0]}"), on, output=True)
 
 
-# The lines of MCode that the product writes by itself: moves, assignments, controls. The drive has one axis.
+# Lines that the product writes by itself. The drive has one axis.
 
 
 def move(axis: str, steps: int) -> tuple[str, ...]:
@@ -151,9 +151,6 @@ def assign(word: str, value: str) -> str:
     return f"{word}={value}"
 
 
-# The controls of an MCode drive, the same over Modbus. (MCode reference 5.1.30, 5.1.54, 5.1.80, 5.1.84, 5.1.117.)
-
-
 CONTROLS: Controls = {
     BY: Control(("MR {by}",)),
     TO: Control(("MA {to}",)),
@@ -163,6 +160,7 @@ CONTROLS: Controls = {
     ENABLE: Control(("DE=1",), "current in the motor"),
     DISABLE: Control(("DE=0",), "no current: nothing holds the load"),
 }
+"""The same over Modbus. (MCode reference 5.1.30, 5.1.54, 5.1.80, 5.1.84, 5.1.117.)"""
 
 
 def controls(state: DriveState, axis: str) -> Controls:

@@ -1,4 +1,4 @@
-"""Conversations with a controller: typed commands, motion of both axes, programs, status in"""
+"""Conversations with a controller: typed commands, motion of both axes, status in words; identification and search."""
 
 from __future__ import annotations
 

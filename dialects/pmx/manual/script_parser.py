@@ -1,4 +1,4 @@
-"""The parser of A-SCRIPT: each line as a statement, or its error with line and column (manual 10).
+"""The words and the parser of A-SCRIPT: each line as a statement, or its error with line and column (manual 10).
 
 A line is one statement. A remark begins with a semicolon. Words are capitals, as everywhere on this controller. A value
 is a number or a variable (V0 to V63). Where it is read into a variable or compared, it may be a register. A line holds
@@ -17,7 +17,7 @@ from multidrop.dialects.files import split_lines
 from multidrop.dialects.pmx.manual.table import grouped, lookup
 from multidrop.dialects.program_files import Entry, Part, Problem, Word
 
-# The words of A-SCRIPT (manual 10.1; the joystick's are in 7.15): access, ASCII command, help, their places in a line.
+# The words (manual 10.1; the joystick's are in 7.15): access, ASCII command, help, their places in a line.
 #
 # A-SCRIPT and the ASCII commands are two languages: `HOMEX-` is `HX-` there, `ECLEARX` is `CLRX`. The axes are X and
 # Y. Z, U, EO3 and programs 2 and 3, which the manual mentions in places, belong to a bigger controller.

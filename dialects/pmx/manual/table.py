@@ -1,4 +1,4 @@
-"""Every ASCII command of the controller: name, values and meaning.
+"""Every ASCII command of the controller: name, values and meaning; its replies in words.
 
 `shape` is the continuation of a name: `bare` nothing, `axis` X or Y, `sign` an axis and a direction, `both` a direction
 for both axes, `1-8` a number, `place` positions. `access` is R, W or RW for a value (`NAME` reads, `NAME=value`
@@ -203,7 +203,7 @@ def starts_motion(text: str) -> bool:
     return row is None or (row.starts and not reads(text))
 
 
-# The replies of a controller in words: status numbers, and refusals with meaning and remedy.
+# Replies in words: status numbers, and refusals with meaning and remedy.
 #
 # A refusal begins with a question mark; an unknown command follows it. (PMX-2ED-SA manual, tables 7.2, 7.9, 7.12,
 # 9.1.)

@@ -35,7 +35,7 @@ from multidrop.dialects.tmcl.manual.commands import (
     Version,
 )
 
-# One request of a procedure, and proof that its reply belongs to no other request; the motors of a module.
+# One request, and proof that its reply belongs to no other one; the motors of a module.
 #
 # A reply repeats the command and not what it was for. So the sync mark is a reading command whose number no lost reply
 # bears.

@@ -1,4 +1,4 @@
-"""TMCL's direct mode: commands, how a person writes each, and the status byte of a reply.
+"""TMCL's direct mode: commands, how a person writes each, the status byte of a reply; axis and global parameters.
 
 A line in TMCL's own notation, `MVP ABS, 0, 51200`, is a word, then its fields with commas between them. A command
 without a word is called by its number, then type, motor and value: `138 0, 0, 1`. Numbers are decimal. Words and types
@@ -303,9 +303,7 @@ REFUSALS: Mapping[int, tuple[str, str]] = MappingProxyType(
 """Meaning of a refusing status and what to do, for a person."""
 
 
-# Axis and global parameters that the one-axis stepper modules have in common.
-#
-# Source: TMCL firmware manuals, "Axis parameters" and "Global parameters".
+# The parameters that the one-axis stepper modules have in common. (Manuals, "Axis parameters", "Global parameters".)
 #
 # Positions are microsteps. Velocities and accelerations are microsteps/s and microsteps/s2 on modules with a TMC5130,
 # TMC5160 or TMC4361; older ones (TMC428, TMC429) count in units of the chip.
