@@ -1,9 +1,10 @@
-"""Settings, conditions and other values of drives, a snapshot, the controls of an axis; the record of a family for them.
+"""Settings, conditions and other values of drives, a snapshot, the controls of an axis; the family's record of these.
 
 A reading has no side effect: it starts and clears nothing, and asks no word that the product refuses. A plan of changes
-is computed from the present values, so that the drive refuses none of its steps. Conditions beyond position and velocity are read in parts, each a short conversation: a typed line for a drive waits for one part at most.
-A part that is `slow` reads settings, which change only when a line was sent. Every move among the controls is bounded:
-it ends by itself. A line of a control holds `{by}` for a distance and `{to}` for a position.
+is computed from the present values, so that the drive refuses none of its steps. Conditions beyond position and
+velocity are read in parts, each a short conversation: a typed line for a drive waits for one part at most. A part that
+is `slow` reads settings, which change only when a line was sent. Every move among the controls is bounded: it ends by
+itself. A line of a control holds `{by}` for a distance and `{to}` for a position.
 """
 
 from __future__ import annotations
