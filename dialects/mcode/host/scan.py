@@ -165,7 +165,9 @@ def _unnamed(own: _Search) -> Procedure[tuple[bool, bool]]:
     """Look for a drive outside of party mode; return whether one replies, and whether the adapter repeats our bytes."""
     checksum, tried, repeated = 0, 0, 0
     for _ in range(ALONE_TRIES):
-        question = _question(own, checksum)
+        # Make the question for the version in its parts; over UDP there is no party line, and it stays whole.
+        frame = sealed(QUESTION) if checksum else QUESTION
+        question = [frame + b"\r"] if own.reach.alone else [frame[:1] + b"\n", frame[1:2] + b"\n", frame[2:] + b"\r"]
         heard = yield from _parts_asked(own, question, own.reach.window)
         if not VERSION.search(b"".join(heard)) and heard != question and any(map(_ambiguous, heard)):
             heard = yield from _parts_asked(own, question, CERTAIN * own.reach.window)
@@ -182,14 +184,6 @@ def _unnamed(own: _Search) -> Procedure[tuple[bool, bool]]:
         if not any(heard) or NAK in heard[-1] or tried == ALONE_TRIES // 2:
             checksum, tried = 1 - checksum, 0
     return False, repeated == ALONE_TRIES
-
-
-def _question(own: _Search, checksum: int) -> list[bytes]:
-    """Make the question for the version in its parts; over UDP there is no party line, and it stays whole."""
-    frame = sealed(QUESTION) if checksum else QUESTION
-    if own.reach.alone:
-        return [frame + b"\r"]
-    return [frame[:1] + b"\n", frame[1:2] + b"\n", frame[2:] + b"\r"]
 
 
 def _parts_asked(own: _Search, question: list[bytes], quiet: float) -> Procedure[list[bytes]]:

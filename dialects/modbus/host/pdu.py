@@ -78,7 +78,10 @@ class PduCodec:
     """The codec of PDUs: requests, messages around them, and the content of replies that fit."""
 
     def __init__(self) -> None:
-        _silence()
+        # Keep pymodbus' log off the screen and out of our logs.
+        logger = logging.getLogger("pymodbus")
+        logger.addHandler(logging.NullHandler())
+        logger.propagate = False
         self._decoder = DecodePDU(is_server=False)
         self._decoder.register(ReadSpecific)
         self._decoder.register(WriteSpecific)
@@ -127,7 +130,13 @@ class PduCodec:
 
     def objects(self, answer: bytes) -> tuple[dict[int, str], int | None]:
         """The objects of an identification, and the first object of the rest if more follow. Raises NotModbus."""
-        pdu = self._decoded(answer[: _objects_end(answer)])
+        # Find the end of the last announced object: pymodbus also reads truncated and surplus objects.
+        at = _OBJECTS
+        for _ in range(answer[at - 1]):
+            if len(answer) < at + 2 or len(answer) < at + 2 + answer[at + 1]:
+                raise NotModbus
+            at += 2 + answer[at + 1]
+        pdu = self._decoded(answer[:at])
         assert isinstance(pdu, ReadDeviceInformationResponse)
         found = {}
         for number, value in pdu.information.items():
@@ -142,22 +151,5 @@ class PduCodec:
         return pdu
 
 
-def _silence() -> None:
-    """Keep pymodbus' log off the screen and out of our logs."""
-    logger = logging.getLogger("pymodbus")
-    logger.addHandler(logging.NullHandler())
-    logger.propagate = False
-
-
 def _bytes(pdu: ModbusPDU) -> bytes:
     return bytes((pdu.function_code,)) + pdu.encode()
-
-
-def _objects_end(answer: bytes) -> int:
-    """Find the end of the last announced object: pymodbus also reads truncated and surplus objects."""
-    at = _OBJECTS
-    for _ in range(answer[at - 1]):
-        if len(answer) < at + 2 or len(answer) < at + 2 + answer[at + 1]:
-            raise NotModbus
-        at += 2 + answer[at + 1]
-    return at

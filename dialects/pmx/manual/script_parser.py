@@ -286,15 +286,13 @@ def parse(text: str) -> tuple[list[Statement], list[Problem]]:
             statements.append(_statement(bare, number))
         except _Wrong as wrong:
             problems.append(Problem(number, wrong.column, wrong.what, wrong.hint))
-            statements.append(Statement("wrong", _seems(bare), (), "", number, wrong.column, wrong=True))
+            # The block word at the head of a line with an error; empty if there is none.
+            head = _HEAD.match(_FOREIGN.split(bare, 1)[0])
+            word = _meant(head[0].strip()) if head else ""
+            statements.append(
+                Statement("wrong", (word if word in BLOCKS else ""), (), "", number, wrong.column, wrong=True)
+            )
     return statements, problems
-
-
-def _seems(bare: str) -> str:
-    """The block word at the head of a line with an error; empty if there is none."""
-    head = _HEAD.match(_FOREIGN.split(bare, 1)[0])
-    word = _meant(head[0].strip()) if head else ""
-    return word if word in BLOCKS else ""
 
 
 def _statement(bare: str, line: int) -> Statement:
