@@ -85,11 +85,6 @@ class Flight:
             longest = max(longest, min(self.received_at + TAIL, longest + NEVER_QUIET))
         return quiet, min(since + timeout, longest)
 
-    def deadline(self, buffer: bytes, default: float, by_quiet: bool) -> float:
-        """Time at which it times out, or at which quiet may end it."""
-        quiet, timeout = self.times(buffer, default)
-        return timeout if not by_quiet or self.judged_length == len(buffer) else min(timeout, quiet)
-
 
 class Waiting(NamedTuple):
     """A queued request and its ticket, by which its end is reported. The least is next; no two tickets are equal."""
@@ -316,7 +311,7 @@ class Line:
         """The reply, if it is whole, if quiet ends it, or if time is up."""
         codec, request, buffer = flight.request.codec, flight.request, self.inbox.buffer
         found = codec.decode(request, buffer) if buffer else None
-        if found is not None or now < flight.deadline(buffer, self.timeout, by_quiet=True):
+        if found is not None:
             return found
         quiet, timeout = flight.times(buffer, self.timeout)
         if flight.judged_length != len(buffer) and now >= quiet:
@@ -350,7 +345,10 @@ class Line:
     def deadline(self) -> float | None:
         """Time of the next internal event; None if only new input can cause one."""
         if isinstance(self._state, Flight):
-            return self._state.deadline(self.inbox.buffer, self.timeout, by_quiet=not self.inbox.awaits_echo)
+            buffer, flight = self.inbox.buffer, self._state
+            quiet, timeout = flight.times(buffer, self.timeout)
+            by_quiet = flight.judged_length != len(buffer) and not self.inbox.awaits_echo
+            return min(timeout, quiet) if by_quiet else timeout
         tail = self.inbox.tail_at()
         if not (isinstance(self._state, Recovering) and (self._queue or self._repeats)):
             return tail
