@@ -260,11 +260,14 @@ def test_a_second_stop_cuts_no_line_but_one_within_its_spoiling_does():
     line = Line(QUIETLY, baud=9600)
     line.ask(request("MR 51200"))
     line.events(0.0)
-    assert line.stop(0.004, StopPiece(b"\x1b")) is True
+    assert line.half_sent(0.004) is True
+    line.stop(0.004, StopPiece(b"\x1b"))
     line.wrote(b"\x1b", 0.004)
-    assert line.stop(0.0041, StopPiece(b"\x1b")) is False
+    assert line.half_sent(0.0041) is False
+    line.stop(0.0041, StopPiece(b"\x1b"))
     line.wrote(b"\x1b" + b"~" * 65 + b"\r\x1b", 0.0041, whole=True)
-    assert line.stop(0.02, StopPiece(b"\x1b")) is True
+    assert line.half_sent(0.02) is True
+    line.stop(0.02, StopPiece(b"\x1b"))
 
 
 def test_a_stop_that_is_still_to_be_repeated_can_be_taken_at_once():

@@ -156,9 +156,11 @@ def test_a_stop_knows_whether_a_line_was_half_sent():
     line = Line(QUIETLY, baud=9600)
     line.ask(request("MR 51200"))
     line.events(0.0)
-    assert line.stop(0.005, StopPiece(b"")) is True
+    assert line.half_sent(0.005) is True
+    line.stop(0.005, StopPiece(b""))
     line.wrote(b"\x1b", 0.005)
-    assert line.stop(1.0, StopPiece(b"")) is False
+    assert line.half_sent(1.0) is False
+    line.stop(1.0, StopPiece(b""))
 
 
 def test_the_local_echo_of_a_two_wire_adapter_is_swallowed():
@@ -206,7 +208,8 @@ def test_a_write_that_the_transport_drops_is_no_half_sent_line_and_ends_as_not_s
     line.events(0.0)
     assert line.half_sent(0.0)
     line.not_written(0.0)
-    assert not line.stop(0.0, StopPiece(b"\x1b"))
+    assert not line.half_sent(0.0)
+    line.stop(0.0, StopPiece(b"\x1b"))
     [ended] = [event for event in line.events(0.0) if isinstance(event, Finished)]
     assert not ended.transaction.sent and ended.reply.end is End.STOPPED
 
