@@ -78,23 +78,19 @@ def check(chosen: argparse.Namespace) -> int:
     """Report what is wrong; exit code 0 if nothing is."""
     found = settings.load()
     text = _text(settings.config_file())
-    troubles = _troubles(found)
+    from multidrop.tui.app import bindings
+    from multidrop.tui.keymap import keymap
+    from multidrop.tui.widgets.theme import wrong_theme
+
+    # The screen knows keys and themes.
+    look = found.look
+    troubles = [*keymap(bindings(), look.keys).troubles, *wrong_theme(look.theme), *found.mqtt.unreadable()]
     for trouble in troubles:
         write(sys.stderr, str(settings.placed(trouble, text, str(settings.config_file()))))
     if not troubles:
         state = "is right" if text else "does not exist: all settings are the defaults"
         write(sys.stdout, f"{settings.config_file()} {state}")
     return WRONG if troubles else 0
-
-
-def _troubles(found: Settings) -> list[str]:
-    """The errors in keys and theme, which only the screen knows, and files that cannot be read."""
-    from multidrop.tui.app import bindings
-    from multidrop.tui.keymap import keymap
-    from multidrop.tui.widgets.theme import wrong_theme
-
-    look = found.look
-    return [*keymap(bindings(), look.keys).troubles, *wrong_theme(look.theme), *found.mqtt.unreadable()]
 
 
 def _keys(found: Settings) -> dict[str, str]:
@@ -133,7 +129,14 @@ def report(chosen: argparse.Namespace) -> int:
 def _keep(path: Path, text: str, agreed: bool, asked: bool) -> int:
     if not agreed and not asked:
         raise Diagnostic("not written: this is not a terminal", str(path), "read the report above, then add --yes")
-    if not agreed and not _agrees(path):
+    if not agreed:
+        sys.stderr.write(f"\nWrite the report to {path}? [y/N] ")
+        sys.stderr.flush()
+        try:
+            agreed = input().strip().lower() in ("y", "yes")
+        except EOFError:
+            agreed = False
+    if not agreed:
         write(sys.stderr, "nothing was written")
         return 0
     try:
@@ -145,15 +148,6 @@ def _keep(path: Path, text: str, agreed: bool, asked: bool) -> int:
         raise Diagnostic(f"cannot be written: {why(problem)}", str(path)) from None
     write(sys.stderr, f"the report is in {path}")
     return 0
-
-
-def _agrees(path: Path) -> bool:
-    sys.stderr.write(f"\nWrite the report to {path}? [y/N] ")
-    sys.stderr.flush()
-    try:
-        return input().strip().lower() in ("y", "yes")
-    except EOFError:
-        return False
 
 
 def report_text() -> str:

@@ -45,22 +45,20 @@ def run(chosen: argparse.Namespace) -> int:
     report = Report(plan, as_json=chosen.json, junit=chosen.junit)
     with Interruption() as interruption:
         try:
-            report.take_all(_results(plan, chosen, interruption))
+            cases = (plan.case(number) for number in range(1, plan.count + 1))
+            if chosen.cluster:
+                agree = partial(_agree, chosen.cluster, chosen.yes, workers.TRUST, interruption)
+                results = workers.cluster_results(plan.job, cases, chosen.cluster, interruption, agree)
+            else:
+                jobs = chosen.jobs or workers.cores()
+                results = workers.results(plan.job, cases, plan.count, jobs, interruption)
+            report.take_all(results)
         except KeyboardInterrupt:
             return report.finish(interruption, INTERRUPTED)
         except (Diagnostic, TransportLost) as problem:
             report.erase()
             return report.finish(interruption, fail(problem))
         return report.finish(interruption, 0)
-
-
-def _results(plan: Plan, chosen: argparse.Namespace, interruption: Interruption) -> Iterator[list[Result]]:
-    cases = (plan.case(number) for number in range(1, plan.count + 1))
-    if chosen.cluster:
-        agree = partial(_agree, chosen.cluster, chosen.yes, workers.TRUST, interruption)
-        return workers.cluster_results(plan.job, cases, chosen.cluster, interruption, agree)
-    jobs = chosen.jobs or workers.cores()
-    return workers.results(plan.job, cases, plan.count, jobs, interruption)
 
 
 def _agree(address: str, yes: bool, what: str, interruption: Interruption) -> None:

@@ -228,15 +228,27 @@ class Replay:
 
     async def _step(self, step: Step) -> bool:
         """Take a step; whether its answer differs, which is shown."""
-        if not step.text:
-            await self._stop()
+        if not step.text:  # every drive was stopped then, and the session went on
+            if self._session.latched:
+                raise Stopped(LATCHED)
+            self._session.stop("the stop in the log")
+            self._session.resume()
+            await settled(self._session)
+            self._moving.clear()
             return False
         drive = self._targets.get((step.bus, step.drive))
         if drive is not None and drive.starts(step.text):
             everyone = drive.address in EVERYONE
             self._moving |= {drive, *(self._session.buses[drive.link.name].all_drives if everyone else ())}
         may_move = drive in self._moving
-        failed = await self._sent(step, drive)
+        self._printed, failed = [], ""
+        target = f"@{join_target(drive.link.name, drive.address)} " if drive is not None else ""
+        try:
+            await self._session.run(f"{target}{step.text}", By.SCRIPT)
+        except Stopped:
+            raise
+        except (DriveError, Diagnostic) as failure:
+            failed = str(failure)
         if step.is_verb and not failed:
             self._moving.clear()
         difference = compared(step, self._printed, failed, may_move)
@@ -248,26 +260,6 @@ class Replay:
             raise DriveError(text)
         self._report.differs(step, text, difference)
         return True
-
-    async def _sent(self, step: Step, drive: Drive | None) -> str:
-        self._printed = []
-        target = f"@{join_target(drive.link.name, drive.address)} " if drive is not None else ""
-        try:
-            await self._session.run(f"{target}{step.text}", By.SCRIPT)
-        except Stopped:
-            raise
-        except (DriveError, Diagnostic) as failure:
-            return str(failure)
-        return ""
-
-    async def _stop(self) -> None:
-        """Stop every drive, as it was done then, and go on."""
-        if self._session.latched:
-            raise Stopped(LATCHED)
-        self._session.stop("the stop in the log")
-        self._session.resume()
-        await settled(self._session)
-        self._moving.clear()
 
     def _note(self, event: SessionEvent) -> None:
         if isinstance(event, Printed):

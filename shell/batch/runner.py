@@ -143,18 +143,15 @@ class _Host:
         if self._session.latched or self.interrupted:
             await settled(self._session)
         if self.interrupted:
-            code, lines = self._code, self._interruption()
+            ended = outcome(self._session, self._session.automations.interrupted) or [""]
+            said = [f"{why_interrupted()}; {ended[0]}".removesuffix("; "), *ended[1:]]
+            code, lines = self._code, said if self._code else []  # a plot ends well
         elif self._session.latched and (tally := self._session.tally()).found:  # a search has closed its port by now
             lines.insert(0, f"stop: {stop_report.words(tally)}")
         for each in lines:
             if each:
                 self._printer.notify(each)
         return code
-
-    def _interruption(self) -> list[str]:
-        """The lines after a signal; none for a plot, which ends well."""
-        lines = outcome(self._session, self._session.automations.interrupted) or [""]
-        return [f"{why_interrupted()}; {lines[0]}".removesuffix("; "), *lines[1:]] if self._code else []
 
     async def _whole(self, urls: Sequence[str], body: Body) -> None:
         async with self._session.automations.run():

@@ -144,7 +144,10 @@ class Publisher:
         """Send what waits, and the goodbye, within a limit; then disconnect."""
         self._backlog.put(goodbye)
         with contextlib.suppress(TimeoutError):
-            await asyncio.wait_for(self._drained(), DRAIN)
+            async with asyncio.timeout(DRAIN):
+                while self._connection is not None and (len(self._backlog) or self._connection.in_flight()):
+                    self.pump()
+                    await asyncio.sleep(LOOK)
         if self._task is not None:
             self._task.cancel()
             await asyncio.wait([self._task])
@@ -159,11 +162,6 @@ class Publisher:
     @property
     def waiting(self) -> int:
         return len(self._backlog)
-
-    async def _drained(self) -> None:
-        while self._connection is not None and (len(self._backlog) or self._connection.in_flight()):
-            self.pump()
-            await asyncio.sleep(LOOK)
 
     async def _connected(self) -> Connection:
         connection = self._make()

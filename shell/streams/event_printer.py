@@ -49,7 +49,10 @@ class Printer:
 
     def show(self, event: SessionEvent) -> None:
         if isinstance(event, Progressed):
-            self._progressed(event)
+            if event.over:
+                self._progress.erase()
+            elif not self._talkative:
+                self._progress.show(event.text)
         elif isinstance(event, Bytes | Output | Printed | OnBus) and not self._replies:
             return
         elif isinstance(event, Bytes):
@@ -58,12 +61,6 @@ class Printer:
             self._write(sys.stderr if event.outgoing or event.watched else sys.stdout, *rows, spare=True)
         elif isinstance(event, Output | Printed | OnBus | Notified | Failed):
             self._print(event)
-
-    def _progressed(self, event: Progressed) -> None:
-        if event.over:
-            self._progress.erase()
-        elif not self._talkative:
-            self._progress.show(event.text)
 
     def _print(self, event: Output | Printed | OnBus | Notified | Failed) -> None:
         if isinstance(event, Output) and event.columns and sys.stdout.isatty():

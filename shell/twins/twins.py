@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+from functools import partial
 from typing import TYPE_CHECKING
 
 from multidrop.dialects import Diagnostic, DriveError, Stopped
@@ -53,7 +54,12 @@ class Twins:
         are warnings. A stop, or the end of the twins, ends the reading.
         """
         drives = [bus.drives[each] for each in (list(bus.drives) if addresses is None else addresses)]
-        twins = self._of(bus)
+        from multidrop.shell.twins.pair import BusTwins
+
+        if bus not in self._buses:
+            publish, lost = partial(self._publish, bus), partial(self._lost, bus)
+            self._buses[bus] = BusTwins(bus, self._rest, publish, lost)
+        twins = self._buses[bus]
         failures: list[Exception] = []
         gaps: dict[str, list[str]] = {}
         try:
@@ -91,15 +97,6 @@ class Twins:
     def _end(self, bus: Bus) -> None:
         if (twins := self._buses.pop(bus, None)) is not None:
             twins.close()
-
-    def _of(self, bus: Bus) -> BusTwins:
-        from multidrop.shell.twins.pair import BusTwins
-
-        if bus not in self._buses:
-            self._buses[bus] = BusTwins(
-                bus, self._rest, lambda event: self._publish(bus, event), lambda: self._lost(bus)
-            )
-        return self._buses[bus]
 
     def _report_gaps(self, bus: Bus, gaps: dict[str, list[str]]) -> None:
         """Report the gaps of twins, each once; drives with an equal gap share a line."""
