@@ -14,7 +14,7 @@ from multidrop.drives.events import Changed
 from multidrop.drives.line import DEFAULT_TIMEOUT, Line
 from multidrop.drives.link import Link, Reserved
 from multidrop.drives.port_journal import Keeper
-from multidrop.drives.roster import Roster, Search
+from multidrop.drives.roster import Roster
 from multidrop.drives.stopping import Halt, Stopping
 from multidrop.drives.telemetry import Telemetry
 from multidrop.transports import Transport, TransportLost
@@ -45,12 +45,11 @@ class Bus:
         self.run = self._conversations.run
         self.witnesses = self._conversations.witnesses
         """The functions called at the end of every conversation."""
-        self.roster = Roster(self._conversations, assumed)
+        self.roster = Roster(self._conversations, assumed, keeper)
         self.at = self.roster.at
         self.telemetry = Telemetry(self.roster)
         self._stopping = Stopping(self.roster)
         self.stop_ahead, self.halt, self.halted = self._stopping.ahead, self._stopping.halt, self._stopping.halted
-        self._search = Search(self.roster, self._conversations, keeper)
 
     @property
     def name(self) -> str:
@@ -74,9 +73,9 @@ class Bus:
     async def identify(self, hints: Hints) -> list[Drive]:
         """Find the drives on the line and how they are set. Raises NoAnswer if none answers."""
         self.roster.stated = hints.drives
-        for state in await self._search.first(hints):
+        for state in await self.roster.search(hints):
             self.roster.found(state)
-        await self._search.over()
+        await self.roster.search_over()
         self.link.publish(Changed(self.now()))
         return list(self.drives.values())
 
@@ -92,7 +91,7 @@ class Bus:
         """List drives that such a search has found."""
         for state in found:
             self.roster.found(state)
-        await self._search.over()
+        await self.roster.search_over()
         self.link.publish(Changed(self.now()))
 
     # A person's own bytes
@@ -138,8 +137,8 @@ class Bus:
             return
         if ends := [each.over for each in self._conversations.under_way]:
             await asyncio.wait(ends)
-        self.roster.found_again(await self._search.again(hints))
-        await self._search.over()
+        self.roster.found_again(await self.roster.search_again(hints))
+        await self.roster.search_over()
         self.link.resumed()
         self.link.reserved = None
         self._stopping.resumed()
@@ -170,7 +169,7 @@ class Bus:
 
     async def close(self) -> None:
         """Remember the drives, end telemetry and conversations, and close the port."""
-        self._search.remember()
+        self.roster.remember()
         self.telemetry.close()
         self.roster.restarts.close()
         conversations, tasks = self._conversations.under_way, self._stopping.tasks

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Callable, Coroutine, Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 from multidrop.dialects import DriveError, DriveState, Family, Hints, NoAnswer
@@ -33,18 +33,6 @@ NAMED = 4
 """Most settings that a message names."""
 
 
-@dataclass(frozen=True)
-class Before:
-    """What was known of a drive when it replied again."""
-
-    rested: Mapping[str, int]
-    """Positions of its axes at rest, if nothing was sent or ran since that can move them."""
-    settings: Mapping[str, Value]
-    """Settings as last read, if nothing was sent since that sets them."""
-    sign: str
-    """The sign of a restart that is there already: a sign-on."""
-
-
 class Restarts:
     """Looks for restarts of the drives of one link, and for the homings after them."""
 
@@ -55,10 +43,15 @@ class Restarts:
 
     def replied_again(self, drive: Drive, sign: str = "") -> None:
         """Compare a drive with what was known of it; `sign`: it has shown already that it restarted."""
-        before = Before(_rested(drive), _unchanged(drive), sign)
+        at, commands, positions = drive.resting
+        # What was known of it, unless a program ran, or something was sent since that can change it.
+        rested = positions if drive.calm and drive.started_at <= at and commands == drive.commands else {}
+        known = [facts for facts, read_at in drive.settings.values() if drive.calm and read_at == drive.commands]
+        before = {name: value for facts in known for name, value in facts.items()}
         running = self._tasks.get(drive)
-        if (sign or before.rested or before.settings) and (running is None or running.done()):
-            self._tasks[drive] = self._begin(f"looking for a restart of {drive.shown}", self._look(drive, before))
+        if (sign or rested or before) and (running is None or running.done()):
+            work = self._look(drive, sign, rested, before)
+            self._tasks[drive] = self._begin(f"looking for a restart of {drive.shown}", work)
 
     def homes(self, drive: Drive, axis: str) -> None:
         if (before := self._homings.pop((drive, axis), None)) is not None:
@@ -81,29 +74,35 @@ class Restarts:
 
         return asyncio.get_running_loop().create_task(guarded())
 
-    async def _look(self, drive: Drive, before: Before) -> None:
-        """Read the drive once; say a restart that shows, once."""
-        await asyncio.sleep(BOOT if before.sign else 0)
+    async def _look(self, drive: Drive, sign: str, rested: Mapping[str, int], before: Mapping[str, Value]) -> None:
+        """Read the drive once; say a restart that shows, once.
+
+        `sign`: one that is there already; `rested`: its positions at rest; `before`: its settings as last read.
+        """
+        await asyncio.sleep(BOOT if sign else 0)
         while self._link.away is not None or drive.programming or drive.transferring:
             await asyncio.sleep(PAUSE)
         try:
             axes = await drive.motion()
-            settings = await self._settings(drive, before) if before.settings else {}
+            settings: dict[str, Value] = {}
+            for part in drive.family.values.parts(drive.state, {}) if before else ():
+                if part.slow and part.name in drive.settings:
+                    settings |= await drive.run(part.read(drive.state))
         except (DriveError, TransportLost) as failure:
             drive.missing = isinstance(failure, NoAnswer)
             return
         at_rest = all(axis.velocity == 0 for axis in axes)
-        jumped = [axis for axis in axes if at_rest and axis.position == 0 != before.rested.get(axis.axis, 0)]
-        changed = [name for name, value in settings.items() if value != before.settings[name]]
-        if not (before.sign or jumped or changed):
+        jumped = [axis for axis in axes if at_rest and axis.position == 0 != rested.get(axis.axis, 0)]
+        changed = [name for name, value in settings.items() if name in before and value != before[name]]
+        if not (sign or jumped or changed):
             return
-        signs = [before.sign] if before.sign else []
+        signs = [sign] if sign else []
         for axis in axes:
             name = f"{axis.axis} " if axis.axis else ""
-            was = f"{before.rested[axis.axis]} before, " if axis.axis in before.rested else ""
+            was = f"{rested[axis.axis]} before, " if axis.axis in rested else ""
             signs.append(f"{name}position {was}{axis.position} now")
         for name in changed:
-            signs.append(f"{_shown(name)} {_text(before.settings[name])} before, {_text(settings[name])} now")
+            signs.append(f"{_shown(name)} {_text(before[name])} before, {_text(settings[name])} now")
         more = f"; {len(signs) - NAMED} more differ" if len(signs) > NAMED else ""
         drive.state.reference_lost(axis.axis for axis in axes)
         verb = f"/referenced {drive.address}".rstrip()
@@ -113,15 +112,6 @@ class Restarts:
             drive.address,
             warning=True,
         )
-
-    @staticmethod
-    async def _settings(drive: Drive, before: Before) -> Mapping[str, Value]:
-        """Read the known settings again."""
-        found: dict[str, Value] = {}
-        for part in drive.family.values.parts(drive.state, {}):
-            if part.slow and part.name in drive.settings:
-                found |= await drive.run(part.read(drive.state))
-        return {name: value for name, value in found.items() if name in before.settings}
 
     async def _to_its_end(self, drive: Drive, axis: str, sent: tuple[int, float]) -> None:
         """Wait until the drive rests; the axis is referenced if nothing was `sent` in between and no error is set."""
@@ -138,18 +128,6 @@ class Restarts:
             self._link.notify(f"{drive.shown}{name} is referenced: the homing has ended", drive.address)
 
 
-def _rested(drive: Drive) -> Mapping[str, int]:
-    """The last positions at rest, if no program ran and nothing was sent since that can change them; else none."""
-    at, commands, positions = drive.resting
-    return positions if drive.calm and drive.started_at <= at and commands == drive.commands else {}
-
-
-def _unchanged(drive: Drive) -> Mapping[str, Value]:
-    """The settings as last read, if no program ran and nothing was sent since that can set them; else none."""
-    known = [facts for facts, commands in drive.settings.values() if drive.calm and commands == drive.commands]
-    return {name: value for facts in known for name, value in facts.items()}
-
-
 def _shown(name: str) -> str:
     """A setting as a person knows it: `VM`, `run current 0`."""
     return name.replace("_", " ").lower() if "_" in name else name
@@ -160,12 +138,13 @@ def _text(value: Value) -> str:
 
 
 class Roster:
-    """Every drive that a stop of the link must reach."""
+    """Every drive that a stop of the link must reach; their search, after which the keeper remembers them."""
 
-    def __init__(self, conversations: Conversations, family: Family[Any]) -> None:
+    def __init__(self, conversations: Conversations, family: Family[Any], keeper: Keeper) -> None:
         self.conversations = conversations
         self.link = conversations.link
         self.family = family
+        self._keeper = keeper
         self.drives: dict[str, Drive] = {}
         """The drives found, by address."""
         self.unlisted: dict[str, Drive] = {}
@@ -270,6 +249,50 @@ class Roster:
         text = f"{which or 'the drive'} was restarted (sign-on); its settings are read before the next line"
         self.link.notify(text, warning=True)
 
+    # The search
+
+    async def search(self, hints: Hints) -> list[DriveState]:
+        """Find the drives on the line and how they are set. Raises NoAnswer if none answers."""
+        self.family = family = FAMILIES[hints.family or self.family.name]
+        self.probing = hints.drives or (*hints.tried, *(each.address for each in hints.remembered))
+        unknown = family.new_state(family.codec, "")
+        return await self.conversations.run(family.identify(hints), unknown, searching=True)
+
+    async def search_again(self, hints: Hints) -> list[DriveState]:
+        """Search where the drives were before the loss, then where they were at first. Raises as `search`."""
+        if not self.drives:
+            self.stated = hints.drives
+            return await self.search(hints)
+        states = [drive.state for drive in self.drives.values()]
+        owed = tuple(state.restore for state in states if state.restore is not None)
+        mark = max((state.sync_marks for state in states), default=0)
+        first = replace(hints, checksum=None, em=None, cut="", owed=owed, remembered=(), first_mark=mark)
+        names = tuple(filter(None, self.drives))
+        last = replace(first, drives=names, party=bool(names), addressed=bool(names) or hints.addressed)
+        try:
+            return await self.search(last)
+        except NoAnswer:
+            if last == first:
+                raise
+            return await self.search(first)
+
+    async def search_over(self) -> None:
+        """Publish and keep what was found, and note that no drive holds a part of a command."""
+        for drive in self.drives.values():
+            self.conversations.publish_notes(drive.state)
+            await self.conversations.keep(drive.state)
+        self.probing = ()
+        self.link.departure.cleared()
+        self.link.leftovers.drives_found()
+        self.remember()
+
+    def remember(self) -> None:
+        """Have the keeper remember the drives, where their family can be found faster by it."""
+        states = {drive.address: (drive.family.remember, drive.state) for drive in self.drives.values()}
+        known = {address: remember(state) for address, (remember, state) in states.items() if remember is not None}
+        if known:
+            self._keeper.remember(known)
+
 
 def _compare(before: DriveState, now: DriveState) -> None:
     """Note in one line that another drive replies, or the same one with other settings."""
@@ -290,53 +313,3 @@ def _compare(before: DriveState, now: DriveState) -> None:
         now.note(f"{who}: another drive replies than before the loss ({'; '.join(differences)})")
     elif now.codec != before.codec or now.address != before.address:
         now.note(f"{who}: its settings are not those of before the loss; they were read again")
-
-
-class Search:
-    """Finds drives and their settings, and has the keeper remember them."""
-
-    def __init__(self, roster: Roster, conversations: Conversations, keeper: Keeper) -> None:
-        self._roster, self._conversations, self._keeper = roster, conversations, keeper
-
-    async def first(self, hints: Hints) -> list[DriveState]:
-        """Find the drives on the line and how they are set. Raises NoAnswer if none answers."""
-        roster = self._roster
-        roster.family = family = FAMILIES[hints.family or roster.family.name]
-        roster.probing = hints.drives or (*hints.tried, *(each.address for each in hints.remembered))
-        unknown = family.new_state(family.codec, "")
-        return await self._conversations.run(family.identify(hints), unknown, searching=True)
-
-    async def again(self, hints: Hints) -> list[DriveState]:
-        """Search where the drives were before the loss, then where they were at first. Raises as `first`."""
-        if not self._roster.drives:
-            self._roster.stated = hints.drives
-            return await self.first(hints)
-        states = [drive.state for drive in self._roster.drives.values()]
-        owed = tuple(state.restore for state in states if state.restore is not None)
-        mark = max((state.sync_marks for state in states), default=0)
-        first = replace(hints, checksum=None, em=None, cut="", owed=owed, remembered=(), first_mark=mark)
-        names = tuple(filter(None, self._roster.drives))
-        last = replace(first, drives=names, party=bool(names), addressed=bool(names) or hints.addressed)
-        try:
-            return await self.first(last)
-        except NoAnswer:
-            if last == first:
-                raise
-            return await self.first(first)
-
-    async def over(self) -> None:
-        """Publish and keep what was found, and note that no drive holds a part of a command."""
-        for drive in self._roster.drives.values():
-            self._conversations.publish_notes(drive.state)
-            await self._conversations.keep(drive.state)
-        self._roster.probing = ()
-        self._conversations.link.departure.cleared()
-        self._conversations.link.leftovers.drives_found()
-        self.remember()
-
-    def remember(self) -> None:
-        """Have the keeper remember the drives, where their family can be found faster by it."""
-        states = {drive.address: (drive.family.remember, drive.state) for drive in self._roster.drives.values()}
-        known = {address: remember(state) for address, (remember, state) in states.items() if remember is not None}
-        if known:
-            self._keeper.remember(known)

@@ -22,8 +22,7 @@ from multidrop.dialects.files import SourceLine
 from multidrop.dialects.mcode.host import classify
 from multidrop.dialects.mcode.host.before_request import before_request
 from multidrop.dialects.mcode.host.exchange import REPEATS, ends_in_program_mode, leave_program, read_error, take_out
-from multidrop.dialects.mcode.host.operations import immediate
-from multidrop.dialects.mcode.host.program_mode import echo_everything, put_back, restore_echo
+from multidrop.dialects.mcode.host.operations import echo_everything, immediate, put_back, restore_echo
 from multidrop.dialects.mcode.host.program_readout import (
     GLOBAL,
     LABEL,

@@ -35,7 +35,7 @@ from multidrop.dialects.mcode.host.identity import (
     overflow,
     write_stop,
 )
-from multidrop.dialects.mcode.host.program_mode import put_back_found
+from multidrop.dialects.mcode.host.operations import put_back_found
 from multidrop.dialects.mcode.host.state import MCodeState, Place, Unconfirmed, who
 from multidrop.dialects.mcode.manual.statements import UNNAMED
 from multidrop.dialects.state import Remembered
