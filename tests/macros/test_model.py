@@ -1,9 +1,134 @@
+"""A macro: its braces and parts, what a line may say of a value, and which values are taken."""
+
+from __future__ import annotations
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from multidrop.dialects.errors import Diagnostic
-from multidrop.macros import Macro, Step, check, escape, fill, value_names
+from multidrop.macros import Macro, Parameter, Step, check, checked_values, escape, fill, filled, missing, value_names
+
+
+def macro(*lines: str, on_stop: tuple[str, ...] = ()) -> Macro:
+    return Macro("m", tuple(Step(0.0, line) for line in lines), on_stop=on_stop)
+
+
+@pytest.mark.parametrize(
+    ("line", "parameter", "valid"),
+    [
+        ("{n}", Parameter("n"), "one line of text"),
+        ("{n:int=10,1..100}", Parameter("n", "int", 10, 1, 100), "a whole number, 1 to 100"),
+        ("{n:int}", Parameter("n", "int"), "a whole number"),
+        ("{n: int = -5 , -10 .. }", Parameter("n", "int", -5, -10, None), "a whole number, -10 or more"),
+        ("{n:float,..2.5}", Parameter("n", "float", None, None, 2.5), "a number, 2.5 or less"),
+        ("{n:text=to, and..fro}", Parameter("n", "text", "to, and..fro"), "one line of text"),
+        ("{n:text=}", Parameter("n", "text", ""), "one line of text"),
+        ("{n:choice(a|b c)=b c}", Parameter("n", "choice", "b c", choices=("a", "b c")), "a or b c"),
+    ],
+)
+def test_a_line_says_type_default_and_limits(line: str, parameter: Parameter, valid: str) -> None:
+    assert macro(line).parameters == (parameter,)
+    assert parameter.valid == valid
+
+
+@pytest.mark.parametrize(
+    ("line", "says"),
+    [
+        ("MR {n:whole}", "m.toml: step 1: {n:whole}: invalid type of a value; valid: {NAME:int=10,1..100}"),
+        ("MR {n:int=ten}", "invalid n = 'ten'; valid: a whole number"),
+        ("MR {n:int=101,1..100}", "invalid n = '101'; valid: a whole number, 1 to 100"),
+        ("MR {n:int,9..1}", "no value from 9 to 1"),
+        ("MR {n:int,1.5..}", "invalid limit = '1.5'"),
+        ("MR {n:choice()}", "invalid choices"),
+        ("MR {n:choice(a|a)}", "invalid choices"),
+        ("MR {n:choice(a|b)=c}", "invalid n = 'c'; valid: a or b"),
+        ("{n:int} {n:float}", "{n:float} differs from n in step 1"),
+    ],
+)
+def test_a_wrong_type_is_told_with_its_step(line: str, says: str) -> None:
+    with pytest.raises(Diagnostic) as caught:
+        check(macro(line), "m.toml")
+    assert says in str(caught.value)
+
+
+def test_a_plain_name_has_the_type_of_another_line() -> None:
+    found = macro("VM {n}", "MR {n:int=7}", "{{n:x}}", on_stop=("MA {n} {m}",)).parameters
+    assert found == (Parameter("n", "int", 7), Parameter("m"))
+
+
+def test_the_name_of_a_set_line_is_no_parameter() -> None:
+    own = macro("/set far P + {n:int}", "MR {far}")
+    assert [each.name for each in own.parameters] == ["n"]
+    assert filled(own, {"n": "3"}) == ("/set far P + 3", "MR {far}")
+
+
+@pytest.mark.parametrize(
+    ("kind", "text", "taken"),
+    [
+        ("int", "+005", "5"),
+        ("int", "-7", "-7"),
+        ("float", "0.00000012", "0.00000012"),
+        ("float", "3.", "3"),
+        ("float", ".5", "0.5"),
+        ("text", "left ä", "left ä"),
+        ("choice(a|b)", "b", "b"),
+    ],
+)
+def test_a_value_is_put_into_the_line(kind: str, text: str, taken: str) -> None:
+    assert filled(macro(f"MR {{n:{kind}}} {{n}}"), {"n": text}) == (f"MR {taken} {taken}",)
+
+
+@pytest.mark.parametrize(
+    ("kind", "text"),
+    [
+        ("int", "1.5"),
+        ("int", "1e3"),
+        ("int", ""),
+        ("int", "١"),
+        ("int", "9" * 16),
+        ("float", "nan"),
+        ("float", "inf"),
+        ("float", "1_0"),
+        ("choice(a|b)", "A"),
+        ("text", "1\rMR 2"),
+        ("text", "1\n"),
+        ("text", "\x1b"),
+        ("text", "\x03"),
+        ("text", "a\u202eb"),
+    ],
+)
+def test_a_wrong_value_is_one_line_with_macro_name_and_valid_values(kind: str, text: str) -> None:
+    wrong = macro(f"MR {{n:{kind}}}")
+    with pytest.raises(Diagnostic, match=r"^macro m: invalid n = .*; valid: ") as caught:
+        checked_values(wrong, {"n": text})
+    assert str(caught.value).isprintable()
+
+
+@pytest.mark.parametrize("text", ["/stop", " /stop", "@b MR 1"])
+def test_a_value_begins_no_verb_and_names_no_drive(text: str) -> None:
+    with pytest.raises(Diagnostic, match=r"macro m, step 1: a value begins the line with [/@]"):
+        filled(macro("{n}"), {"n": text})
+    assert filled(macro("@{d} {n}"), {"d": "b", "n": "MR 5"}) == ("@b MR 5",)
+
+
+def test_what_has_no_default_must_be_given() -> None:
+    wanting = macro("MR {far:int,1..9} {fast:int=3}", "PR {what}")
+    assert [each.name for each in missing(wanting, {"what": "P"})] == ["far"]
+    with pytest.raises(Diagnostic, match=r"step 1: no value for \{far\}; set far=VALUE \(a whole number, 1 to 9\)"):
+        checked_values(wanting, {"what": "P"})
+    assert checked_values(wanting, {"what": "P", "far": "2"}) == {"far": "2", "fast": "3", "what": "P"}
+
+
+@given(st.text(), st.text())
+def test_any_line_with_any_value_is_filled_or_told(line: str, value: str) -> None:
+    try:
+        names = [each.name for each in macro(line).parameters]
+        (one,) = filled(macro(line), dict.fromkeys(names, value))
+    except Diagnostic as problem:
+        assert str(problem)
+    else:
+        assert not names or ("\r" not in one.replace(line, "") and "\n" not in value)
 
 
 @given(st.text())

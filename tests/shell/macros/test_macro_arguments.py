@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import AsyncIterator, Mapping, Sequence
-from pathlib import Path
+from collections.abc import Mapping, Sequence
 from typing import cast as typed
 
 import pytest
@@ -12,21 +11,12 @@ from multidrop.dialects import Diagnostic
 from multidrop.drives.bus import Bus
 from multidrop.macros import Macro, Step
 from multidrop.shell.channel import Field
-from multidrop.shell.connect.settings import Settings
 from multidrop.shell.events import Notified
 from multidrop.shell.macro_arguments import settled
 from multidrop.shell.session import Session
 
 TURNS = Macro("turns", (Step(0.0, "MR {far:int=7,1..9}"), Step(0.0, "VM {fast:int}")))
 GANTRY = Macro("home", (Step(0.0, "@gantry:a HM 1"), Step(0.0, "/wait @gantry:a I1=1")), roles=("gantry",))
-
-
-@pytest.fixture
-async def session(tmp_path: Path) -> AsyncIterator[Session]:
-    session = Session(Settings({}, tmp_path, tmp_path / "state"))
-    yield session
-    session.buses.clear()
-    await session.close()
 
 
 def opened(session: Session, *names: str) -> Session:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import io
 import shlex
 import sys
-from collections.abc import AsyncIterator
 from pathlib import Path
 
 import pytest
@@ -13,14 +12,13 @@ import pytest
 from multidrop.__main__ import main
 from multidrop.dialects import Diagnostic
 from multidrop.macros import MacroStore
-from multidrop.shell.connect.settings import Settings
 from multidrop.shell.events import By, Notified, Output
 from multidrop.shell.session import Session
 
 HAND = "# by hand\nname = 'm' # mine\nkey = 'F3' # left\nnote = 'to and fro'\n\n# first\n[[step]]\nline = '/sleep 0'\n"
 
 
-@pytest.fixture
+@pytest.fixture(autouse=True)
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     (tmp_path / "macros").mkdir()
     (tmp_path / "work").mkdir()
@@ -29,13 +27,6 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     monkeypatch.setenv("MULTIDROP_STATE_DIR", str(tmp_path / "state"))
     (tmp_path / "macros" / "m.toml").write_text(HAND)
     return tmp_path / "macros"
-
-
-@pytest.fixture
-async def session(folder: Path) -> AsyncIterator[Session]:
-    session = Session(Settings({}, folder.parent, folder.parent / "state"))
-    yield session
-    await session.close()
 
 
 async def run(session: Session, *lines: str, by: By = By.OPERATOR) -> list[str]:

@@ -2,31 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import AsyncIterator
 from pathlib import Path
 
 import pytest
 
 from multidrop.__main__ import main
 from multidrop.dialects import Diagnostic
-from multidrop.shell.connect.settings import Settings
 from multidrop.shell.events import Notified, Output
 from multidrop.shell.session import Session
 
 HAND = "# by hand\nname = 'm' # mine\nkey = 'F3' # left\nnote = 'to and fro'\n\n# first\n[[step]]\nline = '/sleep 0'\n"
 
 
-@pytest.fixture
+@pytest.fixture(autouse=True)
 def folder(tmp_path: Path) -> Path:
     (tmp_path / "macros").mkdir()
     return tmp_path / "macros"
-
-
-@pytest.fixture
-async def session(folder: Path) -> AsyncIterator[Session]:
-    session = Session(Settings({}, folder.parent, folder.parent / "state"))
-    yield session
-    await session.close()
 
 
 def put(folder: Path, name: str, key: str = "") -> Path:

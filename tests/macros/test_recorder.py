@@ -1,9 +1,10 @@
-"""Waits that are offered in place of recorded pauses."""
+"""A recording: its lines and times, and the waits that are offered in place of pauses."""
 
 from __future__ import annotations
 
 import pytest
 
+from multidrop.dialects.errors import Diagnostic
 from multidrop.macros import Macro, Recorder, Step
 from multidrop.macros.recorder import Observed, offers, with_waits
 
@@ -97,3 +98,44 @@ def test_what_came_back_is_kept_beside_the_step_and_cut() -> None:
 def test_no_events_and_no_lines_are_no_offers() -> None:
     assert offers([], Observed()) == []
     assert with_waits(Macro("m", (Step(1.0, "PR P"),)), []) == Macro("m", (Step(1.0, "PR P"),))
+
+
+def typed(*kept: tuple[str, float], start: float = 0.0) -> Macro:
+    recorder = Recorder()
+    recorder.start("m", start)
+    for line, at in kept:
+        recorder.record(line, at)
+    return recorder.macro()
+
+
+def test_a_recording_begins_with_its_first_line_in_milliseconds() -> None:
+    macro = typed(("@b MR 1", 7.0), ("/wait stopped", 7.1234), ("PR P", 9.0), start=2.0)
+    assert macro == Macro("m", (Step(0.0, "@b MR 1"), Step(0.123, "/wait stopped"), Step(1.877, "PR P")))
+
+
+def test_rounding_does_not_add_up() -> None:
+    macro = typed(*((f"{n}", n * 0.0104) for n in range(1001)))
+    assert sum(step.after for step in macro.steps) == pytest.approx(10.4, abs=0.001)
+
+
+def test_nothing_is_kept_while_nothing_is_typed() -> None:
+    recorder = Recorder()
+    recorder.record("MR 1", 0.0)
+    recorder.start("m", 1.0)
+    assert recorder.name == "m"
+    with pytest.raises(Diagnostic, match="nothing was typed"):
+        recorder.macro()
+    assert recorder.name == ""
+    with pytest.raises(Diagnostic, match="no macro is being recorded"):
+        recorder.macro()
+
+
+def test_one_macro_is_recorded_at_a_time_under_a_name_that_can_be_kept() -> None:
+    recorder = Recorder()
+    with pytest.raises(Diagnostic, match="invalid macro name"):
+        recorder.start("a/b", 0.0)
+    recorder.start("a", 0.0)
+    with pytest.raises(Diagnostic, match="the macro a is being recorded"):
+        recorder.start("b", 0.0)
+    recorder.discard()
+    recorder.start("b", 0.0)
