@@ -156,8 +156,8 @@ class Reconnections:
     def __init__(self, say: Say, wanted: bool) -> None:
         self._say = say
         self._wanted = wanted
-        self._ways: dict[str, tuple[Hints, Reopen]] = {}
-        self._ports: dict[str, str] = {}
+        self._ways: dict[str, tuple[Hints, Reopen, str]] = {}
+        """How each bus is opened again, and its port."""
         self._tasks: dict[str, asyncio.Task[None]] = {}
 
     @property
@@ -167,25 +167,25 @@ class Reconnections:
     def add(self, bus: Bus, hints: Hints, reopen: Reopen | None, port: str) -> None:
         """Try this bus again whenever it is lost, where that is wanted and possible."""
         if self._wanted and reopen is not None:
-            self._ways[bus.name], self._ports[bus.name] = (hints, reopen), port
+            self._ways[bus.name] = hints, reopen, port
 
     def rename(self, before: str, now: str) -> None:
         """Know a bus by its new name. It must not be lost."""
         if before in self._ways:
-            self._ways[now], self._ports[now] = self._ways.pop(before), self._ports.pop(before)
+            self._ways[now] = self._ways.pop(before)
 
     def waiting_for(self, port: str) -> str:
         """The name of the bus that is being tried again on a port; empty if there is none."""
-        return next((name for name in self._tasks if port and self._ports.get(name) == port), "")
+        return next((name for name, way in self._ways.items() if port and way[2] == port and name in self._tasks), "")
 
     def lost(self, bus: Bus) -> bool:
         """Begin to try a lost bus; whether it is tried."""
-        way = self._ways.get(bus.name)
-        if way is None:
+        if bus.name not in self._ways:
             return False
+        hints, reopen, _ = self._ways[bus.name]
         if earlier := self._tasks.get(bus.name):  # which is back, and reads what moves
             earlier.cancel()
-        self._tasks[bus.name] = asyncio.get_running_loop().create_task(self._try(bus, *way))
+        self._tasks[bus.name] = asyncio.get_running_loop().create_task(self._try(bus, hints, reopen))
         return True
 
     async def _try(self, bus: Bus, hints: Hints, reopen: Reopen) -> None:
@@ -205,7 +205,6 @@ class Reconnections:
     async def remove(self, name: str) -> None:
         """End the attempts for a bus that is being closed."""
         self._ways.pop(name, None)
-        self._ports.pop(name, None)
         if task := self._tasks.get(name):
             task.cancel()
             await asyncio.wait([task])

@@ -13,7 +13,7 @@ from typing import NamedTuple
 from multidrop.dialects import Diagnostic
 from multidrop.dialects.families import program_language_of, program_languages
 from multidrop.dialects.files import split_lines
-from multidrop.dialects.program_files import Block, EditingLanguage, Entry, Offer, Part, Problem, Span, UserName, errors
+from multidrop.dialects.program_files import Block, Entry, Offer, Part, Problem, Span, UserName, errors
 
 BYTE_ORDER_MARK = "\ufeff"
 
@@ -26,11 +26,11 @@ class ProgramGrammar:
         self._file = file
         self._named = language if language != by_name else ""
         self.language = language or by_name
-        self._files = program_languages()[self.language]
-        self.title = self._files.title
+        self.files = program_languages()[self.language]
+        self.title = self.files.title
 
     def parts(self, line: str) -> Sequence[Part]:
-        return self._files.language.parts(line)
+        return self.files.language.parts(line)
 
     def check(self, text: str, product: str) -> Sequence[Problem]:
         """Return the problems of `multidrop program check`; none for an empty text, which a person has just begun."""
@@ -42,15 +42,7 @@ class ProgramGrammar:
         return examine_text(text, self._file, personality_of(self.language, product), self._named).problems
 
     def entries(self, text: str) -> Sequence[Entry]:
-        return self._files.language.entries(text)
-
-    @property
-    def editing(self) -> EditingLanguage:
-        return self._files.editing
-
-    def formatted(self, text: str) -> str:
-        """Return a text in canonical spelling. A line that no drive accepts stays as it is."""
-        return self._files.language.formatted(text)
+        return self.files.language.entries(text)
 
 
 class Help(NamedTuple):
@@ -88,7 +80,7 @@ class ProgramText:
 
     def __init__(self, text: str, grammar: ProgramGrammar, product: str) -> None:
         self.text = " " + text[1:] if text.startswith(BYTE_ORDER_MARK) else text
-        self.grammar, self._language = grammar, grammar.editing
+        self.grammar, self._language = grammar, grammar.files.editing
         self._product = product
 
     @cached_property
@@ -205,7 +197,7 @@ class ProgramText:
         if wrong := errors(self.problems):
             count = f"{len(wrong)} errors, the first" if len(wrong) > 1 else "an error"
             raise Diagnostic(f"not formatted: {count} in line {wrong[0].line}: {wrong[0].what}", "", wrong[0].hint)
-        edits, lines = [], zip(self.lines, split_lines(self.grammar.formatted(self.text)), strict=True)
+        edits, lines = [], zip(self.lines, split_lines(self.grammar.files.language.formatted(self.text)), strict=True)
         for number, (old, new) in enumerate(lines):
             if old != new and first <= number <= last:  # without what both spellings begin and end with
                 start = len(commonprefix((old, new)))
