@@ -63,12 +63,19 @@ class Floor:
     @property
     def deadline(self) -> float | None:
         """When something next happens anywhere, s."""
-        return min([at for wire in self.wires.values() if (at := wire.deadline) is not None], default=None)
+        first = None
+        for wire in self.wires.values():
+            if (at := wire.deadline) is not None and (first is None or at < first):
+                first = at
+        return first
 
     def advance(self, now: float) -> dict[str, bytes]:
         """What the endpoints of each bus hear by `now`; buses on which nothing is heard are left out."""
-        heard = {name: wire.advance(now) for name, wire in self.wires.items()}
-        return {name: data for name, data in heard.items() if data}
+        heard = {}
+        for name, wire in self.wires.items():
+            if data := wire.advance(now):
+                heard[name] = data
+        return heard
 
     def command(self, text: str, now: float) -> str | None:
         """Move the world: `/sim input b 1 0` (`/sim` may be left out). Raises Diagnostic and changes nothing.

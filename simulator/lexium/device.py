@@ -46,50 +46,47 @@ class Answer(NamedTuple):
     refused: bool = False
 
 
-class MCodeDevice:
+class MCodeDevice(EventLoop):
     """One drive. Times are seconds and never go back. Raises Diagnostic for a spec that it cannot be set up with."""
 
     def __init__(self, spec: DriveSpec, world: World) -> None:
         self.spec, self.world = spec, world
         self.memory = memory = _memory(spec)
         period = max(spec.instruction_us, SHORTEST_US) / 1e6
-        self.core = core = Core(memory, world, period, lambda line: self.language.compile_stored(line))
-        self.program, self.errors, self.interpreter, self._mode = core.program, core.errors, core.interpreter, core.mode
-        self.motor = motor = Motor(core)
+        core = Core(memory, world, period, lambda line: self.language.compile_stored(line))
+        self.program, self.errors, self._mode = core.program, core.errors, core.mode
+        motor = Motor(core)
         self.output_lines = outputs = Outputs(core, motor)
         motor.inputs.put_out = outputs.put_out
         self.nvm = Nvm(core, motor, outputs)
-        self._power = Power(core, motor, outputs, self.nvm)
-        self._loop = EventLoop(core, motor, self._power)
+        super().__init__(core, motor, Power(core, motor, outputs, self.nvm))
         serial = spec.identity.serial or f"0401{ord(spec.name[:1] or '!'):05d}"
-        self.language = Instructions(serial, core, motor, outputs, self._loop)
+        self.language = Instructions(serial, core, motor, outputs, self)
         _set_up(self, spec)
-        self._power.boot()
-        _begin_counters(spec, partial(_reason, self))
+        self.power_unit.boot()
+        # Let the counters begin where a snapshot found them: P first, then what P does not say. Raises Diagnostic.
+        counters = {WORDS.get(key, key): value for key, (value,) in spec.identity.counters.items()}
+        for word in sorted(counters, key=lambda word: word != "P"):
+            _accepted(f"{word}={counters[word]}", f"drive {spec.name}: identity", partial(_reason, self))
 
     # What is read.
 
     @property
     def now(self) -> float:
-        return self.core.timeline.now
+        return self._timeline.now
 
     @property
     def powered(self) -> bool:
-        return self._power.on
+        return self.bridges.powered
 
     @property
     def boots(self) -> int:
-        return self._power.boots
+        return self.power_unit.boots
 
     @property
     def running(self) -> bool:
         """BY."""
-        return self.core.thread.running
-
-    @property
-    def stepping(self) -> bool:
-        """Return whether a program is executed step by step, and waits for keys."""
-        return self.core.thread.stepping
+        return self.thread.running
 
     @property
     def programming(self) -> int | None:
@@ -112,54 +109,37 @@ class MCodeDevice:
         """Which outputs are active, by number, likewise."""
         return {n: self.output_lines.active(n, now) for n in self.output_lines.types}
 
-    # Time.
-
-    @property
-    def deadline(self) -> float | None:
-        return self._loop.deadline
-
-    def proceed(self, now: float) -> float | None:
-        """Let time pass up to `now`, or to where there is news; return when that is, None for nothing."""
-        return self._loop.proceed(now)
-
-    def advance(self, now: float, *, program: bool = False) -> None:
-        """Let everything happen that is due up to `now`; `program`: but stop when no program runs any more."""
-        self._loop.advance(now, program=program)
-
-    def quiet(self, now: float, running: bool) -> bool:
-        """Return whether nothing changes up to `now`, if it was `running` before. Quick to ask."""
-        return self._loop.quiet(now, running)
-
     # Lines.
 
     def execute(self, text: str, now: float, *, immediate: bool = False) -> Answer:
         """Carry out one line; in program mode store it, unless it is `immediate`. Never raises, whatever the text."""
-        self._loop.advance_to_line(now)
-        if not self.powered:
+        if self.calm and self.quiet(now, self.thread.running):  # nothing has happened since the last line
+            self._timeline.now = max(self._timeline.now, now)
+        else:
+            self.advance(now)
+        if not self.bridges.powered:
             return Answer(refused=True)
-        self.core.printer.begin_answer()
-        self._loop.calm = refused = False
+        printer = self._printer
+        printer.begin_answer()
+        self.calm = refused = False
         immediate = immediate or self._mode.address is None
         try:
-            self._carry_out(text, immediate)
+            statement = parsed(text, self._mode.known_names())
+            if statement is None:
+                pass
+            elif immediate:
+                self.language.compile(statement, stored=False)()
+                self.calm = statement.word == "PR"  # which changes nothing that there is to look at
+            elif statement.word == "PG" and not statement.arguments:
+                self._mode.address = None
+            else:
+                self.language.compile(statement, stored=True)
+                self._mode.store(statement, strip(text))
         except (LineError, Fault) as error:
             refused = True
             self.interpreter.refuse(error.code, handle=immediate)
-        *lines, tail = self.core.printer.end_answer().split(CRLF)
+        *lines, tail = printer.end_answer().split(CRLF)
         return Answer(tuple(lines), tail, refused)
-
-    def _carry_out(self, text: str, immediate: bool) -> None:
-        statement = parsed(text, self._mode.known_names())
-        if statement is None:
-            return
-        if immediate:
-            self.language.compile(statement, stored=False)()
-            self._loop.calm = statement.word == "PR"  # which changes nothing that there is to look at
-        elif statement.word == "PG" and not statement.arguments:
-            self._mode.address = None
-        else:
-            self.language.compile(statement, stored=True)
-            self._mode.store(statement, strip(text))
 
     def fail(self, code: int, now: float) -> None:
         """Set an error that the port has found, such as a line that is too long."""
@@ -167,7 +147,7 @@ class MCodeDevice:
         self.interpreter.refuse(code, handle=self._mode.address is None)
 
     def prints(self) -> list[tuple[float, str]]:
-        return self.core.printer.take()
+        return self._printer.take()
 
     # Keys and power.
 
@@ -176,8 +156,8 @@ class MCodeDevice:
         self.advance(now)
         self.motor.torque.halt()
         self.motor.stop(self.now)
-        self.core.thread.finish()
-        self.core.timeline.replan()
+        self.thread.finish()
+        self._timeline.replan()
 
     def step(self, key: str, now: float) -> None:
         """A key of single step: space or carriage return."""
@@ -188,21 +168,21 @@ class MCodeDevice:
         """^C: begin again with what NVM holds (manual 3.4.4)."""
         self.advance(now)
         if self.powered:
-            self._power.restart()
+            self.power_unit.restart()
 
     def power(self, on: bool, now: float) -> None:
         """Switch the drive on or off. What NVM holds stays."""
         self.advance(now)
-        self._power.switch(on)
+        self.power_unit.switch(on)
 
     def world_changed(self) -> None:
         """Look at the world again: `/sim` has changed it."""
-        self.core.timeline.replan()
+        self._timeline.replan()
 
     def supply(self, on: bool, now: float) -> None:
         """Switch +V alone, with the auxiliary supply left on (manual 5.1.127)."""
         self.advance(now)
-        self._power.supply(on)
+        self.power_unit.supply(on)
 
 
 def _memory(spec: DriveSpec) -> Memory:
@@ -211,14 +191,6 @@ def _memory(spec: DriveSpec) -> Memory:
         part=own.part or memory.model.part, version=own.version or memory.model.version
     )
     return memory
-
-
-def _load(spec: DriveSpec, execute: Execute) -> None:
-    """Declare the variables, and store the program. Raises Diagnostic."""
-    for name, value in spec.variables.items():
-        _accepted(f"VA {name}={value}", f"drive {spec.name}: variables", execute)
-    for number, line in enumerate(split_lines(spec.program), 1):
-        _accepted(line, f"{spec.program_name or 'program'}:{number}", execute)
 
 
 def _assign(spec: DriveSpec, execute: Execute) -> None:
@@ -240,13 +212,6 @@ def _assign(spec: DriveSpec, execute: Execute) -> None:
         _accepted("=".join(each), f"drive {spec.name}: set", execute)
 
 
-def _begin_counters(spec: DriveSpec, execute: Execute) -> None:
-    """Let the counters begin where a snapshot found them: P first, then what P does not say. Raises Diagnostic."""
-    counters = {WORDS.get(key, key): value for key, (value,) in spec.identity.counters.items()}
-    for word in sorted(counters, key=lambda word: word != "P"):
-        _accepted(f"{word}={counters[word]}", f"drive {spec.name}: identity", execute)
-
-
 def _accepted(line: str, where: str, execute: Execute) -> None:
     if why := execute(line):
         raise Diagnostic(f"{line.strip()}: {why}", where)
@@ -257,7 +222,11 @@ def _set_up(device: MCodeDevice, spec: DriveSpec) -> None:
     execute = partial(_reason, device)
     device.motor.inputs.begin(0.0)
     device.motor.inputs.watched = False
-    _load(spec, execute)
+    # Declare the variables, and store the program. Raises Diagnostic.
+    for name, value in spec.variables.items():
+        _accepted(f"VA {name}={value}", f"drive {spec.name}: variables", execute)
+    for number, line in enumerate(split_lines(spec.program), 1):
+        _accepted(line, f"{spec.program_name or 'program'}:{number}", execute)
     device.core.mode.address = None
     device.core.thread.finish()
     device.motor.stop(0.0)

@@ -29,11 +29,15 @@ RESET_TIME = 0.01
 
 
 class EventLoop:
-    """The events of one drive. `calm`: the last line changed nothing that there is to look at."""
+    """The events of one drive. `calm`: the last line changed nothing that there is to look at.
+
+    `power_unit` is the supply, `bridges.powered` whether the drive has power and is up.
+    """
 
     def __init__(self, core: Core, motor: Motor, power: Power) -> None:
-        self._core, self._timeline, self._printer, self._thread = core, core.timeline, core.printer, core.thread
-        self._interpreter, self._motor, self._inputs, self.power = core.interpreter, motor, motor.inputs, power
+        self.core, self._timeline, self._printer, self.thread = core, core.timeline, core.printer, core.thread
+        self.interpreter, self.motor, self._inputs, self.power_unit = core.interpreter, motor, motor.inputs, power
+        self.bridges = motor.bridges
         self.calm = False
         self._before: tuple[bool, bool, int] | None = None
         self._next: Event = inf, nothing
@@ -65,7 +69,7 @@ class EventLoop:
         """
         timeline = self._timeline
         self.calm = False
-        while self.power.on or self._comes_up(now):
+        while self.bridges.powered or self._comes_up(now):
             if self._news() or not self._run(now, program):
                 return
             timeline.now = max(timeline.now, now)
@@ -73,21 +77,14 @@ class EventLoop:
                 break
         timeline.now = max(timeline.now, now)
 
-    def advance_to_line(self, now: float) -> None:
-        """Advance to a typed line: quickly where nothing has happened since the one before."""
-        if self.calm and self.quiet(now, self._thread.running):
-            self._timeline.now = max(self._timeline.now, now)
-        else:
-            self.advance(now)
-
     @property
     def deadline(self) -> float | None:
         """When something next happens by itself; None if nothing will."""
-        if not self.power.on:
-            return self.power.boots_at
+        if not self.bridges.powered:
+            return self.power_unit.boots_at
         if self._timeline.outdated:
             self._plan()
-        due = min(self._next[0], self._thread.due)
+        due = min(self._next[0], self.thread.next_at if self.thread.live else inf)
         return None if due == inf else max(due, self._timeline.now)
 
     def quiet(self, now: float, running: bool) -> bool:
@@ -95,28 +92,28 @@ class EventLoop:
 
         It has power and has printed nothing, nothing happens by itself, and its program has neither begun nor ended.
         """
-        if self._timeline.outdated or self._printer.pending or not self.power.on or self._next[0] <= now:
+        if self._timeline.outdated or self._printer.printed or not self.bridges.powered or self._next[0] <= now:
             return False
-        thread = self._thread
+        thread = self.thread
         return thread.running == running and (not thread.live or thread.next_at > now)
 
     def _comes_up(self, now: float) -> bool:
         """Return whether it has booted by now."""
-        boots_at = self.power.boots_at
+        boots_at = self.power_unit.boots_at
         if boots_at is None or boots_at > now:
             return False
         self._timeline.now = max(self._timeline.now, boots_at)
-        self.power.come_up()
+        self.power_unit.come_up()
         return True
 
     def _run(self, now: float, program: bool) -> bool:
         """Let lines and events take turns up to `now`. Return whether that was reached."""
         timeline = self._timeline
-        while not program or self._thread.running:
+        while not program or self.thread.running:
             if timeline.outdated:
                 self._plan()
             at, event = self._next
-            self._interpreter.run(nextafter(at, -inf) if at <= now else now)
+            self.interpreter.run(nextafter(at, -inf) if at <= now else now)
             if self._news():
                 break
             if timeline.outdated:
@@ -131,32 +128,33 @@ class EventLoop:
         return False
 
     def _state(self) -> tuple[bool, bool, int]:
-        return self._thread.running, self.power.on, self.power.boots
+        return self.thread.running, self.bridges.powered, self.power_unit.boots
 
     def _news(self) -> bool:
         """Return whether `proceed` waits for news, and there is some."""
-        return self._before is not None and (self._printer.pending or self._state() != self._before)
+        return self._before is not None and (bool(self._printer.printed) or self._state() != self._before)
 
     def _plan(self) -> None:
         """Work out what happens next whatever the program does."""
         self._timeline.outdated = False
         self._look()
-        now, trips = self._timeline.now, self._motor.trips
+        now, trips = self._timeline.now, self.motor.trips
         tripped, bit = trips.next(now)
         wakes_at = inf
-        if self._thread.waits_for_motion:
-            wakes_at = max(self._motor.status.settled_at(), self._thread.next_at)
+        thread = self.thread
+        if not thread.paused and (thread.waiting or thread.ending):
+            wakes_at = max(self.motor.status.settled_at(), thread.next_at)
         self._next = min(
             (tripped, partial(trips.fire, bit) if bit else nothing),
-            self._motor.next(now),
-            (wakes_at, self._thread.wake),
+            self.motor.next(now),
+            (wakes_at, thread.wake),
             (self._inputs.next_change(now), nothing),
             key=when,
         )
 
     def _look(self) -> bool:
         """Act on inputs that have become active or inactive. Return whether any has."""
-        inputs, motor, now = self._inputs, self._motor, self._timeline.now
+        inputs, motor, now = self._inputs, self.motor, self._timeline.now
         risen, fallen = inputs.refresh(now)
         motor.look(now)
         motor.look_at_limits()
@@ -181,7 +179,7 @@ class EventLoop:
         try:
             act()
         except Fault as fault:
-            self._interpreter.raise_error(fault.code)
+            self.interpreter.raise_error(fault.code)
 
     def wired(self, n: int, was: tuple[int, ...]) -> None:
         """Act on an input's new set-up. One that is active already stops or resets; a jog ends with its input.
@@ -193,39 +191,39 @@ class EventLoop:
             return
         if kind != was[0] and active == was[1] and self._inputs.active(n) and kind in (SOFT_STOP, RESET):
             self._changed(kind, True)
-        if self._motor.jog or kind in JOGS:
-            self._motor.update_jog()
+        if self.motor.jog or kind in JOGS:
+            self.motor.update_jog()
 
     def _go(self) -> None:
-        if not self._thread.running:
-            self._interpreter.start(GO_ADDRESS, self._timeline.now)
+        if not self.thread.running:
+            self.interpreter.start(GO_ADDRESS, self._timeline.now)
 
     def _pause(self) -> None:
-        if self._thread.running and not self._thread.paused:
-            self._motor.pause_program()
+        if self.thread.running and not self.thread.paused:
+            self.motor.pause_program()
 
     def _resume(self) -> None:
-        if self._thread.paused:
-            self._motor.resume_program()
+        if self.thread.paused:
+            self.motor.resume_program()
 
     def _reset(self) -> None:
         """Restart. SU takes a moment to start, or one that sets up such an input would reset the drive in no time."""
-        self.power.restart()
-        if self._thread.running:
-            self._thread.next_at = self._timeline.now + RESET_TIME
+        self.power_unit.restart()
+        if self.thread.running:
+            self.thread.next_at = self._timeline.now + RESET_TIME
 
     def _soft_stop(self) -> None:
-        t, thread, motor = self._timeline.now, self._thread, self._motor
+        t, thread, motor = self._timeline.now, self.thread, self.motor
         running, moving = thread.running, motor.status.moving(t)
         if thread.paused or not (running or moving):
             return
         if moving:
             if not motor.torque.halt():
                 motor.axis.slow_to(0, t)
-            self._core.errors.set(E.MOTION_STOPPED_BY_INPUT)
+            self.core.errors.set(E.MOTION_STOPPED_BY_INPUT)
         if running:
             thread.finish()
-            self._core.errors.set(E.PROGRAM_STOPPED_BY_INPUT)
+            self.core.errors.set(E.PROGRAM_STOPPED_BY_INPUT)
         motor.end_jog()
-        self._interpreter.on_error(t)
+        self.interpreter.on_error(t)
         self._timeline.replan()

@@ -24,8 +24,9 @@ from multidrop.simulator.lexium.motion.motor import Motor
 from multidrop.simulator.lexium.motion.outputs import Outputs
 from multidrop.simulator.lexium.state.errors import CRLF, Fault
 from multidrop.simulator.lexium.state.expressions import FLOATS, Read, Value, whole, wrap
-from multidrop.simulator.lexium.state.interpreter import Action, Core
+from multidrop.simulator.lexium.state.interpreter import Core
 from multidrop.simulator.lexium.state.memory import slot
+from multidrop.simulator.lexium.state.program_memory import Action
 
 # PR: numbers, texts, and the lists of parameters, variables and set-ups.
 #
@@ -91,7 +92,12 @@ class Prints:
             word = argument.word if isinstance(argument, Name) else ""
             if word in self._with_option and self._memory.row(word):
                 option = rest.pop(0) if rest and isinstance(rest[0], Number) else None
-                yield self._optional(word, option)
+                number = option.value if isinstance(option, Number) else 0
+                if number not in (0, 1, 2):
+                    raise Fault(E.OUT_OF_RANGE)
+                if word == "VT" and number == 1 and not self._memory.model.auxiliary:
+                    raise Fault(E.NOT_AVAILABLE)
+                yield partial(self._with_option[word], int(number))
             else:
                 yield self._item(argument)
 
@@ -115,14 +121,6 @@ class Prints:
         if word in REGISTERS:
             return lambda: self._floating(read())
         return lambda: str(read())
-
-    def _optional(self, word: str, option: Argument | None) -> Item:
-        number = option.value if isinstance(option, Number) else 0
-        if number not in (0, 1, 2):
-            raise Fault(E.OUT_OF_RANGE)
-        if word == "VT" and number == 1 and not self._memory.model.auxiliary:
-            raise Fault(E.NOT_AVAILABLE)
-        return partial(self._with_option[word], int(number))
 
     def _floating(self, value: Value) -> str:
         """An F register as PF says; unpadded with six decimals until PF has been set."""
@@ -231,7 +229,7 @@ class Instructions:
     """The instructions of one drive. `commands` gives the compiler of a word."""
 
     def __init__(self, serial: str, core: Core, motor: Motor, outputs: Outputs, loop: EventLoop) -> None:
-        power, nvm = loop.power, loop.power.nvm
+        power, nvm = loop.power_unit, loop.power_unit.nvm
         self._memory, self._program = core.memory, core.program
         self._variables = variables = Variables(core, motor, outputs, nvm)
         self._programs = programs = ProgramCommands(core, variables, motor, nvm)

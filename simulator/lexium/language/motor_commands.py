@@ -22,8 +22,9 @@ from multidrop.simulator.lexium.motion.motor import Motor
 from multidrop.simulator.lexium.motion.outputs import Outputs
 from multidrop.simulator.lexium.state.errors import Fault
 from multidrop.simulator.lexium.state.expressions import whole
-from multidrop.simulator.lexium.state.interpreter import Action, Core
+from multidrop.simulator.lexium.state.interpreter import Core
 from multidrop.simulator.lexium.state.memory import Trip
+from multidrop.simulator.lexium.state.program_memory import Action
 
 FIRST_INPUT = 1
 MOST_REPEATS = 65000

@@ -16,9 +16,9 @@ from multidrop.simulator.lexium.motion.motor import Motor
 from multidrop.simulator.lexium.power import Nvm
 from multidrop.simulator.lexium.state.errors import CRLF, Fault
 from multidrop.simulator.lexium.state.expressions import compile_condition, whole
-from multidrop.simulator.lexium.state.interpreter import Action, Core
+from multidrop.simulator.lexium.state.interpreter import Core
 from multidrop.simulator.lexium.state.memory import within
-from multidrop.simulator.lexium.state.program_memory import FIRST, SPACE
+from multidrop.simulator.lexium.state.program_memory import FIRST, SPACE, Action
 
 MOST_PASSES = 65535
 OPTIONS = (Number(0), Number(1))
@@ -44,8 +44,8 @@ class ProgramCommands:
             "RT": bare(self._thread.give_back),
             "PS": bare(self._motor.pause_program),
             "RS": bare(self._motor.resume_program),
-            "BR": lambda statement: self._jump(statement, self._interpreter.branch),
-            "CL": lambda statement: self._jump(statement, self._interpreter.call),
+            "BR": self._jump,
+            "CL": self._jump,
             "H": self._hold,
             "IV": self._input_variable,
             "VA": self._declare,
@@ -64,16 +64,11 @@ class ProgramCommands:
         """E: a program's own ends it at once, a typed one after the motion (manual 5.1.35)."""
         thread, t = self._thread, self._timeline.now
         if self._printer.immediate and thread.running and not thread.paused and self._motor.status.moving(t):
-            thread.finish_after_motion()
+            thread.hold_for_motion(ending=True)
         else:
             thread.finish()
 
-    def _check_running(self) -> None:
-        """Raise Fault (40) for a typed line that needs a program to act on."""
-        if self._printer.immediate and not self._thread.running:
-            raise Fault(E.NO_PROGRAM_RUNNING)
-
-    def _jump(self, statement: Statement, jump: Callable[[Argument], None]) -> Action:
+    def _jump(self, statement: Statement) -> Action:
         """BR, CL; a condition may also be a value, which holds while it is not 0 (manual 5.1.2, 5.1.14)."""
         target, condition = pair(statement)
         if target is None or not is_place(target) or isinstance(condition, Text):
@@ -82,13 +77,22 @@ class ProgramCommands:
         holds = None
         if condition is not None:
             holds = compile_condition(condition, self._variables.reader, self._memory.model.floating)
-        printer, thread = self._printer, self._thread
+        printer, thread, linked = self._printer, self._thread, self._interpreter.linked
+        calls, places, place = statement.word == "CL", linked.places, -1
 
         def go() -> None:
-            if holds is None or holds():
-                if printer.immediate and not thread.running:
-                    raise Fault(E.NO_PROGRAM_RUNNING)
-                jump(target)
+            nonlocal places, place
+            if holds is not None and not holds():
+                return
+            if printer.immediate and not thread.running:
+                raise Fault(E.NO_PROGRAM_RUNNING)
+            if place < 0 or places is not linked.places:
+                place = linked.place(target)
+                places = linked.places
+            if calls:
+                thread.call(place)
+            else:
+                thread.pc = place
 
         return go
 
@@ -100,7 +104,8 @@ class ProgramCommands:
         row = lookup("H", self._memory.product)
 
         def wait() -> None:
-            self._check_running()
+            if self._printer.immediate and not self._thread.running:
+                raise Fault(E.NO_PROGRAM_RUNNING)
             milliseconds = None if read is None else whole(read())
             if row is None or not (milliseconds is None or row.accepts(milliseconds)):
                 raise Fault(E.OUT_OF_RANGE)

@@ -20,8 +20,9 @@ from multidrop.simulator.lexium.motion.outputs import Outputs
 from multidrop.simulator.lexium.power import Nvm
 from multidrop.simulator.lexium.state.errors import Fault
 from multidrop.simulator.lexium.state.expressions import PI, Read, Value, compile_value, compile_whole, whole
-from multidrop.simulator.lexium.state.interpreter import Action, Core
+from multidrop.simulator.lexium.state.interpreter import Core
 from multidrop.simulator.lexium.state.memory import BANKED, slot, within
+from multidrop.simulator.lexium.state.program_memory import Action
 
 # The variables and flags of motion that are more than a number in memory with a range.
 
@@ -42,7 +43,7 @@ class MotionVariables:
 
     def readers(self) -> dict[str, Read]:
         motor, timeline = self._motor, self._timeline
-        counters, status, hmt = motor.counters, motor.status, motor.hmt
+        axis, counters, status, hmt = motor.axis, motor.counters, motor.status, motor.hmt
         return {
             "P": lambda: counters.value(counters.source, timeline.now),
             "C1": lambda: counters.value("C1", timeline.now),
@@ -52,7 +53,7 @@ class MotionVariables:
             "AF": lambda: hmt.status(timeline.now),
             "CB": lambda: hmt.bounds,
             "LL": lambda: hmt.lag(timeline.now),
-            "MV": lambda: int(status.reported(timeline.now)),
+            "MV": lambda: 1 if timeline.now < axis.profile.end else int(status.reported(timeline.now)),
             "MP": lambda: int(status.positioning(timeline.now)),
             "VC": lambda: int(status.changing(timeline.now)),
             "I6": lambda: int(status.at_index(timeline.now)),

@@ -363,9 +363,9 @@ class Axis:
     def _shape(self, kind: str, rate: str) -> Shape | None:
         """Make a shape of AT and AJ, or DT and DJ; None where the middle of the ramp would be too steep."""
         values = self._memory.values
-        if int(values.get(kind, LINEAR)) == LINEAR:
+        if (number := values.get(kind, LINEAR)) == LINEAR:
             return STRAIGHT
-        shape = Shape(int(values.get(kind, LINEAR)), int(values.get(f"{rate}J", 0)))
+        shape = Shape(int(number), int(values.get(f"{rate}J", 0)))
         return shape if values[rate] * self._memory.scale * shape.peak <= STEEPEST else None
 
     def _ready(self, t: float, direction: float) -> None:

@@ -189,7 +189,14 @@ class Motor:
             self._timeline.replan()
         self.hmt.look(t)
         self.heat.look(t)
-        self._follow_clock(t)
+        # Make the steps that a clock asks for, where the command may jump.
+        steps = self._clock.steps()
+        if steps and not self.hmt.calibrating and not self.torque.active and not self.limit_stop.bars(t, steps):
+            before = self.counters.place(t)
+            self.axis.step(steps, t)
+            self._timeline.replan()
+            self.trips.displaced(before, self.counters.place(t), t)
+            self.encoder.look(t)
 
     def look_at_limits(self) -> None:
         """See which limit switches are active; a clock knows no limits (MDrivePlus 5-13)."""
@@ -353,13 +360,3 @@ class Motor:
     def _announce(self) -> None:
         """Send the drive's name: a motion that asks for that has ended."""
         self._core.printer.emit(self._memory.name + CRLF)
-
-    def _follow_clock(self, t: float) -> None:
-        """Make the steps that a clock asks for, where the command may jump."""
-        steps = self._clock.steps()
-        if steps and not self.hmt.calibrating and not self.torque.active and not self.limit_stop.bars(t, steps):
-            before = self.counters.place(t)
-            self.axis.step(steps, t)
-            self._timeline.replan()
-            self.trips.displaced(before, self.counters.place(t), t)
-            self.encoder.look(t)

@@ -144,15 +144,17 @@ class Replier:
     """
 
     def __init__(self, device: MCodeDevice, serial: bool, baud: int) -> None:
-        self._device, self._memory, self._serial = device, device.memory, serial
+        self._device, self._memory, self._serial, self._printer = device, device.memory, serial, device.core.printer
         self._byte_time = BITS_A_BYTE / baud if baud else 0.0
         self._busy_until = 0.0
         self.queue: list[Transmission] = []
         self._begun = b""
 
     def mode(self) -> Mode:
-        memory, serial = self._memory, self._serial
-        return Mode(memory.echo_mode, serial and memory.party, memory.checksum if serial else 0, memory.name)
+        values, name = self._memory.values, self._memory.texts["DN"]
+        if not self._serial:
+            return Mode(int(values["EM"]), False, 0, name)
+        return Mode(int(values["EM"]), bool(values.get("PY")), int(values.get("CK", 0)), name)
 
     def echo(self, mode: Mode, text: bytes, now: float) -> None:
         """Send received characters back, in EM=0."""
@@ -169,7 +171,8 @@ class Replier:
     def carry_out(self, line: Line, now: float) -> None:
         device, memory, mode = self._device, self._memory, line.mode
         command, sound = split(line)
-        before, busy, flagged = memory.checksum, device.running, memory.answers_by_nak
+        before, busy = memory.checksum, device.thread.running
+        flagged = memory.model.flags_by_nak and memory.error_flag
         if sound and command.strip():
             answer = device.execute(command.decode("latin-1"), now)
             outcome = Outcome(answer.lines, answer.tail, not answer.refused, busy=busy, flagged=flagged)
@@ -183,11 +186,10 @@ class Replier:
 
     def collect(self, now: float) -> None:
         """Send what the device has printed by itself; a print is lost, and an error, where the buffer is full."""
-        printed = self._device.prints()
-        if not printed:
+        if not self._printer.printed:
             return
         mode, lost = self.mode(), False
-        for at, text in printed:
+        for at, text in self._printer.take():
             if self._busy_until - at > TRANSMIT_BUFFER * self._byte_time > 0:
                 lost = True
             else:
@@ -272,8 +274,8 @@ class MCodePort:
         self._replier = Replier(device, serial, baud)
         self._overheard = bytearray()
         self._last = 0.0
-        self._powered, self._boots = device.powered, device.boots
-        self._running = device.running
+        self._thread, self._bridges, self._power = device.thread, device.bridges, device.power_unit
+        self._powered, self._boots, self._running = self._bridges.powered, self._power.boots, self._thread.running
         self._forget()
 
     @property
@@ -282,7 +284,7 @@ class MCodePort:
 
     def quiet(self, now: float) -> bool:
         device = self._device
-        same = self._powered and self._boots == device.boots
+        same = self._powered and self._boots == self._power.boots
         return same and not self._replier.queue and device.quiet(now, self._running)
 
     def hears(self, byte: int) -> bool:
@@ -304,10 +306,10 @@ class MCodePort:
         """Take bytes whose last bit arrived at `now`."""
         if not self.quiet(now):
             self._settle(now)
-        device, at = self._device, 0
-        while at < len(data) and device.powered:
+        at = 0
+        while at < len(data) and self._bridges.powered:
             at = self._take(data, at, now)
-        self._running = device.running
+        self._running = self._thread.running
         self._replier.collect(self._last)
 
     def advance(self, now: float) -> bytes:
@@ -322,7 +324,7 @@ class MCodePort:
     def overhear(self, data: bytes, now: float) -> None:
         """Take what another drive has printed: in party mode, whole lines, while the host sends no line."""
         receiving = self._line is not None or self._waiting
-        if receiving or not self._replier.mode().party or not self._device.powered:
+        if receiving or not self._replier.mode().party or not self._bridges.powered:
             self._overheard.clear()
         else:
             heard = self._overheard
@@ -348,15 +350,14 @@ class MCodePort:
         """See what the device has become by itself, or by `/sim`: without power, at its program's end."""
         self._notice_power()
         self._replier.collect(self._last)
-        if self._running and not self._device.running:
+        if self._running and not self._thread.running:
             self._replier.program_ended(at)
-        self._running = self._device.running
+        self._running = self._thread.running
 
     def _notice_power(self) -> None:
         """See whether it has lost power or begun again: by a switch, a reset input, a line."""
-        device = self._device
-        if (device.powered, device.boots) != (self._powered, self._boots):
-            self._powered, self._boots, self._running = device.powered, device.boots, device.running
+        if (self._bridges.powered, self._power.boots) != (self._powered, self._boots):
+            self._powered, self._boots, self._running = self._bridges.powered, self._power.boots, self._thread.running
             self._forget()
 
     def _forget(self) -> None:
@@ -407,7 +408,7 @@ class MCodePort:
             self._on_address(mode, byte, now)
             return
         self._active = False
-        if byte in STEP_KEYS and device.stepping:
+        if byte in STEP_KEYS and self._thread.stepping:
             device.step(STEP_KEYS[byte], now)
         elif byte == LF:
             self._replier.echo(mode, b"\n", now)
@@ -430,8 +431,8 @@ class MCodePort:
         else:
             name = bytes([byte])
             own = name == mode.name.encode("latin-1", "replace")
-            group = name == b"*" or (name == b"^" and self._memory.queued)
-            replies = own or (group and not self._memory.quiet_global)
+            group = name == b"*" or (name == b"^" and bool(self._memory.values.get("QD")))  # 5.1.106
+            replies = own or (group and not self._memory.values.get("DG", 1))  # 5.1.31
             self._line = Line(mode, name, mine=own or group, replies=replies)
             if replies:
                 self._replier.echo(mode, name, now)
@@ -464,7 +465,7 @@ class MCodePort:
         """Carry out what has come: one command, or in party mode several."""
         waiting, self._waiting = self._waiting, []
         for line in waiting:
-            if self._device.powered:
+            if self._bridges.powered:
                 self._replier.carry_out(line, now)
                 self._notice_power()
                 self._replier.collect(self._last)
@@ -484,7 +485,7 @@ class MCodePort:
 
     def _on_reset(self, before: int, now: float) -> None:
         """CE 1 always resets; CE 2 in party mode only after the name (5.1.19)."""
-        mode = self._memory.reset_mode
+        mode = self._memory.values["CE"]
         if mode == 0 or (mode == 2 and self._replier.mode().party and not self._named(before)):
             return
         self._device.reset(now)

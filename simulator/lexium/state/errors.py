@@ -1,6 +1,6 @@
-"""Errors of a simulated MCode drive: raised by a line, recorded for a program run, and kept in ER and EF.
+"""The virtual time of a simulated MCode drive, its prints, and its errors.
 
-Manual 5.1.36, 5.1.40.
+An error is raised by a line, recorded for a program run, and kept in ER and EF (manual 5.1.36, 5.1.40).
 """
 
 from __future__ import annotations
@@ -9,13 +9,8 @@ from collections.abc import Callable, Mapping, MutableMapping
 from dataclasses import dataclass
 from operator import itemgetter
 
-# The virtual time of one simulated drive, and its prints: in the answer of a typed line, or unsolicited.
-
-
 Event = tuple[float, Callable[[float], None]]
 """When something happens, s, and what carries it out then."""
-
-
 when = itemgetter(0)
 """The key that finds the first of several events."""
 
@@ -46,8 +41,9 @@ BITS_A_BYTE, TRANSMIT_BUFFER = 10, 256
 class Printer:
     """The output of one drive.
 
-    `immediate`: a typed line is being carried out, and takes what is printed as its answer. `watched`: time stops
-    where something is printed. `waits`: a program waits for the transmitter; `delay` makes it wait until a time.
+    `immediate`: a typed line is being carried out, and takes what is printed as its answer. `printed`: times and texts
+    since `take`. `watched`: time stops where something is printed. `waits`: a program waits for the transmitter;
+    `delay` makes it wait until a time.
     """
 
     def __init__(self, timeline: Timeline, waits: bool, delay: Callable[[float], None]) -> None:
@@ -56,13 +52,8 @@ class Printer:
         self.watched = False
         self.baud = 9600
         self._answer: list[str] = []
-        self._printed: list[tuple[float, str]] = []
+        self.printed: list[tuple[float, str]] = []
         self._sending_until = 0.0
-
-    @property
-    def pending(self) -> bool:
-        """Return whether something was printed since `take`."""
-        return bool(self._printed)
 
     def begin_answer(self) -> None:
         self._answer, self.immediate = [], True
@@ -81,7 +72,7 @@ class Printer:
 
     def announce(self, text: str) -> None:
         """Print by itself, whatever asked for it."""
-        self._printed.append((self._timeline.now, text))
+        self.printed.append((self._timeline.now, text))
         if self._waits:
             byte = BITS_A_BYTE / self.baud
             self._sending_until = max(self._sending_until, self._timeline.now) + len(text) * byte
@@ -90,7 +81,7 @@ class Printer:
             self._timeline.replan()
 
     def take(self) -> list[tuple[float, str]]:
-        printed, self._printed = self._printed, []
+        printed, self.printed = self.printed, []
         return printed
 
 

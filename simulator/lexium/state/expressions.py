@@ -147,6 +147,8 @@ class _Compiler:
         compare = _COMPARE[condition.op]
         if isinstance(condition.right, Number):
             constant = condition.right.value
+            if condition.op == "=":  # what programs ask most
+                return lambda: left() == constant
             return lambda: compare(left(), constant)
         return lambda: compare(left(), right())
 

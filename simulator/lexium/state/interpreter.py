@@ -19,7 +19,7 @@ from multidrop.dialects.mcode.manual.grammar import Argument, Name, Statement, i
 from multidrop.dialects.mcode.manual.table import lookup
 from multidrop.simulator.lexium.state.errors import CRLF, ErrorFlag, Fault, Printer, Timeline
 from multidrop.simulator.lexium.state.memory import TABLE_SIZE, Memory
-from multidrop.simulator.lexium.state.program_memory import Program
+from multidrop.simulator.lexium.state.program_memory import Action, LinkedProgram, Program
 from multidrop.simulator.world import World
 
 # The thread of a running program: which line comes next and when, the stack of subroutines, holds and pauses.
@@ -83,26 +83,12 @@ class Thread:
         self.next_at = inf
         self.refresh()
 
-    def finish_after_motion(self) -> None:
-        self.ending = True
-        self.refresh()
-
     def refresh(self) -> None:
         stepped = self.mode == STEPPED and self.steps <= 0
         self.live = self.running and not (self.paused or self.waiting or self.ending or stepped)
         self._timeline.replan()
 
     # Time.
-
-    @property
-    def due(self) -> float:
-        """When the next line is executed; infinite if none will be by itself."""
-        return self.next_at if self.live else inf
-
-    @property
-    def waits_for_motion(self) -> bool:
-        """Return whether a hold, or the end of the program, waits for the end of the motion."""
-        return not self.paused and (self.waiting or self.ending)
 
     def wake(self, t: float) -> None:
         self.waiting = False
@@ -147,9 +133,12 @@ class Thread:
 
     # What lines do.
 
-    def hold_for_motion(self) -> None:
-        """H: wait until the motion is over."""
-        self.waiting = True
+    def hold_for_motion(self, ending: bool = False) -> None:
+        """H: wait until the motion is over; `ending`: that is the end of the program too."""
+        if ending:
+            self.ending = True
+        else:
+            self.waiting = True
         self.refresh()
 
     def hold(self, seconds: float) -> None:
@@ -189,69 +178,6 @@ class Thread:
         if len(self.stack) >= STACK_DEPTH:
             raise Fault(E.STACK_FULL, fatal=True)
         self.stack.append(frame)
-
-
-# Program memory compiled to closures in a list; labels are no lines of it (they are marks and take no time).
-
-
-Action = Callable[[], None]
-"""What a line does."""
-
-
-class LinkedProgram:
-    """The lines of program memory as they were when a program was last started.
-
-    `actions` and `texts` are by line, `index` gives the line of an address. Where a gap or the end of memory follows a
-    line, `finish` ends the program.
-    """
-
-    def __init__(self, program: Program, compile_line: Callable[[Statement], Action], finish: Action) -> None:
-        self._program, self._compile_line, self._finish = program, compile_line, finish
-        self.actions: list[Action] = [finish]
-        self.texts: list[str] = [""]
-        self.index: dict[int, int] = {}
-        self._places: dict[Argument | None, int] = {}
-        self._linked = False
-
-    def forget(self) -> None:
-        """Compile again when something is started: program memory has changed."""
-        self._linked = False
-        self._places.clear()
-
-    def entry(self, target: Argument | None) -> int:
-        """The line at which a program starts. Raises Fault (24, 30, 34, 42)."""
-        address = self._program.resolve(target)
-        if not self._linked:
-            self._link()
-        return self.index[address]
-
-    def place(self, target: Argument | None) -> int:
-        """Where the program that runs goes on. Raises Fault (30, 34, 42), 42 too for what was stored since it began."""
-        place = self._places.get(target)
-        if place is None:
-            address = self._program.resolve(target)
-            if address not in self.index:
-                raise Fault(E.NO_SUCH_ADDRESS, fatal=True)
-            place = self._places[target] = self.index[address]
-        return place
-
-    def _link(self) -> None:
-        self.actions, self.texts, self.index, self._places = [], [], {}, {}
-        program, expected = self._program, None
-        for address in program.order:
-            line = program.lines[address]
-            if expected not in (None, address):
-                self._append(self._finish, "")
-            expected = address + line.size
-            self.index[address] = len(self.actions)
-            if line.statement.word != "LB":
-                self._append(self._compile_line(line.statement), f"{address}  {line.text}")
-        self._append(self._finish, "")
-        self._linked = True
-
-    def _append(self, action: Action, text: str) -> None:
-        self.actions.append(action)
-        self.texts.append(text)
 
 
 class ProgramMode:
@@ -406,9 +332,9 @@ class Interpreter:
     def _run(self, until: float) -> None:
         thread, timeline, actions, period = self._thread, self._timeline, self.linked.actions, self.period
         count = 0
-        while thread.live and thread.next_at <= until and not timeline.outdated:
+        while thread.live and (at := thread.next_at) <= until and not timeline.outdated:
             count += 1
-            at, pc = thread.next_at, thread.pc
+            pc = thread.pc
             timeline.now = at
             thread.pc = pc + 1
             thread.next_at = at + period
@@ -447,14 +373,6 @@ class Interpreter:
         thread = self._thread
         holding = thread.waiting or thread.next_at > self._timeline.now + self.period
         return thread.pc - (self._executing or holding)
-
-    def branch(self, target: Argument | None) -> None:
-        """Go on elsewhere. Raises Fault (30, 42)."""
-        self._thread.pc = self.linked.place(target)
-
-    def call(self, target: Argument | None) -> None:
-        """Go on elsewhere until RT. Raises Fault (30, 42, 43)."""
-        self._thread.call(self.linked.place(target))
 
     # Trips and errors.
 

@@ -173,29 +173,9 @@ class Memory:
         return int(self.values["ES"])
 
     @property
-    def reset_mode(self) -> int:
-        """CE (manual 5.1.19)."""
-        return int(self.values["CE"])
-
-    @property
-    def quiet_global(self) -> bool:
-        """DG (manual 5.1.31)."""
-        return bool(self.values.get("DG", 1))
-
-    @property
-    def queued(self) -> bool:
-        """QD (manual 5.1.106)."""
-        return bool(self.values.get("QD"))
-
-    @property
     def error_flag(self) -> bool:
         """EF (manual 5.1.39)."""
         return bool(self.values["EF"])
-
-    @property
-    def answers_by_nak(self) -> bool:
-        """Return whether a reply with checksum is NAK now: the product says so while an error is set."""
-        return self.model.flags_by_nak and self.error_flag
 
     # Ranges of words; those of motion depend on EE.
 
