@@ -16,8 +16,7 @@ from typing import cast
 
 from multidrop.dialects import Diagnostic
 from multidrop.simulator.cell.spec import BusSpec, Endpoint
-from multidrop.simulator.serving.input_queue import PIECE, InputQueue
-from multidrop.simulator.serving.running import RunningFloor
+from multidrop.simulator.serving.running import PIECE, Client, InputQueue, Listener, RunningFloor
 
 BACKLOG = 1 << 20
 """Bytes that a TCP client may leave unread before it is disconnected."""
@@ -89,7 +88,7 @@ def _bracketed(host: str) -> str:
     return f"[{host}]" if ":" in host else host
 
 
-class TcpServer:
+class TcpServer(Listener):
     """A listening socket. An Ethernet drive's socket listens only while the drive has power."""
 
     def __init__(self, floor: RunningFloor, bus: str, endpoint: Endpoint) -> None:
@@ -119,15 +118,6 @@ class TcpServer:
         if server is not None:
             await server.wait_closed()
 
-    def receive(self, data: bytes) -> None:
-        """Nothing to do: the clients receive it."""
-
-    def unplugged(self) -> None:
-        """Nothing to do: clients disconnect, and new ones are refused."""
-
-    def plugged(self) -> None:
-        """Nothing to do: clients may connect again."""
-
     def disconnected(self) -> None:
         """Stop listening, and disconnect the clients."""
         if self._server is not None:
@@ -156,7 +146,7 @@ class TcpServer:
         return not self._closed and self._floor.floor.connectable(self._bus)
 
 
-class TcpClient(asyncio.BufferedProtocol):
+class TcpClient(asyncio.BufferedProtocol, Client):
     """One client's connection: it receives the whole wire, and is read as fast as the wire carries what it writes."""
 
     def __init__(self, floor: RunningFloor, bus: str, clients: set[TcpClient]) -> None:
@@ -202,9 +192,6 @@ class TcpClient(asyncio.BufferedProtocol):
         if self._transport is not None and not self._transport.is_closing():
             self._transport.resume_reading()
 
-    def poll(self) -> None:
-        """Nothing to do: a TCP client cannot take bytes back."""
-
     def has_left(self) -> bool:
         """Whether the client has left: its end comes after what is unread, but the connection's state shows it."""
         return self._transport is not None and _ended(self._transport)
@@ -215,10 +202,10 @@ class TcpClient(asyncio.BufferedProtocol):
             self._transport.abort()
 
     def receive(self, data: bytes) -> None:
-        """Pass on what the wire sends; a client that never reads is disconnected."""
         self._send(data)
 
     def _send(self, data: bytes) -> None:
+        """Pass on what the wire sends; a client that never reads is disconnected."""
         if self._transport is None or self._transport.is_closing():
             return
         if self._transport.get_write_buffer_size() > BACKLOG:
@@ -230,15 +217,6 @@ class TcpClient(asyncio.BufferedProtocol):
         """Close the connection."""
         if self._transport is not None:
             self._transport.close()
-
-    def plugged(self) -> None:
-        """Nothing to do: the client must connect again."""
-
-    def disconnected(self) -> None:
-        """Nothing to do: the server closes the connection."""
-
-    def connectable(self) -> None:
-        """Nothing to do: the client must connect again."""
 
 
 class ModbusClient(TcpClient):
@@ -286,7 +264,7 @@ def _ended(transport: asyncio.Transport) -> bool:
     return bool(connection.getsockopt(socket.IPPROTO_TCP, socket.TCP_INFO, 1)[0] != ESTABLISHED)
 
 
-class UdpServer(asyncio.DatagramProtocol):
+class UdpServer(asyncio.DatagramProtocol, Listener):
     """Datagrams in and out; the last senders receive the wire. What comes faster than it goes out is dropped."""
 
     def __init__(self, floor: RunningFloor, bus: str) -> None:
@@ -319,9 +297,6 @@ class UdpServer(asyncio.DatagramProtocol):
             self._floor.notify(f"{self._bus}: datagrams come faster than the wire carries them; some are dropped")
         self.dropped += 1
 
-    def error_received(self, exc: Exception) -> None:
-        """Nothing to do: a sender has left."""
-
     def receive(self, data: bytes) -> None:
         """Pass on what the wire sends."""
         if self._transport is None or cast(asyncio.Transport, self._transport).get_write_buffer_size() > BACKLOG:
@@ -333,15 +308,9 @@ class UdpServer(asyncio.DatagramProtocol):
         """Forget the senders."""
         self._senders.clear()
 
-    def plugged(self) -> None:
-        """Nothing to do: senders come back by themselves."""
-
     def disconnected(self) -> None:
         """Forget the senders, as a drive does that boots."""
         self._senders.clear()
-
-    def connectable(self) -> None:
-        """Nothing to do: senders come back by themselves."""
 
     def close(self) -> None:
         """End the service."""

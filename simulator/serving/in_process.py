@@ -17,7 +17,7 @@ from multidrop.simulator import cells
 from multidrop.simulator.cell.spec import BusSpec, Cell
 from multidrop.simulator.families import FAMILIES, family_of
 from multidrop.simulator.floor import Floor
-from multidrop.simulator.serving.running import RunningFloor
+from multidrop.simulator.serving.running import Listener, RunningFloor
 from multidrop.transports import Lost, Received, Transport, TransportLost
 
 DEFAULT = next(iter(FAMILIES))
@@ -129,7 +129,7 @@ def _dialect(bus: BusSpec) -> str:
     return chosen.name if chosen else DEFAULT
 
 
-class SimPipe(Transport):
+class SimPipe(Transport, Listener):
     """A transport to a bus of a running floor. Bytes are delivered in the loop's next turn."""
 
     def __init__(self, name: str, floor: RunningFloor, bus: str, closed: Callable[[], None]) -> None:
@@ -186,15 +186,9 @@ class SimPipe(Transport):
         """Break the pipe, for good."""
         self._break("unplugged")
 
-    def plugged(self) -> None:
-        """Nothing to do: a broken pipe stays broken."""
-
     def disconnected(self) -> None:
         """Break the pipe, for good."""
         self._break("no power")
-
-    def connectable(self) -> None:
-        """Nothing to do: a broken pipe stays broken."""
 
     def _break(self, why: str) -> None:
         if not self._why:

@@ -21,8 +21,7 @@ import tty
 from pathlib import Path
 
 from multidrop.dialects import Diagnostic
-from multidrop.simulator.serving.input_queue import InputQueue
-from multidrop.simulator.serving.running import RunningFloor
+from multidrop.simulator.serving.running import Client, InputQueue, RunningFloor
 from multidrop.simulator.wire import resample
 
 # The number of clients that have a pseudo-terminal open, counted without polling.
@@ -154,7 +153,7 @@ FULL = contextlib.suppress(BlockingIOError)
 SPEEDS = {baud: code for code, baud in BAUDS.items()}
 
 
-class PtyServer:
+class PtyServer(Client):
     """Serves one bus on a pseudo-terminal, with a symlink at `link` if one is given. Raises Diagnostic."""
 
     def __init__(self, floor: RunningFloor, bus: str, link: Path | None) -> None:
@@ -198,12 +197,6 @@ class PtyServer:
     def plugged(self) -> None:
         """Serve a new pseudo-terminal by the link."""
         self._open()
-
-    def disconnected(self) -> None:
-        """Stay: a serial port has power of its own."""
-
-    def connectable(self) -> None:
-        """Nothing changes."""
 
     def close(self) -> None:
         """End the service."""

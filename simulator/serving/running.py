@@ -1,27 +1,42 @@
-"""A floor in real time: the one place where the simulator meets the event loop's clock.
+"""A floor in real time: the one place where the simulator meets the event loop's clock; what clients write to it.
 
 It wakes at the floor's next event, at most once a millisecond, and not at all without one. What comes from a client is
 carried out at once, so a reply that takes no time is sent in the same turn.
+
+A queue is between a client and a wire. It holds as much as a serial port's buffer, and feeds the wire in short pieces,
+so that the clients of a bus take turns. While it is full the client is not read; a timer of some milliseconds looks for
+room. When a client has left, its bytes have some seconds to go out, as with a serial port that is closed. Then the rest
+is dropped, with a notice.
 """
 
 from __future__ import annotations
 
 import asyncio
+from collections import deque
 from collections.abc import Callable
-from typing import Protocol
 
 from multidrop.simulator.family import Connection, Shadow
 from multidrop.simulator.floor import Floor
 from multidrop.simulator.wire import BITS_A_BYTE
 
+HOLD = 4096
+"""Bytes of one client that wait in the queue."""
+PIECE = 256
+"""Bytes that are read at a time, so that no turn of the event loop takes long; at least as many wait on the wire."""
+AHEAD = 0.02
+"""Seconds of a fast wire's bytes that wait on it, if those are more."""
+POLL = 0.01
+"""Seconds between two polls while a client is not read."""
+GRACE = 10.0
+"""Seconds in which the bytes of a client that has left can go out: 9600 bytes at 9600 baud."""
 SHORTEST_SLEEP = 0.001
 LATEST = 0.1
 """Seconds that are made up for where this process came too late. The floor's time pauses for the rest, so that a
 machine that is too slow for a floor still serves its clients at once."""
 
 
-class Listener(Protocol):
-    """An endpoint of a bus."""
+class Listener:
+    """An endpoint of a bus. It leaves as they are the events that mean nothing to its clients."""
 
     def receive(self, data: bytes) -> None:
         """Take bytes from the wire."""
@@ -46,9 +61,9 @@ class RunningFloor:
         self.floor = floor
         self.notify: Callable[[str], None] = lambda text: None
         """Takes a notice about clients, for a person."""
-        self._loop = asyncio.get_running_loop()
+        self.loop = asyncio.get_running_loop()
         self._speed = speed
-        self._origin = self._loop.time()
+        self._origin = self.loop.time()
         self._now = 0.0
         self._deadline: float | None = None
         """When something happens next, as of the last turn."""
@@ -60,14 +75,9 @@ class RunningFloor:
         self._sources = 0
         self._turn()
 
-    @property
-    def loop(self) -> asyncio.AbstractEventLoop:
-        """The loop that it runs in."""
-        return self._loop
-
     def now(self) -> float:
         """The floor's time: seconds since the start, times the speed; less where it stood still."""
-        now = (self._loop.time() - self._origin) * self._speed
+        now = (self.loop.time() - self._origin) * self._speed
         if self._deadline is not None:
             most = max(self._deadline + LATEST * self._speed, self._now)
             self._origin += max(0.0, now - most) / self._speed
@@ -118,7 +128,7 @@ class RunningFloor:
 
     def later(self, seconds: float, call: Callable[[], None]) -> None:
         """Call something when so much of the floor's time has passed."""
-        self._loop.call_later(seconds / self._speed, call)
+        self.loop.call_later(seconds / self._speed, call)
 
     def retract(self, bus: str, source: int) -> int:
         """Drop what a source has written and what has not begun to go out; return the number of bytes."""
@@ -148,12 +158,7 @@ class RunningFloor:
             self._wake.cancel()
 
     def _turn(self) -> None:
-        """Bring the floor up to date, and see when to come back."""
-        self._advance()
-        self._set_alarm()
-
-    def _advance(self) -> None:
-        """Bring the floor up to date, and call the listeners."""
+        """Bring the floor up to date, call the listeners, and see when to come back."""
         for bus, data in self.floor.advance(self.now()).items():
             for listener in tuple(self._listeners[bus]):
                 listener.receive(data)
@@ -168,6 +173,7 @@ class RunningFloor:
                 self._connectable[bus] = now
                 for listener in tuple(self._listeners[bus]):
                     (listener.connectable if now else listener.disconnected)()
+        self._set_alarm()
 
     def _set_alarm(self) -> None:
         if self._wake is not None:
@@ -175,5 +181,104 @@ class RunningFloor:
             self._wake = None
         self._deadline = self.floor.deadline
         if self._deadline is not None and not self._closed:
-            at = max(self._origin + self._deadline / self._speed, self._loop.time() + SHORTEST_SLEEP)
-            self._wake = self._loop.call_at(at, self._turn)
+            at = max(self._origin + self._deadline / self._speed, self.loop.time() + SHORTEST_SLEEP)
+            self._wake = self.loop.call_at(at, self._turn)
+
+
+class Client(Listener):
+    """The endpoint of one client, that a queue reads and pauses."""
+
+    def pause(self) -> None:
+        """Stop reading the client."""
+
+    def resume(self) -> None:
+        """Read the client again."""
+
+    def poll(self) -> None:
+        """Look for what cannot wait: the client may take back what it has written."""
+
+    def has_left(self) -> bool:
+        """Whether the client has left, as far as the system reports it."""
+        return False
+
+    def discard(self) -> None:
+        """Drop what the client has left unread."""
+
+
+class InputQueue:
+    """Puts what a client writes on the wire, and pauses its reading while the wire is slower."""
+
+    def __init__(self, floor: RunningFloor, bus: str, client: Client) -> None:
+        self._floor, self._bus = floor, bus
+        self._client: Client | None = client
+        self._source = floor.source()
+        self._pending: deque[tuple[bytes, int | None]] = deque()
+        self._waiting = 0
+        self._paused = False
+        self._gone_at: float | None = None
+        self._timer: asyncio.TimerHandle | None = None
+
+    @property
+    def room(self) -> int:
+        """How many bytes may be read now."""
+        return min(PIECE, HOLD - self._waiting)
+
+    def write(self, data: bytes, baud: int | None = None) -> None:
+        """Queue bytes for the wire. `baud`: the client's baud rate, if known."""
+        self._pending.append((data, baud))
+        self._waiting += len(data)
+        self._feed()
+        if self._client is not None and not self._paused and self.room <= 0:
+            self._paused = True
+            self._client.pause()
+        self._come_back()
+
+    def retract(self) -> None:
+        """Drop what has not begun to go out: the client takes it back."""
+        self._pending.clear()
+        self._waiting = 0
+        self._floor.retract(self._bus, self._source)
+
+    def close(self) -> None:
+        """Take note that the client has left. What it wrote goes out in the time that it has."""
+        self._client = None
+
+    def _feed(self) -> None:
+        """Hand the wire as much as it has room for."""
+        most = max(PIECE, int(AHEAD * self._floor.bytes_a_second(self._bus)))
+        wire = self._floor.floor.wires[self._bus]
+        while self._pending and (room := most - wire.queued(self._source)) > 0:
+            data, baud = self._pending.popleft()
+            if data[room:]:
+                self._pending.appendleft((data[room:], baud))
+            self._waiting -= len(data[:room])
+            self._floor.write(self._bus, data[:room], self._source, baud)
+
+    def _come_back(self) -> None:
+        if self._timer is None and (self._waiting or self._paused):
+            self._timer = self._floor.loop.call_later(POLL, self._look)
+
+    def _look(self) -> None:
+        self._timer = None
+        if self._client is not None:
+            self._client.poll()
+        self._feed()
+        now = self._floor.loop.time()
+        if self._client is not None and not self._client.has_left():
+            self._gone_at = None
+        elif self._gone_at is None:
+            self._gone_at = now
+        elif now - self._gone_at > GRACE:
+            self._drop()
+        if self._paused and self._client is not None and 2 * self._waiting <= HOLD:
+            self._paused = False
+            self._client.resume()
+        self._come_back()
+
+    def _drop(self) -> None:
+        self._gone_at = None
+        self._paused = self._paused and self._client is not None
+        self.retract()
+        if self._client is not None:
+            self._client.discard()
+        self._floor.notify(f"{self._bus}: a client has left; what it wrote faster than the wire is dropped")

@@ -21,7 +21,7 @@ from multidrop.dialects.mcode.manual.errors import text as error_text
 from multidrop.simulator.cell.spec import Faults
 from multidrop.simulator.cells import load, read
 from multidrop.simulator.floor import Floor
-from multidrop.simulator.serving import input_queue
+from multidrop.simulator.serving import running
 from multidrop.simulator.serving.endpoints import BACKLOG, serve_bus
 from multidrop.simulator.serving.running import RunningFloor
 from multidrop.simulator.wire import Wire
@@ -64,7 +64,7 @@ def clients(floor: RunningFloor, bus: str = "press") -> list[object]:
 @pytest.fixture
 def impatient(monkeypatch: pytest.MonkeyPatch) -> None:
     """A client that has gone has no ten seconds for what it left."""
-    monkeypatch.setattr(input_queue, "GRACE", 0.3)
+    monkeypatch.setattr(running, "GRACE", 0.3)
 
 
 @pytest.fixture
