@@ -89,6 +89,10 @@ class MCodeDevice(EventLoop):
         return self.thread.running
 
     @property
+    def stepping(self) -> bool:
+        return self.thread.stepping
+
+    @property
     def programming(self) -> int | None:
         """Where program mode stores the next line; None: it is not on."""
         return self._mode.address

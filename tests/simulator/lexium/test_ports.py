@@ -26,7 +26,7 @@ class Drive:
     def __init__(self, **settings: object) -> None:
         self.powered = True
         self.boots = 0
-        self.memory = self
+        self.thread = self.bridges = self.power_unit = self.memory = self.model = self.core = self.printer = self
         self.name, self.party, self.checksum, self.echo_mode = "a", False, 0, 0
         self.escape_mode, self.reset_mode, self.quiet_global, self.queued = 1, 1, True, False
         self.error_flag = self.running = self.stepping = self.flags_by_nak = False
@@ -39,8 +39,24 @@ class Drive:
             setattr(self, name, value)
 
     @property
-    def answers_by_nak(self) -> bool:
-        return self.flags_by_nak and self.error_flag
+    def values(self) -> dict[str, int]:
+        words = {
+            "EM": "echo_mode",
+            "PY": "party",
+            "CK": "checksum",
+            "QD": "queued",
+            "DG": "quiet_global",
+            "CE": "reset_mode",
+        }
+        return {word: int(getattr(self, name)) for word, name in words.items()}
+
+    @property
+    def texts(self) -> dict[str, str]:
+        return {"DN": self.name}
+
+    @property
+    def printed(self) -> list[tuple[float, str]]:
+        return self.said
 
     @property
     def deadline(self) -> float | None:
@@ -76,7 +92,7 @@ class Drive:
             self.name = rest.strip('"')
         return Said()
 
-    def prints(self) -> list[tuple[float, str]]:
+    def take(self) -> list[tuple[float, str]]:
         said, self.said = self.said, []
         return said
 
