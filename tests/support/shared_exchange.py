@@ -4,8 +4,14 @@ from __future__ import annotations
 
 from multidrop.shell.sharing.exchange import Action, Close, Exchange, Purge, Say, Send, Set, Stop, Write
 from multidrop.shell.sharing.stop_bytes import stop_bytes
+from multidrop.transports import telnet
+from multidrop.transports.telnet import OPTION
 
 ADA, BOB, EVE = 1, 2, 3
+HELLO = telnet.option(telnet.WILL, OPTION)
+"""The first bytes of a client that speaks RFC 2217."""
+MST = bytes([1, 3, 0, 0, 0, 0, 0, 0, 4])
+ROR = bytes([1, 1, 0, 0, 0, 0, 0, 100, 102])
 
 
 class Port:

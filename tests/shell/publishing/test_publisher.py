@@ -39,8 +39,12 @@ class Desk:
         return [int(each) for each in self.broker.texts("p/n")]
 
 
-async def test_the_first_message_is_online_and_the_last_is_bye() -> None:
-    desk = Desk()
+@pytest.fixture
+def desk() -> Desk:
+    return Desk()
+
+
+async def test_the_first_message_is_online_and_the_last_is_bye(desk: Desk) -> None:
     await desk.publisher.begin()
     desk.put(1, 2)
     await desk.publisher.end(BYE)
@@ -48,16 +52,14 @@ async def test_the_first_message_is_online_and_the_last_is_bye() -> None:
     assert desk.broker.connections[0].closed and desk.publisher.sent == 4 and desk.said == []
 
 
-async def test_a_broker_that_is_not_there_at_the_start_is_a_failure() -> None:
-    desk = Desk()
+async def test_a_broker_that_is_not_there_at_the_start_is_a_failure(desk: Desk) -> None:
     desk.broker.refusals = ["no broker at h:1"]
     with pytest.raises(Unreachable, match="no broker at h:1"):
         await desk.publisher.begin()
     assert len(desk.broker.attempts) == 1
 
 
-async def test_a_lost_broker_is_tried_again_with_back_off_and_each_reason_is_said_once() -> None:
-    desk = Desk()
+async def test_a_lost_broker_is_tried_again_with_back_off_and_each_reason_is_said_once(desk: Desk) -> None:
     await desk.publisher.begin()
     desk.broker.refusals = ["refused"] * 7 + ["wrong password"] * 2
     begin = asyncio.get_running_loop().time()
@@ -74,8 +76,7 @@ async def test_a_lost_broker_is_tried_again_with_back_off_and_each_reason_is_sai
     await desk.publisher.end(BYE)
 
 
-async def test_what_waited_arrives_in_order_and_then_the_retained_states_again() -> None:
-    desk = Desk()
+async def test_what_waited_arrives_in_order_and_then_the_retained_states_again(desk: Desk) -> None:
     await desk.publisher.begin()
     desk.publisher.put(Message("p/a/state", "moving", True, "press"))
     desk.put(1)
@@ -136,8 +137,7 @@ async def test_a_retained_message_that_was_dropped_is_sent_again_once_there_is_r
     await desk.publisher.end(BYE)
 
 
-async def test_the_end_while_the_broker_is_away_waits_for_nothing() -> None:
-    desk = Desk()
+async def test_the_end_while_the_broker_is_away_waits_for_nothing(desk: Desk) -> None:
     await desk.publisher.begin()
     desk.broker.refusals = ["refused"] * 100
     desk.broker.cut()

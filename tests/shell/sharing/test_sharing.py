@@ -11,15 +11,10 @@ from multidrop.shell.sharing.exchange import SILENT, Close, Exchange, Send, Stop
 from multidrop.shell.sharing.stop_bytes import stop_bytes
 from multidrop.transports import telnet
 from multidrop.transports.telnet import OPTION, Setting, message
-from tests.support.shared_exchange import ADA, BOB, EVE, Port
-
-HELLO = telnet.option(telnet.WILL, OPTION)
-MST = bytes([1, 3, 0, 0, 0, 0, 0, 0, 4])
-ROR = bytes([1, 1, 0, 0, 0, 0, 0, 100, 102])
+from tests.support.shared_exchange import ADA, BOB, EVE, MST, ROR, Port
 
 
-def test_the_first_to_write_is_the_writer_and_bytes_of_another_are_refused() -> None:
-    port = Port()
+def test_the_first_to_write_is_the_writer_and_bytes_of_another_are_refused(port: Port) -> None:
     port.send(ADA, b"PR P\r")
     port.send(BOB, b"MR 51200\r", 9.9)
     assert port.written == b"PR P\r"
@@ -28,8 +23,7 @@ def test_the_first_to_write_is_the_writer_and_bytes_of_another_are_refused() -> 
     assert port.said == ["ada writes", "bob refused ada writes, until it leaves or is silent for 10 s"]
 
 
-def test_every_client_hears_what_the_drives_send_but_one_that_was_refused() -> None:
-    port = Port()
+def test_every_client_hears_what_the_drives_send_but_one_that_was_refused(port: Port) -> None:
     port.send(ADA, b"PR P\r")
     port.send(EVE, b"x")
     port.sent[EVE] = b""
@@ -37,8 +31,7 @@ def test_every_client_hears_what_the_drives_send_but_one_that_was_refused() -> N
     assert port.sent == {ADA: b"51200\r\n\xff", BOB: b"51200\r\n\xff", EVE: b""}
 
 
-def test_after_ten_seconds_of_silence_another_writes_and_the_first_is_refused() -> None:
-    port = Port()
+def test_after_ten_seconds_of_silence_another_writes_and_the_first_is_refused(port: Port) -> None:
     port.send(ADA, b"PR P\r", 1.0)
     port.send(ADA, b"PR V\r", 5.0)
     assert port.exchange.deadline == 5.0 + SILENT
@@ -51,15 +44,13 @@ def test_after_ten_seconds_of_silence_another_writes_and_the_first_is_refused() 
     assert port.exchange.writer == BOB and port.closed == [ADA]
 
 
-def test_silence_counts_although_nothing_has_looked_at_the_clock() -> None:
-    port = Port()
+def test_silence_counts_although_nothing_has_looked_at_the_clock(port: Port) -> None:
     port.send(ADA, b"PR P\r", 1.0)
     port.send(BOB, b"PR V\r", 11.0)
     assert port.written == b"PR P\rPR V\r" and port.closed == []
 
 
-def test_a_writer_that_leaves_makes_room_at_once() -> None:
-    port = Port()
+def test_a_writer_that_leaves_makes_room_at_once(port: Port) -> None:
     port.send(ADA, b"PR P\r")
     port.do(port.exchange.leave(ADA))
     port.send(BOB, b"PR V\r", 0.1)
@@ -67,8 +58,7 @@ def test_a_writer_that_leaves_makes_room_at_once() -> None:
 
 
 @pytest.mark.parametrize("key", [b"\x1b", b"\x03", b"\x05", b"a\x1bb\x1b\n", b"@00ABORT\r", b"\xff\xf4\xff\xfd\x06"])
-def test_a_stop_passes_from_any_client_which_stays_connected_and_does_not_write(key: bytes) -> None:
-    port = Port()
+def test_a_stop_passes_from_any_client_which_stays_connected_and_does_not_write(port: Port, key: bytes) -> None:
     port.send(ADA, b"MR 51200\r")
     port.send(BOB, key)
     expected = b"\x03" if key[0] == telnet.IAC else key
@@ -77,8 +67,7 @@ def test_a_stop_passes_from_any_client_which_stays_connected_and_does_not_write(
     assert port.said[-1] == f"bob stop {visible(expected.decode())}"
 
 
-def test_a_stop_passes_from_a_client_that_was_refused_and_in_the_read_that_is_refused() -> None:
-    port = Port()
+def test_a_stop_passes_from_a_client_that_was_refused_and_in_the_read_that_is_refused(port: Port) -> None:
     port.send(ADA, b"PR P\r")
     port.send(BOB, b"MR 1\r\x1bMR 2\r")
     assert port.closed == [BOB] and port.written == b"PR P\r\x1b"
@@ -87,8 +76,7 @@ def test_a_stop_passes_from_a_client_that_was_refused_and_in_the_read_that_is_re
     assert port.written == b"PR P\r\x1b\x1b"
 
 
-def test_enter_after_a_stop_is_not_refused() -> None:
-    port = Port()
+def test_enter_after_a_stop_is_not_refused(port: Port) -> None:
     port.send(ADA, b"PR P\r")
     port.send(BOB, b"\x1b\r\n")
     assert port.closed == [] and port.written == b"PR P\r\x1b"
@@ -136,8 +124,7 @@ def test_a_stop_within_a_line_that_another_one_is_typing_is_no_part_of_it(
     assert port.written.startswith(line + written.rstrip(b"\n"))
 
 
-def test_the_writers_own_stop_drops_what_came_with_it_and_what_follows_is_written() -> None:
-    port = Port()
+def test_the_writers_own_stop_drops_what_came_with_it_and_what_follows_is_written(port: Port) -> None:
     port.send(ADA, b"PR P\r")
     port.send(ADA, b"MR 51200\r\x1bPR V\r")
     assert port.written == b"PR P\r\x1bPR V\r"
@@ -153,8 +140,7 @@ def test_a_stop_of_this_side_is_one_of_any_client() -> None:
     assert r"this terminal stop \x1b" in port.said
 
 
-def test_bytes_of_no_language_of_text_pass_as_they_are_and_a_stop_among_anothers_does_too() -> None:
-    port = Port()
+def test_bytes_of_no_language_of_text_pass_as_they_are_and_a_stop_among_anothers_does_too(port: Port) -> None:
     port.send(ADA, bytes(range(256)))
     assert port.written == bytes(range(256))
     port.send(BOB, b"\x80\x1b\x81")
@@ -193,15 +179,13 @@ def test_a_motion_that_a_writer_left_unfinished_is_not_executed_by_the_next_one(
     assert port.written == line + harmless + b"\n"
 
 
-def test_a_writer_that_was_silent_ends_its_own_line() -> None:
-    port = Port()
+def test_a_writer_that_was_silent_ends_its_own_line(port: Port) -> None:
     port.send(ADA, b"MR 5", 0.0)
     port.send(ADA, b"0\r", 20.0)
     assert port.written == b"MR 50\r"
 
 
-def test_a_stop_leaves_no_unfinished_line() -> None:
-    port = Port()
+def test_a_stop_leaves_no_unfinished_line(port: Port) -> None:
     port.send(ADA, b"MR 5")
     port.send(ADA, b"\x1b")
     port.do(port.exchange.leave(ADA))

@@ -12,7 +12,7 @@ from multidrop.shell.sharing.exchange import NEVER, NOT_REACHED, OWED
 from multidrop.shell.sharing.stop_bytes import CERTAIN, NOTICED, stop_bytes
 from multidrop.transports import telnet
 from multidrop.transports.telnet import OPTION, REPLY, Setting, message
-from tests.support.shared_exchange import ADA, BOB, Port
+from tests.support.shared_exchange import ADA, BOB, MST, ROR, Port
 
 CODECS: list[tuple[str, Codec]] = [
     *(("mcode", MCode(party=party, escape=escape)) for party in (False, True) for escape in (0, 1, 2, 3)),
@@ -66,8 +66,6 @@ def test_the_stop_of_this_side_is_in_every_form_and_repeated() -> None:
 
 OWN = b"\x1b\x05!\x05!\x1b\n\x1b\x05"
 MENDED = OWN.replace(b"\n", b"") + b"~" * 65 + b"\r" + OWN
-MST = bytes([1, 3, 0, 0, 0, 0, 0, 0, 4])
-ROR = bytes([1, 1, 0, 0, 0, 0, 0, 100, 102])
 GAP_3 = bytes([1, 6, 3, 0, 0, 0, 0, 0, 10])
 
 
@@ -76,8 +74,7 @@ def first_bytes(port: Port) -> list[bytes]:
     return [each.data for each in port.exchange.owed.pieces]
 
 
-def test_a_stop_while_the_port_is_away_is_not_reached_and_is_the_first_thing_written_on_its_return() -> None:
-    port = Port()
+def test_a_stop_while_the_port_is_away_is_not_reached_and_is_the_first_thing_written_on_its_return(port: Port) -> None:
     port.do(port.exchange.lose("gone", 0.0))
     port.said.clear()
     port.do(port.exchange.stop(OWN, 1.0))
@@ -108,8 +105,7 @@ def test_a_clients_stop_while_the_port_is_away_is_owed_in_its_own_form_and_in_ev
     assert pieces == [first.data, form, *(each.data for each in others)]
 
 
-def test_a_client_that_comes_with_a_stop_while_the_port_is_away_is_told_that_it_reached_nothing() -> None:
-    port = Port()
+def test_a_client_that_comes_with_a_stop_while_the_port_is_away_is_told_that_it_reached_nothing(port: Port) -> None:
     port.do(port.exchange.lose("gone", 0.0))
     port.do(port.exchange.connect(4, "new"))
     port.sent[4] = b""
@@ -119,8 +115,7 @@ def test_a_client_that_comes_with_a_stop_while_the_port_is_away_is_told_that_it_
     assert len(reason) < telnet.LONGEST - 2  # a longer one is cut
 
 
-def test_a_stop_just_before_the_loss_may_not_have_left_and_is_owed_and_its_client_reads_that() -> None:
-    port = Port()
+def test_a_stop_just_before_the_loss_may_not_have_left_and_is_owed_and_its_client_reads_that(port: Port) -> None:
     port.send(ADA, telnet.option(telnet.WILL, OPTION))
     port.send(ADA, b"\x1b", 1.0)
     port.do(port.exchange.printed(b"51200\r\n", 1.1))  # of a command before the stop, perhaps
@@ -164,8 +159,7 @@ def test_a_stop_is_not_owed_once_the_drives_have_sent_something_later_or_a_loss_
         assert first_bytes(port) == []
 
 
-def test_a_stop_before_the_loss_of_a_port_without_a_stable_name_is_never_written_and_that_is_said() -> None:
-    port = Port()
+def test_a_stop_before_the_loss_of_a_port_without_a_stable_name_is_never_written_and_that_is_said(port: Port) -> None:
     port.do(port.exchange.stop(OWN, 1.0))
     port.do(port.exchange.lose("gone", 1.0, returns=False))
     assert any(each.startswith(f"this terminal {NOT_REACHED}") and each.endswith(NEVER) for each in port.said)

@@ -7,11 +7,7 @@ import pytest
 from multidrop.shell.sharing.exchange import TURN, WAITING, Action, Close, Send, Set, Stop, Write
 from multidrop.transports import telnet
 from multidrop.transports.telnet import OPTION, REPLY, Control, Setting, message
-from tests.support.shared_exchange import ADA, BOB, EVE, Port
-
-HELLO = telnet.option(telnet.WILL, OPTION)
-MST = bytes([1, 3, 0, 0, 0, 0, 0, 0, 4])
-ROR = bytes([1, 1, 0, 0, 0, 0, 0, 100, 102])
+from tests.support.shared_exchange import ADA, BOB, EVE, HELLO, Port
 
 
 def agreed(port: Port, *clients: int) -> Port:
@@ -21,15 +17,13 @@ def agreed(port: Port, *clients: int) -> Port:
     return port
 
 
-def test_a_client_that_negotiates_nothing_is_sent_nothing_but_the_drives_bytes() -> None:
-    port = Port()
+def test_a_client_that_negotiates_nothing_is_sent_nothing_but_the_drives_bytes(port: Port) -> None:
     assert port.sent[ADA] == b""
     port.send(ADA, b"\x00\xff\xfb\x2c")
     assert port.written == b"\x00\xff\xfb\x2c" and port.sent[ADA] == b""
 
 
-def test_the_option_is_agreed_on_once() -> None:
-    port = Port()
+def test_the_option_is_agreed_on_once(port: Port) -> None:
     port.send(ADA, HELLO * 3 + telnet.option(telnet.DO, 1) * 2 + telnet.option(telnet.WONT, 9))
     yes = [(telnet.DO, OPTION), (telnet.WILL, 0), (telnet.DO, 0)]
     expected = b"".join(telnet.option(*each) for each in yes)
@@ -37,8 +31,7 @@ def test_the_option_is_agreed_on_once() -> None:
     assert port.sent[ADA] == expected + modem * 3 + telnet.option(telnet.WONT, 1)
 
 
-def test_iac_is_doubled_for_telnet_and_a_nul_after_a_terminals_cr_is_left_out() -> None:
-    port = Port()
+def test_iac_is_doubled_for_telnet_and_a_nul_after_a_terminals_cr_is_left_out(port: Port) -> None:
     port.send(ADA, telnet.option(telnet.WILL, telnet.SGA) + b"PR P\r\0")
     port.sent[ADA] = b""
     port.do(port.exchange.printed(b"\xff", 0.0))
@@ -129,8 +122,7 @@ def test_a_refused_client_of_rfc_2217_is_told_in_a_signature() -> None:
     assert port.sent[BOB] == message(Setting.SIGNATURE + REPLY, why)
 
 
-def test_a_refused_telnet_terminal_is_sent_a_line() -> None:
-    port = Port()
+def test_a_refused_telnet_terminal_is_sent_a_line(port: Port) -> None:
     port.send(BOB, telnet.option(telnet.WILL, telnet.SGA))
     port.sent[BOB] = b""
     port.send(ADA, b"PR P\r")
