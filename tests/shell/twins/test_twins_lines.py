@@ -213,7 +213,7 @@ async def test_a_stop_while_a_drive_is_read_leaves_nothing_behind(tmp_path: Path
         await asyncio.sleep(2)
         cell.events.clear()
         await asyncio.sleep(2)
-        assert cell.written("press") == b"" and not cell.session.buses["press"].witnesses
+        assert cell.written("press") == b"" and not cell.session.buses["press"].witnesses.all
 
 
 async def test_a_closed_bus_has_no_twins(tmp_path: Path) -> None:
