@@ -20,6 +20,7 @@ from multidrop.drives.line import Finished, Line, Write
 from multidrop.simulator.cell.spec import Faults
 from multidrop.simulator.cells import read
 from multidrop.simulator.floor import Floor
+from tests.support.faults import disturb
 from tests.support.procedure import ProcedureRunner
 
 pytest_plugins = ["tests.support.marks", "tests.support.front_door"]
@@ -56,7 +57,7 @@ class Bench:
         self.floor = Floor(read(text, "bench.toml"))
         self.wire = self.floor.wires["bench"]
         if faults:
-            self.wire._faults = Faults(**faults)
+            disturb(self.wire, Faults(**faults))
         self.line = Line(MCode(), baud=baud, timeout=timeout)
         self.now = 0.0
         self.written: list[bytes] = []

@@ -14,7 +14,7 @@ from multidrop.dialects.tmcl.host import values as tmcl
 from multidrop.dialects.tmcl.host.codec import Tmcl, TmclState
 from multidrop.dialects.values import COMMUNICATION, Permission, Reading, Readings, same
 from multidrop.simulator.pmx.settings import REGISTERS as PMX_REGISTERS
-from tests.dialects.modbus.test_talk import Far
+from tests.dialects.modbus.test_exchange import Far
 from tests.support.procedure import ProcedureRunner
 
 UNIT = PmxState(Pmx(), "00")

@@ -1,26 +1,21 @@
 """A bus over simulated drives, in virtual time: stops seen to work, lost pipes, polls, names, ends."""
 
 import asyncio
-from collections.abc import Callable
 from typing import Any
 
 import pytest
 
-from multidrop.dialects import End, Hints, Stopped
+from multidrop.dialects import End, Stopped
 from multidrop.dialects.mcode.manual import program_file
-from multidrop.drives.bus import Bus
-from multidrop.drives.events import Changed, Ended, Lost, Notice, Sample, Traffic
-from multidrop.simulator.cells import read
-from multidrop.simulator.floor import Floor
+from multidrop.drives.events import Changed, Ended, Lost, Notice, Sample
 from multidrop.simulator.serving.in_process import SimPipe
-from multidrop.simulator.serving.running import RunningFloor
 from multidrop.transports import TransportLost
-from tests.support.virtual import in_virtual_time
+from tests.support.cell_session import party
+from tests.support.simulated_bus import SimulatedBus
+from tests.support.until import until
 
-CELL = '[[bus]]\nname = "w"\nbaud = 9600\n' + "".join(
-    f'[[bus.drive]]\npersonality = "LMDCM"\nname = "{name}"\nparty = true\nset = {{ EM = 1, CK = 1 }}\n'
-    for name in "ab"
-)
+pytestmark = pytest.mark.virtual
+
 LOOP = "PG 1\nLB G1\n" + "R1=R1+1\n" * 30 + "E\nPG\n"
 
 
@@ -35,62 +30,32 @@ class Deaf(SimPipe):
         return super().write(data)
 
 
-class Desk:
-    """An open bus; its events, the simulated drives."""
-
-    def __init__(self, keeper: Any = None) -> None:
-        self.floor = RunningFloor(Floor(read(CELL, "cell")))
-        self.devices = {placed.spec.name: placed.device for placed in self.floor.floor.drives}
-        self.pipe = Deaf("sim:#w", self.floor, "w", lambda: None)
-        self.bus = Bus("w", self.pipe, baud=9600, timeout=0.5, keeper=keeper)
-        self.events: list[Any] = []
-        self.bus.watch(self.events.append)
-
-    async def open(self) -> "Desk":
-        self.bus.start()
-        await self.bus.identify(Hints(drives=("a", "b"), party=True, checksum=1, em=1))
-        self.events.clear()
-        return self
-
-    async def send(self, address: str, text: str) -> tuple[str, ...]:
-        return await self.bus.drives[address].send(text)
-
-    @property
-    def sent(self) -> bytes:
-        return b"".join(e.data for e in self.events if isinstance(e, Traffic) and e.outgoing)
-
-    @property
-    def told(self) -> list[str]:
-        return [event.text for event in self.events if isinstance(event, Notice)]
-
-    def moves(self, name: str) -> bool:
-        return bool(self.devices[name].moving(self.floor.now()))
+async def opened(**more: Any) -> SimulatedBus:
+    """A bus with drives a and b, whose settings are known."""
+    desk = await SimulatedBus(party("a"), party("b"), pipe=Deaf, timeout=0.5, **more).open("a", "b", checksum=1, em=1)
+    desk.events.clear()
+    return desk
 
 
-async def until(condition: Callable[[], bool]) -> None:
-    async with asyncio.timeout(60):
-        while not condition():
-            await asyncio.sleep(0.001)
+@pytest.fixture
+async def desk():
+    return await opened()
 
 
-@in_virtual_time
-async def test_a_stop_is_written_before_it_returns_and_fails_all_that_waits():
-    desk = await Desk().open()
+async def test_a_stop_is_written_before_it_returns_and_fails_all_that_waits(desk):
     await desk.send("a", "SL 5000")
     waiting = [asyncio.create_task(desk.send(address, "MR 51200")) for address in "abab"]
-    await until(lambda: b"MR 51200" in desk.sent)
+    await until(lambda: b"MR 51200" in desk.written)
     desk.events.clear()
     desk.bus.stop()
-    assert desk.sent.startswith(b"\x1b") and desk.bus.line.waiting == []
+    assert desk.written.startswith(b"\x1b") and desk.bus.line.waiting == []
     ended = await asyncio.gather(*waiting, return_exceptions=True)
     assert [type(each) for each in ended] == [Stopped] * 4
     await desk.bus.stopped()
-    assert b"MR" not in desk.sent and not desk.moves("a") and not desk.moves("b")
+    assert b"MR" not in desk.written and not desk.moving("a") and not desk.moving("b")
 
 
-@in_virtual_time
-async def test_stopped_is_said_only_when_the_velocity_was_read_as_0():
-    desk = await Desk().open()
+async def test_stopped_is_said_only_when_the_velocity_was_read_as_0(desk):
     await desk.send("b", "SL 50000")
     desk.events.clear()
     desk.bus.stop()
@@ -104,34 +69,28 @@ async def test_stopped_is_said_only_when_the_velocity_was_read_as_0():
     assert reply.end is End.DONE and reply.text.endswith('"b"0')
 
 
-@in_virtual_time
-async def test_a_drive_that_still_moves_is_stopped_again():
-    desk = await Desk().open()
+async def test_a_drive_that_still_moves_is_stopped_again(desk):
     await desk.send("b", "SL 50000")
-    desk.pipe.stops = 3
+    desk.transport.stops = 3
     desk.bus.stop()
     await desk.bus.stopped()
     assert [text.split(" at ")[0] for text in desk.told if text.startswith("b: ")] == [
         "b: still moves",
         "b: stopped, velocity 0",
     ]
-    assert not desk.moves("b")
+    assert not desk.moving("b")
 
 
-@in_virtual_time
-async def test_a_drive_that_no_stop_reaches_is_named_in_the_end():
-    desk = await Desk().open()
+async def test_a_drive_that_no_stop_reaches_is_named_in_the_end(desk):
     await desk.send("b", "SL 50000")
-    desk.pipe.stops = 100
+    desk.transport.stops = 100
     desk.bus.stop()
     await desk.bus.stopped()
     assert desk.told[-1] == "STILL MOVING after 3 stops: b; cut the power"
-    assert not any(text.startswith("b: stopped") for text in desk.told) and desk.moves("b")
+    assert not any(text.startswith("b: stopped") for text in desk.told) and desk.moving("b")
 
 
-@in_virtual_time
-async def test_a_lost_pipe_fails_all_that_waits_and_whatever_follows():
-    desk = await Desk().open()
+async def test_a_lost_pipe_fails_all_that_waits_and_whatever_follows(desk):
     waiting = [asyncio.create_task(desk.send(address, "PR P")) for address in "aabb"]
     await asyncio.sleep(0.001)
     desk.floor.command("/sim unplug w")
@@ -144,11 +103,9 @@ async def test_a_lost_pipe_fails_all_that_waits_and_whatever_follows():
     assert any(isinstance(e, Changed) for e in desk.events)
 
 
-@in_virtual_time
-async def test_drives_are_polled_only_while_somebody_looks():
-    desk = await Desk().open()
+async def test_drives_are_polled_only_while_somebody_looks(desk):
     await asyncio.sleep(1)
-    assert desk.sent == b""
+    assert desk.written == b""
     looks = [desk.bus.telemetry.subscribe(["a"], 0.1), desk.bus.telemetry.subscribe(["a", "b"], 0.5)]
     await asyncio.sleep(2)
     samples = [event.address for event in desk.events if isinstance(event, Sample)]
@@ -165,9 +122,7 @@ async def test_drives_are_polled_only_while_somebody_looks():
     assert desk.events == []
 
 
-@in_virtual_time
-async def test_a_drive_that_is_renamed_is_found_under_its_new_name_only():
-    desk = await Desk().open()
+async def test_a_drive_that_is_renamed_is_found_under_its_new_name_only(desk):
     drive = desk.bus.drives["b"]
     await drive.send('DN="z"')
     assert list(desk.bus.drives) == ["a", "z"] and desk.bus.drives["z"] is drive
@@ -175,12 +130,10 @@ async def test_a_drive_that_is_renamed_is_found_under_its_new_name_only():
     assert any(isinstance(event, Changed) and event.address == "z" for event in desk.events)
 
 
-@in_virtual_time
-async def test_whoever_is_cancelled_in_a_download_leaves_the_drive_as_it_was():
-    desk = await Desk().open()
+async def test_whoever_is_cancelled_in_a_download_leaves_the_drive_as_it_was(desk):
     lines = program_file.read(LOOP, "loop.mxt")
     loading = asyncio.create_task(desk.bus.drives["b"].download(lines))
-    await until(lambda: desk.sent.count(b"R1=R1+1") == 5)
+    await until(lambda: desk.written.count(b"R1=R1+1") == 5)
     loading.cancel()
     with pytest.raises(asyncio.CancelledError):
         await loading
@@ -192,9 +145,7 @@ async def test_whoever_is_cancelled_in_a_download_leaves_the_drive_as_it_was():
     assert any("the program in it is incomplete" in text for text in desk.told)
 
 
-@in_virtual_time
-async def test_closing_leaves_nothing_behind():
-    desk = await Desk().open()
+async def test_closing_leaves_nothing_behind(desk):
     desk.bus.telemetry.subscribe(["a", "b"])
     loading = asyncio.create_task(desk.bus.drives["b"].download(program_file.read(LOOP, "loop.mxt")))
     await desk.send("a", "SL 5000")

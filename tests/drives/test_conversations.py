@@ -13,7 +13,8 @@ from multidrop.drives.line import Line
 from multidrop.drives.link import Link
 from multidrop.drives.port_journal import Keeper
 from multidrop.transports import Transport, TransportLost
-from tests.support.virtual import in_virtual_time
+
+pytestmark = pytest.mark.virtual
 
 CODEC = MCode(em=1)
 REPLY_AFTER = 0.01
@@ -78,7 +79,6 @@ def request(text: str) -> Request:
     return CODEC.request("", text)
 
 
-@in_virtual_time
 async def test_conversations_with_a_drive_take_turns_in_order():
     desk = Desk()
     runs = [desk.run("PR P", "PR V"), desk.run("PR A"), desk.run("PR D")]
@@ -86,7 +86,6 @@ async def test_conversations_with_a_drive_take_turns_in_order():
     assert desk.sent == ["PR P", "PR V", "PR A", "PR D"] and not desk.conversations.engaged(desk.state)
 
 
-@in_virtual_time
 async def test_the_next_request_of_a_conversation_leaves_in_the_turn_that_read_the_reply():
     desk = Desk()
     running = desk.run("PR P", "PR V")
@@ -97,7 +96,6 @@ async def test_the_next_request_of_a_conversation_leaves_in_the_turn_that_read_t
     running.cancel()
 
 
-@in_virtual_time
 async def test_thousands_of_conversations_that_wait_end_with_a_stop_and_none_is_sent():
     desk = Desk()
     runs = [desk.run("PR P") for _ in range(3000)]
@@ -107,7 +105,6 @@ async def test_thousands_of_conversations_that_wait_end_with_a_stop_and_none_is_
     assert ends[0] == "5" and all(isinstance(end, Stopped) for end in ends[1:]) and desk.sent == ["PR P"]
 
 
-@in_virtual_time
 async def test_a_waiting_conversation_that_is_cancelled_gives_up_its_turn():
     desk = Desk()
     first, second, third = desk.run("PR P"), desk.run("PR A"), desk.run("PR D")
@@ -117,7 +114,6 @@ async def test_a_waiting_conversation_that_is_cancelled_gives_up_its_turn():
     assert desk.sent == ["PR P", "PR D"]
 
 
-@in_virtual_time
 async def test_a_cancelled_conversation_cleans_up_before_the_next_one_begins():
     desk = Desk()
     first, second = desk.run("PR P", "PR V", after=("PR EM", "PR ES")), desk.run("PR A")
@@ -127,7 +123,6 @@ async def test_a_cancelled_conversation_cleans_up_before_the_next_one_begins():
     assert desk.sent == ["PR P", "PR EM", "PR ES", "PR A"] and desk.state.reply_pending
 
 
-@in_virtual_time
 async def test_a_clean_up_is_not_cancelled():
     desk = Desk()
     first = desk.run("PR P", after=("PR EM", "PR ES"))
@@ -140,7 +135,6 @@ async def test_a_clean_up_is_not_cancelled():
     assert desk.sent == ["PR P", "PR EM", "PR ES"]
 
 
-@in_virtual_time
 async def test_a_defect_reaches_the_caller_and_the_next_conversation_goes_on():
     def broken() -> Procedure[str]:
         yield request("PR P")
@@ -154,7 +148,6 @@ async def test_a_defect_reaches_the_caller_and_the_next_conversation_goes_on():
     assert await second == "5"
 
 
-@in_virtual_time
 async def test_what_fails_in_who_waits_for_an_outcome_holds_up_nobody(caplog):
     def over(outcome) -> None:
         raise ZeroDivisionError
@@ -165,7 +158,6 @@ async def test_what_fails_in_who_waits_for_an_outcome_holds_up_nobody(caplog):
     assert "a conversation on desk failed" in caplog.text
 
 
-@in_virtual_time
 async def test_a_loss_ends_every_conversation_even_one_that_would_clean_up():
     desk = Desk()
     runs = [desk.run("PR P", after=("PR EM", "PR ES")), desk.run("PR A")]
@@ -192,7 +184,6 @@ def owing(state: DriveState) -> Procedure[str]:
 
 
 @pytest.mark.parametrize("how", ["cancel", "stop", "nothing"])
-@in_virtual_time
 async def test_nothing_is_sent_before_what_is_owed_is_written_down(how: str) -> None:
     keeper = SlowKeeper()
     desk = Desk(keeper)
@@ -208,7 +199,6 @@ async def test_nothing_is_sent_before_what_is_owed_is_written_down(how: str) -> 
     assert keeper.kept == 1 and desk.sent == (["EM=0"] if how == "nothing" else [])
 
 
-@in_virtual_time
 async def test_an_operators_line_goes_before_the_next_poll_of_the_same_drive():
     desk = Desk()
     polls = 0
@@ -230,7 +220,6 @@ async def test_an_operators_line_goes_before_the_next_poll_of_the_same_drive():
 
 
 @pytest.mark.parametrize(("priority", "first"), [(Priority.POLL, "Sent"), (Priority.OPERATOR, "Ended")])
-@in_virtual_time
 async def test_the_next_poll_is_written_before_the_watchers_hear_of_the_reply_and_a_typed_line_after(priority, first):
     desk = Desk()
     told: list[tuple[str, int]] = []

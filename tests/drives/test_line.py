@@ -1,5 +1,7 @@
 """The line: one request in flight, priorities, quiet after trouble, local echo; bytes and times in, events out."""
 
+from dataclasses import replace
+
 import pytest
 
 from multidrop.dialects import End, Kind, Priority, Request, StopPiece
@@ -7,54 +9,31 @@ from multidrop.dialects.mcode.host.codec import MCode
 from multidrop.dialects.mcode.host.framing import sealed
 from multidrop.drives.events import Unsolicited
 from multidrop.drives.line import QUIET, Finished, Line, Write
+from tests.support.line_run import LineRun
 
 ECHO = MCode(em=0)
 QUIETLY = MCode(em=1)
 
 
 def request(text="PR P", codec=QUIETLY, **changes) -> Request:
-    from dataclasses import replace
-
     return replace(codec.request("", text), **changes)
-
-
-def run(line: Line, until: float, start: float = 0.0, answers: dict[float, bytes] | None = None):
-    """Step a line from deadline to deadline; `answers` come at their times. All events, with their times."""
-    coming = dict(answers or {})
-    now, seen = start, []
-    while True:
-        seen += [(round(now, 4), event) for event in line.events(now)]
-        times = [t for t in (line.deadline, *coming) if t is not None]
-        if not times or min(times) > until:
-            return seen
-        now = max(now, min(times))
-        if now in coming:
-            line.receive(coming.pop(now), now)
-
-
-def written(events):
-    return [(at, event.data) for at, event in events if isinstance(event, Write)]
-
-
-def finished(events):
-    return [(at, e.request.text, e.reply.end, e.reply.lines) for at, e in events if isinstance(e, Finished)]
 
 
 def test_one_request_is_in_flight_and_the_next_goes_when_it_is_answered():
     line = Line(QUIETLY)
     line.ask(request("PR P"))
     line.ask(request("PR V"))
-    events = run(line, 2.0, answers={0.1: b"\r\n1\r\n", 0.3: b"\r\n2\r\n"})
-    assert written(events) == [(0.0, b"PR P\r"), (0.1, b"PR V\r")]
-    assert finished(events) == [(0.1, "PR P", End.DONE, ("1",)), (0.3, "PR V", End.DONE, ("2",))]
+    run = LineRun(line, 2.0, {0.1: b"\r\n1\r\n", 0.3: b"\r\n2\r\n"})
+    assert run.written == [(0.0, b"PR P\r"), (0.1, b"PR V\r")]
+    assert run.ended == [(0.1, "PR P", End.DONE, ("1",)), (0.3, "PR V", End.DONE, ("2",))]
 
 
 def test_bytes_may_come_one_by_one():
     line = Line(ECHO)
     line.ask(request("PR P", ECHO))
     data = b"PR P\r\n-12\r\n>"
-    events = run(line, 2.0, answers={(i + 1) / 100: data[i : i + 1] for i in range(len(data))})
-    assert finished(events) == [(len(data) / 100, "PR P", End.DONE, ("-12",))]
+    run = LineRun(line, 2.0, {(i + 1) / 100: data[i : i + 1] for i in range(len(data))})
+    assert run.ended == [(len(data) / 100, "PR P", End.DONE, ("-12",))]
 
 
 def test_operators_go_before_transfers_and_polls_last():
@@ -69,9 +48,9 @@ def test_operators_go_before_transfers_and_polls_last():
 def test_a_request_without_an_answer_ends_once_and_is_written_once():
     line = Line(QUIETLY, timeout=1.0)
     line.ask(request("PR P"))
-    events = run(line, 10.0)
-    assert written(events) == [(0.0, b"PR P\r")]
-    assert finished(events) == [(1.0, "PR P", End.TIMEOUT, ())]
+    run = LineRun(line, 10.0)
+    assert run.written == [(0.0, b"PR P\r")]
+    assert run.ended == [(1.0, "PR P", End.TIMEOUT, ())]
 
 
 @pytest.mark.parametrize(("timeout", "end"), [(1.0, End.SILENT), (5.0, End.DONE)])
@@ -79,13 +58,13 @@ def test_a_signed_print_is_awaited_longer_on_a_line_whose_timeout_is_longer(time
     """Marks wait 0.25 s of a wire: on a link of 4 s, for which a person said timeout=5, none came in time."""
     line = Line(QUIETLY, timeout=timeout)
     line.ask(request('PR P,"~1"', kind=Kind.QUIET, timeout=0.25, expect=r"(-?\d+)~1", signed=True))
-    assert [each[2] for each in finished(run(line, 9.0, answers={4.0: b"\r\n7~1\r\n"}))] == [end]
+    assert [each[2] for each in LineRun(line, 9.0, {4.0: b"\r\n7~1\r\n"}).ended] == [end]
 
 
 def test_the_wires_own_time_is_added_to_the_timeout():
     line = Line(QUIETLY, baud=9600, timeout=1.0)
     line.ask(request("PR P"))
-    [(at, *_)] = finished(run(line, 10.0))
+    [(at, *_)] = LineRun(line, 10.0).ended
     assert at == round(1.0 + 5 * 10 / 9600, 4)
 
 
@@ -94,16 +73,16 @@ def test_a_late_answer_is_a_stray_and_never_the_next_requests():
     line.ask(request("PR P"))
     line.ask(request("PR V"))
     late = {1.05: b"\r\n111\r\n", 1.5: b"\r\n2\r\n"}
-    events = run(line, 5.0, answers=late)
-    assert written(events) == [(0.0, b"PR P\r"), (round(1.05 + QUIET, 4), b"PR V\r")]
-    assert finished(events) == [(1.0, "PR P", End.TIMEOUT, ()), (1.5, "PR V", End.DONE, ("2",))]
-    assert (1.05, Unsolicited(1.05, ("111",))) in events
+    run = LineRun(line, 5.0, late)
+    assert run.written == [(0.0, b"PR P\r"), (round(1.05 + QUIET, 4), b"PR V\r")]
+    assert run.ended == [(1.0, "PR P", End.TIMEOUT, ()), (1.5, "PR V", End.DONE, ("2",))]
+    assert (1.05, Unsolicited(1.05, ("111",))) in run.seen
 
 
 def test_what_cannot_be_understood_is_damaged_not_silent():
     line = Line(ECHO, timeout=1.0)
     line.ask(request("MR 51200", ECHO))
-    [(_, _, end, _)] = finished(run(line, 5.0, answers={0.1: b"MR 5120p\r\n>"}))
+    [(_, _, end, _)] = LineRun(line, 5.0, {0.1: b"MR 5120p\r\n>"}).ended
     assert end is End.DAMAGED
 
 
@@ -111,7 +90,7 @@ def test_a_chattering_program_does_not_keep_a_request_alive_for_ever():
     line = Line(ECHO, timeout=1.0)
     line.ask(request("PR P", ECHO))
     chatter = {n / 2: b"Logic 000\r\n" for n in range(1, 40)}
-    [(at, _, end, _)] = finished(run(line, 20.0, answers=chatter))
+    [(at, _, end, _)] = LineRun(line, 20.0, chatter).ended
     assert end is End.DAMAGED
     assert at <= 4.5
 
@@ -139,17 +118,17 @@ def test_a_stop_fails_what_is_queued_and_in_flight_and_is_repeated_once_it_is_qu
     line = Line(QUIETLY)
     line.ask(request("MR 51200"))
     line.ask(request("PR P"))
-    assert written([(0.0, event) for event in line.events(0.0)]) == [(0.0, b"MR 51200\r")]
+    assert [event.data for event in line.events(0.0) if isinstance(event, Write)] == [b"MR 51200\r"]
     line.stop(0.01, StopPiece(b"\x1b"))
     line.wrote(b"\x1b", 0.01)
     assert line.ask(request("PR V"))
-    events = run(line, 3.0, start=0.01, answers={0.05: b"\r\n", 0.5: b"\r\n7\r\n"})
-    assert [(text, end) for _, text, end, _ in finished(events)] == [
+    run = LineRun(line, 3.0, {0.05: b"\r\n", 0.5: b"\r\n7\r\n"}, start=0.01)
+    assert [(text, end) for _, text, end, _ in run.ended] == [
         ("MR 51200", End.STOPPED),
         ("PR P", End.STOPPED),
         ("PR V", End.DONE),
     ]
-    assert written(events) == [(0.15, b"\x1b"), (0.25, b"PR V\r")]
+    assert run.written == [(0.15, b"\x1b"), (0.25, b"PR V\r")]
 
 
 def test_a_stop_knows_whether_a_line_was_half_sent():
@@ -166,30 +145,30 @@ def test_a_stop_knows_whether_a_line_was_half_sent():
 def test_the_local_echo_of_a_two_wire_adapter_is_swallowed():
     line = Line(QUIETLY, local_echo=True)
     line.ask(request("PR P"))
-    events = run(line, 2.0, answers={0.01: b"PR ", 0.02: b"P\r\r\n5\r\n"})
-    assert finished(events) == [(0.02, "PR P", End.DONE, ("5",))]
+    run = LineRun(line, 2.0, {0.01: b"PR ", 0.02: b"P\r\r\n5\r\n"})
+    assert run.ended == [(0.02, "PR P", End.DONE, ("5",))]
 
 
 def test_a_withdrawn_request_is_not_sent():
     line = Line(QUIETLY)
     line.ask(request("PR P"))
     line.withdraw(line.ask(request("MR 1")))
-    events = run(line, 3.0, answers={0.1: b"\r\n1\r\n"})
-    assert written(events) == [(0.0, b"PR P\r")]
+    run = LineRun(line, 3.0, {0.1: b"\r\n1\r\n"})
+    assert run.written == [(0.0, b"PR P\r")]
 
 
 def test_a_list_goes_on_while_lines_come_and_ends_in_quiet():
     line = Line(QUIETLY)
     line.ask(request("L"))
     answers = {0.1 * n: b"%d  H\r\n" % n for n in range(1, 30)}
-    [(_, _, end, lines)] = finished(run(line, 10.0, answers=answers))
+    [(_, _, end, lines)] = LineRun(line, 10.0, answers).ended
     assert (end, len(lines)) == (End.DONE, 29)
 
 
 def test_a_collection_takes_whatever_comes_until_it_is_quiet():
     line = Line(QUIETLY)
     line.ask(Request("", "", Kind.QUIET, MCode(party=True), settle=0.1))
-    [(at, _, end, _)] = finished(run(line, 3.0))
+    [(at, _, end, _)] = LineRun(line, 3.0).ended
     assert (at, end) == (0.1, End.SILENT)
 
 
@@ -198,8 +177,8 @@ def test_a_poll_is_passed_over_only_once():
     for text in ("PR A", "PR D", "PR R1"):
         line.ask(request(text))
     line.ask(request("PR P", priority=Priority.POLL))
-    events = run(line, 3.0, answers={0.1 * n: b"\r\n1\r\n" for n in range(1, 5)})
-    assert [data for _, data in written(events)] == [b"PR A\r", b"PR P\r", b"PR D\r", b"PR R1\r"]
+    run = LineRun(line, 3.0, {0.1 * n: b"\r\n1\r\n" for n in range(1, 5)})
+    assert [data for _, data in run.written] == [b"PR A\r", b"PR P\r", b"PR D\r", b"PR R1\r"]
 
 
 def test_a_write_that_the_transport_drops_is_no_half_sent_line_and_ends_as_not_sent():

@@ -6,8 +6,13 @@ program's, and nothing is executed twice. Without a checksum a digit may be dama
 
 import pytest
 
+from multidrop.dialects import DriveError, NoAnswer
+from multidrop.dialects.mcode.family import MCODE
 from multidrop.simulator.cell.spec import Faults
+from tests.support.faults import disturb
+from tests.support.mcode_drives import Desk
 from tests.support.noisy_wire import Crowd
+from tests.support.procedure import ProcedureRunner
 
 NOISE = {
     "clean": Faults(),
@@ -32,3 +37,80 @@ def test_no_value_is_told_as_anothers_and_nothing_is_executed_twice(bench, em, c
 def test_a_flipped_bit_in_a_drives_name_has_no_other_drive_answer_for_it(bench):
     told = Crowd(bench, 1, 0, 2, Faults(flip=2e-3), program=False).run(150)
     assert told.misdeeds == [] and told.ends["done"] > 350
+
+
+# A NAK that noise makes
+
+
+SLOW = (0.0, 0.05, 0.3, 0.6, 0.9)
+"""Delays of a reply, s, up to the time that the host waits."""
+
+
+def with_false_nak(desk, text):
+    """Let a NAK come as soon as a line with that text has been written, once."""
+    receive, frames = desk.bench.wire.receive, []
+
+    def noisy(data, now):
+        receive(data, now)
+        if text.encode() in data and not frames:
+            frames.append(data)
+            desk.bench.line.receive(b"\x15", now)
+
+    desk.bench.wire.receive = noisy
+
+
+@pytest.mark.parametrize("delay", SLOW)
+@pytest.mark.parametrize(("em", "check"), [(em, check) for em in (0, 1, 3) for check in (1, 2)])
+def test_a_command_is_not_executed_twice(bench, em, check, delay):
+    desk = Desk(bench, (em, check), party=True, faults=Faults(delay=(delay, delay)))
+    with_false_nak(desk, "MR 100")
+    try:
+        desk.type("MR 100")
+    except DriveError as error:
+        assert isinstance(error, NoAnswer) and ("not known whether" in str(error) or "may have been" in str(error))
+    assert len(desk.witness.executed("MR 100")) == 1
+
+
+@pytest.mark.parametrize("delay", SLOW)
+@pytest.mark.parametrize("em", [0, 1])
+def test_a_program_line_is_not_stored_twice(bench, em, delay):
+    desk = Desk(bench, (em, 1), party=True)
+    desk.type("PG 1")
+    disturb(desk.bench.wire, Faults(delay=(delay, delay)))
+    with_false_nak(desk, "MR 100")
+    try:
+        desk.type("MR 100")
+    except DriveError as error:
+        assert "not known whether" in str(error) or "may have been" in str(error)
+    assert [stored for text, _, stored in desk.witness.lines if text == "MR 100"] == [True]
+
+
+def run_all(desk, runners):
+    """Run conversations side by side; return the failures."""
+    failures = {}
+    tickets = {desk.bench.line.ask(runner.request): runner for runner in runners}
+    while tickets:
+        for ended in [*desk.bench.events(), *desk.bench.step(desk.bench.now + 1.0)]:
+            runner = tickets.pop(ended.ticket)
+            try:
+                runner.answer(ended.reply)
+            except DriveError as error:
+                failures[runner] = str(error)
+            else:
+                if runner.request is not None:
+                    tickets[desk.bench.line.ask(runner.request)] = runner
+    return failures
+
+
+@pytest.mark.parametrize("other", ["MR 200", "PR R1"])
+def test_an_ack_after_a_false_nak_that_another_drives_request_has_met_is_not_forgotten(bench, other):
+    desk = Desk(bench, (1, 1), (1, 1), party=True, faults=Faults(delay=(0.3, 0.3)))
+    with_false_nak(desk, "MR 100")
+    receive = desk.bench.wire.receive
+    desk.bench.wire.receive = lambda data, now: None if b"MR 200" in data else receive(data, now)
+    a, b = desk.knowns
+    first, second = ProcedureRunner(MCODE.perform(a, "MR 100")), ProcedureRunner(MCODE.perform(b, other))
+    failures = run_all(desk, [first, second])
+    assert "an ACK came later: it is not known whether 'MR 100' was executed" in failures[first]
+    assert len(desk.witnesses[0].executed("MR 100")) == 1 and not desk.witnesses[1].executed(other)
+    assert other == "PR R1" or any("is not confirmed" in note for note in b.notes)

@@ -14,6 +14,8 @@ from multidrop.drives.stopping import Fate, stop_forms
 from multidrop.transports import Transport
 from tests.support.virtual import in_virtual_time
 
+pytestmark = pytest.mark.virtual
+
 BYTE = 10 / 9600
 
 
@@ -67,7 +69,6 @@ async def opened(*numbers, **answers):
     return bus, wire
 
 
-@in_virtual_time
 async def test_a_stop_reaches_every_known_number_and_no_answers_run_into_it():
     bus, wire = await opened("00", "01", "02")
     told = []
@@ -98,7 +99,6 @@ async def test_a_stop_reaches_every_known_number_and_no_answers_run_into_it():
         ("2", Fate.STANDING, "00: stopped, velocity 0 at 0, 0", 3),
     ],
 )
-@in_virtual_time
 async def test_a_stop_is_confirmed_by_both_programs_too(program, answer, fate, said, aborts):
     bus, wire = await opened("00", **{program: answer})
     wire.written.clear()
@@ -111,7 +111,6 @@ async def test_a_stop_is_confirmed_by_both_programs_too(program, answer, fate, s
     await bus.close()
 
 
-@in_virtual_time
 async def test_one_that_was_only_spoken_to_is_stopped_too_and_alone_at_first():
     bus, wire = await opened("00")
     wire.numbers = ("00", "05")
@@ -124,7 +123,6 @@ async def test_one_that_was_only_spoken_to_is_stopped_too_and_alone_at_first():
     await bus.close()
 
 
-@in_virtual_time
 async def test_a_late_answer_of_one_is_not_taken_for_anothers():
     bus, wire = await opened("00", "01", PX="5")
     wire.answers["PX"] = None
@@ -136,7 +134,6 @@ async def test_a_late_answer_of_one_is_not_taken_for_anothers():
     await bus.close()
 
 
-@in_virtual_time
 async def test_to_all_is_told_to_each_in_turn_and_one_failure_keeps_it_from_none():
     bus, wire = await opened("00", "01", PX="5")
     wire.written.clear()
@@ -149,7 +146,6 @@ async def test_to_all_is_told_to_each_in_turn_and_one_failure_keeps_it_from_none
     await bus.close()
 
 
-@in_virtual_time
 async def test_samples_come_for_both_axes():
     bus, wire = await opened("00", PX="7", PY="-8", MSTY="4", PSY="300", MSTX="256")
     samples = []

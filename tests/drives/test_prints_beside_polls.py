@@ -13,6 +13,7 @@ from multidrop.drives.events import Sent, Traffic, Unsolicited
 from multidrop.shell.events import OnBus
 from multidrop.simulator.cell.spec import Faults
 from tests.support.cell_session import CellSession, bus, party
+from tests.support.faults import disturb
 from tests.support.procedure import ProcedureRunner
 
 LINES = 60
@@ -130,7 +131,7 @@ def test_a_late_reply_to_a_signed_request_is_no_line_of_a_program(bench, priorit
     wired = bench([{"name": "a", "party": True, "set": {"EM": 1}}], timeout=0.3)
     wired.wire.receive(b"\n\n", 0.0)
     wired.wait(0.1)
-    wired.wire._faults = Faults(delay=(0.5, 0.5))
+    disturb(wired.wire, Faults(delay=(0.5, 0.5)))
     state = MCodeState(MCode(em=1, party=True, escape=1), "a", "a", "LMDCM")
     asked = ProcedureRunner(family_of(state.codec).motion(state, priority)).request
     assert asked is not None

@@ -1,14 +1,12 @@
 """Stops and conversations of a bus on simulated drives, in virtual time: at the worst moment, twice, of strangers."""
 
 import asyncio
-from typing import Any
 
 import pytest
 
 from multidrop.dialects import (
     DriveState,
     End,
-    Hints,
     Kind,
     NoAnswer,
     Priority,
@@ -20,50 +18,17 @@ from multidrop.dialects import (
 )
 from multidrop.dialects.codec import copy_with
 from multidrop.dialects.mcode.manual import program_file
-from multidrop.drives.bus import Bus
 from multidrop.drives.drive import confirmed_motion
-from multidrop.drives.events import Ended, Notice, Sample, Sent, Silent, Traffic, Unsolicited
+from multidrop.drives.events import Ended, Sample, Sent, Silent, Unsolicited
 from multidrop.drives.stopping import Fate
-from multidrop.simulator.cells import read
-from multidrop.simulator.floor import Floor
 from multidrop.simulator.serving.in_process import SimPipe
-from multidrop.simulator.serving.running import RunningFloor
-from tests.support.until import PATIENCE
-from tests.support.virtual import in_virtual_time
+from tests.support.cell_session import party
+from tests.support.simulated_bus import SimulatedBus
+from tests.support.until import until
+
+pytestmark = pytest.mark.virtual
 
 PROGRAM = "PG 1\nLB G1\nMR 51200\nH\nE\nPG\n"
-
-
-class Shop:
-    """A bus on a simulated wire. `said` is what it told, `sent` what it wrote."""
-
-    def __init__(self, *drives: str, baud: int = 9600, pipe: type[SimPipe] = SimPipe) -> None:
-        text = f'[[bus]]\nname = "w"\nbaud = {baud}\n' + "".join(f"[[bus.drive]]\n{each}\n" for each in drives)
-        self.floor = RunningFloor(Floor(read(text, "cell")))
-        self.devices = {placed.spec.name: placed.device for placed in self.floor.floor.drives}
-        self.bus = Bus("w", pipe("sim:#w", self.floor, "w", lambda: None), baud=baud)
-        self.events: list[Any] = []
-        self.bus.watch(self.events.append)
-        self.bus.start()
-
-    @property
-    def sent(self) -> list[bytes]:
-        return [e.data for e in self.events if isinstance(e, Traffic) and e.outgoing]
-
-    @property
-    def said(self) -> str:
-        return "\n".join(e.text for e in self.events if isinstance(e, Notice))
-
-    def moving(self, name: str) -> bool:
-        return self.devices[name].moving(self.floor.now())
-
-    async def open(self, *names: str) -> None:
-        await self.bus.identify(Hints(drives=names, party=bool(names)))
-
-
-def party(name: str, **settings: int) -> str:
-    values = ", ".join(f"{key} = {value}" for key, value in settings.items())
-    return f'personality = "LMDCM"\nname = "{name}"\nparty = true\nset = {{ {values} }}'
 
 
 ALONE = 'personality = "LMDCM"\nset = { EM = 1 }'
@@ -91,30 +56,26 @@ class Preempted(SimPipe):
         return not self.held and super().write(data)
 
 
-@in_virtual_time
 async def test_a_stop_that_a_thread_has_written_is_not_written_again_and_nothing_goes_out_before_the_loop_knows():
-    shop = Shop(party("a", EM=1, CK=1), pipe=Preempted)
-    await shop.open("a")
-    await shop.bus.drives["a"].send("SL 50000")
+    shop = await SimulatedBus(party("a"), pipe=Preempted).open("a")
+    await shop.send("a", "SL 50000")
     shop.bus.stop_ahead()
-    late = asyncio.ensure_future(shop.bus.drives["a"].send("SL 60000"))
+    late = asyncio.ensure_future(shop.send("a", "SL 60000"))
     await asyncio.sleep(0.01)
     before = len(shop.sent)
     shop.bus.stop()
     await refused_by_stop(late)
     assert shop.sent[before].startswith(b"\x1b")
     assert not any(b"60000" in data for data in shop.sent[before:])
-    assert not shop.bus.link.transport.held
+    assert not shop.transport.held
     await shop.bus.stopped()
     assert not shop.moving("a")
-    await shop.bus.drives["a"].send("SL 70000")
+    await shop.send("a", "SL 70000")
     assert shop.moving("a")
 
 
-@in_virtual_time
 async def test_what_a_preempted_pipe_drops_is_neither_published_as_sent_nor_taken_as_sent():
-    shop = Shop(party("a", EM=1, CK=1), pipe=Preempted)
-    await shop.open("a")
+    shop = await SimulatedBus(party("a"), pipe=Preempted).open("a")
     drive = shop.bus.drives["a"]
     shop.bus.stop_ahead()
     before, written = len(shop.events), len(shop.sent)
@@ -130,38 +91,32 @@ async def test_what_a_preempted_pipe_drops_is_neither_published_as_sent_nor_take
     assert drive.commands == 0
 
 
-@in_virtual_time
 async def test_a_drive_that_is_started_again_after_a_stop_is_left_to_its_operator():
-    shop = Shop(party("a", EM=1, CK=1), party("b", EM=1, CK=1))
-    await shop.open("a", "b")
-    await shop.bus.drives["b"].send("SL 50000")
+    shop = await SimulatedBus(party("a"), party("b")).open("a", "b")
+    await shop.send("b", "SL 50000")
     halt = shop.bus.stop()
     await asyncio.sleep(0.001)
-    await shop.bus.drives["a"].send("SL 50000")
+    await shop.send("a", "SL 50000")
     await shop.bus.stopped()
     assert shop.moving("a") and not shop.moving("b")
     assert "a: still moves" not in shop.said and "b: stopped, velocity 0" in shop.said
     assert halt.fate(shop.bus.drives["a"]) is Fate.STARTED
 
 
-@in_virtual_time
 async def test_a_line_that_is_refused_after_a_stop_does_not_end_its_confirmation():
-    shop = Shop(party("a", EM=1, CK=1), party("b", EM=1, CK=1))
-    await shop.open("a", "b")
-    await shop.bus.drives["b"].send("SL 50000")
+    shop = await SimulatedBus(party("a"), party("b")).open("a", "b")
+    await shop.send("b", "SL 50000")
     halt = shop.bus.stop()
     await asyncio.sleep(0.001)
     with pytest.raises(Refused):
-        await shop.bus.drives["b"].send("MR 1,2,3,4,5")
+        await shop.send("b", "MR 1,2,3,4,5")
     await shop.bus.stopped()
     assert "b: stopped, velocity 0" in shop.said and not shop.moving("b")
     assert halt.fate(shop.bus.drives["b"]) is Fate.STANDING
 
 
-@in_virtual_time
 async def test_a_drive_whose_rest_a_poll_confirms_is_reported_as_stopped_like_the_others():
-    shop = Shop(*(party(name, EM=1, CK=1) for name in "abc"))
-    await shop.open(*"abc")
+    shop = await SimulatedBus(*(party(name) for name in "abc")).open(*"abc")
     a = shop.bus.drives["a"]
 
     async def polls():
@@ -177,14 +132,12 @@ async def test_a_drive_whose_rest_a_poll_confirms_is_reported_as_stopped_like_th
     assert [shop.said.count(f"{name}: stopped, velocity 0") for name in "abc"] == [1, 1, 1]
 
 
-@in_virtual_time
 async def test_a_drive_that_is_plotted_and_started_again_after_a_stop_is_not_said_to_slow_down():
-    shop = Shop(party("a", EM=1, CK=1))
-    await shop.open("a")
+    shop = await SimulatedBus(party("a")).open("a")
     shop.bus.telemetry.subscribe(["a"])
     shop.bus.stop()
     await asyncio.sleep(0.001)
-    await shop.bus.drives["a"].send("SL 50000")
+    await shop.send("a", "SL 50000")
     begun = shop.bus.now()
     await shop.bus.stopped()
     assert shop.bus.now() - begun < 1.0 and shop.moving("a")
@@ -192,10 +145,8 @@ async def test_a_drive_that_is_plotted_and_started_again_after_a_stop_is_not_sai
     await shop.bus.close()
 
 
-@in_virtual_time
 async def test_a_refused_line_is_no_proof_that_a_drive_still_stands():
-    shop = Shop(party("a", EM=1, CK=1))
-    await shop.open("a")
+    shop = await SimulatedBus(party("a")).open("a")
     drive = shop.bus.drives["a"]
     halt = shop.bus.stop()
     await shop.bus.stopped()
@@ -208,11 +159,9 @@ async def test_a_refused_line_is_no_proof_that_a_drive_still_stands():
     assert halt.fate(drive) is Fate.STANDING
 
 
-@in_virtual_time
 async def test_a_conversation_begun_before_a_stop_sends_nothing_after_it():
-    shop = Shop(party("a", EM=1, CK=1))
-    await shop.open("a")
-    sending = asyncio.ensure_future(shop.bus.drives["a"].send("SL 50000"))
+    shop = await SimulatedBus(party("a")).open("a")
+    sending = asyncio.ensure_future(shop.send("a", "SL 50000"))
     await asyncio.sleep(0)  # the call has begun; its conversation has not
     shop.bus.stop()
     await refused_by_stop(sending)
@@ -220,10 +169,8 @@ async def test_a_conversation_begun_before_a_stop_sends_nothing_after_it():
     assert not [data for data in shop.sent if b"SL 50000" in data]
 
 
-@in_virtual_time
 async def test_a_stop_between_an_answer_and_the_next_request_ends_the_conversation():
-    shop = Shop(party("a", EM=1, CK=1))
-    await shop.open("a")
+    shop = await SimulatedBus(party("a")).open("a")
     drive = shop.bus.drives["a"]
 
     def twice():
@@ -244,11 +191,12 @@ async def test_a_stop_between_an_answer_and_the_next_request_ends_the_conversati
 
 @pytest.mark.parametrize("escape", [0, 1, 2, 3])
 @pytest.mark.parametrize("cell", ["alone", "party"])
-@in_virtual_time
 async def test_a_moving_drive_stands_after_a_stop_whatever_its_escape_mode(cell, escape):
-    together = [party("a", EM=1, ES=escape), party("b", EM=1, ES=(escape + 1) % 4)]
-    shop = Shop(*(together if cell == "party" else [ALONE.replace("EM = 1", f"EM = 1, ES = {escape}")]))
-    await shop.open(*(("a", "b") if cell == "party" else ()))
+    if cell == "party":
+        both = party("a", ES=escape, CK=0), party("b", ES=(escape + 1) % 4, CK=0)
+        shop = await SimulatedBus(*both).open("a", "b")
+    else:
+        shop = await SimulatedBus(ALONE.replace("EM = 1", f"EM = 1, ES = {escape}")).open()
     for drive in shop.bus.drives.values():
         await drive.send("SL 50000")
     await asyncio.sleep(1.0)
@@ -263,11 +211,9 @@ async def test_a_moving_drive_stands_after_a_stop_whatever_its_escape_mode(cell,
 
 
 @pytest.mark.parametrize("escape", [0, 1, 2, 3])
-@in_virtual_time
 async def test_a_stop_while_drives_are_looked_for_reaches_those_that_are_called(escape):
-    shop = Shop(party("a", EM=1, ES=escape))
-    for line in ("SL 50000",):
-        shop.devices["a"].execute(line, 0.0)
+    shop = SimulatedBus(party("a", ES=escape, CK=0))
+    shop.devices["a"].execute("SL 50000", 0.0)
     opening = asyncio.ensure_future(shop.open("a", "b"))
     await asyncio.sleep(0.2)
     assert shop.moving("a")
@@ -280,13 +226,11 @@ async def test_a_stop_while_drives_are_looked_for_reaches_those_that_are_called(
 
 @pytest.mark.parametrize("cut", [0.0005, 0.0045, 0.0075, 0.0125])
 @pytest.mark.parametrize("escape", [0, 1, 2, 3])
-@in_virtual_time
 async def test_no_piece_of_a_half_sent_line_is_executed(escape, cut):
-    shop = Shop(party("a", EM=1, ES=escape), party("b", EM=1, ES=3 - escape))
-    await shop.open("a", "b")
+    shop = await SimulatedBus(party("a", ES=escape, CK=0), party("b", ES=3 - escape, CK=0)).open("a", "b")
     # What is known of the drive is wrong by now, so its own escape does not clear its buffer.
     shop.devices["a"].execute(f"ES={(escape + 1) % 4}", shop.floor.now())
-    moves = asyncio.ensure_future(shop.bus.drives["a"].send("MR 51200000"))
+    moves = asyncio.ensure_future(shop.send("a", "MR 51200000"))
     await asyncio.sleep(cut)
     shop.bus.stop()
     await refused_by_stop(moves)
@@ -295,16 +239,12 @@ async def test_no_piece_of_a_half_sent_line_is_executed(escape, cut):
     assert not shop.moving("a")
 
 
-@in_virtual_time
 async def test_a_second_stop_in_the_middle_of_the_clean_up_does_not_leave_program_mode_on():
-    shop = Shop(party("a", EM=1, CK=1))
-    await shop.open("a")
+    shop = await SimulatedBus(party("a")).open("a")
     drive = shop.bus.drives["a"]
     for wait in (0.05, 0.15, 0.22, 0.3, 0.4):
         loading = asyncio.ensure_future(drive.download(program_file.read(PROGRAM, "x")))
-        async with asyncio.timeout(PATIENCE):
-            while not drive.programming:
-                await asyncio.sleep(0.001)
+        await until(lambda: drive.programming)
         await asyncio.sleep(0.06)
         shop.bus.stop()
         await asyncio.sleep(wait)
@@ -318,11 +258,9 @@ async def test_a_second_stop_in_the_middle_of_the_clean_up_does_not_leave_progra
         await drive.send("CP")
 
 
-@in_virtual_time
 async def test_many_stops_in_a_row_are_confirmed_by_the_last():
-    shop = Shop(party("a", EM=1))
-    await shop.open("a")
-    await shop.bus.drives["a"].send("SL 50000")
+    shop = await SimulatedBus(party("a", CK=0)).open("a")
+    await shop.send("a", "SL 50000")
     for _ in range(8):
         shop.bus.stop()
         await asyncio.sleep(0.07)
@@ -331,10 +269,8 @@ async def test_many_stops_in_a_row_are_confirmed_by_the_last():
     assert "not known" not in shop.said
 
 
-@in_virtual_time
 async def test_a_drive_that_was_only_spoken_to_is_stopped_too():
-    shop = Shop(party("a", EM=1, ES=3), party("q", EM=0, ES=2))
-    await shop.open("a")
+    shop = await SimulatedBus(party("a", ES=3, CK=0), party("q", EM=0, ES=2, CK=0)).open("a")
     await shop.bus.at("q").send("SL 50000")
     await asyncio.sleep(0.5)
     assert shop.moving("q")
@@ -344,19 +280,15 @@ async def test_a_drive_that_was_only_spoken_to_is_stopped_too():
     assert "q: stopped, velocity 0" in shop.said
 
 
-@in_virtual_time
 async def test_a_stranger_that_is_not_there_is_not_remembered():
-    shop = Shop(party("a", EM=1))
-    await shop.open("a")
+    shop = await SimulatedBus(party("a", CK=0)).open("a")
     with pytest.raises(NoAnswer, match="was not sent"):
         await shop.bus.at("x").send("MR 100")
     assert shop.bus.roster.unlisted == {}
 
 
-@in_virtual_time
 async def test_a_stop_takes_the_form_of_a_drive_that_was_restarted():
-    shop = Shop(ALONE)
-    await shop.open()
+    shop = await SimulatedBus(ALONE).open()
     drive = shop.bus.drives[""]
     await drive.send("ES=3")
     device = shop.devices["!"]
@@ -372,14 +304,12 @@ async def test_a_stop_takes_the_form_of_a_drive_that_was_restarted():
     assert drive.codec.escape == 1
 
 
-@in_virtual_time
 async def test_a_bus_that_is_closed_repeats_its_stop_first():
-    shop = Shop(party("a", EM=1))
-    await shop.open("a")
+    shop = await SimulatedBus(party("a", CK=0)).open("a")
     before = len(shop.sent)
     written: list[bytes] = []
-    write = shop.bus.link.transport.write
-    shop.bus.link.transport.write = lambda data: (written.append(data), write(data))[1]  # type: ignore[method-assign]
+    write = shop.transport.write
+    shop.transport.write = lambda data: (written.append(data), write(data))[1]  # type: ignore[method-assign]
     shop.bus.stop()
     await shop.bus.close()
     assert len(shop.sent) == before + 1
@@ -390,13 +320,11 @@ async def listing(drive):
     return await drive.run(drive.programs.listing(drive.state, ""))
 
 
-@in_virtual_time
 async def test_no_poll_is_stored_in_a_program():
-    shop = Shop(party("a", EM=1), party("b", EM=1))
-    await shop.open("a", "b")
+    shop = await SimulatedBus(party("a", CK=0), party("b", CK=0)).open("a", "b")
     looking = shop.bus.telemetry.subscribe(("a", "b"))
     for line in PROGRAM.splitlines():
-        await shop.bus.drives["a"].send(line)
+        await shop.send("a", line)
         await asyncio.sleep(0.2)
     looking.close()
     listed = await listing(shop.bus.drives["a"])
@@ -405,10 +333,8 @@ async def test_no_poll_is_stored_in_a_program():
     assert not any(isinstance(e, Silent) for e in shop.events)
 
 
-@in_virtual_time
 async def test_no_command_to_all_is_stored_in_a_program():
-    shop = Shop(party("a", EM=1), party("b", EM=1))
-    await shop.open("a", "b")
+    shop = await SimulatedBus(party("a", CK=0), party("b", CK=0)).open("a", "b")
     everyone, drive = shop.bus.at("*"), shop.bus.drives["a"]
     entering = asyncio.ensure_future(drive.send("PG 1"))
     outcomes = []
@@ -425,20 +351,16 @@ async def test_no_command_to_all_is_stored_in_a_program():
     assert any(isinstance(outcome, Refused) for outcome in outcomes)
 
 
-@in_virtual_time
 async def test_a_setting_for_all_is_followed_with_every_drive():
-    shop = Shop(party("a", EM=1), party("b", EM=0), party("c", EM=3, CK=0))
-    await shop.open("a", "b", "c")
+    shop = await SimulatedBus(party("a", CK=0), party("b", EM=0, CK=0), party("c", EM=3, CK=0)).open("a", "b", "c")
     await shop.bus.at("*").send("EM=2")
     for name, drive in shop.bus.drives.items():
         assert await drive.send("PR EM") == ("2",), name
         assert drive.codec.em == 2
 
 
-@in_virtual_time
 async def test_a_plot_is_not_blinded_by_a_silent_drive_and_does_not_mistake_one_for_another():
-    shop = Shop(party("a", EM=1), party("b", EM=1))
-    await shop.open("a", "b")
+    shop = await SimulatedBus(party("a", CK=0), party("b", CK=0)).open("a", "b")
     shop.devices["b"].execute("P=77", shop.floor.now())
     looking = shop.bus.telemetry.subscribe(("a", "b"))
     await asyncio.sleep(1.0)
@@ -451,10 +373,8 @@ async def test_a_plot_is_not_blinded_by_a_silent_drive_and_does_not_mistake_one_
     assert any(isinstance(e, Silent) and e.address == "a" for e in shop.events)
 
 
-@in_virtual_time
 async def test_a_watcher_that_stops_keeps_back_what_was_about_to_be_written():
-    shop = Shop(party("a", EM=1), party("b", EM=1))
-    await shop.open("a", "b")
+    shop = await SimulatedBus(party("a", CK=0), party("b", CK=0)).open("a", "b")
     a, b = shop.bus.drives["a"], shop.bus.drives["b"]
 
     def stop_at_once(event):
@@ -469,10 +389,8 @@ async def test_a_watcher_that_stops_keeps_back_what_was_about_to_be_written():
     assert not any(b"SL 50000" in data for data in shop.sent)
 
 
-@in_virtual_time
 async def test_an_answer_that_was_under_way_when_a_stop_came_is_nobodys():
-    shop = Shop(party("a", EM=1))
-    await shop.open("a")
+    shop = await SimulatedBus(party("a", CK=0)).open("a")
     drive = shop.bus.drives["a"]
     reading = asyncio.ensure_future(drive.send("PR A"))
     await asyncio.sleep(0.001)
@@ -508,7 +426,7 @@ def test_a_reply_keeps_what_it_was_read_from():
 DWELL = 'program_text = """\nPG 1\nLB G1\nH 60000\nBR G1\nE\nPG\n"""'
 
 
-def deaf(shop: Shop, name: str, times: int, then: str = "") -> list[float]:
+def deaf(shop: SimulatedBus, name: str, times: int, then: str = "") -> list[float]:
     """Make a drive ignore this many stops, or execute a line after each of them; return their times."""
     device, heard = shop.devices[name], []
     escape = device.escape
@@ -525,11 +443,9 @@ def deaf(shop: Shop, name: str, times: int, then: str = "") -> list[float]:
 
 
 @pytest.mark.parametrize("then", ["", "EX G1"])
-@in_virtual_time
 async def test_a_drive_whose_program_runs_on_or_again_is_stopped_once_more_although_it_reads_velocity_0(then):
-    shop = Shop(f"{party('a', EM=1, CK=1)}\n{DWELL}", party("b", EM=1, CK=1))
-    await shop.open("a", "b")
-    await shop.bus.drives["a"].send("EX G1")
+    shop = await SimulatedBus(f"{party('a')}\n{DWELL}", party("b")).open("a", "b")
+    await shop.send("a", "EX G1")
     await asyncio.sleep(0.5)
     stops, since = deaf(shop, "a", 2, then), len(shop.sent)  # a stop is two escapes
     halt = shop.bus.stop()
@@ -545,11 +461,9 @@ async def test_a_drive_whose_program_runs_on_or_again_is_stopped_once_more_altho
     assert len(asked) == 2 and all(data.startswith(b"aPR BY,P,DN,V") for data in asked)
 
 
-@in_virtual_time
 async def test_a_program_that_three_stops_do_not_end_is_named_among_twelve_drives():
     names = "abcdefghijkl"
-    shop = Shop(*(f"{party(name, EM=1, CK=1)}\n{DWELL}" for name in names))
-    await shop.open(*names)
+    shop = await SimulatedBus(*(f"{party(name)}\n{DWELL}" for name in names)).open(*names)
     await shop.bus.at("*").send("EX G1")
     await asyncio.sleep(0.5)
     assert all(device.running for device in shop.devices.values())
@@ -564,22 +478,18 @@ async def test_a_program_that_three_stops_do_not_end_is_named_among_twelve_drive
     await shop.bus.close()
 
 
-@in_virtual_time
 async def test_a_program_that_a_person_starts_after_a_stop_is_left_to_them():
-    shop = Shop(f"{party('a', EM=1, CK=1)}\n{DWELL}")
-    await shop.open("a")
+    shop = await SimulatedBus(f"{party('a')}\n{DWELL}").open("a")
     halt = shop.bus.stop()
     await asyncio.sleep(0.001)
-    await shop.bus.drives["a"].send("EX G1")
+    await shop.send("a", "EX G1")
     await shop.bus.stopped()
     assert shop.devices["a"].running and halt.fate(shop.bus.drives["a"]) is Fate.STARTED
     assert "still runs" not in shop.said
 
 
-@in_virtual_time
 async def test_a_program_that_starts_by_itself_after_a_stop_takes_back_that_the_drive_is_at_rest():
-    shop = Shop(f"{party('a', EM=1, CK=1)}\n{DWELL}")
-    await shop.open("a")
+    shop = await SimulatedBus(f"{party('a')}\n{DWELL}").open("a")
     drive = shop.bus.drives["a"]
     halt = shop.bus.stop()
     await shop.bus.stopped()
@@ -592,10 +502,8 @@ async def test_a_program_that_starts_by_itself_after_a_stop_takes_back_that_the_
     await shop.bus.close()
 
 
-@in_virtual_time
 async def test_a_poll_does_not_ask_for_the_program_and_a_stop_does():
-    shop = Shop(party("a", EM=1, CK=1))
-    await shop.open("a")
+    shop = await SimulatedBus(party("a")).open("a")
     with_poll = shop.bus.telemetry.subscribe(("a",))
     await asyncio.sleep(1.0)
     with_poll.close()

@@ -3,36 +3,19 @@
 import importlib
 import subprocess
 import sys
+import tomllib
 
 import pytest
 
+import multidrop
 from multidrop import cli
 from multidrop.shell.operations import table
 from multidrop.simulator.families import PROGRAMS, TABLE
 from tests.support.paths import ROOT
-from tests.support.processes import environment
 from tests.support.until import PATIENCE
 
 COMMANDS = ["demo", "tui", "shell", "send", "run", "sim", "program", "macro", "plot", "ports", "report", "completion"]
 RUN = [each.run for each in table.COMMANDS.values() if each.run]
-
-
-@pytest.fixture
-def process(tmp_path):
-    """Run a command as a process, in a folder of its own."""
-
-    def run(*arguments):
-        return subprocess.run(
-            [sys.executable, "-m", "multidrop", *arguments],
-            stdin=subprocess.DEVNULL,
-            capture_output=True,
-            text=True,
-            timeout=PATIENCE,
-            cwd=tmp_path,
-            env=environment(tmp_path),
-        )
-
-    return run
 
 
 @pytest.mark.process
@@ -40,8 +23,8 @@ def process(tmp_path):
     ("arguments", "code", "out", "err"),
     [(["--version"], 0, 1, 0), (["frob"], 2, 0, 1), (["send", "/dev/does-not-exist", "PR P"], 3, 0, 1)],
 )
-def test_a_process_has_the_exit_code_and_its_lines_on_either_output(process, arguments, code, out, err):
-    done = process(*arguments)
+def test_a_process_has_the_exit_code_and_its_lines_on_either_output(home, arguments, code, out, err):
+    done = home.process(*arguments)
     assert (done.returncode, done.stdout.count("\n"), done.stderr.count("\n")) == (code, out, err)
 
 
@@ -119,21 +102,42 @@ def test_help_and_version_import_nothing_heavy():
         assert done.stdout.splitlines()[-1] == "0 []"
 
 
-def test_a_broken_configuration_is_one_line_that_names_it(multidrop, tmp_path):
-    (tmp_path / "conf").mkdir()
-    (tmp_path / "conf" / "multidrop.toml").write_text("[connections.press]\nur = 1\n")
-    done = multidrop("send", "press", "PR P")
+def test_a_broken_configuration_is_one_line_that_names_it(home):
+    home.settings("[connections.press]\nur = 1\n")
+    done = home.run("send", "press", "PR P")
     assert done.returncode == 2 and "multidrop.toml:2: no key connections.press.ur" in done.stderr
 
 
-def test_macros_are_listed_and_shown_as_their_files_have_them(multidrop, tmp_path):
-    folder = tmp_path / "conf" / "macros"
-    folder.mkdir(parents=True)
-    (folder / "go.toml").write_text('name = "go"\nkey = "F3"\n[[step]]\nafter = 0.0\nline = "@a MR {STEPS}"\n')
-    (folder / "bad.toml").write_text("name =\n")
-    listed = multidrop("macro", "list")
+def test_macros_are_listed_and_shown_as_their_files_have_them(home):
+    home.macro("go", "@a MR {STEPS}", key="F3")
+    home.file("conf/macros/bad.toml", "name =\n")
+    listed = home.run("macro", "list")
     assert listed.returncode == 2 and "bad.toml" in listed.stderr
     assert listed.stdout.split() == ["go", "F3", "1", "line", "values:", "STEPS"]
-    assert 'line = "@a MR {STEPS}"' in multidrop("macro", "show", "go").stdout
-    played = multidrop("macro", "play", "go", "--on", "/dev/does-not-exist")
+    assert 'line = "@a MR {STEPS}"' in home.run("macro", "show", "go").stdout
+    played = home.run("macro", "play", "go", "--on", "/dev/does-not-exist")
     assert played.returncode == 2 and "STEPS" in played.stderr
+
+
+# The package
+
+
+def test_the_public_names_are_there():
+    assert [name for name in multidrop.__all__ if getattr(multidrop, name) is None] == []
+    assert multidrop.Session.__name__ == "Session" and set(multidrop.__all__) == set(multidrop._PUBLIC)
+
+
+def test_what_is_not_public_is_an_attribute_error():
+    with pytest.raises(AttributeError, match="frob"):
+        multidrop.frob  # noqa: B018
+
+
+def test_the_version_says_which_extras_are_installed(monkeypatch):
+    with open(ROOT / "pyproject.toml", "rb") as file:
+        project = tomllib.load(file)["project"]
+    assert set(cli.EXTRAS) == set(project["optional-dependencies"])
+    monkeypatch.setattr(cli, "EXTRAS", {"here": "json", "absent": "no_such_module"})
+    python = ".".join(map(str, sys.version_info[:3]))
+    assert cli.version() == f"multidrop {multidrop.__version__}, Python {python}, extras: here"
+    monkeypatch.setattr(cli, "EXTRAS", {})
+    assert cli.version().endswith("extras: none")

@@ -5,7 +5,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 import re
 import signal
@@ -17,7 +16,8 @@ from pathlib import Path
 
 import pytest
 
-from tests.support.processes import Running, environment
+from tests.support.front_door import Home
+from tests.support.served_cell import until
 from tests.support.until import PATIENCE
 
 pytestmark = pytest.mark.process
@@ -35,34 +35,15 @@ def cell(baud: int, party: bool) -> str:
     )
 
 
-class Floor:
+class Floor(Home):
     """A simulated drive on a pseudo-terminal, and somebody who counts what it says."""
 
     def __init__(self, folder, baud=38400, party=True):
-        self.folder, self.party = folder, party
-        (folder / "cell.toml").write_text(cell(baud, party))
-        (folder / "p.mxt").write_text(PROGRAM)
-        self.sim = Running("sim", "cell.toml", "--json", folder=folder)
-        told = [json.loads(line)["endpoint"] for line in self.sim.until('{"ready": true}')[:-1]]
-        port = next(int(each.rpartition(":")[2]) for each in told if each.startswith("tcp:"))
-        self.listener = socket.create_connection(("127.0.0.1", port))
-        self.baud = baud
-        self.url = f"{folder / 'w.tty'}?baud={baud}&timeout=5" + ("&drives=a&party=1" if party else "&party=0")
-        self.started = []
-
-    def start(self, *arguments):
-        self.started.append(
-            subprocess.Popen(
-                [sys.executable, "-m", "multidrop", *arguments],
-                stdin=subprocess.PIPE,
-                stdout=subprocess.PIPE,
-                stderr=subprocess.PIPE,
-                text=True,
-                cwd=self.folder,
-                env=environment(self.folder),
-            )
-        )
-        return self.started[-1]
+        super().__init__(folder)
+        self.file("p.mxt", PROGRAM)
+        self.serve(cell(baud, party))
+        self.listener = socket.create_connection(("127.0.0.1", self.port("w")))
+        self.url = f"{folder / 'w.tty'}?baud={baud}&timeout=3" + ("&drives=a&party=1" if party else "&party=0")
 
     def heard(self, process, enough=None):
         """How many bytes the drive says until the process ends, or (`enough`) until they are so many."""
@@ -88,9 +69,8 @@ class Floor:
 
     def ask(self, *lines):
         """What a new session prints for these lines, and what it says besides."""
-        process = self.start("send", self.url, *lines)
-        out, err = process.communicate(timeout=PATIENCE)
-        assert process.returncode == 0, err
+        code, out, err = self.process("send", self.url, *lines)
+        assert code == 0, err
         return out.split("\n")[:-1], err
 
     def kept(self):
@@ -98,11 +78,7 @@ class Floor:
 
     def close(self):
         self.listener.close()
-        for process in self.started:
-            process.kill()
-            process.communicate()
-        self.sim.process.terminate()
-        self.sim.end()
+        super().close()
 
 
 @pytest.fixture
@@ -118,7 +94,7 @@ def floor(tmp_path):
         each.close()
 
 
-@pytest.mark.timeout(60 + 15 * KILLS)
+@pytest.mark.timeout(120 + 60 * KILLS)
 def test_after_a_download_that_is_killed_the_next_session_finds_the_drive_as_it_was(floor):
     line = floor()
     download = ("program", "download", line.url, "p.mxt", "--no-verify")
@@ -168,24 +144,18 @@ def test_half_a_line_of_another_program_that_was_killed_is_not_executed(floor, p
     assert printed == ["0", "0"] and "overflow" not in said
 
 
-def until(condition):
-    """Wait for another process."""
-    ends = time.monotonic() + PATIENCE
-    while not condition():
-        assert time.monotonic() < ends
-        time.sleep(0.01)
-
-
 def test_a_plug_that_is_pulled_in_the_middle_of_a_line_has_the_next_session_make_it_overflow(floor):
     line, long = floor(baud=1200), f"MR{50 * ' '}51200"  # which takes half a second
     shell = line.start("shell", line.url)
     shell.stdin.write(f"{long}\n")
     shell.stdin.flush()
-    until(lambda: any(b"MR" in path.read_bytes() for path in line.folder.glob("state/ports/*.line")))
+    until(
+        lambda: any(b"MR" in path.read_bytes() for path in line.folder.glob("state/ports/*.line")), "it does not come"
+    )
     line.sim.say("/sim unplug w")
     assert shell.wait(PATIENCE) == 3
     line.sim.say("/sim plug w")
-    until(lambda: (line.folder / "w.tty").exists())
+    until(lambda: (line.folder / "w.tty").exists(), "it does not come")
     printed, said = line.ask("PR P", "PR MV")
     assert printed == ["0", "0"]
     assert f"was interrupted while it sent 'a{long}'" in said

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import json
 import random
 import re
 import signal
@@ -15,7 +14,7 @@ import time
 import pexpect
 import pytest
 
-from tests.support.front_door import command
+from tests.support.front_door import Home
 from tests.support.processes import Running, Tap, environment
 from tests.support.until import PATIENCE
 
@@ -45,69 +44,22 @@ CELL = "".join(
 )
 
 
-class Shop:
+class Shop(Home):
     """A served cell, and those who work with it."""
 
     def __init__(self, folder):
-        self.folder, self.started = folder, []
-        (folder / "cell.toml").write_text(CELL)
-        self.sim = Running("sim", "cell.toml", "--json", folder=folder)
-        told = [json.loads(line) for line in self.sim.until('{"ready": true}')[:-1]]
-        self.ports = {
-            each["bus"]: ("127.0.0.1", int(each["endpoint"].rpartition(":")[2]))
-            for each in told
-            if each["endpoint"].startswith("tcp:")
-        }
+        super().__init__(folder)
+        self.serve(CELL)
 
     def url(self, bus, drives="a"):
-        return f"tcp://127.0.0.1:{self.ports[bus][1]}?drives={drives}&{KNOWN}"
+        return f"{self.endpoints[bus]['tcp']}?drives={drives}&{KNOWN}"
 
     def pty(self):
         return f"{self.folder / 'press.tty'}?drives=a&{KNOWN}"
 
-    def file(self, name, text):
-        (self.folder / name).write_bytes(text if isinstance(text, bytes) else text.encode())
-        return name
-
-    def popen(self, *arguments, **more):
-        command = [sys.executable, "-m", "multidrop", *arguments]
-        more = {"stdin": subprocess.DEVNULL, "env": environment(self.folder)} | more
-        self.started.append(
-            subprocess.Popen(
-                command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, cwd=self.folder, **more
-            )
-        )
-        return self.started[-1]
-
-    def done(self, *arguments):
-        """(exit code, standard output, standard error) of a command that needs no process of its own."""
-        done = command(self.folder, *arguments)
-        return done.returncode, done.stdout, done.stderr
-
-    def process(self, *arguments, stdin):
-        """The same of a process that reads its standard input."""
-        process = self.popen(*arguments, stdin=subprocess.PIPE)
-        out, err = process.communicate(stdin, timeout=PATIENCE)
-        return process.returncode, out, err
-
     def close(self):
-        for process in self.started:
-            if not process.stdout.closed:  # its test failed
-                process.kill()
-                process.communicate()
-        self.sim.process.terminate()
-        assert self.sim.end() == 0 and self.sim.errors == []
-
-    def terminal(self, *arguments):
-        return pexpect.spawn(
-            sys.executable,
-            ["-m", "multidrop", *arguments],
-            cwd=self.folder,
-            env=environment(self.folder),
-            timeout=PATIENCE,
-            encoding="utf-8",
-            dimensions=(24, 120),
-        )
+        super().close()
+        assert self.sim.errors == []
 
 
 @pytest.fixture(scope="module")
@@ -123,7 +75,7 @@ def tapped(shop):
     taps = []
 
     def tap(bus, more=KNOWN):
-        taps.append(Tap(shop.ports[bus]))
+        taps.append(Tap(("127.0.0.1", shop.port(bus))))
         return taps[-1], f"tcp://127.0.0.1:{taps[-1].port}?drives=a&{more}"
 
     yield tap
@@ -140,7 +92,7 @@ def one_line(err):
 
 def standing(shop, url, drive="a"):
     """Where a drive stands, which it must."""
-    code, out, err = shop.done("send", url, f"@{drive} PR V", f"@{drive} PR P")
+    code, out, err = shop.run("send", url, f"@{drive} PR V", f"@{drive} PR P")
     assert (code, err) == (0, "") and out.startswith("0\n"), (out, err)
     return int(out.splitlines()[1])
 
@@ -160,7 +112,7 @@ def test_what_nobody_answers_is_told_and_not_sent_twice_in_any_mode(shop, tapped
     for em, ck in MODES if nightly else EACH_ECHO if door == "send" else (MODES[0], MODES[-1]):
         tap, url = tapped(f"em{em}ck{ck}", f"timeout=0.5&party=1&checksum={ck}")
         words = {"send": ["send", url, line, "@a MR 1"], "run": ["run", script, "--on", url], "shell": ["shell", url]}
-        started.append((tap, shop.popen(*words[door], stdin=subprocess.PIPE)))
+        started.append((tap, shop.start(*words[door])))
     where = re.escape("nobody.txt:1: " if door == "run" else "")
     fate = "(it is not known whether 'MR 51200' was executed; it was sent once|'MR 51200' was not sent)"
     for tap, process in started:
@@ -177,7 +129,7 @@ def test_what_nobody_answers_is_told_and_not_sent_twice_in_any_mode(shop, tapped
 def test_a_line_of_65_characters_is_one_line_and_nothing_is_sent(shop, tapped):
     fits, longer = ('PR "' + "x" * number + '"' for number in (57, 58))  # and the name and the checksum
     tap, url = tapped("press")
-    assert shop.done("send", url, fits)[:2] == (0, "x" * 57 + "\n")
+    assert shop.run("send", url, fits)[:2] == (0, "x" * 57 + "\n")
     assert b"x" * 57 in tap.written()
     tap.forget()
     script = shop.file("long.txt", f"PR P\n{longer}\nPR V\n")
@@ -186,7 +138,7 @@ def test_a_line_of_65_characters_is_one_line_and_nothing_is_sent(shop, tapped):
         ("", ["shell", url]),
         ("long.txt:2: ", ["run", script, "--on", url]),
     ):
-        code, out, err = shop.process(*more, stdin=f"{longer}\n") if more[0] == "shell" else shop.done(*more)
+        code, out, err = shop.process(*more, stdin=f"{longer}\n") if more[0] == "shell" else shop.run(*more)
         assert (code, out) == (1, "0\n" if where else "")
         assert one_line(err).startswith(f"{where}the line has 65 characters")
     assert b"xx" not in tap.written() and b"PR V\n" not in tap.written()
@@ -197,7 +149,7 @@ class Unplugged:
 
     def __init__(self, shop, url):
         self.script = shop.file("move.txt", '@a SL 5000\nPR "moves"\n/wait stopped\n@a PR P\n')
-        self.process = shop.popen("run", self.script, "--on", url)
+        self.process = shop.start("run", self.script, "--on", url)
         assert self.process.stdout.readline() == "moves\n"
 
     def end(self):
@@ -213,11 +165,11 @@ def test_a_pty_that_is_unplugged_in_mid_move_is_exit_3_and_its_drive_is_named(sh
     script = Unplugged(shop, shop.pty())
     shop.sim.say("/sim unplug press")
     assert script.end().startswith(f"move.txt:3: {shop.folder}/press.tty was lost: ")
-    code, _, err = shop.done("send", shop.pty(), "PR P")
+    code, _, err = shop.run("send", shop.pty(), "PR P")
     assert code == 3 and "no port" in one_line(err)
     shop.sim.say("/sim plug press")
     # the link is there again when the line was read
-    eventually(lambda: shop.done("send", shop.pty(), "SL 0", "/wait stopped") == (0, "", ""))
+    eventually(lambda: shop.run("send", shop.pty(), "SL 0", "/wait stopped") == (0, "", ""))
 
 
 def test_a_connection_that_is_cut_in_mid_move_is_exit_3_and_its_drive_is_named(shop, tapped):
@@ -225,7 +177,7 @@ def test_a_connection_that_is_cut_in_mid_move_is_exit_3_and_its_drive_is_named(s
     script = Unplugged(shop, url)
     tap.hang_up()
     assert re.fullmatch(r"move.txt:3: tcp://127.0.0.1:\d+ was lost: .*; check its power and the network", script.end())
-    assert shop.done("send", shop.url("press"), "SL 0", "/wait stopped")[0] == 0
+    assert shop.run("send", shop.url("press"), "SL 0", "/wait stopped")[0] == 0
 
 
 def test_a_wire_that_hangs_up_by_itself_is_exit_3_and_its_drive_is_named(shop):
@@ -236,7 +188,7 @@ def test_a_wire_that_hangs_up_by_itself_is_exit_3_and_its_drive_is_named(shop):
 def test_the_stop_key_in_a_download_leaves_a_drive_that_listens(shop, tapped):
     shop.file("long.mxt", LONG)
     tap, url = tapped("press")
-    child = shop.terminal("shell", url)
+    child = shop.terminal("shell", url, columns=120)
     child.expect("a>")
     child.send("/download long.mxt\r")
     tap.wait_for(b"R1=20")
@@ -259,25 +211,25 @@ def test_a_script_that_is_stopped_in_a_download_leaves_a_drive_that_listens(shop
     shop.file("long.mxt", LONG)
     script = shop.file("load.txt", "/download long.mxt\nSL 1000\n")
     tap, url = tapped("slow")
-    child = shop.terminal("run", script, "--on", url)
+    child = shop.terminal("run", script, "--on", url, columns=120)
     tap.wait_for(b"R1=5")
     child.send("\x18") if how == "the stop key" else child.kill(signal.SIGTERM)
     child.expect(pexpect.EOF)
     child.close()
     assert child.exitstatus == (4 if how == "the stop key" else 130)
     assert "SL" not in tap.written().decode("latin-1")
-    tap, url = tapped("slow", f"party=1&timeout={PATIENCE}")
-    assert shop.done("send", url, "PR EM", "PR P", "PR BY") == (0, "1\n0\n0\n", "")
+    tap, url = tapped("slow", "party=1&timeout=3")
+    eventually(lambda: shop.run("send", url, "PR EM", "PR P", "PR BY") == (0, "1\n0\n0\n", ""))
     assert b"PG" not in tap.written()
 
 
 def test_a_line_that_is_half_sent_when_the_stop_comes_moves_nothing(shop):
     script = shop.file("half.txt", "@a MR 512000." + "0" * 45 + "\n")
-    with socket.create_connection(shop.ports["echo"], PATIENCE) as wire:  # which hears the drive echo what has arrived
+    # the wire hears the drive echo what has arrived
+    with socket.create_connection(("127.0.0.1", shop.port("echo")), PATIENCE) as wire:
         child = shop.terminal(
             "run", script, "--on", f"{shop.folder}/echo.tty?baud=1200&drives=a&party=1&em=0&checksum=0&timeout=20"
         )
-        child.delaybeforesend = None
         heard = b""
         while b"MR 512" not in heard:
             heard += wire.recv(100)
@@ -285,17 +237,13 @@ def test_a_line_that_is_half_sent_when_the_stop_comes_moves_nothing(shop):
         child.expect(pexpect.EOF)
     child.close()
     assert child.exitstatus == 4
-    url = f"tcp://127.0.0.1:{shop.ports['echo'][1]}?drives=a&party=1&em=0&checksum=0&timeout=20"
-    assert shop.done("send", url, "PR P", "PR V")[:2] == (0, "0\n0\n")
+    url = f"tcp://127.0.0.1:{shop.port('echo')}?drives=a&party=1&em=0&checksum=0&timeout=20"
+    assert shop.run("send", url, "PR P", "PR V")[:2] == (0, "0\n0\n")
 
 
 def test_the_stop_key_in_a_macro_is_exit_4_and_the_drive_stands(shop):
-    folder = shop.folder / "conf" / "macros"
-    folder.mkdir(parents=True, exist_ok=True)
-    lines = ["@b P=0", "@b MR 51200000", '@b PR "moves"', "/sleep 1000"]
-    steps = "".join(f"[[step]]\nafter = 0.0\nline = '''{line}'''\n" for line in lines)
-    (folder / "far.toml").write_text(f'name = "far"\n{steps}')
-    child = shop.terminal("macro", "play", "far", "--on", shop.url("press", "a,b"))
+    shop.macro("far", "@b P=0", "@b MR 51200000", '@b PR "moves"', "/sleep 1000")
+    child = shop.terminal("macro", "play", "far", "--on", shop.url("press", "a,b"), columns=120)
     child.expect("moves")
     child.send("\x18")
     child.expect("stopped before it was done\r\n")
@@ -316,7 +264,7 @@ def test_an_ssh_that_drops_in_a_script_stops_the_drive_short_of_its_target(shop)
     child.ptyproc.wait()
     url = shop.url("press", "a,b")
     # the shell may be gone before its child is
-    eventually(lambda: shop.done("send", url, "@b PR V")[1].startswith("0\n"))
+    eventually(lambda: shop.run("send", url, "@b PR V")[1].startswith("0\n"))
     assert 0 < standing(shop, url, "b") < 51200000
 
 
@@ -324,7 +272,7 @@ def test_a_second_process_on_a_port_is_told_who_has_it_and_the_first_goes_on(sho
     first = Running("shell", shop.pty(), folder=shop.folder)
     first.say("PR 1")
     first.until("1")
-    code, out, err = shop.done("send", shop.pty(), "SL 1000")
+    code, out, err = shop.run("send", shop.pty(), "SL 1000")
     assert (code, out) == (3, "")
     told = one_line(err)
     assert told.startswith(f"{shop.folder}/press.tty is in use by ") and told.endswith(
@@ -375,7 +323,7 @@ def test_a_rogue_in_place_of_a_drive_is_one_line_and_is_sent_no_command(shop):
             tap = Tap(answer=rogue)
             stack.callback(tap.close)
             url = f"tcp://127.0.0.1:{tap.port}?timeout=0.3&drives=a"
-            started.append(shop.popen("send", url, "MR 51200", "PR P"))
+            started.append(shop.start("send", url, "MR 51200", "PR P"))
         for process, code in zip(started, ROGUES.values(), strict=True):
             out, err = process.communicate(timeout=PATIENCE)
             assert process.returncode == code
@@ -386,9 +334,9 @@ def test_a_rogue_in_place_of_a_drive_is_one_line_and_is_sent_no_command(shop):
 def test_a_late_answer_is_not_the_next_ones(shop, tapped):
     tap, url = tapped("press")
     tap.hold(b"aPR P")
-    code, out, err = shop.done("send", url, "PR P")
+    code, out, err = shop.run("send", url, "PR P")
     assert (code, out) == (1, "") and "it was sent once" in one_line(err)
-    shell = shop.terminal("shell", url)
+    shell = shop.terminal("shell", url, columns=120)
     shell.expect("a>")
     shell.send("R1=17\r")
     shell.send("PR P\r")
@@ -436,28 +384,23 @@ def test_wrong_input_is_one_line_and_moves_nothing(shop, tapped):
     for what, arguments in WRONG.items():
         opens = any("drives=a" in each for each in arguments)
         tap, _ = tapped("em{}ck{}".format(*next(modes)) if opens else "press")
-        code, out, err = shop.done(*(each.format(port=tap.port) for each in arguments))
+        code, out, err = shop.run(*(each.format(port=tap.port) for each in arguments))
         assert (code, out) == (2, ""), what
         assert named.get(what, "") in one_line(err), what
         assert not re.search(rb"MR|PG|R1=|x{5}", tap.written()), what
 
 
 def test_a_full_disk_ends_the_log_and_spoils_no_macro(shop):
-    code, out, err = shop.done("send", shop.url("press"), "/log /dev/full", "PR V")
+    code, out, err = shop.run("send", shop.url("press"), "/log /dev/full", "PR V")
     assert (code, out) == (0, "0\n") and "/dev/full: No space left on device" in one_line(err)
     lines = "/record m\nPR V\n/record stop\n"
     assert shop.process("shell", shop.url("press"), stdin=lines)[0] == 0
     kept = (shop.folder / "conf" / "macros" / "m.toml").read_text()
     command = f"ulimit -f 0; exec {sys.executable} -m multidrop shell '{shop.url('press')}'"
     process = subprocess.Popen(
-        ["/bin/bash", "-c", command],
-        stdin=subprocess.PIPE,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-        cwd=shop.folder,
-        env=environment(shop.folder),
-    )
+        ["/bin/bash", "-c", command], stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+        cwd=shop.folder, env=environment(shop.folder),
+    )  # fmt: skip
     _, err = process.communicate("/record m\nPR P\nPR A\n/record stop\n", timeout=PATIENCE)
     assert process.returncode == 2 and "m" in one_line(err)
     assert (shop.folder / "conf" / "macros" / "m.toml").read_text() == kept

@@ -9,20 +9,9 @@ import pytest
 
 from multidrop.__main__ import main
 from tests.support.cases import for_each
+from tests.support.cell_session import bus, drive
 
-CELL = """
-[[bus]]
-name = "press"
-[[bus.drive]]
-personality = "LMDCM"
-name = "a"
-program_text = '''
-PG 1
-LB SU
-E
-PG
-'''
-"""
+CELL = bus("press", drive("LMDCM", "a", 'program_text = """\nPG 1\nLB SU\nE\nPG\n"""'), baud=0)
 LONG = "x" * 300
 URL = "sim:cell.toml#press"
 

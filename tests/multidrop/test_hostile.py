@@ -10,7 +10,6 @@ import pexpect
 import pyte
 import pytest
 
-from tests.support.front_door import multidrop  # noqa: F401
 from tests.support.hostile_drive import ACTING, HOSTILE, OVERRIDE, hostile_url  # noqa: F401
 from tests.support.processes import environment
 from tests.support.until import PATIENCE
@@ -76,7 +75,7 @@ FILES = {
 
 
 @pytest.mark.parametrize("name", FILES, ids=range(len(FILES)))
-def test_a_file_is_shown_and_not_obeyed(multidrop, tmp_path, name):  # noqa: F811
+def test_a_file_is_shown_and_not_obeyed(multidrop, tmp_path, name):
     text, command = FILES[name]
     (tmp_path / name).write_text(text, encoding="utf-8")
     done = multidrop(*(each.format(name) for each in command))
@@ -97,24 +96,21 @@ def test_a_file_is_shown_and_not_obeyed(multidrop, tmp_path, name):  # noqa: F81
     ],
     ids=range(7),
 )
-def test_what_is_typed_is_quoted_and_not_obeyed(multidrop, arguments):  # noqa: F811
+def test_what_is_typed_is_quoted_and_not_obeyed(multidrop, arguments):
     done = multidrop(*arguments)
     assert done.returncode in (1, 2, 3) and acts(done.stdout + done.stderr) == []
 
 
-def test_a_macro_and_a_configuration_are_shown_and_not_obeyed(multidrop, tmp_path):  # noqa: F811
-    (tmp_path / "conf" / "macros").mkdir(parents=True)
-    (tmp_path / "conf" / "macros" / "go.toml").write_text(f'name = "go"\n{QUOTED} = 1\n')
-    (tmp_path / "conf" / "macros" / "on.toml").write_text(
-        f'name = "on"\ndescription = {QUOTED}\n[[step]]\nline = {QUOTED}\n'
-    )
-    (tmp_path / "conf" / "multidrop.toml").write_text(f'[connections.a]\nurl = "sim:"\nnames = {{ a = {QUOTED} }}\n')
+def test_a_macro_and_a_configuration_are_shown_and_not_obeyed(home):
+    home.file("conf/macros/go.toml", f'name = "go"\n{QUOTED} = 1\n')
+    home.file("conf/macros/on.toml", f'name = "on"\ndescription = {QUOTED}\n[[step]]\nline = {QUOTED}\n')
+    home.settings(f'[connections.a]\nurl = "sim:"\nnames = {{ a = {QUOTED} }}\n')
     for arguments in (
         ("macro", "list"),
         ("macro", "show", "on"),
         ("macro", "play", "on", "--on", "sim:"),
         ("send", "a", "PR P"),
     ):
-        done = multidrop(*arguments)
+        done = home.run(*arguments)
         assert acts(done.stdout + done.stderr) == []
     assert done.returncode == 2

@@ -38,6 +38,11 @@ def _span(place: types.Range) -> tuple[int, int, int]:
     return place.start.line, place.start.character, place.end.character
 
 
+@pytest.fixture
+def editor(client) -> Editor:
+    return Editor(client)
+
+
 async def test_problems_are_those_of_the_check_at_their_places(client: LanguageClient) -> None:
     text = 'VA Q1=5\nPG 1\n \' 😀\n\tPR "😀",QX\n MR *\nBR K1\nH 99999\nE\nPG\n'
     editor = Editor(client)
@@ -52,8 +57,7 @@ async def test_problems_are_those_of_the_check_at_their_places(client: LanguageC
     assert {each.source for each in found} == {"multidrop"}
 
 
-async def test_problems_follow_the_text_and_go_with_the_document(client: LanguageClient) -> None:
-    editor = Editor(client)
+async def test_problems_follow_the_text_and_go_with_the_document(client: LanguageClient, editor: Editor) -> None:
     assert len(await editor.open("PG 1\nMX 5\nE\nPG\n")) == 1
     editor.change("PG 1\nMR 5\nH\nE\nPG\n")
     assert await editor.problems() == []
@@ -92,8 +96,7 @@ async def test_the_client_names_the_drive() -> None:
         assert "no personality XYZ; valid: LMDOM" in client.messages[0].message
 
 
-async def test_help_is_that_of_the_prompt_and_of_the_file(client: LanguageClient) -> None:
-    editor = Editor(client)
+async def test_help_is_that_of_the_prompt_and_of_the_file(client: LanguageClient, editor: Editor) -> None:
     await editor.open(PROGRAM)
     assert "MR: Move relative" in (shown := await editor.hover(3, 3)) and "range " in shown
     assert shown.startswith("```text\n")
@@ -101,15 +104,13 @@ async def test_help_is_that_of_the_prompt_and_of_the_file(client: LanguageClient
     assert await editor.hover(2, 12) == await editor.hover(99, 5) == await editor.hover(0, 10) == ""
 
 
-async def test_no_remark_ends_the_frame_of_the_help(client: LanguageClient) -> None:
-    editor = Editor(client)
+async def test_no_remark_ends_the_frame_of_the_help(client: LanguageClient, editor: Editor) -> None:
     await editor.open("PG 1\nLB G1 ' ```\nBR G1\nPG\n")
     shown = await editor.hover(1, 3)
     assert shown.startswith("````text\n") and shown.endswith("\n````")
 
 
-async def test_completion_offers_what_fits_the_place(client: LanguageClient) -> None:
-    editor = Editor(client)
+async def test_completion_offers_what_fits_the_place(client: LanguageClient, editor: Editor) -> None:
     await editor.open("VA Q1=5\nPG 1\nLB G1 ' start\nBR \nPR \n P\nVA \n\nE\nPG\n")
     label = (await editor.complete(3, 3, " "))["G1"]
     assert label.detail == "label, line 3: start" and _span(label.text_edit.range) == (3, 3, 3)
@@ -123,8 +124,7 @@ async def test_completion_offers_what_fits_the_place(client: LanguageClient) -> 
     assert {"MR", "Q1"} <= set(await editor.complete(7, 0))
 
 
-async def test_a_name_is_found_where_it_is_declared_and_used(client: LanguageClient) -> None:
-    editor = Editor(client)
+async def test_a_name_is_found_where_it_is_declared_and_used(client: LanguageClient, editor: Editor) -> None:
     await editor.open(PROGRAM)
     at = types.Position(5, 5)
     (place,) = await client.text_document_definition_async(types.DefinitionParams(editor.document, at))
@@ -136,8 +136,7 @@ async def test_a_name_is_found_where_it_is_declared_and_used(client: LanguageCli
     assert [each.kind for each in shown] == [types.DocumentHighlightKind.Write, types.DocumentHighlightKind.Read]
 
 
-async def test_a_rename_changes_every_use_and_nothing_else(client: LanguageClient) -> None:
-    editor = Editor(client)
+async def test_a_rename_changes_every_use_and_nothing_else(client: LanguageClient, editor: Editor) -> None:
     await editor.open(PROGRAM)
     place = await client.text_document_prepare_rename_async(
         types.PrepareRenameParams(editor.document, types.Position(3, 6))
@@ -153,8 +152,9 @@ async def test_a_rename_changes_every_use_and_nothing_else(client: LanguageClien
         )
 
 
-async def test_the_spelling_is_canonical_and_the_second_time_nothing_changes(client: LanguageClient) -> None:
-    editor = Editor(client)
+async def test_the_spelling_is_canonical_and_the_second_time_nothing_changes(
+    client: LanguageClient, editor: Editor
+) -> None:
     await editor.open(PROGRAM)
     edits = await editor.format()
     assert [_span(each.range) + (each.new_text,) for each in edits] == [
@@ -165,8 +165,7 @@ async def test_the_spelling_is_canonical_and_the_second_time_nothing_changes(cli
     assert await editor.problems() == [] and not await editor.format()
 
 
-async def test_a_range_is_formatted_alone_and_a_wrong_text_not_at_all(client: LanguageClient) -> None:
-    editor = Editor(client)
+async def test_a_range_is_formatted_alone_and_a_wrong_text_not_at_all(client: LanguageClient, editor: Editor) -> None:
     await editor.open(PROGRAM)
     options = types.FormattingOptions(tab_size=4, insert_spaces=True)
     asked = types.Range(types.Position(5, 0), types.Position(6, 0))
@@ -180,8 +179,7 @@ async def test_a_range_is_formatted_alone_and_a_wrong_text_not_at_all(client: La
     assert "not formatted: an error in line 2" in client.messages[-1].message
 
 
-async def test_the_outline_has_programs_labels_and_variables(client: LanguageClient) -> None:
-    editor = Editor(client)
+async def test_the_outline_has_programs_labels_and_variables(client: LanguageClient, editor: Editor) -> None:
     await editor.open(PROGRAM)
     variable, program = await client.text_document_document_symbol_async(types.DocumentSymbolParams(editor.document))
     assert (variable.name, variable.detail) == ("Q1", "=5  half")
@@ -192,8 +190,7 @@ async def test_the_outline_has_programs_labels_and_variables(client: LanguageCli
     assert [(each.start_line, each.end_line) for each in folds] == [(1, 7), (2, 6)]
 
 
-async def test_colours_count_code_units(client: LanguageClient) -> None:
-    editor = Editor(client)
+async def test_colours_count_code_units(client: LanguageClient, editor: Editor) -> None:
     await editor.open(PROGRAM)
     found = await client.text_document_semantic_tokens_full_async(types.SemanticTokensParams(editor.document))
     line, start, seen = 0, 0, []

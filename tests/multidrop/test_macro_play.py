@@ -9,10 +9,8 @@ from pathlib import Path
 import pytest
 
 from tests.shell.scripts.test_interrupts import Shop
-from tests.support.front_door import Command, multidrop
+from tests.support.front_door import Command
 from tests.support.until import PATIENCE
-
-__all__ = ["multidrop"]
 
 SHUTTLE = """name = "shuttle"
 roles = ["gantry"]
@@ -134,7 +132,7 @@ def shop(tmp_path: Path):  # type: ignore[no-untyped-def]
 @pytest.mark.process
 def test_a_signal_stops_the_drives_runs_on_stop_and_is_130_with_no_terminal(shop: Shop) -> None:
     put(shop.folder, "go", RUN)
-    playing = shop.process("macro", "play", "go", "--on", shop.url, "--times", "forever")
+    playing = shop.start("macro", "play", "go", "--on", shop.url, "--times", "forever")
     assert playing.stdout.readline() == "1234\n"
     playing.send_signal(signal.SIGTERM)
     out, err = playing.communicate(timeout=PATIENCE)
@@ -146,12 +144,10 @@ def test_a_signal_stops_the_drives_runs_on_stop_and_is_130_with_no_terminal(shop
 @pytest.mark.process
 def test_the_next_opening_explains_a_macro_that_was_killed(shop: Shop) -> None:
     put(shop.folder, "go", RUN)
-    playing = shop.process("macro", "play", "go", "--on", shop.url)
+    playing = shop.start("macro", "play", "go", "--on", shop.url)
     assert playing.stdout.readline() == "1234\n"
     playing.kill()
     playing.communicate(timeout=PATIENCE)
-    done = shop.process("send", shop.url, "@a PR V")
-    out, err = done.communicate(timeout=PATIENCE)
+    _, out, err = shop.run("send", shop.url, "@a PR V")
     assert out == "5000\n" and "macro go, begun at " in err and "nothing stopped its drives: they may still move" in err
-    again = shop.process("send", shop.url, "@a SL 0")
-    assert again.communicate(timeout=PATIENCE)[1] == ""
+    assert shop.run("send", shop.url, "@a SL 0").stderr == ""

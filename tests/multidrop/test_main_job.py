@@ -11,26 +11,12 @@ from pathlib import Path
 
 import pytest
 
+from tests.support.cell_session import bus, party
 from tests.support.processes import Running
 
 pytestmark = pytest.mark.process
 
-CELL = """
-seed = 7
-[[bus]]
-name = "press"
-serve = ["pty:press.tty"]
-baud = 9600
-""" + "".join(
-    f"""
-[[bus.drive]]
-personality = "LMDCM"
-name = "{name}"
-party = true
-set = {{ EM = 1, CK = 1 }}
-"""
-    for name in "abc"
-)
+CELL = "seed = 7\n" + bus("press", *(party(name) for name in "abc"), serve=["pty:press.tty"])
 PROGRAM = """
 ' [VARIABLES]
 Is=1,0,0
@@ -66,14 +52,8 @@ S
 
 
 @pytest.fixture
-def sim(tmp_path):
-    (tmp_path / "cell.toml").write_text(CELL)
-    running = Running("sim", "cell.toml", "--json", folder=tmp_path)
-    running.until('{"ready": true}')
-    yield running
-    if running.process.poll() is None:
-        running.process.terminate()
-        assert running.end() == 0
+def sim(home):
+    return home.serve(CELL).sim
 
 
 def series(file: Path, name: str) -> list[tuple[float, float]]:

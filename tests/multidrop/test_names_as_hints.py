@@ -1,10 +1,6 @@
 """A party line whose URL states no drives: the names of the command line and of last time find its drives."""
 
-import json
-
 import pytest
-
-from tests.support.processes import Running
 
 pytestmark = pytest.mark.process
 
@@ -14,13 +10,10 @@ PROGRAM = "PG 1\nLB G1\nPR P\nE\nPG\n"
 
 
 @pytest.fixture
-def url(tmp_path):
-    (tmp_path / "cell.toml").write_text(CELL)
-    (tmp_path / "f.mxt").write_text(PROGRAM)
-    sim = Running("sim", "cell.toml", "--json", folder=tmp_path)
-    yield json.loads(sim.until('{"ready": true}')[0])["endpoint"]
-    sim.process.terminate()
-    sim.end()
+def url(home):
+    home.file("f.mxt", PROGRAM)
+    [bus] = home.serve(CELL).endpoints.values()
+    return bus["tcp"]
 
 
 def test_a_drive_that_is_named_is_found_and_last_times_drives_are_all_found(multidrop, url, tmp_path):

@@ -17,20 +17,12 @@ pytestmark = pytest.mark.process
 FULL = Path("/dev/full")
 
 
-def run(folder, *arguments, stdout, **variables):
-    command = [sys.executable, "-m", "multidrop", *arguments]
-    return subprocess.run(
-        command, stdin=subprocess.DEVNULL, stdout=stdout, stderr=subprocess.PIPE, text=True, timeout=PATIENCE,
-        cwd=folder, env=environment(folder) | variables,
-    )  # fmt: skip
-
-
 @pytest.mark.skipif(not FULL.exists(), reason="no /dev/full here")
 @pytest.mark.parametrize("variables", [{}, {"PYTHONUNBUFFERED": "1"}])
 @pytest.mark.parametrize("arguments", [["send", "sim:#press", "PR P", "PR V"], ["--version"], ["send", "--help"]])
-def test_a_full_disk_is_one_line_and_exit_1(tmp_path, arguments, variables):
+def test_a_full_disk_is_one_line_and_exit_1(home, arguments, variables):
     with FULL.open("w") as full:
-        done = run(tmp_path, *arguments, stdout=full, **variables)
+        done = home.process(*arguments, stdout=full, env=environment(home.folder) | variables)
     assert (done.returncode, done.stderr) == (1, "the output cannot be written: No space left on device\n")
 
 
@@ -48,23 +40,14 @@ FOREVER = "name = 'go'\n" + "".join(
 )
 
 
-def left(folder, *arguments, typed="", lines=1):
-    """Run a command until it has printed so many lines, and leave. Return its exit code and standard error."""
-    process = subprocess.Popen(
-        [sys.executable, "-m", "multidrop", *arguments], stdin=subprocess.PIPE, stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE, text=True, cwd=folder, env=environment(folder),
-    )  # fmt: skip
+def left(home, *arguments, typed=""):
+    """Run a command until it has printed a line, and leave. Return its exit code and standard error."""
+    process = home.start(*arguments)
     process.stdin.write(typed)
     process.stdin.flush()
-    for _ in range(lines):
-        assert process.stdout.readline()
+    assert process.stdout.readline()
     process.stdout.close()
-    try:
-        code = process.wait(PATIENCE)
-    finally:
-        process.kill()
-    with process.stdin, process.stderr:
-        return code, process.stderr.read()
+    return process.wait(PATIENCE), process.stderr.read()
 
 
 @pytest.mark.parametrize(
@@ -78,23 +61,21 @@ def left(folder, *arguments, typed="", lines=1):
     ],
     ids=lambda arguments: arguments[0] + arguments[1].removeprefix("s"),
 )
-def test_a_reader_that_leaves_stops_what_automation_moves_although_nothing_is_printed(tmp_path, arguments):
-    (tmp_path / "s.txt").write_text(f"PR P\n{MOVES}")
-    (tmp_path / "s.py").write_text(PROGRAM)
-    (tmp_path / "conf/macros").mkdir(parents=True)
-    (tmp_path / "conf/macros/go.toml").write_text(FOREVER)
-    code, said = left(tmp_path, *arguments, typed=f"PR P\n{MOVES}" if arguments[0] == "shell" else "")
+def test_a_reader_that_leaves_stops_what_automation_moves_although_nothing_is_printed(home, arguments):
+    for name, text in {"s.txt": f"PR P\n{MOVES}", "s.py": PROGRAM, "conf/macros/go.toml": FOREVER}.items():
+        home.file(name, text)
+    code, said = left(home, *arguments, typed=f"PR P\n{MOVES}" if arguments[0] == "shell" else "")
     assert code == 141
     assert "the reader of standard output is gone" in said and "stopped b" in said
 
 
-def test_a_reader_that_leaves_a_session_of_reads_alone_stops_nothing(tmp_path):
-    code, said = left(tmp_path, "send", "sim:#press", "@b PR P", "/sleep 100")
+def test_a_reader_that_leaves_a_session_of_reads_alone_stops_nothing(home):
+    code, said = left(home, "send", "sim:#press", "@b PR P", "/sleep 100")
     assert (code, said) == (141, "the reader of standard output is gone\n")
 
 
-def test_a_reader_that_has_its_last_line_is_a_good_end(tmp_path):
-    assert left(tmp_path, "send", "sim:#press", "@b MR 5000", "/wait stopped", "@b PR P") == (0, "")
+def test_a_reader_that_has_its_last_line_is_a_good_end(home):
+    assert left(home, "send", "sim:#press", "@b MR 5000", "/wait stopped", "@b PR P") == (0, "")
 
 
 @pytest.mark.parametrize(
@@ -102,23 +83,24 @@ def test_a_reader_that_has_its_last_line_is_a_good_end(tmp_path):
     [["sim", "--json"], ["program", "test", "endless.mxt", "--until", "100000"], ["log", "follow", "day.jsonl"]],
     ids=lambda arguments: arguments[0],
 )
-def test_a_reader_that_leaves_ends_what_prints(tmp_path, arguments):
-    (tmp_path / "endless.mxt").write_text('PG 1\nLB G1\nPR "begun"\nLB G2\nR1=1\nBR G2\nE\nPG\n')
-    (tmp_path / "day.jsonl").write_bytes(line_of(Entry(datetime(2026, 1, 1, tzinfo=UTC), "typed", "PR P")))
-    assert left(tmp_path, *arguments) == (141, "")
+def test_a_reader_that_leaves_ends_what_prints(home, arguments):
+    home.file("endless.mxt", 'PG 1\nLB G1\nPR "begun"\nLB G2\nR1=1\nBR G2\nE\nPG\n')
+    home.file("day.jsonl", line_of(Entry(datetime(2026, 1, 1, tzinfo=UTC), "typed", "PR P")))
+    assert left(home, *arguments) == (141, "")
 
 
-def test_the_reader_of_a_persons_own_program_leaves(tmp_path):
-    (tmp_path / "own.py").write_text(
+def test_the_reader_of_a_persons_own_program_leaves(home):
+    home.file(
+        "own.py",
         "import multidrop, sys, time\n"
         "with multidrop.connect('sim:#press') as session:\n"
         "    print('begun', flush=True)\n"
         "    session.send('@b MR 5000000')\n"
-        "    time.sleep(100)\n"
+        "    time.sleep(100)\n",
     )
     process = subprocess.Popen(
-        [sys.executable, "own.py"], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, cwd=tmp_path,
-        env=environment(tmp_path),
+        [sys.executable, "own.py"], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, cwd=home.folder,
+        env=environment(home.folder),
     )  # fmt: skip
     assert process.stdout.readline() == "begun\n"
     process.stdout.close()
@@ -137,11 +119,11 @@ def test_the_reader_of_a_persons_own_program_leaves(tmp_path):
         (["--version"], ">&-", 0, ""),
     ],
 )
-def test_closed_standard_streams_are_no_crash(tmp_path, arguments, closed, code, told):
+def test_closed_standard_streams_are_no_crash(home, arguments, closed, code, told):
     words = shlex.join([sys.executable, "-m", "multidrop", *arguments])
     done = subprocess.run(
-        ["/bin/sh", "-c", f"exec {words} {closed}"], capture_output=True, text=True, timeout=PATIENCE, cwd=tmp_path,
-        env=environment(tmp_path),
+        ["/bin/sh", "-c", f"exec {words} {closed}"], capture_output=True, text=True, timeout=PATIENCE, cwd=home.folder,
+        env=environment(home.folder),
     )  # fmt: skip
     assert done.returncode == code
     assert "Traceback" not in done.stderr and done.stderr.count("\n") <= 1

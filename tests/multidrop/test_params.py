@@ -4,20 +4,9 @@ import json
 
 import pytest
 
-CELL = """
-[[bus]]
-name = "press"
-[[bus.drive]]
-personality = "LMDCM"
-name = "a"
-party = true
-set = { EM = 1 }
-[[bus.drive]]
-personality = "LMDCM"
-name = "b"
-party = true
-set = { EM = 1, VM = 600000 }
-"""
+from tests.support.cell_session import bus, party
+
+CELL = bus("press", party("a", CK=0), party("b", CK=0, VM=600000), baud=0)
 URL = "sim:cell.toml"
 
 

@@ -5,64 +5,33 @@ from __future__ import annotations
 import json
 import os
 import signal
-from collections.abc import Callable
-from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-from multidrop.__main__ import main
+from tests.support.cell_session import bus, drive
+from tests.support.front_door import Command, Done, Home
 from tests.support.processes import Running
 from tests.support.until import PATIENCE
 
 GOOD = '\' a remark\nVM=200000\nPG 1\nLB SU\n MR 51200\n H\n PR "at ",P\n E\nLB K1\n PR "k1"\n E\nPG\nS\n'
 BAD = GOOD.replace(" H\n", " H\n VM=5\n")
 ENDLESS = 'PG 1\nLB K1\n H 1000\n PR "tick"\n BR K1\nPG\n'
-CELL = """
-[[bus]]
-name = "line"
-[[bus.drive]]
-personality = "LMDOM"
-name = "a"
-party = true
-[[bus.drive]]
-personality = "LMDCM"
-name = "b"
-party = true
-set = { VI = 2000 }
-[bus.drive.world]
-inputs = [[1.5, 1, 0]]
-[[bus]]
-name = "pmx"
-[[bus.drive]]
-personality = "PMX"
-"""
+B = drive("LMDCM", "b", "[bus.drive.world]", "inputs = [[1.5, 1, 0]]", party=True, VI=2000)
+CELL = bus("line", drive("LMDOM", "a", party=True), B, baud=0) + bus("pmx", drive("PMX"), baud=0)
 
 
-@dataclass
-class Done:
-    returncode: int
-    stdout: str
-    stderr: str
-
-
-Program = Callable[..., Done]
+FILES = {"good.mxt": GOOD, "bad.mxt": BAD, "endless.mxt": ENDLESS, "cell.toml": CELL}
 
 
 @pytest.fixture
-def program(tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> Program:
-    """Runs `program test` in a folder with some files."""
-    texts = {"good.mxt": GOOD, "bad.mxt": BAD, "endless.mxt": ENDLESS, "cell.toml": CELL}
-    for name, text in texts.items():
-        (tmp_path / name).write_text(text)
-    monkeypatch.chdir(tmp_path)
-
-    def run(*arguments: str) -> Done:
-        code = main(["program", "test", *arguments])
-        return Done(code, *capsys.readouterr())
-
-    return run
+def program(home: Home) -> Command:
+    """Run `program test` in a folder with some files."""
+    for name, text in FILES.items():
+        home.file(name, text)
+    return partial(home.run, "program", "test")
 
 
 def objects(done: Done) -> list[dict[str, Any]]:
@@ -70,7 +39,7 @@ def objects(done: Done) -> list[dict[str, Any]]:
     return [json.loads(line) for line in done.stdout.splitlines()]
 
 
-def test_prints_and_summary_go_to_standard_output(program: Program) -> None:
+def test_prints_and_summary_go_to_standard_output(program: Command) -> None:
     done = program("good.mxt")
     printed, summary = done.stdout.splitlines()
     assert printed.split(None, 1)[1] == "at 51200" and float(printed.split()[0]) > 0.2
@@ -78,14 +47,14 @@ def test_prints_and_summary_go_to_standard_output(program: Program) -> None:
     assert (done.returncode, done.stderr) == (0, "")
 
 
-def test_an_error_is_one_line_with_file_and_line_and_exit_1(program: Program) -> None:
+def test_an_error_is_one_line_with_file_and_line_and_exit_1(program: Command) -> None:
     done = program("bad.mxt")
     (told,) = done.stderr.splitlines()
     assert told.startswith("bad.mxt:7: VM=5: at 0.") and "error 23, VM must be above VI" in told
     assert done.returncode == 1 and "errors 23" in done.stdout
 
 
-def test_json_is_one_object_a_line(program: Program) -> None:
+def test_json_is_one_object_a_line(program: Command) -> None:
     done = program("bad.mxt", "--json")
     failed, printed, last = objects(done)
     assert done.returncode == 1
@@ -103,7 +72,7 @@ def test_json_is_one_object_a_line(program: Program) -> None:
     assert summary["virtual_s"] > printed["t"] and summary["real_s"] < PATIENCE
 
 
-def test_a_file_that_is_refused_tells_every_line_and_is_not_run(program: Program, tmp_path: Path) -> None:
+def test_a_file_that_is_refused_tells_every_line_and_is_not_run(program: Command, tmp_path: Path) -> None:
     (tmp_path / "wrong.mxt").write_text("MS=7\nPG 1\nQQ=1\nE\nPG\n")
     done = program("wrong.mxt")
     first, second = done.stderr.splitlines()
@@ -115,11 +84,11 @@ def test_a_file_that_is_refused_tells_every_line_and_is_not_run(program: Program
     assert last["summary"]["ended"] == "error"
 
 
-def test_run_names_what_is_executed(program: Program) -> None:
+def test_run_names_what_is_executed(program: Command) -> None:
     assert program("good.mxt", "--run", "k1").stdout.splitlines()[0].endswith("  k1")
 
 
-def test_until_is_enough_for_a_program_without_an_end(program: Program) -> None:
+def test_until_is_enough_for_a_program_without_an_end(program: Command) -> None:
     done = program("endless.mxt", "--until", "2.5", "--json")
     events = objects(done)
     assert [each.get("print") for each in events] == ["tick", "tick", None]
@@ -127,14 +96,14 @@ def test_until_is_enough_for_a_program_without_an_end(program: Program) -> None:
     assert (summary["ended"], summary["virtual_s"], done.returncode) == ("until", 2.5, 0)
 
 
-def test_without_until_a_program_without_an_end_is_given_up_and_that_is_said(program: Program) -> None:
+def test_without_until_a_program_without_an_end_is_given_up_and_that_is_said(program: Command) -> None:
     done = program("endless.mxt")
     (told,) = done.stderr.splitlines()
     assert told.startswith("endless.mxt:") and "still runs" in told and "--until" in told
     assert done.returncode == 1 and done.stdout.count("tick") == 3598
 
 
-def test_a_cell_gives_the_drive_its_settings_and_its_world(program: Program, tmp_path: Path) -> None:
+def test_a_cell_gives_the_drive_its_settings_and_its_world(program: Command, tmp_path: Path) -> None:
     (tmp_path / "wait.mxt").write_text("IS=1,0,0\nPG 1\nPR VI,VR\nLB K1\nBR K1,I1=0\nE\nPG\n")
     first, last = objects(program("wait.mxt", "--cell", "cell.toml#line:b", "--json"))
     assert first["print"].startswith("2000LMDCM")
@@ -143,11 +112,11 @@ def test_a_cell_gives_the_drive_its_settings_and_its_world(program: Program, tmp
     assert first["print"].startswith("1000LMDOM") and last["summary"]["ended"] == "until"
 
 
-def test_the_demo_cell_is_meant_where_no_file_stands_before_the_number_sign(program: Program) -> None:
+def test_the_demo_cell_is_meant_where_no_file_stands_before_the_number_sign(program: Command) -> None:
     assert program("good.mxt", "--cell", "#eth").returncode == 0
 
 
-def test_personality_goes_before_the_cells(program: Program, tmp_path: Path) -> None:
+def test_personality_goes_before_the_cells(program: Command, tmp_path: Path) -> None:
     (tmp_path / "who.mxt").write_text("PG 1\nPR VR\nE\nPG\n")
     done = program("who.mxt", "--cell", "cell.toml#line:a", "--personality", "mdi")
     assert done.stdout.splitlines()[0].endswith("  3.010")
@@ -168,13 +137,13 @@ def test_personality_goes_before_the_cells(program: Program, tmp_path: Path) -> 
         ([], "FILE"),
     ],
 )
-def test_what_cannot_be_tested_is_one_line_and_exit_2(program: Program, arguments: list[str], says: str) -> None:
+def test_what_cannot_be_tested_is_one_line_and_exit_2(program: Command, arguments: list[str], says: str) -> None:
     done = program(*arguments)
     assert (done.returncode, done.stdout) == (2, "")
     assert len(done.stderr.splitlines()) == 1 and says in done.stderr
 
 
-def test_several_files_are_each_tested_and_the_worst_decides(program: Program) -> None:
+def test_several_files_are_each_tested_and_the_worst_decides(program: Command) -> None:
     done = program("good.mxt", "bad.mxt", "good.mxt", "--json")
     events = objects(done)
     assert [each["file"] for each in events if "summary" in each] == ["good.mxt", "bad.mxt", "good.mxt"]
@@ -182,13 +151,13 @@ def test_several_files_are_each_tested_and_the_worst_decides(program: Program) -
     assert program("good.mxt", "gone.mxt", "bad.mxt").returncode == 2
 
 
-def test_what_would_act_on_a_terminal_is_shown_instead(program: Program, tmp_path: Path) -> None:
+def test_what_would_act_on_a_terminal_is_shown_instead(program: Command, tmp_path: Path) -> None:
     (tmp_path / "bell.mxt").write_text('PG 1\nPR "\\g\\e[2J"\nE\nPG\n')
     assert "\\x07\\x1b[2J" in program("bell.mxt").stdout
 
 
 @pytest.mark.process
-def test_an_interruption_is_exit_130(program: Program, tmp_path: Path) -> None:
+def test_an_interruption_is_exit_130(program: Command, tmp_path: Path) -> None:
     (tmp_path / "loud.mxt").write_text('PG 1\nPR "begun"\nLB K1\nIC R1\nBR K1\nPG\n')
     running = Running("program", "test", "loud.mxt", "--until", "1e7", folder=tmp_path)
     running.until("    0.0000  begun")

@@ -8,10 +8,10 @@ from pathlib import Path
 
 import pytest
 
-from multidrop.__main__ import main
 from multidrop.dialects.mcode.family import MCODE
 from multidrop.dialects.mcode.manual.program_file import read
 from tests.conftest import Bench
+from tests.support.front_door import Home
 from tests.support.mcode_drives import Desk
 
 TABLE = 'VA Pa = 0 \' step\nVA Pb=25600\nPG 1\nLB Ga\n\tPR "pos\t", P, "\terr\t", ER\n\tMR\tPb\n\tH\n\tE\nPG\nS\n'
@@ -21,14 +21,12 @@ Check = Callable[..., tuple[int, str, list[str]]]
 
 
 @pytest.fixture
-def check(tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> Check:
+def check(home: Home, monkeypatch: pytest.MonkeyPatch) -> Check:
     """Write a file and check it: exit code, standard output, the lines on standard error."""
-    monkeypatch.chdir(tmp_path)
+    monkeypatch.chdir(home.folder)
 
     def run(text: str, *more: str, name: str = "a.mxt") -> tuple[int, str, list[str]]:
-        (tmp_path / name).write_text(text)
-        code = main(["program", "check", name, *more])
-        out, err = capsys.readouterr()
+        code, out, err = home.run("program", "check", home.file(name, text), *more)
         return code, out, err.splitlines()
 
     return run
@@ -155,21 +153,19 @@ def test_a_program_without_pg_is_told_once_and_what_is_wrong_with_a_setting_wher
 # -- before a download
 
 
-def test_a_download_says_how_many_more_errors_there_are(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    file = tmp_path / "b.mxt"
-    file.write_text('PG 1\nPR "\xe9"\nPR "\xe8"\nE\n')
-    assert main(["program", "download", "sim:#press", str(file)]) == 2
-    (told,) = capsys.readouterr().err.splitlines()
-    assert told.startswith(f"{file}:1:1: PG is never ended (2 more: multidrop program check)")
+def test_a_download_says_how_many_more_errors_there_are(home: Home) -> None:
+    file = home.file("b.mxt", 'PG 1\nPR "\xe9"\nPR "\xe8"\nE\n')
+    code, _, told = home.run("program", "download", "sim:#press", file)
+    assert code == 2 and told.startswith("b.mxt:1:1: PG is never ended (2 more") and told.count("\n") == 1
 
 
-def test_a_download_tells_the_warnings(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    (file := tmp_path / "a.mxt").write_text(SETTINGS.replace("EM 1\n", ""))
-    assert main(["program", "download", "sim:#eth", str(file)]) == 0
-    assert f"{file}:2:1: warning: holds no program: settings only" in capsys.readouterr().err.splitlines()
-    file.write_text("PG 1\nLB K1\nBR K1,R1=1&MV\nE\nPG\n")
-    assert main(["program", "download", "sim:#eth", str(file)]) == 0
-    assert "is read as (R1=1)&MV" in capsys.readouterr().err
+def test_a_download_tells_the_warnings(home: Home) -> None:
+    download = ("program", "download", "sim:#eth", home.file("a.mxt", SETTINGS.replace("EM 1\n", "")))
+    code, _, told = home.run(*download)
+    assert code == 0 and "a.mxt:2:1: warning: holds no program: settings only" in told.splitlines()
+    home.file("a.mxt", "PG 1\nLB K1\nBR K1,R1=1&MV\nE\nPG\n")
+    code, _, told = home.run(*download)
+    assert code == 0 and "is read as (R1=1)&MV" in told
 
 
 def test_a_refusal_says_which_products_have_the_word(check: Check) -> None:
@@ -224,15 +220,11 @@ def test_a_script_of_the_pmx_is_formatted_too(check: Check) -> None:
     assert Path("a.prg").read_text() == "WHILE V1<10    ; ten\n  V1=V1+1\nENDWHILE\nEND\n"
 
 
-def test_a_program_that_is_too_big_is_one_line_with_its_size_and_that_of_the_drive(multidrop, tmp_path):
-    (tmp_path / "big.mxt").write_text("PG 1\nLB G1\n" + "R1=1\n" * 5000 + "E\nPG\n")
-    done = multidrop("program", "check", "big.mxt")
-    assert done.returncode == 1 and done.stderr.count("\n") == 1
-    assert "program too big: 5002 lines take " in done.stderr and "bytes, the drive holds 6384;" in done.stderr
+def test_a_program_that_is_too_big_is_one_line_with_its_size_and_that_of_the_drive(check: Check) -> None:
+    code, _, [told] = check("PG 1\nLB G1\n" + "R1=1\n" * 5000 + "E\nPG\n")
+    assert code == 1 and "program too big: 5002 lines take " in told and "bytes, the drive holds 6384;" in told
 
 
-def test_of_many_problems_a_hundred_are_shown(multidrop, tmp_path):
-    (tmp_path / "odd.mxt").write_text("PG 1\nLB G1\n" + "FROB 7\n" * 150 + "E\nPG\n")
-    done = multidrop("program", "check", "odd.mxt")
-    shown = done.stderr.splitlines()
-    assert len(shown) == 101 and shown[-1] == "odd.mxt: 50 more problems, not shown"
+def test_of_many_problems_a_hundred_are_shown(check: Check) -> None:
+    shown = check("PG 1\nLB G1\n" + "FROB 7\n" * 150 + "E\nPG\n")[2]
+    assert len(shown) == 101 and shown[-1] == "a.mxt: 50 more problems, not shown"

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from pathlib import Path
+from collections.abc import Callable
 
 import pytest
 
-from multidrop.__main__ import main
+from tests.support.front_door import Home
 
 FEEDER = """
 ' [VARIABLES]
@@ -97,41 +97,34 @@ LB Tz
 PG
 """
 
-FILES = {
-    "feeder.mxt": FEEDER,
-    "encoded.mxt": ENCODED,
-    "expanded.mxt": EXPANDED,
-}
+FILES = {"feeder.mxt": FEEDER, "encoded.mxt": ENCODED, "expanded.mxt": EXPANDED}
+Run = Callable[..., tuple[int, list[str], list[str]]]
 
 
 @pytest.fixture
-def files(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+def run(home: Home) -> Run:
+    """Run `program`: exit code, printed lines, narration."""
     for name, text in FILES.items():
-        (tmp_path / name).write_text(text, encoding="utf-8")
-    monkeypatch.chdir(tmp_path)
-    return tmp_path
+        home.file(name, text)
 
+    def program(*arguments: str) -> tuple[int, list[str], list[str]]:
+        code, out, err = home.run("program", *arguments)
+        return code, out.splitlines(), err.splitlines()
 
-def run(capsys: pytest.CaptureFixture[str], *arguments: str) -> tuple[int, list[str], list[str]]:
-    """Exit code, printed lines, narration."""
-    code = main(["program", *arguments])
-    said = capsys.readouterr()
-    return code, said.out.splitlines(), said.err.splitlines()
+    return program
 
 
 @pytest.mark.parametrize("personality", ["MDI", "MDIE", "MDIX"])
-def test_a_program_with_names_that_a_lexium_has_as_words(
-    files: Path, capsys: pytest.CaptureFixture[str], personality: str
-) -> None:
-    code, out, _ = run(capsys, "check", "feeder.mxt", "--personality", personality)
+def test_a_program_with_names_that_a_lexium_has_as_words(run: Run, personality: str) -> None:
+    code, out, _ = run("check", "feeder.mxt", "--personality", personality)
     assert (code, out) == (0, ["feeder.mxt: nothing wrong, 22 lines of program"])
-    code, out, told = run(capsys, "test", "feeder.mxt", "--personality", personality)
+    code, out, told = run("test", "feeder.mxt", "--personality", personality)
     assert (code, told) == (0, [])
     assert out[0].endswith("  Count 3 at 76800") and "6 motions, 46 lines, no errors" in out[1]
 
 
-def test_a_lexium_says_what_it_does_not_take_of_it(files: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    code, out, told = run(capsys, "check", "feeder.mxt", "--personality", "LMDCM")
+def test_a_lexium_says_what_it_does_not_take_of_it(run: Run) -> None:
+    code, out, told = run("check", "feeder.mxt", "--personality", "LMDCM")
     assert (code, out) == (1, [])
     assert any(
         "warning: this is a program for MDI, MDIE or MDIX: no LMDCM has S1, S2, S4, S3 and" in line for line in told
@@ -140,25 +133,25 @@ def test_a_lexium_says_what_it_does_not_take_of_it(files: Path, capsys: pytest.C
     assert "feeder.mxt:19:1: LB Rd: error 29, the name is a command of the drive; choose another name" in told
 
 
-def test_a_program_in_encoder_counts(files: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_program_in_encoder_counts(run: Run) -> None:
     for personality in ("MDIE", "MDIX"):
-        assert run(capsys, "check", "encoded.mxt", "--personality", personality)[0] == 0
-        code, out, told = run(capsys, "test", "encoded.mxt", "--personality", personality)
+        assert run("check", "encoded.mxt", "--personality", personality)[0] == 0
+        code, out, told = run("test", "encoded.mxt", "--personality", personality)
         assert (code, told) == (0, [])
         assert [line.split("  ")[-1] for line in out[:2]] == ["at 2048 steps 51200", "index 1"]
-    code, _, told = run(capsys, "check", "encoded.mxt", "--personality", "MDI")
+    code, _, told = run("check", "encoded.mxt", "--personality", "MDI")
     assert told[1].startswith(
         "encoded.mxt:2:1: warning: this is a program for MDIE, MDIX, LMDCE, LMDCM or LMM: no MDI "
     )
     assert code == 1 and told[0] == "encoded.mxt:2:1: EE=1: error 37, not available in this drive; EE is for MDIE, MDIX"
 
 
-def test_a_program_for_expanded_io(files: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert run(capsys, "check", "expanded.mxt", "--personality", "MDIX")[0] == 0
-    code, out, told = run(capsys, "test", "expanded.mxt", "--personality", "MDIX")
+def test_a_program_for_expanded_io(run: Run) -> None:
+    assert run("check", "expanded.mxt", "--personality", "MDIX")[0] == 0
+    code, out, told = run("test", "expanded.mxt", "--personality", "MDIX")
     assert (code, told) == (0, [])
     assert [line.split()[-1] for line in out[:2]] == ["15", "206"]
-    code, _, told = run(capsys, "check", "expanded.mxt", "--personality", "MDIE")
+    code, _, told = run("check", "expanded.mxt", "--personality", "MDIE")
     assert told[1].startswith(
         "expanded.mxt:3:1: warning: this is a program for MDIX: no MDIE has S9, S10, S11, S12 and"
     )

@@ -3,53 +3,30 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-from multidrop.__main__ import main
 from multidrop.dialects.pmx.manual import program_file
 from multidrop.simulator.cell.spec import DriveSpec
 from multidrop.simulator.cells import read
 from multidrop.simulator.pmx.program_run import Failed, Output, ProgramRun, Summary
 from tests.support import pmx_programs as shapes
+from tests.support.cell_session import bus, drive, pmx
+from tests.support.front_door import Command, Done
 
 pytestmark = pytest.mark.slow
 
-CELL = """
-[[bus]]
-name = "line"
-[[bus.drive]]
-personality = "LMDCM"
-[[bus]]
-name = "pmx"
-[[bus.drive]]
-personality = "PMX"
-name = "07"
-[bus.drive.world]
-inputs = {inputs}
-"""
+CELL = bus("line", drive("LMDCM"), baud=0) + bus("pmx", pmx("07", "[bus.drive.world]", "inputs = {inputs}"), baud=0)
 LIMIT = "limit_plus = 500\n"
 
 
-@dataclass
-class Done:
-    code: int
-    out: str
-    err: str
-
-
 @pytest.fixture
-def program(tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> Callable[..., Done]:
-    monkeypatch.chdir(tmp_path)
-
-    def run(*arguments: str) -> Done:
-        return Done(main(["program", "test", *arguments]), *capsys.readouterr())
-
-    return run
+def program(multidrop: Command) -> Command:
+    return partial(multidrop, "program", "test")
 
 
 def tried(text: str, until: float, inputs: str = "[]", more: str = "") -> tuple[list[Output | Failed], Summary]:
@@ -125,45 +102,45 @@ def test_a_limit_calls_sub_31_and_without_it_ends_the_program() -> None:
 
 
 def objects(done: Done) -> list[dict[str, Any]]:
-    return [json.loads(line) for line in done.out.splitlines()]
+    return [json.loads(line) for line in done.stdout.splitlines()]
 
 
-def test_json_and_exit_codes(program: Callable[..., Done], tmp_path: Path) -> None:
+def test_json_and_exit_codes(program: Command, tmp_path: Path) -> None:
     (tmp_path / "a.prg").write_text("EO=1\nDO=5\nX100Y-200\nWAITX\nWAITY\nEND\n")
     done = program("a.prg", "--json")
     switched, last = objects(done)
-    assert done.code == 0 and switched["outputs"] == 5 and switched["program"] == 0
+    assert done.returncode == 0 and switched["outputs"] == 5 and switched["program"] == 0
     summary = last["summary"]
     assert list(summary) == ["position", "moves", "errors", "instructions", "virtual_s", "real_s", "ended"]
     assert summary["position"] == {"X": 100, "Y": -200} and summary["ended"] == "END"
     (tmp_path / "b.asc").write_text("EO=1\nX100\nX0\nEND\n")
     done = program("b.asc")
-    assert done.code == 1 and done.err.startswith("b.asc:3: program 0 at ") and "?Moving" in done.err
-    assert "1 error" in done.out
+    assert done.returncode == 1 and done.stderr.startswith("b.asc:3: program 0 at ") and "?Moving" in done.stderr
+    assert "1 error" in done.stdout
     (tmp_path / "c.prg").write_text("FROB\n")
-    assert program("c.prg").code == 2
+    assert program("c.prg").returncode == 2
 
 
-def test_a_program_without_end_is_given_up_and_that_is_said(program: Callable[..., Done], tmp_path: Path) -> None:
+def test_a_program_without_end_is_given_up_and_that_is_said(program: Command, tmp_path: Path) -> None:
     (tmp_path / "a.prg").write_text("WHILE 1=1\nDELAY=1000\nENDWHILE\nEND\n")
     done = program("a.prg")
-    assert done.code == 1 and "still runs" in done.err
-    assert program("a.prg", "--until", "5").code == 0
+    assert done.returncode == 1 and "still runs" in done.stderr
+    assert program("a.prg", "--until", "5").returncode == 0
 
 
-def test_one_of_two_programs_can_be_chosen(program: Callable[..., Done], tmp_path: Path) -> None:
+def test_one_of_two_programs_can_be_chosen(program: Command, tmp_path: Path) -> None:
     (tmp_path / "a.prg").write_text("PRG 0\nDO=1\nEND\nPRG 1\nDO=2\nEND\n")
     assert [each.get("outputs") for each in objects(program("a.prg", "--run", "1", "--json"))] == [2, None]
     done = program("a.prg", "--run", "2")
-    assert done.code == 2 and "no program 2" in done.err
+    assert done.returncode == 2 and "no program 2" in done.stderr
 
 
-def test_the_controller_comes_from_a_cell(program: Callable[..., Done], tmp_path: Path) -> None:
+def test_the_controller_comes_from_a_cell(program: Command, tmp_path: Path) -> None:
     (tmp_path / "cell.toml").write_text(CELL.format(inputs="[[0.5, 1, 0]]"))
     (tmp_path / "a.prg").write_text("WHILE DI1=0\nENDWHILE\nEND\n")
     (last,) = objects(program("a.prg", "--cell", "cell.toml#pmx", "--json"))
     assert 0.5 <= last["summary"]["virtual_s"] < 0.51
-    assert program("a.prg", "--cell", "cell.toml#line").code == 2
+    assert program("a.prg", "--cell", "cell.toml#line").returncode == 2
 
 
 def test_another_personality_is_refused() -> None:

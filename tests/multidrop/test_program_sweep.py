@@ -14,28 +14,13 @@ import pytest
 from multidrop.dialects import Diagnostic
 from multidrop.shell.batch.report import Case, JUnitFile
 from multidrop.shell.sweeps import trial
+from tests.support.cell_session import bus, drive
 from tests.support.front_door import Command, Done
-from tests.support.front_door import multidrop as multidrop
 
 GO = 'PG 1\nLB SU\n MR 51200\n H\n PR "at ",P\nE\nLB K1\n PR "k1"\nE\nPG\nS\n'
 ENDLESS = "PG 1\nLB SU\n H 30000\n BR SU\nE\nPG\n"
-CELL = """
-[[bus]]
-name = "line"
-[[bus.drive]]
-personality = "LMDCM"
-name = "a"
-party = true
-[[bus.drive]]
-personality = "LMDCM"
-name = "b"
-party = true
-set = { EE = 1 }
-[[bus]]
-name = "stage"
-[[bus.drive]]
-personality = "PMX"
-"""
+CELL = bus("line", drive("LMDCM", "a", party=True), drive("LMDCM", "b", party=True, EE=1), baud=0)
+CELL += bus("stage", drive("PMX"), baud=0)
 WALLS = ("--vary", "b.load=0..0.9:0.1", "--vary", "b.stall_at=100000,200000,700000", "--vary", "seed=1..2")
 """With an encoder, MR 51200 turns the motor by 655360 motor steps."""
 

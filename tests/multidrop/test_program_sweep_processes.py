@@ -17,8 +17,7 @@ import pytest
 
 from multidrop.shell.prompt import terminal_input
 from multidrop.shell.sweeps import workers
-from tests.support.front_door import Command
-from tests.support.front_door import multidrop as multidrop
+from tests.support.front_door import Command, Home
 from tests.support.paths import ROOT
 from tests.support.processes import environment
 from tests.support.until import PATIENCE
@@ -32,11 +31,11 @@ WALLS = ("--cell", "cell.toml", "--vary", "b.stall_at=20000,90000", "--vary", "s
 
 
 @pytest.fixture
-def folder(tmp_path: Path) -> Path:
+def folder(home: Home) -> Path:
     """A folder with a program that ends, one that does not, and a cell."""
     for name, text in {"go.mxt": GO, "slow.mxt": SLOW, "cell.toml": CELL}.items():
-        (tmp_path / name).write_text(text)
-    return tmp_path
+        home.file(name, text)
+    return home.folder
 
 
 def gone(pid: int) -> bool:
@@ -45,18 +44,10 @@ def gone(pid: int) -> bool:
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="no such signals")
-def test_an_interrupted_sweep_reports_what_is_done_and_leaves_no_process(folder: Path) -> None:
+def test_an_interrupted_sweep_reports_what_is_done_and_leaves_no_process(folder: Path, home: Home) -> None:
     command = ["program", "sweep", "slow.mxt", "--vary", "seed=1..5000", "--jobs", "2", "--json", "--junit", "r.xml"]
     with open(folder / "errors", "wb") as log:
-        process = subprocess.Popen(
-            [sys.executable, "-m", "multidrop", *command],
-            stdout=subprocess.PIPE,
-            stderr=log,
-            text=True,
-            cwd=folder,
-            env=environment(folder),
-            start_new_session=True,
-        )
+        process = home.start(*command, stderr=log, start_new_session=True)
     assert process.stdout is not None
     lines = [process.stdout.readline() for _ in range(20)]
     os.killpg(process.pid, signal.SIGINT)

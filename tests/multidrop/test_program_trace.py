@@ -9,8 +9,8 @@ from typing import Any
 
 import pytest
 
-from multidrop.__main__ import main
 from multidrop.simulator import program_run
+from tests.support.front_door import Home
 
 LOOP = """VM=200000
 PG 1
@@ -39,16 +39,14 @@ Test = Callable[..., tuple[int, list[str], list[str]]]
 
 
 @pytest.fixture
-def test(tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> Test:
-    """Runs `program test`; gives its exit code and the lines of both streams."""
-    (tmp_path / "loop.mxt").write_text(LOOP)
-    (tmp_path / "lamp.prg").write_text(LAMP)
-    monkeypatch.chdir(tmp_path)
+def test(home: Home) -> Test:
+    """Run `program test`: its exit code and the lines of both streams."""
+    home.file("loop.mxt", LOOP)
+    home.file("lamp.prg", LAMP)
 
     def run(*arguments: str) -> tuple[int, list[str], list[str]]:
-        code = main(["program", "test", *arguments])
-        streams = capsys.readouterr()
-        return code, streams.out.splitlines(), streams.err.splitlines()
+        code, out, err = home.run("program", "test", *arguments)
+        return code, out.splitlines(), err.splitlines()
 
     return run
 

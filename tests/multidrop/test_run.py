@@ -1,14 +1,9 @@
 """`multidrop run` as a process: a script from standard input, roles, and both reports."""
 
 import json
-import subprocess
-import sys
 from xml.etree import ElementTree
 
 import pytest
-
-from tests.support.processes import environment
-from tests.support.until import PATIENCE
 
 pytestmark = pytest.mark.process
 
@@ -19,19 +14,9 @@ SCRIPT = """@gantry:a PR "at ",P
 """
 
 
-def test_a_script_from_standard_input_reports_its_checks(tmp_path):
-    command = [sys.executable, "-m", "multidrop", "run", "-", "--role", "gantry=sim:#press"]
-    options = ["--set", "x=0", "--json", "--junit", "report.xml"]
-    done = subprocess.run(
-        [*command, *options],
-        input=SCRIPT,
-        capture_output=True,
-        text=True,
-        cwd=tmp_path,
-        env=environment(tmp_path),
-        timeout=PATIENCE,
-        check=False,
-    )
+def test_a_script_from_standard_input_reports_its_checks(home, tmp_path):
+    words = ("run", "-", "--role", "gantry=sim:#press", "--set", "x=0", "--json", "--junit", "report.xml")
+    done = home.process(*words, stdin=SCRIPT)
     assert done.returncode == 1
     facts = [json.loads(line) for line in done.stdout.splitlines()]
     assert [each["ok"] for each in facts[:-1]] == [True, True, True, False]

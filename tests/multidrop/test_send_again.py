@@ -1,33 +1,17 @@
 """`multidrop send` on a line that it has used before: the same output, fewer bytes, and what differs is said."""
 
-import json
-
 import pytest
 
-from tests.support.processes import Running
+from tests.support.cell_session import TCP, bus, party
 
 pytestmark = pytest.mark.process
 
-CELL = """
-[[bus]]
-name = "line"
-serve = ["tcp://127.0.0.1:0"]
-[[bus.drive]]
-personality = "LMDCM"
-name = "a"
-party = true
-set = { EM = 1 }
-"""
+CELL = bus("line", party("a", CK=0), baud=0, serve=TCP)
 
 
 @pytest.fixture
-def url(tmp_path):
-    (tmp_path / "cell.toml").write_text(CELL)
-    sim = Running("sim", "cell.toml", "--json", folder=tmp_path)
-    told = [json.loads(line) for line in sim.until('{"ready": true}')[:-1]]
-    yield f"{told[0]['endpoint']}?drives=a"
-    sim.process.terminate()
-    sim.end()
+def url(home):
+    return f"{home.serve(CELL).endpoints['line']['tcp']}?drives=a"
 
 
 def test_a_second_send_prints_the_same_and_another_drive_is_reported(multidrop, url, tmp_path):

@@ -24,19 +24,11 @@ from multidrop.transports import Transport, TransportLost, Unreachable
 from multidrop.transports.serial_ports import lock_owner
 from multidrop.transports.ssh import FarPort
 from multidrop.transports.ssh_session import open_ssh, reason
+from tests.support.cell_session import bus, party
 from tests.support.ssh_server import fake_ssh, far_programs, script, ssh_server
 from tests.support.until import until
 
-CELL = """
-[[bus]]
-name = "press"
-baud = 0
-[[bus.drive]]
-personality = "LMDCM"
-name = "a"
-party = true
-set = { EM = 1, CK = 1 }
-"""
+CELL = bus("press", party("a"), baud=0)
 
 
 def pid_of(owner: str) -> int:

@@ -7,7 +7,6 @@ import itertools
 import tempfile
 from collections import Counter
 from pathlib import Path
-from random import Random
 
 import pytest
 from hypothesis import settings
@@ -31,6 +30,7 @@ from soak.judge import Witness
 from soak.languages import MCodeLanguage
 from tests.support.cell_session import CellSession, bus, moves, party
 from tests.support.examples import examples
+from tests.support.faults import disturb
 from tests.support.virtual import VirtualLoop
 
 pytestmark = pytest.mark.slow
@@ -60,13 +60,13 @@ class AnyOrder(RuleBasedStateMachine):
         drives = (party(name, EM=em, CK=check) for name in "ab")
         self.shop = CellSession(Path(self.folder.name), bus("w", *drives))
         self.run(self.shop.__aenter__())
-        self.floor = self.shop._floor()
+        self.floor = self.shop.floor
         self.devices = {placed.spec.name: placed.device for placed in self.floor.floor.drives}
         self.witnesses = {
             name: Witness(device, MCodeLanguage.asks, MCodeLanguage.refused) for name, device in self.devices.items()
         }
         self.numbers = itertools.count(1000)
-        self.plugged = True
+        self.plugged, self.faults = True, Faults()
 
     def run(self, work):
         """Do it; what a person may read is no defect."""
@@ -103,8 +103,8 @@ class AnyOrder(RuleBasedStateMachine):
 
     @rule(faults=FAULTS, seed=st.integers(0, 99))
     def noise(self, faults, seed):
-        wire = self.floor.floor.wires["w"]
-        wire._faults, wire._rng = faults, Random(seed)
+        self.faults = faults
+        disturb(self.floor.floor.wires["w"], faults, seed)
 
     @rule(drive=DRIVES)
     def power_cycle(self, drive):
@@ -142,9 +142,8 @@ class AnyOrder(RuleBasedStateMachine):
             await asyncio.sleep(2.0)
             await self.session.run("/resume")
 
-        quiet = self.floor.floor.wires["w"]._faults == Faults()
         self.run(amid())
-        if quiet and self.plugged:
+        if self.faults == Faults() and self.plugged:
             now = self.floor.now()
             assert not any(moves(device, now) for device in self.devices.values())
 
@@ -165,8 +164,8 @@ class AnyOrder(RuleBasedStateMachine):
             await self.session.open(self.shop.url)
 
         self.plugged = True
-        wire = self.floor.floor.wires["w"]
-        wire._faults = Faults()
+        self.faults = Faults()
+        disturb(self.floor.floor.wires["w"])
         self.run(again())
 
     async def _world(self, line):

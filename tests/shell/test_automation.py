@@ -12,9 +12,8 @@ from multidrop.shell.scripts import model
 from multidrop.shell.scripts.executor import run_script
 from multidrop.transports import TransportLost
 from tests.support.cell_session import ETHERNET, CellSession, bus, party, pmx
-from tests.support.virtual import in_virtual_time
 
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.virtual, pytest.mark.slow]
 
 FLOOR = (
     bus("press", party("a"), party("b")),
@@ -62,7 +61,6 @@ async def macro(session, *lines):
         ("/use nobody", Exception),
     ],
 )
-@in_virtual_time
 async def test_whatever_ends_it_early_stops_what_it_started_and_nothing_else(runs, ending, failure, tmp_path):
     async with CellSession(tmp_path, *FLOOR, bus("lost", party("e"))) as shop:
         for name in ("gantry:d", "stages:01"):
@@ -80,7 +78,6 @@ async def test_whatever_ends_it_early_stops_what_it_started_and_nothing_else(run
         await shop.session.run("@gantry:c SL 100", By.SCRIPT)
 
 
-@in_virtual_time
 async def test_what_it_starts_behind_a_stop_and_a_resume_is_stopped_too(tmp_path):
     async with CellSession(tmp_path, *FLOOR) as shop:
         with pytest.raises(Refused):
@@ -93,7 +90,6 @@ async def test_what_it_starts_behind_a_stop_and_a_resume_is_stopped_too(tmp_path
         assert shop.warned()[-2].startswith("stopped gantry:d, press:a: ")
 
 
-@in_virtual_time
 async def test_reads_never_count(tmp_path):
     async with CellSession(tmp_path, *FLOOR) as shop:
         for line in GO.values():
@@ -107,7 +103,6 @@ async def test_reads_never_count(tmp_path):
         assert not [text for text in shop.told() if "stop" in text and "/wait" not in text]
 
 
-@in_virtual_time
 async def test_a_stop_without_a_name_says_what_else_it_stopped(tmp_path):
     async with CellSession(tmp_path, *FLOOR) as shop:
         for name in ("press:b", "gantry:d"):
@@ -121,7 +116,6 @@ async def test_a_stop_without_a_name_says_what_else_it_stopped(tmp_path):
         ]
 
 
-@in_virtual_time
 async def test_a_line_to_all_is_all(tmp_path):
     async with CellSession(tmp_path, *FLOOR) as shop:
         with pytest.raises(DriveError):
@@ -130,7 +124,6 @@ async def test_a_line_to_all_is_all(tmp_path):
         assert shop.warned()[-1] == "stopped press, stages: all 4 read velocity 0"
 
 
-@in_virtual_time
 async def test_a_program_counts_when_it_is_executed_and_not_when_it_is_stored(tmp_path):
     async with CellSession(tmp_path, *FLOOR) as shop:
         await shop.session.run(GO["press:b"])
@@ -145,7 +138,6 @@ async def test_a_program_counts_when_it_is_executed_and_not_when_it_is_stored(tm
         assert shop.warned()[-2].startswith("stopped press:a: ")
 
 
-@in_virtual_time
 async def test_what_could_not_be_reached_is_named(tmp_path):
     async with CellSession(tmp_path, *FLOOR) as shop:
         with pytest.raises(TransportLost):
@@ -161,7 +153,6 @@ async def test_what_could_not_be_reached_is_named(tmp_path):
         ]
 
 
-@in_virtual_time
 async def test_lines_do_not_end_well_where_their_bus_was_lost_in_a_pause(tmp_path):
     async with CellSession(tmp_path, *FLOOR) as shop:
         asyncio.get_running_loop().call_later(1.0, shop.world, "/sim unplug press")
@@ -170,14 +161,12 @@ async def test_lines_do_not_end_well_where_their_bus_was_lost_in_a_pause(tmp_pat
         assert "press: stop not sent (lost)" in shop.warned()[-1]
 
 
-@in_virtual_time
 async def test_an_automation_that_ends_well_leaves_what_it_moved(tmp_path):
     async with CellSession(tmp_path, *FLOOR) as shop:
         await sent(shop.session, *GO.values())
         assert shop.moving() == set(GO) and shop.warned() == []
 
 
-@in_virtual_time
 async def test_a_macro_within_a_script_belongs_to_it(tmp_path):
     async with CellSession(tmp_path, *FLOOR) as shop:
         shop.session.macros.save(Macro("m", (Step(0.0, GO["press:b"]), Step(0.0, "@press:b PR XX"))))
@@ -190,7 +179,6 @@ async def test_a_macro_within_a_script_belongs_to_it(tmp_path):
         ]
 
 
-@in_virtual_time
 async def test_a_stop_of_everything_is_not_followed_by_another(tmp_path):
     async with CellSession(tmp_path, *FLOOR) as shop:
         running = asyncio.create_task(macro(shop.session, GO["press:a"], "/sleep 100"))
@@ -202,7 +190,6 @@ async def test_a_stop_of_everything_is_not_followed_by_another(tmp_path):
         assert not [text for text in shop.warned() if text.startswith("stopped")] and shop.session.latched
 
 
-@in_virtual_time
 async def test_an_interruption_is_written_at_once_and_stops_what_was_started_alone(tmp_path):
     async with CellSession(tmp_path, *FLOOR) as shop:
         await shop.session.run(GO["gantry:d"])
@@ -222,7 +209,6 @@ async def test_an_interruption_is_written_at_once_and_stops_what_was_started_alo
         )
 
 
-@in_virtual_time
 async def test_an_operators_lines_go_on_beside_a_macro_that_fails(tmp_path):
     async with CellSession(tmp_path, *FLOOR) as shop:
         asked = [asyncio.create_task(shop.session.run(f"@gantry:d PR {n}")) for n in range(20)]
@@ -233,7 +219,6 @@ async def test_an_operators_lines_go_on_beside_a_macro_that_fails(tmp_path):
         assert shop.moving() == set()
 
 
-@in_virtual_time
 async def test_two_stops_of_single_drives_are_both_repeated(tmp_path):
     async with CellSession(tmp_path, *FLOOR) as shop:
         gantry = shop.session.buses["gantry"]

@@ -20,7 +20,8 @@ from multidrop.shell.scripts.executor import play, run_script
 from multidrop.shell.scripts.reading import read_script
 from tests.support.cases import for_each
 from tests.support.cell_session import CellSession, bus, party, pmx
-from tests.support.virtual import in_virtual_time
+
+pytestmark = pytest.mark.virtual
 
 GROUPED = {
     "MA 200,000": "200000", "MR -200,000": "200000", "MA200,000": "200000", "ma 1,234,567": "1234567",
@@ -85,7 +86,6 @@ def test_a_line_of_a_program_is_an_error_with_its_place() -> None:
         pmx_file.read("X200,000\nEND\n", "x")
 
 
-@in_virtual_time
 async def test_nothing_is_sent_however_the_line_comes(tmp_path) -> None:
     async with CellSession(tmp_path, bus("press", party("a"), party("b")), bus("stages", pmx("00"))) as shop:
         await asyncio.sleep(1.0)
@@ -102,7 +102,6 @@ async def test_nothing_is_sent_however_the_line_comes(tmp_path) -> None:
         assert b"MA 200,1" in shop.written("press")
 
 
-@in_virtual_time
 async def test_a_line_for_the_program_is_refused_too(tmp_path) -> None:
     async with CellSession(tmp_path, bus("press", party("a"))) as shop:
         await shop.session.run("PG 1")
@@ -114,7 +113,6 @@ async def test_a_line_for_the_program_is_refused_too(tmp_path) -> None:
 
 
 @for_each("wrong", ["@a MA 200,000", "@a MA {FAR}", "@stages:00 X200,000", "@lab:1 MVP ABS, 0, 200,000"])
-@in_virtual_time
 async def test_a_line_that_no_drive_gets_is_found_before_the_script_moves_anything(tmp_path, wrong: str) -> None:
     (tmp_path / "s.txt").write_text(f"@a MR 51200\n/if 1 == 1\n  {wrong}\n/end\n", encoding="utf-8")
     async with CellSession(tmp_path, bus("press", party("a")), bus("stages", pmx("00")), bus("lab", MODULE)) as shop:

@@ -11,7 +11,8 @@ from multidrop.shell.connect import settings
 from multidrop.shell.events import By
 from multidrop.shell.scripts.executor import play
 from tests.support.cell_session import CellSession, bus, party, pmx
-from tests.support.virtual import in_virtual_time
+
+pytestmark = pytest.mark.virtual
 
 PRESS, STAGES = bus("press", party("a"), party("b"), baud=0), bus("stages", pmx("00"), baud=0)
 GUARDED = {"@a CP": "CP", "@b FD": "FD", "@* MR 5": "can start every drive", "@stages:00 STORE": "STORE"}
@@ -44,7 +45,6 @@ def silent(shop):
     return not (shop.written("press") or shop.written("stages"))
 
 
-@in_virtual_time
 async def test_without_anybody_to_ask_nothing_is_sent_and_the_refusal_names_yes(tmp_path):
     async with opened(tmp_path) as shop:
         for line, part in GUARDED.items():
@@ -53,7 +53,6 @@ async def test_without_anybody_to_ask_nothing_is_sent_and_the_refusal_names_yes(
         assert silent(shop)
 
 
-@in_virtual_time
 async def test_no_sends_nothing_and_yes_sends_once(tmp_path):
     async with opened(tmp_path) as shop:
         for answer in (False, True):
@@ -68,7 +67,6 @@ async def test_no_sends_nothing_and_yes_sends_once(tmp_path):
         assert shop.written("press").count(b"CP") == 1
 
 
-@in_virtual_time
 async def test_a_stop_while_it_asks_is_sent_and_the_line_is_not(tmp_path):
     async with opened(tmp_path) as shop:
         person = Person(shop, None)
@@ -81,7 +79,6 @@ async def test_a_stop_while_it_asks_is_sent_and_the_line_is_not(tmp_path):
         assert b"\x1b" in shop.written("press") and b"MR" not in shop.written("press") and not shop.moving()
 
 
-@in_virtual_time
 async def test_a_script_and_a_macro_ask_nobody(tmp_path):
     async with opened(tmp_path) as shop:
         person = Person(shop, True)
@@ -95,7 +92,6 @@ async def test_a_script_and_a_macro_ask_nobody(tmp_path):
         assert b"CP" in shop.written("press") and person.asked == []
 
 
-@in_virtual_time
 async def test_a_refused_line_is_not_recorded(tmp_path):
     async with opened(tmp_path) as shop:
         await shop.session.run("/record wipe")
@@ -106,7 +102,6 @@ async def test_a_refused_line_is_not_recorded(tmp_path):
         assert [step.line for step in shop.session.macros.load("wipe").steps] == ["@press:a PR P"]
 
 
-@in_virtual_time
 async def test_stops_are_sent_without_a_question(tmp_path):
     async with opened(tmp_path) as shop:
         person = Person(shop, False)
@@ -115,7 +110,6 @@ async def test_stops_are_sent_without_a_question(tmp_path):
         assert person.asked == []
 
 
-@in_virtual_time
 async def test_a_line_in_program_mode_is_stored_and_needs_no_yes(tmp_path):
     async with opened(tmp_path) as shop:
         for line in ("@a PG 1", "@a AS=3", "@a E", "@a PG"):
@@ -123,7 +117,6 @@ async def test_a_line_in_program_mode_is_stored_and_needs_no_yes(tmp_path):
         assert b"AS=3" in shop.written("press")
 
 
-@in_virtual_time
 async def test_the_configuration_takes_guards_away_and_adds_words(tmp_path):
     async with opened(tmp_path) as shop:
         found = settings.parse('[guards]\noff = ["cp", "*"]\nalso = ["S"]', "multidrop.toml")

@@ -9,7 +9,8 @@ from multidrop.dialects import Diagnostic
 from multidrop.shell.events import Bytes
 from multidrop.shell.streams.event_printer import Printer
 from tests.support.cell_session import CellSession, bus
-from tests.support.virtual import in_virtual_time
+
+pytestmark = pytest.mark.virtual
 
 CELL = bus("line", 'personality = "LMDCM"\nset = { EM = 0 }')
 
@@ -20,7 +21,6 @@ def shown(cell: CellSession) -> list[tuple[str, str]]:
     ]
 
 
-@in_virtual_time
 async def test_the_bytes_of_a_typed_line_are_shown_and_those_of_polls_are_not(tmp_path: Path) -> None:
     async with CellSession(tmp_path, CELL) as cell:
         await cell.session.run("/hex hex")
@@ -40,7 +40,6 @@ async def test_the_bytes_of_a_typed_line_are_shown_and_those_of_polls_are_not(tm
         assert shown(cell) == typed, "without a word it ends"
 
 
-@in_virtual_time
 async def test_raw_mode_shows_its_bytes_once(tmp_path: Path) -> None:
     async with CellSession(tmp_path, CELL) as cell:
         await cell.session.run("/hex on")

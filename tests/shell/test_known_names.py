@@ -3,6 +3,7 @@
 import asyncio
 from pathlib import Path
 
+import pytest
 from prompt_toolkit.completion import CompleteEvent
 from prompt_toolkit.document import Document
 
@@ -15,7 +16,8 @@ from multidrop.shell.prompt.complete import complete, names_of
 from multidrop.shell.prompt.view import SessionCompleter
 from tests.support.cases import for_each
 from tests.support.cell_session import CellSession, bus, party
-from tests.support.virtual import in_virtual_time
+
+pytestmark = pytest.mark.virtual
 
 PROGRAM = 'program_text = """VA CT=7\\nPG 100\\nLB GO\\nMR 100\\nH\\nBR GO\\nE\\nPG\\n"""'
 CELL = bus("press", f"{party('a')}\n{PROGRAM}", party("b"))
@@ -54,7 +56,6 @@ def test_a_name_comes_with_what_it_is() -> None:
     }
 
 
-@in_virtual_time
 async def test_names_are_read_when_a_person_asks_and_offered_before_the_words(tmp_path: Path) -> None:
     async with CellSession(tmp_path, CELL) as cell:
         drive = cell.session.drive("press", "a")
@@ -78,14 +79,12 @@ async def test_names_are_read_when_a_person_asks_and_offered_before_the_words(tm
         assert cell.session.names.ask(drive) is not None
 
 
-@in_virtual_time
 async def test_a_listing_teaches_the_names(tmp_path: Path) -> None:
     async with CellSession(tmp_path, CELL) as cell:
         await cell.session.run("/list a")
         assert words(cell, "EX ") == ["GO"]
 
 
-@in_virtual_time
 async def test_a_drive_that_stores_lines_or_is_gone_is_not_asked(tmp_path: Path) -> None:
     async with CellSession(tmp_path, CELL) as cell:
         drive = cell.session.drive("press", "a")
@@ -100,7 +99,6 @@ async def test_a_drive_that_stores_lines_or_is_gone_is_not_asked(tmp_path: Path)
         assert names_of(cell.session, "@* EX ") is None
 
 
-@in_virtual_time
 async def test_tab_at_the_prompt_waits_for_the_names(tmp_path: Path) -> None:
     async with CellSession(tmp_path, CELL) as cell:
         completer = SessionCompleter(cell.session)
@@ -113,7 +111,6 @@ async def test_tab_at_the_prompt_waits_for_the_names(tmp_path: Path) -> None:
         assert await found(tab=True) == ["GO"]
 
 
-@in_virtual_time
 async def test_a_stop_ends_the_reading(tmp_path: Path) -> None:
     async with CellSession(tmp_path, CELL) as cell:
         reading = cell.session.names.ask(cell.session.drive("press", "a"))

@@ -8,43 +8,21 @@ from pathlib import Path
 import pytest
 
 from multidrop.dialects import Refused
-from multidrop.shell.connect.settings import Settings
 from multidrop.shell.events import Output
 from multidrop.shell.prompt import complete
 from multidrop.shell.session import Session
+from tests.support.cell_session import bus, drive, session_on
 
 pytestmark = pytest.mark.virtual
 
-CELL = """
-[[bus]]
-name = "base"
-[[bus.drive]]
-personality = "MDI"
-[[bus]]
-name = "party"
-[[bus.drive]]
-personality = "MDIE"
-name = "e"
-party = true
-[[bus.drive]]
-personality = "MDIX"
-name = "x"
-party = true
-[[bus.drive]]
-personality = "LMDCM"
-name = "l"
-party = true
-"""
+PARTY = (drive(personality, name, party=True) for personality, name in (("MDIE", "e"), ("MDIX", "x"), ("LMDCM", "l")))
+CELL = bus("base", drive("MDI"), baud=0) + bus("party", *PARTY, baud=0)
 
 
 @pytest.fixture
-async def session(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> AsyncIterator[Session]:
-    monkeypatch.chdir(tmp_path)
-    (tmp_path / "cell.toml").write_text(CELL, encoding="utf-8")
-    made = Session(Settings({}, tmp_path / "config", tmp_path / "state"))
-    await made.open("sim:cell.toml")
-    yield made
-    await made.close()
+async def session(tmp_path: Path) -> AsyncIterator[Session]:
+    async with session_on(tmp_path, CELL) as made:
+        yield made
 
 
 async def said(session: Session, line: str) -> list[str]:

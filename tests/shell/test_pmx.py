@@ -8,34 +8,21 @@ import pytest
 
 from multidrop.dialects import Diagnostic, Refused, Stopped
 from multidrop.drives.events import Sample
-from multidrop.shell.connect.settings import Settings
 from multidrop.shell.events import By, Notified, OnBus, Output, Printed
 from multidrop.shell.prompt.complete import complete, hint
-from multidrop.shell.session import Session
+from tests.support.cell_session import bus, drive, pmx, session_on
 from tests.support.until import PATIENCE
 
 pytestmark = pytest.mark.virtual
 
-DRIVE = """
-[[bus.drive]]
-personality = "PMX"
-name = "{}"
-[bus.drive.world.y]
-limit_minus = -100
-"""
-CELL = '[[bus]]\nname = "stages"\nbaud = 9600\n' + "".join(DRIVE.format(name) for name in ("00", "01", "02"))
-LEXIUM = '[[bus]]\nname = "press"\n[[bus.drive]]\npersonality = "LMDCM"\n'
+STAGES = (pmx(name, "[bus.drive.world.y]", "limit_minus = -100") for name in ("00", "01", "02"))
+CELL = bus("stages", *STAGES) + bus("press", drive("LMDCM"), baud=0)
 
 
 @pytest.fixture
 async def session(tmp_path):
-    (tmp_path / "cell.toml").write_text(CELL + LEXIUM)
-    made = Session(Settings({}, tmp_path / "config", tmp_path / "state"))
-    made.events = []
-    made.subscribe(made.events.append)
-    await made.open(f"sim:{tmp_path / 'cell.toml'}")
-    yield made
-    await made.close()
+    async with session_on(tmp_path, CELL) as made:
+        yield made
 
 
 async def say(session, *lines):

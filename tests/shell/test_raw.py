@@ -18,7 +18,8 @@ from multidrop.shell.scripts.executor import play
 from multidrop.shell.session import Session
 from multidrop.transports import TransportLost
 from tests.support.cell_session import CellSession, bus, moves, party, pmx
-from tests.support.virtual import in_virtual_time
+
+pytestmark = pytest.mark.virtual
 
 ALONE = 'personality = "LMDCM"\nset = { EM = 0 }'
 
@@ -52,14 +53,12 @@ async def say(shop, *lines):
     return rows(shop)
 
 
-@in_virtual_time
 async def test_opening_writes_nothing(tmp_path):
     async with opened(tmp_path) as shop:
         await asyncio.sleep(10.0)
         assert shop.written("line") == b"" and shop.session.buses["line"].drives == {}
 
 
-@in_virtual_time
 async def test_text_goes_out_with_its_terminator_and_every_byte_is_shown(tmp_path):
     async with opened(tmp_path) as shop:
         await say(shop, "/raw show text")
@@ -71,7 +70,6 @@ async def test_text_goes_out_with_its_terminator_and_every_byte_is_shown(tmp_pat
         assert await say(shop, "/bytes 0D") == ["\\r\\n".ljust(24) + " 0D 0A", ">".ljust(24) + " 3E"]
 
 
-@in_virtual_time
 async def test_a_line_with_an_at_sign_is_text(tmp_path):
     async with opened(tmp_path, pmx("01"), query="?dialect=pmx") as shop:
         await say(shop, "/raw show text")
@@ -79,7 +77,6 @@ async def test_a_line_with_an_at_sign_is_text(tmp_path):
         assert shop.written("line") == b"@01ID\r"
 
 
-@in_virtual_time
 async def test_the_stop_is_that_of_the_family_in_the_url_and_says_so(tmp_path):
     async with opened(tmp_path) as shop:
         await say(shop, "SL 50000")
@@ -97,7 +94,6 @@ async def test_the_stop_is_that_of_the_family_in_the_url_and_says_so(tmp_path):
         assert b"ABORT" in shop.written("line") and b"SR0=0" in shop.written("line")
 
 
-@in_virtual_time
 async def test_a_stop_that_was_written_is_not_written_again_when_the_line_comes_back(tmp_path):
     async with opened(tmp_path, reconnect=True) as shop:
         for when in ("before the loss", "during the loss"):
@@ -123,7 +119,6 @@ async def replugged(shop, stop=False):
     assert shop.session.buses["line"].lost is None
 
 
-@in_virtual_time
 async def test_raw_off_finds_the_drives_and_raw_on_takes_the_line_back(tmp_path):
     async with opened(tmp_path, party("a"), party("b"), query="?drives=a,b") as shop:
         await say(shop, "/raw end lf")
@@ -147,7 +142,6 @@ async def test_raw_off_finds_the_drives_and_raw_on_takes_the_line_back(tmp_path)
         assert b"PR P" in shop.written("line")
 
 
-@in_virtual_time
 async def test_a_port_where_nothing_answers_is_opened_from_a_session_that_runs(tmp_path):
     async with CellSession(tmp_path, bus("line", party("a"), baud=0)) as shop:
         with pytest.raises(NoAnswer):
@@ -160,7 +154,6 @@ async def test_a_port_where_nothing_answers_is_opened_from_a_session_that_runs(t
         assert shop.written("line-2") == b"q"
 
 
-@in_virtual_time
 async def test_a_macro_never_sends_its_lines_as_bytes(tmp_path):
     async with opened(tmp_path, party("a"), party("b"), query="?drives=a,b") as shop:
         for line in ("MR 5", "@a MR 5", "@line:a MR 5"):
@@ -169,7 +162,6 @@ async def test_a_macro_never_sends_its_lines_as_bytes(tmp_path):
         assert shop.written("line") == b""
 
 
-@in_virtual_time
 async def test_the_selected_drive_is_the_same_afterwards(tmp_path):
     async with opened(tmp_path, party("a"), party("b"), query="?drives=a,b") as shop:
         await shop.session.run("/raw off")
@@ -178,7 +170,6 @@ async def test_the_selected_drive_is_the_same_afterwards(tmp_path):
         assert shop.session.selected.address == "b"
 
 
-@in_virtual_time
 async def test_raw_waits_for_the_conversation_under_way_and_a_stop_ends_that(tmp_path):
     async with opened(tmp_path, party("a"), query="?drives=a") as shop:
         await shop.session.run("/raw off")
@@ -200,7 +191,6 @@ async def test_raw_waits_for_the_conversation_under_way_and_a_stop_ends_that(tmp
         await shop.session.run("@a PR P")
 
 
-@in_virtual_time
 async def test_where_no_drive_replies_the_line_stays_raw(tmp_path):
     async with opened(tmp_path, party("a"), query="?drives=q") as shop:
         with pytest.raises(NoAnswer):
@@ -210,7 +200,6 @@ async def test_where_no_drive_replies_the_line_stays_raw(tmp_path):
         assert await say(shop, '/bytes 61 "PR P" LF') != []
 
 
-@in_virtual_time
 async def test_automation_in_raw_mode_stops_the_line_when_it_ends_early(tmp_path):
     async with opened(tmp_path) as shop:
         with pytest.raises(Diagnostic):
@@ -229,7 +218,6 @@ async def test_automation_in_raw_mode_stops_the_line_when_it_ends_early(tmp_path
         assert shop.written("line") == b"PR P\r"  # a print starts nothing
 
 
-@in_virtual_time
 async def test_a_guarded_text_asks_and_an_address_is_refused(tmp_path):
     async with opened(tmp_path) as shop:
         for line, part in {"FD": "erases all", "aCP": "erases the program", "@line:a PR P": "has no address a"}.items():
@@ -240,7 +228,6 @@ async def test_a_guarded_text_asks_and_an_address_is_refused(tmp_path):
         assert shop.written("line") == b"PR P\r"
 
 
-@in_virtual_time
 async def test_text_on_its_way_is_on_record_until_it_has_left(tmp_path):
     async with opened(tmp_path) as shop:
         link = shop.session.buses["line"].link
@@ -257,7 +244,6 @@ async def test_text_on_its_way_is_on_record_until_it_has_left(tmp_path):
         assert link.cut == ""
 
 
-@in_virtual_time
 async def test_a_line_that_was_lost_comes_back_raw(tmp_path):
     async with opened(tmp_path, reconnect=True) as shop:
         shop.world("/sim unplug line")
@@ -269,7 +255,6 @@ async def test_a_line_that_was_lost_comes_back_raw(tmp_path):
         assert await say(shop, "/raw show text", "PR P") == ["PR P\\r\\n", "0\\r\\n", ">"]
 
 
-@in_virtual_time
 async def test_what_a_port_cannot_do_is_one_clear_line(tmp_path):
     async with opened(tmp_path) as shop:
         for line in ("/raw baud 19200", "/raw dtr on", "/raw rts off", "/raw break"):
@@ -296,7 +281,6 @@ async def test_what_a_port_cannot_do_is_one_clear_line(tmp_path):
                 await shop.session.run(line)
 
 
-@in_virtual_time
 async def test_a_stop_drops_text_that_was_typed_before_it(tmp_path):
     async with opened(tmp_path) as shop:
         since = shop.session.stops

@@ -1,543 +1,368 @@
-"""Session over buses that are not there: where lines go, what is told, and what a stop does."""
+"""A session on simulated buses: where lines go, what is told, and what a stop does."""
 
 import asyncio
-from dataclasses import dataclass, field
+import contextlib
 
 import pytest
 
-from multidrop.dialects import Diagnostic, DriveError, Hints, Motion, NoAnswer, Refused, Stopped
-from multidrop.dialects.families import DEFAULT, FAMILIES
-from multidrop.dialects.mcode.host.codec import MCode
-from multidrop.dialects.mcode.host.state import MCodeState
-from multidrop.drives.events import Changed, Lost, Notice, Unsolicited
-from multidrop.drives.stopping import Halt
+from multidrop.dialects import Diagnostic, DriveError, NoAnswer, Refused, Stopped
+from multidrop.drives.events import Notice, Sent, Unsolicited
 from multidrop.macros import Macro, Step
-from multidrop.shell.connect.opening import Opened
-from multidrop.shell.connect.settings import SavedConnection, Settings
 from multidrop.shell.events import By, Entered, Failed, Notified, OnBus, Printed, StateChanged
-from multidrop.shell.session import Session
 from multidrop.shell.streams.stdout import report
 from multidrop.transports import TransportLost
+from tests.support.cell_session import ETHERNET, CellSession, bus, party
+
+pytestmark = pytest.mark.virtual
+
+DWELL = 'program_text = """\nPG 1\nLB Ga\nH 2000\nE\nPG\n"""'
+PRESS = bus("press", party("a"), f"{party('b')}\n{DWELL}", party("c"), baud=0)
+ETH = bus("eth", ETHERNET, baud=0)
 
 
-@dataclass(eq=False)
-class FakeDrive:
-    bus: "FakeBus"
-    address: str
-    label: str = ""
-    product: str = "LMDCM"
-    version: str = "6.002"
-    programming: bool = False
-    family: object = FAMILIES[DEFAULT]
-    state: object = field(default_factory=lambda: MCodeState(MCode()))
+class Press(CellSession):
+    """A session on the press, whose drives note what they carry out, prints excepted: `done`, as (drive, line)."""
 
-    seen = running = None
-    commands = 0
-    started_at = commanded_at = float("-inf")
-    starting = 0
+    def __init__(self, folder, *buses):
+        super().__init__(folder, *buses)
+        self.done = []
 
-    def starts(self, text):
-        return not text.startswith("PR")
-
-    @property
-    def link(self):
-        return self.bus
-
-    async def send(self, text):
-        self.bus.sent.append((self.address, text))
-        answer = self.bus.answers.get(text, ())
-        if isinstance(answer, BaseException):
-            raise answer
-        if isinstance(answer, asyncio.Event):
-            await answer.wait()
-            return ()
-        return answer
-
-    async def motion(self):
-        return (Motion(0, 0),)
-
-    async def rest(self):
-        return () if not self.bus.standing or self.bus.standing.pop(0) else None
-
-    async def busy(self):
-        return self.bus.programs.pop(0) if self.bus.programs else False
-
-
-class FakeBus:
-    def __init__(self, name, addresses):
-        self.name, self.lost, self.stops, self.closed = name, None, 0, False
-        self.addresses, self.drives, self.sent, self.watchers = addresses, {}, [], []
-        self.answers, self.standing, self.programs = {}, [], []
-        self.halts, self.told_of, self.last_stop, self.fails = [], [], None, None
-
-    @property
-    def link(self):
+    async def __aenter__(self):
+        await super().__aenter__()
+        for placed in self.floor.floor.drives:
+            placed.device.execute = self._noting(placed.spec.name, placed.device.execute)
         return self
 
-    @property
-    def away(self):
-        return self.lost
+    def _noting(self, name, execute):
+        def noted(text, now):
+            answer = execute(text, now)
+            if not answer.refused and not text.startswith("PR") and text.strip():
+                self.done.append((name, text.strip()))
+            return answer
 
-    loss = away
+        return noted
 
-    def watch(self, watcher):
-        self.watchers.append(watcher)
-        return lambda: self.watchers.remove(watcher)
+    def heard(self, kind):
+        return [event for event in self.events if isinstance(event, kind)]
 
-    def publish(self, event):
-        for watcher in list(self.watchers):
-            watcher(event)
-
-    def start(self):
-        pass
-
-    async def identify(self, hints):
-        if isinstance(self.addresses, BaseException):
-            raise self.addresses
-        self.drives = {address: FakeDrive(self, address) for address in self.addresses}
-        return list(self.drives.values())
-
-    def at(self, address):
-        return self.drives.get(address) or FakeDrive(self, address)
-
-    @property
-    def all_drives(self):
-        return list(self.drives.values())
-
-    def halt(self, only=None):
-        """Noted as the real one does it; `fails` is raised in place of that."""
-        if self.fails:
-            raise self.fails
-        self.stops += 1
-        drives = tuple(self.all_drives if only is None else only)
-        self.halts.append(Halt(self, asyncio.get_running_loop().time(), self.stops, only is None, drives, data=b"!"))
-        self.last_stop = self.halts[-1] if only is None else self.last_stop
-        return self.halts[-1]
-
-    def halted(self, halt):
-        self.told_of.append(halt)
-
-    async def settled(self):
-        pass
-
-    async def close(self):
-        self.closed = True
-
-
-class Shop:
-    """What the fake URLs lead to, by scheme-less name."""
-
-    def __init__(self):
-        self.buses = {}
-
-    def put(self, name, addresses="abc"):
-        self.buses[name] = FakeBus(name, addresses)
-        return self.buses[name]
-
-    async def opener(self, connection, naming):
-        wanted = connection.target.removeprefix("/").split("+")
-        for name in wanted:
-            self.buses[name].name = naming(self.buses[name].name)
-        return [Opened(self.buses[name], Hints()) for name in wanted]
+    async def run(self, *lines):
+        for line in lines:
+            await self.session.run(line)
 
 
 @pytest.fixture
-def shop():
-    return Shop()
+async def press(tmp_path):
+    async with Press(tmp_path, PRESS) as cell:
+        yield cell
 
 
 @pytest.fixture
-async def session(shop, tmp_path):
-    names = {"b": "gantry"}
-    settings = Settings({"saved": SavedConnection("saved", "/press", names)}, tmp_path / "c", tmp_path / "s")
-    made = Session(settings, shop.opener)
-    made.events = []
-    made.subscribe(made.events.append)
-    yield made
-    await made.close()
+async def both(tmp_path):
+    """The press, and another bus beside it."""
+    async with Press(tmp_path, PRESS, ETH) as cell:
+        yield cell
 
 
-def told(session, kind):
-    return [event for event in session.events if isinstance(event, kind)]
-
-
-async def test_the_first_bus_and_its_first_drive_are_selected(session, shop):
-    press = shop.put("press")
-    shop.put("eth", "!")
-    await session.open("/press")
-    await session.open("/eth")
-    assert (session.selected_bus, session.selected.address) == ("press", "a")
-    await session.run("MR 100")
-    assert press.sent == [("a", "MR 100")]
+async def test_the_first_bus_and_its_first_drive_are_selected(both):
+    assert (both.session.selected_bus, both.session.selected.address) == ("press", "a")
+    await both.run("MR 100")
+    assert both.done == [("a", "MR 100")]
 
 
 @pytest.mark.parametrize(
     ("line", "bus", "sent"),
     [
-        ("PR P", "press", ("a", "PR P")),
-        ("  PR P  ", "press", ("a", "PR P")),
-        ("@b MR 100", "press", ("b", "MR 100")),
-        ("@gantry MR 100", "press", ("b", "MR 100")),
-        ("@* SL 0", "press", ("*", "SL 0")),
-        ("@^ MA 0", "press", ("^", "MA 0")),
-        ("@x MR 100", "press", ("x", "MR 100")),
-        ("@eth:! PR P", "eth", ("!", "PR P")),
+        ("PR P", "press", b"aPR P"),
+        ("  PR P  ", "press", b"aPR P"),
+        ("@b MR 100", "press", b"bMR 100"),
+        ("@gantry MR 100", "press", b"bMR 100"),
+        ("@* SL 0", "press", b"*SL 0"),
+        ("@^ MA 0", "press", b"^MA 0"),
+        ("@x MR 100", "press", b"x"),
+        ("@eth: PR P", "eth", b"PR P"),
     ],
 )
-async def test_a_line_goes_where_it_says(session, shop, line, bus, sent):
-    shop.put("press"), shop.put("eth", "!")
-    await session.open("saved", "press")
-    await session.open("/eth")
-    await session.run(line)
-    assert shop.buses[bus].sent == [sent]
+async def test_a_line_goes_where_it_says(both, line, bus, sent):
+    both.session.buses["press"].drives["b"].label = "gantry"
+    with contextlib.suppress(NoAnswer):
+        await both.run(line)
+    other = "eth" if bus == "press" else "press"
+    assert sent in both.written(bus) and both.written(other) == b""
 
 
-async def test_what_a_drive_prints_and_what_it_says_by_itself_are_told(session, shop):
-    press = shop.put("press")
-    await session.open("/press")
-    press.answers["PR AL"] = ("A = 1", "D = 2")
-    await session.run("@b PR AL")
-    press.publish(Unsolicited(5.0, ("Hello", "there")))
-    press.publish(Notice(5.0, "taken out of program mode", "b", warning=True))
-    assert [(each.address, each.text) for each in told(session, Printed)] == [("b", "A = 1"), ("b", "D = 2")]
-    unsolicited = [each for each in told(session, OnBus) if isinstance(each.event, Unsolicited)]
-    assert unsolicited == [OnBus("press", Unsolicited(5.0, ("Hello", "there")))]
-    assert told(session, Notified)[-1].warning
-    assert [(each.line, each.bus, each.address) for each in told(session, Entered)] == [("@b PR AL", "press", "b")]
+async def test_what_a_drive_prints_and_what_it_says_by_itself_are_told(press):
+    await press.run("@b PR A,D", "@b PR VM")
+    link = press.session.buses["press"].link
+    link.publish(Unsolicited(5.0, ("Hello", "there")))
+    link.publish(Notice(5.0, "taken out of program mode", "b", warning=True))
+    assert [(each.address, each.text) for each in press.heard(Printed)] == [("b", "10000001000000"), ("b", "768000")]
+    assert OnBus("press", Unsolicited(5.0, ("Hello", "there"))) in press.heard(OnBus)
+    assert press.heard(Notified)[-1].warning
+    assert [(each.line, each.bus, each.address) for each in press.heard(Entered)][0] == ("@b PR A,D", "press", "b")
 
 
-@pytest.mark.parametrize("failure", [Refused("b: 20", 20), NoAnswer("b"), TransportLost("gone")])
-async def test_a_failure_is_told_once_and_raised(session, shop, failure):
-    shop.put("press").answers["VX"] = failure
-    await session.open("/press")
-    with pytest.raises(type(failure)):
-        await session.run("@b VX")
-    assert [(each.text, each.address) for each in told(session, Failed)] == [(str(failure), "b")]
+@pytest.mark.parametrize(
+    ("world", "failure"), [("", Refused), ("/sim power b off", NoAnswer), ("/sim unplug press", TransportLost)]
+)
+async def test_a_failure_is_told_once_and_raised(press, world, failure):
+    if world:
+        press.world(world)
+    with pytest.raises(failure) as caught:
+        await press.run("@b VX")
+    assert [(each.text, each.address) for each in press.heard(Failed) if each.address] == [(str(caught.value), "b")]
 
 
-async def test_where_several_buses_are_open_a_failure_says_which_it_was(session, shop):
-    shop.put("press"), shop.put("eth", "!").answers.update(VX=Refused("! refused"))
-    await session.open("/press")
-    await session.open("/eth")
+async def test_where_several_buses_are_open_a_failure_says_which_it_was(both):
     with pytest.raises(Refused) as caught:
-        await session.run("@eth:! VX")
-    assert report(caught.value) == "eth: ! refused"
+        await both.run("@eth: VX")
+    assert report(caught.value).startswith("eth: ")
 
 
-async def test_a_failure_in_the_background_is_told_and_not_raised(session, shop):
-    shop.put("press").answers["VX"] = Refused("no")
-    await session.open("/press")
-    await session.start("VX")
-    assert [each.text for each in told(session, Failed)] == ["no"]
+async def test_a_failure_in_the_background_is_told_and_not_raised(press):
+    await press.session.start("VX")
+    assert len(press.heard(Failed)) == 1
 
 
 @pytest.mark.parametrize("line", ["/nothing", "@ ", "@b", "@b /wait stopped", "@nowhere:b PR P", "/use", "/use x"])
-async def test_a_line_that_means_nothing_is_a_diagnostic_and_nothing_is_sent(session, shop, line):
-    press = shop.put("press")
-    await session.open("/press")
+async def test_a_line_that_means_nothing_is_a_diagnostic_and_nothing_is_sent(press, line):
     with pytest.raises(Diagnostic):
-        await session.run(line)
-    assert press.sent == []
-    assert len(told(session, Failed)) == 1
+        await press.run(line)
+    assert press.written("press") == b"" and len(press.heard(Failed)) == 1
 
 
-async def test_with_nothing_open_a_line_says_how_to_open(session):
+async def test_with_nothing_open_a_line_says_how_to_open(tmp_path):
     with pytest.raises(Diagnostic, match="/open"):
-        await session.run("PR P")
+        await Press(tmp_path, PRESS).run("PR P")
 
 
-async def test_a_drive_that_answers_where_none_was_known_is_known_from_then_on(session, shop):
-    press = shop.put("press")
-    press.answers["VX"] = NoAnswer("x")
-    await session.open("/press")
+async def test_a_drive_that_answers_where_none_was_known_is_known_from_then_on(press):
+    await press.session.close_bus("press")
+    [line] = await press.session.open(f"{press.url}?drives=a,b")
+    press.world("/sim power c off")
     with pytest.raises(NoAnswer):
-        await session.run("@x VX")
-    assert "x" not in press.drives
-    await session.run("@x PR P")
-    assert "x" in press.drives
+        await press.run("@c VX")
+    assert list(line.drives) == ["a", "b"]
+    press.world("/sim power c on")
+    await asyncio.sleep(1)
+    await press.run("@c PR P")
+    assert list(line.drives) == ["a", "b", "c"]
 
 
-async def test_a_bus_that_cannot_be_identified_is_closed_again(session, shop):
-    press = shop.put("press", NoAnswer("nobody"))
+async def test_a_bus_that_cannot_be_identified_is_closed_again(press):
+    await press.session.close_bus("press")
     with pytest.raises(NoAnswer):
-        await session.open("/press")
-    assert press.closed and session.buses == {} and session.selected_bus == ""
+        await press.session.open(f"{press.url}?drives=q")
+    assert press.session.buses == press.session.cells == {} and press.session.selected_bus == ""
 
 
-async def test_buses_of_the_same_name_are_told_apart(session, shop):
-    shop.put("press"), shop.put("other")
-    shop.buses["other"].name = "press"
-    await session.open("/press")
-    await session.open("/other")
-    assert list(session.buses) == ["press", "press-2"]
+async def test_buses_of_the_same_name_are_told_apart(press):
+    await press.session.open(press.url)
+    assert list(press.session.buses) == ["press", "press-2"]
     with pytest.raises(Diagnostic, match="already open"):
-        await session.open("/other", "press")
+        await press.session.open(press.url, "press")
 
 
-async def test_closing_the_selected_bus_selects_another(session, shop):
-    shop.put("press"), shop.put("eth", "!")
-    await session.open("/press")
-    await session.open("/eth")
-    await session.run("/close press")
-    assert session.selected_bus == "eth" and shop.buses["press"].closed
-    await session.run("/close eth")
-    assert session.selected is None
+async def test_closing_the_selected_bus_selects_another(both):
+    await both.run("/close press")
+    assert both.session.selected_bus == "eth" and list(both.session.buses) == ["eth"]
+    await both.run("/close eth")
+    assert both.session.selected is None
 
 
-async def test_a_lost_bus_is_told_once(session, shop):
-    press = shop.put("press")
-    await session.open("/press")
-    press.lost = TransportLost("unplugged")
-    press.publish(Lost(1.0, press.lost))
-    press.publish(Changed(1.0))
-    assert [each.text for each in told(session, Failed)] == ["unplugged"]
+async def test_a_lost_bus_is_told_once(press):
+    press.world("/sim unplug press")
+    await asyncio.sleep(1)
+    [failed] = press.heard(Failed)
+    assert "unplugged" in failed.text
 
 
 # Stop
 
 
-async def test_a_stop_reaches_every_bus_ends_what_runs_and_latches(session, shop):
-    press, eth = shop.put("press"), shop.put("eth", "!")
-    await session.open("/press")
-    await session.open("/eth")
+async def test_a_stop_reaches_every_bus_ends_what_runs_and_latches(both):
+    session = both.session
+    await both.run("@b SL 50000")
     waiting = [asyncio.create_task(session.run(line)) for line in ("/sleep 1000", "/wait stopped 1000")]
-    press.standing = [False] * 1000
     await asyncio.sleep(0)
+    both.events.clear()
     session.stop("test")
-    session.stop("test")
-    assert (press.stops, eth.stops, session.latched) == (2, 2, True)
+    assert b"\x1b" in both.written("press") and b"\x1b" in both.written("eth") and session.latched
     for each in waiting:
         with pytest.raises(Stopped):
             await each
     assert not session.busy
 
 
-async def test_a_stop_latches_against_automation_but_not_against_a_person(session, shop):
-    press = shop.put("press")
-    await session.open("/press")
+async def test_a_stop_latches_against_automation_but_not_against_a_person(press):
+    session = press.session
     session.stop()
     for by in (By.MACRO, By.SCRIPT):
         with pytest.raises(Stopped, match="/resume"):
             await session.run("MR 100", by)
     with pytest.raises(Stopped):
         await session.run("/resume", By.SCRIPT)
-    await session.run("PR P")
+    await session.run("R1=5")
     await session.run("/resume")
     await session.run("MR 100", By.SCRIPT)
-    assert [text for _, text in press.sent] == ["PR P", "MR 100"]
+    assert press.done == [("a", "R1=5"), ("a", "MR 100")]
 
 
-async def test_a_line_typed_before_a_stop_is_not_sent_after_it(session, shop):
-    press = shop.put("press")
-    await session.open("/press")
+async def test_a_line_typed_before_a_stop_is_not_sent_after_it(press):
+    session = press.session
     typed = session.stops
     waiting = session.start("MR 5")
     session.stop()
     with pytest.raises(Stopped, match="'MR 51200' was typed"):
         await session.run("MR 51200", since=typed)
     await waiting
-    assert press.sent == []
+    assert press.done == []
     await session.run("MR 7", since=session.stops)
-    assert press.sent == [("a", "MR 7")]
+    assert press.done == [("a", "MR 7")]
 
 
-async def test_a_stop_before_anything_is_open_does_no_harm(session):
+async def test_a_stop_before_anything_is_open_does_no_harm(tmp_path):
+    session = Press(tmp_path, PRESS).session
     session.stop()
     assert session.latched
 
 
-async def test_cancelling_a_wait_from_outside_is_no_stop(session, shop):
-    shop.put("press")
-    await session.open("/press")
-    waiting = asyncio.create_task(session.run("/sleep 1000"))
+async def test_cancelling_a_wait_from_outside_is_no_stop(press):
+    waiting = asyncio.create_task(press.session.run("/sleep 1000"))
     await asyncio.sleep(0)
     waiting.cancel()
     with pytest.raises(asyncio.CancelledError):
         await waiting
-    assert not session.latched
+    assert not press.session.latched
 
 
 # Waits
 
 
-async def test_wait_stopped_wants_two_readings_of_every_drive_that_was_addressed(session, shop):
-    press = shop.put("press")
-    await session.open("/press")
-    await session.run("@b MR 1")
-    await session.run("@* SL 0")
-    press.standing = [True, False, True, True, True, True, True, False]
-    await session.run("/wait stopped 5")
-    assert press.standing == []
+async def test_wait_stopped_wants_two_readings_of_every_drive_that_was_addressed(press):
+    await press.run("@b MR 1", "@* SL 0")
+    press.events.clear()
+    await press.run("/wait stopped 5")
+    asked = [each.event.request.address for each in press.heard(OnBus) if isinstance(each.event, Sent)]
+    assert [asked.count(name) >= 2 for name in "abc"] == [True] * 3
 
 
-async def test_a_wait_that_runs_out_is_a_failure_that_names_the_drive(session, shop):
-    press = shop.put("press")
-    await session.open("/press")
-    await session.run("@b SL 100")
-    press.standing = [False] * 1000
+async def test_a_wait_that_runs_out_is_a_failure_that_names_the_drive(press):
+    await press.run("@b SL 100")
     with pytest.raises(DriveError, match=r"/wait stopped: b .* after 0 s"):
-        await session.run("/wait stopped 0")
+        await press.run("/wait stopped 0")
 
 
-async def test_wait_idle_also_waits_for_the_program(session, shop):
-    press = shop.put("press")
-    await session.open("/press")
-    press.programs = [True, True, False, False]
-    await session.run("/wait idle 5")
-    assert press.programs == []
-    press.programs = [True]
-    await session.run("/wait stopped 5")
-    assert press.programs == [True]
+async def test_wait_idle_also_waits_for_the_program(press):
+    loop = asyncio.get_running_loop()
+    for wait, most in (("/wait stopped 5", 1.0), ("/wait idle 5", 5.0)):
+        begun = loop.time()
+        await press.run("@b EX Ga", wait)
+        took = loop.time() - begun
+        assert took < most and press.device("press:b").running is (wait == "/wait stopped 5")
+    assert took > 2.0
 
 
-async def test_a_drive_in_program_mode_is_not_asked(session, shop):
-    press = shop.put("press")
-    await session.open("/press")
-    press.drives["a"].programming = True
+async def test_a_drive_in_program_mode_is_not_asked(press):
+    await press.run("PG 1")
     with pytest.raises(DriveError, match="program mode"):
-        await session.run("/wait stopped")
+        await press.run("/wait stopped")
 
 
 @pytest.mark.parametrize("line", ["/wait", "/wait running", "/wait stopped soon", "/sleep", "/sleep -1", "/sleep 1e9"])
-async def test_a_wait_that_is_not_understood_shows_its_usage(session, shop, line):
-    shop.put("press")
-    await session.open("/press")
+async def test_a_wait_that_is_not_understood_shows_its_usage(press, line):
     with pytest.raises(Diagnostic, match="usage: /"):
-        await session.run(line)
+        await press.run(line)
 
 
 # Macros
 
 
-async def test_a_macro_keeps_lines_with_their_address_and_only_what_drives_see(session, shop):
-    press = shop.put("press")
-    await session.open("/press")
-    for line in (
-        "/record shuttle",
-        "MR 100",
-        "/use b",
-        "MR 200",
-        "/wait stopped",
-        "@c PR P",
-        "/drives",
-        "/record stop",
-    ):
-        await session.run(line)
-    assert [step.line for step in session.macros.load("shuttle").steps] == [
-        "@a MR 100",
-        "@b MR 200",
-        "/wait stopped",
-        "@c PR P",
-    ]
-    press.sent.clear()
-    await session.run("/play shuttle")
-    assert press.sent == [("a", "MR 100"), ("b", "MR 200"), ("c", "PR P")]
+def steps(cell, name):
+    return [step.line for step in cell.session.macros.load(name).steps]
 
 
-async def test_with_several_buses_a_macro_keeps_the_bus_too(session, shop):
-    shop.put("press"), shop.put("eth", "!")
-    await session.open("/press")
-    await session.open("/eth")
-    for line in ("/record m", "MR 1", "@eth:! MR 2", "/record stop"):
-        await session.run(line)
-    assert [step.line for step in session.macros.load("m").steps] == ["@press:a MR 1", "@eth:! MR 2"]
+async def test_a_macro_keeps_lines_with_their_address_and_only_what_drives_see(press):
+    await press.run(
+        "/record shuttle", "MR 100", "/use b", "MR 200", "/wait stopped", "@c R1=5", "/drives", "/record stop"
+    )
+    assert steps(press, "shuttle") == ["@a MR 100", "@b MR 200", "/wait stopped", "@c R1=5"]
+    press.done.clear()
+    await press.run("/play shuttle")
+    assert press.done == [("a", "MR 100"), ("b", "MR 200"), ("c", "R1=5")]
 
 
-async def test_what_a_playing_macro_sends_is_not_recorded(session, shop):
-    shop.put("press")
-    await session.open("/press")
-    for line in ("/record inner", "MR 1", "/record stop", "/record outer", "/play inner", "/record stop"):
-        await session.run(line)
-    assert [step.line for step in session.macros.load("outer").steps] == ["/play inner"]
+async def test_with_several_buses_a_macro_keeps_the_bus_too(both):
+    await both.run("/record m", "MR 1", "@eth: MR 2", "/record stop")
+    assert steps(both, "m") == ["@press:a MR 1", "@eth: MR 2"]
 
 
-async def test_recording_is_seen_and_ends_well(session, shop):
-    shop.put("press")
-    await session.open("/press")
-    await session.run("/record m")
-    assert session.recording == "m"
+async def test_what_a_playing_macro_sends_is_not_recorded(press):
+    await press.run("/record inner", "MR 1", "/record stop", "/record outer", "/play inner", "/record stop")
+    assert steps(press, "outer") == ["/play inner"]
+
+
+async def test_recording_is_seen_and_ends_well(press):
+    await press.run("/record m")
+    assert press.session.recording == "m"
     with pytest.raises(Diagnostic):
-        await session.run("/record other")
+        await press.run("/record other")
     with pytest.raises(Diagnostic, match="nothing was typed"):
-        await session.run("/record stop")
-    assert session.recording == ""
+        await press.run("/record stop")
+    assert press.session.recording == ""
 
 
-async def test_a_stop_ends_a_playing_macro_and_refuses_the_next(session, shop):
-    press = shop.put("press")
-    await session.open("/press")
-    for line in ("/record m", "MR 1", "/sleep 0", "MR 2", "/record stop"):
-        await session.run(line)
-    press.sent.clear()
-    press.answers["MR 1"] = asyncio.Event()
-    playing = asyncio.create_task(session.run("/play m"))
-    while not press.sent:
-        await asyncio.sleep(0)
-    assert [each.name for each in session.playing] == ["m"]
-    session.stop()
+def save(cell, *lines):
+    cell.session.macros.save(Macro("m", tuple(Step(0.0, line) for line in lines)))
+
+
+async def test_a_stop_ends_a_playing_macro_and_refuses_the_next(press):
+    save(press, "MR 1", "/sleep 5", "MR 2")
+    playing = asyncio.create_task(press.session.run("/play m"))
+    await asyncio.sleep(2)
+    assert [each.name for each in press.session.playing] == ["m"]
+    press.session.stop()
     with pytest.raises(Stopped):
         await playing
     with pytest.raises(Stopped, match="/resume"):
-        await session.run("/play m")
-    assert press.sent == [("a", "MR 1")] and session.playing == []
+        await press.run("/play m")
+    assert press.done == [("a", "MR 1")] and press.session.playing == []
 
 
-async def test_a_macro_goes_on_with_the_drive_that_was_selected_as_it_began(session, shop):
-    press, eth = shop.put("press"), shop.put("eth", "!")
-    await session.open("/press")
-    await session.open("/eth")
-    lines = ("MR 1", "MR 2", "@b MR 3", "@eth: MR 4", "/use eth", "MR 5")
-    session.macros.save(Macro("m", tuple(Step(0.0, line) for line in lines)))
-    press.answers["MR 1"] = gate = asyncio.Event()
-    playing = asyncio.create_task(session.run("/play m"))
-    while not press.sent:
-        await asyncio.sleep(0)
-    session.select("", "eth")
-    gate.set()
+async def test_a_macro_goes_on_with_the_drive_that_was_selected_as_it_began(both):
+    save(both, "R1=1", "/sleep 5", "R1=2", "@b R1=3", "@eth: R1=4", "/use eth", "R1=5")
+    playing = asyncio.create_task(both.session.run("/play m"))
+    await asyncio.sleep(2)
+    both.session.select("", "eth")
     await playing
-    assert press.sent == [("a", "MR 1"), ("a", "MR 2"), ("b", "MR 3")]
-    assert eth.sent == [("!", "MR 4"), ("!", "MR 5")]
+    assert both.done == [("a", "R1=1"), ("a", "R1=2"), ("b", "R1=3"), ("!", "R1=4"), ("!", "R1=5")]
 
 
-async def test_a_failing_line_ends_the_macro_and_is_told_once(session, shop):
-    press = shop.put("press")
-    await session.open("/press")
-    for line in ("/record m", "MR 1", "MR 2", "/record stop"):
-        await session.run(line)
-    press.answers["MR 1"] = Refused("a: no")
-    press.sent.clear()
+async def test_a_failing_line_ends_the_macro_and_is_told_once(press):
+    save(press, "VX", "MR 2")
     with pytest.raises(Refused):
-        await session.run("/play m")
-    assert press.sent == [("a", "MR 1")]
-    assert [each.text for each in told(session, Failed)] == ["a: no"]
+        await press.run("/play m")
+    assert press.done == [] and len(press.heard(Failed)) == 1
 
 
-async def test_a_macro_that_plays_itself_is_refused(session, shop):
-    shop.put("press")
-    await session.open("/press")
-    session.macros.save(Macro("m", (Step(0.0, "/play n"),)))
-    session.macros.save(Macro("n", (Step(0.0, "/play m"),)))
+async def test_a_macro_that_plays_itself_is_refused(press):
+    press.session.macros.save(Macro("n", (Step(0.0, "/play m"),)))
+    save(press, "/play n")
     with pytest.raises(Diagnostic, match=r"macro n, step 1 .*: m would call itself: m -> n -> m; use /repeat"):
-        await session.run("/play m")
-    assert session.playing == []
+        await press.run("/play m")
+    assert press.session.playing == []
 
 
-async def test_a_key_plays_one_macro(session, shop):
-    shop.put("press")
-    await session.open("/press")
+async def test_a_key_plays_one_macro(press):
+    macros = press.session.macros
     for name in ("m", "n"):
-        for line in (f"/record {name}", "MR 1", "/record stop", f"/key f3 {name}"):
-            await session.run(line)
-    assert session.macros.by_key("F3").name == "n"
-    assert session.macros.load("m").key == ""
-    await session.run("/record n --replace")
-    await session.run("MR 2")
-    await session.run("/record stop")
-    assert session.macros.load("n").key == "F3"
-    await session.run("/key F3 off")
-    assert session.macros.by_key("F3") is None
+        await press.run(f"/record {name}", "MR 1", "/record stop", f"/key f3 {name}")
+    assert macros.by_key("F3").name == "n" and macros.load("m").key == ""
+    await press.run("/record n --replace", "MR 2", "/record stop")
+    assert macros.load("n").key == "F3"
+    await press.run("/key F3 off")
+    assert macros.by_key("F3") is None
 
 
-async def test_quit_is_for_the_front_end_to_see(session):
-    await session.run("/quit")
-    assert session.quitting and told(session, StateChanged)
+async def test_quit_is_for_the_front_end_to_see(press):
+    await press.run("/quit")
+    assert press.session.quitting and press.heard(StateChanged)

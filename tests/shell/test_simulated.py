@@ -10,28 +10,12 @@ from multidrop.shell.connect.settings import SavedConnection, Settings
 from multidrop.shell.events import Failed, Notified, OnBus, Output, Printed
 from multidrop.shell.session import Session
 from multidrop.transports import TransportLost
+from tests.support.cell_session import ETHERNET, bus, drive, party
 from tests.support.until import PATIENCE
 
 pytestmark = pytest.mark.virtual
 
-CELL = """
-[[bus]]
-name = "press"
-[[bus.drive]]
-personality = "LMDCM"
-name = "a"
-party = true
-set = { EM = 1, CK = 1 }
-[[bus.drive]]
-personality = "LMDCM"
-name = "b"
-party = true
-set = { EM = 2 }
-[[bus]]
-name = "eth"
-[[bus.drive]]
-personality = "LMDCE"
-"""
+CELL = bus("press", party("a"), drive("LMDCM", "b", party=True, EM=2), baud=0) + bus("eth", ETHERNET, baud=0)
 PROGRAM = "' a remark\nVA Q1\nPG 100\nLB Ga\nMR 100\nH\nE\nPG\n"
 
 

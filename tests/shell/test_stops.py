@@ -13,7 +13,8 @@ from multidrop.shell.automation import outcome
 from multidrop.shell.events import OnBus
 from multidrop.transports import TransportLost
 from tests.support.cell_session import ETHERNET, CellSession, bus, party, pmx
-from tests.support.virtual import in_virtual_time
+
+pytestmark = pytest.mark.virtual
 
 FLOOR = (bus("press", party("a"), party("b")), bus("eth", ETHERNET), bus("stages", pmx("00"), pmx("01")))
 ALL = ("@press:a SL 50000", "@press:b SL -50000", "@eth:! SL 30000", "@stages:00 JX+", "@stages:01 JY-")
@@ -62,7 +63,6 @@ def no_front_end(shop, monkeypatch):
 
 
 @pytest.mark.parametrize("defect", [no_transport, no_taking_back, no_dialect, no_line, no_watcher, no_front_end])
-@in_virtual_time
 async def test_what_fails_on_one_line_keeps_no_other_from_its_stop(defect, tmp_path, monkeypatch):
     async with CellSession(tmp_path, *FLOOR) as shop:
         await all_moving(shop)
@@ -85,7 +85,6 @@ async def test_what_fails_on_one_line_keeps_no_other_from_its_stop(defect, tmp_p
         assert shop.moving() == set()
 
 
-@in_virtual_time
 async def test_the_bytes_are_on_every_wire_before_anybody_hears_of_it(tmp_path):
     async with CellSession(tmp_path, *FLOOR) as shop:
         heard = []
@@ -102,7 +101,6 @@ async def test_the_bytes_are_on_every_wire_before_anybody_hears_of_it(tmp_path):
         assert any(isinstance(event, OnBus) for event, _ in heard)
 
 
-@in_virtual_time
 async def test_a_defect_in_a_stop_is_logged_and_not_swallowed(tmp_path, monkeypatch, caplog):
     async with CellSession(tmp_path, *FLOOR) as shop:
         no_transport(shop, monkeypatch)
@@ -111,7 +109,6 @@ async def test_a_defect_in_a_stop_is_logged_and_not_swallowed(tmp_path, monkeypa
         assert any(text.startswith("press: stop not sent (a defect: KeyError)") for text in shop.warned())
 
 
-@in_virtual_time
 async def test_stopped_is_said_when_every_drive_was_read_at_velocity_0_and_not_before(tmp_path):
     async with CellSession(tmp_path, *FLOOR) as shop:
         await all_moving(shop)
@@ -128,7 +125,6 @@ async def test_stopped_is_said_when_every_drive_was_read_at_velocity_0_and_not_b
         assert stop_report.headline(shop.session.tally()).startswith("■ STOPPED   all 5 read velocity 0")
 
 
-@in_virtual_time
 async def test_a_lost_bus_is_named_with_how_its_drives_were_last_seen(tmp_path):
     async with CellSession(tmp_path, bus("press", party("a")), bus("line", party("c"), party("d"))) as shop:
         await shop.session.run("@line:c SL 5000")
@@ -150,7 +146,6 @@ async def test_a_lost_bus_is_named_with_how_its_drives_were_last_seen(tmp_path):
         assert shop.moving() == {"line:c"}
 
 
-@in_virtual_time
 async def test_a_bus_that_is_lost_before_its_stop_was_seen_to_work_is_not_known(tmp_path):
     async with CellSession(tmp_path, bus("press", party("a")), bus("line", party("c"))) as shop:
         await shop.session.run("@line:c SL 50000")
@@ -163,7 +158,6 @@ async def test_a_bus_that_is_lost_before_its_stop_was_seen_to_work_is_not_known(
             await shop.session.run("@line:c PR P")
 
 
-@in_virtual_time
 async def test_a_silent_drive_and_one_in_program_mode_are_not_known(tmp_path):
     async with CellSession(tmp_path, bus("press", party("a"), party("b"), party("c"))) as shop:
         await shop.session.run("@b PG 1")
@@ -173,7 +167,6 @@ async def test_a_silent_drive_and_one_in_program_mode_are_not_known(tmp_path):
         assert stop_report.words(shop.session.tally()) == "1 stands, 2 NOT KNOWN: b, c - use the E-stop"
 
 
-@in_virtual_time
 async def test_what_an_operator_starts_behind_a_stop_is_not_said_to_stand(tmp_path):
     async with CellSession(tmp_path, bus("press", party("a"), party("b"))) as shop:
         shop.session.stop()
@@ -185,14 +178,13 @@ async def test_what_an_operator_starts_behind_a_stop_is_not_said_to_stand(tmp_pa
         assert "STOPPED" not in stop_report.headline(shop.session.tally())
 
 
-@in_virtual_time
 async def test_a_drive_that_begins_to_move_by_itself_behind_a_stop_is_told(tmp_path):
     async with CellSession(tmp_path, bus("press", party("a"))) as shop:
         shop.session.stop()
         await asyncio.sleep(2.0)
         assert shop.session.tally().stand
-        placed = shop._floor().floor.drives[0]
-        placed.device.execute("SL 5000", shop._floor().now())
+        placed = shop.floor.floor.drives[0]
+        placed.device.execute("SL 5000", shop.floor.now())
         await asyncio.sleep(1.0)
         await shop.session.selected.motion()
         assert stop_report.words(shop.session.tally()) == "1 MOVES: a"
@@ -210,7 +202,6 @@ async def test_a_drive_that_begins_to_move_by_itself_behind_a_stop_is_told(tmp_p
         ),
     ],
 )
-@in_virtual_time
 async def test_a_drive_that_slows_down_is_waited_for_and_one_that_does_not_is_stopped_again(
     speeds, said, tmp_path, monkeypatch
 ):
@@ -231,7 +222,6 @@ async def test_a_drive_that_slows_down_is_waited_for_and_one_that_does_not_is_st
 DWELLS = 'program_text = """\nPG 1\nLB G1\nH 60000\nBR G1\nE\nPG\n"""'
 
 
-@in_virtual_time
 async def test_a_program_that_a_stop_does_not_end_is_named_in_every_report_of_it(tmp_path):
     async with CellSession(tmp_path, bus("press", f"{party('a')}\n{DWELLS}", party("b"))) as shop:
         await shop.session.run("@a EX G1")
@@ -250,7 +240,6 @@ async def test_a_program_that_a_stop_does_not_end_is_named_in_every_report_of_it
         assert "1 RUNS A PROGRAM: a" in outcome(shop.session, [halt])[0]
 
 
-@in_virtual_time
 async def test_resume_tells_what_is_known(tmp_path):
     async with CellSession(tmp_path, bus("press", party("a"), party("b"))) as shop:
         shop.session.stop()
@@ -261,14 +250,13 @@ async def test_resume_tells_what_is_known(tmp_path):
         assert shop.told()[-1] == "macros and scripts may run again"
 
 
-@in_virtual_time
 async def test_a_stop_reaches_a_bus_whose_drives_are_still_being_looked_for(tmp_path):
     shop = CellSession(tmp_path, bus("press", party("a")), bus("line", party("c", ES=3)))
     opening = asyncio.create_task(shop.session.open(shop.url))
     while "line" not in shop.session.buses:
         await asyncio.sleep(0)
-    placed = shop._floor().floor.drives[1]
-    placed.device.execute("SL 5000", shop._floor().now())
+    placed = shop.floor.floor.drives[1]
+    placed.device.execute("SL 5000", shop.floor.now())
     assert not shop.session.buses["press"].drives, "the first is being identified, the second has yet to wait"
     shop.session.stop()
     with pytest.raises(Stopped):
@@ -278,7 +266,6 @@ async def test_a_stop_reaches_a_bus_whose_drives_are_still_being_looked_for(tmp_
 
 
 @pytest.mark.parametrize("turns", range(5))
-@in_virtual_time
 async def test_a_stop_in_the_middle_of_a_close_leaves_no_open_port_that_it_does_not_reach(turns, tmp_path):
     async with CellSession(tmp_path, bus("press", party("a")), bus("line", party("b"))) as shop:
         press = shop.session.buses["press"]

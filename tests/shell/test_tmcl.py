@@ -11,42 +11,21 @@ from multidrop.dialects import Diagnostic, DriveError, Inexpressible, NoAnswer, 
 from multidrop.dialects.families import TABLE
 from multidrop.drives.events import Sample, Unsolicited
 from multidrop.drives.stopping import stop_forms
-from multidrop.shell.connect.settings import Settings
 from multidrop.shell.connect.urls import parse as parse_url
 from multidrop.shell.events import By, Notified, OnBus, Output, Printed
 from multidrop.shell.prompt.complete import complete, hint
-from multidrop.shell.session import Session
+from tests.support.cell_session import bus, drive, session_on
 from tests.support.until import PATIENCE
 
 pytestmark = pytest.mark.virtual
 
-CELL = """
-[[bus]]
-name = "slide"
-baud = 9600
-[[bus.drive]]
-personality = "TMCM"
-[[bus.drive]]
-personality = "TMCM"
-name = "7"
-set = { G75 = 2 }
-[[bus]]
-name = "press"
-[[bus.drive]]
-personality = "LMDCM"
-"""
+CELL = bus("slide", drive("TMCM"), drive("TMCM", "7", G75=2)) + bus("press", drive("LMDCM"), baud=0)
 
 
 @pytest.fixture
 async def session(tmp_path):
-    (tmp_path / "cell.toml").write_text(CELL)
-    made = Session(Settings({}, tmp_path / "config", tmp_path / "state"))
-    made.questions.agreed = True
-    made.events = []
-    made.subscribe(made.events.append)
-    await made.open(f"sim:{tmp_path / 'cell.toml'}")
-    yield made
-    await made.close()
+    async with session_on(tmp_path, CELL, agreed=True) as made:
+        yield made
 
 
 async def say(session, *lines):

@@ -10,7 +10,8 @@ from multidrop.shell.events import Notified
 from multidrop.shell.transcripts import EVERYTHING, Filter
 from tests.support.cases import for_each
 from tests.support.cell_session import CellSession, bus, party
-from tests.support.virtual import in_virtual_time
+
+pytestmark = pytest.mark.virtual
 
 CELL = bus("press", party("a"), party("b"))
 
@@ -46,7 +47,6 @@ class Shelf:
         ("/filter off", EVERYTHING),
     ],
 )
-@in_virtual_time
 async def test_a_filter_is_understood(line: str, wanted: Filter, tmp_path: Path) -> None:
     async with CellSession(tmp_path, CELL) as cell:
         shelf = cell.session.front.transcripts = Shelf()
@@ -68,7 +68,6 @@ async def test_a_filter_is_understood(line: str, wanted: Filter, tmp_path: Path)
         ("/unsent now", "usage"),
     ],
 )
-@in_virtual_time
 async def test_a_wrong_line_changes_nothing(line: str, why: str, tmp_path: Path) -> None:
     async with CellSession(tmp_path, CELL) as cell:
         shelf = cell.session.front.transcripts = Shelf()
@@ -77,7 +76,6 @@ async def test_a_wrong_line_changes_nothing(line: str, why: str, tmp_path: Path)
         assert (shelf.wanted, shelf.times, shelf.offered) == (EVERYTHING, "clock", 0)
 
 
-@in_virtual_time
 async def test_times_go_round_and_are_kept(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("MULTIDROP_CONFIG_DIR", str(tmp_path))
     file = tmp_path / "multidrop.toml"
@@ -96,7 +94,6 @@ async def test_times_go_round_and_are_kept(tmp_path: Path, monkeypatch: pytest.M
         assert file.read_text() == "[["
 
 
-@in_virtual_time
 async def test_without_a_screen_they_are_refused_in_one_line(tmp_path: Path) -> None:
     async with CellSession(tmp_path, CELL) as cell:
         for line in ("/times off", "/filter mine", "/save talk.txt", "/unsent"):

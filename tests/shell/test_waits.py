@@ -8,51 +8,23 @@ from pathlib import Path
 import pytest
 
 from multidrop.dialects import Diagnostic, DriveError
-from multidrop.shell.connect.settings import Settings
 from multidrop.shell.lines import each_names_one_drive
 from multidrop.shell.session import Session
 from multidrop.shell.waits import condition
+from tests.support.cell_session import bus, party, pmx, session_on
 
 pytestmark = pytest.mark.virtual
 
-CELL = """
-[[bus]]
-name = "press"
-[[bus.drive]]
-personality = "LMDCM"
-name = "a"
-party = true
-set = { EM = 1, VM = 512000 }
-[bus.drive.world]
-inputs = [[0.0, 1, 1], [3.0, 1, 0], [4.0, 1, 1]]
-[[bus.drive]]
-personality = "LMDCM"
-name = "b"
-party = true
-set = { EM = 1 }
-program_text = '''
-PG 100
-LB Ga
-H 2000
-PR "ready: 7"
-E
-PG
-'''
-[[bus]]
-name = "pmx"
-[[bus.drive]]
-personality = "PMX"
-name = "00"
-"""
+SWITCHED = "[bus.drive.world]\ninputs = [[0.0, 1, 1], [3.0, 1, 0], [4.0, 1, 1]]"
+READY = "program_text = '''\nPG 100\nLB Ga\nH 2000\nPR \"ready: 7\"\nE\nPG\n'''"
+CELL = bus("press", party("a", SWITCHED, CK=0, VM=512000), party("b", READY, CK=0), baud=0)
+CELL += bus("pmx", pmx("00"), baud=0)
 
 
 @pytest.fixture
 async def session(tmp_path: Path) -> AsyncIterator[Session]:
-    (tmp_path / "cell.toml").write_text(CELL)
-    session = Session(Settings({}, tmp_path, tmp_path / "state"))
-    await session.open(f"sim:{tmp_path / 'cell.toml'}")
-    yield session
-    await session.close()
+    async with session_on(tmp_path, CELL) as made:
+        yield made
 
 
 @pytest.mark.parametrize(

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import json
+from collections.abc import AsyncIterator, Sequence
+from contextlib import asynccontextmanager
 from pathlib import Path
 from typing import Any
 
@@ -11,23 +14,38 @@ from multidrop.shell.events import Failed, Notified, OnBus, Output, Printed
 from multidrop.shell.session import Session
 
 
-def bus(name: str, *drives: str, baud: int = 9600) -> str:
-    """A bus of a cell file; a drive is its lines."""
-    return f'[[bus]]\nname = "{name}"\nbaud = {baud}\n' + "".join(f"[[bus.drive]]\n{each}\n" for each in drives)
+def bus(name: str, *drives: str, baud: int = 9600, serve: Sequence[str] = ()) -> str:
+    """A bus of a cell file; a drive is its lines. `serve`: where it is served."""
+    served = f"serve = {json.dumps(serve)}\n" if serve else ""
+    return f'[[bus]]\nname = "{name}"\n{served}baud = {baud}\n' + "".join(f"[[bus.drive]]\n{each}\n" for each in drives)
 
 
-def party(name: str, **settings: int) -> str:
+def drive(personality: str, name: str = "", *lines: str, party: bool = False, **settings: int) -> str:
+    """A drive, as it is from the factory but for these settings; further lines of its table."""
+    table = f'personality = "{personality}"\n'
+    if name:
+        table += f'name = "{name}"\n'
+    if party:
+        table += "party = true\n"
+    if settings:
+        table += "set = { " + ", ".join(f"{key} = {value}" for key, value in settings.items()) + " }\n"
+    return table + "\n".join(lines)
+
+
+def party(name: str, *lines: str, **settings: int) -> str:
     """A drive on a party line."""
-    values = ", ".join(f"{key} = {value}" for key, value in {"EM": 1, "CK": 1, **settings}.items())
-    return f'personality = "LMDCM"\nname = "{name}"\nparty = true\nset = {{ {values} }}'
+    return drive("LMDCM", name, *lines, party=True, **{"EM": 1, "CK": 1, **settings})
 
 
 ETHERNET = 'personality = "LMDCE"'
 
 
-def pmx(number: str) -> str:
+TCP = ["tcp://127.0.0.1:0"]
+
+
+def pmx(number: str, *lines: str) -> str:
     """A controller with its device number."""
-    return f'personality = "PMX"\nname = "{number}"'
+    return drive("PMX", number, *lines)
 
 
 def moves(device: Any, now: float) -> bool:
@@ -35,6 +53,21 @@ def moves(device: Any, now: float) -> bool:
     if hasattr(device, "controller"):
         return any(axis.pulses.profile.moving(now) or axis.homing is not None for axis in device.controller.axes)
     return bool(device.moving(now))
+
+
+@asynccontextmanager
+async def session_on(folder: Path, cell: str, *, opened: bool = True, agreed: bool = False) -> AsyncIterator[Any]:
+    """A session on a cell, opened unless told otherwise; `events` is all that it told."""
+    (folder / "cell.toml").write_text(cell)
+    session: Any = Session(Settings({}, folder / "config", folder / "state"))
+    session.questions.agreed, session.events = agreed, []
+    session.subscribe(session.events.append)
+    try:
+        if opened:
+            await session.open(f"sim:{folder / 'cell.toml'}")
+        yield session
+    finally:
+        await session.close()
 
 
 class CellSession:
@@ -59,24 +92,26 @@ class CellSession:
     async def __aexit__(self, *_: object) -> None:
         await self.session.close()
 
-    def _floor(self) -> Any:
+    @property
+    def floor(self) -> Any:
+        """The simulated cell, which runs."""
         return next(iter(self.session.cells.values()))
 
     def moving(self) -> set[str]:
         """Which drives move, in the simulator."""
-        floor = self._floor()
+        floor = self.floor
         return {
             f"{placed.bus}:{placed.spec.name}" for placed in floor.floor.drives if moves(placed.device, floor.now())
         }
 
     def device(self, name: str) -> Any:
         """A simulated drive, as `bus:name`."""
-        drives = self._floor().floor.drives
+        drives = self.floor.floor.drives
         return next(placed.device for placed in drives if f"{placed.bus}:{placed.spec.name}" == name)
 
     def world(self, command: str) -> None:
         """A `/sim` line."""
-        self._floor().command(command)
+        self.floor.command(command)
 
     def told(self, *kinds: type) -> list[str]:
         """What was narrated or failed."""

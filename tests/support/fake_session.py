@@ -6,7 +6,8 @@ from __future__ import annotations
 
 import asyncio
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import AsyncIterator, Callable, Sequence
+from contextlib import asynccontextmanager
 from dataclasses import dataclass, field, replace
 from datetime import datetime, timedelta
 from types import SimpleNamespace
@@ -419,12 +420,57 @@ def a_talk(session: FakeSession) -> list[SessionEvent]:
     ]
 
 
-def make_app(session: FakeSession | None = None, *urls: str, theme: str = "multidrop-dark") -> MultidropApp:
+def make_app(
+    session: FakeSession | None = None, *urls: str, theme: str = "multidrop-dark", assist: Assist | None = None
+) -> MultidropApp:
     """The app on a session; an empty theme lets the app choose."""
-    app = MultidropApp(session or demo_session(), urls, FakeAssist())
+    app = MultidropApp(session or demo_session(), urls, assist or FakeAssist())
     app.theme = theme or app.theme
     app.view.show_signs(Signs.FULL)
     return app
+
+
+@asynccontextmanager
+async def on_screen(
+    session: FakeSession | None = None, width: int = 80, height: int = 24
+) -> AsyncIterator[tuple[Pilot[int], MultidropApp, FakeSession]]:
+    """The app on a session, that of the demo unless another is given, while it runs."""
+    session = session or demo_session()
+    app = make_app(session)
+    async with app.run_test(size=(width, height)) as pilot:
+        yield pilot, app, session
+
+
+async def press(pilot: Pilot[int], *keys: str) -> None:
+    """Press keys, and let the screen take in what follows from them."""
+    await pilot.press(*keys)
+    await settle(pilot)
+
+
+async def emit(pilot: Pilot[int], *happened: SessionEvent) -> None:
+    """Publish events of the session, and let the screen take them in."""
+    pilot.app.session.emit(*happened)  # type: ignore[attr-defined]
+    await settle(pilot)
+
+
+def driver_of(app: Any) -> Any:
+    """The driver of an app that runs; Textual has no public name for it."""
+    return app._driver
+
+
+def painted(screen: Any) -> list[Any]:
+    """The rows of a screen as they are painted."""
+    return screen._compositor.render_strips(screen.app.size)
+
+
+def toasts(app: MultidropApp) -> list[str]:
+    """The notes that are shown over the screen."""
+    return [str(each.message) for each in app._notifications]
+
+
+def readable(pilot: Pilot[int]) -> None:
+    """Keys have paused after the screen changed by itself: they count from here on."""
+    pilot.app.keyboard._deaf_until = 0.0  # type: ignore[attr-defined]
 
 
 async def settle(pilot: Pilot[int]) -> None:

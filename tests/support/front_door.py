@@ -1,24 +1,27 @@
-"""The command line in the test's own process: arguments in; exit code and output out."""
+"""The command line: in the test's own process, as processes on pipes and terminals, and beside a served cell."""
 
 from __future__ import annotations
 
 import contextlib
 import functools
 import io
+import json
 import os
-from collections.abc import Callable
-from dataclasses import dataclass
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Any, NamedTuple
 from unittest import mock
 
 import pytest
 
 from multidrop.__main__ import main
-from tests.support.processes import environment
+from tests.support.processes import Running, environment
+from tests.support.until import PATIENCE
 
 
-@dataclass(frozen=True)
-class Done:
+class Done(NamedTuple):
     """How a command ended, and what it printed."""
 
     returncode: int
@@ -47,3 +50,113 @@ def command(folder: Path, *arguments: str, stdin: str = "") -> Done:
 def multidrop(tmp_path: Path) -> Command:
     """Run commands in the folder of the test."""
     return functools.partial(command, tmp_path)
+
+
+class Home:
+    """A folder with a configuration and a state of its own, the processes that work in it, and its served cell."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        self.started: list[subprocess.Popen[str]] = []
+        self.terminals: list[Any] = []
+        self.sim: Running | None = None
+        self.endpoints: dict[str, dict[str, str]] = {}
+        """Of the served cell: by bus and scheme."""
+
+    def file(self, name: str, text: str | bytes) -> str:
+        """Write a file; return its name."""
+        path = self.folder / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_bytes(text if isinstance(text, bytes) else text.encode())
+        return name
+
+    def script(self, text: str) -> str:
+        return self.file("script.txt", text)
+
+    def settings(self, text: str) -> None:
+        self.file("conf/multidrop.toml", text)
+
+    def macro(self, name: str, *lines: str, key: str = "") -> None:
+        """Keep a macro of these lines, without a pause between them."""
+        steps = "".join(f"[[step]]\nafter = 0.0\nline = '''{line}'''\n" for line in lines)
+        self.file(f"conf/macros/{name}.toml", f"name = '{name}'\nkey = '{key}'\n{steps}")
+
+    def serve(self, cell: str = "") -> Home:
+        """Serve a cell, the shipped one without a text, in a process of its own."""
+        files = [self.file("cell.toml", cell)] if cell else []
+        self.sim = Running("sim", *files, "--json", folder=self.folder)
+        for line in self.sim.until('{"ready": true}')[:-1]:
+            fact = json.loads(line)
+            self.endpoints.setdefault(fact["bus"], {})[fact["endpoint"].partition(":")[0]] = fact["endpoint"]
+        return self
+
+    def port(self, bus: str) -> int:
+        return int(self.endpoints[bus]["tcp"].rpartition(":")[2])
+
+    def run(self, *arguments: str, stdin: str = "") -> Done:
+        """Run a command that needs no process of its own."""
+        return command(self.folder, *arguments, stdin=stdin)
+
+    def start(self, *arguments: str, stdin: Any = subprocess.PIPE, **more: Any) -> subprocess.Popen[str]:
+        """Start a process on pipes."""
+        process = subprocess.Popen(
+            [sys.executable, "-m", "multidrop", *arguments],
+            **{"stdin": stdin, "stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
+            | {"cwd": self.folder, "env": environment(self.folder)}
+            | more,
+        )
+        self.started.append(process)
+        return process
+
+    def process(self, *arguments: str, stdin: str | None = None, **more: Any) -> Done:
+        """Run a process to its end; `stdin`: what it is given to read, nothing without one."""
+        process = self.start(*arguments, stdin=subprocess.DEVNULL if stdin is None else subprocess.PIPE, **more)
+        out, err = process.communicate(stdin, timeout=PATIENCE)
+        return Done(process.returncode, out, err)
+
+    def terminal(self, *arguments: str, columns: int = 80) -> Any:
+        """Start a process on a pseudo-terminal of its own."""
+        import pexpect
+
+        child = pexpect.spawn(
+            sys.executable,
+            ["-m", "multidrop", *arguments],
+            cwd=self.folder,
+            env=environment(self.folder),
+            timeout=PATIENCE,
+            encoding="utf-8",
+            dimensions=(24, columns),
+        )
+        child.delaybeforesend = None
+        self.terminals.append(child)
+        return child
+
+    def end_all(self) -> None:
+        """End the processes of a test."""
+        for child in self.terminals:
+            child.close(force=True)
+        self.terminals.clear()
+        for process in self.started:
+            process.kill()
+            process.wait(PATIENCE)
+            for stream in (process.stdin, process.stdout, process.stderr):
+                with contextlib.suppress(BrokenPipeError):
+                    if stream is not None:
+                        stream.close()
+        self.started.clear()
+
+    def close(self) -> None:
+        """End every process, the served cell last."""
+        self.end_all()
+        if self.sim is not None:
+            if self.sim.process.poll() is None:
+                self.sim.process.terminate()
+            assert self.sim.end() == 0 or sys.platform == "win32", self.sim.errors
+
+
+@pytest.fixture
+def home(tmp_path: Path) -> Iterator[Home]:
+    """The folder of the test, whose processes end with it."""
+    made = Home(tmp_path)
+    yield made
+    made.close()

@@ -1,9 +1,8 @@
 """Shared by the tests: simulated MCode drives that are their own witnesses, and what a host knows of them."""
 
-from random import Random
-
 from multidrop.dialects.mcode.host.codec import MCode
 from multidrop.dialects.mcode.host.state import MCodeState
+from tests.support.faults import disturb
 
 MODES = [(em, party, check) for em in range(4) for party in (False, True) for check in range(3)]
 
@@ -24,6 +23,19 @@ class Witness:
 
     def executed(self, text):
         return [line for line in self.lines if line[0] == text.strip() and not line[1] and not line[2]]
+
+
+def one_drive(bench, em=0, party=False, check=0, product="", baud=0, **table):
+    """A drive in that mode on a bench, and what is known of it."""
+    name = "a" if party else "!"
+    settings = {"EM": em, **({"CK": check} if check else {}), **table.pop("set", {})}
+    desk = bench([{"name": name, "party": party, "set": settings, **table}], baud=baud)
+    desk.wire.receive(b"\n\n", 0.0)  # two line feeds make party mode effective
+    desk.wait(0.5)
+    desk.line.events(desk.now)
+    desk.strays.clear()
+    codec = MCode(em=em, party=party, checksum=check, escape=1)
+    return desk, MCodeState(codec, name if party else "", name, product)
 
 
 class Desk:
@@ -52,7 +64,7 @@ class Desk:
             for name, (em, check) in zip(names, modes, strict=True)
         ]
         if faults:
-            self.bench.wire._faults, self.bench.wire._rng = faults, Random(seed)
+            disturb(self.bench.wire, faults, seed)
 
     @property
     def state(self):

@@ -17,6 +17,7 @@ from multidrop.dialects.families import family_of
 from multidrop.dialects.mcode.host.codec import MCode
 from multidrop.dialects.mcode.host.state import MCodeState
 from multidrop.simulator.cell.spec import Faults
+from tests.support.faults import disturb
 from tests.support.mcode_drives import Witness
 from tests.support.procedure import ProcedureRunner
 
@@ -61,7 +62,7 @@ class Crowd:
             for line in PROGRAM:
                 self.devices["c"].execute(line, self.bench.now)
         self.bench.line.events(self.bench.now)
-        self.bench.wire._faults, self.bench.wire._rng = faults, Random(seed)
+        disturb(self.bench.wire, faults, seed)
 
     def fresh(self, name: str, signs: bool) -> DriveState:
         return MCodeState(self.mode, name, name, "LMDCM", signs=signs)

@@ -17,6 +17,7 @@ from textual.geometry import Size
 
 from multidrop.tui.app import MultidropApp
 from multidrop.tui.terminal.driver import Terminal
+from tests.support.fake_session import FakeAssist, FakeSession, demo_session, driver_of
 from tests.support.until import PATIENCE
 
 
@@ -39,8 +40,7 @@ class PtyScreen:
     @property
     def at_rest(self) -> bool:
         """True if everything written has been done."""
-        keys = self.app._driver.keys  # type: ignore[union-attr]
-        app = self.app
+        app, keys = self.app, driver_of(self.app).keys
         done = app.keyboard.idle and app.outbox.idle and not app.message_queue_size
         return bool(self.taken >= self.written and keys.idle and done)
 
@@ -119,13 +119,14 @@ async def on_a_pty(make: Callable[[type[Driver]], MultidropApp]) -> AsyncIterato
         await screen.until(lambda: running.done() or app.keyboard._awake)
         if running.done():
             running.result()
-        take = app._driver.keys.take  # type: ignore[union-attr]
+        keys = driver_of(app).keys
+        take = keys.take
 
         def counted(data: bytes) -> None:
             take(data)
             screen.count(data)
 
-        app._driver.keys.take = counted  # type: ignore[union-attr]
+        keys.take = counted
         await screen.rest()
         yield screen
     finally:
@@ -135,3 +136,11 @@ async def on_a_pty(make: Callable[[type[Driver]], MultidropApp]) -> AsyncIterato
         loop.remove_reader(master)
         os.close(master)
         os.close(slave)
+
+
+@asynccontextmanager
+async def demo(session: FakeSession | None = None) -> AsyncIterator[tuple[PtyScreen, FakeSession, FakeAssist]]:
+    """The app on a session, that of the demo unless another is given."""
+    session, assist = session or demo_session(), FakeAssist()
+    async with on_a_pty(lambda driver: MultidropApp(session, [], assist, driver)) as screen:
+        yield screen, session, assist

@@ -3,44 +3,23 @@
 from __future__ import annotations
 
 import fcntl
-import json
 import re
 import signal
 import socket
 import struct
-import sys
 import termios
 import time
 
-import pexpect
 import pytest
 
 from multidrop.dialects.mcode.host.codec import MCode
 from multidrop.dialects.mcode.host.framing import sealed
-from tests.support.processes import Running, environment
+from tests.support.cell_session import TCP, bus, party
+from tests.support.front_door import Home
 from tests.support.until import PATIENCE
 
-CELL = """
-[[bus]]
-name = "press"
-serve = ["tcp://127.0.0.1:0"]
-baud = 0
-[[bus.drive]]
-personality = "LMDCM"
-name = "b"
-party = true
-set = { EM = 1, CK = 1 }
-[[bus]]
-name = "noisy"
-serve = ["tcp://127.0.0.1:0"]
-baud = 0
-[[bus.drive]]
-personality = "LMDCM"
-name = "a"
-party = true
-set = { EM = 1, CK = 1 }
-program = "noise.mxt"
-"""
+CELL = bus("press", party("b"), baud=0, serve=TCP)
+CELL += bus("noisy", party("a", 'program = "noise.mxt"'), baud=0, serve=TCP)
 NOISE = """PG 1
 LB G1
 PR "noise noise noise noise noise noise noise noise noise"
@@ -56,38 +35,19 @@ FLOOD = 250_000
 LOG = "seen.log"
 
 
-class Shop:
+class Shop(Home):
     """A served cell with a quiet drive b on `press` and, on `noisy`, a drive a whose program prints without end."""
 
     def __init__(self, folder):
-        self.folder = folder
-        (folder / "cell.toml").write_text(CELL)
-        (folder / "noise.mxt").write_text(NOISE)
-        self.sim = Running("sim", "cell.toml", "--json", folder=folder)
-        told = [json.loads(line) for line in self.sim.until('{"ready": true}')[:-1]]
-        self.ports = {each["bus"]: int(each["endpoint"].rpartition(":")[2]) for each in told}
-        self.port = self.ports["noisy"]
+        super().__init__(folder)
+        self.file("noise.mxt", NOISE)
+        self.serve(CELL)
         known = "party=1&checksum=1&em=1&timeout=20"  # the cell is a process of its own, which a busy machine delays
         self.urls = {
-            each["bus"]: f"{each['endpoint']}?drives={name}&{known}" for each, name in zip(told, "ba", strict=True)
+            line: f"{self.endpoints[line]['tcp']}?drives={name}&{known}"
+            for line, name in (("press", "b"), ("noisy", "a"))
         }
-        (folder / "conf").mkdir()
-        saved = "".join(f"[connections.{bus}]\nurl = '{url}'\n" for bus, url in self.urls.items())
-        (folder / "conf" / "multidrop.toml").write_text(saved)
-        self.terminals = []
-
-    def terminal(self, *arguments):
-        child = pexpect.spawn(
-            sys.executable, ["-m", "multidrop", *arguments], cwd=self.folder, env=environment(self.folder),
-            timeout=PATIENCE, encoding="utf-8", dimensions=(24, 80),
-        )  # fmt: skip
-        child.delaybeforesend = None
-        self.terminals.append(child)
-        return child
-
-    def script(self, text):
-        (self.folder / "script.txt").write_text(text)
-        return "script.txt"
+        self.settings("".join(f"[connections.{line}]\nurl = '{url}'\n" for line, url in self.urls.items()))
 
     def has_seen(self, size):
         """Whether the log of a session, which `/log seen.log` began, has lines of so many bytes: what it worked off.
@@ -99,28 +59,22 @@ class Shop:
 
     def velocity(self):
         """Of drive b, steps a second."""
-        with socket.create_connection(("127.0.0.1", self.ports["press"]), 3.0) as wire:
+        with socket.create_connection(("127.0.0.1", self.port("press")), 3.0) as wire:
             return int(_asked(wire, b'bPR "<",V,">"', rb"<(-?\d+)>"))
 
     def leave(self):
         """End every terminal, and what the drives do."""
-        for child in self.terminals:
-            child.close(force=True)
-        self.terminals.clear()
+        self.end_all()
         (self.folder / LOG).unlink(missing_ok=True)
-        for bus, name in (("noisy", "a"), ("press", "b")):
-            self._stop(bus, name)
+        self._stop("noisy", "a")
+        self._stop("press", "b")
         until(lambda: self.velocity() == 0, "the drive goes on")
 
-    def _stop(self, bus, name):
+    def _stop(self, line, name):
         """Stop a drive, and wait until it has: it answers in order, and what it printed before is before that."""
-        with socket.create_connection(("127.0.0.1", self.ports[bus]), 3.0) as wire:
+        with socket.create_connection(("127.0.0.1", self.port(line)), 3.0) as wire:
             wire.sendall(MCode(party=True).stop([name], sure=False) + b"\n")
             _asked(wire, name.encode() + b'PR "qu","iet"', rb"(quiet)")
-
-    def close(self):
-        self.sim.process.terminate()
-        assert self.sim.end() == 0
 
 
 def _asked(wire, line, answer):

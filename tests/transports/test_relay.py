@@ -2,23 +2,44 @@
 
 from __future__ import annotations
 
+import asyncio
 import os
 import select
+import socket
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
 from dataclasses import dataclass, field
 
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from multidrop.transports import relay
-from multidrop.transports.relay import CREDIT, GREETING, MOST, Frames, Garbled, Kind, Relay, Setting, frame
-from multidrop.transports.relay_pipe import RelayEndpoint
+from multidrop.transports import TransportLost, relay
+from multidrop.transports.relay import (
+    BEAT,
+    CREDIT,
+    GREETING,
+    MISSED,
+    MOST,
+    Frames,
+    Garbled,
+    Kind,
+    Relay,
+    Setting,
+    frame,
+)
+from multidrop.transports.relay_pipe import RelayEndpoint, RelayPipe
 from multidrop.transports.serial_ports import lock_owner
-from tests.support.lent_port import lent
+from tests.support.lent_port import SocketConnection, lent
 
 FRAMES = st.lists(st.tuples(st.sampled_from(Kind), st.binary(max_size=40)), max_size=20)
 HELD = 16
 """Bytes that the driver of the port holds."""
+
+
+@pytest.fixture
+def both():
+    return Both()
 
 
 @given(FRAMES, st.integers(1, 7))
@@ -172,8 +193,7 @@ class Both:
             self.far.push()
 
 
-def test_no_more_leaves_than_the_credit_until_the_port_has_sent() -> None:
-    both = Both()
+def test_no_more_leaves_than_the_credit_until_the_port_has_sent(both: Both) -> None:
     assert both.write(b"x" * 1000) == CREDIT
     assert both.write(b"x") == 0
     both.deliver()
@@ -189,8 +209,7 @@ def test_no_more_leaves_than_the_credit_until_the_port_has_sent() -> None:
     assert bytes(both.port.sent) == b"x" * (CREDIT + 10)
 
 
-def test_the_stop_is_the_next_that_a_blocked_port_sends() -> None:
-    both = Both()
+def test_the_stop_is_the_next_that_a_blocked_port_sends(both: Both) -> None:
     both.write(b"MR 51200\r" * 100)
     both.deliver()
     assert len(both.port.held) == HELD and both.far.queue
@@ -202,8 +221,7 @@ def test_the_stop_is_the_next_that_a_blocked_port_sends() -> None:
     assert bytes(both.port.sent) == stop
 
 
-def test_a_drop_is_obeyed_ahead_of_what_came_with_it() -> None:
-    both = Both()
+def test_a_drop_is_obeyed_ahead_of_what_came_with_it(both: Both) -> None:
     both.write(b"MR 51200\r")
     both.near.drop()
     both.write(b"\x1b")
@@ -243,8 +261,7 @@ def test_whatever_is_on_its_way_a_stop_follows_only_what_was_sent_before_it(data
     assert both.near.unsent() == 0 and both.near.room == CREDIT
 
 
-def test_of_what_arrives_after_too_long_a_silence_only_a_stop_is_passed_on() -> None:
-    both = Both()
+def test_of_what_arrives_after_too_long_a_silence_only_a_stop_is_passed_on(both: Both) -> None:
     both.far.late(frame(Kind.DATA, b"MR 51200\r") + frame(Kind.BEAT))
     both.send_all()
     assert bytes(both.port.sent) == b""
@@ -253,8 +270,7 @@ def test_of_what_arrives_after_too_long_a_silence_only_a_stop_is_passed_on() -> 
     assert bytes(both.port.sent) == b"\x1b"
 
 
-def test_a_way_that_is_full_gets_the_rest_of_a_frame_first() -> None:
-    both = Both()
+def test_a_way_that_is_full_gets_the_rest_of_a_frame_first(both: Both) -> None:
     both.way.full = True
     assert both.write(b"PR P\r") == 5
     assert both.near.blocked
@@ -267,8 +283,7 @@ def test_a_way_that_is_full_gets_the_rest_of_a_frame_first() -> None:
     assert bytes(both.port.sent) == b"\x1b"
 
 
-def test_bytes_of_the_port_come_back_in_order_and_its_loss_is_named() -> None:
-    both = Both()
+def test_bytes_of_the_port_come_back_in_order_and_its_loss_is_named(both: Both) -> None:
     both.port.arrived += [bytes(range(256)) * 40, b"51200\r\n"]
     assert both.far.read() and both.far.read() and both.far.read()
     assert both.answer(1) == b""
@@ -296,9 +311,8 @@ def test_an_end_without_a_word_of_the_relay_quotes_ssh() -> None:
     ],
 )
 def test_settings_of_the_port_change_and_a_refusal_is_named(
-    setting: int, value: int, done: list[tuple[str, int]], outcome: str
+    setting: int, value: int, done: list[tuple[str, int]], outcome: str, both: Both
 ) -> None:
-    both = Both()
     both.near.send(frame(Kind.SET, bytes([3, setting]) + value.to_bytes(4)))
     both.deliver()
     both.answer()
@@ -306,8 +320,7 @@ def test_settings_of_the_port_change_and_a_refusal_is_named(
     assert both.near.outcome(3) == outcome
 
 
-def test_a_sign_of_life_is_replied_to_and_no_outcome_is_waited_for_at_the_end() -> None:
-    both = Both()
+def test_a_sign_of_life_is_replied_to_and_no_outcome_is_waited_for_at_the_end(both: Both) -> None:
     both.near.send(frame(Kind.BEAT))
     both.deliver()
     both.answer()
@@ -323,8 +336,7 @@ def test_input_that_is_not_of_multidrop_ends_the_relay(data: bytes) -> None:
         Both().far.receive(data)
 
 
-def test_output_that_is_not_of_a_relay_is_a_loss() -> None:
-    both = Both()
+def test_output_that_is_not_of_a_relay_is_a_loss(both: Both) -> None:
     both.way.back += b"bash: warning\n"
     with pytest.raises(OSError, match="not of a relay"):
         both.near.read()
@@ -355,3 +367,75 @@ def test_a_relay_that_gets_no_sign_of_life_ends_and_frees_its_port() -> None:
     finally:
         os.close(master)
         os.close(slave)
+
+
+# The near side over time
+
+
+@asynccontextmanager
+async def pipe(early: bytes = b"") -> AsyncIterator[tuple[RelayPipe, socket.socket, bytearray, list[TransportLost]]]:
+    ours, theirs = socket.socketpair()
+    theirs.setblocking(False)
+    data, losses = bytearray(), []
+    with theirs:
+        transport = RelayPipe(SocketConnection(ours), 9600, early)
+        try:
+            yield transport, theirs, data, losses
+        finally:
+            await transport.close()
+
+
+@pytest.mark.virtual
+async def test_a_far_side_that_does_not_reply_is_lost_after_three_signs_of_life() -> None:
+    async with pipe() as (transport, _, data, losses):
+        transport.start(data.extend, losses.append)
+        began = asyncio.get_running_loop().time()
+        while not losses:
+            await asyncio.sleep(0.1)
+        assert asyncio.get_running_loop().time() - began == pytest.approx(MISSED * BEAT, abs=0.2)
+        assert "has not replied for 4.5 s" in str(losses[0])
+        assert not transport.write(b"MR 51200\r")
+
+
+@pytest.mark.virtual
+async def test_a_far_side_that_replies_is_kept_and_one_that_is_not_read_yet_is_not_missed() -> None:
+    async with pipe() as (transport, far, data, losses):
+        await asyncio.sleep(10 * BEAT)
+        transport.start(data.extend, losses.append)
+        asked = Frames()
+        for _ in range(100):
+            await asyncio.sleep(BEAT)
+            replies = sum(kind is Kind.BEAT for kind, _ in asked.take(far.recv(1000)))
+            far.send(frame(Kind.BEAT) * replies)
+        assert losses == []
+
+
+@pytest.mark.virtual
+async def test_what_came_with_the_greeting_is_delivered_first() -> None:
+    async with pipe(frame(Kind.DATA, b"512") + frame(Kind.DATA)[:1]) as (transport, far, data, losses):
+        transport.start(data.extend, losses.append)
+        far.send(frame(Kind.DATA, b"00\r\n")[1:])
+        while len(data) < 7:
+            await asyncio.sleep(0.1)
+        assert data == b"51200\r\n" and losses == []
+
+
+@pytest.mark.virtual
+@pytest.mark.parametrize(
+    ("last", "reason"),
+    [
+        (frame(Kind.LOST, b"the port is gone (unplugged)"), "the port is gone (unplugged)"),
+        (frame(Kind.DATA, b"half of a frame")[:9], "the connection has ended; check the network"),
+        (b"Connection to pc closed.", "not of a relay"),
+    ],
+)
+async def test_every_end_is_one_loss_with_a_reason(last: bytes, reason: str) -> None:
+    async with pipe() as (transport, far, data, losses):
+        transport.start(data.extend, losses.append)
+        far.send(frame(Kind.DATA, b"51200\r\n") + last)
+        far.shutdown(socket.SHUT_RDWR)
+        while not losses:
+            await asyncio.sleep(0.1)
+        await asyncio.sleep(20.0)
+        assert bytes(data) == b"51200\r\n" or "not of a relay" in reason
+        assert len(losses) == 1 and reason in str(losses[0])

@@ -12,6 +12,8 @@ from multidrop.transports.rfc2217 import Rfc2217Pipe, negotiated
 from multidrop.transports.telnet import OPTION, REPLY, Control, Setting, message, parsed
 from tests.support.virtual import in_virtual_time
 
+pytestmark = pytest.mark.virtual
+
 DTR = (Setting.CONTROL, Control.DTR_ON)
 RTS = (Setting.CONTROL, Control.RTS_ON)
 
@@ -82,7 +84,6 @@ async def opened(server: Server) -> Rfc2217Pipe:
     return await negotiated(server, 9600)
 
 
-@in_virtual_time
 async def test_opening_takes_no_longer_than_the_replies() -> None:
     server = Server()
     pipe = await opened(server)
@@ -139,14 +140,12 @@ def test_a_needed_setting_that_is_refused_is_named(server: Callable[[], Server],
     test()
 
 
-@in_virtual_time
 async def test_a_server_of_another_kind_is_said_to_be_one() -> None:
     server = Server(option=telnet.option(telnet.DONT, OPTION))
     with pytest.raises(Unreachable, match="does not support RFC 2217; .* use tcp://"):
         await opened(server)
 
 
-@in_virtual_time
 async def test_what_a_server_says_as_it_closes_the_pipe_is_quoted() -> None:
     server = Server(option=telnet.option(telnet.DO, OPTION) + b"Port already in use\r\n")
     server.late = 99
@@ -157,7 +156,6 @@ async def test_what_a_server_says_as_it_closes_the_pipe_is_quoted() -> None:
         await opening
 
 
-@in_virtual_time
 async def test_options_that_were_not_offered_are_refused_once_each_and_ours_need_no_answer() -> None:
     echo = telnet.option(telnet.WILL, 1) + telnet.option(telnet.DO, 24) + telnet.option(telnet.WILL, telnet.BINARY)
     server = Server(option=echo + telnet.option(telnet.WILL, OPTION))
@@ -166,7 +164,6 @@ async def test_options_that_were_not_offered_are_refused_once_each_and_ours_need
     assert answers == [telnet.Option(telnet.DONT, 1), telnet.Option(telnet.WONT, 24)]
 
 
-@in_virtual_time
 async def test_bytes_go_both_ways_and_those_before_the_start_are_kept() -> None:
     server, got = Server(), bytearray()
     pipe = await opened(server)
@@ -180,7 +177,6 @@ async def test_bytes_go_both_ways_and_those_before_the_start_are_kept() -> None:
     assert server.data == bytes(range(256)) * 3
 
 
-@in_virtual_time
 async def test_a_stop_drops_what_is_unsent_here_and_at_the_server() -> None:
     server = Server()
     pipe = await opened(server)
@@ -191,7 +187,6 @@ async def test_a_stop_drops_what_is_unsent_here_and_at_the_server() -> None:
     assert server.asked == [(Setting.PURGE, 2)]
 
 
-@in_virtual_time
 async def test_a_setting_that_is_refused_or_not_confirmed_is_an_error() -> None:
     server = Server()
     pipe = await opened(server)
@@ -205,7 +200,6 @@ async def test_a_setting_that_is_refused_or_not_confirmed_is_an_error() -> None:
         await pipe.ask("DTR", *DTR)
 
 
-@in_virtual_time
 async def test_a_loss_names_the_reason_that_the_server_gave_last() -> None:
     server, losses = Server(), list[TransportLost]()
     pipe = await opened(server)

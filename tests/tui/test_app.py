@@ -20,19 +20,21 @@ from tests.support.fake_session import (
     FakeMacros,
     FakeSession,
     demo_session,
+    driver_of,
+    emit,
     make_app,
+    on_screen,
+    press,
     settle,
+    toasts,
 )
 
 pytestmark = pytest.mark.tui
 
 
 async def test_a_typed_line_goes_to_the_session_and_into_the_history() -> None:
-    session = demo_session()
-    app = make_app(session)
-    async with app.run_test(size=(80, 24)) as pilot:
-        await pilot.press(*"MR 5", "enter")
-        await settle(pilot)
+    async with on_screen() as (pilot, app, session):
+        await press(pilot, *"MR 5", "enter")
         assert session.lines == [("MR 5", By.OPERATOR)]
         assert app.assist.history()[-1] == "MR 5"
         assert "› MR 5" in app.main.page("press").plain
@@ -40,9 +42,7 @@ async def test_a_typed_line_goes_to_the_session_and_into_the_history() -> None:
 
 
 async def test_enter_sends_what_stands_in_the_line_and_not_what_the_list_offers() -> None:
-    session = demo_session()
-    app = make_app(session)
-    async with app.run_test(size=(80, 24)) as pilot:
+    async with on_screen() as (pilot, app, session):
         await pilot.press("M")
         assert app.main.entry.listing.open
         await pilot.press("enter")
@@ -50,8 +50,7 @@ async def test_enter_sends_what_stands_in_the_line_and_not_what_the_list_offers(
 
 
 async def test_tab_goes_through_the_completions_with_their_meaning() -> None:
-    app = make_app()
-    async with app.run_test(size=(80, 24)) as pilot:
+    async with on_screen() as (pilot, app, _):
         await pilot.press(*"PR M", "tab", "tab")
         assert app.main.entry.value == "PR MR"
         assert "move relative" in app.main.query_one("#menu").plain  # type: ignore[attr-defined]
@@ -62,25 +61,21 @@ async def test_tab_goes_through_the_completions_with_their_meaning() -> None:
 
 
 async def test_the_list_closes_when_nothing_is_typed_any_more() -> None:
-    app = make_app()
-    async with app.run_test(size=(80, 24)) as pilot:
+    async with on_screen() as (pilot, app, _):
         await pilot.press("M", "backspace")
         assert not app.main.entry.listing.open
         assert not app.main.query_one("#menu").display
 
 
 async def test_a_click_anywhere_leaves_the_keys_with_the_input() -> None:
-    app = make_app()
-    async with app.run_test(size=(80, 24)) as pilot:
+    async with on_screen() as (pilot, app, _):
         await pilot.click("#pages", offset=(20, 5))
         await pilot.press("M")
         assert app.main.entry.value == "M"
 
 
 async def test_a_click_on_the_stop_stops_and_one_on_a_tab_shows_its_bus() -> None:
-    session = demo_session()
-    app = make_app(session)
-    async with app.run_test(size=(80, 24)) as pilot:
+    async with on_screen() as (pilot, app, session):
         await settle(pilot)
         await click(pilot, 16, 23)
         assert session.stops == 0
@@ -95,16 +90,14 @@ async def test_a_click_on_the_stop_stops_and_one_on_a_tab_shows_its_bus() -> Non
 
 async def click(pilot: Pilot[int], x: int, y: int) -> None:
     """A click in the form that the terminal sends."""
-    assert pilot.app._driver is not None
     for kind in (events.MouseMove, events.MouseDown, events.MouseUp):
-        pilot.app._driver.send_message(kind(None, x, y, 0, 0, 1, False, False, False, x, y))
+        driver_of(pilot.app).send_message(kind(None, x, y, 0, 0, 1, False, False, False, x, y))
     await pilot.pause()
     await pilot.pause()
 
 
 async def test_up_goes_back_through_lines_that_begin_with_what_was_typed() -> None:
-    app = make_app()
-    async with app.run_test(size=(80, 24)) as pilot:
+    async with on_screen() as (pilot, app, _):
         await pilot.press("up", "up")
         assert app.main.entry.value == "MR 512000"
         await pilot.press("down", "down")
@@ -116,9 +109,7 @@ async def test_up_goes_back_through_lines_that_begin_with_what_was_typed() -> No
 
 
 async def test_one_pasted_line_is_typed_and_several_are_asked_about_and_sent_in_order() -> None:
-    session = demo_session()
-    app = make_app(session)
-    async with app.run_test(size=(80, 24)) as pilot:
+    async with on_screen() as (pilot, app, session):
         app.post_message(events.Paste("MR 7\r\n"))
         await pilot.pause()
         assert (app.main.entry.value, session.lines) == ("MR 7", [])
@@ -127,15 +118,12 @@ async def test_one_pasted_line_is_typed_and_several_are_asked_about_and_sent_in_
         assert isinstance(app.screen, Confirm)
         assert "3" in app.screen.heading
         assert session.lines == []
-        await pilot.press("enter")
-        await settle(pilot)
+        await press(pilot, "enter")
         assert [line for line, _ in session.lines] == ["PG 100", "MR 1", "PG"]
 
 
 async def test_a_paste_with_a_hidden_line_types_and_sends_nothing() -> None:
-    session = demo_session()
-    app = make_app(session)
-    async with app.run_test(size=(80, 24)) as pilot:
+    async with on_screen() as (pilot, app, session):
         for text in ("PR P\u2028MR 1", "# x\rMR 1\nPR P\n", "PR P\x0cMR 1", "PR P\x85MR 1"):
             app.post_message(events.Paste(text))
             await pilot.pause()
@@ -148,12 +136,10 @@ async def test_a_paste_with_a_hidden_line_types_and_sends_nothing() -> None:
 async def test_pasted_lines_after_one_that_failed_are_not_sent() -> None:
     session = demo_session()
     session.refuses["BAD"] = "a: 20 unknown"
-    app = make_app(session)
-    async with app.run_test(size=(80, 24)) as pilot:
+    async with on_screen(session) as (pilot, app, _):
         app.post_message(events.Paste("BAD\nMR 1\nMR 2"))
         await pilot.pause()
-        await pilot.press("enter")
-        await settle(pilot)
+        await press(pilot, "enter")
         assert [line for line, _ in session.lines] == ["BAD"]
         await pilot.pause(BURST + 0.1)
         await settle(pilot)
@@ -161,35 +147,26 @@ async def test_pasted_lines_after_one_that_failed_are_not_sent() -> None:
 
 
 async def test_a_function_key_plays_its_macro_and_a_free_one_says_how_to_use_it() -> None:
-    session = demo_session()
-    app = make_app(session)
-    async with app.run_test(size=(100, 24)) as pilot:
+    async with on_screen(width=100) as (pilot, app, session):
         await settle(pilot)
-        await pilot.press("f3", "f7")
-        await settle(pilot)
+        await press(pilot, "f3", "f7")
         assert session.lines == [("/play shuttle", By.OPERATOR)]
         assert "F7 plays nothing" in app.main.page("press").plain
         assert "F3 shuttle" in app.main.lines("footer").plain
 
 
 async def test_recording_is_begun_in_the_palette_by_a_name_and_ended_there() -> None:
-    session = demo_session()
-    app = make_app(session)
-    async with app.run_test(size=(80, 24)) as pilot:
-        await pilot.press("ctrl+p", *"record", "enter", *"lift", "enter")
-        await settle(pilot)
+    async with on_screen() as (pilot, app, session):
+        await press(pilot, "ctrl+p", *"record", "enter", *"lift", "enter")
         assert "● rec lift" in app.main.lines("top").plain
         assert "/record stop ends it" in app.main.lines("footer").plain
-        await pilot.press("ctrl+p", *"end rec", "enter")
-        await settle(pilot)
+        await press(pilot, "ctrl+p", *"end rec", "enter")
         assert [line for line, _ in session.lines] == ["/record lift", "/record stop"]
         assert "rec" not in app.main.lines("top").plain
 
 
 async def test_keys_and_numbers_switch_buses() -> None:
-    session = demo_session()
-    app = make_app(session)
-    async with app.run_test(size=(80, 24)) as pilot:
+    async with on_screen() as (pilot, _, session):
         found = []
         for key in ("ctrl+pagedown", "ctrl+pagedown", "ctrl+pagedown", "ctrl+pageup", "alt+2"):
             await pilot.press(key)
@@ -199,16 +176,12 @@ async def test_keys_and_numbers_switch_buses() -> None:
 
 @pytest.mark.parametrize(("key", "picked"), [("ctrl+o", "b"), ("ctrl+l", "b")])
 async def test_a_picker_narrows_and_a_letter_that_matches_nothing_takes_nothing(key: str, picked: str) -> None:
-    session = demo_session()
-    app = make_app(session)
-    async with app.run_test(size=(80, 24)) as pilot:
-        await pilot.press(key, "q", "enter")
-        await settle(pilot)
+    async with on_screen() as (pilot, app, session):
+        await press(pilot, key, "q", "enter")
         assert isinstance(app.screen, Choose)
         assert app.main.beside.bus == ""
         assert session.selected is not None and session.selected.address == "a"
-        await pilot.press("backspace", picked, "enter")
-        await settle(pilot)
+        await press(pilot, "backspace", picked, "enter")
         assert app.screen is app.main
         taken = session.selected.address if key == "ctrl+o" else app.main.beside.address
         assert taken == picked
@@ -225,13 +198,10 @@ def test_a_picker_takes_the_drive_of_that_address_and_no_part_of_a_word() -> Non
 
 
 async def test_a_letter_chooses_an_answer_and_one_that_begins_none_takes_nothing() -> None:
-    session = demo_session()
-    app = make_app(session)
-    async with app.run_test(size=(80, 24)) as pilot:
+    async with on_screen() as (pilot, app, session):
         for letter, sent in {"z": [], "n": [], "s": ["press:a MR 1", "press:a MR 2"]}.items():
             await app.questions.paste(["MR 1", "MR 2"], lambda lines: [app.outbox.type(line) for line in lines])
-            await pilot.press(letter, "enter")
-            await settle(pilot)
+            await press(pilot, letter, "enter")
             assert isinstance(app.screen, Confirm) is (letter == "z")
             assert session.sent == sent, letter
             if letter == "z":
@@ -239,9 +209,7 @@ async def test_a_letter_chooses_an_answer_and_one_that_begins_none_takes_nothing
 
 
 async def test_the_selector_chooses_a_drive_of_any_bus() -> None:
-    session = demo_session()
-    app = make_app(session)
-    async with app.run_test(size=(80, 24)) as pilot:
+    async with on_screen() as (pilot, app, session):
         await pilot.press("ctrl+o", "down", "enter")
         assert session.selected is not None
         assert session.selected.address == "b"
@@ -250,15 +218,12 @@ async def test_the_selector_chooses_a_drive_of_any_bus() -> None:
         await pilot.press("alt+2")
         assert app.main.lines("label").plain == " eth ▸ "
         del session.buses["press"], session.buses["pmx"]
-        session.emit(StateChanged(session.time))
-        await settle(pilot)
+        await emit(pilot, StateChanged(session.time))
         assert app.main.lines("label").plain == " ▸ ", "where one is open, nothing else can be meant"
 
 
 async def test_everything_is_in_the_palette() -> None:
-    session = demo_session()
-    app = make_app(session)
-    async with app.run_test(size=(80, 24)) as pilot:
+    async with on_screen() as (pilot, app, _):
         await settle(pilot)
         titles = {command.title for command in app.act.commands()}
     assert titles >= {
@@ -281,8 +246,7 @@ async def test_only_what_is_shown_is_polled_and_only_while_it_is() -> None:
         assert press.polled == {"a": REST, "b": OTHERS, "c": OTHERS}
         assert (eth.polled, pmx.polled) == ({"": OTHERS}, {}), "a lost bus is not polled"
         await pilot.press("ctrl+t")
-        session.emit(OnBus("press", Sample(session.time, "a", 5, 7)))
-        await settle(pilot)
+        await emit(pilot, OnBus("press", Sample(session.time, "a", 5, 7)))
         assert press.polled["a"] == PLOT
         await pilot.press("ctrl+t")
         await settle(pilot)
@@ -299,58 +263,45 @@ async def test_a_drive_that_was_sent_a_line_or_moves_is_looked_at_more_often() -
     app = make_app(session)
     polled = session.buses["press"].telemetry
     async with app.run_test(size=(80, 24)) as pilot:
-        session.emit(Entered(session.time, "@b MR 5", By.OPERATOR, "press", "b"))
-        await settle(pilot)
+        await emit(pilot, Entered(session.time, "@b MR 5", By.OPERATOR, "press", "b"))
         assert polled.polled == {"a": REST, "b": LIVELY, "c": OTHERS}
         session.time += 10
-        session.emit(OnBus("press", Sample(session.time, "b", 5, 7)))
-        await settle(pilot)
+        await emit(pilot, OnBus("press", Sample(session.time, "b", 5, 7)))
         assert polled.polled["b"] == LIVELY
-        session.emit(OnBus("press", Sample(session.time, "b", 5, 0)))
-        await settle(pilot)
+        await emit(pilot, OnBus("press", Sample(session.time, "b", 5, 0)))
         assert polled.polled["b"] == OTHERS
 
 
 async def test_a_lost_bus_says_so_on_its_tab_and_the_others_go_on() -> None:
-    session = demo_session()
-    app = make_app(session)
-    async with app.run_test(size=(100, 24)) as pilot:
+    async with on_screen(width=100) as (pilot, app, session):
         session.emit(OnBus("press", Sample(session.time, "a", 0, 0)))
         session.buses["press"].lost = TransportLost("/dev/ttyUSB0: unplugged")
-        session.emit(StateChanged(session.time), OnBus("eth", Sample(session.time, "", 5, 7)))
-        await settle(pilot)
+        await emit(pilot, StateChanged(session.time), OnBus("eth", Sample(session.time, "", 5, 7)))
         top = app.main.lines("top").plain
         assert "1 press ✗ lost" in top
         assert "2 eth ▶ moving" in top
         assert "LOST - /dev/ttyUSB0: unplugged" in app.main.query_one(".banner").plain  # type: ignore[attr-defined]
-        await pilot.press("alt+2")
-        await settle(pilot)
+        await press(pilot, "alt+2")
         assert not app.main.query_one(".banner").display
 
 
 async def test_events_of_a_hidden_bus_wait_in_its_transcript() -> None:
-    session = demo_session()
-    app = make_app(session)
-    async with app.run_test(size=(80, 24)) as pilot:
-        session.emit(OnBus("eth", Unsolicited(session.time, ("12 parts",))))
-        await settle(pilot)
+    async with on_screen() as (pilot, app, session):
+        await emit(pilot, OnBus("eth", Unsolicited(session.time, ("12 parts",))))
         assert "12 parts" not in app.main.page("press").plain
-        await pilot.press("alt+2")
-        await settle(pilot)
+        await press(pilot, "alt+2")
         assert "« 12 parts" in app.main.page("eth").plain
 
 
 async def test_the_first_screen_opens_what_is_chosen_and_stays_when_it_cannot() -> None:
     session = FakeSession()
     session.openable["/dev/ttyUSB0"] = FakeBus("ttyUSB0", {"a": FakeDrive("a")})
-    app = make_app(session)
-    async with app.run_test(size=(80, 24)) as pilot:
+    async with on_screen(session) as (pilot, app, _):
         await pilot.press("enter")
         await pilot.pause()
         assert isinstance(app.screen, Start)
         assert "✗ press: no such port" in str(app.screen.query_one("#outcome").render())
-        await pilot.press("escape", "down", "enter")
-        await settle(pilot)
+        await press(pilot, "escape", "down", "enter")
         assert app.screen is app.main
         assert "1 ttyUSB0" in app.main.lines("top").plain
 
@@ -364,8 +315,7 @@ async def test_what_cannot_be_opened_at_the_start_leads_to_the_first_screen_with
 
 
 async def test_a_small_terminal_says_so_and_comes_back_by_itself() -> None:
-    app = make_app()
-    async with app.run_test(size=(80, 24)) as pilot:
+    async with on_screen() as (pilot, app, _):
         await pilot.resize_terminal(50, 24)
         await pilot.pause()
         assert isinstance(app.screen, TooSmall)
@@ -388,16 +338,14 @@ async def test_a_bug_is_not_hidden(monkeypatch: pytest.MonkeyPatch) -> None:
     app = make_app(session)
     with pytest.raises(WorkerFailed, match="a bug"):
         async with app.run_test(size=(80, 24)) as pilot:
-            await pilot.press("E", "enter")
-            await settle(pilot)
+            await press(pilot, "E", "enter")
 
 
 async def test_ctrl_c_explains_and_ctrl_q_quits() -> None:
-    app = make_app()
-    async with app.run_test(size=(80, 24)) as pilot:
+    async with on_screen() as (pilot, app, _):
         await pilot.press("ctrl+c")
         assert app.is_running
-        assert [toast.message for toast in app._notifications] == ["Ctrl+Q quits, Ctrl+X stops all drives"]
+        assert toasts(app) == ["Ctrl+Q quits, Ctrl+X stops all drives"]
         await pilot.press("ctrl+q")
     assert app.return_value == 0
 
@@ -405,8 +353,7 @@ async def test_ctrl_c_explains_and_ctrl_q_quits() -> None:
 async def test_quitting_asks_while_automation_runs_or_a_drive_moves() -> None:
     session = demo_session()
     session.busy = True
-    app = make_app(session)
-    async with app.run_test(size=(80, 24)) as pilot:
+    async with on_screen(session) as (pilot, app, _):
         await pilot.press("ctrl+q")
         assert [key for key, _ in app.screen.answers] == ["stop", "stay"]  # type: ignore[attr-defined]
         await pilot.press("escape")
@@ -426,8 +373,7 @@ async def test_quitting_asks_while_automation_runs_or_a_drive_moves() -> None:
 async def test_quitting_asks_in_a_small_terminal_too_and_only_once() -> None:
     session = demo_session()
     session.busy = True
-    app = make_app(session)
-    async with app.run_test(size=(50, 12)) as pilot:
+    async with on_screen(session, 50, 12) as (pilot, app, _):
         await pilot.press("ctrl+q", "ctrl+q")
         assert [type(screen).__name__ for screen in app.screen_stack] == ["MainScreen", "Confirm"]
         await pilot.press("escape")
@@ -436,20 +382,16 @@ async def test_quitting_asks_in_a_small_terminal_too_and_only_once() -> None:
 
 
 async def test_quit_as_a_line_ends_the_app_too() -> None:
-    session = demo_session()
-    app = make_app(session)
-    async with app.run_test(size=(80, 24)) as pilot:
+    async with on_screen() as (pilot, app, session):
         session.quitting = True
-        session.emit(StateChanged(session.time))
-        await settle(pilot)
+        await emit(pilot, StateChanged(session.time))
     assert app.return_value == 0
 
 
 async def test_quit_as_a_line_asks_like_the_key() -> None:
     session = demo_session()
     session.moves = ["press:a moves at 5 a second"]
-    app = make_app(session)
-    async with app.run_test(size=(80, 24)) as pilot:
+    async with on_screen(session) as (pilot, app, _):
         assert session.front.before_quit is not None and await session.front.before_quit() is False
         await pilot.pause()
         assert app.screen.lines == session.moves  # type: ignore[attr-defined]
@@ -459,43 +401,33 @@ async def test_quit_as_a_line_asks_like_the_key() -> None:
 
 
 async def test_a_signal_stops_automation_and_nothing_else() -> None:
-    session = demo_session()
-    app = make_app(session)
-    async with app.run_test(size=(80, 24)) as pilot:
+    async with on_screen() as (pilot, app, session):
         app.interrupted()
         await pilot.pause()
     assert (session.interrupts, session.stops, app.return_value) == (1, 0, 130)
 
 
 async def test_a_drive_in_program_mode_is_marked_where_lines_are_typed() -> None:
-    session = demo_session()
-    app = make_app(session)
-    async with app.run_test(size=(80, 24)) as pilot:
+    async with on_screen() as (pilot, app, session):
         session.buses["press"].drives["a"].programming = True
-        session.emit(StateChanged(session.time))
-        await settle(pilot)
+        await emit(pilot, StateChanged(session.time))
         assert "◆ stores" in app.main.lines("label").plain
         assert f"◆ {State.STORING.word}" in app.main.lines("status").plain
 
 
 async def test_the_meaning_of_what_is_typed_stands_beside_it_where_there_is_room() -> None:
-    app = make_app()
-    async with app.run_test(size=(120, 40)) as pilot:
+    async with on_screen(width=120, height=40) as (pilot, app, _):
         await pilot.press(*"MR ")
         await pilot.pause()
         assert "move relative to where it stands" in app.main.lines("hint").plain
 
 
 async def test_a_closed_bus_takes_its_transcript_with_it() -> None:
-    session = demo_session()
-    app = make_app(session)
-    async with app.run_test(size=(80, 24)) as pilot:
-        await pilot.press("alt+2")
-        await settle(pilot)
+    async with on_screen() as (pilot, app, session):
+        await press(pilot, "alt+2")
         del session.buses["eth"]
         session.selected_bus = "press"
-        session.emit(StateChanged(session.time))
-        await settle(pilot)
+        await emit(pilot, StateChanged(session.time))
         assert "eth" not in app.main.pages
         assert "eth" not in app.main.lines("top").plain
 
@@ -503,31 +435,24 @@ async def test_a_closed_bus_takes_its_transcript_with_it() -> None:
 async def test_a_key_with_two_macros_plays_neither_and_says_so() -> None:
     session = demo_session()
     session.macros = FakeMacros(FakeMacro("away", "F3"), FakeMacro("back", "F3"), FakeMacro("home-all", "F2"))
-    app = make_app(session)
-    async with app.run_test(size=(100, 24)) as pilot:
+    async with on_screen(session, width=100) as (pilot, app, _):
         await settle(pilot)
         assert "F3 2 macros!" in app.main.lines("footer").plain
-        await pilot.press("f3", "f2")
-        await settle(pilot)
+        await press(pilot, "f3", "f2")
         assert session.lines == [("/play home-all", By.OPERATOR)]
         assert "away and back are both on F3" in app.main.page("press").plain
 
 
 async def test_a_renamed_bus_keeps_its_transcript_its_values_and_the_line_that_is_typed() -> None:
-    session = demo_session()
-    app = make_app(session)
-    async with app.run_test(size=(80, 24)) as pilot:
-        await pilot.press(*"PR P", "enter", *"MR 5")
-        await settle(pilot)
+    async with on_screen() as (pilot, app, session):
+        await press(pilot, *"PR P", "enter", *"MR 5")
         session.buses = {("gantry" if name == "press" else name): bus for name, bus in session.buses.items()}
         session.buses["gantry"].name = session.selected_bus = "gantry"
         session.addresses["gantry"] = "a"
         assert session.front.renamed is not None
         session.front.renamed("press", "gantry")
-        session.emit(StateChanged(session.time))
-        await settle(pilot)
+        await emit(pilot, StateChanged(session.time))
         assert "1 gantry" in app.main.lines("top").plain and "press" not in app.main.lines("top").plain
         assert "› PR P" in app.main.page("gantry").plain and app.main.entry.value == "MR 5"
-        await pilot.press("enter")
-        await settle(pilot)
+        await press(pilot, "enter")
         assert session.sent[-1] == "gantry:a MR 5"

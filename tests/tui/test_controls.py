@@ -17,7 +17,7 @@ from multidrop.drives.events import Conditioned, Sample, Silent
 from multidrop.shell.events import OnBus
 from multidrop.tui.readout import Readout, State
 from multidrop.tui.screens.controls import ControlsPage, Jog
-from tests.support.fake_session import FakeSession, demo_session, make_app, settle
+from tests.support.fake_session import FakeSession, demo_session, emit, on_screen, press, settle
 
 at_screen = pytest.mark.tui
 UNSEEN = "nothing was sent: the drive was not shown yet"
@@ -110,8 +110,7 @@ def test_a_controllers_moves_say_first_that_numbers_are_positions() -> None:
 
 async def opened(pilot: Pilot[int], session: FakeSession) -> ControlsPage:
     session.emit(OnBus("press", Sample(session.time - 0.05, "a", 1000, 0)))
-    await pilot.press("ctrl+n")
-    await settle(pilot)
+    await press(pilot, "ctrl+n")
     page = pilot.app.screen
     assert isinstance(page, ControlsPage)
     return page
@@ -119,37 +118,29 @@ async def opened(pilot: Pilot[int], session: FakeSession) -> ControlsPage:
 
 @at_screen
 async def test_each_press_sends_one_move_of_the_step_shown() -> None:
-    session = demo_session()
-    async with make_app(session).run_test(size=(80, 24)) as pilot:
+    async with on_screen() as (pilot, _, session):
         page = await opened(pilot, session)
         assert "MR -100" in page.lines("controls").plain and "MR 100" in page.lines("controls").plain
-        await pilot.press("up", "right", "right", "left", "right")
-        await settle(pilot)
+        await press(pilot, "up", "right", "right", "left", "right")
         assert session.sent == ["press:a MR 1000"]
         assert "3 presses dropped" in page.lines("controls").plain
         session.time += 1
-        session.emit(OnBus("press", Sample(session.time - 0.1, "a", 2000, 0)))
-        await settle(pilot)
-        await pilot.press("left")
-        await settle(pilot)
+        await emit(pilot, OnBus("press", Sample(session.time - 0.1, "a", 2000, 0)))
+        await press(pilot, "left")
         assert session.sent == ["press:a MR 1000", "press:a MR -1000"]
 
 
 @at_screen
 async def test_nothing_is_sent_while_it_moves_is_silent_or_a_line_runs() -> None:
-    session = demo_session()
-    async with make_app(session).run_test(size=(80, 24)) as pilot:
+    async with on_screen() as (pilot, _, session):
         page = await opened(pilot, session)
-        session.emit(OnBus("press", Sample(session.time, "a", 1500, 400)))
-        await settle(pilot)
+        await emit(pilot, OnBus("press", Sample(session.time, "a", 1500, 400)))
         await pilot.press("right")
         assert "a press is dropped now: it moves" in page.lines("controls").plain
-        session.emit(OnBus("press", Silent(session.time, "a")))
-        await settle(pilot)
+        await emit(pilot, OnBus("press", Silent(session.time, "a")))
         session.time += 0.5
         for key in ("right", "h", "enter"):
-            await pilot.press(key)
-            await settle(pilot)
+            await press(pilot, key)
         assert session.sent == []
         assert "not sent: " in page.lines("said").plain
 
@@ -173,30 +164,25 @@ WALK: tuple[tuple[tuple[str, ...], list[str]], ...] = (
 
 @at_screen
 async def test_a_control_sends_its_line_and_a_wrong_number_sends_nothing() -> None:
-    session = demo_session()
-    async with make_app(session).run_test(size=(80, 24)) as pilot:
+    async with on_screen() as (pilot, _, session):
         page = await opened(pilot, session)
         for keys, sent in WALK:
             session.time += 1
-            session.emit(OnBus("press", Sample(session.time - 0.05, "a", 1000, 0)))
-            await settle(pilot)
+            await emit(pilot, OnBus("press", Sample(session.time - 0.05, "a", 1000, 0)))
             session.sent.clear()
             for key in keys:
-                await pilot.press(key)
-                await settle(pilot)
+                await press(pilot, key)
             assert session.sent == sent, keys
             assert sent or keys[-1] == "escape" or "nothing was sent" in page.lines("said").plain
 
 
 @at_screen
 async def test_a_letter_alone_neither_moves_nor_lets_go_and_a_stop_or_another_drive_drops_it() -> None:
-    session = demo_session()
-    async with make_app(session).run_test(size=(80, 24)) as pilot:
+    async with on_screen() as (pilot, _, session):
         page = await opened(pilot, session)
         for letter in "hHde":
             for after in ((), ("up", "enter"), ("ctrl+x", "enter"), ("escape", "enter")):
-                await pilot.press(letter, *after)
-                await settle(pilot)
+                await press(pilot, letter, *after)
                 assert session.sent == [], (letter, after)
                 if not after:
                     assert "Enter sends" in page.lines("said").plain
@@ -206,44 +192,34 @@ async def test_a_letter_alone_neither_moves_nor_lets_go_and_a_stop_or_another_dr
             await settle(pilot)
             assert session.sent == [], keys
             await pilot.press("x")
-        await pilot.press("ctrl+o", "escape")
-        await settle(pilot)
+        await press(pilot, "ctrl+o", "escape")
         assert pilot.app.screen is page
         for key in ("h", "a", "enter"):
-            await pilot.press(key)
-            await settle(pilot)
+            await press(pilot, key)
         assert session.sent == [] and "nothing was sent" in page.lines("said").plain
         await pilot.press("d")
         session.select("b")
-        await pilot.press("enter")
-        await settle(pilot)
+        await press(pilot, "enter")
         assert session.sent == []
 
 
 @at_screen
 async def test_a_disabled_axis_has_its_own_state_and_takes_no_move() -> None:
-    session = demo_session()
-    app = make_app(session)
-    async with app.run_test(size=(80, 24)) as pilot:
+    async with on_screen() as (pilot, app, session):
         for address in "abc":
-            session.emit(OnBus("press", Sample(session.time - 0.05, address, 1000, 0)))
-        await settle(pilot)
+            await emit(pilot, OnBus("press", Sample(session.time - 0.05, address, 1000, 0)))
         assert "1 press ■ idle" in app.main.lines("top").plain
-        session.emit(OnBus("press", Conditioned(session.time, "a", (Conditions(disabled="DE=0"),))))
-        await settle(pilot)
+        await emit(pilot, OnBus("press", Conditioned(session.time, "a", (Conditions(disabled="DE=0"),))))
         assert "1 press □ off" in app.main.lines("top").plain
         status = app.main.lines("status").plain
         assert "a gantry □ no current" in status and "b clamp  ■ stopped" in status
-        await pilot.press("ctrl+n")
-        await settle(pilot)
-        await pilot.press("right")
-        await settle(pilot)
+        await press(pilot, "ctrl+n")
+        await press(pilot, "right")
         page = app.screen
         assert isinstance(page, ControlsPage)
         assert "not sent: no current in the motor (DE=0)" in page.lines("said").plain
         assert "□ no current" in page.lines("drive").plain and "no current (DE=0)" in page.lines("drive").plain
-        await pilot.press("escape", "ctrl+a")
-        await settle(pilot)
+        await press(pilot, "escape", "ctrl+a")
         shown = app.screen.lines("drives").plain  # type: ignore[attr-defined]
         assert "press:a gantry    □ no current" in shown
         assert session.sent == []
@@ -253,16 +229,14 @@ async def test_a_disabled_axis_has_its_own_state_and_takes_no_move() -> None:
 async def test_the_stop_of_the_drive_waits_for_no_line_and_counts_while_a_number_is_typed() -> None:
     session = demo_session()
     session.refuses["MR 100"] = "a: no answer"
-    async with make_app(session).run_test(size=(80, 24)) as pilot:
+    async with on_screen(session) as (pilot, _, _):
         await opened(pilot, session)
         session.gate = asyncio.Event()
-        await pilot.press("right", "m", "5", "space")
-        await settle(pilot)
+        await press(pilot, "right", "m", "5", "space")
         assert session.sent == ["press:a MR 100", "press:a SL 0"]
         session.gate.set()
         await settle(pilot)
-        await pilot.press("space")
-        await settle(pilot)
+        await press(pilot, "space")
         assert session.sent[2:] == ["press:a SL 0"]
 
 
@@ -272,9 +246,7 @@ async def test_the_stop_of_the_drive_waits_for_no_line_and_counts_while_a_number
 )
 @at_screen
 async def test_of_a_drive_that_is_not_shown_yet_the_stop_alone_is_sent(key: str, sent: list[str], said: str) -> None:
-    session = demo_session()
-    app = make_app(session)
-    async with app.run_test(size=(80, 24)) as pilot:
+    async with on_screen() as (pilot, app, session):
         await settle(pilot)
         page = ControlsPage(app)
         await app.push_screen(page)
@@ -291,26 +263,21 @@ async def test_of_a_drive_that_is_not_shown_yet_the_stop_alone_is_sent(key: str,
 async def test_a_refusal_is_shown_on_the_page() -> None:
     session = demo_session()
     session.refuses["MR 100"] = "a: error 83: plus limit reached"
-    async with make_app(session).run_test(size=(80, 24)) as pilot:
+    async with on_screen(session) as (pilot, _, _):
         page = await opened(pilot, session)
-        await pilot.press("right")
-        await settle(pilot)
+        await press(pilot, "right")
         assert "✗ a: error 83: plus limit reached" in page.lines("said").plain
 
 
 @at_screen
 async def test_a_stop_forgets_the_number_and_escape_leaves_it_then_the_page_and_stops_nothing() -> None:
-    session = demo_session()
-    async with make_app(session).run_test(size=(80, 24)) as pilot:
+    async with on_screen() as (pilot, _, session):
         page = await opened(pilot, session)
-        await pilot.press("m", "9", "ctrl+x")
-        await settle(pilot)
+        await press(pilot, "m", "9", "ctrl+x")
         assert pilot.app.screen is page and session.stops == 1
-        await pilot.press("enter", "m", "escape")
-        await settle(pilot)
+        await press(pilot, "enter", "m", "escape")
         assert pilot.app.screen is page
-        await pilot.press("escape")
-        await settle(pilot)
+        await press(pilot, "escape")
         assert not isinstance(pilot.app.screen, ControlsPage)
         assert (session.sent, session.stops) == ([], 1)
 
@@ -318,7 +285,8 @@ async def test_a_stop_forgets_the_number_and_escape_leaves_it_then_the_page_and_
 @at_screen
 @pytest.mark.slow
 async def test_the_simulated_drive_moves_by_one_step(tmp_path: Path) -> None:
-    from tests.tui.test_session import app_of, press, until
+    from tests.support.real_screen import until
+    from tests.tui.test_session import app_of, press
 
     async with press(tmp_path) as pilot:
         readout = app_of(pilot).model.bus("press").readout("a")

@@ -3,7 +3,7 @@
 import pytest
 from textual import events
 
-from tests.support.fake_session import demo_session, make_app
+from tests.support.fake_session import demo_session, make_app, on_screen
 
 pytestmark = pytest.mark.tui
 
@@ -25,9 +25,7 @@ async def test_a_line_takes_its_first_step_before_the_input_line_is_emptied() ->
 
 
 async def test_a_line_that_is_written_as_the_stop_comes_is_not_said_to_be_unsent() -> None:
-    session = demo_session()
-    app = make_app(session)
-    async with app.run_test(size=(80, 24)) as pilot:
+    async with on_screen() as (pilot, app, session):
         run = session.run
 
         async def stopping(line: str, *more: object) -> None:
@@ -47,8 +45,7 @@ async def test_a_line_that_is_written_as_the_stop_comes_is_not_said_to_be_unsent
 
 @pytest.mark.parametrize("keys", [[], ["ctrl+e"], ["ctrl+p"], ["ctrl+f"]])
 async def test_a_key_finds_the_binding_that_is_active(keys: list[str]) -> None:
-    app = make_app()
-    async with app.run_test(size=(80, 24)) as pilot:
+    async with on_screen() as (pilot, app, _):
         await pilot.press(*keys)
         active = app.screen.active_bindings
         assert "escape" in active

@@ -9,7 +9,7 @@ import pytest
 from multidrop.shell.events import Printed
 from multidrop.tui.frame_scheduler import FRAMES, Frames
 from multidrop.tui.presenter import FLOOD, FLOOD_PERIOD, Presenter
-from tests.support.fake_session import demo_session, make_app
+from tests.support.fake_session import demo_session, driver_of, make_app
 
 pytestmark = pytest.mark.tui
 
@@ -24,7 +24,7 @@ async def test_a_reply_is_painted_once_the_terminal_has_swallowed_the_frame_befo
     app, painted = make_app(session), []
     async with app.run_test(size=(80, 24)) as pilot:
         app.presenter.paint = lambda main, now, panels, page: painted.append(panels)  # type: ignore[method-assign]
-        driver: Any = app._driver
+        driver = driver_of(app)
         session.gate, driver.ready = asyncio.Event(), lambda: False
         await pilot.press(*"PR P", "enter")
         session.emit(Printed(session.time, "press", "a", "384112"))

@@ -1,5 +1,7 @@
 """Keys under the names of functions: read, changed by the configuration, refused where they clash or stop."""
 
+from __future__ import annotations
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -7,12 +9,12 @@ from textual.binding import Binding
 
 from multidrop.shell.connect.settings import Look
 from multidrop.tui.app import MultidropApp, bindings
-from multidrop.tui.keymap import keymap, read_key
+from multidrop.tui.keymap import FunctionKeys, keymap, read_key
 from multidrop.tui.screens.all_drives import AllDrives
 from multidrop.tui.screens.dialogs import Search
 from multidrop.tui.screens.page import PAGES, Page, PageEntry
 from multidrop.tui.widgets.theme import Signs
-from tests.support.fake_session import FakeAssist, demo_session, settle
+from tests.support.fake_session import FakeAssist, FakeMacro, FakeMacros, demo_session, press, settle
 
 
 @pytest.mark.parametrize(
@@ -95,8 +97,7 @@ async def test_a_key_that_was_set_works_and_is_shown() -> None:
         assert isinstance(app.screen, AllDrives)
         await pilot.press("ctrl+b")
         assert isinstance(app.screen, Search)
-        await pilot.press("ctrl+x")
-        await settle(pilot)
+        await press(pilot, "ctrl+x")
         assert app.session.stops == 1
 
 
@@ -146,3 +147,56 @@ async def test_what_was_used_lately_comes_after_the_stop() -> None:
         first, second = app.screen.found[:2]
         assert first.text.plain.startswith("Stop all") and first.text.plain.endswith("^X")
         assert second.text.plain.startswith("Mouse on")
+
+
+# Pages of function keys
+
+
+def read(*macros: FakeMacro) -> FunctionKeys:
+    keys = FunctionKeys()
+    keys.read(FakeMacros(*macros))
+    return keys
+
+
+def test_each_page_has_keys_of_its_own() -> None:
+    keys = read(FakeMacro("a", "F3"), FakeMacro("b", "F3", page="jog"), FakeMacro("c", "F2", page="10"), FakeMacro("d"))
+    assert keys.pages == ["1", "10", "jog"]
+    seen = []
+    for _ in range(4):
+        seen.append((keys.place, keys.keys, keys.bound))
+        keys.turn()
+    assert seen == [
+        ("keys 1", {"F3": "a"}, [("F3", "a")]),
+        ("keys 10", {"F2": "c"}, [("F2", "c")]),
+        ("keys jog", {"F3": "b"}, [("F3", "b")]),
+        ("keys 1", {"F3": "a"}, [("F3", "a")]),
+    ]
+
+
+def test_one_page_is_not_named() -> None:
+    keys = read(FakeMacro("a", "F3"))
+    keys.turn()
+    assert (keys.place, keys.keys) == ("", {"F3": "a"})
+
+
+def test_a_page_whose_last_macro_is_gone_is_left() -> None:
+    keys = read(FakeMacro("a", "F3"), FakeMacro("b", "F3", page="2"))
+    keys.turn()
+    keys.read(FakeMacros(FakeMacro("a", "F3")))
+    assert (keys.page, keys.keys) == ("1", {"F3": "a"})
+
+
+def test_a_clash_is_one_of_a_page() -> None:
+    keys = read(FakeMacro("a", "F3", page="2"), FakeMacro("b", "F3", page="2"), FakeMacro("c", "F3"))
+    assert (keys.clash("F3"), keys.keys) == ("", {"F3": "c"})
+    keys.turn()
+    assert keys.keys == {} and keys.shown == [("F3", "2 macros!")]
+    assert (
+        keys.clash("F3") == "a and b are both on F3, which plays none of them; /key F3 NAME --page 2 leaves one on it"
+    )
+
+
+def test_a_held_key_counts_once_and_another_key_or_a_later_press_again() -> None:
+    keys = read()
+    assert [keys.held("F3", now / 30) for now in range(90)] == [False] + [True] * 89
+    assert not keys.held("F4", 3.0) and not keys.held("F3", 3.01) and not keys.held("F3", 3.3)

@@ -11,7 +11,6 @@ from textual import constants, events
 from textual.message import Message
 
 from multidrop.tui.terminal.keystream import MOST, STALLED, KeyStream, Kind, Piece, Splitter
-from tests.support.virtual import in_virtual_time
 
 PASTE = b"\x1b[200~MR 1\rMR 2\r\x1b[201~"
 TYPED: dict[bytes, list[str]] = {
@@ -86,7 +85,7 @@ def joined(pieces: list[Piece]) -> list[Piece]:
     return found
 
 
-@in_virtual_time
+@pytest.mark.virtual
 async def test_an_escape_is_one_when_nothing_has_followed_and_nothing_waits() -> None:
     session = SessionView()
     session.stream.take(b"\x1b")
@@ -103,7 +102,7 @@ async def test_an_escape_is_one_when_nothing_has_followed_and_nothing_waits() ->
     assert await session.done() == ["up"]
 
 
-@in_virtual_time
+@pytest.mark.virtual
 async def test_each_escape_has_its_own_time() -> None:
     session = SessionView()
     session.stream.take(b"\x1b")
@@ -116,7 +115,7 @@ async def test_each_escape_has_its_own_time() -> None:
     assert await session.done() == ["up", "down"]
 
 
-@in_virtual_time
+@pytest.mark.virtual
 async def test_half_a_sequence_is_never_typed_however_late_the_rest_is() -> None:
     session = SessionView()
     session.stream.take(b"\x1b[1;")
@@ -148,7 +147,7 @@ async def test_the_rest_of_a_paste_in_which_the_stop_came_is_dropped_whenever_it
     assert session.told == ["the rest of the paste in which the stop came was dropped, too"]
 
 
-@in_virtual_time
+@pytest.mark.virtual
 async def test_a_paste_that_does_not_end_says_so_and_ctrl_c_leaves_it() -> None:
     session = SessionView()
     session.stream.take(b"\x1b[200~MR 1\r")

@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Callable
 from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
-from textual.pilot import Pilot
 
 from multidrop.drives.events import Traffic
 from multidrop.shell.events import OnBus
@@ -16,17 +14,11 @@ from multidrop.tui.frame_scheduler import Frames
 from multidrop.tui.screens.macros import Listed, MacrosPage, macro_row, step_rows
 from multidrop.tui.screens.program import ProgramPage
 from multidrop.tui.screens.traffic import TrafficPage
-from tests.support.fake_session import FakeMacro, demo_session, make_app, settle
+from tests.support.fake_session import FakeMacro, demo_session, emit, make_app, on_screen, press, settle
+from tests.support.real_screen import until
 from tests.support.until import PATIENCE
 
 pytestmark = pytest.mark.tui
-
-
-async def until(pilot: Pilot[int], true: Callable[[], bool]) -> None:
-    async with asyncio.timeout(PATIENCE):
-        while not true():
-            await pilot.pause(0.01)
-            pilot.app.tick()  # type: ignore[attr-defined]
 
 
 def text(row: tuple[tuple[str, str], ...]) -> str:
@@ -62,16 +54,14 @@ async def test_macros_are_played_put_on_a_key_deleted_and_edited_by_keys(tmp_pat
     session = demo_session()
     (tmp_path / "shuttle.toml").write_text('name = "shuttle"\n[[step]]\nline = "MR 5"\nafter = "soon"\n')
     session.macros.path = lambda name: tmp_path / f"{name}.toml"  # type: ignore[attr-defined]
-    app = make_app(session)
-    async with app.run_test(size=(80, 24)) as pilot:
+    async with on_screen(session) as (pilot, app, _):
         await app.run_action("act.page('macros')")
         await until(pilot, lambda: "shuttle" in app.screen.lines("macros").plain)  # type: ignore[attr-defined]
         await pilot.press("down", "enter")
         await until(pilot, lambda: [line for line, _ in session.lines] == ["/play shuttle"])
         await pilot.press("k", "backspace", "backspace", *"f4.2", "enter")
         await until(pilot, lambda: session.lines[-1][0] == "/key F4 shuttle --page 2")
-        await pilot.press("delete", "enter")
-        await settle(pilot)
+        await press(pilot, "delete", "enter")
         assert len(session.lines) == 2 and isinstance(app.screen, MacrosPage)
         await pilot.press("e")
         await until(pilot, lambda: isinstance(app.screen, ProgramPage) and bool(app.screen.findings.problems))
@@ -79,13 +69,10 @@ async def test_macros_are_played_put_on_a_key_deleted_and_edited_by_keys(tmp_pat
 
 
 async def test_a_name_that_is_typed_on_the_page_plays_no_other_macro() -> None:
-    session = demo_session()
-    app = make_app(session)
-    async with app.run_test(size=(80, 24)) as pilot:
+    async with on_screen() as (pilot, app, session):
         await app.run_action("act.page('macros')")
         await until(pilot, lambda: "shuttle" in app.screen.lines("macros").plain)  # type: ignore[attr-defined]
-        await pilot.press(*"go", "enter")
-        await settle(pilot)
+        await press(pilot, *"go", "enter")
         assert session.lines == [] and "▸" not in app.screen.lines("macros").plain  # type: ignore[attr-defined]
         assert "nothing plays" in app.screen.lines("heading").plain  # type: ignore[attr-defined]
         await pilot.press("down", "enter")
@@ -95,8 +82,7 @@ async def test_a_name_that_is_typed_on_the_page_plays_no_other_macro() -> None:
 async def test_a_held_enter_plays_once_and_the_end_of_a_macro_waits_for_no_line_before_it() -> None:
     session = demo_session()
     session.gate = asyncio.Event()
-    app = make_app(session)
-    async with app.run_test(size=(80, 24)) as pilot:
+    async with on_screen(session) as (pilot, app, _):
         await app.run_action("act.page('macros')")
         await until(pilot, lambda: "shuttle" in app.screen.lines("macros").plain)  # type: ignore[attr-defined]
         await pilot.press("down", *["enter"] * 20, "s")
@@ -108,9 +94,7 @@ async def test_a_held_enter_plays_once_and_the_end_of_a_macro_waits_for_no_line_
 
 
 async def test_traffic_can_be_paused_looked_back_and_shown_with_polls() -> None:
-    session = demo_session()
-    app = make_app(session)
-    async with app.run_test(size=(80, 24)) as pilot:
+    async with on_screen() as (pilot, app, session):
         for number in range(60):
             session.emit(OnBus("press", Traffic(session.time, True, f"aPR {number}\n".encode())))
         await app.run_action("act.page('traffic')")
@@ -119,12 +103,39 @@ async def test_traffic_can_be_paused_looked_back_and_shown_with_polls() -> None:
         assert isinstance(page, TrafficPage)
         assert "aPR 59·" in page.lines("traffic").plain and "61 50 52 20 35 39 0A" in page.lines("traffic").plain
         await pilot.press("space")
-        session.emit(OnBus("press", Traffic(session.time, True, b"aMR 5\n")))
-        await settle(pilot)
+        await emit(pilot, OnBus("press", Traffic(session.time, True, b"aMR 5\n")))
         assert "aMR 5" not in page.lines("traffic").plain and "1 pieces came" in page.lines("heading").plain
-        await pilot.press("home", "h")
-        await settle(pilot)
+        await press(pilot, "home", "h")
         assert "aPR 0\\n" in page.lines("traffic").plain and "61 50" not in page.lines("traffic").plain
-        await pilot.press("end")
-        await settle(pilot)
+        await press(pilot, "end")
         assert "aMR 5" in page.lines("traffic").plain
+
+
+# A macro in the editor
+
+
+TEXT = "# mine\nname = 'm'\n[[step]]\nline = 'MR 1'\n"
+
+
+async def test_a_wrong_macro_is_not_saved_and_a_right_one_is(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv("NO_COLOR", raising=False)
+    path = tmp_path / "m.toml"
+    path.write_text(TEXT)
+    async with on_screen(width=100, height=30) as (pilot, app, session):
+        await settle(pilot)
+        assert session.front.edit is not None
+        await session.front.edit(str(path))
+        async with asyncio.timeout(PATIENCE):
+            while not isinstance(app.screen, ProgramPage) or app.screen.text is None:
+                await pilot.pause(0.01)
+        page = app.screen
+        page.editor.text = TEXT.replace("line", "lin")
+        assert not await page.save()
+        assert path.read_text() == TEXT
+        app.tick()
+        told = [record.text for record in app.last_records(10) if "not saved" in record.text]
+        assert told[0].startswith(f"{path}:4:1: step 1: unknown key 'lin'")
+        assert told[0].endswith("not saved: the macro is as it was, and this text stays")
+        page.editor.text = TEXT.replace("1", "2")
+        assert await page.save()
+        assert path.read_text() == TEXT.replace("1", "2")

@@ -6,10 +6,13 @@ import asyncio
 from collections.abc import Callable, Coroutine
 from typing import Any
 
+import pytest
+
 from multidrop.shell.events import By
 from multidrop.tui.outbox import BURST, Outbox
 from tests.support.fake_session import FakeSession, demo_session
-from tests.support.virtual import in_virtual_time
+
+pytestmark = pytest.mark.virtual
 
 LATER = BURST + 0.1
 
@@ -45,7 +48,6 @@ class Box:
         return self.session.sent
 
 
-@in_virtual_time
 async def test_lines_of_a_burst_are_sent_each_when_the_one_before_was_answered() -> None:
     box = Box(MR=1.0)
     await box.type("MR 1", "MR 2", "@b PR P", "PR V")
@@ -58,7 +60,6 @@ async def test_lines_of_a_burst_are_sent_each_when_the_one_before_was_answered()
     assert box.outbox.idle
 
 
-@in_virtual_time
 async def test_what_a_person_types_while_a_wait_goes_on_is_answered_at_once() -> None:
     box = Box(**{"/wait": 60.0})
     await box.type("/wait stopped 60", "PR P", apart=LATER)
@@ -67,7 +68,6 @@ async def test_what_a_person_types_while_a_wait_goes_on_is_answered_at_once() ->
     assert box.sent[2:] == ["press:a /wait stopped 60"], "in one go it is a sequence"
 
 
-@in_virtual_time
 async def test_a_line_for_a_bus_that_has_not_answered_waits_however_slowly_it_is_typed() -> None:
     box = Box(MR=3.0)
     await box.type("MR 1", "MR 2", "@eth: PR P", apart=LATER)
@@ -76,7 +76,6 @@ async def test_a_line_for_a_bus_that_has_not_answered_waits_however_slowly_it_is
     assert box.sent[2:] == ["press:a MR 2"]
 
 
-@in_virtual_time
 async def test_the_first_refused_line_holds_the_rest_and_what_still_comes_of_the_burst() -> None:
     box = Box()
     box.session.refuses["BAD"] = "a: 20 unknown"
@@ -91,7 +90,6 @@ async def test_the_first_refused_line_holds_the_rest_and_what_still_comes_of_the
     assert box.sent[2:] == ["press:a MR 5"], "a person has seen it"
 
 
-@in_virtual_time
 async def test_a_refusal_drops_what_was_waiting_when_it_came() -> None:
     box = Box(BAD=2.0)
     box.session.refuses["BAD"] = "a: no answer"
@@ -108,7 +106,6 @@ async def test_a_refusal_drops_what_was_waiting_when_it_came() -> None:
     assert box.told == ["'BAD' failed; not sent: MR 2; /unsent offers it again"]
 
 
-@in_virtual_time
 async def test_a_stop_drops_what_waits_and_what_comes_then_follows_nothing() -> None:
     box = Box(MR=1.0)
     await box.type("MR 1", "MR 2", "MR 3")
@@ -122,7 +119,6 @@ async def test_a_stop_drops_what_waits_and_what_comes_then_follows_nothing() -> 
     assert len(box.told) == 1
 
 
-@in_virtual_time
 async def test_a_line_carries_the_count_of_stops_of_its_enter() -> None:
     box = Box()
     typed: list[int | None] = []
@@ -140,7 +136,6 @@ def note(typed: list[int | None], start: Callable[..., Any]) -> Callable[..., An
     return noting
 
 
-@in_virtual_time
 async def test_a_line_goes_to_the_drive_that_was_selected_as_it_was_typed() -> None:
     box = Box(MR=1.0)
     await box.type("MR 1", "MR 2", "@b MR 3", "@eth: PR P")
@@ -149,7 +144,6 @@ async def test_a_line_goes_to_the_drive_that_was_selected_as_it_was_typed() -> N
     assert [line.partition(" ")[2] for line in box.sent] == ["MR 1", "@press:a MR 2", "@press:b MR 3", "@eth: PR P"]
 
 
-@in_virtual_time
 async def test_a_verb_is_held_where_it_would_be_for_another_drive() -> None:
     box = Box(MR=1.0)
     await box.type("MR 1", "/list", "MR 2")
@@ -161,7 +155,6 @@ async def test_a_verb_is_held_where_it_would_be_for_another_drive() -> None:
     ]
 
 
-@in_virtual_time
 async def test_lines_behind_a_use_are_for_what_it_selects() -> None:
     box = Box(MR=1.0)
     await box.type("MR 1", "/use eth", "MR 2")
@@ -169,14 +162,12 @@ async def test_lines_behind_a_use_are_for_what_it_selects() -> None:
     assert box.sent == ["press:a MR 1", "eth: /use eth", "eth: MR 2"]
 
 
-@in_virtual_time
 async def test_quit_waits_for_nothing() -> None:
     box = Box(MR=9.0)
     await box.type("MR 1", "MR 2", "/quit")
     assert box.sent == ["press:a MR 1", "press:a /quit"]
 
 
-@in_virtual_time
 async def test_a_second_paste_does_not_mix_with_the_first() -> None:
     box = Box(MR=1.0)
     box.outbox.paste(["MR 1", "MR 2"])
@@ -186,7 +177,6 @@ async def test_a_second_paste_does_not_mix_with_the_first() -> None:
     assert [line.partition(" ")[2] for line in box.sent] == ["MR 1", "MR 2", "PG 1", "PG"]
 
 
-@in_virtual_time
 async def test_a_line_that_cannot_be_read_holds_the_rest_too() -> None:
     box = Box()
     box.session.refuses["@"] = "no address after the @"
@@ -196,7 +186,6 @@ async def test_a_line_that_cannot_be_read_holds_the_rest_too() -> None:
     assert box.told == ["'@' failed; not sent: MR 2; /unsent offers it again"]
 
 
-@in_virtual_time
 async def test_of_five_hundred_pasted_lines_the_rest_after_a_failure_is_offered_again() -> None:
     box = Box()
     box.session.refuses["MR 250"] = "a: 20 unknown"
@@ -216,7 +205,6 @@ async def test_of_five_hundred_pasted_lines_the_rest_after_a_failure_is_offered_
     assert len(box.sent) == 500
 
 
-@in_virtual_time
 async def test_a_stop_in_the_middle_of_a_paste_offers_the_rest_but_not_the_line_that_was_sent() -> None:
     box = Box(MR=0.1)
     box.outbox.paste([f"MR {n}" for n in range(500)])

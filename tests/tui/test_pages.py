@@ -3,13 +3,13 @@
 import pytest
 
 from multidrop.drives.events import Sample, Silent
-from multidrop.shell.events import By, OnBus
+from multidrop.shell.events import By, Entered, OnBus, Printed
 from multidrop.tui.app import MultidropApp
 from multidrop.tui.panels.view import Glance
 from multidrop.tui.readout import Readout
 from multidrop.tui.screens.all_drives import AllDrives, Place, drive_row
 from multidrop.tui.widgets.lines import width_of
-from tests.support.fake_session import a_move, demo_session, make_app, settle
+from tests.support.fake_session import a_move, a_talk, demo_session, emit, make_app, on_screen, press, settle, toasts
 
 pytestmark = pytest.mark.tui
 
@@ -20,68 +20,48 @@ def rows(app: MultidropApp) -> list[str]:
 
 
 async def test_all_drives_are_a_page_with_the_worst_first() -> None:
-    session = demo_session()
-    app = make_app(session)
-    async with app.run_test(size=(80, 24)) as pilot:
+    async with on_screen() as (pilot, app, session):
         session.emit(*a_move(session), OnBus("eth", Sample(session.time, "", 5, 0)))
-        await pilot.press("ctrl+a")
-        await settle(pilot)
+        await press(pilot, "ctrl+a")
         assert [row.split()[0] for row in rows(app)] == ["▸pmx:00", "press:c", "press:b", "press:a", "eth"]
         assert "1 lost · 1 silent · 1 moving" in app.screen.lines("heading").plain  # type: ignore[attr-defined]
 
 
 async def test_enter_selects_the_drive_and_goes_back() -> None:
-    session = demo_session()
-    app = make_app(session)
-    async with app.run_test(size=(80, 24)) as pilot:
+    async with on_screen() as (pilot, app, session):
         session.emit(*a_move(session))
-        await pilot.press("ctrl+a")
-        await settle(pilot)
-        await pilot.press("slash", *"clamp")
-        await settle(pilot)
+        await press(pilot, "ctrl+a")
+        await press(pilot, "slash", *"clamp")
         assert len(rows(app)) == 1
-        await pilot.press("enter")
-        await settle(pilot)
+        await press(pilot, "enter")
         assert app.screen is app.main
         assert (session.selected_bus, session.selected and session.selected.address) == ("press", "b")
         assert session.lines == []
 
 
 async def test_the_chosen_drive_stays_chosen_when_another_gets_worse() -> None:
-    session = demo_session()
-    app = make_app(session)
-    async with app.run_test(size=(80, 24)) as pilot:
+    async with on_screen() as (pilot, app, session):
         session.emit(*a_move(session))
-        await pilot.press("ctrl+a")
-        await settle(pilot)
-        await pilot.press("down", "down", "down")
-        await settle(pilot)
+        await press(pilot, "ctrl+a")
+        await press(pilot, "down", "down", "down")
         assert rows(app)[3].startswith("▸press:a")
-        session.emit(OnBus("eth", Silent(session.time, "")))
-        await settle(pilot)
+        await emit(pilot, OnBus("eth", Silent(session.time, "")))
         assert rows(app)[4].startswith("▸press:a")
 
 
 async def test_a_page_stays_after_a_stop_and_shows_its_outcome() -> None:
-    session = demo_session()
-    app = make_app(session)
-    async with app.run_test(size=(80, 24)) as pilot:
-        await pilot.press("ctrl+a", "ctrl+p", "ctrl+x")
-        await settle(pilot)
+    async with on_screen() as (pilot, app, session):
+        await press(pilot, "ctrl+a", "ctrl+p", "ctrl+x")
         assert isinstance(app.screen, AllDrives) and session.stops == 1
         assert "STOP SENT" in app.screen.query_one(".banner").plain  # type: ignore[attr-defined]
         assert "^X STOP ALL" in app.screen.lines("footer").plain
-        await pilot.press("escape")
-        await settle(pilot)
+        await press(pilot, "escape")
         assert app.screen is app.main
 
 
 async def test_pages_open_by_typing_and_an_unknown_one_is_refused() -> None:
-    session = demo_session()
-    app = make_app(session)
-    async with app.run_test(size=(80, 24)) as pilot:
-        await pilot.press(*"/page drives", "enter")
-        await settle(pilot)
+    async with on_screen() as (pilot, app, session):
+        await press(pilot, *"/page drives", "enter")
         assert isinstance(app.screen, AllDrives)
         assert session.lines == [("/page drives", By.OPERATOR)]
 
@@ -93,23 +73,20 @@ async def test_a_key_shows_and_hides_a_panel_at_every_size(size: tuple[int, int]
         await settle(pilot)
         shown = "plot" in app.main.wants()
         assert shown is (size[0] >= 110)
-        await pilot.press("ctrl+t")
-        await settle(pilot)
+        await press(pilot, "ctrl+t")
         assert ("plot" in app.main.wants()) is not shown
         parts = [app.main.lines(name) for name, _ in app.main.columns()]
         assert any("last 20 s" in part.plain for part in parts) is not shown
 
 
 async def test_a_click_on_the_footer_does_what_the_key_does_but_moves_nothing() -> None:
-    session = demo_session()
-    app = make_app(session)
-    async with app.run_test(size=(120, 24)) as pilot:
+    async with on_screen(width=120) as (pilot, app, session):
         await settle(pilot)
         footer = app.main.lines("footer").plain
         await pilot.click("#footer", offset=(footer.index("F3 shuttle") + 4, 0))
         await settle(pilot)
         assert session.lines == []  # the click was for the focus of the terminal
-        assert any("press F3" in str(each.message) for each in app._notifications)
+        assert any("press F3" in text for text in toasts(app))
         await pilot.click("#footer", offset=(footer.index("^A all drives"), 0))
         await settle(pilot)
         assert isinstance(app.screen, AllDrives)
@@ -119,14 +96,10 @@ async def test_a_click_on_the_footer_does_what_the_key_does_but_moves_nothing() 
 
 
 async def test_what_is_typed_on_the_page_of_all_drives_chooses_an_address_and_enter_takes_nothing_else() -> None:
-    session = demo_session()
-    app = make_app(session)
-    async with app.run_test(size=(80, 24)) as pilot:
+    async with on_screen() as (pilot, app, session):
         for typed, selected in {"t": "a", "b": "b"}.items():
-            await pilot.press("ctrl+a")
-            await settle(pilot)
-            await pilot.press(*typed, "enter", *(["escape", "escape"] if typed == "t" else []))
-            await settle(pilot)
+            await press(pilot, "ctrl+a")
+            await press(pilot, *typed, "enter", *(["escape", "escape"] if typed == "t" else []))
             assert session.selected is not None and session.selected.address == selected, typed
             assert app.screen is app.main
 
@@ -138,3 +111,41 @@ def test_a_row_fits_and_shows_the_trouble_at_every_width(width: int) -> None:
     row = drive_row(Place("gantry-left", Glance("a", "a-long-name", "LMDCM", "", readout)), 1.0, width, True)
     assert width_of(row) == width
     assert "✗ limi" in "".join(text for text, _ in row)
+
+
+# The split screen
+
+
+@pytest.mark.parametrize("size", [(80, 24), (200, 50)])
+async def test_the_other_half_shows_one_drive_and_a_key_types_to_it(size: tuple[int, int]) -> None:
+    session = demo_session()
+    app = make_app(session)
+    async with app.run_test(size=size) as pilot:
+        await emit(pilot, *a_talk(session))
+        await press(pilot, "ctrl+l", "down", "enter")
+        beside = app.main.beside
+        assert (beside.bus, beside.address) == ("press", "b")
+        assert "@b PR VX" in beside.transcript.plain and "512000" not in beside.transcript.plain
+        above = beside.region.bottom <= app.main.page("press").region.y
+        assert above is (size[0] == 80)
+        await emit(pilot, Printed(session.time, "press", "b", "4711"), Printed(session.time, "press", "a", "4712"))
+        assert "4711" in beside.transcript.plain and "4712" not in beside.transcript.plain
+        assert app.main.lines("label").plain == " press:a ▸ "
+        await press(pilot, "ctrl+l")
+        assert app.main.lines("label").plain == " press:b ▸ " and (beside.bus, beside.address) == ("press", "a")
+        await press(pilot, *"PR P", "enter")
+        assert session.sent == ["press:b PR P"]
+
+
+async def test_the_other_half_of_a_closed_line_goes_and_the_palette_ends_the_split() -> None:
+    async with on_screen() as (pilot, app, session):
+        app.view._show_half("", "eth")
+        await emit(pilot, Entered(session.time, "PR MV", By.OPERATOR, "eth", ""))
+        assert "PR MV" in app.main.beside.transcript.plain
+        session.buses.pop("eth")
+        app.model.changed = True
+        await settle(pilot)
+        assert not app.main.beside.display
+        await press(pilot, "ctrl+l", "down", "enter")
+        await press(pilot, "ctrl+p", *"one half", "enter")
+        assert not app.main.beside.display

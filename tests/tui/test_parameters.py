@@ -15,7 +15,7 @@ from multidrop.dialects.values import IO, VARIABLES, Reading, Readings
 from multidrop.shell.events import SettingsRead
 from multidrop.shell.params.page import edit, found_in, meanings_of, parsed, rows
 from multidrop.tui.screens.parameters import ParametersPage
-from tests.support.fake_session import FakeSession, demo_session, make_app, settle
+from tests.support.fake_session import FakeSession, demo_session, emit, on_screen, press, settle
 
 at_screen = pytest.mark.tui
 FOUND = Readings(
@@ -103,61 +103,47 @@ def names(page: ParametersPage) -> list[str]:
 
 @at_screen
 async def test_settings_are_read_when_asked_for() -> None:
-    session = demo_session()
-    async with make_app(session).run_test(size=(80, 24)) as pilot:
+    async with on_screen() as (pilot, _, session):
         page = await opened(pilot, session, None)
         assert "r reads every setting" in page.lines("table").plain
-        await pilot.press("r")
-        await settle(pilot)
+        await press(pilot, "r")
         assert session.sent == ["press:a /params read"]
 
 
 @at_screen
 async def test_search_compare_and_differences_only() -> None:
-    session = demo_session()
-    async with make_app(session).run_test(size=(80, 24)) as pilot:
+    async with on_screen() as (pilot, _, session):
         page = await opened(pilot, session)
         assert names(page) == ["A", "MS", "VI", "VM", "IS1", "DN", "Q1"]
-        await pilot.press("d", "equals_sign")
-        await settle(pilot)
+        await press(pilot, "d", "equals_sign")
         assert names(page) == ["VM", "IS1"]
-        await pilot.press("slash", *"vm", "enter")
-        await settle(pilot)
+        await press(pilot, "slash", *"vm", "enter")
         assert names(page) == ["VM"] and "768000" in page.lines("table").plain
-        await pilot.press("equals_sign", "v")
-        await settle(pilot)
+        await press(pilot, "equals_sign", "v")
         assert names(page) == ["Q1"]
         assert session.sent == []
 
 
 @at_screen
 async def test_a_value_is_checked_then_shown_then_sent_and_read_again() -> None:
-    session = demo_session()
-    async with make_app(session).run_test(size=(80, 24)) as pilot:
+    async with on_screen() as (pilot, _, session):
         page = await opened(pilot, session)
-        await pilot.press("slash", *"vm", "enter", "enter")
-        await settle(pilot)
-        await pilot.press(*["backspace"] * 6, *"10", "enter")
-        await settle(pilot)
+        await press(pilot, "slash", *"vm", "enter", "enter")
+        await press(pilot, *["backspace"] * 6, *"10", "enter")
         assert "nothing was sent" in page.lines("said").plain and session.sent == []
-        await pilot.press(*["backspace"] * 2, *"500000", "enter")
-        await settle(pilot)
+        await press(pilot, *["backspace"] * 2, *"500000", "enter")
         assert "Enter sends VM=500000" in page.lines("said").plain and session.sent == []
-        await pilot.press("enter")
-        await settle(pilot)
+        await press(pilot, "enter")
         assert session.sent == ["press:a VM=500000", "press:a /params read"]
 
 
 @at_screen
 async def test_escape_and_a_stop_send_nothing() -> None:
-    session = demo_session()
-    async with make_app(session).run_test(size=(80, 24)) as pilot:
+    async with on_screen() as (pilot, _, session):
         await opened(pilot, session)
         for end in ("escape", "ctrl+x"):
-            await pilot.press("enter", *["backspace"] * 7, *"70000", "enter")
-            await settle(pilot)
-            await pilot.press(end)
-            await settle(pilot)
+            await press(pilot, "enter", *["backspace"] * 7, *"70000", "enter")
+            await press(pilot, end)
             assert isinstance(pilot.app.screen, ParametersPage)
         await pilot.press("escape")
         assert session.sent == []
@@ -168,19 +154,15 @@ async def test_escape_and_a_stop_send_nothing() -> None:
 async def test_a_file_and_another_drive_to_compare_with(tmp_path: Path) -> None:
     session = demo_session()
     (tmp_path / "a.toml").write_text("[parameters]\nVM = 100\n")
-    async with make_app(session).run_test(size=(80, 24)) as pilot:
+    async with on_screen(session) as (pilot, _, _):
         page = await opened(pilot, session)
         await pilot.press("f")
         page.field.value = str(tmp_path / "none.toml")
-        await pilot.press("enter")
-        await settle(pilot)
+        await press(pilot, "enter")
         assert "nothing was sent" in page.lines("said").plain
         page.field.value = str(tmp_path / "a.toml")
-        await pilot.press("enter", "equals_sign")
-        await settle(pilot)
+        await press(pilot, "enter", "equals_sign")
         assert names(page) == ["VM"] and "a.toml" in page.lines("columns").plain
-        session.emit(SettingsRead(session.time, "press", "b", Readings((Reading("MS", 64),))))
-        await settle(pilot)
-        await pilot.press("a", "b", "enter")
-        await settle(pilot)
+        await emit(pilot, SettingsRead(session.time, "press", "b", Readings((Reading("MS", 64),))))
+        await press(pilot, "a", "b", "enter")
         assert names(page) == ["MS"]

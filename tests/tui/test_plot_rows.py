@@ -7,7 +7,6 @@ import math
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from textual.pilot import Pilot
 
 from multidrop.drives.events import Lost, Sample, Valued
 from multidrop.shell.events import By, OnBus
@@ -15,22 +14,10 @@ from multidrop.shell.roles import Series
 from multidrop.transports import TransportLost
 from multidrop.tui.curves.raster import ASCII
 from multidrop.tui.panels.plot import cursor_row, plot_rows, plot_title
-from multidrop.tui.panels.view import View, glances_of
-from multidrop.tui.screen_model import ScreenModel
 from multidrop.tui.screens.plot_page import PlotPage
-from multidrop.tui.widgets.lines import Row, width_of
-from tests.support.fake_session import FakeBus, FakeDrive, FakeSession, a_move, demo_session, make_app, settle
-
-
-def plain(*rows: Row) -> str:
-    return "\n".join("".join(text for text, _ in row) for row in rows)
-
-
-def view(session: FakeSession, *events: OnBus, polling: bool = True) -> View:
-    model = ScreenModel(lambda: session.selected_bus, lambda: session.buses)
-    for event in events:
-        model.take(event)
-    return View(session, model, glances_of(session, model, session.buses["press"]), session.now(), polling)
+from multidrop.tui.widgets.lines import width_of
+from tests.support.fake_session import FakeBus, FakeDrive, FakeSession, a_move, demo_session, on_screen, press, settle
+from tests.support.panel_rows import plain, view
 
 
 def rest(address: str, position: int, session: FakeSession) -> list[OnBus]:
@@ -44,34 +31,34 @@ def wave(address: str, session: FakeSession) -> list[OnBus]:
     ]
 
 
-def test_a_resting_drive_is_one_line() -> None:
-    session = demo_session()
+@pytest.fixture
+def session() -> FakeSession:
+    return demo_session()
+
+
+def test_a_resting_drive_is_one_line(session: FakeSession) -> None:
     rows = plot_rows(view(session, *rest("a", 51_300, session)), 60, 20)
     assert plain(*rows) == " a gantry at rest at 51300 steps"
 
 
-def test_an_encoder_between_two_counts_rests() -> None:
-    session = demo_session()
+def test_an_encoder_between_two_counts_rests(session: FakeSession) -> None:
     shown = view(session, *rest("a", 51_300, session), OnBus("press", Sample(session.time, "a", 51_301, 0)))
     assert plain(*plot_rows(shown, 60, 20)) == " a gantry at rest at 51300 to 51301 steps"
 
 
-def test_a_steady_velocity_is_one_line_while_the_position_changes() -> None:
-    session = demo_session()
+def test_a_steady_velocity_is_one_line_while_the_position_changes(session: FakeSession) -> None:
     events = [OnBus("press", Sample(session.time - 25 + n / 20, "a", 100 * n, 2000)) for n in range(500)]
     text = plain(*plot_rows(view(session, *events), 60, 20))
     assert text.startswith(" a gantry steady at 2000 steps/s\n position a gantry steps ")
 
 
-def test_without_samples_it_says_so() -> None:
-    session = demo_session()
+def test_without_samples_it_says_so(session: FakeSession) -> None:
     assert plain(*plot_rows(view(session), 60, 20)) == " a gantry no samples yet"
     old = view(session, OnBus("press", Sample(session.time - 100, "a", 5, 0)))
     assert plain(*plot_rows(old, 60, 20)) == " a gantry no samples in this time"
 
 
-def test_a_drive_that_is_not_read_any_more_says_so_where_its_value_stands() -> None:
-    session = demo_session()
+def test_a_drive_that_is_not_read_any_more_says_so_where_its_value_stands(session: FakeSession) -> None:
     session.plotted = (Series("press", "a"), Series("press", "b"))
     events = [*rest("a", 5, session), *wave("b", session)]
     session.time += 4
@@ -80,40 +67,35 @@ def test_a_drive_that_is_not_read_any_more_says_so_where_its_value_stands() -> N
     assert {role for row in rows for text, role in row if "4 s" in text and "-" not in text} == {"dim"}
 
 
-def test_the_title_says_the_span_and_the_real_rate() -> None:
-    session = demo_session()
+def test_the_title_says_the_span_and_the_real_rate(session: FakeSession) -> None:
     events = rest("a", 5, session)
     assert plain(plot_title(view(session, *events))) == " plot last 20 s  20 Hz "
     assert "polling off" in plain(plot_title(view(session, *events, polling=False)))
     assert "no samples" in plain(plot_title(view(session)))
 
 
-def test_what_rests_is_said_and_does_not_widen_the_scale_of_what_moves() -> None:
-    session = demo_session()
+def test_what_rests_is_said_and_does_not_widen_the_scale_of_what_moves(session: FakeSession) -> None:
     session.plotted = (Series("press", "a"), Series("press", "b"))
     text = plain(*plot_rows(view(session, *wave("a", session), *rest("b", 2_048_000, session)), 60, 20))
     assert " b clamp at rest at 2048000 steps" in text
     assert "M ┤" not in text
 
 
-def test_lines_bear_their_names_at_their_ends_with_their_last_values() -> None:
-    session = demo_session()
+def test_lines_bear_their_names_at_their_ends_with_their_last_values(session: FakeSession) -> None:
     session.plotted = (Series("press", "a"), Series("press", "b"))
     rows = plot_rows(view(session, *a_move(session)[:480], *wave("b", session)), 100, 30)
     assert "a gantry 600000" in plain(*rows) and "b clamp" in plain(*rows)
     assert {role for row in rows for text, role in row if "b clamp" in text} == {"series2"}
 
 
-def test_values_are_plotted_by_their_words_on_any_line() -> None:
-    session = demo_session()
+def test_values_are_plotted_by_their_words_on_any_line(session: FakeSession) -> None:
     session.plotted = (Series("press", "b", "I1"), Series("eth", "", "VM"))
     inputs = [OnBus("press", Valued(session.time - 5 + n / 10, "b", "I1", float(n > 25))) for n in range(50)]
     text = plain(*plot_rows(view(session, *inputs, OnBus("eth", Valued(session.time - 1, "", "VM", 768000))), 100, 20))
     assert " I1 press:b clamp " in text and " eth VM steady at 768000" in text
 
 
-def test_each_drive_may_have_charts_of_its_own() -> None:
-    session = demo_session()
+def test_each_drive_may_have_charts_of_its_own(session: FakeSession) -> None:
     session.plotted = (Series("press", "a"), Series("press", "b"))
     shown = view(session, *wave("a", session), *wave("b", session))
     shown.model.look.apart = True
@@ -121,14 +103,12 @@ def test_each_drive_may_have_charts_of_its_own() -> None:
     assert titles == ["velocity a gantry", "position a gantry", "velocity b clamp", "position b clamp"]
 
 
-def test_what_finds_no_room_is_named() -> None:
-    session = demo_session()
+def test_what_finds_no_room_is_named(session: FakeSession) -> None:
     rows = plot_rows(view(session, *wave("a", session)), 40, 6)
     assert plain(rows[-1]).strip() == "no room: position a gantry"
 
 
-def test_the_cursor_shows_the_values_there() -> None:
-    session = demo_session()
+def test_the_cursor_shows_the_values_there(session: FakeSession) -> None:
     shown = view(session, *wave("a", session))
     look = shown.model.look
     plot_rows(shown, 60, 20)
@@ -139,8 +119,7 @@ def test_the_cursor_shows_the_values_there() -> None:
     assert "not known" not in plain(cursor_row(shown, 60))
 
 
-def test_a_lost_line_leaves_a_gap() -> None:
-    session = demo_session()
+def test_a_lost_line_leaves_a_gap(session: FakeSession) -> None:
     first = [OnBus("press", Sample(session.time - 18 + n / 20, "a", n, 20)) for n in range(100)]
     then = [OnBus("press", Sample(session.time - 4 + n / 20, "a", n, 20)) for n in range(80)]
     lost = OnBus("press", Lost(session.time - 13, TransportLost("unplugged")))
@@ -180,16 +159,9 @@ def test_many_drives_at_rest_are_counted() -> None:
 # The page
 
 
-async def press(pilot: Pilot[int], *keys: str) -> None:
-    await pilot.press(*keys)
-    await settle(pilot)
-
-
 @pytest.mark.tui
 async def test_keys_of_the_page() -> None:
-    session = demo_session()
-    app = make_app(session)
-    async with app.run_test(size=(100, 30)) as pilot:
+    async with on_screen(width=100, height=30) as (pilot, app, session):
         session.emit(*a_move(session))
         await press(pilot, "ctrl+g")
         page = app.screen
@@ -216,9 +188,7 @@ async def test_keys_of_the_page() -> None:
 
 @pytest.mark.tui
 async def test_escape_goes_on_before_it_leaves_and_a_stop_leaves_the_page() -> None:
-    session = demo_session()
-    app = make_app(session)
-    async with app.run_test(size=(80, 24)) as pilot:
+    async with on_screen() as (pilot, app, session):
         await press(pilot, "ctrl+g", "left", "escape")
         assert isinstance(app.screen, PlotPage) and app.model.look.paused_at is None
         await press(pilot, "ctrl+x")
@@ -227,9 +197,7 @@ async def test_escape_goes_on_before_it_leaves_and_a_stop_leaves_the_page() -> N
 
 @pytest.mark.tui
 async def test_what_is_plotted_is_polled_and_values_are_read() -> None:
-    session = demo_session()
-    app = make_app(session)
-    async with app.run_test(size=(80, 24)) as pilot:
+    async with on_screen() as (pilot, app, session):
         session.plotted = (Series("press", "b"), Series("press", "c", "I1"))
         await press(pilot, "ctrl+g")
         app.model.changed = True
@@ -244,21 +212,16 @@ async def test_what_is_plotted_is_polled_and_values_are_read() -> None:
 
 @pytest.mark.tui
 async def test_what_is_typed_after_a_line_that_opens_a_page_is_no_key_of_the_page() -> None:
-    session = demo_session()
-    app = make_app(session)
-    async with app.run_test(size=(80, 24)) as pilot:
-        await pilot.press(*"/page plot", "enter", "r", "a")
-        await settle(pilot)
+    async with on_screen() as (pilot, app, session):
+        await press(pilot, *"/page plot", "enter", "r", "a")
         assert isinstance(app.screen, PlotPage)
         assert session.lines == [("/page plot", By.OPERATOR)]
 
 
 @pytest.mark.tui
-async def test_a_refused_line_of_the_page_is_seen_on_the_page() -> None:
-    session = demo_session()
+async def test_a_refused_line_of_the_page_is_seen_on_the_page(session: FakeSession) -> None:
     session.refuses["/plot press:a --serve 9876"] = "cannot serve at 127.0.0.1:9876 (Address already in use)"
-    app = make_app(session)
-    async with app.run_test(size=(80, 24)) as pilot:
+    async with on_screen(session) as (pilot, app, _):
         await press(pilot, "ctrl+g", "r")
         await settle(pilot)
         assert isinstance(app.screen, PlotPage)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import AsyncIterator, Callable
+from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from pathlib import Path
 
@@ -17,7 +17,7 @@ from multidrop.tui.app import MultidropApp
 from multidrop.tui.screens.dialogs import Confirm, Search
 from multidrop.tui.screens.program import ProgramPage
 from tests.support.fake_session import FakeAssist, FakeSession, demo_session, settle
-from tests.support.until import PATIENCE
+from tests.support.real_screen import real_screen, until
 
 pytestmark = pytest.mark.tui
 
@@ -57,13 +57,6 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     monkeypatch.setattr("multidrop.tui.screens.edit.PAUSE", 0.02)
     (tmp_path / "a.mxt").write_text(TEXT)
     return tmp_path
-
-
-async def until(pilot: Pilot[int], true: Callable[[], bool]) -> None:
-    async with asyncio.timeout(PATIENCE):
-        while not true():
-            await pilot.pause(0.01)
-            pilot.app.tick()  # type: ignore[attr-defined]
 
 
 async def asked(pilot: Pilot[int]) -> None:
@@ -266,3 +259,43 @@ async def test_a_paste_of_control_characters_cannot_reach_the_terminal(folder: P
         await until(pilot, lambda: "' ok" in shown(pilot).editor.text)
         assert "\x1b" not in shown(pilot).editor.text
         assert all(each.isprintable() for each in shown(pilot).editor.render_line(0).text)
+
+
+# On a real session with a simulated drive: an error is made and mended, then the program runs and is stopped.
+
+LONG = "PG 1\nLB G1\n MA 5120000\n H\n MA 0\n H\n BR G1\n E\nPG\n"
+
+
+@pytest.mark.slow
+async def test_a_program_is_mended_downloaded_traced_and_stopped(folder: Path) -> None:
+    (folder / "long.mxt").write_text(LONG)
+    async with real_screen(folder, "sim:#eth") as pilot:
+        app = pilot.app
+        assert isinstance(app, MultidropApp)
+        session = app.session
+        await until(pilot, lambda: session.selected is not None)
+        typed(pilot, "ctrl+e")
+        await until(pilot, lambda: isinstance(app.screen, Search))
+        typed(pilot, "long", "enter")
+        await until(pilot, lambda: isinstance(app.screen, ProgramPage))
+        page = app.screen
+        assert isinstance(page, ProgramPage)
+        typed(pilot, "end", "Z")
+        await until(pilot, lambda: bool(page.findings.problems))
+        typed(pilot, "backspace")
+        await until(pilot, lambda: not page.findings.problems and not page.findings.pending)
+        typed(pilot, "ctrl+d")
+        await until(pilot, lambda: isinstance(app.screen, Confirm))
+        typed(pilot, "enter")
+        await until(pilot, lambda: len(page.findings.addresses) == 7)
+        typed(pilot, "ctrl+r")
+        await until(pilot, lambda: isinstance(app.screen, Search))
+        typed(pilot, "trace g1", "enter")
+        await until(pilot, lambda: "▶" in page.editor.render_line(3).text)
+        await until(pilot, lambda: "executes" in page.lines("below").plain)
+        await until(pilot, lambda: "▶ moving" in page.lines("top").plain)
+        typed(pilot, "ctrl+x")
+        await until(pilot, lambda: "velocity 0" in page.query_one(".banner").plain)  # type: ignore[attr-defined]
+        await until(pilot, lambda: "▶" not in page.editor.render_line(3).text)
+        assert app.screen is page and page.editor.text == LONG
+        assert next(iter((folder / "state" / "backups").iterdir())).suffix == ".mxt"

@@ -1,17 +1,20 @@
-"""The question as a dialog: what was typed ahead answers nothing, a stop closes it, no macro starts behind it."""
+"""A question and a form as dialogs: what was typed ahead answers nothing, a stop closes them, no macro starts."""
 
 from __future__ import annotations
 
 import asyncio
-from collections.abc import AsyncIterator, Awaitable, Callable
+from collections.abc import AsyncIterator, Awaitable, Callable, Mapping
 from contextlib import asynccontextmanager
 from typing import Any
 
 import pytest
 from textual.pilot import Pilot
+from textual.widgets import Static
 
-from multidrop.tui.screens.dialogs import GoOn
-from tests.support.fake_session import FakeSession, demo_session, make_app, settle
+from multidrop.macros import Macro, Step
+from multidrop.shell.macro_arguments import value_fields
+from multidrop.tui.screens.dialogs import Form, GoOn
+from tests.support.fake_session import FakeSession, demo_session, make_app, on_screen, press, readable, settle
 
 pytestmark = pytest.mark.tui
 WHAT = "a: CP erases every program and every user variable"
@@ -26,20 +29,13 @@ def colours(monkeypatch: pytest.MonkeyPatch) -> None:
 @asynccontextmanager
 async def asked() -> AsyncIterator[tuple[Pilot[int], FakeSession, asyncio.Future[bool]]]:
     """The app with an open question, before keys count."""
-    session = demo_session()
-    app = make_app(session)
-    async with app.run_test(size=(80, 24)) as pilot:
+    async with on_screen() as (pilot, app, session):
         assert session.front.ask is not None
         answer = asyncio.ensure_future(session.front.ask(WHAT))
         await settle(pilot)
         assert isinstance(app.screen, GoOn)
         yield pilot, session, answer
         answer.cancel()
-
-
-def readable(pilot: Pilot[int]) -> None:
-    """Keys have paused."""
-    pilot.app.keyboard._deaf_until = 0.0  # type: ignore[attr-defined]
 
 
 async def test_a_letter_or_the_list_answers() -> None:
@@ -54,15 +50,13 @@ async def test_a_letter_or_the_list_answers() -> None:
         answer.cancel()
         await pilot.pause()
         readable(pilot)
-        await pilot.press(*"MR 5", "enter")
-        await settle(pilot)
+        await press(pilot, *"MR 5", "enter")
         assert session.sent == ["press:a MR 5"]
 
 
 async def test_keys_typed_ahead_answer_nothing_and_a_function_key_plays_nothing() -> None:
     async with asked() as (pilot, session, answer):
-        await pilot.press("y", "enter")
-        await settle(pilot)
+        await press(pilot, "y", "enter")
         assert not answer.done() and isinstance(pilot.app.screen, GoOn)
         readable(pilot)
         await pilot.press("f2")
@@ -102,9 +96,7 @@ def test_snapshot_of_a_question(snap_compare: Callable[..., bool]) -> None:
 
 
 async def test_the_lines_that_lead_to_the_question_are_in_it_and_can_be_read_to_their_end() -> None:
-    session = demo_session()
-    app = make_app(session)
-    async with app.run_test(size=(80, 24)) as pilot:
+    async with on_screen() as (pilot, app, session):
         app.show_line("/params restore kept.toml", ">")
         for number in range(20):
             app.show_line(f"a: Q{number}=1", "")
@@ -116,20 +108,64 @@ async def test_the_lines_that_lead_to_the_question_are_in_it_and_can_be_read_to_
         box, lines = app.screen.query_one(".box"), app.screen.query_one(".before")
         assert box.region.bottom <= 24 and app.screen.query_one(".keys").region.bottom < box.region.bottom
         assert lines.size.height == 6 and lines.scroll_y == 0
-        await pilot.press("pagedown", "pagedown", "pagedown")
-        await settle(pilot)
+        await press(pilot, "pagedown", "pagedown", "pagedown")
         assert lines.scroll_y == 14 and not answer.done()
         await pilot.press("y")
         assert await answer is True
 
 
 async def test_a_low_screen_shows_the_answers_first() -> None:
-    session = demo_session()
-    app = make_app(session)
-    async with app.run_test(size=(60, 15)) as pilot:
+    async with on_screen(width=60, height=15) as (pilot, app, session):
         app.show_line("a: Q1=1", "")
         assert session.front.ask is not None
         answer = asyncio.ensure_future(session.front.ask(WHAT))
         await settle(pilot)
         assert app.screen.query_one(".keys").region.bottom < app.screen.query_one(".box").region.bottom <= 15
         answer.cancel()
+
+
+# A form
+
+MACRO = Macro("m", (Step(0.0, "MR {turns:int=10,1..100}"), Step(0.0, "{mode:choice(slow|fast)} {turns}")))
+
+
+@asynccontextmanager
+async def filling() -> AsyncIterator[tuple[Pilot[int], Any, asyncio.Future[Mapping[str, str] | None]]]:
+    """The app with an open form, whose keys count."""
+    async with on_screen() as (pilot, app, session):
+        assert session.front.fill is not None
+        answer = asyncio.ensure_future(session.front.fill("macro m", value_fields(MACRO, {})))
+        await settle(pilot)
+        assert isinstance(app.screen, Form)
+        await pilot.press(*"lost", "enter")  # typed ahead
+        readable(pilot)
+        yield pilot, session, answer
+        answer.cancel()
+
+
+def wrong(pilot: Pilot[int]) -> str:
+    return str(pilot.app.screen.query_one("#wrong", Static).render())
+
+
+async def test_the_form_begins_where_a_value_is_needed_and_gives_all_values() -> None:
+    async with filling() as (pilot, session, answer):
+        await pilot.press("enter")
+        assert wrong(pilot) == "mode: a value is needed" and not answer.done()
+        await pilot.press(*"quick", "enter")
+        assert wrong(pilot) == "macro m: invalid mode = 'quick'; valid: slow or fast"
+        await pilot.press("ctrl+u", *"fast", "up", "ctrl+u", *"500", "down", "enter")
+        assert wrong(pilot) == "macro m: invalid turns = '500'; valid: a whole number, 1 to 100"
+        await pilot.press("f2")
+        assert session.sent == [] and not answer.done()
+        await pilot.press("ctrl+u", "enter", "enter")
+        assert await answer == {"turns": "10", "mode": "fast"}
+
+
+async def test_escape_gives_no_values_and_a_stop_closes_the_form() -> None:
+    async with filling() as (pilot, session, answer):
+        await pilot.press("escape")
+        assert await answer is None
+    async with filling() as (pilot, session, answer):
+        await press(pilot, "ctrl+x")
+        assert session.stops == 1 and not isinstance(pilot.app.screen, Form)
+        assert await answer is None

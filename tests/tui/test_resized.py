@@ -8,10 +8,9 @@ from itertools import zip_longest
 import pyte
 import pytest
 
-from multidrop.tui.app import MultidropApp
 from multidrop.tui.widgets.theme import Signs
-from tests.support.fake_session import FakeAssist, demo_session
-from tests.support.pty_screen import PtyScreen, on_a_pty
+from tests.support.fake_session import demo_session, painted
+from tests.support.pty_screen import PtyScreen, demo
 from tests.support.until import PATIENCE
 
 pytestmark = pytest.mark.tui
@@ -41,7 +40,7 @@ class Shown:
         self.feed()
         app = self.screen.app
         with app._context():
-            strips = app.screen._compositor.render_strips(app.size)
+            strips = painted(app.screen)
         rows = ["".join(segment.text for segment in strip).rstrip() for strip in strips]
         shown = [row.rstrip() for row in self.terminal.display]
         return [pair for pair in zip_longest(rows, shown, fillvalue="no row") if pair[0] != pair[1]]
@@ -59,7 +58,7 @@ class Shown:
 )
 async def test_a_size_that_changes_and_changes_back_at_once_leaves_no_gap(sizes: list[tuple[int, int]]) -> None:
     session = demo_session()
-    async with on_a_pty(lambda driver: MultidropApp(session, [], FakeAssist(), driver)) as screen:
+    async with demo(session) as (screen, _, _):
         shown = Shown(screen)
         await shown.agrees()
         shown.resize(*sizes[-1])
@@ -71,7 +70,7 @@ async def test_a_size_that_changes_and_changes_back_at_once_leaves_no_gap(sizes:
 
 async def test_other_signs_are_painted_at_once() -> None:
     session = demo_session()
-    async with on_a_pty(lambda driver: MultidropApp(session, [], FakeAssist(), driver)) as screen:
+    async with demo(session) as (screen, _, _):
         shown = Shown(screen)
         for signs in (Signs.ASCII, Signs.FULL, Signs.BOXES):
             screen.app.view.show_signs(signs)

@@ -18,15 +18,12 @@ from multidrop.tui.panels.view import Glance, View, firmware_of
 from multidrop.tui.readout import Readout, State
 from multidrop.tui.screen_model import ScreenModel
 from multidrop.tui.widgets.bars import STOP, Footer, banner_row, footer_row
-from multidrop.tui.widgets.lines import Lines, Row, width_of
-from tests.support.fake_session import FakeDrive, demo_session, make_app, settle
+from multidrop.tui.widgets.lines import Lines, width_of
+from tests.support.fake_session import FakeDrive, demo_session, emit, on_screen, press
+from tests.support.panel_rows import plain
 
 KEYS = [("F1", "help"), *((f"F{n}", f"macro-number-{n}") for n in range(2, 13)), ("^Q", "quit")]
 states = st.sampled_from(list(State))
-
-
-def plain(row: Row) -> str:
-    return "".join(text for text, _ in row)
 
 
 def glance(address: str, *points: tuple[float, int, int], **more: bool) -> Glance:
@@ -203,19 +200,15 @@ def test_a_row_from_elsewhere_acts_on_no_terminal() -> None:
 async def test_a_position_without_reference_has_its_sign_everywhere() -> None:
     session = demo_session()
     drive = cast(FakeDrive, session.buses["press"].drives["a"])
-    app = make_app(session)
-    async with app.run_test(size=(120, 40)) as pilot:
+    async with on_screen(session, 120, 40) as (pilot, app, _):
         for address in "ab":
-            session.emit(OnBus("press", Sample(session.time - 0.05, address, 1234, 0)))
-        await settle(pilot)
+            await emit(pilot, OnBus("press", Sample(session.time - 0.05, address, 1234, 0)))
         assert "~1234" not in app.main.lines("side").plain
         drive.unreferenced = frozenset({""})
-        session.emit(StateChanged(session.time))
-        await settle(pilot)
+        await emit(pilot, StateChanged(session.time))
         side = app.main.lines("side").plain
         assert side.count("~1234") == 2 and "not referenced: home it, set it, or /referenced a" in side
-        await pilot.press("ctrl+a")
-        await settle(pilot)
+        await press(pilot, "ctrl+a")
         shown = app.screen.lines("drives").plain.splitlines()  # type: ignore[attr-defined]
         marked = [row for row in shown if "~1234" in row]
         assert len(marked) == 1 and "press:a" in marked[0] and "not referenced" in marked[0]

@@ -1,9 +1,15 @@
 """The screen's memory, and what it may claim of a drive."""
 
+from __future__ import annotations
+
+from dataclasses import replace
+
 import pytest
 
+from multidrop.dialects import End, Priority, Reply
+from multidrop.dialects.mcode.host.codec import MCode
 from multidrop.dialects.values import Conditions
-from multidrop.drives.events import Conditioned, Sample, Silent, Traffic, Unsolicited
+from multidrop.drives.events import Conditioned, Ended, Sample, Sent, Silent, Traffic, Transaction, Unsolicited
 from multidrop.shell.events import (
     Agreed,
     By,
@@ -20,7 +26,7 @@ from multidrop.shell.events import (
 )
 from multidrop.tui.panels.drive import program_words
 from multidrop.tui.readout import Readout, State
-from multidrop.tui.screen_model import BusFacts, ScreenModel, bus_old, bus_state
+from multidrop.tui.screen_model import MOST, MOST_BYTES, BusFacts, ScreenModel, TrafficStore, bus_old, bus_state
 
 
 def sample(at: float, velocity: int, position: int = 0, address: str = "a", axis: str = "") -> OnBus:
@@ -276,3 +282,58 @@ def test_a_prediction_that_says_nothing_new_is_no_reason_to_paint(model: ScreenM
     model.take(predicted(1.0, 0, 0))
     assert model.quiet(predicted(1.1, 0, 0))
     assert not model.quiet(predicted(1.1, 0, 1)) and not model.quiet(predicted(1.1, 5, 0))
+
+
+# The bytes of a bus that are kept
+
+
+def exchange(store: TrafficStore, out: bytes, back: bytes, priority: Priority) -> None:
+    request = replace(MCode().request("b", "PR P"), priority=priority)
+    store.take(Sent(1.0, request))
+    store.take(Traffic(1.0, True, out))
+    store.take(Traffic(1.1, False, back))
+    store.take(Ended(1.2, Transaction(request, Reply(End.DONE), 1.0, 1.2, 1.0)))
+
+
+def test_polls_and_lines_of_people_are_told_apart_with_their_drive() -> None:
+    store = TrafficStore()
+    exchange(store, b"bPR P\n", b"5\r\n", Priority.OPERATOR)
+    exchange(store, b"bPR V\n", b"0\r\n", Priority.POLL)
+    store.take(Traffic(2.0, False, b"at home\r\n"))
+    assert [(each.outgoing, each.address, each.poll) for each in store.pieces] == [
+        (True, "b", False),
+        (False, "b", False),
+        (True, "b", True),
+        (False, "b", True),
+        (False, "", False),
+    ]
+
+
+def test_a_stop_is_nobodys_request_and_never_a_poll() -> None:
+    store = TrafficStore()
+    store.take(Traffic(2.0, True, b"\x1b"))
+    assert store.pieces[0].poll is False and store.pieces[0].address == ""
+
+
+def test_single_bytes_of_a_slow_line_are_one_piece_up_to_its_end() -> None:
+    store = TrafficStore()
+    for number, each in enumerate(b"51200\r\n7\r\n"):
+        store.take(Traffic(number * 0.001, False, bytes([each])))
+    store.take(Traffic(0.5, False, b"late"))
+    assert [(each.at, each.data) for each in store.pieces] == [(0.0, b"51200\r\n"), (0.007, b"7\r\n"), (0.5, b"late")]
+    assert store.taken == 3
+
+
+def test_what_is_kept_is_bounded_in_pieces_and_in_bytes() -> None:
+    store = TrafficStore()
+    for _ in range(MOST + 10):
+        store.take(Traffic(1.0, True, b"x"))
+    assert len(store.pieces) == MOST and store.taken == MOST + 10
+    for _ in range(40):
+        store.take(Traffic(1.0, False, b"y" * (MOST_BYTES // 8)))
+    store.take(Traffic(1.0, False, b"z" * (2 * MOST_BYTES)))
+    assert sum(len(each.data) for each in store.pieces) <= MOST_BYTES
+
+
+def test_other_events_are_left_to_others() -> None:
+    assert TrafficStore().take(Sample(1.0, "b", 0, 0)) is False

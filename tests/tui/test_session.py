@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import asyncio
-from collections.abc import AsyncIterator, Callable
+from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from pathlib import Path
 
@@ -13,11 +12,9 @@ from textual.keys import _character_to_key
 from textual.pilot import Pilot
 
 from multidrop.dialects.mcode.host.framing import sealed
-from multidrop.shell.connect.settings import Settings
-from multidrop.shell.session import Session
 from multidrop.tui.app import MultidropApp
-from multidrop.tui.assist import Assist
-from tests.support.until import PATIENCE
+from tests.support.fake_session import driver_of
+from tests.support.real_screen import real_screen, until
 
 pytestmark = pytest.mark.tui
 
@@ -26,15 +23,9 @@ NAMED = frozenset({"enter", "ctrl+p", "ctrl+x", "f4"})
 
 @asynccontextmanager
 async def press(tmp_path: Path, size: tuple[int, int] = (80, 24), reconnect: bool = False) -> AsyncIterator[Pilot[int]]:
-    settings = Settings(folder=tmp_path / "config", state=tmp_path / "state")
-    session = Session(settings, reconnect=reconnect)
-    app = MultidropApp(session, ["sim:#press"], Assist(session, settings))
-    try:
-        async with app.run_test(size=size) as pilot:
-            await until(pilot, lambda: "■ stopped" in status(pilot))
-            yield pilot
-    finally:
-        await session.close()
+    async with real_screen(tmp_path, size=size, reconnect=reconnect) as pilot:
+        await until(pilot, lambda: "■ stopped" in status(pilot))
+        yield pilot
 
 
 def app_of(pilot: Pilot[int]) -> MultidropApp:
@@ -56,19 +47,12 @@ def typed(pilot: Pilot[int], *pieces: str) -> None:
     """Keys by name, and texts by their characters, without a pause: the pilot would wait after each until the process
     is idle.
     """
-    driver = pilot.app._driver
-    assert driver is not None
+    driver = driver_of(pilot.app)
     for piece in pieces:
         named = piece in NAMED
         for character in (piece,) if named else piece:
             key = piece if named else _character_to_key(character)
             driver.send_message(events.Key(key, None if named else character))
-
-
-async def until(pilot: Pilot[int], true: Callable[[], bool]) -> None:
-    async with asyncio.timeout(PATIENCE):
-        while not true():
-            await pilot.pause(0.02)
 
 
 async def test_a_typed_move_is_seen_and_its_end_is_read(tmp_path: Path) -> None:
@@ -136,21 +120,15 @@ async def test_a_lost_bus_comes_back_in_its_tab(tmp_path: Path) -> None:
 
 
 async def test_a_controller_shows_both_axes_and_ctrl_x_stops_them(tmp_path: Path) -> None:
-    settings = Settings(folder=tmp_path / "config", state=tmp_path / "state")
-    session = Session(settings)
-    app = MultidropApp(session, ["sim:#pmx"], Assist(session, settings))
-    try:
-        async with app.run_test(size=(120, 40)) as pilot:
-            await until(pilot, lambda: "■ stopped" in status(pilot))
-            typed(pilot, "X300Y-200", "enter")
-            await until(pilot, lambda: "   300 pulses" in status(pilot))
-            await until(pilot, lambda: "  -200 pulses" in status(pilot) and "■ stopped" in status(pilot))
-            typed(pilot, "JY+", "enter")
-            await until(pilot, lambda: "▶ moving" in status(pilot))
-            typed(pilot, "ctrl+x")
-            await until(pilot, lambda: "■ stopped" in status(pilot))
-    finally:
-        await session.close()
+    async with real_screen(tmp_path, "sim:#pmx", (120, 40)) as pilot:
+        await until(pilot, lambda: "■ stopped" in status(pilot))
+        typed(pilot, "X300Y-200", "enter")
+        await until(pilot, lambda: "   300 pulses" in status(pilot))
+        await until(pilot, lambda: "  -200 pulses" in status(pilot) and "■ stopped" in status(pilot))
+        typed(pilot, "JY+", "enter")
+        await until(pilot, lambda: "▶ moving" in status(pilot))
+        typed(pilot, "ctrl+x")
+        await until(pilot, lambda: "■ stopped" in status(pilot))
 
 
 async def test_raw_mode_shows_the_bytes_and_names_the_bus(tmp_path: Path) -> None:

@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 from rich.cells import cell_len
 
 from multidrop.tui.widgets.theme import BRAILLE, TABLES, Signs, shown_as, signs_for
-from tests.support.fake_session import a_move, a_talk, demo_session, make_app, settle
+from tests.support.fake_session import a_move, a_talk, demo_session, make_app, painted, press
 from tests.support.paths import ROOT
 
 
@@ -55,7 +55,6 @@ async def test_nothing_but_ascii_reaches_a_terminal_of_ascii(keys: tuple[str, ..
     app.view.show_signs(Signs.ASCII)
     async with app.run_test(size=(120, 40)) as pilot:
         session.emit(*a_talk(session), *a_move(session))
-        await pilot.press(*keys)
-        await settle(pilot)
-        screen = "".join(strip.text for screen in app.screen_stack for strip in screen._compositor.render_strips())
+        await press(pilot, *keys)
+        screen = "".join(strip.text for screen in app.screen_stack for strip in painted(screen))
         assert screen.isascii() and "> moving" in screen

@@ -14,7 +14,7 @@ from multidrop.tui.assist import StartEntry
 from multidrop.tui.screens.dialogs import Options
 from multidrop.tui.screens.start import Start
 from multidrop.tui.text import ago
-from tests.support.fake_session import FakeAssist, FakeBus, FakeDrive, FakeSession, settle
+from tests.support.fake_session import FakeAssist, FakeBus, FakeDrive, FakeSession, painted, press, settle
 
 
 class Assist(FakeAssist):
@@ -67,11 +67,9 @@ async def test_everything_that_can_be_opened_is_listed_and_typing_narrows_it() -
 async def test_a_typed_url_is_opened_and_one_that_fails_stays_in_the_line() -> None:
     app, session = made("tcp://10.0.0.7:503")
     async with app.run_test(size=(80, 24)) as pilot:
-        await pilot.press(*"tcp://10.0.0.8:503", "enter")
-        await settle(pilot)
+        await press(pilot, *"tcp://10.0.0.8:503", "enter")
         assert isinstance(app.screen, Start) and "✗ tcp://10.0.0.8:503: no such port" in outcome(app)
-        await pilot.press("left", "left", "left", "left", "backspace", "7", "enter")
-        await settle(pilot)
+        await press(pilot, "left", "left", "left", "left", "backspace", "7", "enter")
         assert app.screen is app.main and list(session.buses) == ["bus0"]
 
 
@@ -80,8 +78,7 @@ async def test_a_port_is_opened_raw_on_its_key() -> None:
     app, session = made("/dev/ttyUSB0")
     async with app.run_test(size=(80, 24)) as pilot:
         await settle(pilot)
-        await pilot.press("down", "down", "ctrl+r")
-        await settle(pilot)
+        await press(pilot, "down", "down", "ctrl+r")
         assert session.raw == {"bus0"}
 
 
@@ -90,11 +87,9 @@ async def test_a_search_puts_the_url_of_what_it_finds_into_the_line() -> None:
     app, session = made("serial:/dev/ttyUSB0?baud=19200&drives=a")
     async with app.run_test(size=(80, 24)) as pilot:
         await settle(pilot)
-        await pilot.press("down", "down", "ctrl+s")
-        await settle(pilot)
+        await press(pilot, "down", "down", "ctrl+s")
         assert "found 1; Enter opens what is in the line" in outcome(app)
-        await pilot.press("enter")
-        await settle(pilot)
+        await press(pilot, "enter")
         assert list(session.buses) == ["bus0"]
 
 
@@ -102,17 +97,14 @@ async def test_a_search_puts_the_url_of_what_it_finds_into_the_line() -> None:
 async def test_a_search_that_finds_nothing_says_so_and_a_stop_leaves_the_page_usable() -> None:
     app, session = made("sim:")
     async with app.run_test(size=(80, 24)) as pilot:
-        await pilot.press(*"/dev/gone", "ctrl+s")
-        await settle(pilot)
+        await press(pilot, *"/dev/gone", "ctrl+s")
         assert "✗ /dev/gone: no drive replies" in outcome(app)
         app.screen.query_one("#url").value = "/dev/slow"  # type: ignore[attr-defined]
-        await pilot.press("ctrl+s", "ctrl+x")
-        await settle(pilot)
+        await press(pilot, "ctrl+s", "ctrl+x")
         assert isinstance(app.screen, Start) and session.stops == 1
         assert outcome(app) == "✗ stopped; the search has ended"
         app.screen.query_one("#url").value = "sim:"  # type: ignore[attr-defined]
-        await pilot.press("enter")
-        await settle(pilot)
+        await press(pilot, "enter")
         assert app.screen is app.main and list(session.buses) == ["bus0"]
 
 
@@ -171,8 +163,7 @@ async def test_on_the_smallest_screen_all_of_a_failure_is_shown() -> None:
 
     session.open = refused  # type: ignore[method-assign,assignment]
     async with app.run_test(size=(60, 15)) as pilot:
-        await pilot.press(*"tcp://x:1", "enter")
-        await settle(pilot)
+        await press(pilot, *"tcp://x:1", "enter")
         assert why in outcome(app)
-        shown = [strip.text for strip in app.screen._compositor.render_strips(app.size)]
+        shown = [strip.text for strip in painted(app.screen)]
         assert "tries all" in " ".join(row.strip() for row in shown)

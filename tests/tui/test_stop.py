@@ -1,6 +1,9 @@
 """Ctrl+X stops: from every screen, in every state, before any queue."""
 
+from __future__ import annotations
+
 import asyncio
+import threading
 from typing import cast
 
 import pytest
@@ -20,8 +23,18 @@ from multidrop.tui.screens.dialogs import Ask, Choose, Confirm, Search, TooSmall
 from multidrop.tui.screens.start import Start
 from multidrop.tui.terminal.keystream import STOP
 from tests.support.cell_session import CellSession, bus, party
-from tests.support.fake_session import FakeSession, a_move, demo_session, make_app, settle
-from tests.support.virtual import in_virtual_time
+from tests.support.fake_session import (
+    FakeSession,
+    a_move,
+    demo_session,
+    emit,
+    make_app,
+    on_screen,
+    press,
+    settle,
+)
+from tests.support.pty_screen import demo
+from tests.support.until import PATIENCE
 
 SCREENS = {
     "main": ((), None),
@@ -43,8 +56,7 @@ def banner(app: MultidropApp) -> str:
 
 @pytest.mark.tui
 async def test_it_stops_from_every_screen_and_says_so() -> None:
-    app = make_app()
-    async with app.run_test(size=(80, 24)) as pilot:
+    async with on_screen() as (pilot, app, _):
         for name in SCREENS:
             await stopped_from(pilot, app, name)
 
@@ -69,8 +81,7 @@ async def stopped_from(pilot: Pilot[int], app: MultidropApp, name: str) -> None:
 async def test_it_stops_under_the_questions_too() -> None:
     session = demo_session()
     session.busy = True
-    app = make_app(session)
-    async with app.run_test(size=(80, 24)) as pilot:
+    async with on_screen(session) as (pilot, app, _):
         await pilot.press("ctrl+q")
         assert isinstance(app.screen, Confirm)
         await pilot.press("ctrl+x")
@@ -86,8 +97,7 @@ async def test_it_stops_under_the_questions_too() -> None:
 @pytest.mark.tui
 async def test_it_stops_on_the_first_screen_and_shows_it_there() -> None:
     session = FakeSession()
-    app = make_app(session)
-    async with app.run_test(size=(80, 24)) as pilot:
+    async with on_screen(session) as (pilot, app, _):
         assert isinstance(app.screen, Start)
         await pilot.press("tab", "t", "ctrl+x")
         assert session.stops == 1
@@ -97,9 +107,7 @@ async def test_it_stops_on_the_first_screen_and_shows_it_there() -> None:
 
 @pytest.mark.tui
 async def test_it_stops_when_the_terminal_is_too_small() -> None:
-    session = demo_session()
-    app = make_app(session)
-    async with app.run_test(size=(59, 20)) as pilot:
+    async with on_screen(width=59, height=20) as (pilot, app, session):
         assert isinstance(app.screen, TooSmall)
         await pilot.press("ctrl+x")
         assert session.stops == 1
@@ -107,23 +115,17 @@ async def test_it_stops_when_the_terminal_is_too_small() -> None:
 
 @pytest.mark.tui
 async def test_after_a_stop_every_drive_is_looked_at_and_none_is_said_to_stand_unread() -> None:
-    session = demo_session()
-    app = make_app(session)
-    async with app.run_test(size=(80, 24)) as pilot:
-        session.emit(*a_move(session))
-        await settle(pilot)
+    async with on_screen() as (pilot, app, session):
+        await emit(pilot, *a_move(session))
         assert "b clamp  ■ stopped" in app.main.lines("status").plain
-        await pilot.press("ctrl+x")
-        await settle(pilot)
+        await press(pilot, "ctrl+x")
         assert "b clamp  ■ stood 0.9 s" in app.main.lines("status").plain
         assert set(session.buses["press"].telemetry.polled.values()) == {STATUS, LIVELY}
 
 
 @pytest.mark.tui
 async def test_the_banner_follows_what_is_read_without_a_word_from_anybody() -> None:
-    session = demo_session()
-    app = make_app(session)
-    async with app.run_test(size=(120, 40)) as pilot:
+    async with on_screen(width=120, height=40) as (pilot, app, session):
         await pilot.press("ctrl+x")
         session.fates = {f"press:{name}": Fate.STANDING for name in "abc"} | {"pmx:00": Fate.NOT_REACHED}
         await settle(pilot)
@@ -141,7 +143,7 @@ async def test_the_banner_follows_what_is_read_without_a_word_from_anybody() -> 
 DWELLS = 'program_text = """\nPG 1\nLB G1\nMR 51200\nH\nH 500\nBR G1\nE\nPG\n"""'
 
 
-@in_virtual_time
+@pytest.mark.virtual
 async def test_rows_and_tabs_never_say_the_contrary_of_the_banner_on_a_line_of_twelve_programs(tmp_path):
     names = "abcdefghijkl"
     async with CellSession(tmp_path, bus("press", *(f"{party(name)}\n{DWELLS}" for name in names))) as shop:
@@ -196,11 +198,8 @@ async def test_it_does_not_wait_for_what_the_app_is_doing() -> None:
 
 @pytest.mark.tui
 async def test_the_banner_goes_when_automation_may_run_again() -> None:
-    session = demo_session()
-    app = make_app(session)
-    async with app.run_test(size=(80, 24)) as pilot:
-        await pilot.press("ctrl+x")
-        await settle(pilot)
+    async with on_screen() as (pilot, app, session):
+        await press(pilot, "ctrl+x")
         assert banner(app)
         session.resume()
         await settle(pilot)
@@ -209,9 +208,7 @@ async def test_the_banner_goes_when_automation_may_run_again() -> None:
 
 @pytest.mark.tui
 async def test_escape_closes_and_never_stops() -> None:
-    session = demo_session()
-    app = make_app(session)
-    async with app.run_test(size=(80, 24)) as pilot:
+    async with on_screen() as (pilot, app, session):
         for opener in ("f1", "ctrl+o", "ctrl+p", "ctrl+r", "M"):
             await pilot.press(opener, "escape")
             await pilot.pause()
@@ -224,8 +221,7 @@ async def test_escape_closes_and_never_stops() -> None:
 async def test_pasted_lines_that_wait_are_never_sent_after_a_stop() -> None:
     session = demo_session()
     session.gate = asyncio.Event()
-    app = make_app(session)
-    async with app.run_test(size=(80, 24)) as pilot:
+    async with on_screen(session) as (pilot, app, _):
         await paste(pilot, "MR 1\nMR 2\nMR 3\n")
         await pilot.press("enter")
         await pilot.pause()
@@ -250,3 +246,19 @@ def test_however_a_terminal_spells_it_it_is_the_stop(key: str) -> None:
 @pytest.mark.parametrize("key", ["x", "X", "alt+x", "ctrl+c", "escape"])
 def test_nothing_else_is(key: str) -> None:
     assert not is_stop(events.Key(key, None))
+
+
+# Ahead of the event loop
+
+
+@pytest.mark.tui
+async def test_the_stop_is_written_while_the_event_loop_is_held_up() -> None:
+    session = demo_session()
+    written = threading.Event()
+    session.stop_ahead = written.set
+    async with demo(session) as (screen, _, _):
+        screen.write(b"MR 5\x18")
+        assert written.wait(PATIENCE)  # and nothing else runs in the loop meanwhile
+        assert session.stops == 0
+        await screen.rest()
+        assert (session.stops, session.lines) == (1, [])

@@ -7,13 +7,10 @@ from hypothesis import strategies as st
 
 from multidrop.tui.readout import State
 from multidrop.tui.widgets.bars import TROUBLE, Tab, rule_row, tab_at, top_row
-from multidrop.tui.widgets.lines import Row, width_of
+from multidrop.tui.widgets.lines import width_of
+from tests.support.panel_rows import plain
 
 states = st.sampled_from(list(State))
-
-
-def plain(row: Row) -> str:
-    return "".join(text for text, _ in row)
 
 
 def tabs_of(states: list[State], chosen: int, name: str = "line") -> list[Tab]:

@@ -2,15 +2,13 @@
 
 import pytest
 
-from tests.support.fake_session import demo_session, make_app, settle
+from tests.support.fake_session import on_screen, press, settle
 
 pytestmark = pytest.mark.tui
 
 
 async def test_each_step_waits_until_it_was_done_and_escape_ends_it() -> None:
-    session = demo_session()
-    app = make_app(session)
-    async with app.run_test(size=(80, 24)) as pilot:
+    async with on_screen() as (pilot, app, session):
         app.tour.begin_on("press")
 
         async def step() -> int:
@@ -41,21 +39,17 @@ async def test_each_step_waits_until_it_was_done_and_escape_ends_it() -> None:
         await step()
         await pilot.press("escape")
         assert await step() == 10 and "That was the tour" in app.main.lines("tour").plain
-        await pilot.press("escape")
-        await settle(pilot)
+        await press(pilot, "escape")
         assert not app.tour.on and not app.main.lines("tour").display
 
 
 async def test_lines_to_another_machine_do_not_count_and_nothing_is_typed_for_the_person() -> None:
-    session = demo_session()
-    app = make_app(session)
-    async with app.run_test(size=(80, 24)) as pilot:
+    async with on_screen() as (pilot, app, session):
         app.tour.begin_on("press")
         session.select("", "eth")
         await settle(pilot)
         assert "Lines go to eth now" in app.main.lines("tour").plain
-        await pilot.press(*"PR P", "enter")
-        await settle(pilot)
+        await press(pilot, *"PR P", "enter")
         session.select("", "press")
         await settle(pilot)
         assert "tour 1 of" in app.main.lines("tour").plain
@@ -66,8 +60,7 @@ async def test_lines_to_another_machine_do_not_count_and_nothing_is_typed_for_th
 
 
 async def test_escape_closes_completions_before_it_ends_the_tour() -> None:
-    app = make_app()
-    async with app.run_test(size=(80, 24)) as pilot:
+    async with on_screen() as (pilot, app, _):
         app.tour.begin_on("press")
         await pilot.press("M")
         assert app.main.entry.listing.open
@@ -78,9 +71,7 @@ async def test_escape_closes_completions_before_it_ends_the_tour() -> None:
 
 
 async def test_the_tour_is_on_the_demo_cell_that_is_open_and_opens_nothing_twice() -> None:
-    session = demo_session()
-    app = make_app(session)
-    async with app.run_test(size=(80, 24)) as pilot:
+    async with on_screen() as (pilot, app, session):
         before = list(session.buses)
         await app.tour.begin()
         await settle(pilot)

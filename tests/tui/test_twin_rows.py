@@ -15,24 +15,16 @@ from multidrop.tui.curves.raster import ASCII, BLOCK, BRAILLE, TWINS, Ink
 from multidrop.tui.panels.drive import drive_rows
 from multidrop.tui.panels.drives import drives_rows, kept, narrow_rows
 from multidrop.tui.panels.plot import plot_rows, plot_title
-from multidrop.tui.panels.view import View, glances_of
 from multidrop.tui.polling import Polling
 from multidrop.tui.presenter import trouble_mark
 from multidrop.tui.readout import State
-from multidrop.tui.screen_model import ScreenModel, bus_state
+from multidrop.tui.screen_model import bus_state
 from multidrop.tui.screens.all_drives import drive_row, summary, worst_first
 from multidrop.tui.widgets.lines import Row, width_of
 from multidrop.tui.widgets.theme import Signs, shown_as
-from tests.support.fake_session import AT_LIMIT, FakeSession, demo_session, make_app, settle
+from tests.support.fake_session import AT_LIMIT, FakeSession, demo_session, emit, make_app, on_screen, press
 from tests.support.fake_twin import beside, isolated
-
-
-def view(session: FakeSession, *events: SessionEvent) -> View:
-    model = ScreenModel(lambda: session.selected_bus, lambda: session.buses)
-    for event in events:
-        model.take(event)
-    glances = glances_of(session, model, session.buses[session.selected_bus])
-    return View(session, model, glances, session.now(), True)
+from tests.support.panel_rows import view
 
 
 def plain(*rows: Row) -> str:
@@ -46,8 +38,12 @@ def roles(row: Row) -> set[str]:
 # The panel of the drive
 
 
-def test_what_is_predicted_is_below_what_is_measured() -> None:
-    session = demo_session()
+@pytest.fixture
+def session() -> FakeSession:
+    return demo_session()
+
+
+def test_what_is_predicted_is_below_what_is_measured(session: FakeSession) -> None:
     rows = drive_rows(view(session, *beside(session.time, 384_112, 600_000, -14)), 45, 20)
     assert plain(*rows[:4]).splitlines() == [
         " ▶ moving                     600000 steps/s",
@@ -58,8 +54,7 @@ def test_what_is_predicted_is_below_what_is_measured() -> None:
     assert "error" not in roles(rows[3])
 
 
-def test_a_divergence_has_a_sign_its_limit_and_its_causes() -> None:
-    session = demo_session()
+def test_a_divergence_has_a_sign_its_limit_and_its_causes(session: FakeSession) -> None:
     rows = drive_rows(view(session, *beside(session.time, 0, 0, 8112), isolated(session)), 45, 20)
     assert plain(*rows[3:5]).splitlines() == [
         " ≠      -8112 difference           limit 200",
@@ -72,8 +67,7 @@ def test_a_divergence_has_a_sign_its_limit_and_its_causes() -> None:
     assert "≠" not in plain(*drive_rows(after, 45, 20))
 
 
-def test_a_twin_that_ended_is_not_shown() -> None:
-    session = demo_session()
+def test_a_twin_that_ended_is_not_shown(session: FakeSession) -> None:
     ended = OnBus("press", TwinEnded(session.time, "a"))
     shown = view(session, *beside(session.time, 0, 0, 8112), isolated(session), ended)
     text = plain(*drive_rows(shown, 45, 20), *narrow_rows(shown, 80))
@@ -83,22 +77,19 @@ def test_a_twin_that_ended_is_not_shown() -> None:
     assert "twin" not in plain(*plot_rows(view(session, *beside(session.time - 21, 0, 0, 8112)), 60, 20))
 
 
-def test_a_prediction_that_is_not_renewed_is_dim() -> None:
-    session = demo_session()
+def test_a_prediction_that_is_not_renewed_is_dim(session: FakeSession) -> None:
     old, new = beside(session.time - 3, 0, 0, 14), OnBus("press", Sample(session.time, "a", 0, 0))
     twin = drive_rows(view(session, *old, new), 45, 20)[2]
     assert roles(twin) == {"dim"} and roles(drive_rows(view(session, *old[:1], *old), 45, 20)[2]) == {"dim"}
 
 
-def test_each_axis_has_its_own_twin() -> None:
-    session = demo_session()
+def test_each_axis_has_its_own_twin(session: FakeSession) -> None:
     events = [*beside(session.time, 5, 0, 0, axis="x"), *beside(session.time, 7, 0, 9000, axis="y")]
     text = plain(*drive_rows(view(session, *events, isolated(session, axis="y")), 45, 20))
     assert "+0 difference" in text and "≠      -9000 difference" in text
 
 
-def test_predictions_that_come_before_the_first_samples_make_no_further_axis() -> None:
-    session = demo_session()
+def test_predictions_that_come_before_the_first_samples_make_no_further_axis(session: FakeSession) -> None:
     events = [*beside(session.time, 5, 0, 0, axis="x"), *beside(session.time, 7, 0, 0, axis="y")]
     shown = view(session, *reversed(events[1:]), *events)
     early = view(session, events[1], events[3], events[0], events[2])
@@ -109,8 +100,7 @@ def test_predictions_that_come_before_the_first_samples_make_no_further_axis() -
 # Rows of drives, and tabs
 
 
-def test_rows_of_drives_have_a_sign_and_as_many_causes_as_fit() -> None:
-    session = demo_session()
+def test_rows_of_drives_have_a_sign_and_as_many_causes_as_fit(session: FakeSession) -> None:
     shown = view(session, *beside(session.time, 0, 600_000, 8112), isolated(session))
     assert "600000/s ≠ -8112 stall, load" in plain(*narrow_rows(shown, 80))
     assert plain(drives_rows(shown, 45, 3)[0]).endswith("≠ -8112")
@@ -119,8 +109,7 @@ def test_rows_of_drives_have_a_sign_and_as_many_causes_as_fit() -> None:
 
 
 @pytest.mark.parametrize("width", [60, 80, 120, 200])
-def test_a_drive_that_differs_comes_first_of_all_drives(width: int) -> None:
-    session = demo_session()
+def test_a_drive_that_differs_comes_first_of_all_drives(width: int, session: FakeSession) -> None:
     rests = OnBus("press", Sample(session.time, "c", 0, 0))
     shown = view(session, rests, *beside(session.time, 0, 0, 8112, "b"), isolated(session, "b"))
     places = worst_first(shown, "≠")
@@ -131,8 +120,7 @@ def test_a_drive_that_differs_comes_first_of_all_drives(width: int) -> None:
     assert kept(shown.glances, 1)[0].address == "a" and kept(shown.glances, 2)[1].address == "b"
 
 
-def test_trouble_and_a_difference_are_both_said() -> None:
-    session = demo_session()
+def test_trouble_and_a_difference_are_both_said(session: FakeSession) -> None:
     error = OnBus("press", Conditioned(session.time, "a", (replace(AT_LIMIT, lamps=()),)))
     shown = view(session, *beside(session.time, 0, 0, 8112), isolated(session), error)
     assert plain(narrow_rows(shown, 80)[0]).endswith(" ✗ error ≠ -8112")
@@ -143,8 +131,7 @@ def test_trouble_and_a_difference_are_both_said() -> None:
     assert summary(places).startswith("1 ≠ twin · ")
 
 
-def test_a_tab_counts_a_drive_that_differs_as_trouble() -> None:
-    session = demo_session()
+def test_a_tab_counts_a_drive_that_differs_as_trouble(session: FakeSession) -> None:
     facts = view(session, *beside(session.time, 0, 0, 8112), isolated(session)).model.bus("press")
     assert bus_state(facts, ["a"], False) is State.DIFFERS and trouble_mark(facts, ["a"], False) == ""
     facts = view(session, *beside(session.time, 0, 9, 8112), isolated(session)).model.bus("press")
@@ -165,8 +152,7 @@ def a_run(session: FakeSession, address: str = "a", ahead: int = 400_000) -> lis
     return found
 
 
-def test_a_plot_has_a_curve_of_the_twin_beside_that_of_the_drive() -> None:
-    session = demo_session()
+def test_a_plot_has_a_curve_of_the_twin_beside_that_of_the_drive(session: FakeSession) -> None:
     rows = plot_rows(view(session, *a_run(session)), 100, 30)
     text = plain(*rows)
     assert "a gantry 5970000" in text and "a twin 6368000" in text and "velocity a gantry" in text
@@ -175,8 +161,7 @@ def test_a_plot_has_a_curve_of_the_twin_beside_that_of_the_drive() -> None:
     assert plain(plot_title(view(session, *a_run(session)))) == " plot last 20 s  20 Hz"
 
 
-def test_a_narrow_plot_names_its_lines_in_the_title() -> None:
-    session = demo_session()
+def test_a_narrow_plot_names_its_lines_in_the_title(session: FakeSession) -> None:
     assert "velocity a gantry steps/s ⠤⠤ drive ⠄ ⠠ twin" in plain(*plot_rows(view(session, *a_run(session)), 45, 20))
     session.plotted = (Series("press", "a"), Series("press", "b"))
     two = plain(*plot_rows(view(session, *a_run(session), *a_run(session, "b")), 60, 20))
@@ -201,8 +186,7 @@ def test_the_dots_of_a_twin_are_as_many_in_every_direction(slope: tuple[int, int
     assert sum(len(ink.dots(TWINS, x, y, y)) for x, y in line) == share
 
 
-def test_what_rests_where_its_twin_does_is_said_once() -> None:
-    session = demo_session()
+def test_what_rests_where_its_twin_does_is_said_once(session: FakeSession) -> None:
     agree = [event for n in range(100) for event in beside(session.time - 5 + n / 20, 51_300, 0, 0)]
     assert plain(*plot_rows(view(session, *agree), 60, 20)) == " a gantry at rest at 51300 steps, its twin too"
     off = [event for n in range(100) for event in beside(session.time - 5 + n / 20, 51_300, 0, 0)[:1]]
@@ -213,8 +197,7 @@ def test_what_rests_where_its_twin_does_is_said_once() -> None:
     ]
 
 
-def test_the_difference_is_plotted_as_a_value() -> None:
-    session = demo_session()
+def test_the_difference_is_plotted_as_a_value(session: FakeSession) -> None:
     session.plotted = (Series("press", "a", DIFFERENCE),)
     shown = view(session, *a_run(session))
     text = plain(*plot_rows(shown, 100, 20))
@@ -243,35 +226,27 @@ def test_rows_with_a_twin_stay_in_their_room(width: int, height: int, places: li
 
 @pytest.mark.tui
 async def test_a_key_begins_and_ends_the_twins_of_the_line_as_typed_lines_do() -> None:
-    session = demo_session()
-    app = make_app(session)
-    async with app.run_test(size=(200, 50)) as pilot:
+    async with on_screen(width=200, height=50) as (pilot, app, session):
         await pilot.press("ctrl+f2")
-        session.emit(*beside(session.time, 0, 0, 8112), isolated(session))
-        await settle(pilot)
+        await emit(pilot, *beside(session.time, 0, 0, 8112), isolated(session))
         assert "≠" in app.main.lines("side").plain + app.main.lines("far").plain
         assert "≠ twin" in app.main.lines("top").plain and "^F2 twin" in app.main.lines("footer").plain
         assert "Twin off" in {each.title for each in app.act.commands()}
         await pilot.press("ctrl+f2")
         session.emit(OnBus("press", TwinEnded(session.time, "a")))
-        await pilot.press("ctrl+pagedown", "ctrl+f2")
-        await settle(pilot)
+        await press(pilot, "ctrl+pagedown", "ctrl+f2")
         assert session.sent == ["press:a /twin on", "press:a /twin off", "eth: /twin on"]
         assert "≠" not in app.main.lines("top").plain and "Twin on" in {each.title for each in app.act.commands()}
 
 
 @pytest.mark.tui
 async def test_d_plots_the_difference_and_plots_it_no_longer() -> None:
-    session = demo_session()
-    app = make_app(session)
-    async with app.run_test(size=(100, 30)) as pilot:
-        await pilot.press("ctrl+g", "d")
-        await settle(pilot)
+    async with on_screen(width=100, height=30) as (pilot, _, session):
+        await press(pilot, "ctrl+g", "d")
         session.plotted = (Series("press", "a"), Series("press", "a", DIFFERENCE), Series("press", "b", "VM"))
         await pilot.press("d")
         session.plotted = (Series("press", "a", DIFFERENCE),)
-        await pilot.press("d")
-        await settle(pilot)
+        await press(pilot, "d")
         assert session.lines == [
             ("/plot press:a press:a.difference", By.OPERATOR),
             ("/plot press:a press:b.VM", By.OPERATOR),

@@ -2,7 +2,6 @@
 
 import contextlib
 from dataclasses import replace
-from random import Random
 
 import pytest
 
@@ -10,6 +9,7 @@ from multidrop.dialects import DriveError, Hints, NoAnswer, Owed
 from multidrop.dialects.mcode.host import identify
 from multidrop.dialects.mcode.host.codec import MCode
 from multidrop.simulator.cell.spec import Faults
+from tests.support.faults import disturb
 from tests.support.mcode_drives import MODES, Witness
 
 NAMED, STATED, ALONE = Hints(drives=("a",)), Hints(drives=("a",), party=True), Hints()
@@ -246,7 +246,7 @@ def test_on_a_bad_wire_nothing_is_carried_out_twice_and_no_value_is_wrong(bench,
     for number, (em, party, check) in enumerate(rounds * MODES):
         again = Again(bench, NAMED if party else ALONE, at_home(party, em=em, check=check), baud=9600)
         wire = again.desk.wire
-        wire._faults, wire._rng = Faults(flip=2e-3, drop=1e-3, delay=(0.0, 0.01)), Random(number)
+        disturb(wire, Faults(flip=2e-3, drop=1e-3, delay=(0.0, 0.01)), number)
         try:
             again.open()
             said = again.type("PR P")
@@ -283,9 +283,9 @@ def test_a_line_with_a_debt_is_found_out_in_full(bench, more):
 def test_a_line_that_is_unplugged_meanwhile_sends_nothing_and_goes_on_afterwards(bench):
     again = Again(bench, NAMED, table(True))
     again.open()
-    again.desk.wire._faults, again.desk.wire._rng = Faults(drop=1.0), Random(0)
+    disturb(again.desk.wire, Faults(drop=1.0), 0)
     for line in ("PR P", "VM=1000", "VM=1000"):
         with pytest.raises(NoAnswer, match="was not sent"):
             again.type(line)
-    again.desk.wire._faults = Faults()
+    disturb(again.desk.wire)
     assert again.type("VM=300000") == () and again.executed("VM=") == 1

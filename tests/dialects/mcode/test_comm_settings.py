@@ -11,6 +11,7 @@ from multidrop.dialects.mcode.host import classify
 from multidrop.dialects.mcode.host.codec import MCode
 from multidrop.dialects.mcode.host.state import MCodeState
 from multidrop.simulator.cell.spec import Faults
+from tests.support.faults import disturb
 from tests.support.mcode_drives import MODES, Desk
 
 pytestmark = pytest.mark.slow
@@ -74,11 +75,11 @@ def test_another_drive_by_the_new_name_is_not_taken_for_one_whose_renaming_was_l
     desk = Desk(bench, (em, check), (em, check), party=True)
 
     def lose_the_first(bench):
-        bench.wire._faults = Faults(drop=1.0) if b"DN" in bench.written[-1] else Faults()
+        disturb(bench.wire, Faults(drop=1.0 if b"DN" in bench.written[-1] else 0.0))
 
     with pytest.raises(DriveError):
         desk.bench.run(MCODE.perform(desk.state, 'DN="b"'), desk.state, at=lose_the_first)
-    desk.bench.wire._faults = Faults()
+    disturb(desk.bench.wire)
     desk.device.execute("R1=11", desk.bench.now)
     assert desk.type("PR R1") == ("11",)
     assert desk.state.address == "a" and desk.witnesses[1].executed("R1=11") == []

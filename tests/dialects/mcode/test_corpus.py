@@ -11,8 +11,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from multidrop.dialects.mcode.family import MCODE as FAMILY
-from multidrop.dialects.mcode.host.codec import MCode
-from multidrop.dialects.mcode.host.state import MCodeState
 from multidrop.dialects.mcode.manual.program_checker import check
 from multidrop.dialects.mcode.manual.program_file import formatted, read, remark_at
 from multidrop.dialects.mcode.manual.statements import canonical
@@ -22,6 +20,7 @@ from multidrop.simulator.lexium.device import MCodeDevice
 from multidrop.simulator.world import World
 from tests.conftest import Bench
 from tests.support.examples import examples
+from tests.support.mcode_drives import one_drive
 from tests.support.sample_files import MCODE, product_of
 
 pytestmark = pytest.mark.slow
@@ -156,17 +155,10 @@ def test_any_text_is_formatted_once(text: str) -> None:
     assert formatted(spelled) == spelled and check(text) is not None
 
 
-def host(bench: Callable[..., Bench], product: str) -> tuple[Bench, MCodeState]:
-    """A drive of a product on a wire, and what a host knows of it."""
-    desk = bench([{"name": "!", "personality": product}])
-    desk.wait(0.5)
-    desk.line.events(desk.now)
-    return desk, MCodeState(MCode(em=0, escape=1), "", "!", product)
-
-
 @pytest.mark.parametrize("file", EVERY)
 def test_a_drive_with_a_program_has_its_formatted_file_too(bench: Callable[..., Bench], file: Path) -> None:
-    desk, state = host(bench, product_of(file))
+    product = product_of(file)
+    desk, state = one_drive(bench, product=product, personality=product)
     text = file.read_bytes().decode()
     for sent, other in ((text, formatted(text)), (formatted(text), text)):
         programs, quiet = FAMILY.programs, lambda done, total: None

@@ -9,6 +9,7 @@ from multidrop.dialects.mcode.host.codec import MCode
 from multidrop.dialects.mcode.manual import program_file
 from multidrop.simulator.cell.spec import Faults
 from tests.support.cases import for_each
+from tests.support.faults import disturb
 from tests.support.mcode_drives import MODES, Witness
 
 pytestmark = pytest.mark.slow
@@ -140,12 +141,12 @@ def test_what_could_not_be_put_back_at_opening_stays_owed_and_is_put_back_before
     def loses(desk):
         if b"EM=1" in desk.written[-1] and not lost:
             lost.append(True)
-            desk.wire._faults = Faults(drop=1.0)
+            disturb(desk.wire, Faults(drop=1.0))
 
     hints = Hints(drives=("a",), party=True, owed=(owed,))
     [state] = desk.run(identify.identify(hints), at=loses)
     assert lost and state.restore == owed and any("may be EM=0 now" in note for note in state.notes)
-    desk.wire._faults = Faults()
+    disturb(desk.wire)
     assert desk.type(state, "PR EM") == ("1",)
     assert state.restore is None
 

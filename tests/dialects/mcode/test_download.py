@@ -8,6 +8,9 @@ from multidrop.dialects.mcode.host.codec import MCode
 from multidrop.dialects.mcode.host.state import MCodeState
 from multidrop.dialects.mcode.manual import program_file
 from multidrop.dialects.program_files import Held
+from multidrop.simulator.cell.spec import Faults
+from tests.support.faults import disturb
+from tests.support.mcode_drives import one_drive
 from tests.support.procedure import ProcedureRunner
 
 pytestmark = pytest.mark.slow
@@ -29,14 +32,6 @@ S
 """
 
 
-def desk_and_known(bench, em, party, check, **more):
-    desk = bench([{"name": "a" if party else "!", "party": party, "set": {"EM": em, "CK": check}}], **more)
-    desk.wire.receive(b"\n\n", 0.0)
-    desk.wait(0.5)
-    desk.line.events(desk.now)
-    return desk, MCodeState(MCode(em=em, party=party, checksum=check, escape=1), "a" if party else "")
-
-
 def download(desk, state, text=PROGRAM, **how):
     progress = []
     lines = program_file.read(text, "x.mxt")
@@ -50,7 +45,7 @@ def download(desk, state, text=PROGRAM, **how):
 
 @pytest.mark.parametrize(("em", "party", "check"), MODES)
 def test_a_program_is_stored_and_the_echo_mode_restored(bench, em, party, check):
-    desk, state = desk_and_known(bench, em, party, check)
+    desk, state = one_drive(bench, em, party, check)
     progress = download(desk, state)
     assert progress[-1] == (9, 9)
     assert (state.programming, state.codec.em) == (False, em)
@@ -61,7 +56,7 @@ def test_a_program_is_stored_and_the_echo_mode_restored(bench, em, party, check)
 
 @pytest.mark.parametrize(("em", "party", "check"), MODES)
 def test_what_the_file_saves_is_the_echo_mode_that_was_there(bench, em, party, check):
-    desk, state = desk_and_known(bench, em, party, check)
+    desk, state = one_drive(bench, em, party, check)
     download(desk, state)
     device = desk.devices["a" if party else "!"]
     device.reset(device.now)
@@ -71,7 +66,7 @@ def test_what_the_file_saves_is_the_echo_mode_that_was_there(bench, em, party, c
 @pytest.mark.parametrize("wanted", range(4))
 @pytest.mark.parametrize(("em", "party", "check"), [(0, False, 0), (1, True, 0), (2, True, 1), (3, False, 2)])
 def test_an_echo_mode_that_the_file_sets_is_kept_and_saved(bench, em, party, check, wanted):
-    desk, state = desk_and_known(bench, em, party, check)
+    desk, state = one_drive(bench, em, party, check)
     download(desk, state, PROGRAM.replace("VM=400000", f"EM={wanted}"))
     device = desk.devices["a" if party else "!"]
     assert (state.codec.em, device.memory.echo_mode) == (wanted, wanted)
@@ -81,7 +76,7 @@ def test_an_echo_mode_that_the_file_sets_is_kept_and_saved(bench, em, party, che
 
 @pytest.mark.parametrize(("em", "party", "check"), [(0, False, 0), (1, True, 1), (2, True, 0), (3, True, 2)])
 def test_a_line_that_the_drive_refuses_ends_it_with_the_files_line(bench, em, party, check):
-    desk, state = desk_and_known(bench, em, party, check)
+    desk, state = one_drive(bench, em, party, check)
     with pytest.raises(Refused, match=r"^line 3: .*'XYZZY 5': error \d+: "):
         download(desk, state, "PG 1\nLB G1\nXYZZY 5\nE\nPG\n")
     assert (state.programming, state.codec.em) == (False, em)
@@ -90,7 +85,7 @@ def test_a_line_that_the_drive_refuses_ends_it_with_the_files_line(bench, em, pa
 
 
 def test_a_download_that_is_refused_half_way_says_what_is_stored(bench):
-    desk, state = desk_and_known(bench, 1, True, 1)
+    desk, state = one_drive(bench, 1, True, 1)
     with pytest.raises(Refused, match=r"^line 5: .*'XYZZY 5': error \d+: [^;]*; .*3 lines are stored") as refused:
         download(desk, state, "PG 1\nLB G1\nMR 51200\nH\nXYZZY 5\nE\nPG\n")
     assert str(refused.value).endswith(
@@ -100,19 +95,19 @@ def test_a_download_that_is_refused_half_way_says_what_is_stored(bench):
 
 
 def test_a_download_that_is_refused_at_its_first_line_says_that_nothing_is_stored(bench):
-    desk, state = desk_and_known(bench, 1, True, 1)
+    desk, state = one_drive(bench, 1, True, 1)
     with pytest.raises(Refused, match="; no line of the program is stored$"):
         download(desk, state, "PG 1\nXYZZY 5\nE\nPG\n")
 
 
 def test_a_download_that_is_refused_behind_its_programs_says_that_they_are_stored(bench):
-    desk, state = desk_and_known(bench, 0, False, 0)
+    desk, state = one_drive(bench, 0, False, 0)
     with pytest.raises(Refused, match=r"; 3 lines are stored \(addresses 1 to 7, 100 to 101, from label G1\)$"):
         download(desk, state, "PG 1\nLB G1\nE\nPG\nPG 100\nE\nPG\nXYZZY\n")
 
 
 def test_a_stop_in_a_download_says_what_is_stored(bench):
-    desk, state = desk_and_known(bench, 1, True, 1, baud=9600)
+    desk, state = one_drive(bench, 1, True, 1, baud=9600)
 
     def stop(desk):
         if b"R1=" in desk.written[-1]:
@@ -124,7 +119,7 @@ def test_a_stop_in_a_download_says_what_is_stored(bench):
 
 
 def test_a_refusal_is_told_though_what_comes_after_it_fails(bench):
-    desk, state = desk_and_known(bench, 1, True, 1)
+    desk, state = one_drive(bench, 1, True, 1)
 
     def goes(desk):
         if b"EM=1" in desk.written[-1]:
@@ -136,7 +131,7 @@ def test_a_refusal_is_told_though_what_comes_after_it_fails(bench):
 
 
 def test_a_program_whose_end_was_not_seen_is_not_told_as_stored(bench):
-    desk, state = desk_and_known(bench, 1, True, 0)
+    desk, state = one_drive(bench, 1, True, 0)
 
     def goes(desk):
         if desk.written[-1] == b"aPG\n":
@@ -149,14 +144,14 @@ def test_a_program_whose_end_was_not_seen_is_not_told_as_stored(bench):
 
 
 def test_a_variable_that_is_refused_ends_it_before_the_program(bench):
-    desk, state = desk_and_known(bench, 1, True, 1)
+    desk, state = one_drive(bench, 1, True, 1)
     with pytest.raises(Refused, match="^line 1: .*error 23"):
         download(desk, state, "VM=500\nPG 1\nE\nPG\n")
     assert desk.type(state, "L") == ()
 
 
 def test_no_line_of_a_program_is_sent_where_program_mode_was_refused(bench):
-    desk, state = desk_and_known(bench, 1, True, 0)
+    desk, state = one_drive(bench, 1, True, 0)
     desk.type(state, "SL 5000")
     with pytest.raises(Refused, match="^line 1: .*'PG 1': error 73"):
         download(desk, state, "PG 1\nMR 51200\nE\nPG\n")
@@ -165,7 +160,7 @@ def test_no_line_of_a_program_is_sent_where_program_mode_was_refused(bench):
 
 
 def test_a_line_too_long_for_this_drive_is_told_before_anything_is_sent(bench):
-    desk, state = desk_and_known(bench, 1, True, 1)
+    desk, state = one_drive(bench, 1, True, 1)
     sent = len(desk.written)
     with pytest.raises(Inexpressible, match="^line 2: the line has 66 characters"):
         download(desk, state, f'PG 1\nPR "{"x" * 59}"\nPG\n')
@@ -207,7 +202,7 @@ def test_a_way_back_into_program_mode_that_is_not_seen_is_cleaned_up_after():
 
 @pytest.mark.parametrize("line", range(8))
 def test_a_stop_at_any_line_leaves_program_mode_and_restores_the_echo(bench, line):
-    desk, state = desk_and_known(bench, 1, True, 1, baud=9600)
+    desk, state = one_drive(bench, 1, True, 1, baud=9600)
     stopped = []
 
     def stop(desk):
@@ -226,19 +221,15 @@ def test_a_stop_at_any_line_leaves_program_mode_and_restores_the_echo(bench, lin
 
 @pytest.mark.parametrize("seed", range(40))
 def test_on_a_bad_line_a_download_is_right_or_says_that_it_is_not(bench, seed):
-    from random import Random
-
-    desk, state = desk_and_known(bench, 1, True, 1, baud=9600)
-    from multidrop.simulator.cell.spec import Faults
-
+    desk, state = one_drive(bench, 1, True, 1, baud=9600)
     desk.devices["a"].execute("CE=0", desk.now)  # a flipped bit makes ^C of a C, and a reset forgets what is not saved
-    desk.wire._faults, desk.wire._rng = Faults(flip=4e-3), Random(seed)
+    disturb(desk.wire, Faults(flip=4e-3), seed)
     try:
         download(desk, state)
         whole = True
     except DriveError:
         whole = False
-    desk.wire._faults = Faults()
+    disturb(desk.wire)
     device = desk.devices["a"]
     assert (device.programming is not None) is state.programming
     if whole:

@@ -9,22 +9,16 @@ from multidrop.dialects.mcode.family import MCODE
 from multidrop.dialects.mcode.host import identify
 from multidrop.dialects.mcode.host.codec import MCode
 from multidrop.dialects.mcode.host.framing import sealed
-from multidrop.dialects.mcode.host.state import MCodeState
-from tests.support.mcode_drives import Witness
+from tests.support.mcode_drives import Witness, one_drive
 
 MODES = [(em, party, check) for em in range(4) for party in (False, True) for check in (1, 2)]
 NAK = b"\x15"
 
 
 def unit(bench, em, party, check):
-    name = "a" if party else "!"
-    desk = bench([{"personality": "MDI", "name": name, "party": party, "set": {"EM": em, "CK": check}}])
-    desk.wire.receive(b"\n\n", 0.0)
-    desk.wait(0.5)
-    desk.line.events(desk.now)
-    desk.strays.clear()
-    state = MCodeState(MCode(em=em, party=party, checksum=check, escape=1), name if party else "", name, "MDI")
-    return desk, state, desk.devices[name], Witness(desk.devices[name])
+    desk, state = one_drive(bench, em, party, check, "MDI", personality="MDI")
+    [device] = desk.devices.values()
+    return desk, state, device, Witness(device)
 
 
 @pytest.mark.parametrize(("em", "party", "check"), MODES)

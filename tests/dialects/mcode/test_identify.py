@@ -1,7 +1,6 @@
 """Finding drives: nothing moves, nothing is refused or saved, and nobody else's answer is taken for a drive's."""
 
 from dataclasses import replace
-from random import Random
 
 import pytest
 
@@ -10,6 +9,7 @@ from multidrop.dialects.mcode.host import identify, identity
 from multidrop.dialects.mcode.host.codec import MCode
 from multidrop.drives.line import Line
 from multidrop.simulator.cell.spec import Faults
+from tests.support.faults import disturb
 from tests.support.mcode_drives import MODES, Witness
 
 SEVERAL = [(em, check) for em in range(4) for check in range(3)]
@@ -51,7 +51,7 @@ def test_a_drive_named_p_is_taken_for_one_on_a_party_line(bench):
 def test_a_lost_answer_does_not_lead_to_a_checksum_that_the_drive_would_refuse(bench):
     for seed in range(40):
         desk = bench([{"name": "a", "party": True, "set": {"EM": 1}}], baud=9600)
-        desk.wire._faults, desk.wire._rng = Faults(drop=0.002), Random(seed)
+        disturb(desk.wire, Faults(drop=0.002), seed)
         try:
             desk.run(identify.identify(Hints(drives=("a",))))
         except NoAnswer:
@@ -137,7 +137,7 @@ def test_nothing_is_misread_on_a_bad_wire_and_nothing_but_prints_is_executed(ben
         tables = [{"name": n, "party": party, "set": {"EM": em, "CK": check, "ES": 2 - i}} for i, n in enumerate(names)]
         desk = bench(tables, baud=9600)
         witnesses = [Witness(device) for device in desk.devices.values()]
-        desk.wire._faults, desk.wire._rng = Faults(flip=3e-3, drop=1e-3, delay=(0.0, 0.01)), Random(number)
+        disturb(desk.wire, Faults(flip=3e-3, drop=1e-3, delay=(0.0, 0.01)), number)
         try:
             knowns = desk.run(identify.identify(Hints(drives=tuple(names) if party else ())))
         except NoAnswer:
@@ -196,7 +196,7 @@ def test_a_name_that_a_stop_needs_and_that_could_not_be_read_is_said(bench):
 
     def cut(desk):
         if b"DN" in desk.written[-1]:
-            desk.wire._faults, desk.wire._rng = Faults(drop=1.0), Random(0)
+            disturb(desk.wire, Faults(drop=1.0), 0)
 
     [state] = desk.run(identify.identify(Hints()), at=cut)
     assert state.codec.escape == 3 and state.name == ""

@@ -8,26 +8,15 @@ from multidrop.dialects.mcode.host import identify
 from multidrop.dialects.mcode.host.codec import MCode
 from multidrop.dialects.mcode.host.exchange import answered
 from multidrop.dialects.mcode.host.state import MCodeState
+from tests.support.mcode_drives import one_drive
 from tests.support.procedure import ProcedureRunner
 
 MODES = [(em, party, check) for em in range(4) for party in (False, True) for check in range(3)]
 
 
-def drive(bench, em=0, party=False, check=0, **more):
-    """A simulated drive in that mode, and what is known of it."""
-    settings = {"EM": em, "CK": check, **more.pop("set", {})}
-    made = bench([{"name": "a" if party else "!", "party": party, "set": settings, **more}])
-    made.wire.receive(b"\n\n", 0.0)  # two line feeds make party mode effective
-    made.wait(0.5)
-    made.line.events(made.now)
-    made.strays.clear()
-    state = MCodeState(MCode(em=em, party=party, checksum=check, escape=1), "a" if party else "")
-    return made, state
-
-
 @pytest.mark.parametrize(("em", "party", "check"), MODES)
 def test_a_print_gives_its_line_in_every_mode(bench, em, party, check):
-    desk, state = drive(bench, em, party, check)
+    desk, state = one_drive(bench, em, party, check)
     assert desk.type(state, "PR P") == ("0",)
     assert desk.type(state, 'PR "P is ",P') == ("P is 0",)
     assert desk.strays == []
@@ -35,7 +24,7 @@ def test_a_print_gives_its_line_in_every_mode(bench, em, party, check):
 
 @pytest.mark.parametrize(("em", "party", "check"), MODES)
 def test_a_command_that_is_taken_prints_nothing_and_is_sent_once(bench, em, party, check):
-    desk, state = drive(bench, em, party, check)
+    desk, state = one_drive(bench, em, party, check)
     assert desk.type(state, "R1=5") == ()
     assert desk.type(state, "PR R1") == ("5",)
     assert len([frame for frame in desk.written if b"R1=5" in frame]) == 1
@@ -43,7 +32,7 @@ def test_a_command_that_is_taken_prints_nothing_and_is_sent_once(bench, em, part
 
 @pytest.mark.parametrize(("em", "party", "check"), MODES)
 def test_a_refusal_is_seen_in_every_mode_with_number_and_text(bench, em, party, check):
-    desk, state = drive(bench, em, party, check)
+    desk, state = one_drive(bench, em, party, check)
     for line, code in (("VM=500", 23), ("ZZ=5", 20), ("PR ZZ", 35), ("XYZZY", 60)):
         with pytest.raises(Refused, match=f"refused '{line}': error {code}: "):
             desk.type(state, line)
@@ -54,7 +43,7 @@ def test_a_refusal_is_seen_in_every_mode_with_number_and_text(bench, em, party, 
 @pytest.mark.parametrize(("em", "party", "check"), MODES)
 def test_a_list_is_whole_in_every_mode(bench, em, party, check):
     program = "PG 1\nLB G1\nMR 51200\nH\nE\nPG\n"
-    desk, state = drive(bench, em, party, check)
+    desk, state = one_drive(bench, em, party, check)
     for device in desk.devices.values():
         for line in program.splitlines():
             device.execute(line, desk.now)
@@ -64,7 +53,7 @@ def test_a_list_is_whole_in_every_mode(bench, em, party, check):
 
 @pytest.mark.parametrize(("em", "party", "check"), [m for m in MODES if m[0] and not m[2]])
 def test_without_a_prompt_or_a_checksum_the_error_flag_is_asked_behind_a_command(bench, em, party, check):
-    desk, state = drive(bench, em, party, check)
+    desk, state = one_drive(bench, em, party, check)
     desk.type(state, "R1=5")
     name = b"a" if party else b""
     frames = [frame.rstrip(b"\r\n").removeprefix(b"~\n") for frame in desk.written]
@@ -73,7 +62,7 @@ def test_without_a_prompt_or_a_checksum_the_error_flag_is_asked_behind_a_command
 
 
 def test_an_old_error_is_told_and_not_blamed_on_the_next_command(bench):
-    desk, state = drive(bench, em=1)
+    desk, state = one_drive(bench, em=1)
     desk.devices["!"].fail(86, desk.now)
     state.error = True
     desk.type(state, "R1=5")
@@ -82,7 +71,7 @@ def test_an_old_error_is_told_and_not_blamed_on_the_next_command(bench):
 
 
 def test_the_prompt_of_a_print_tells_that_an_error_stands(bench):
-    desk, state = drive(bench)
+    desk, state = one_drive(bench)
     desk.devices["!"].fail(86, desk.now)
     assert desk.type(state, "PR P") == ("0",)
     assert state.error
@@ -90,7 +79,7 @@ def test_the_prompt_of_a_print_tells_that_an_error_stands(bench):
 
 def test_silence_is_told_as_not_known_and_nothing_is_sent_twice(bench):
     for em, check in ((0, 0), (1, 0), (2, 0), (3, 0), (1, 1)):
-        desk, _ = drive(bench, em, True, check)
+        desk, _ = one_drive(bench, em, True, check)
         nobody = MCodeState(MCode(em=em, party=True, checksum=check), "x")
         with pytest.raises(NoAnswer, match="was not sent" if em == 2 else "not known whether"):
             desk.type(nobody, "MR 51200")
@@ -99,7 +88,7 @@ def test_silence_is_told_as_not_known_and_nothing_is_sent_twice(bench):
 
 
 def test_after_silence_a_command_is_not_sent_to_a_drive_that_prints_no_mark(bench):
-    desk, state = drive(bench, em=1)
+    desk, state = one_drive(bench, em=1)
     desk.devices["!"].power(False, desk.now)
     with pytest.raises(NoAnswer):
         desk.type(state, "MR 51200")
@@ -244,7 +233,7 @@ def test_a_print_that_comes_to_nothing_is_not_taken_for_an_answer():
 
 @pytest.mark.parametrize(("em", "party", "check"), MODES)
 def test_a_drive_that_runs_a_program_is_spoken_to_in_every_mode(bench, em, party, check):
-    desk, state = drive(bench, em, party, check)
+    desk, state = one_drive(bench, em, party, check)
     for device in desk.devices.values():
         for line in ("PG 1", "LB AA", "R2=R2+1", "H 5", "BR AA", "PG"):
             device.execute(line, desk.now)
@@ -259,7 +248,7 @@ def test_a_drive_that_runs_a_program_is_spoken_to_in_every_mode(bench, em, party
 
 @pytest.mark.parametrize(("em", "party", "check"), MODES)
 def test_a_wire_setting_is_followed_and_taken_back(bench, em, party, check):
-    desk, state = drive(bench, em, party, check)
+    desk, state = one_drive(bench, em, party, check)
     for new in (0, 1, 2, 3, em):
         desk.type(state, f"EM={new}")
         assert state.codec.em == new
@@ -270,14 +259,14 @@ def test_a_wire_setting_is_followed_and_taken_back(bench, em, party, check):
 
 
 def test_a_new_name_is_used_from_then_on(bench):
-    desk, state = drive(bench, 1, True, 1)
+    desk, state = one_drive(bench, 1, True, 1)
     desk.type(state, 'DN="q"')
     assert state.address == "q"
     assert desk.type(state, "PR P") == ("0",)
 
 
 def test_a_drive_is_taken_into_and_out_of_party_mode(bench):
-    desk, state = drive(bench, 1, False, 0)
+    desk, state = one_drive(bench, 1, False, 0)
     state.name = "!"
     desk.type(state, "PY=1")
     assert (state.address, state.codec.party) == ("!", True)
@@ -289,7 +278,7 @@ def test_a_drive_is_taken_into_and_out_of_party_mode(bench):
 
 @pytest.mark.parametrize(("em", "party", "check"), MODES)
 def test_typed_program_mode_stores_lines_and_asks_nothing_in_between(bench, em, party, check):
-    desk, state = drive(bench, em, party, check)
+    desk, state = one_drive(bench, em, party, check)
     desk.type(state, "PG 1")
     assert state.programming
     start = len(desk.written)
@@ -305,7 +294,7 @@ def test_typed_program_mode_stores_lines_and_asks_nothing_in_between(bench, em, 
 
 
 def test_a_refused_line_in_program_mode_is_told_and_not_stored(bench):
-    desk, state = drive(bench)
+    desk, state = one_drive(bench)
     desk.type(state, "PG 1")
     with pytest.raises(Refused, match="in program mode; it is not stored"):
         desk.type(state, "XYZZY 5")
@@ -315,14 +304,14 @@ def test_a_refused_line_in_program_mode_is_told_and_not_stored(bench):
 
 
 def test_pg_alone_is_not_sent_to_a_drive_that_is_not_in_program_mode(bench):
-    desk, state = drive(bench)
+    desk, state = one_drive(bench)
     with pytest.raises(Refused, match="not in program mode"):
         desk.type(state, "PG")
     assert desk.written == []
 
 
 def test_position_and_velocity_come_in_one_print(bench):
-    desk, state = drive(bench, 1, True, 1)
+    desk, state = one_drive(bench, 1, True, 1)
     desk.type(state, "MR 512000")
     desk.wait(0.5)
     [axis] = desk.run(MCODE.motion(state, Priority.POLL))
@@ -332,7 +321,7 @@ def test_position_and_velocity_come_in_one_print(bench):
 
 
 def test_a_command_to_all_waits_for_no_answer(bench):
-    desk, _ = drive(bench, 1, True, 1)
+    desk, _ = one_drive(bench, 1, True, 1)
     everyone = MCodeState(MCode(em=1, party=True, checksum=1), "*")
     assert desk.type(everyone, "R1=9") == ()
     state = MCodeState(MCode(em=1, party=True, checksum=1), "a")

@@ -12,6 +12,7 @@ from multidrop.dialects.mcode.manual import program_file
 from multidrop.dialects.program_files import Difference, Held, Stored
 from tests.conftest import Bench
 from tests.support.examples import examples
+from tests.support.mcode_drives import one_drive
 
 pytestmark = pytest.mark.slow
 
@@ -33,10 +34,7 @@ GAPS = (0, 1, 2, 7, 63, 64, 65, 300)
 
 
 def drive(personality="LMDCM", bench=Bench):
-    desk = bench([{"name": "!", "personality": personality, "set": {"EM": 0}}])
-    desk.wait(0.5)
-    desk.line.events(desk.now)
-    return desk, MCodeState(MCode(em=0, escape=1), "", "!", personality)
+    return one_drive(bench, product=personality, personality=personality)
 
 
 def stores(desk, *lines):

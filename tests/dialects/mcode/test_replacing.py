@@ -7,12 +7,11 @@ from hypothesis import strategies as st
 from multidrop.dialects import NoAnswer, Refused
 from multidrop.dialects.mcode.family import MCODE
 from multidrop.dialects.mcode.host import program_readout
-from multidrop.dialects.mcode.host.codec import MCode
 from multidrop.dialects.mcode.host.download import plan
 from multidrop.dialects.mcode.host.program_readout import GLOBAL, LABEL, LOCAL
-from multidrop.dialects.mcode.host.state import MCodeState
 from multidrop.dialects.mcode.manual import program_file
 from multidrop.dialects.program_files import Held, Stored
+from tests.support.mcode_drives import one_drive
 
 MODES = [(em, party, check) for em in range(4) for party in (False, True) for check in (0, 1)]
 PROGRAM = """
@@ -29,15 +28,6 @@ E
 PG
 S
 """
-
-
-def drive(bench, em=1, party=True, check=1):
-    desk = bench([{"name": "a" if party else "!", "party": party, "set": {"EM": em, "CK": check}}])
-    desk.wire.receive(b"\n\n", 0.0)
-    desk.wait(0.5)
-    desk.line.events(desk.now)
-    state = MCodeState(MCode(em=em, party=party, checksum=check, escape=1), "a" if party else "", "a" if party else "!")
-    return desk, state
 
 
 def download(desk, state, text, **how):
@@ -62,7 +52,7 @@ def listed(desk, state):
 @pytest.mark.parametrize(("em", "party", "check"), MODES)
 @pytest.mark.parametrize("first", ["", "CP\n", "CP S\n", "CP 1\n"])
 def test_an_edited_file_is_downloaded_over_itself_again_and_again(bench, em, party, check, first):
-    desk, state = drive(bench, em, party, check)
+    desk, state = one_drive(bench, em, party, check)
     device = next(iter(desk.devices.values()))
     for value in range(30, 34):
         edited = PROGRAM.replace("25", str(value)).replace("K1=3", f"K1={value}").replace("G2", f"B{value}")
@@ -81,7 +71,7 @@ def test_an_edited_file_is_downloaded_over_itself_again_and_again(bench, em, par
 
 
 def test_a_drive_without_the_files_names_keeps_its_other_programs(bench):
-    desk, state = drive(bench)
+    desk, state = one_drive(bench, 1, True, 1)
     download(desk, state, PROGRAM)
     download(desk, state, "PG 500\nLB X9\nE\nPG\n")
     assert desk.devices["a"].program.labels.keys() == {"G1", "G2", "X9"}
@@ -89,7 +79,7 @@ def test_a_drive_without_the_files_names_keeps_its_other_programs(bench):
 
 
 def test_a_program_at_another_address_stays(bench):
-    desk, state = drive(bench)
+    desk, state = one_drive(bench, 1, True, 1)
     download(desk, state, PROGRAM)
     for _ in range(2):
         download(desk, state, "PG 60\nLB X9\n  P=5\nE\nPG\nPG 500\nLB X8\nE\nPG\n")
@@ -100,7 +90,7 @@ def test_a_program_at_another_address_stays(bench):
 
 
 def test_a_shorter_program_leaves_nothing_of_a_longer_one(bench):
-    desk, state = drive(bench)
+    desk, state = one_drive(bench, 1, True, 1)
     download(desk, state, PROGRAM)
     download(desk, state, "PG 1\nLB X9\nE\nPG\n")
     cleared = "a: the program at 1 was cleared (CP)"
@@ -109,28 +99,28 @@ def test_a_shorter_program_leaves_nothing_of_a_longer_one(bench):
 
 
 def test_a_program_whose_label_is_given_again_elsewhere_is_replaced(bench):
-    desk, state = drive(bench)
+    desk, state = one_drive(bench, 1, True, 1)
     download(desk, state, "PG 1\nLB G1\nE\nPG\n")
     download(desk, state, "PG 100\nLB G1\nE\nPG\n")
     assert desk.devices["a"].program.listing() == ["100  LB G1", "105  E"]
 
 
 def test_lines_inside_a_program_change_a_part_of_it(bench):
-    desk, state = drive(bench)
+    desk, state = one_drive(bench, 1, True, 1)
     download(desk, state, "PG 1\nLB G1\nP=100\nH\nE\nPG\n")
     download(desk, state, "PG 6\nP=111\nPG\n")
     assert desk.devices["a"].program.listing() == ["1  LB G1", "6  P=111", "10  H", "12  E"] and not desk.notes
 
 
 def test_a_file_that_clears_the_drive_itself_is_sent_as_it_is(bench):
-    desk, state = drive(bench)
+    desk, state = one_drive(bench, 1, True, 1)
     download(desk, state, "PG 500\nLB X9\nE\nPG\n")
     download(desk, state, f"CP\n{PROGRAM}")
     assert desk.devices["a"].program.labels.keys() == {"G1", "G2"} and not desk.notes
 
 
 def test_a_program_that_stays_is_named_where_it_cannot_be_stored_again(bench):
-    desk, state = drive(bench)
+    desk, state = one_drive(bench, 1, True, 1)
     download(desk, state, PROGRAM)
     download(desk, state, "PG 500\nLB X9\nE\nPG\n")
 
@@ -144,7 +134,7 @@ def test_a_program_that_stays_is_named_where_it_cannot_be_stored_again(bench):
 
 @pytest.mark.parametrize("line", ["VA Q1", "VA Q1=5", "LB Q1"])
 def test_a_global_variable_in_the_way_is_told_before_anything_is_sent(bench, line):
-    desk, state = drive(bench)
+    desk, state = one_drive(bench, 1, True, 1)
     desk.type(state, "VA Q1=5")
     desk.type(state, "VA Q2=6")
     download(desk, state, "PG 1\nLB G1\nE\nPG\n")
@@ -158,7 +148,7 @@ def test_a_global_variable_in_the_way_is_told_before_anything_is_sent(bench, lin
 
 
 def test_a_label_that_was_a_local_variable_is_made_room_for(bench):
-    desk, state = drive(bench)
+    desk, state = one_drive(bench, 1, True, 1)
     download(desk, state, "PG 1\nVA K1\nE\nPG\n")
     desk.type(state, "EX 1")
     desk.wait(0.2)
@@ -168,7 +158,7 @@ def test_a_label_that_was_a_local_variable_is_made_room_for(bench):
 
 
 def test_a_locked_program_is_not_erased_by_a_download(bench):
-    desk, state = drive(bench)
+    desk, state = one_drive(bench, 1, True, 1)
     download(desk, state, PROGRAM)
     desk.type(state, "LK=1")
     with pytest.raises(Refused, match="locked"):
@@ -178,7 +168,7 @@ def test_a_locked_program_is_not_erased_by_a_download(bench):
 
 @pytest.mark.parametrize("slip", ["XYZZY 7", "BR G9", "R1=Q9", "LB G1"])
 def test_a_program_is_not_erased_for_a_file_with_a_slip(bench, slip):
-    desk, state = drive(bench)
+    desk, state = one_drive(bench, 1, True, 1)
     download(desk, state, PROGRAM)
     desk.type(state, "VA Z1")
     sent = len(desk.written)
@@ -189,7 +179,7 @@ def test_a_program_is_not_erased_for_a_file_with_a_slip(bench, slip):
 
 
 def test_while_the_motor_moves_the_program_in_it_stays(bench):
-    desk, state = drive(bench)
+    desk, state = one_drive(bench, 1, True, 1)
     download(desk, state, PROGRAM)
     desk.type(state, "SL 5000")
     with pytest.raises(Refused, match="error 74"):
@@ -198,7 +188,7 @@ def test_while_the_motor_moves_the_program_in_it_stays(bench):
 
 
 def test_what_was_uploaded_can_be_downloaded_again(bench):
-    desk, state = drive(bench)
+    desk, state = one_drive(bench, 1, True, 1)
     download(desk, state, PROGRAM)
     desk.type(state, "EX G1")
     desk.wait(0.2)

@@ -1,5 +1,7 @@
 """Answers of an MCode drive in every echo, party and checksum mode, whole and byte by byte."""
 
+from __future__ import annotations
+
 from dataclasses import replace
 
 import pytest
@@ -7,8 +9,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from multidrop.dialects import Decoded, End, Inexpressible, Kind, Reply
-from multidrop.dialects.mcode.host.codec import MCode
-from multidrop.dialects.mcode.host.framing import checksum, sealed, unsealed
+from multidrop.dialects.mcode.host.codec import MCode, only_strays, short_reply
+from multidrop.dialects.mcode.host.framing import checksum, pieces, printable, sealed, unasked, unsealed
+from multidrop.dialects.mcode.host.reply_parser import ReplyParser
 from tests.support.cases import for_each
 
 S = {text: sealed(text) for text in (b"0", b"aPR P", b"PR P", b"aMR 1", b"MR 1", b"12", b"Logic 000", b"PR ES")}
@@ -269,3 +272,86 @@ def test_any_bytes_decode_to_an_answer_or_to_nothing(em, party, check, text, par
         if found is not None:
             assert 0 <= found.used <= len(data)
             assert isinstance(found.reply, Reply)
+
+
+# Lines that no request asked for
+
+
+BYTES = st.text(alphabet="ab>?\r\n\x06\x15\xe9 ", max_size=40).map(lambda text: text.encode("latin-1"))
+
+
+@given(BYTES, st.sampled_from([0, 1, 2, 3]))
+def test_lines_taken_at_once_are_those_taken_piece_by_piece(buffer, echo):
+    used, lines = 0, []
+    for piece in pieces(buffer, 0, acknowledged=False):
+        prompt = echo == 0 and piece.shown[:1] in (b">", b"?")
+        if piece.what == "rest" and not (prompt and len(piece.shown) == 1):
+            break
+        used = piece.end
+        lines.append(printable(piece.data)[1 if prompt else 0 :])
+    assert unasked(buffer, echo, 0) == (tuple(filter(None, lines)), used)
+
+
+def test_a_thousand_lines_are_taken_at_once():
+    text = "".join(f"{n}\r\n" for n in range(1000)) + "half"
+    assert unasked(text.encode(), 1, 0) == (tuple(map(str, range(1000))), len(text) - 4)
+
+
+# A reply that is read at once
+
+
+PIECES = st.sampled_from(
+    [
+        b"\r\n",
+        b"\n",
+        b"\r",
+        b"5",
+        b"-51200",
+        b'12"a"0',
+        b">",
+        b"?",
+        b"Copyright 2010 Schneider",
+        b"\x06",
+        b"\x15",
+        b"x y",
+    ]
+)
+BUFFERS = st.lists(PIECES, max_size=5).map(b"".join)
+ASKED = ["PR P", "PR P,DN,V", 'PR "x y"', "PR AL", "PR S1", "MR 5", "VM=5", "L", 'PR "Copyright"']
+
+
+@given(buffer=BUFFERS, em=st.sampled_from([1, 2]), text=st.sampled_from(ASKED), gather=st.booleans())
+def test_it_is_what_the_parser_finds(buffer, em, text, gather):
+    codec = MCode(em=em)
+    request = codec.request("", text)
+    request = replace(request, gather=gather, expect=request.expect if gather else request.expect or ".*")
+    found = short_reply(request, buffer)
+    assert found is None or found == ReplyParser(request, em, 0, text.encode(), buffer).whole()
+
+
+@given(buffer=BUFFERS, em=st.sampled_from([1, 2]), text=st.sampled_from(ASKED), gather=st.booleans())
+def test_among_strays_only_the_parser_finds_no_reply(buffer, em, text, gather):
+    request = replace(MCode(em=em).request("", text), gather=gather)
+    if only_strays(request, buffer):
+        assert ReplyParser(request, em, 0, text.encode(), buffer).whole() is None
+
+
+def test_a_flood_of_prints_is_known_to_hold_no_reply():
+    request = MCode(em=1).request("", "PR P")
+    flood = b"".join(b"tick %d\r\n" % n for n in range(100))
+    assert only_strays(request, flood + b"51200")
+    assert not only_strays(request, flood + b"51200\r\n")
+    assert not only_strays(request, flood + b"tick\r51200\r\n"), "a lost line feed"
+
+
+@pytest.mark.parametrize("buffer", [b"\r\n51200\r\n", b"51200\r\n"])
+def test_a_plain_print_is_read_at_once(buffer):
+    request = MCode(em=1).request("", "PR P")
+    assert request.kind is Kind.PRINT
+    found = short_reply(request, buffer)
+    assert found is not None and found.reply.lines == ("51200",) and found.used == len(buffer)
+
+
+@pytest.mark.parametrize("buffer", [b"", b"\r\n", b"51200", b"51200\r", b"\r\n\r\n5\r\n", b"5\r\n6\r\n", b"ten\r\n"])
+def test_anything_else_is_left_to_the_parser(buffer):
+    assert short_reply(MCode(em=1).request("", "PR P"), buffer) is None

@@ -6,19 +6,11 @@ from multidrop.dialects import Kind
 from multidrop.dialects.mcode.family import MCODE
 from multidrop.dialects.mcode.host import codec as codecs
 from multidrop.dialects.mcode.host.codec import EXECUTED, EXECUTING, LIST_QUIET, PATIENT, SHORT, MCode
-from multidrop.dialects.mcode.host.state import MCodeState
 from multidrop.dialects.mcode.manual import program_file
 from multidrop.dialects.program_files import Held
+from tests.support.mcode_drives import one_drive
 
 PROGRAM = "VA Q1=3\n" + "VM=400000\n" * 9 + "PG 1\nLB G1\nR1=R1+12\nMR 51200\nH\n" + "R1=R1+12\n" * 46 + "E\nPG\n"
-
-
-def drive(bench, em, party, check, baud):
-    desk = bench([{"name": "a" if party else "!", "party": party, "set": {"EM": em, "CK": check}}], baud=baud)
-    desk.wire.receive(b"\n\n", 0.0)
-    desk.wait(0.5)
-    desk.line.events(desk.now)
-    return desk, MCodeState(MCode(em, party, check, 1), "a" if party else "", "a" if party else "!", "LMDCM")
 
 
 def took(desk, procedure, state):
@@ -29,7 +21,7 @@ def took(desk, procedure, state):
 
 def transfers(bench, em, party, check, baud):
     """Seconds of a download and of an upload, and the file that the upload made."""
-    desk, state = drive(bench, em, party, check, baud)
+    desk, state = one_drive(bench, em, party, check, "LMDCM", baud)
     lines = program_file.read(PROGRAM, "x.mxt")
     down, _ = took(desk, MCODE.programs.download(state, lines, Held(), lambda done, total: None), state)
     up, made = took(desk, MCODE.programs.upload(state, True), state)
@@ -50,7 +42,7 @@ def test_transfers_in_any_echo_mode_take_little_longer_than_with_all_echoed(benc
 
 @pytest.mark.parametrize("em", [1, 2, 3])
 def test_a_program_that_the_file_starts_saves_the_echo_mode_that_was_there(bench, em):
-    desk, state = drive(bench, em, True, 1, 0)
+    desk, state = one_drive(bench, em, True, 1, "LMDCM", 0)
     text = "VM=400000\nPG 1\nLB G1\nS\nE\nPG\nVM=300000\nEX G1\n"
     desk.run(MCODE.programs.download(state, program_file.read(text, "x.mxt"), None, lambda done, total: None), state)
     desk.wait(2.0)
@@ -115,7 +107,7 @@ def test_a_list_is_parsed_once_however_its_bytes_come(monkeypatch):
 
 
 def test_an_empty_line_of_a_program_does_not_cut_a_list_short(bench):
-    desk, state = drive(bench, 1, False, 0, 9600)
+    desk, state = one_drive(bench, 1, False, 0, "LMDCM", 9600)
     desk.run(MCODE.programs.download(state, program_file.read(PROGRAM, "x.mxt"), None, lambda done, total: None), state)
     printed = []
 

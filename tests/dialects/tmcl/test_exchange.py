@@ -14,9 +14,11 @@ from multidrop.dialects.tmcl.host.codec import Tmcl
 from multidrop.dialects.tmcl.manual.commands import AXIS, Axis, Call, Command, Status
 from multidrop.dialects.values import BY
 from multidrop.drives.line import Line
+from multidrop.simulator.cell.spec import Faults
 from multidrop.simulator.tmcl.module import Refused as Lacking
 from tests.conftest import Bench
 from tests.support.cases import for_each
+from tests.support.faults import disturb
 
 pytestmark = pytest.mark.slow
 
@@ -70,9 +72,19 @@ class Shop(Bench):
         return sum(data[1] == command for data in self.written)
 
 
-def test_identification_reads_version_and_motors_and_moves_nothing():
-    shop = Shop()
-    (state,) = shop.open()
+@pytest.fixture
+def shop():
+    return Shop()
+
+
+@pytest.fixture
+def state(shop):
+    """The only module of the line, identified."""
+    (found,) = shop.open()
+    return found
+
+
+def test_identification_reads_version_and_motors_and_moves_nothing(shop, state):
     assert (state.address, state.product, state.version, state.motors) == ("1", "TMCM-1241", "1.15", 1)
     assert {data[1] for data in shop.written} <= {Command.VERSION, Command.GAP}
 
@@ -95,8 +107,7 @@ def test_hints_of_other_families_are_refused(hints):
         Shop().run(TMCL.identify(hints))
 
 
-def test_the_first_request_may_complete_a_message_of_somebody_else():
-    shop = Shop()
+def test_the_first_request_may_complete_a_message_of_somebody_else(shop):
     shop.wire.receive(b"\x01\x01\x00", 0.0)
     (state,) = shop.open()
     assert state.product == "TMCM-1241"
@@ -113,32 +124,24 @@ def test_the_first_request_may_complete_a_message_of_somebody_else():
         ("sap 4, 0, 1000", ()),
     ],
 )
-def test_only_what_reads_prints(text, printed):
-    shop = Shop()
-    (state,) = shop.open()
+def test_only_what_reads_prints(text, printed, shop, state):
     assert shop.type(state, text) == printed
 
 
-def test_a_refusal_names_its_status_and_what_to_do():
-    shop = Shop()
-    (state,) = shop.open()
+def test_a_refusal_names_its_status_and_what_to_do(shop, state):
     with pytest.raises(Refused, match=r"module 1 refused 'GAP 250, 0': status 3, wrong type \(this module has no such"):
         shop.type(state, "GAP 250, 0")
 
 
 @pytest.mark.parametrize("text", ["", "ROR 0", "MR 100", "ROR 0, 1\nROR 0, 2", "GAP 1, 0 ; x"])
-def test_what_is_no_command_is_not_sent(text):
-    shop = Shop()
-    (state,) = shop.open()
+def test_what_is_no_command_is_not_sent(text, shop, state):
     sent = len(shop.written)
     with pytest.raises(Inexpressible, match="nothing was sent"):
         shop.type(state, text)
     assert len(shop.written) == sent
 
 
-def test_motion_is_position_and_velocity():
-    shop = Shop()
-    (state,) = shop.open()
+def test_motion_is_position_and_velocity(shop, state):
     shop.type(state, "ROR 0, -5000")
     shop.wait(1.0)
     (axis,) = shop.run(TMCL.motion(state, Priority.POLL))
@@ -157,9 +160,7 @@ def test_a_search_counts_as_motion_between_its_phases():
     assert seen > 5 and shop.position(state) == 0 and shop.type(state, "GAP 11, 0") == ("0",)
 
 
-def test_what_was_lost_is_not_sent_again_and_the_next_value_is_its_own():
-    shop = Shop()
-    (state,) = shop.open()
+def test_what_was_lost_is_not_sent_again_and_the_next_value_is_its_own(shop, state):
     shop.delays = [None]
     with pytest.raises(NoAnswer, match="it is not known whether 'ROR 0, 700' was executed; it was sent once"):
         shop.type(state, "ROR 0, 700")
@@ -171,9 +172,7 @@ def test_what_was_lost_is_not_sent_again_and_the_next_value_is_its_own():
 
 @pytest.mark.parametrize("delay", [1.05, 1.2, 1.5, 2.0, 3.0])
 @pytest.mark.parametrize("second", ["GAP 4, 0", "GGP 66, 0", "GAP 3, 0"])
-def test_a_late_reply_is_never_the_next_ones(delay, second):
-    shop = Shop()
-    (state,) = shop.open()
+def test_a_late_reply_is_never_the_next_ones(delay, second, shop, state):
     right = shop.type(state, second)
     shop.delays = [delay]
     with pytest.raises(NoAnswer):
@@ -187,9 +186,7 @@ def test_a_late_reply_is_never_the_next_ones(delay, second):
     assert shop.type(state, second) == right
 
 
-def test_after_a_stop_a_late_reply_is_not_taken_for_a_value():
-    shop = Shop()
-    (state,) = shop.open()
+def test_after_a_stop_a_late_reply_is_not_taken_for_a_value(shop, state):
     shop.delays = [0.5]
     asked = shop.count(Command.GAP) + 1
 
@@ -219,9 +216,8 @@ def test_after_a_stop_in_a_mark_the_next_mark_has_another_command():
     assert len(set(commands)) == 3
 
 
-def test_a_damaged_reply_is_no_value():
-    shop = Shop(flip=0.02)
-    shop.wire._rng.seed(5)
+def test_a_damaged_reply_is_no_value(shop):
+    disturb(shop.wire, Faults(flip=0.02), 5)
     state = TMCL.new_state(Tmcl(), "1")
     values, failures = set(), 0
     for _ in range(200):
@@ -232,9 +228,7 @@ def test_a_damaged_reply_is_no_value():
     assert failures and len(values) <= 2  # a flip in both a byte and the sum goes unseen in 1 of 2000
 
 
-def test_a_new_address_is_told():
-    shop = Shop()
-    (state,) = shop.open()
+def test_a_new_address_is_told(shop, state):
     assert shop.run(TMCL.perform(state, "SGP 66, 0, 5")) == ()
     assert state.remarks == ["module 1: its address is 5 from now on: type @5"]
     assert state.address == "5" and shop.type(state, "GGP 66, 0") == ("5",)
@@ -256,9 +250,7 @@ def test_whatever_is_late_a_value_is_right_or_not_given(delays, start):
             assert shop.type(state, text) == (value,)
 
 
-def test_the_whole_stop_stops_a_module_that_lost_a_byte_of_the_frame_before():
-    shop = Shop()
-    (state,) = shop.open()
+def test_the_whole_stop_stops_a_module_that_lost_a_byte_of_the_frame_before(shop, state):
     shop.type(state, "ROR 0, 1000")
     shop.wait(1.0)
     shop.wire.receive(bytes.fromhex("01 01 00 00 00 03 E8 ED"), shop.now)  # a byte of nine is lost
@@ -272,9 +264,8 @@ def test_the_whole_stop_stops_a_module_that_lost_a_byte_of_the_frame_before():
 
 
 @pytest.mark.parametrize("at", range(9))
-def test_a_byte_lost_of_one_request_is_not_filled_up_by_the_next(at):
+def test_a_byte_lost_of_one_request_is_not_filled_up_by_the_next(at, shop):
     """Also where the user's timeout is shorter than the pause after which a module drops an unfinished message."""
-    shop = Shop()
     shop.line.timeout = 0.1
     (state,) = shop.open()
     shop.lose(at)
@@ -284,8 +275,7 @@ def test_a_byte_lost_of_one_request_is_not_filled_up_by_the_next(at):
     assert not any("status 1" in text for text in shop.strays)
 
 
-def test_an_address_that_cannot_be_is_refused_before_the_first_module_is_asked():
-    shop = Shop()
+def test_an_address_that_cannot_be_is_refused_before_the_first_module_is_asked(shop):
     with pytest.raises(Inexpressible, match="no module address '999'; valid: 1 to 255"):
         shop.open("1", "999")
     assert not shop.written
@@ -325,8 +315,7 @@ def test_every_module_of_a_line_is_stopped_with_the_others():
     assert not one.settings_unknown
 
 
-def test_a_module_found_in_download_mode_is_taken_out_of_it_and_that_is_said():
-    shop = Shop()
+def test_a_module_found_in_download_mode_is_taken_out_of_it_and_that_is_said(shop):
     program = shop.devices["1"].program
     program.download(0)
     (state,) = shop.open()
@@ -334,8 +323,7 @@ def test_a_module_found_in_download_mode_is_taken_out_of_it_and_that_is_said():
     assert any("found in download mode" in note and "133" in note for note in state.notes)
 
 
-def test_the_last_session_s_download_is_ended_before_anything_is_stored():
-    shop = Shop()
+def test_the_last_session_s_download_is_ended_before_anything_is_stored(shop):
     program = shop.devices["1"].program
     (state,) = shop.open()
     shop.type(state, "132 0, 0, 0")
@@ -345,9 +333,7 @@ def test_the_last_session_s_download_is_ended_before_anything_is_stored():
     assert (program.storing, len(program.memory), again.programming, again.restore) == (False, 1, False, None)
 
 
-def test_a_line_of_a_download_that_was_executed_is_said():
-    shop = Shop()
-    (state,) = shop.open()
+def test_a_line_of_a_download_that_was_executed_is_said(shop, state):
     shop.type(state, "132 0, 0, 0")
     shop.devices["1"].program.storing = False  # by another host
     with pytest.raises(Refused, match="was executed and not stored"):
@@ -356,9 +342,7 @@ def test_a_line_of_a_download_that_was_executed_is_said():
 
 
 @pytest.mark.parametrize(("without", "runs"), [((), True), ((135,), True), ((135, 10), False)])
-def test_whether_a_program_runs_is_read_by_135_or_global_parameter_128(without, runs, monkeypatch):
-    shop = Shop()
-    (state,) = shop.open()
+def test_whether_a_program_runs_is_read_by_135_or_global_parameter_128(without, runs, monkeypatch, shop, state):
     for line in ("132 0, 0, 0", "27 0, 0, 1000", "133 0, 0, 0", "129 1, 0, 0"):
         shop.type(state, line)
     device = shop.devices["1"]
@@ -418,8 +402,7 @@ def test_the_host_says_from_where_a_relative_move_counts(option, counted):
     assert "not known" in TMCL.values.controls(state, "")[BY].about
 
 
-def test_a_module_without_parameter_127_counts_from_a_place_that_is_not_known(monkeypatch):
-    shop = Shop()
+def test_a_module_without_parameter_127_counts_from_a_place_that_is_not_known(monkeypatch, shop):
     monkeypatch.setattr(
         "multidrop.simulator.tmcl.module.AXIS", {n: row for n, row in AXIS.items() if n != Axis.RELATIVE_FROM}
     )

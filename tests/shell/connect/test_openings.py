@@ -10,8 +10,8 @@ from multidrop.shell.connect.opening import Opened
 from multidrop.shell.connect.settings import Settings
 from multidrop.shell.session import Session
 from multidrop.transports import Unreachable
-from tests.shell.test_session import FakeBus
 from tests.support.cell_session import CellSession, bus, party
+from tests.support.fake_bus import FakeBus
 
 pytestmark = pytest.mark.virtual
 

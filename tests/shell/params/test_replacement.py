@@ -65,7 +65,7 @@ async def applied(cell: CellSession, folder: Path, source: str = "b", **wanted: 
 async def test_a_replacement_becomes_the_drive_and_keeps_it_over_power_off(tmp_path, present):
     async with CellSession(tmp_path, unit(present)) as cell:
         await applied(cell, tmp_path)
-        device = next(each.device for each in cell._floor().floor.drives)
+        device = next(each.device for each in cell.floor.floor.drives)
         for on in (False, True):
             device.power(on, device.now)
         printed = [device.execute(text, device.now).lines for text in ("PR DN,PY,EM,CK", "PR VM,A,Q1", "PR TP", "L")]
@@ -229,10 +229,10 @@ async def test_a_pmx_becomes_the_one_of_the_file(tmp_path):
     present = 'personality = "PMX"\nvariables = { V41 = 9 }\nprogram_text = "PRG 0\\nX1000\\nWAITX\\nEND"'
     cell = await becomes(tmp_path, machine, present, "05")
     try:
-        device = next(each.device for each in cell._floor().floor.drives)
+        device = next(each.device for each in cell.floor.floor.drives)
         for on in (False, True):
-            device.power(on, cell._floor().now())
-        assert [device.execute(text, cell._floor().now()) for text in ("DN", "SLRX", "DOBOOT", "V40", "V41")] == [
+            device.power(on, cell.floor.now())
+        assert [device.execute(text, cell.floor.now()) for text in ("DN", "SLRX", "DOBOOT", "V40", "V41")] == [
             *("2ED05", "2.500", "3", "7", "0")
         ]
         assert "00: after that, DN waits until the drive is switched off and on" in cell.printed()
@@ -314,7 +314,7 @@ OWN = 'personality = "LMDCM"\nprogram_text = "PG 1\\nLB Ga\\nE\\nPG\\nPG 500\\nL
 async def test_no_program_of_the_replacement_stays_beside_that_of_the_file(tmp_path):
     async with CellSession(tmp_path, unit(OWN)) as cell:
         await applied(cell, tmp_path)
-        assert next(each.device for each in cell._floor().floor.drives).execute("L", 1e3).lines[-1] == "20  E"
+        assert next(each.device for each in cell.floor.floor.drives).execute("L", 1e3).lines[-1] == "20  E"
         assert "ZZ = 500" in next((tmp_path / "state" / "backups").glob("*.mxt")).read_text()
 
 

@@ -8,9 +8,8 @@ import pytest
 
 from multidrop.shell.prompt import collector
 from multidrop.shell.prompt.collector import collected_at_rest
-from tests.support.virtual import in_virtual_time
 
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.virtual, pytest.mark.slow]
 
 
 class Kept:
@@ -27,7 +26,6 @@ async def frozen_cycle():
     return weakref.ref(kept)
 
 
-@in_virtual_time
 async def test_what_survives_is_frozen_each_second_and_visited_no_more():
     with collected_at_rest(lambda: False):
         kept = [Kept() for _ in range(1000)]
@@ -37,7 +35,6 @@ async def test_what_survives_is_frozen_each_second_and_visited_no_more():
     assert gc.get_freeze_count() == 0
 
 
-@in_virtual_time
 async def test_everything_is_collected_while_all_is_at_rest():
     resting = False
     with collected_at_rest(lambda: resting):
@@ -49,7 +46,6 @@ async def test_everything_is_collected_while_all_is_at_rest():
         assert lost() is None
 
 
-@in_virtual_time
 async def test_a_machine_that_never_rests_is_collected_all_the_same_in_the_end():
     with collected_at_rest(lambda: False):
         lost = await frozen_cycle()

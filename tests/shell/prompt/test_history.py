@@ -11,6 +11,11 @@ from multidrop.shell.prompt.typed_lines import History
 from tests.support.until import PATIENCE
 
 
+@pytest.fixture
+def three_kept(monkeypatch):
+    monkeypatch.setattr(typed_lines, "KEPT", 3)
+
+
 def test_lines_are_kept_between_runs_oldest_first(tmp_path):
     kept = History(tmp_path / "new" / "history")
     for line in ("PR P", "  ", "MR 100", "two\nlines"):
@@ -26,8 +31,7 @@ def test_a_history_that_cannot_be_kept_costs_no_line(tmp_path):
     assert kept.lines() == []
 
 
-def test_a_long_history_is_cut(tmp_path, monkeypatch):
-    monkeypatch.setattr(typed_lines, "KEPT", 3)
+def test_a_long_history_is_cut(tmp_path, three_kept):
     kept = History(tmp_path / "history")
     for number in range(7):
         kept.append(f"MR {number}")
@@ -40,8 +44,7 @@ def filled(path, lines=7):
     return History(path)
 
 
-def test_a_file_that_is_cut_keeps_its_mode(tmp_path, monkeypatch):
-    monkeypatch.setattr(typed_lines, "KEPT", 3)
+def test_a_file_that_is_cut_keeps_its_mode(tmp_path, three_kept):
     kept = filled(tmp_path / "history")
     for mode in (0o600, 0o640, 0o400):
         kept.path.chmod(0o600)
@@ -51,8 +54,7 @@ def test_a_file_that_is_cut_keeps_its_mode(tmp_path, monkeypatch):
         assert kept.path.stat().st_mode & 0o777 == mode
 
 
-def test_a_file_made_anew_is_for_its_user_only(tmp_path, monkeypatch):
-    monkeypatch.setattr(typed_lines, "KEPT", 3)
+def test_a_file_made_anew_is_for_its_user_only(tmp_path, three_kept):
     kept = History(tmp_path / "history")
     for number in range(9):
         kept.append(f"MR {number}")
@@ -61,8 +63,7 @@ def test_a_file_made_anew_is_for_its_user_only(tmp_path, monkeypatch):
     assert len(kept.path.read_text().splitlines()) <= 6
 
 
-def test_a_link_stays_a_link_and_the_file_behind_it_is_cut(tmp_path, monkeypatch):
-    monkeypatch.setattr(typed_lines, "KEPT", 3)
+def test_a_link_stays_a_link_and_the_file_behind_it_is_cut(tmp_path, three_kept):
     (tmp_path / "state").mkdir()
     filled(tmp_path / "elsewhere")
     (link := tmp_path / "state" / "history").symlink_to(tmp_path / "elsewhere")
@@ -74,8 +75,7 @@ def test_a_link_stays_a_link_and_the_file_behind_it_is_cut(tmp_path, monkeypatch
     assert sorted(os.listdir(tmp_path)) == ["elsewhere", "state"]
 
 
-def test_a_line_that_another_process_adds_while_the_file_is_cut_is_kept(tmp_path, monkeypatch):
-    monkeypatch.setattr(typed_lines, "KEPT", 3)
+def test_a_line_that_another_process_adds_while_the_file_is_cut_is_kept(tmp_path, monkeypatch, three_kept):
     ours, theirs = filled(tmp_path / "history"), History(tmp_path / "history")
     write = typed_lines.write_atomically
 
@@ -120,8 +120,7 @@ def test_a_full_disk_costs_one_line_and_not_the_next(tmp_path):
     assert kept.lines()[0] == "MR 1" and kept.lines()[-1] == "MR 2"
 
 
-def test_a_full_disk_leaves_a_long_history_as_it_was(tmp_path, monkeypatch):
-    monkeypatch.setattr(typed_lines, "KEPT", 3)
+def test_a_full_disk_leaves_a_long_history_as_it_was(tmp_path, monkeypatch, three_kept):
     kept = filled(tmp_path / "history")
 
     def full(descriptor):

@@ -1,131 +1,231 @@
-"""The prompt driven through prompt_toolkit's own pipe, without a terminal."""
+"""The prompt without a terminal: lines, stops, the toolbar, a question, and a form whose values are asked for."""
 
 import asyncio
+import contextlib
+import io
 
 import pytest
-from prompt_toolkit.application import create_app_session
-from prompt_toolkit.input import create_pipe_input
-from prompt_toolkit.output import DummyOutput
 
-from multidrop.shell.connect.settings import Settings
-from multidrop.shell.events import Entered, Output, Progressed, StateChanged
-from multidrop.shell.prompt.prompt import Prompt
-from multidrop.shell.session import Session
-from tests.support.until import PATIENCE
+from multidrop.dialects import Diagnostic, Stopped
+from multidrop.macros import Macro, Step
+from multidrop.shell.events import Progressed
+from multidrop.shell.macro_arguments import value_fields
+from multidrop.shell.prompt.terminal_input import PAUSE, at_terminal
+from tests.support.typist import typist as typist_in
+from tests.support.until import until
 
+pytestmark = pytest.mark.virtual
 
-class Typist:
-    """A prompt over a session, and the keys to type on."""
-
-    def __init__(self, keys, session):
-        self.keys, self.session = keys, session
-        self.entered, self.output = [], []
-        self.noticed = asyncio.Event()
-        session.subscribe(self.take)
-        self.prompt = Prompt(session)
-        self.code = asyncio.create_task(self.prompt.run())
-
-    def take(self, event):
-        if isinstance(event, Entered):
-            self.entered.append(event.line)
-        if isinstance(event, Output):
-            self.output.append(event.text)
-        if isinstance(event, Entered | StateChanged):
-            self.noticed.set()
-
-    async def until(self, condition):
-        async with asyncio.timeout(PATIENCE):
-            while not condition():
-                self.noticed.clear()
-                await self.noticed.wait()
-
-    async def ends(self):
-        async with asyncio.timeout(PATIENCE):
-            return await self.code
+LONG = PAUSE * 2
+FIELDS = value_fields(Macro("m", (Step(0.0, "{turns:int=10,1..100} {mode:choice(a|b)}"),)), {})
+TURNS = "macro m: turns, a whole number, 1 to 100 [10]: "
 
 
 @pytest.fixture
 async def typist(tmp_path):
-    session = Session(Settings(folder=tmp_path / "config", state=tmp_path / "state"))
-    with create_pipe_input() as keys, create_app_session(input=keys, output=DummyOutput()):
-        made = Typist(keys, session)
+    async with typist_in(tmp_path) as made:
         yield made
-        made.code.cancel()
-        await asyncio.gather(made.code, return_exceptions=True)
-        await session.close()
 
 
 async def test_lines_run_in_order_and_are_kept_in_the_history(typist, tmp_path):
-    typist.keys.send_text("/sleep 0\r/help MR\r/drives\r")
-    await typist.until(lambda: "/drives" in typist.entered)
+    typist.send("/sleep 0\r/help MR\r/drives\r")
+    await until(lambda: "/drives" in typist.entered)
     assert typist.entered == ["/sleep 0", "/help MR", "/drives"]
     assert any("MR" in line for line in typist.output)
-    typist.keys.send_text("/quit\r")
+    typist.send("/quit\r")
     assert await typist.ends() == 0
     assert (tmp_path / "state" / "history").read_text().splitlines() == ["/sleep 0", "/help MR", "/drives", "/quit"]
 
 
 async def test_the_stop_key_stops_at_once_and_drops_what_waits(typist):
-    typist.keys.send_text("/sleep 1000\r/sleep 2000\r")
-    await typist.until(lambda: typist.entered == ["/sleep 1000"])
-    typist.keys.send_text("half a line\x18")
-    await typist.until(lambda: typist.session.latched)
-    await typist.until(lambda: not typist.session.busy)
-    typist.keys.send_text("\x03/quit\r")
+    typist.send("/sleep 1000\r/sleep 2000\r")
+    await until(lambda: typist.entered == ["/sleep 1000"])
+    typist.send("half a line\x18")
+    await until(lambda: typist.session.latched and not typist.session.busy)
+    typist.send("\x03/quit\r")
     assert await typist.ends() == 0
     assert "/sleep 2000" not in typist.entered
 
 
 async def test_the_toolbar_shows_the_progress_of_a_job(typist):
-    await typist.until(lambda: typist.prompt._prompt.app.is_running)
     typist.session.publish(Progressed(0.0, "a: download", 3, 10, 2.0))
-    assert "a: download: 3 of 10, 2 s left" in typist.prompt._toolbar()
+    await until(lambda: "a: download: 3 of 10, 2 s left" in typist.screen)
     typist.session.publish(Progressed(0.0, "a: download", 10, 10, 0.0))
-    assert "download" not in typist.prompt._toolbar()
+    await until(lambda: "download" not in typist.screen)
 
 
 async def test_the_toolbar_shows_that_a_log_is_on(typist, tmp_path):
-    await typist.until(lambda: typist.prompt._prompt.app.is_running)
     await typist.session.run(f"/log {tmp_path / 'day.jsonl'}")
-    assert "  log day.jsonl  " in typist.prompt._toolbar()
+    await until(lambda: "  log day.jsonl" in typist.screen)
     await typist.session.run("/log off")
-    assert "log day" not in typist.prompt._toolbar()
+    await until(lambda: "log day" not in typist.screen)
 
 
 async def test_the_toolbar_says_what_is_known_since_a_stop(typist):
-    await typist.until(lambda: typist.prompt._prompt.app.is_running)
-    assert typist.prompt._toolbar().startswith("^X STOP ALL  /open")
+    assert "^X STOP ALL  /open" in typist.screen
     typist.session.stop()
-    assert typist.prompt._toolbar().startswith(
-        "^X STOP ALL  · NO STOP SENT   no drive is open       /resume lets macros run"
-    )
+    await until(lambda: "^X STOP ALL  · NO STOP SENT   no drive is open       /resume lets" in typist.screen)
 
 
 async def test_ctrl_c_clears_the_line_or_stops_what_runs(typist):
-    typist.keys.send_text("MR 51200\x03/sleep 1000\r")
-    await typist.until(lambda: typist.entered == ["/sleep 1000"])
-    typist.keys.send_text("\x03")
-    await typist.until(lambda: typist.session.latched)
+    typist.send("MR 51200\x03/sleep 1000\r")
+    await until(lambda: typist.entered == ["/sleep 1000"])
+    typist.send("\x03")
+    await until(lambda: typist.session.latched)
 
 
 async def test_ctrl_d_ends_and_stops_what_still_ran(typist):
-    typist.keys.send_text("/sleep 1000\r")
-    await typist.until(lambda: typist.session.busy)
-    typist.keys.send_text("\x04")
+    typist.send("/sleep 1000\r")
+    await until(lambda: typist.session.busy)
+    typist.send("\x04")
     assert await typist.ends() == 0
-    await typist.until(lambda: not typist.session.busy)
+    await until(lambda: not typist.session.busy)
     assert not typist.session.latched
 
 
 async def test_ctrl_r_finds_a_line_of_an_earlier_run(tmp_path):
     (tmp_path / "state").mkdir()
     (tmp_path / "state" / "history").write_text("/help VM\n/help MR\n/sleep 0\n")
-    session = Session(Settings(folder=tmp_path / "config", state=tmp_path / "state"))
-    with create_pipe_input() as keys, create_app_session(input=keys, output=DummyOutput()):
-        typist = Typist(keys, session)
-        keys.send_text("\x12help V\r\r")
-        await typist.until(lambda: typist.entered)
-        keys.send_text("\x04")
+    async with typist_in(tmp_path) as typist:
+        typist.send("\x12help V\r\r")
+        await until(lambda: typist.entered)
+        typist.send("\x04")
         await typist.ends()
         assert typist.entered == ["/help VM"]
-    await session.close()
+
+
+# A question: one key answers, but no key that was typed before the question could be read.
+
+
+@contextlib.asynccontextmanager
+async def asked(folder):
+    """A typist who is asked; the session's task of asking."""
+    async with typist_in(folder) as typist:
+        question = asyncio.create_task(typist.session.questions.confirm("CP erases the program", "a"))
+        await typist.shows("a: CP erases the program. Go on? [y/N]")
+        yield typist, question
+    await asyncio.gather(question, return_exceptions=True)
+
+
+async def answers_a_line(typist):
+    await typist.shows(">")
+    typist.send("/help MR\r")
+    await asyncio.sleep(LONG)
+    return typist.entered == ["/help MR"]
+
+
+async def test_one_key_answers(tmp_path):
+    async with asked(tmp_path) as (typist, question):
+        await asyncio.sleep(LONG)
+        typist.send("y")
+        await question
+        assert await answers_a_line(typist)
+
+
+async def test_enter_escape_and_ctrl_c_are_no(tmp_path):
+    for key in ("n", "\r", "\x1b", "\x03", "\x04"):
+        async with asked(tmp_path) as (typist, question):
+            await asyncio.sleep(LONG)
+            typist.send(key)
+            with pytest.raises(Diagnostic, match="the answer was no"):
+                await question
+            assert not typist.session.latched and typist.entered == []
+
+
+async def test_what_was_typed_ahead_answers_nothing(tmp_path):
+    async with asked(tmp_path) as (typist, question):
+        typist.send("/sleep 0\rY100")
+        await asyncio.sleep(LONG)
+        assert typist.entered == ["/sleep 0"]
+        assert typist.notices == ["not sent, as a question came: Y100"]
+        typist.send("MR 1y\r")  # no answer: y and Enter come right after other keys
+        await asyncio.sleep(LONG)
+        assert not question.done() and typist.app.current_buffer.text == ""
+        typist.send("y")
+        await question
+
+
+async def test_keys_that_edit_a_line_do_nothing_while_a_question_is_open(tmp_path):
+    async with asked(tmp_path) as (typist, question):
+        await asyncio.sleep(LONG)
+        typist.send("\x1b[A\x12\t\x17\x1b[200~MR 5\rMR 6\x1b[201~")
+        await asyncio.sleep(LONG)
+        assert not question.done() and not typist.app.layout.is_searching
+        assert typist.app.current_buffer.text == "" and typist.entered == []
+
+
+async def test_the_stop_key_goes_first_and_is_no_yes(tmp_path):
+    async with asked(tmp_path) as (typist, question):
+        await asyncio.sleep(LONG)
+        typist.send("\x18")
+        with pytest.raises(Stopped):
+            await question
+        assert typist.session.latched and await answers_a_line(typist)
+
+
+# A form: each value is asked for until it is valid.
+
+
+@contextlib.asynccontextmanager
+async def filling(folder):
+    """A typist who fills in a form; the session's task of asking."""
+    async with typist_in(folder) as typist:
+        answers = asyncio.create_task(typist.session.tasks.run(typist.session.questions.fill_in("macro m", FIELDS)))
+        await typist.shows(TURNS.rstrip())
+        yield typist, answers
+    await asyncio.gather(answers, return_exceptions=True)
+
+
+async def typed(typist, *texts):
+    for text in texts:
+        await asyncio.sleep(LONG)
+        typist.send(text)
+    await asyncio.sleep(LONG)
+
+
+async def test_each_value_is_asked_for_until_it_is_valid(tmp_path):
+    async with filling(tmp_path) as (typist, answers):
+        await typed(typist, "500\r", "\r")
+        assert typist.notices == ["macro m: invalid turns = '500'; valid: a whole number, 1 to 100"]
+        await typist.shows("macro m: mode, a or b:")
+        await typed(typist, "\r", "b\r")
+        assert await answers == {"turns": "10", "mode": "b"}
+        assert typist.notices[1:] == ["a value is needed; Ctrl+C gives up"] and typist.entered == []
+        await typist.shows(">")
+        assert list(typist.app.current_buffer.history.get_strings()) == []
+
+
+async def test_ctrl_c_escape_and_ctrl_d_give_up(tmp_path):
+    for key in ("\x03", "\x1b", "\x04"):
+        async with filling(tmp_path) as (typist, answers):
+            await asyncio.sleep(LONG)
+            typist.send("5")
+            typist.send(key)
+            with pytest.raises(Diagnostic, match="macro m: no values were given; nothing was sent"):
+                await answers
+            assert not typist.session.latched and typist.running
+
+
+async def test_what_was_typed_ahead_is_a_line_and_no_value(tmp_path):
+    async with filling(tmp_path) as (typist, answers):
+        typist.send("/sleep 0\r77")
+        await asyncio.sleep(LONG)
+        assert typist.entered == ["/sleep 0"] and not answers.done()
+        assert typist.notices == ["not sent, as a question came: 77"]
+
+
+async def test_a_stop_ends_the_form(tmp_path):
+    async with filling(tmp_path) as (typist, answers):
+        await asyncio.sleep(LONG)
+        typist.send("\x18")
+        with pytest.raises(Stopped):
+            await answers
+        assert typist.session.latched
+        await typist.shows(">")
+
+
+@pytest.mark.parametrize(("typed", "answers"), [("\nx\nb\n", {"turns": "10", "mode": "b"}), ("7\n", None), ("", None)])
+def test_a_terminal_is_asked_line_by_line(typed, answers, monkeypatch, capsys):
+    monkeypatch.setattr("sys.stdin", io.StringIO(typed))
+    assert at_terminal("macro m", FIELDS) == answers
+    assert TURNS in capsys.readouterr().err

@@ -193,10 +193,7 @@ def test_what_is_typed_while_it_opens_is_a_line_of_the_prompt(shop):
 
 
 def test_a_terminal_that_hangs_up_ends_the_prompt_with_130_and_stops_what_runs(shop):
-    folder = shop.folder / "conf" / "macros"
-    folder.mkdir(exist_ok=True)
-    steps = "".join(f"[[step]]\nafter = 0.0\nline = '{line}'\n" for line in ("SL 50000", "/sleep 1000"))
-    (folder / "go.toml").write_text(f'name = "go"\n{steps}')
+    shop.macro("go", "SL 50000", "/sleep 1000")
     for how in ("EIO", "SIGHUP"):
         child = shop.terminal("shell", "press")
         child.expect("b>")

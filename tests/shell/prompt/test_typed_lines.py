@@ -3,10 +3,13 @@
 import asyncio
 from typing import Any
 
+import pytest
+
 from multidrop.dialects import Refused
 from multidrop.shell.lines import TypedLine
 from multidrop.shell.prompt.typed_lines import BURST, SHOWN, LineQueue
-from tests.support.virtual import in_virtual_time
+
+pytestmark = pytest.mark.virtual
 
 
 class FakeSession:
@@ -51,7 +54,6 @@ class Typist:
         await asyncio.gather(self._work, return_exceptions=True)
 
 
-@in_virtual_time
 async def test_lines_run_one_after_the_other():
     async with Typist() as typist:
         typist.queue.enter("MR 1\nMR 2")
@@ -61,7 +63,6 @@ async def test_lines_run_one_after_the_other():
         assert typist.session.done == ["MR 1", "MR 2"] and typist.queue.running == ""
 
 
-@in_virtual_time
 async def test_a_text_with_a_hidden_line_is_not_sent_and_a_paste_with_cr_has_lines():
     async with Typist() as typist:
         for text in ("PR P\u2028MR 1", "PR P\x0bMR 1\nMR 2", "# x\rMR 1\nMR 2", "PR P\x85MR 1"):
@@ -74,7 +75,6 @@ async def test_a_text_with_a_hidden_line_is_not_sent_and_a_paste_with_cr_has_lin
         assert typist.session.done == ["MR 1", "MR 2"]
 
 
-@in_virtual_time
 async def test_a_failed_line_holds_back_the_rest_of_its_burst_only():
     async with Typist() as typist:
         typist.queue.enter("bad\nMR 1")
@@ -90,7 +90,6 @@ async def test_a_failed_line_holds_back_the_rest_of_its_burst_only():
         assert typist.session.done == ["MR 5"]
 
 
-@in_virtual_time
 async def test_a_stop_drops_what_waits_and_takes_new_lines():
     async with Typist() as typist:
         typist.queue.enter("MR 1\nMR 2")
@@ -103,7 +102,6 @@ async def test_a_stop_drops_what_waits_and_takes_new_lines():
         assert typist.session.done == ["MR 1", "MR 3"]  # the session ends the running line; this one's fake does not
 
 
-@in_virtual_time
 async def test_a_line_that_a_stop_ended_holds_back_nothing_typed_after_that_stop():
     async with Typist() as typist:
         typist.queue.enter("bad")
@@ -115,7 +113,6 @@ async def test_a_line_that_a_stop_ended_holds_back_nothing_typed_after_that_stop
         assert (typist.session.done, typist.session.notices) == (["MR 1"], [])
 
 
-@in_virtual_time
 async def test_stop_and_quit_wait_for_no_line_and_a_macro_for_those_of_its_burst_only():
     async with Typist() as typist:
         typist.queue.enter("MR 1\n/play m\n/stop\n/quit")
@@ -128,7 +125,6 @@ async def test_stop_and_quit_wait_for_no_line_and_a_macro_for_those_of_its_burst
         assert (typist.session.done, typist.session.started[3:]) == (["MR 1"], ["/play m"])
 
 
-@in_virtual_time
 async def test_of_many_lines_the_first_are_shown_and_the_rest_counted():
     typist = Typist()
     typist.queue.show_unsent("a stop came", [f"MR {n}" for n in range(SHOWN + 7)] + ["  "])
@@ -136,7 +132,6 @@ async def test_of_many_lines_the_first_are_shown_and_the_rest_counted():
     assert typist.session.notices[-1] == "7 more lines were not sent"
 
 
-@in_virtual_time
 async def test_what_is_entered_while_buses_open_waits_for_them_but_stop_and_quit():
     async with Typist() as typist:
         typist.queue.opening = True

@@ -7,7 +7,8 @@ import asyncio
 import pytest
 
 from multidrop.shell.prompt.view import BURST, CHUNK, LONG_PAUSE, MANY, MOST, PATIENCE, PAUSE, LinesAbove, Stream
-from tests.support.virtual import in_virtual_time
+
+pytestmark = pytest.mark.virtual
 
 
 class Output:
@@ -70,7 +71,6 @@ class Above(LinesAbove):
         return self._writer
 
 
-@in_virtual_time
 async def test_a_flood_is_shown_whole_and_in_chunks():
     above = Above()
     flood = [f"{n:062}" for n in range(5000)]
@@ -83,7 +83,6 @@ async def test_a_flood_is_shown_whole_and_in_chunks():
     assert len(above.app.output.pieces) > 10
 
 
-@in_virtual_time
 async def test_many_lines_have_the_prompt_drawn_less_often():
     updates = []
     for lines in (1, MANY):
@@ -95,7 +94,6 @@ async def test_many_lines_have_the_prompt_drawn_less_often():
     assert updates[0] == pytest.approx(updates[1] * LONG_PAUSE / PAUSE, rel=0.2)
 
 
-@in_virtual_time
 async def test_of_more_than_a_burst_the_oldest_are_counted_and_warnings_stay_in_their_place():
     above = Above()
     above.add(["lost"] * 3, keep=False)
@@ -111,7 +109,6 @@ async def test_of_more_than_a_burst_the_oldest_are_counted_and_warnings_stay_in_
     assert above.lines[-1] == "again"
 
 
-@in_virtual_time
 async def test_few_lines_wait_for_a_terminal_that_takes_none():
     above = Above()
     above.writer.behind = True
@@ -125,7 +122,6 @@ async def test_few_lines_wait_for_a_terminal_that_takes_none():
     assert above.lines == ["6 lines are missing here: the terminal did not take them", *["x"] * MOST]
 
 
-@in_virtual_time
 async def test_the_end_does_not_wait_for_a_flood_and_loses_no_warning():
     above = Above()
     above.add(["STILL MOVING"], keep=True)

@@ -1,88 +1,37 @@
 """Automation that is interrupted, from outside: real processes, a simulated cell served on TCP and ptys."""
 
-import json
 import shutil
 import signal
-import subprocess
 import sys
 from pathlib import Path
 
 import pexpect
 import pytest
 
-from tests.support.front_door import command
-from tests.support.processes import Running, environment
+from tests.support.cell_session import TCP, bus, party
+from tests.support.front_door import Home
 from tests.support.served_cell import until
 from tests.support.until import PATIENCE
 
 pytestmark = pytest.mark.process
 
-CELL = """
-[[bus]]
-name = "press"
-serve = ["tcp://127.0.0.1:0", "pty:press.tty"]
-baud = 0
-[[bus.drive]]
-personality = "LMDCM"
-name = "a"
-party = true
-set = { EM = 1, CK = 1 }
-[[bus.drive]]
-personality = "LMDCM"
-name = "b"
-party = true
-set = { EM = 1, CK = 1 }
-"""
+CELL = bus("press", party("a"), party("b"), baud=0, serve=[*TCP, "pty:press.tty"])
 
 
 KNOWN = "party=1&checksum=1&em=1"
 """What a URL says so that opening takes less time."""
 
 
-class Shop:
+class Shop(Home):
     """A served cell with two drives, and processes that work with it."""
 
     def __init__(self, folder):
-        self.folder, self.started = folder, []
-        (folder / "cell.toml").write_text(CELL)
-        self.sim = Running("sim", "cell.toml", "--json", folder=folder)
-        told = [json.loads(line)["endpoint"] for line in self.sim.until('{"ready": true}')[:-1]]
-        self.url = next(f"{each}?drives=a,b&{KNOWN}" for each in told if each.startswith("tcp:"))
-
-    def process(self, *arguments, stdin=subprocess.DEVNULL):
-        made = subprocess.Popen(
-            [sys.executable, "-m", "multidrop", *arguments],
-            stdin=stdin,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.PIPE,
-            text=True,
-            cwd=self.folder,
-            env=environment(self.folder),
-        )
-        self.started.append(made)
-        return made
-
-    def terminal(self, *arguments):
-        return pexpect.spawn(
-            sys.executable,
-            ["-m", "multidrop", *arguments],
-            cwd=self.folder,
-            env=environment(self.folder),
-            timeout=PATIENCE,
-            encoding="utf-8",
-        )
-
-    def done(self, *arguments):
-        """(exit code, standard output, standard error) of a command that needs no process of its own."""
-        done = command(self.folder, *arguments)
-        return done.returncode, done.stdout, done.stderr
+        super().__init__(folder)
+        self.serve(CELL)
+        self.url = f"{self.endpoints['press']['tcp']}?drives=a,b&{KNOWN}"
 
     def send(self, *lines):
-        return self.done("send", self.url, *lines)
-
-    def script(self, text):
-        (self.folder / "script.txt").write_text(text)
-        return "script.txt"
+        return self.run("send", self.url, *lines)
 
     def standing(self):
         return self.send("/sleep 0.3", "@a PR V", "@b PR V")  # a drive takes 0.1 s to reach 100000
@@ -94,18 +43,11 @@ class Shop:
 
     def leave(self):
         """End the processes; stop the drives and put them back to 0."""
-        for each in self.started:
-            each.kill()
-            each.communicate(timeout=PATIENCE)
-        self.started.clear()
+        self.end_all()
         shutil.rmtree(self.folder / "conf", ignore_errors=True)
         shutil.rmtree(self.folder / "state", ignore_errors=True)
         code, _, err = self.send("/stop", "@a P=0", "@b P=0")
         assert code == 0, err
-
-    def close(self):
-        self.sim.process.terminate()
-        assert self.sim.end() == 0
 
 
 @pytest.fixture(scope="module")
@@ -129,7 +71,7 @@ ENDS = ("INT", "TERM", "HUP", "QUIT", "ALRM", "USR1", "USR2", "XCPU", "PIPE")
 
 @pytest.mark.parametrize("number", [signal.Signals[f"SIG{name}"] for name in ENDS])
 def test_a_signal_in_a_script_stops_what_it_moved(shop, number):
-    script = shop.process("run", shop.script(RUNAWAY), "--on", shop.url)
+    script = shop.start("run", shop.script(RUNAWAY), "--on", shop.url)
     assert script.stdout.readline() == "1234\n"
     assert shop.standing()[1] != "0\n0\n"
     script.send_signal(number)
@@ -140,9 +82,8 @@ def test_a_signal_in_a_script_stops_what_it_moved(shop, number):
 
 @pytest.mark.skipif(sys.platform != "linux", reason="reads the signal masks of threads in /proc")
 def test_a_log_swallows_no_signal(shop):
-    (shop.folder / "conf").mkdir()
-    (shop.folder / "conf" / "multidrop.toml").write_text("[log]\nalways = true\n")
-    script = shop.process("run", shop.script(RUNAWAY), "--on", shop.url)
+    shop.settings("[log]\nalways = true\n")
+    script = shop.start("run", shop.script(RUNAWAY), "--on", shop.url)
     assert script.stdout.readline() == "1234\n"
     threads = Path(f"/proc/{script.pid}/task")
     masks = [(each / "status").read_text().partition("SigBlk:\t")[2][:16] for each in threads.iterdir()]
@@ -175,7 +116,7 @@ def test_the_stop_key_on_the_terminal_of_a_script_is_exit_4(shop):
 
 def test_a_signal_before_anything_was_sent_stops_nothing(shop):
     shop.turn()
-    waiting = shop.process("shell", shop.url, stdin=subprocess.PIPE)
+    waiting = shop.start("shell", shop.url)
     waiting.stdin.write("/drives\n")
     waiting.stdin.flush()
     assert waiting.stdout.readline().startswith("* a")
@@ -186,11 +127,8 @@ def test_a_signal_before_anything_was_sent_stops_nothing(shop):
 
 
 def test_a_macro_that_is_interrupted_stops_what_it_moved(shop):
-    folder = shop.folder / "conf" / "macros"
-    folder.mkdir(parents=True)
-    steps = "".join(f"[[step]]\nafter = 0.0\nline = '''{line}'''\n" for line in RUNAWAY.splitlines())
-    (folder / "go.toml").write_text(f'name = "go"\n{steps}')
-    playing = shop.process("macro", "play", "go", "--on", shop.url)
+    shop.macro("go", *RUNAWAY.splitlines())
+    playing = shop.start("macro", "play", "go", "--on", shop.url)
     assert playing.stdout.readline() == "1234\n"
     playing.send_signal(signal.SIGTERM)
     playing.communicate(timeout=PATIENCE)
@@ -200,7 +138,7 @@ def test_a_macro_that_is_interrupted_stops_what_it_moved(shop):
 
 def test_a_plot_runs_until_it_is_interrupted_and_its_file_is_whole(shop):
     pytest.importorskip("rerun")
-    plotting = shop.process("plot", shop.url, "--drive", "a", "--to", "run.rrd")
+    plotting = shop.start("plot", shop.url, "--drive", "a", "--to", "run.rrd")
     assert (
         plotting.stderr.readline() == "plotting to run.rrd, at most 50 samples a second of each drive; Ctrl+C ends it\n"
     )
@@ -213,7 +151,7 @@ def test_a_plot_runs_until_it_is_interrupted_and_its_file_is_whole(shop):
 def test_a_script_plots_what_it_moves(shop):
     pytest.importorskip("rerun")
     file = shop.script("/plot run.rrd\n@a MR 1000\n/wait stopped\n/plot\n/plot off\n@a PR P\n")
-    done = shop.process("run", file, "--on", shop.url)
+    done = shop.start("run", file, "--on", shop.url)
     assert (
         done.communicate(timeout=PATIENCE)
         == ("plotting to run.rrd, at most 50 samples a second of each drive\n1000\n", "")
@@ -224,11 +162,11 @@ def test_a_script_plots_what_it_moves(shop):
 
 def test_a_port_that_another_process_has_is_one_line_and_exit_3(shop):
     port = f"{shop.folder / 'press.tty'}?drives=a"
-    first = shop.process("shell", port, stdin=subprocess.PIPE)
+    first = shop.start("shell", port)
     first.stdin.write("PR P\n")
     first.stdin.flush()
     assert first.stdout.readline() == "0\n"
-    code, out, err = shop.done("send", port, "PR P")
+    code, out, err = shop.run("send", port, "PR P")
     assert (code, out) == (3, "")
     assert "in use" in err and err.count("\n") == 1
     first.communicate(timeout=PATIENCE)
@@ -236,7 +174,7 @@ def test_a_port_that_another_process_has_is_one_line_and_exit_3(shop):
 
 
 def test_a_line_that_is_unplugged_in_a_wait_is_exit_3_and_its_drives_are_named(shop):
-    script = shop.process("run", shop.script('SL 1000\nPR "moves"\n/wait stopped\n'), "--on", shop.url)
+    script = shop.start("run", shop.script('SL 1000\nPR "moves"\n/wait stopped\n'), "--on", shop.url)
     assert script.stdout.readline() == "moves\n"
     shop.sim.say("/sim unplug press")
     _, err = script.communicate(timeout=PATIENCE)
@@ -251,7 +189,7 @@ def test_a_line_that_is_unplugged_in_a_wait_is_exit_3_and_its_drives_are_named(s
 
 def test_a_refusal_in_a_script_stops_what_it_started_says_so_and_keeps_its_exit_code(shop):
     assert shop.send("@b PR P", "@a SL 100000") == (0, "0\n", "")
-    script = shop.process("run", shop.script("@b SL 5000\n@b XX\n"), "--on", shop.url)
+    script = shop.start("run", shop.script("@b SL 5000\n@b XX\n"), "--on", shop.url)
     _, err = script.communicate(timeout=PATIENCE)
     others = "stopped as well, because the stop of their line has no name: a"
     assert script.returncode == 1
@@ -269,7 +207,7 @@ def test_a_send_that_succeeds_leaves_its_drive_moving_and_one_that_fails_does_no
 
 def test_an_interrupted_reader_stops_nothing(shop):
     shop.turn()
-    script = shop.process("run", shop.script("@a PR V\n/sleep 100\n"), "--on", shop.url)
+    script = shop.start("run", shop.script("@a PR V\n/sleep 100\n"), "--on", shop.url)
     assert script.stdout.readline() == "100000\n"
     script.send_signal(signal.SIGINT)
     _, err = script.communicate(timeout=PATIENCE)
@@ -278,15 +216,13 @@ def test_an_interrupted_reader_stops_nothing(shop):
 
 
 def test_a_piped_shell_that_is_refused_stops_what_it_started(shop):
-    piped = shop.process("shell", shop.url, stdin=subprocess.PIPE)
+    piped = shop.start("shell", shop.url)
     _, err = piped.communicate("@b SL 5000\n@b XX\n", timeout=PATIENCE)
     assert piped.returncode == 1 and err.startswith("stopped b: all 2 read velocity 0\n")
     assert shop.standing() == (0, "0\n0\n", "")
 
 
 def test_a_saved_connection_is_opened_by_its_name_and_a_script_takes_values(shop):
-    (shop.folder / "conf").mkdir()
-    text = f'[connections.press]\nurl = "{shop.url}"\nnames = {{ b = "gantry" }}\n'
-    (shop.folder / "conf" / "multidrop.toml").write_text(text)
+    shop.settings(f'[connections.press]\nurl = "{shop.url}"\nnames = {{ b = "gantry" }}\n')
     file = shop.script("@gantry MR {STEPS}  # there\n/wait stopped\n@gantry PR P\n")
-    assert shop.done("run", file, "--on", "press", "--set", "STEPS=-700") == (0, "-700\n", "")
+    assert shop.run("run", file, "--on", "press", "--set", "STEPS=-700") == (0, "-700\n", "")

@@ -14,7 +14,8 @@ from multidrop.shell.scripts.executor import run_script
 from multidrop.shell.scripts.reading import read_script
 from multidrop.shell.streams.stdout import exit_code, report
 from tests.support.cell_session import CellSession, bus, party, pmx
-from tests.support.virtual import in_virtual_time
+
+pytestmark = pytest.mark.virtual
 
 FLOOR = (bus("press", party("a"), party("b", VM=700000), baud=0), bus("stages", pmx("00"), baud=0))
 
@@ -56,7 +57,6 @@ class Shop(CellSession):
         ("/repeat 5\n/print 1\n/quit\n/end", ["1"]),
     ],
 )
-@in_virtual_time
 async def test_blocks_and_values(text, printed, tmp_path):
     async with Shop(tmp_path) as shop:
         await shop.run(text, COUNT="4")
@@ -75,7 +75,6 @@ async def test_blocks_and_values(text, printed, tmp_path):
         "-5 % 3 == 1",
     ],
 )
-@in_virtual_time
 async def test_a_check_that_holds(line, tmp_path):
     async with Shop(tmp_path) as shop:
         await shop.run(f"/set goal 700000\n/assert {line}\n")
@@ -92,7 +91,6 @@ async def test_a_check_that_holds(line, tmp_path):
         ('/expect "READY" 2.5', 's.txt:2: /expect "READY" 2.5: wanted "READY" within 2.5 s, seen "going READ"'),
     ],
 )
-@in_virtual_time
 async def test_a_check_that_fails_names_place_wanted_and_seen_and_stops_what_moves(line, said, tmp_path):
     async with Shop(tmp_path) as shop:
         await shop.session.run("@b SL 1000")  # an operator's
@@ -103,7 +101,6 @@ async def test_a_check_that_fails_names_place_wanted_and_seen_and_stops_what_mov
         assert shop.moving() == {"press:b"}
 
 
-@in_virtual_time
 async def test_an_expectation_sees_what_comes_by_itself_and_not_the_scripts_own_words(tmp_path):
     async with Shop(tmp_path) as shop:
         program = '@a PG 100\n@a LB G1\n@a H 1500\n@a PR "READY"\n@a E\n@a PG\n'
@@ -129,21 +126,18 @@ async def test_an_expectation_sees_what_comes_by_itself_and_not_the_scripts_own_
         ("/set n 999999999\n/repeat 9\n/set n n * n\n/end", "s.txt:3: 999999999 * 999999999 is beyond 1e+15"),
     ],
 )
-@in_virtual_time
 async def test_what_only_shows_when_it_is_executed_sends_nothing(text, said, tmp_path):
     async with Shop(tmp_path) as shop:
         assert (await shop.failure(text, Diagnostic)).startswith(said)
         assert not shop.moving()
 
 
-@in_virtual_time
 async def test_a_drive_in_program_mode_is_not_asked(tmp_path):
     async with Shop(tmp_path) as shop:
         said = await shop.failure("@a PG 100\n/assert @a P == 0")
         assert "s.txt:2: press:a is in program mode" in said
 
 
-@in_virtual_time
 async def test_a_called_file_has_the_values_given_to_it_and_those_of_the_command_line(tmp_path):
     async with Shop(tmp_path) as shop:
         called = tmp_path / "c.txt"
@@ -153,7 +147,6 @@ async def test_a_called_file_has_the_values_given_to_it_and_those_of_the_command
         assert shop.printed() == ["a b *"]
 
 
-@in_virtual_time
 async def test_a_called_macro_is_played(tmp_path):
     async with Shop(tmp_path) as shop:
         shop.session.macros.save(Macro("say", (Step(0.0, 'PR "{word}"'),)))
@@ -162,7 +155,6 @@ async def test_a_called_macro_is_played(tmp_path):
         assert "no line takes the value wrod" in await shop.failure("/call say wrod=5", Diagnostic)
 
 
-@in_virtual_time
 async def test_a_stop_ends_a_loop_that_sends_nothing(tmp_path):
     async with Shop(tmp_path) as shop:
         running = asyncio.create_task(shop.session.tasks.run(shop.run("/repeat 1000000000\n/set x 1\n/end")))
@@ -176,7 +168,6 @@ async def test_a_stop_ends_a_loop_that_sends_nothing(tmp_path):
             await shop.run("/assert P == 0")
 
 
-@in_virtual_time
 async def test_the_reports_agree(tmp_path, capsys):
     text = '@a PR "é<\\x1b"\n/set n 1\n/assert @b P != "\uffff"\n@a XX\n'
     async with Shop(tmp_path) as shop:

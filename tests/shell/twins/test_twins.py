@@ -48,7 +48,7 @@ async def test_a_program_whose_lines_take_longer_is_kept_in_step(tmp_path: Path)
     async with CellSession(tmp_path, bus("press", drive, baud=0)) as cell:
         await run(cell, "/twin on", "EX G1", "/sleep 13")
         assert of(cell, Diverged) == []
-        cell.device("press:a").execute("VM=150000", cell._floor().now())
+        cell.device("press:a").execute("VM=150000", cell.floor.now())
         await asyncio.sleep(3)
         assert of(cell, Diverged)[0].causes[0] == "settings changed"
 
@@ -79,7 +79,7 @@ async def test_the_cause_is_named_first(
 async def test_another_acceleration_is_named_a_setting(tmp_path: Path) -> None:
     async with CellSession(tmp_path, bus("press", party("a", VM=200000, A=400000))) as cell:
         await run(cell, "/twin on")
-        cell.device("press:a").execute("A=150000", cell._floor().now())
+        cell.device("press:a").execute("A=150000", cell.floor.now())
         await run(cell, "MR 200000", "/sleep 3")
         diverged, *more = of(cell, Diverged)
         assert diverged.causes[0] == "settings changed"

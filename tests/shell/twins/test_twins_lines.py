@@ -45,10 +45,10 @@ async def test_the_start_reads_what_a_snapshot_reads(tmp_path: Path) -> None:
 async def test_a_line_that_the_drive_refused_does_not_reach_its_twin(tmp_path: Path) -> None:
     async with CellSession(tmp_path, bus("press", party("a", VM=200000), baud=0)) as cell:
         await run(cell, "/twin on")
-        cell.device("press:a").execute("VI=90000", cell._floor().now())
+        cell.device("press:a").execute("VI=90000", cell.floor.now())
         with pytest.raises(Refused):
             await cell.session.run("VM=50000")
-        cell.device("press:a").execute("VI=1000", cell._floor().now())
+        cell.device("press:a").execute("VI=1000", cell.floor.now())
         await run(cell, "MR 200000", "/sleep 3")
         assert {each.difference for each in of(cell, Predicted)} <= {-1, 0, 1}
 
@@ -68,7 +68,7 @@ async def test_a_line_that_may_be_lost_does_not_count_and_is_the_first_cause(tmp
         cell.world("power a on")
         await asyncio.sleep(4)
         assert of(cell, Predicted)[-1].position == 0
-        cell.device("press:a").execute("MR 51200", cell._floor().now())
+        cell.device("press:a").execute("MR 51200", cell.floor.now())
         await asyncio.sleep(3)
         (diverged,) = of(cell, Diverged)
         assert diverged.causes[0] == "it is not known whether 'MR 51200' was executed"
@@ -77,7 +77,7 @@ async def test_a_line_that_may_be_lost_does_not_count_and_is_the_first_cause(tmp
 async def test_a_command_from_elsewhere_is_named_first(tmp_path: Path) -> None:
     async with CellSession(tmp_path, bus("press", party("a"))) as cell:
         await run(cell, "/twin on")
-        cell.device("press:a").execute("SL 20000", cell._floor().now())
+        cell.device("press:a").execute("SL 20000", cell.floor.now())
         await asyncio.sleep(1)
         (diverged,) = of(cell, Diverged)
         assert diverged.causes[0] == "a command not seen here"
@@ -122,7 +122,7 @@ async def test_a_line_that_comes_back_is_read_again(tmp_path: Path) -> None:
         await asyncio.sleep(1)
         assert len(of(cell, TwinEnded)) == 1
         assert not cell.session.twins.running(cell.session.buses["press"])
-        cell.device("press:a").execute("MR 400", cell._floor().now())
+        cell.device("press:a").execute("MR 400", cell.floor.now())
         cell.world("plug press")
         cell.events.clear()
         await asyncio.sleep(7)
@@ -179,7 +179,7 @@ async def test_a_wrong_use_is_one_line(tmp_path: Path) -> None:
 async def test_the_list_of_twins_names_the_causes_of_a_difference_until_it_is_over(tmp_path: Path) -> None:
     async with CellSession(tmp_path, bus("press", party("a"), party("b"))) as cell:
         await run(cell, "/twin on")
-        cell.device("press:a").execute("SL 20000", cell._floor().now())
+        cell.device("press:a").execute("SL 20000", cell.floor.now())
         await asyncio.sleep(1)
         await run(cell, "/twin")
         apart, agrees, _ = cell.printed()

@@ -1,0 +1,102 @@
+"""At rest, by the rule of each family: one false zero between readings of motion ends no wait and confirms no rest."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Iterator
+from dataclasses import replace
+from typing import Any
+
+import pytest
+
+from multidrop.dialects import Motion, Priority
+from multidrop.dialects.families import FAMILIES
+from multidrop.drives.drive import Drive
+from multidrop.drives.events import Sample
+from multidrop.drives.stopping import Fate
+from multidrop.shell.events import OnBus
+from multidrop.shell.waits import standings
+from tests.support.cell_session import CellSession, bus, party
+
+pytestmark = pytest.mark.virtual
+
+ENDS = 5.0
+"""When the drive comes to rest, s."""
+SPEED = 5000
+FAMILY_NAMES = ["mcode", "modbus", "pmx", "tmcl"]
+MODULE = 'personality = "TMCM"'
+
+
+class Moving:
+    """A drive of any family that moves until ENDS; its readings of velocity by these numbers are a false zero."""
+
+    def __init__(self, monkeypatch: pytest.MonkeyPatch, family: str, *false: int) -> None:
+        self.false = set(false)
+        self.read = 0
+        own = replace(FAMILIES[family], motion=self._motion, moving=self._moving, busy=self._busy)
+        monkeypatch.setattr(Drive, "family", property(lambda drive: own))
+
+    def _velocity(self) -> int:
+        self.read += 1
+        return SPEED if asyncio.get_running_loop().time() < ENDS and self.read not in self.false else 0
+
+    def _motion(self, state: Any, priority: Priority) -> Iterator[Any]:
+        yield replace(state.codec.request(state.address, "PR V"), priority=priority)
+        return (Motion(int(SPEED * min(asyncio.get_running_loop().time(), ENDS)), self._velocity()),)
+
+    def _moving(self, state: Any) -> Iterator[Any]:
+        yield state.codec.request(state.address, "PR MV")
+        return self._velocity() != 0
+
+    def _busy(self, state: Any) -> Iterator[Any]:
+        yield state.codec.request(state.address, "PR BY")
+        return False
+
+
+@pytest.mark.parametrize("family", FAMILY_NAMES)
+@pytest.mark.parametrize("false", [1, 2, 3])
+async def test_one_false_zero_ends_no_wait(family, false, tmp_path, monkeypatch):
+    async with CellSession(tmp_path, bus("press", party("a"))) as shop:
+        Moving(monkeypatch, family, false)
+        await shop.session.run("/wait stopped 20")
+        assert asyncio.get_running_loop().time() >= ENDS
+
+
+@pytest.mark.parametrize("family", FAMILY_NAMES)
+@pytest.mark.parametrize("false", [1, 2, 3])
+async def test_one_false_zero_confirms_no_stop_and_no_rest(family, false, tmp_path, monkeypatch):
+    async with CellSession(tmp_path, bus("press", party("a"))) as shop:
+        drive, now = shop.session.selected, asyncio.get_running_loop().time
+        moving = Moving(monkeypatch, family, false)
+        bus_ = shop.session.buses["press"]
+        halt = bus_.stop()
+        while now() < ENDS:
+            assert halt.fate(drive) is not Fate.STANDING
+            await asyncio.sleep(0.03)
+        await asyncio.sleep(2.0)
+        assert halt.fate(drive) is Fate.STANDING
+        monkeypatch.setattr(f"{__name__}.ENDS", now() + 1.0)
+        moving.false = {moving.read + 1}
+        (found,) = await standings(shop.session, [drive])
+        assert "stands" not in found.text
+
+
+async def test_a_module_that_reads_velocity_0_in_motion_is_at_rest_in_one_place_only(tmp_path, monkeypatch):
+    async with CellSession(tmp_path, bus("slide", MODULE)) as shop:
+        module = shop.session.selected
+        motor = shop.device("slide:1").motor
+        read = motor.read
+        monkeypatch.setattr(motor, "read", lambda number, t: 0 if number == 3 else read(number, t))
+        await shop.session.run("MVP ABS, 0, 200000")
+        polling = shop.session.buses["slide"].telemetry.subscribe(("1",), 0.1)
+        await asyncio.sleep(2.0)
+        polling.close()
+        samples = [each.event for each in shop.events if isinstance(each, OnBus) and isinstance(each.event, Sample)]
+        assert len(samples) > 10 and all(each.velocity > 0 for each in samples[1:]), "rows say that it moves"
+        await asyncio.sleep(2.0)
+        (found,) = await standings(shop.session, [module])
+        assert found.text.startswith("1 reads velocity 0, but not twice at one position")
+        await shop.session.run("/wait stopped")
+        assert await module.send("GAP 1, 0") == ("200000",)
+        (found,) = await standings(shop.session, [module])
+        assert found.text == "1 stands at 200000"

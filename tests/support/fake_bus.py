@@ -1,0 +1,86 @@
+"""A bus that opens at once and notes stops, for tests of the order and the time in which several are opened."""
+
+import asyncio
+from dataclasses import dataclass, field
+
+from multidrop.dialects import Motion
+from multidrop.dialects.families import DEFAULT, FAMILIES
+from multidrop.dialects.mcode.host.codec import MCode
+from multidrop.dialects.mcode.host.state import MCodeState
+from multidrop.drives.stopping import Halt
+
+
+@dataclass(eq=False)
+class FakeDrive:
+    bus: "FakeBus"
+    address: str
+    label: str = ""
+    product: str = "LMDCM"
+    version: str = "6.002"
+    programming: bool = False
+    family: object = FAMILIES[DEFAULT]
+    state: object = field(default_factory=lambda: MCodeState(MCode()))
+
+    seen = running = None
+    commands = starting = 0
+    started_at = commanded_at = float("-inf")
+
+    @property
+    def link(self):
+        return self.bus
+
+    def starts(self, text):
+        return not text.startswith("PR")
+
+    async def send(self, text):
+        return ()
+
+    async def motion(self):
+        return (Motion(0, 0),)
+
+
+class FakeBus:
+    """A bus with drives that take every line."""
+
+    lost = away = loss = last_stop = None
+    stops, closed = 0, False
+
+    def __init__(self, name, addresses):
+        self.name = name
+        self.drives = {address: FakeDrive(self, address) for address in addresses}
+
+    @property
+    def link(self):
+        return self
+
+    @property
+    def all_drives(self):
+        return list(self.drives.values())
+
+    def watch(self, watcher):
+        return lambda: None
+
+    def start(self):
+        pass
+
+    async def identify(self, hints):
+        return self.all_drives
+
+    def at(self, address):
+        return self.drives[address]
+
+    def halt(self, only=None):
+        """Noted as the real one does it."""
+        self.stops += 1
+        drives = tuple(self.all_drives if only is None else only)
+        self.last_stop = Halt(self, asyncio.get_running_loop().time(), self.stops, only is None, drives, data=b"!")
+        return self.last_stop
+
+    def halted(self, halt):
+        pass
+
+    async def settled(self):
+        pass
+
+    async def close(self):
+        self.closed = True

@@ -1,0 +1,22 @@
+"""Rows of panels as text, and what a panel is drawn from, for tests without an app."""
+
+from __future__ import annotations
+
+from multidrop.shell.events import SessionEvent
+from multidrop.tui.panels.view import View, glances_of
+from multidrop.tui.screen_model import ScreenModel
+from multidrop.tui.widgets.lines import Row
+from tests.support.fake_session import FakeSession
+
+
+def plain(*rows: Row) -> str:
+    return "\n".join("".join(text for text, _ in row) for row in rows)
+
+
+def view(session: FakeSession, *events: SessionEvent, polling: bool = True) -> View:
+    """What the selected bus shows after these events."""
+    model = ScreenModel(lambda: session.selected_bus, lambda: session.buses)
+    for event in events:
+        model.take(event)
+    glances = glances_of(session, model, session.buses[session.selected_bus])
+    return View(session, model, glances, session.now(), polling)
