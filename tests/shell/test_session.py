@@ -136,7 +136,7 @@ async def test_with_nothing_open_a_line_says_how_to_open(tmp_path):
 
 
 async def test_a_drive_that_answers_where_none_was_known_is_known_from_then_on(press):
-    await press.session.close_bus("press")
+    await press.run("/close press")
     [line] = await press.session.open(f"{press.url}?drives=a,b")
     press.world("/sim power c off")
     with pytest.raises(NoAnswer):
@@ -149,7 +149,7 @@ async def test_a_drive_that_answers_where_none_was_known_is_known_from_then_on(p
 
 
 async def test_a_bus_that_cannot_be_identified_is_closed_again(press):
-    await press.session.close_bus("press")
+    await press.run("/close press")
     with pytest.raises(NoAnswer):
         await press.session.open(f"{press.url}?drives=q")
     assert press.session.buses == press.session.cells == {} and press.session.selected_bus == ""
