@@ -137,7 +137,7 @@ class Recorder:
         self._begun = ""
         self._recorded: list[Recorded] = []
         self.observed = Observed()
-        """What drives did since the recording began."""
+        """The actions of drives since the recording began."""
 
     def start(self, name: str, now: float, before: bytes | None = None, time: str = "") -> None:
         """Begin. `time`: the time of day, for the file.

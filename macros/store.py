@@ -59,7 +59,7 @@ class MacroStore:
         return _hiding(name, self.folders) if hides else ""
 
     def is_project(self, name: str) -> bool:
-        """Whether a macro is beside the project."""
+        """True for a macro beside the project."""
         return self.path(name).parent == self.project
 
     def _names_in(self, folder: Path) -> set[str]:
@@ -302,7 +302,7 @@ class Draft(NamedTuple):
     base: bytes
     """The macro's file when the copy was made."""
     remark: str = ""
-    """What a person must know before editing it."""
+    """A notice for the person before the edit."""
 
 
 def begin_draft(store: MacroStore, folder: Path, name: str) -> Draft:

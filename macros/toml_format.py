@@ -116,7 +116,7 @@ def _which(number: int) -> str:
 
 
 def _fits(value: object, kind: type | tuple[type, ...]) -> bool:
-    """Whether a TOML value has the type of a key; a whole number is a float, a boolean is neither."""
+    """True if a TOML value has the type of a key; a whole number is a float, a boolean is neither."""
     if isinstance(value, bool):
         return kind is bool
     if isinstance(value, int) and kind is float:
@@ -145,34 +145,29 @@ MARK = "\ufeff"
 
 
 def with_values(text: str, values: Mapping[str, str], where: str) -> str:
-    """Change several top-level text values, as `with_value` does."""
-    for key, value in values.items():
-        text = with_value(text, key, value, where)
-    return text
-
-
-def with_value(text: str, key: str, value: str, where: str) -> str:
-    """Change a top-level text value, or add it after the first one; return the new text.
+    """Change top-level text values, or add them after the first one; return the new text.
 
     Raises Diagnostic if that would change anything else in the file.
     """
     body = text.removeprefix(MARK)
-    before = tomllib.loads(body)
-    if key in before:
-        import tomlkit  # takes 30 ms to import, and only a change wants it
+    mark = text[: len(text) - len(body)]
+    for key, value in values.items():
+        before, line = tomllib.loads(body), f"{key} = {quoted(value)}"
+        if key in before:
+            import tomlkit  # takes 30 ms to import, and only a change wants it
 
-        document = tomlkit.parse(body)
-        document[key] = value
-        edited = tomlkit.dumps(document)
-    else:
-        edited = _added(body, f"{key} = {quoted(value)}")
-    try:
-        same = tomllib.loads(edited) == {**before, key: value}
-    except tomllib.TOMLDecodeError:
-        same = False
-    if not same:
-        raise Diagnostic(f"cannot set {key} in this file automatically", where, f"write {key} = {quoted(value)} in it")
-    return text[: len(text) - len(body)] + edited
+            document = tomlkit.parse(body)
+            document[key] = value
+            body = tomlkit.dumps(document)
+        else:
+            body = _added(body, line)
+        try:
+            same = tomllib.loads(body) == {**before, key: value}
+        except tomllib.TOMLDecodeError:
+            same = False
+        if not same:
+            raise Diagnostic(f"cannot set {key} in this file automatically", where, f"write {line} in it")
+    return mark + body
 
 
 def _added(text: str, line: str) -> str:

@@ -50,7 +50,7 @@ def url_without_secrets(url: str) -> str:
 
 
 def holds_password(url: str) -> bool:
-    """Whether a URL has a password, or may have one."""
+    """True if a URL has a password, or may have one."""
     return ":" in url.partition("://")[2].rpartition("@")[0] and url_without_secrets(url) != url
 
 
@@ -74,7 +74,7 @@ def _without_values(text: str) -> str:
 
 
 def _is_secret(key: str) -> bool:
-    """Whether a key names a secret, quoted, dotted or written with escapes."""
+    """True for a key that names a secret, quoted, dotted or written with escapes."""
     plain = _ESCAPE.sub(lambda found: chr(min(int("".join(filter(None, found.groups())), 16), 0x10FFFF)), key)
     return any(word in plain.lower() for word in _WORDS)
 
@@ -116,7 +116,7 @@ def _hide(part: Any, secret: bool) -> None:
 
 
 def _leaks(part: Any, secret: bool) -> bool:
-    """Whether a value that is a secret was not replaced."""
+    """True if a value that is a secret was not replaced."""
     if isinstance(part, dict):
         return any(_leaks(value, secret or _is_secret(key)) for key, value in part.items())
     if isinstance(part, list):

@@ -157,7 +157,7 @@ class Reconnections:
         self._say = say
         self._wanted = wanted
         self._ways: dict[str, tuple[Hints, Reopen, str]] = {}
-        """How each bus is opened again, and its port."""
+        """The hints, the way to open it again, and the port of each bus."""
         self._tasks: dict[str, asyncio.Task[None]] = {}
 
     @property
@@ -285,7 +285,7 @@ async def _motion(drive: Drive) -> str:
 
 
 def may_move(drive: Drive) -> bool:
-    """Whether the last that is known of a drive is that it moved, or that something was sent to start it."""
+    """True if a drive moved when it was last seen, or if something was sent since to start it."""
     seen = drive.seen
     if seen is None or drive.started_at > seen.at:
         return drive.started_at > float("-inf")

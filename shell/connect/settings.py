@@ -75,7 +75,7 @@ class Guarding:
     also: frozenset[str] = frozenset()
 
     def what(self, family: Family[Any], state: DriveState, text: str) -> str:
-        """What a line for a drive will do, if a person must agree to it; empty: it needs no yes."""
+        """The effect of a line for a drive, if a person must agree to it; empty: it needs no yes."""
         guards = family.guards
         if guards is None or state.programming:
             return ""
@@ -88,7 +88,7 @@ class Guarding:
 
 @dataclass(frozen=True)
 class LogSettings:
-    """How logs are kept; `size` is that of a part, bytes."""
+    """The keeping of logs; `size` is that of a part, bytes."""
 
     always: bool = False
     size: int = 16 * MEGABYTE
@@ -150,7 +150,7 @@ class Settings:
     look: Look = DEFAULT_LOOK
     mqtt: MqttSettings = MqttSettings()
     allowed: tuple[Path, ...] = ()
-    """Where paths of cell files may lead, too, in `simulator.allow`."""
+    """Further folders to which paths of cell files may lead, in `simulator.allow`."""
     clusters: tuple[str, ...] = ()
     """The addresses of the schedulers that may run code here, in `sweep.clusters`."""
 
@@ -335,11 +335,10 @@ def _log(found: Any, where: str) -> LogSettings:
 
 
 def _look(screen: Any, keys: Any, where: str) -> Look:
-    if not isinstance(screen, dict) or not isinstance(keys, dict):
-        table = "keys" if isinstance(screen, dict) else "screen"
-        raise Diagnostic(f"{table} is not a table", where, f"write [{table}]")
-    for key, value in screen.items():
-        _table({key: value}, "screen", (*CHOICES, "theme"), where, "")
+    table = _table(screen, "screen", (*CHOICES, "theme"), where, "write [screen]")
+    if not isinstance(keys, dict):
+        raise Diagnostic("keys is not a table", where, "write [keys]")
+    for key, value in table.items():
         if not isinstance(value, str):
             raise Diagnostic(f"screen.{key} is not text", where)
         if key in CHOICES and value not in CHOICES[key]:
@@ -347,7 +346,7 @@ def _look(screen: Any, keys: Any, where: str) -> Look:
     for name, key in keys.items():
         if not isinstance(key, str):
             raise Diagnostic(f"keys.{name} is not text", where, 'write a key as in "^T" or "F9"')
-    return Look(**screen, keys=keys, where=where)
+    return Look(**table, keys=keys, where=where)
 
 
 def _mqtt(found: Any, where: str) -> MqttSettings:

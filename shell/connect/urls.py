@@ -37,7 +37,7 @@ _WORD = r"[A-Za-z0-9_.][A-Za-z0-9_.-]*"
 
 @dataclass(frozen=True)
 class Connection:
-    """Where drives are, and what the user states of them."""
+    """The place of drives, and the settings that the user states of them."""
 
     scheme: str
     """One of `URL_FORMS`."""

@@ -42,7 +42,7 @@ REPEATED = 0.2
 """The time in which a stop is repeated once the line is quiet, s."""
 UNLISTED = "It was not confirmed for drives that have not replied"
 SO_FAR = "nothing more was sent"
-"""What a refused question says in the middle of a search."""
+"""The end of the message of a refused question in the middle of a search."""
 HAZARD = (
     "a drive that receives another baud rate or language may take it for an error, and the OE subroutine of its "
     "program may then run and move it"

@@ -60,7 +60,7 @@ class SettingsFile:
 
 
 def identity(state: DriveState, language: str) -> dict[str, str]:
-    """What a drive reports of itself, for its file, and the language of its settings."""
+    """The identity that a drive reports, for its file, and the language of its settings."""
     known = {
         "language": language,
         "product": state.product,

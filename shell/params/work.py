@@ -44,7 +44,7 @@ Work = Callable[["Drive"], Awaitable[None]]
 Difference = tuple[str, Value | None, Value | None]
 """A name, the value here, and the value there; None where one side has none."""
 OWN_NAME = frozenset({"DN"})
-"""What two drives on one line never share."""
+"""The setting that two drives on one line never share."""
 
 
 def targets(workspace: Workspace, target: str, having: str = "parameters") -> list[Drive]:
@@ -68,7 +68,7 @@ def targets(workspace: Workspace, target: str, having: str = "parameters") -> li
 
 
 def is_several(target: str) -> bool:
-    """Whether a target is several drives, so that a file's name is a folder's."""
+    """True for a target of several drives, for which a file's name is a folder's."""
     return "," in target or split_target(target)[1] in ALL
 
 
@@ -227,7 +227,7 @@ CLOSE = 0.5
 
 @dataclass(frozen=True)
 class Options:
-    """What a restore may do."""
+    """The permissions and options of a restore, and of an apply."""
 
     named: frozenset[str] = frozenset()
     """Settings that are only written when they are named."""

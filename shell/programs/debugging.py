@@ -54,7 +54,7 @@ class Debugger:
         """The program was seen to wait, and nothing was sent that lets it go on."""
         self._last: Row | None = None
         self._last_at = float("-inf")
-        """When the last line was executed, s of the session's clock."""
+        """The time of the last executed line, s of the session's clock."""
         self._free_at = float("-inf")
         """Until then a timed H holds the program."""
         self.break_point = ""
@@ -151,9 +151,17 @@ class Debugger:
             if not look.runs:
                 return self.say(f"the program has ended{await self._changed()}")
             if look.paused:
-                return await self._stands(look.address)
-            if (address := await self._broken()) is not None:
-                return await self._stands(address)
+                return await self._show_waiting(look.address)
+            quiet = self._session.now() - max(self._last_at, self._free_at)
+            if not self.break_point or self._last is None or quiet < QUIET:
+                continue  # a quiet trace without a hold may wait at its break point
+            procedure = self._debugging.broken(self._drive.state, self._listing.rows, self._last, self.break_point)
+            address: int | None = await self._run(procedure)
+            if address is not None:
+                return await self._show_waiting(address)
+            if LONG_QUIET <= quiet < LONG_QUIET + 2 * PERIOD:
+                where = f"it holds, or waits at {self.break_point}"
+                self.say(f"no line since '{self._last.text}': {where}; /break now makes sure")
 
     async def _look(self) -> Look:
         look: Look = await self._run(self._debugging.look(self._drive.state, self._place))
@@ -163,21 +171,8 @@ class Debugger:
             self._sight.seen(None)
         return look
 
-    async def _broken(self) -> int | None:
-        """The address of the break point, if the program waits there: the trace is quiet, and no hold is the reason."""
-        quiet = self._session.now() - max(self._last_at, self._free_at)
-        if not self.break_point or self._last is None or quiet < QUIET:
-            return None
-        procedure = self._debugging.broken(self._drive.state, self._listing.rows, self._last, self.break_point)
-        address: int | None = await self._run(procedure)
-        if address is None and LONG_QUIET <= quiet < LONG_QUIET + 2 * PERIOD:
-            self.say(
-                f"no line since '{self._last.text}': it holds, or waits at {self.break_point}; /break now makes sure"
-            )
-        return address
-
-    async def _stands(self, address: int | None) -> None:
-        """Show where the program waits: the listing around the line that comes next, and the watched values."""
+    async def _show_waiting(self, address: int | None) -> None:
+        """Show the place of a program that waits: the listing around its next line, and the watched values."""
         self._waits = True
         for row in self._listing.around(address):
             self._session.output(row)
@@ -220,7 +215,7 @@ class Debugger:
         await self._read_listing()
         await self._run(self._debugging.break_now(self._drive.state, self._place))
         self._last, self._free_at = MAYBE_HELD, float("-inf")
-        await self._stands((await self._look()).address)
+        await self._show_waiting((await self._look()).address)
 
     # Watched variables
 

@@ -45,7 +45,7 @@ class EditedFile:
 
     @property
     def new(self) -> bool:
-        """Whether the file did not exist when it was last looked at."""
+        """True if the file did not exist when it was last read or written."""
         return self._data is None
 
     def save(self, text: str, over: bool = False) -> None:

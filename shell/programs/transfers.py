@@ -43,7 +43,7 @@ MOST = 20
 
 @dataclass(frozen=True)
 class Wanted:
-    """What a download does beside sending the file."""
+    """The options of a download."""
 
     verify: bool = True
     save: bool = False

@@ -76,7 +76,7 @@ def _marks(state: Path, port: str) -> Store:
 
 
 def _runs(pid: int) -> bool:
-    """Whether a process runs, as far as the system shows."""
+    """True if a process runs, as far as the system shows."""
     if sys.platform == "win32":
         return False
     try:

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from multidrop.dialects.errors import Diagnostic
 from multidrop.macros import Macro, MacroStore, Step, format_macro, parse_macro
 from multidrop.macros.store import listed
-from multidrop.macros.toml_format import with_value
+from multidrop.macros.toml_format import with_values
 
 SHUTTLE = Macro("shuttle", (Step(0.0, "@b EX Ga"), Step(1.25, 'PR "x \\ y"')), key="F3", note="to and fro")
 GOOD = 'name = "a"\n[[step]]\nafter = 0\nline = "MR 1"\n'
@@ -303,7 +303,7 @@ def test_remarks_anywhere_survive_a_change_of_the_key(remark: str, note: str) ->
         parse_macro(text)
     except Diagnostic:
         return  # a control character within a remark
-    assert with_value(text, "key", "F12", "x") == text.replace('key = "F2"', 'key = "F12"')
+    assert with_values(text, {"key": "F12"}, "x") == text.replace('key = "F2"', 'key = "F12"')
 
 
 def test_a_file_keeps_its_mode_and_a_linked_one_too(store: MacroStore, tmp_path: Path) -> None:
