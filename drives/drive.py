@@ -143,6 +143,7 @@ class Drive:
         self.commands = 0
         """Number of requests sent to it that may do more than ask."""
         self.link: Link = conversations.link
+        self.family: Family[Any] = FAMILIES[state.codec.family]
         self._conversations = conversations
         self._neighbours = neighbours
         self._judged = Judged()
@@ -156,10 +157,6 @@ class Drive:
     def codec(self) -> Codec:
         """Its language, as it is set."""
         return self.state.codec
-
-    @property
-    def family(self) -> Family[Any]:
-        return FAMILIES[self.state.codec.family]
 
     @property
     def programs(self) -> Programs[Any]:

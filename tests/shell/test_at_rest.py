@@ -34,7 +34,7 @@ class Moving:
         self.false = set(false)
         self.read = 0
         own = replace(FAMILIES[family], motion=self._motion, moving=self._moving, busy=self._busy)
-        monkeypatch.setattr(Drive, "family", property(lambda drive: own))
+        monkeypatch.setattr(Drive, "family", property(lambda drive: own, lambda drive, found: None), raising=False)
 
     def _velocity(self) -> int:
         self.read += 1

@@ -6,7 +6,7 @@ from dataclasses import replace
 import pytest
 
 from multidrop.dialects import Motion, Stopped
-from multidrop.drives.drive import Drive, confirmed_motion
+from multidrop.drives.drive import confirmed_motion
 from multidrop.drives.stopping import Fate
 from multidrop.shell import stop_report
 from multidrop.shell.automation import outcome
@@ -213,7 +213,7 @@ async def test_a_drive_that_slows_down_is_waited_for_and_one_that_does_not_is_st
             return (Motion(0, next(left, 0)),)
 
         family = replace(shop.session.selected.family, motion=motion)
-        monkeypatch.setattr(Drive, "family", property(lambda drive: family))
+        monkeypatch.setattr(shop.session.selected, "family", family)
         shop.session.stop()
         await asyncio.sleep(10.0)
         assert [text.removeprefix("press: ") for text in shop.told()[1:]] == said
