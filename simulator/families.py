@@ -51,5 +51,4 @@ def snapshots_of(family: Family) -> Snapshots:
 
 
 def family_of(personality: str) -> Family:
-    """Find the family of a personality."""
     return BY_PERSONALITY[personality]

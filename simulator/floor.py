@@ -32,7 +32,6 @@ class Placed:
 
     @property
     def device(self) -> Device:
-        """The simulated drive itself."""
         return self.unit.device
 
     @property
@@ -130,10 +129,6 @@ class Floor:
         while True:
             yield rng.uniform(low, high) if high else 0.0
 
-    def find(self, drive: str, where: str) -> Placed:
-        """Find a drive by `b` or `press:b`. Raises Diagnostic."""
-        return self.place(drive, where)[0]
-
     def place(self, drive: str, where: str) -> tuple[Placed, World]:
         """Find a drive and the surroundings of its axis; `00.y` names an axis. Raises Diagnostic."""
         bus, _, name = drive.rpartition(":")
@@ -178,6 +173,12 @@ def _number(text: str, allowed: Sequence[int], what: str, where: str) -> int:
     return number
 
 
+def _on(text: str, where: str) -> bool:
+    if text not in ("on", "off"):
+        raise Diagnostic(f'no state "{text}"', where, "valid: on, off")
+    return text == "on"
+
+
 def _input(floor: Floor, words: list[str], now: float) -> None:
     placed, world = floor.place(words[0], "/sim input")
     if not placed.unit.inputs:
@@ -194,7 +195,7 @@ def _analog(floor: Floor, words: list[str], now: float) -> None:
     placed, world = floor.place(words[0], "/sim analog")
     counts = _number(words[1], range(placed.unit.counts + 1), "analog value", "/sim analog")
     placed.device.advance(now)
-    world.set_analog(counts, now)
+    world.set_input(0, counts, now)
     placed.device.advance(now)
 
 
@@ -209,30 +210,26 @@ def _push(floor: Floor, words: list[str], now: float) -> None:
 
 
 def _power(floor: Floor, words: list[str], now: float) -> None:
-    placed = floor.find(words[0], "/sim power")
-    if words[1] not in ("on", "off"):
-        raise Diagnostic(f'no state "{words[1]}"', "/sim power", "valid: on, off")
+    placed = floor.place(words[0], "/sim power")[0]
+    on = _on(words[1], "/sim power")
     placed.device.advance(now)
-    placed.device.power(words[1] == "on", now)
+    placed.device.power(on, now)
     floor.retune(placed.bus)
 
 
 def _supply(floor: Floor, words: list[str], now: float) -> None:
-    placed = floor.find(words[0], "/sim supply")
+    placed = floor.place(words[0], "/sim supply")[0]
     if placed.unit.single_supply:
         what = f'"{words[0]}" has one supply only'
         raise Diagnostic(what, "/sim supply", f"/sim power {words[0]} {words[1]} switches it")
-    if words[1] not in ("on", "off"):
-        raise Diagnostic(f'no state "{words[1]}"', "/sim supply", "valid: on, off")
-    placed.device.supply(words[1] == "on", now)
+    placed.device.supply(_on(words[1], "/sim supply"), now)
 
 
 def _lock(floor: Floor, words: list[str], now: float) -> None:
     placed, world = floor.place(words[0], "/sim lock")
-    if words[1] not in ("on", "off"):
-        raise Diagnostic(f'no state "{words[1]}"', "/sim lock", "valid: on, off")
+    on = _on(words[1], "/sim lock")
     placed.device.advance(now)
-    world.hold(words[1] == "on")
+    world.hold(on)
     placed.device.world_changed()
     placed.device.advance(now)
 

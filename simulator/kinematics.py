@@ -66,7 +66,6 @@ class Segment(NamedTuple):
 
     @property
     def end(self) -> float:
-        """The time of its end."""
         return self.start + self.duration
 
     @property
@@ -77,7 +76,6 @@ class Segment(NamedTuple):
 
     @property
     def changing(self) -> bool:
-        """Whether the velocity changes in it."""
         return bool(self.acceleration or self.gain)
 
     def position_at(self, t: float) -> float:
@@ -90,7 +88,6 @@ class Segment(NamedTuple):
         return place + square * (x**3 / 6 if self.kind != SINUSOIDAL else x * x / 4 + (cos(pi * x) - 1) / (2 * pi * pi))
 
     def velocity_at(self, t: float) -> float:
-        """The velocity at such a time."""
         dt = t - self.start
         velocity = self.velocity + self.acceleration * dt
         if not self.gain:
@@ -99,7 +96,6 @@ class Segment(NamedTuple):
         return velocity + whole * (x * x / 2 if self.kind != SINUSOIDAL else x / 2 - sin(pi * x) / (2 * pi))
 
     def acceleration_at(self, t: float) -> float:
-        """The acceleration at such a time."""
         if not self.gain:
             return self.acceleration
         x = (t - self.start) / self.duration
@@ -185,7 +181,6 @@ class Profile(NamedTuple):
         return 0.0 if segment is None else segment.acceleration_at(t)
 
     def changing(self, t: float) -> bool:
-        """Whether it accelerates or decelerates."""
         segment = self._at(t)
         return segment is not None and segment.changing
 
@@ -280,7 +275,6 @@ class _Path:
             self._add(distance / speed, direction * speed, 0.0, direction * distance)
 
     def stop(self) -> Profile:
-        """Give the profile that ends here."""
         return Profile(self.start, self.t, self.origin, self.position, tuple(self.segments))
 
     def go_on(self, velocity: float) -> Profile:
@@ -301,7 +295,6 @@ class _Path:
 
 
 def halt(at: float, position: float) -> Profile:
-    """Make the profile of a motor at rest."""
     return Profile(at, at, position, position)
 
 

@@ -39,7 +39,6 @@ class Debugging:
 
     @property
     def wanted(self) -> bool:
-        """Whether there is anything to follow."""
         return bool(self.trace or self.breaks or self.watch)
 
 
@@ -54,7 +53,6 @@ class Event:
 
     @property
     def failed(self) -> bool:
-        """Whether the test has failed."""
         return False
 
     def fact(self, real: float) -> dict[str, Any]:
@@ -62,7 +60,6 @@ class Event:
         raise NotImplementedError
 
     def lines(self, file: str, real: float) -> Iterator[Line]:
-        """Yield the lines for a person about a run of this file."""
         raise NotImplementedError
 
 
@@ -225,7 +222,6 @@ class TraceFull(Event):
 
 
 def shown(values: Values) -> str:
-    """Values as a person reads them, with blanks before."""
     return "".join(f"   {name}={value}" for name, value in values.items())
 
 
@@ -308,6 +304,5 @@ class Recorder:
         return changed
 
     def take(self) -> list[Event]:
-        """Return the events since the last time."""
         taken, self._events = self._events, []
         return taken

@@ -389,7 +389,6 @@ class Wire:
         return completes and not any(port.urgent(data) for _, data, _ in self._coming for port in self._ports)
 
     def _arrive(self, received: bytes, at: float) -> None:
-        """Give bytes of the host to the drives."""
         self._merger.new_cause()
         for who, port in enumerate(self._ports):
             if len(received) == 1 and not port.hears(received[0]):
@@ -407,7 +406,6 @@ class Wire:
         return now < self._ports_due and not self._outdated
 
     def _earliest(self) -> float:
-        """The earliest deadline of all ports."""
         return min((at for port in self._ports if (at := port.deadline) is not None), default=inf)
 
     def _note_due(self, port: Port) -> None:

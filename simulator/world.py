@@ -76,14 +76,7 @@ class World:
         return self._since + self._schedule[self._done][0]
 
     def set_input(self, n: int, level: int | None, now: float) -> None:
-        """Set the level of input `n` from now on; None leaves it open."""
-        self._set_by_hand(n, level, now)
-
-    def set_analog(self, counts: int, now: float) -> None:
-        """Set the analog input from now on."""
-        self._set_by_hand(0, counts, now)
-
-    def _set_by_hand(self, n: int, level: int | None, now: float) -> None:
+        """Set the level of input `n` from now on; None leaves it open. Number 0 is the analog input, in counts."""
         self._catch_up(now)
         for levels in (self._levels, self._by_hand):
             if level is None:
@@ -106,7 +99,6 @@ class World:
         self.pushed += steps
 
     def hold(self, held: bool) -> None:
-        """Hold the rotor fast, or release it."""
         self._held = held
 
     def locked(self, now: float) -> bool:
@@ -122,20 +114,11 @@ class World:
         times = (self._since + time for lock in self._locks for time in lock)
         return min((time for time in times if time > now), default=inf)
 
-    def home_closed(self, position: float) -> bool:
-        """Whether the home switch is closed: between its edges; a switch with a single edge is closed below it."""
-        return self.switches(position)[0]
-
-    def limit_plus_closed(self, position: float) -> bool:
-        """Whether the plus limit switch is closed: from `limit_plus` on."""
-        return self.switches(position)[1]
-
-    def limit_minus_closed(self, position: float) -> bool:
-        """Whether the minus limit switch is closed: up to `limit_minus`."""
-        return self.switches(position)[2]
-
     def switches(self, position: float) -> tuple[bool, bool, bool]:
-        """Home, limit plus, limit minus: which are closed."""
+        """Home, limit plus, limit minus: which are closed.
+
+        Home is closed between its edges, with a single edge below it; plus from `limit_plus` on, minus up to its edge.
+        """
         home, plus, minus = self.home, self.limit_plus, self.limit_minus
         return (
             home is not None and home[0] <= position <= home[1],

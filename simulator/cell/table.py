@@ -75,7 +75,6 @@ class Table:
         return value
 
     def boolean(self, key: str, default: bool) -> bool:
-        """Read true or false."""
         value = self.values.get(key, default)
         if not isinstance(value, bool):
             raise self.wrong(key, f"must be true or false, not {shown(value)}")
@@ -111,7 +110,6 @@ class Table:
         return low, high
 
     def texts(self, key: str) -> tuple[str, ...]:
-        """Read a list of strings."""
         values = self._list(key)
         if not all(isinstance(each, str) for each in values):
             raise self.wrong(key, 'must be a list of texts, as in ["pty:", "tcp://127.0.0.1:0"]')
@@ -128,7 +126,6 @@ class Table:
         return low, high
 
     def rows(self, key: str, columns: Sequence[Column]) -> tuple[tuple[float, ...], ...]:
-        """Read a list of rows of numbers."""
         shape = f"[{', '.join(word for word, _, _ in columns)}]"
         rows = []
         for number, row in enumerate(self._list(key), 1):

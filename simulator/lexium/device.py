@@ -56,12 +56,12 @@ class MCodeDevice(EventLoop):
         core = Core(memory, world, period, lambda line: self.language.compile_stored(line))
         self.program, self.errors, self._mode = core.program, core.errors, core.mode
         motor = Motor(core)
-        self.output_lines = outputs = Outputs(core, motor)
+        outputs = Outputs(core, motor)
         motor.inputs.put_out = outputs.put_out
         self.nvm = Nvm(core, motor, outputs)
-        super().__init__(core, motor, Power(core, motor, outputs, self.nvm))
+        super().__init__(core, motor, outputs, Power(core, motor, outputs, self.nvm))
         serial = spec.identity.serial or f"0401{ord(spec.name[:1] or '!'):05d}"
-        self.language = Instructions(serial, core, motor, outputs, self)
+        self.language = Instructions(serial, self)
         _set_up(self, spec)
         self.power_unit.boot()
         # Let the counters begin where a snapshot found them: P first, then what P does not say. Raises Diagnostic.

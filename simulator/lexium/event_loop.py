@@ -18,6 +18,7 @@ from multidrop.dialects.mcode.manual.errors import ErrorNumber as E
 from multidrop.dialects.mcode.manual.grammar import Number
 from multidrop.simulator.lexium.motion.inputs import GO, JOG_MINUS, JOG_PLUS, PAUSE, RESET, SOFT_STOP
 from multidrop.simulator.lexium.motion.motor import Motor
+from multidrop.simulator.lexium.motion.outputs import Outputs
 from multidrop.simulator.lexium.power import Power
 from multidrop.simulator.lexium.state.errors import Event, Fault, nothing, when
 from multidrop.simulator.lexium.state.interpreter import Core
@@ -29,15 +30,16 @@ RESET_TIME = 0.01
 
 
 class EventLoop:
-    """The events of one drive. `calm`: the last line changed nothing that there is to look at.
+    """The events of one drive, and its parts, which the language is given.
 
-    `power_unit` is the supply, `bridges.powered` whether the drive has power and is up.
+    `calm`: the last line changed nothing that there is to look at. `power_unit` is the supply, `bridges.powered`
+    whether the drive has power and is up.
     """
 
-    def __init__(self, core: Core, motor: Motor, power: Power) -> None:
+    def __init__(self, core: Core, motor: Motor, outputs: Outputs, power: Power) -> None:
         self.core, self._timeline, self._printer, self.thread = core, core.timeline, core.printer, core.thread
         self.interpreter, self.motor, self._inputs, self.power_unit = core.interpreter, motor, motor.inputs, power
-        self.bridges = motor.bridges
+        self.output_lines, self.bridges = outputs, motor.bridges
         self.calm = False
         self._before: tuple[bool, bool, int] | None = None
         self._next: Event = inf, nothing

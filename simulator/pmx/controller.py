@@ -148,7 +148,6 @@ class PmxController:
         self.boot_outputs(now)
 
     def boot_outputs(self, now: float) -> None:
-        """Set the outputs to DOBOOT and EOBOOT."""
         self.outputs, self.enabled = self.settings["DOBOOT"], self.settings["EOBOOT"]
         self.look(now)
 

@@ -133,7 +133,6 @@ class PmxDevice:
         return self.programs.deadline if self.powered else None
 
     def advance(self, now: float) -> None:
-        """Let everything happen that is due up to `now`."""
         if self.powered:
             self.programs.advance(now)
 
@@ -200,7 +199,6 @@ class PmxPort(Port):
         return CR in data
 
     def receive(self, data: bytes, now: float) -> None:
-        """Take bytes whose last bit arrived at `now`."""
         if not self._device.powered:
             self._line.clear()
             return

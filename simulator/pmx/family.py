@@ -69,7 +69,6 @@ def _check_setting(table: Table, word: str, value: Setting) -> None:
 
 
 def describe(snapshot: Snapshot) -> DriveText:
-    """Make the table of a controller."""
     readings = [each for each in snapshot.readings.readings if each.name != "DN"]
     return DriveText(
         personality="PMX",
@@ -99,7 +98,6 @@ def wanted(spec: DriveSpec) -> dict[str, Value]:
 
 
 def program(spec: DriveSpec) -> StoredProgram:
-    """The program of a controller in a cell file."""
     if not spec.program:
         return StoredProgram()
     return StoredProgram(

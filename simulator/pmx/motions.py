@@ -106,7 +106,6 @@ class Stick:
         self.due: float | None = None
 
     def switch(self, on: bool, t: float) -> None:
-        """Begin or end sampling."""
         self.due = t if on else None
 
     def wanted(self, millivolts: int, t: float) -> float:
@@ -170,7 +169,6 @@ class Line:
         self._members: tuple[Axis, ...] = ()
 
     def begin(self, targets: tuple[int, int], t: float) -> None:
-        """Move both axes from rest to their targets."""
         axes, settings = self._axes, self._settings
         for axis in axes:
             check(axis, t)

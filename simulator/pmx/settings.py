@@ -138,7 +138,6 @@ class Settings:
         self.store()
 
     def __getitem__(self, name: str) -> int:
-        """A register's value."""
         return self.values[name]
 
     def __setitem__(self, name: str, value: int) -> None:

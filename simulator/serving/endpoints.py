@@ -119,7 +119,6 @@ class TcpServer(Listener):
             await server.wait_closed()
 
     def disconnected(self) -> None:
-        """Stop listening, and disconnect the clients."""
         if self._server is not None:
             self._server.close()
         self._server = None
@@ -127,7 +126,6 @@ class TcpServer(Listener):
             client.unplugged()
 
     def connectable(self) -> None:
-        """Listen again."""
         if self._opening is None or self._opening.done():
             self._opening = self._floor.loop.create_task(self._reopen())
 
@@ -168,15 +166,12 @@ class TcpClient(asyncio.BufferedProtocol, Client):
         return memoryview(self._buffer)[: max(1, self._queue.room)]
 
     def buffer_updated(self, nbytes: int) -> None:
-        """Take what the client has written."""
         self.take(bytes(self._buffer[:nbytes]))
 
     def take(self, data: bytes) -> None:
-        """Put it on the wire."""
         self._queue.write(data)
 
     def connection_lost(self, exc: Exception | None) -> None:
-        """End: the client has left."""
         self._transport = None
         self._clients.discard(self)
         self._queue.close()
@@ -188,7 +183,6 @@ class TcpClient(asyncio.BufferedProtocol, Client):
             self._transport.pause_reading()
 
     def resume(self) -> None:
-        """Read again."""
         if self._transport is not None and not self._transport.is_closing():
             self._transport.resume_reading()
 
@@ -197,7 +191,6 @@ class TcpClient(asyncio.BufferedProtocol, Client):
         return self._transport is not None and _ended(self._transport)
 
     def discard(self) -> None:
-        """End the connection with all that is unread."""
         if self._transport is not None:
             self._transport.abort()
 
@@ -214,7 +207,6 @@ class TcpClient(asyncio.BufferedProtocol, Client):
             self._transport.write(data)
 
     def unplugged(self) -> None:
-        """Close the connection."""
         if self._transport is not None:
             self._transport.close()
 
@@ -298,22 +290,18 @@ class UdpServer(asyncio.DatagramProtocol, Listener):
         self.dropped += 1
 
     def receive(self, data: bytes) -> None:
-        """Pass on what the wire sends."""
         if self._transport is None or cast(asyncio.Transport, self._transport).get_write_buffer_size() > BACKLOG:
             return
         for sender in self._senders:
             self._transport.sendto(data, sender)
 
     def unplugged(self) -> None:
-        """Forget the senders."""
         self._senders.clear()
 
     def disconnected(self) -> None:
-        """Forget the senders, as a drive does that boots."""
         self._senders.clear()
 
     def close(self) -> None:
-        """End the service."""
         if self.dropped:
             self._floor.notify(f"{self._bus}: {self.dropped} datagrams were dropped in all")
         self._detach()

@@ -183,11 +183,9 @@ class SimPipe(Transport, Listener):
         self._received_bytes += data
 
     def unplugged(self) -> None:
-        """Break the pipe, for good."""
         self._break("unplugged")
 
     def disconnected(self) -> None:
-        """Break the pipe, for good."""
         self._break("no power")
 
     def _break(self, why: str) -> None:

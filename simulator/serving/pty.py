@@ -61,7 +61,6 @@ class TtyWatch:
         return self._clients == 0 and self.clients() == 0
 
     def close(self) -> None:
-        """Stop watching."""
         if self.fd is not None:
             os.close(self.fd)
             self.fd = None
@@ -199,7 +198,6 @@ class PtyServer(Client):
         self._open()
 
     def close(self) -> None:
-        """End the service."""
         self._queue.close()
         self._detach()
         self._shut()
@@ -253,7 +251,6 @@ class PtyServer(Client):
             self._floor.loop.remove_reader(self._master)
 
     def resume(self) -> None:
-        """Read the client again."""
         if self._master >= 0:
             self._floor.loop.add_reader(self._master, self._readable)
 
@@ -279,7 +276,6 @@ class PtyServer(Client):
         return self._watch is not None and self._watch.deserted()
 
     def discard(self) -> None:
-        """Drop what is unread."""
         with contextlib.suppress(BlockingIOError):
             while self._master >= 0:
                 self._read(READ_SIZE)

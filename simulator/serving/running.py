@@ -105,7 +105,6 @@ class RunningFloor:
         return self.floor.wires[bus].baud / BITS_A_BYTE * self._speed
 
     def write(self, bus: str, data: bytes, source: int = 0, baud: int | None = None) -> None:
-        """Put a client's bytes on a wire."""
         if not self._closed:
             wire = self.floor.wires[bus]
             wire.receive(data, self.now(), baud, source)
@@ -135,7 +134,6 @@ class RunningFloor:
         return self.floor.wires[bus].retract(self.now(), source)
 
     def command(self, text: str) -> str | None:
-        """Carry out a `/sim` line. Raises Diagnostic."""
         if self._closed:
             return None
         self._turn()

@@ -7,7 +7,6 @@ as it was read from a unit becomes such a table, and a table the settings to wri
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
 
 from multidrop.dialects.family import Motion
 from multidrop.dialects.tmcl.manual.commands import AXIS, BAUDS, GLOBAL, Axis, Global, Parameter
@@ -18,7 +17,7 @@ from multidrop.simulator.cell.spec import Value as Setting
 from multidrop.simulator.cell.table import Folder, Table, quoted
 from multidrop.simulator.cell.writer import DriveText, Entry, remark
 from multidrop.simulator.family import Family, Place, Shadow, Snapshots, StoredProgram, Unit
-from multidrop.simulator.tmcl.module import VERSION, TmclModule
+from multidrop.simulator.tmcl.module import TmclModule
 from multidrop.simulator.tmcl.motor import STORED
 from multidrop.simulator.tmcl.port import TmclPort
 from multidrop.simulator.world import World
@@ -61,13 +60,6 @@ def read_drive(table: Table, folder: Folder) -> DriveSpec:
     )
 
 
-def split_settings(settings: Mapping[str, Setting]) -> tuple[dict[int, int], dict[int, int]]:
-    """Divide checked settings into axis parameters and global parameters, by number."""
-    axis = {int(name): int(value) for name, value in settings.items() if name.isdigit()}  # type: ignore[arg-type]
-    module = {int(name[1:]): int(value) for name, value in settings.items() if not name.isdigit()}  # type: ignore[arg-type]
-    return axis, module
-
-
 def _check_setting(table: Table, word: str, value: Setting) -> None:
     row = _parameter(word.upper())
     if row is None:
@@ -93,7 +85,6 @@ BAUD = f"{GLOBAL_PREFIX}{int(Global.BAUD)}"
 
 
 def describe(snapshot: Snapshot) -> DriveText:
-    """Make the table of a module."""
     readings = [each for each in snapshot.readings.readings if each.name != ADDRESS]
     return DriveText(
         personality="TMCM",
@@ -119,12 +110,8 @@ def wanted(spec: DriveSpec) -> dict[str, Value]:
 
 
 def build(spec: DriveSpec, place: Place) -> Unit:
-    """Build a module that is powered up."""
     world = World(spec.world)
-    axis, module = split_settings(spec.set)
-    own = spec.identity
-    position = own.counters.get("position", (0,))[0]
-    device = TmclModule(int(spec.name), world, axis, module, place.baud, own.version or VERSION, position)
+    device = TmclModule(spec, world, place.baud)
     port = TmclPort(device, any_baud=place.baud not in BAUDS.values())
     return Unit(device=device, port=port, worlds={"": world}, shadow=_shadow(device), single_supply=True)
 

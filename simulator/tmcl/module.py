@@ -6,11 +6,9 @@ commands that set something; global parameters are kept without power; the modul
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass
 from math import inf
-from types import MappingProxyType
 
 from multidrop.dialects.tmcl.manual.commands import (
     AXIS,
@@ -27,6 +25,7 @@ from multidrop.dialects.tmcl.manual.commands import (
     Status,
     Version,
 )
+from multidrop.simulator.cell.spec import DriveSpec
 from multidrop.simulator.tmcl.motor import STORED, Motor, Phase, ReferenceSearch
 from multidrop.simulator.tmcl.program import Program
 from multidrop.simulator.world import World
@@ -54,20 +53,14 @@ class Refused(Exception):
 
 
 class TmclModule:
-    """One module, powered up at time 0. `axis` and `module` are parameters in its EEPROM, by number and in range."""
+    """One module, powered up at time 0. `set` of its spec is checked. `baud` is its baud rate if that sets no other."""
 
-    def __init__(
-        self,
-        address: int,
-        world: World,
-        axis: Mapping[int, int] = MappingProxyType({}),
-        module: Mapping[int, int] = MappingProxyType({}),
-        baud: int = 0,
-        version: str = VERSION,
-        position: int = 0,
-    ) -> None:
+    def __init__(self, spec: DriveSpec, world: World, baud: int = 0) -> None:
+        position = spec.identity.counters.get("position", (0,))[0]
+        axis = {int(name): int(value) for name, value in spec.set.items() if name.isdigit()}  # type: ignore[arg-type]
+        module = {int(name[1:]): int(value) for name, value in spec.set.items() if not name.isdigit()}  # type: ignore[arg-type]
         self.world = world
-        self._version_text = version
+        self._version_text = spec.identity.version or VERSION
         self.powered = False
         self.motor = Motor(world)
 
@@ -80,10 +73,10 @@ class TmclModule:
         self._notify = 0
         self._notices: list[tuple[float, int]] = []
         self._now = 0.0
-        self._axis = {number: AXIS[number].fresh for number in STORED} | dict(axis)
+        self._axis = {number: AXIS[number].fresh for number in STORED} | axis
         code = next((code for code, each in BAUDS.items() if each == baud), 0)
         self._global = {number: row.fresh for number, row in GLOBAL.items()}
-        self._global |= {Global.BAUD: code, **module, Global.ADDRESS: address}
+        self._global |= {Global.BAUD: code, **module, Global.ADDRESS: int(spec.name)}
         self.power(True, 0.0)
         self.motor.stand_at(position, 0.0)
 

@@ -40,7 +40,6 @@ class Motor:
         self._target = 0
 
     def read(self, number: int, t: float) -> int:
-        """The value of an axis parameter."""
         home, right, left = self.shaft.switches(t)
         measured = {
             Axis.TARGET_POSITION: self._target,
@@ -120,7 +119,6 @@ class Motor:
             yield self._profile.end
 
     def live(self, t: float) -> None:
-        """Take in what has happened by now."""
         self.shaft.settle(t)
         if self.moving(t) and self._blocked(self._profile.direction(t), t):
             self.freeze(t)
@@ -200,7 +198,6 @@ class ReferenceSearch:
         self._enter(ROUTES[mode][0], t)
 
     def live(self, t: float) -> None:
-        """Go on to the next phase where this one has found its switch."""
         while self.phase is not Phase.DONE:
             _, switch, closed, _ = STEPS[self.phase]
             if self._motor.shaft.switches(t)[switch] is not closed:

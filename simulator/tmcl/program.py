@@ -73,13 +73,11 @@ class Program:
             self._place = 0
 
     def step(self, t: float) -> None:
-        """Carry out one line."""
         self.halt()
         self._line(t)
         self.due = inf
 
     def live(self, t: float) -> None:
-        """Carry out what is due."""
         if self._waits is not None and self._over(self._waits, t):
             self._waits, self.due = None, min(self.due, t + LINE_TIME)
         if self.running and self.due <= t:

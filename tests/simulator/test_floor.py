@@ -72,8 +72,8 @@ def test_inputs_can_be_held_high_and_low_and_let_go() -> None:
     each = floor()
     for text, level in (("/sim input press:b 1 0", 0), ("input press:b 1 1", 1), ("/sim input press:b 1 open", None)):
         assert each.command(text, 0.5) is None
-        assert each.find("press:b", "").world.level(1, 0.5) is level
-    assert each.find("saw:b", "").world.level(1, 0.5) is None
+        assert each.place("press:b", "")[0].world.level(1, 0.5) is level
+    assert each.place("saw:b", "")[0].world.level(1, 0.5) is None
 
 
 def test_an_input_moves_what_the_drive_reads() -> None:
@@ -88,7 +88,7 @@ def test_the_analog_input_and_a_push_reach_the_world() -> None:
     each = floor()
     each.command("/sim analog a 2048", 1.0)
     each.command("/sim push a -100", 1.0)
-    world = each.find("a", "").world
+    world = each.place("a", "")[0].world
     assert (world.analog(1.0), world.pushed) == (2048, -100)
 
 

@@ -49,7 +49,7 @@ def test_what_is_set_by_hand_holds_until_the_schedule_changes_it() -> None:
     assert [world.level(1, t) for t in (1.0, 1.9, 2.0)] == [1, 1, 0]
     world.set_input(1, None, 2.1)
     assert world.level(1, 2.2) is None
-    world.set_analog(7, 3.5)
+    world.set_input(0, 7, 3.5)
     assert world.analog(9) == 7
 
 
@@ -121,9 +121,9 @@ def test_a_switch_is_met_on_the_way_out_and_on_the_way_back() -> None:
     world = World(WorldSpec(limit_plus=1000))
     profile = move(0, 0, 50_000, 0, vi=1000, vm=60_000, a=1e6, d=1e6)
     first = world.next_switch(profile, 0)
-    assert first is not None and world.limit_plus_closed(profile.position(first))
+    assert first is not None and world.switches(profile.position(first))[1]
     second = world.next_switch(profile, first)
-    assert second is not None and not world.limit_plus_closed(profile.position(second))
+    assert second is not None and not world.switches(profile.position(second))[1]
     assert world.next_switch(profile, second) is None
 
 
@@ -138,10 +138,10 @@ def test_a_push_moves_the_switches_against_the_motor() -> None:
 def test_the_time_of_a_switch_is_one_at_which_it_has_changed(mark: int, way: float, at: float, speed: int) -> None:
     world = World(WorldSpec(home=mark))
     profile = slew(at, mark - way * 1000, 0, way * speed, vi=1, a=1e9, d=1e9)
-    before = world.home_closed(profile.origin)
+    before = world.switches(profile.origin)[0]
     found = world.next_switch(profile, at)
     assert found is not None
-    assert world.home_closed(profile.position(found)) is not before
+    assert world.switches(profile.position(found))[0] is not before
     assert profile.position(found) == pytest.approx(mark, abs=1.1)
     assert world.next_switch(profile, found) is None
 

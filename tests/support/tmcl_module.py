@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from multidrop.dialects.tmcl.host import codec
 from multidrop.dialects.tmcl.manual import commands
-from multidrop.simulator.cell.spec import WorldSpec
-from multidrop.simulator.tmcl.family import split_settings
+from multidrop.simulator.cell.spec import DriveSpec, WorldSpec
 from multidrop.simulator.tmcl.module import TmclModule
 from multidrop.simulator.tmcl.port import TmclPort
 from multidrop.simulator.world import World
@@ -16,8 +15,8 @@ class Module:
 
     def __init__(self, *, address: int = 1, settings: dict[str, int] | None = None, **world: object) -> None:
         self.world = World(WorldSpec(**world))  # type: ignore[arg-type]
-        axis, module = split_settings(settings or {})
-        self.device = TmclModule(address, self.world, axis, module)
+        spec = DriveSpec(personality="TMCM", name=str(address), set=settings or {})
+        self.device = TmclModule(spec, self.world)
         self.port = TmclPort(self.device)
         self.now = 0.0
 

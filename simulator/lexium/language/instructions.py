@@ -20,11 +20,8 @@ from multidrop.simulator.lexium.language.motor_commands import MotorCommands, Se
 from multidrop.simulator.lexium.language.program_commands import ProgramCommands
 from multidrop.simulator.lexium.language.variables import Compile, Variables, bare, is_place, only
 from multidrop.simulator.lexium.motion.counters import BITS
-from multidrop.simulator.lexium.motion.motor import Motor
-from multidrop.simulator.lexium.motion.outputs import Outputs
 from multidrop.simulator.lexium.state.errors import CRLF, Fault
 from multidrop.simulator.lexium.state.expressions import FLOATS, Read, Value, whole, wrap
-from multidrop.simulator.lexium.state.interpreter import Core
 from multidrop.simulator.lexium.state.memory import slot
 from multidrop.simulator.lexium.state.program_memory import Action
 
@@ -51,14 +48,10 @@ def unescape(text: str) -> str:
 class Prints:
     """PR of one drive with this serial number."""
 
-    def __init__(self, serial: str, core: Core, variables: Variables, motor: Motor, outputs: Outputs) -> None:
-        self._memory, self._program, self._timeline, self._printer = (
-            core.memory,
-            core.program,
-            core.timeline,
-            core.printer,
-        )
-        self._errors, self._variables, self._motor, self._outputs = core.errors, variables, motor, outputs
+    def __init__(self, serial: str, drive: EventLoop, variables: Variables) -> None:
+        core, self._variables, self._motor, self._outputs = drive.core, variables, drive.motor, drive.output_lines
+        self._memory, self._program, self._timeline = core.memory, core.program, core.timeline
+        self._printer, self._errors = core.printer, core.errors
         values, model, texts = core.values, core.model, self._text
         self._shapes: Mapping[str, Item] = {
             "ER": self._error,
@@ -228,14 +221,14 @@ def _fields(values: tuple[int, ...]) -> str:
 class Instructions:
     """The instructions of one drive. `commands` gives the compiler of a word."""
 
-    def __init__(self, serial: str, core: Core, motor: Motor, outputs: Outputs, loop: EventLoop) -> None:
-        power, nvm = loop.power_unit, loop.power_unit.nvm
-        self._memory, self._program = core.memory, core.program
-        self._variables = variables = Variables(core, motor, outputs, nvm)
-        self._programs = programs = ProgramCommands(core, variables, motor, nvm)
-        self.motions = MotorCommands(core, variables, motor)
-        setups = Setups(core, variables, motor, outputs, loop)
-        prints = Prints(serial, core, variables, motor, outputs)
+    def __init__(self, serial: str, drive: EventLoop) -> None:
+        power, nvm = drive.power_unit, drive.power_unit.nvm
+        self._memory, self._program = drive.core.memory, drive.core.program
+        self._variables = variables = Variables(drive)
+        self._programs = programs = ProgramCommands(drive, variables)
+        self.motions = MotorCommands(drive, variables)
+        setups = Setups(drive, variables)
+        prints = Prints(serial, drive, variables)
         self.commands: Mapping[str, Compile] = {
             "IC": partial(self._step, 1),
             "DC": partial(self._step, -1),

@@ -18,11 +18,8 @@ from multidrop.simulator.lexium.event_loop import EventLoop
 from multidrop.simulator.lexium.language.variables import Compile, Variables, bare, is_place, missing, only
 from multidrop.simulator.lexium.motion.counters import BITS
 from multidrop.simulator.lexium.motion.inputs import ANALOG
-from multidrop.simulator.lexium.motion.motor import Motor
-from multidrop.simulator.lexium.motion.outputs import Outputs
 from multidrop.simulator.lexium.state.errors import Fault
 from multidrop.simulator.lexium.state.expressions import whole
-from multidrop.simulator.lexium.state.interpreter import Core
 from multidrop.simulator.lexium.state.memory import Trip
 from multidrop.simulator.lexium.state.program_memory import Action
 
@@ -35,8 +32,9 @@ PRINT_FORMAT = (10, 6, 0, 0)
 class MotorCommands:
     """The instructions of the motor of one drive. `begun` counts the motions that they have begun."""
 
-    def __init__(self, core: Core, variables: Variables, motor: Motor) -> None:
-        self._memory, self._timeline, self._variables, self._motor = core.memory, core.timeline, variables, motor
+    def __init__(self, drive: EventLoop, variables: Variables) -> None:
+        self._memory, self._timeline = drive.core.memory, drive.core.timeline
+        self._variables, self._motor = variables, drive.motor
         self.begun = 0
 
     def commands(self) -> Mapping[str, Compile]:
@@ -134,14 +132,10 @@ class MotorCommands:
 class Setups:
     """The instructions with several settings, for one drive."""
 
-    def __init__(self, core: Core, variables: Variables, motor: Motor, outputs: Outputs, loop: EventLoop) -> None:
-        self._memory, self._program, self._timeline, self._variables = (
-            core.memory,
-            core.program,
-            core.timeline,
-            variables,
-        )
-        self._motor, self._inputs, self._outputs, self._loop = motor, motor.inputs, outputs, loop
+    def __init__(self, drive: EventLoop, variables: Variables) -> None:
+        core, self._variables, self._drive = drive.core, variables, drive
+        self._memory, self._program, self._timeline = core.memory, core.program, core.timeline
+        self._motor, self._inputs, self._outputs = drive.motor, drive.motor.inputs, drive.output_lines
         self._points = core.model.points
 
     def commands(self) -> Mapping[str, Compile]:
@@ -176,7 +170,7 @@ class Setups:
         self._motor.limit_stop.wired(n, was[0], self._timeline.now)
         self._timeline.replan()
         if n in self._inputs.numbers:
-            self._loop.wired(n, was)
+            self._drive.wired(n, was)
 
     def _output(self, statement: Statement) -> Action:
         """OS (manual 5.1.93)."""

@@ -11,12 +11,10 @@ from collections.abc import Callable, Mapping
 from multidrop.dialects.mcode.manual.errors import ErrorNumber as E
 from multidrop.dialects.mcode.manual.grammar import Argument, Compare, Name, Number, Statement, Text
 from multidrop.dialects.mcode.manual.table import lookup
+from multidrop.simulator.lexium.event_loop import EventLoop
 from multidrop.simulator.lexium.language.variables import Compile, Variables, bare, is_place, only, pair
-from multidrop.simulator.lexium.motion.motor import Motor
-from multidrop.simulator.lexium.power import Nvm
 from multidrop.simulator.lexium.state.errors import CRLF, Fault
 from multidrop.simulator.lexium.state.expressions import compile_condition, whole
-from multidrop.simulator.lexium.state.interpreter import Core
 from multidrop.simulator.lexium.state.memory import within
 from multidrop.simulator.lexium.state.program_memory import FIRST, SPACE, Action
 
@@ -28,15 +26,15 @@ OPTIONS = (Number(0), Number(1))
 class ProgramCommands:
     """The instructions on programs, for one drive."""
 
-    def __init__(self, core: Core, variables: Variables, motor: Motor, nvm: Nvm) -> None:
-        self._memory, self._program, self._timeline, self._printer = (
-            core.memory,
-            core.program,
-            core.timeline,
+    def __init__(self, drive: EventLoop, variables: Variables) -> None:
+        core, self._variables, self._motor, self._nvm = drive.core, variables, drive.motor, drive.power_unit.nvm
+        self._memory, self._program, self._timeline = core.memory, core.program, core.timeline
+        self._printer, self._interpreter, self._thread, self._mode = (
             core.printer,
+            core.interpreter,
+            core.thread,
+            core.mode,
         )
-        self._interpreter, self._thread, self._mode = core.interpreter, core.thread, core.mode
-        self._variables, self._motor, self._nvm = variables, motor, nvm
 
     def commands(self) -> Mapping[str, Compile]:
         return {

@@ -14,10 +14,9 @@ from math import inf
 from multidrop.dialects.mcode.manual.errors import ErrorNumber as E
 from multidrop.dialects.mcode.manual.grammar import Argument, Compare, Name, Number, Statement, Text
 from multidrop.dialects.mcode.manual.table import Mnemonic
+from multidrop.simulator.lexium.event_loop import EventLoop
 from multidrop.simulator.lexium.motion.counters import BITS
 from multidrop.simulator.lexium.motion.motor import Motor
-from multidrop.simulator.lexium.motion.outputs import Outputs
-from multidrop.simulator.lexium.power import Nvm
 from multidrop.simulator.lexium.state.errors import Fault
 from multidrop.simulator.lexium.state.expressions import PI, Read, Value, compile_value, compile_whole, whole
 from multidrop.simulator.lexium.state.interpreter import Core
@@ -62,8 +61,7 @@ class MotionVariables:
 
     def writers(self) -> dict[str, Write]:
         return {
-            "VI": self._write_vi,
-            "VM": self._write_vm,
+            **{name: partial(self._write_velocity, name) for name in ("VI", "VM")},
             "MS": self._write_ms,
             "EE": self._write_ee,
             "HT": partial(self._write_delay, "MT", "HT"),
@@ -82,24 +80,16 @@ class MotionVariables:
 
     # Velocities and resolution.
 
-    def _write_vi(self, value: Value) -> None:
-        number = self._velocity("VI", value)
-        if number >= self._values["VM"]:
-            raise Fault(E.VI_NOT_BELOW_VM)
-        self._values["VI"] = number
-
-    def _write_vm(self, value: Value) -> None:
-        number = self._velocity("VM", value)
-        if number <= self._values["VI"]:
-            raise Fault(E.VM_NOT_ABOVE_VI)
-        self._values["VM"] = number
-
-    def _velocity(self, name: str, value: Value) -> int:
-        """A velocity in the unit of motion. Raises Fault (21, 77)."""
-        number = self._memory.checked(name, value)
+    def _write_velocity(self, name: str, value: Value) -> None:
+        """VI or VM, in the unit of motion; VI stays below VM. Raises Fault (21, 77, and the code of the word)."""
+        number, values = self._memory.checked(name, value), self._values
         if not self._memory.counting:
             self._check_resolution(number)
-        return number
+        if name == "VI" and number >= values["VM"]:
+            raise Fault(E.VI_NOT_BELOW_VM)
+        if name == "VM" and number <= values["VI"]:
+            raise Fault(E.VM_NOT_ABOVE_VI)
+        values[name] = number
 
     def _check_resolution(self, velocity: int) -> None:
         """Raise Fault (77) for what this resolution does not reach, on products that have such a bound."""
@@ -281,9 +271,15 @@ def _unreadable() -> Value:
 class Variables:
     """The variables of one drive."""
 
-    def __init__(self, core: Core, motor: Motor, outputs: Outputs, nvm: Nvm) -> None:
-        self._memory, self._values, self._program, self._nvm = core.memory, core.values, core.program, nvm
-        self._timeline, self._inputs, self._outputs, self._motor = core.timeline, motor.inputs, outputs, motor
+    def __init__(self, drive: EventLoop) -> None:
+        core, motor, self._nvm = drive.core, drive.motor, drive.power_unit.nvm
+        self._memory, self._values, self._program, self._timeline = (
+            core.memory,
+            core.values,
+            core.program,
+            core.timeline,
+        )
+        self._inputs, self._outputs, self._motor = motor.inputs, drive.output_lines, motor
         motion = MotionVariables(core, motor)
         self._readers: dict[str, Read] = {
             "LS": _unreadable,

@@ -87,9 +87,9 @@ def test_the_switch_is_seen_at_both_edges():
 
 def test_a_single_number_is_closed_up_to_there():
     world = World(WorldSpec(home=-5))
-    assert [world.home_closed(place) for place in (-1e12, -6, -5, -4)] == [True, True, True, False]
+    assert [world.switches(place)[0] for place in (-1e12, -6, -5, -4)] == [True, True, True, False]
     both = World(WorldSpec(home=(-10, -5)))
-    assert [both.home_closed(place) for place in (-11, -10, -5, -4)] == [False, True, True, False]
+    assert [both.switches(place)[0] for place in (-11, -10, -5, -4)] == [False, True, True, False]
 
 
 def test_a_cell_takes_one_edge_or_two():

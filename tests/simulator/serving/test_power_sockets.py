@@ -222,11 +222,11 @@ def test_it_boots_as_long_as_a_real_one_and_a_serial_drive_is_there_at_once() ->
     floor = Floor(read(CELL))
     for drive in "es":
         floor.command(f"/sim power {drive} off", 1.0)
-        assert not floor.find(drive, "").device.powered
+        assert not floor.place(drive, "")[0].device.powered
         floor.command(f"/sim power {drive} on", 2.0)
     assert [floor.connectable(bus) for bus in ("eth", "line")] == [False, True]
     assert floor.wires["eth"].deadline == 2.0 + ETHERNET_BOOT
     floor.advance(2.0 + ETHERNET_BOOT - 0.001)
     assert not floor.connectable("eth")
     floor.advance(2.0 + ETHERNET_BOOT)
-    assert floor.connectable("eth") and floor.find("e", "").device.powered
+    assert floor.connectable("eth") and floor.place("e", "")[0].device.powered
