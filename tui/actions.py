@@ -1,6 +1,6 @@
 """The actions of the app: what keys and the palette run. Each is named in a binding or in `tui.palette`.
 
-They are two action targets beside Textual's own: `act` sends lines and selects, `view` changes what is shown.
+They are an action target beside Textual's own, `act`.
 """
 
 from __future__ import annotations
@@ -52,8 +52,8 @@ class Parts(Host):
     mouse_on: bool = True
 
 
-class Target:
-    """A target of actions. Textual asks it whether an action is possible."""
+class Actions:
+    """The target of actions: they change what is shown, send lines, select, open pages and dialogs."""
 
     def __init__(self, parts: Parts) -> None:
         self._parts = parts
@@ -65,9 +65,7 @@ class Target:
             return self._parts.tour.on and self._parts.app.focused is entry and not entry.listing.open
         return True
 
-
-class ViewActions(Target):
-    """The actions that change what is shown, and send nothing."""
+    # What is shown; nothing is sent
 
     def action_panel(self, name: str) -> None:
         self._parts.main.toggle_panel(name)
@@ -146,9 +144,7 @@ class ViewActions(Target):
     def action_unsplit(self) -> None:
         self._parts.main.beside.hide()
 
-
-class Actions(Target):
-    """The actions that send lines, select, and open pages and dialogs."""
+    # Lines, the selection, pages and dialogs
 
     async def action_run_line(self, line: str) -> None:
         """Run a line in the background. Its event reports a failure; a bug ends the app.

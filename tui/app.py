@@ -30,7 +30,7 @@ from textual.screen import Screen
 from multidrop.drives.events import Unsolicited
 from multidrop.shell.connect.settings import DEFAULT_LOOK, Look
 from multidrop.shell.events import Failed, OnBus, Printed, SessionEvent, StateChanged
-from multidrop.tui.actions import Actions, Parts, ViewActions
+from multidrop.tui.actions import Actions, Parts
 from multidrop.tui.assist import Assist
 from multidrop.tui.frame_scheduler import AGEING, Frames
 from multidrop.tui.keymap import FunctionKeys, keymap, named_key
@@ -39,7 +39,7 @@ from multidrop.tui.polling import Polling
 from multidrop.tui.presenter import Presenter
 from multidrop.tui.screen_model import Record, ScreenModel
 from multidrop.tui.screens.dialogs import LEAST, Over, TooSmall
-from multidrop.tui.screens.main_screen import MainScreen, Reading
+from multidrop.tui.screens.main_screen import MainScreen
 from multidrop.tui.screens.page import PAGES, Framed, Page
 from multidrop.tui.screens.questions import Questions
 from multidrop.tui.screens.start import Opener, Start
@@ -78,7 +78,7 @@ class MultidropApp(App[int]):
     """Textual's own palette; ours is a `Search`, in which keys keep their order."""
     BINDINGS: ClassVar[list[BindingType]] = [
         named_key("quit", "ctrl+q", "quit", "quit; asks if something moves"),
-        Binding("ctrl+c", "view.explain", show=False, priority=True),
+        Binding("ctrl+c", "act.explain", show=False, priority=True),
         *(
             named_key(f"page-{page.name}", page.key, f"act.page_key('{page.name}')", f"page: {page.about}")
             for page in PAGES
@@ -159,8 +159,8 @@ class MultidropApp(App[int]):
             self.tour,
             self._signs,
         )
-        self.act, self.view = Actions(parts), ViewActions(parts)
-        self._action_targets |= {"act", "view"}
+        self.act = Actions(parts)
+        self._action_targets |= {"act"}
         Hooks(parts, self.act, self.presenter, lambda: self._check_size(self.size))
 
     def get_default_screen(self) -> Screen[Any]:
@@ -414,5 +414,5 @@ class MultidropApp(App[int]):
 
 def bindings() -> list[BindingType]:
     """The keys of all screens that can be set, those of the app first; no page has one of its own."""
-    screens: list[type[Framed]] = [Reading, MainScreen, Page]
+    screens: list[type[Framed]] = [MainScreen, Page]
     return [*MultidropApp.BINDINGS, *(each for screen in screens for each in screen.BINDINGS)]

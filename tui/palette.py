@@ -86,7 +86,7 @@ def all_commands(
         yield Command(page.title, page.about, _call("act.page", page.name), keys.shown(f"page-{page.name}"))
     for panel in PANELS:
         title = f"Panel {panel.name} on or off"
-        yield Command(title, panel.about, _call("view.panel", panel.name), keys.shown(f"panel-{panel.name}"))
+        yield Command(title, panel.about, _call("act.panel", panel.name), keys.shown(f"panel-{panel.name}"))
     yield from _choices(session, macros, keys)
     about = "simulated drives that run beside those of this line; every difference shows"
     yield Command(f"Twin {_other(switches.twin)}", about, "act.twin", keys.shown("twin"))
@@ -98,16 +98,16 @@ def all_commands(
 
 def _view(keys: Keymap, switches: Switches) -> Iterator[Command]:
     """The commands of the screen itself."""
-    yield Command(f"Polling {_other(switches.polling)}", "reading of position and velocity", "view.polling")
+    yield Command(f"Polling {_other(switches.polling)}", "reading of position and velocity", "act.polling")
     yield Command("Open a connection", "saved ones, serial ports, the demo cell, a URL", "act.open", "/open URL")
-    yield Command("Split the screen", "a second transcript; again: type to it", "view.split", keys.shown("split"))
-    yield Command("One half", "end the split of the screen", "view.unsplit")
+    yield Command("Split the screen", "a second transcript; again: type to it", "act.split", keys.shown("split"))
+    yield Command("One half", "end the split of the screen", "act.unsplit")
     yield Command("Tour", "two minutes through the product, on a demo cell", _line("/tour"), "/tour")
     # The commands of the transcript that is shown.
     yield Command("Search the transcript", "as you type; Tab shows only what is found", "find", keys.shown("find"))
     yield Command("Pause the scrolling", "or let it go on", "pause", keys.shown("pause"))
     yield Command("Copy lines", "pick lines of the transcript, and copy them", "pick(0)", keys.shown("pick"))
-    yield Command("Copy the view", "the transcript in view, to the terminal's clipboard", "view.copy_view")
+    yield Command("Copy the view", "the transcript in view, to the terminal's clipboard", "act.copy_view")
     yield Command("Only my lines", "with their replies, and warnings", _line("/filter mine"), "/filter mine")
     yield Command("Only errors", "failures and warnings, with the lines that failed", _line("/filter errors"))
     yield Command("All lines", "end the filter", _line("/filter off"), "/filter off")
@@ -116,12 +116,12 @@ def _view(keys: Keymap, switches: Switches) -> Iterator[Command]:
     yield Command("Save the transcript", "to a new file", _call("act.begin_line", "/save "), "/save FILE")
     yield Command("Newest line", "follow the transcript again", "look_end(True)", keys.shown("newest"))
     yield Command("Oldest line", "the beginning of the transcript", "look_end(False)", keys.shown("oldest"))
-    yield Command("Clear the transcript", "of the bus that is shown", "view.clear")
-    yield Command(f"Mouse {_other(switches.mouse)}", "off: the terminal's own selection works", "view.mouse")
-    yield Command("Repaint", "the whole screen, where another program wrote on it", "view.repaint")
-    yield Command("Theme", "colours; multidrop-ansi uses the terminal's own", "view.choose_theme")
-    yield Command("Signs", "all, boxes without braille, or ASCII alone", "view.choose_signs")
-    yield Command("Help", "keys and signs, for where you are", "view.help", keys.shown("help"))
+    yield Command("Clear the transcript", "of the bus that is shown", "act.clear")
+    yield Command(f"Mouse {_other(switches.mouse)}", "off: the terminal's own selection works", "act.mouse")
+    yield Command("Repaint", "the whole screen, where another program wrote on it", "act.repaint")
+    yield Command("Theme", "colours; multidrop-ansi uses the terminal's own", "act.choose_theme")
+    yield Command("Signs", "all, boxes without braille, or ASCII alone", "act.choose_signs")
+    yield Command("Help", "keys and signs, for where you are", "act.help", keys.shown("help"))
     yield Command("Quit", "drives go on as they are", "app.quit", keys.shown("quit"))
 
 

@@ -426,7 +426,7 @@ def make_app(
     """The app on a session; an empty theme lets the app choose."""
     app = MultidropApp(session or demo_session(), urls, assist or FakeAssist())
     app.theme = theme or app.theme
-    app.view.show_signs(Signs.FULL)
+    app.act.show_signs(Signs.FULL)
     return app
 
 

@@ -251,10 +251,10 @@ async def test_only_what_is_shown_is_polled_and_only_while_it_is() -> None:
         await pilot.press("ctrl+t")
         await settle(pilot)
         assert press.polled["a"] == STATUS
-        app.view.action_polling()
+        app.act.action_polling()
         await settle(pilot)
         assert press.polled == eth.polled == {}
-        app.view.action_polling()
+        app.act.action_polling()
     assert press.polled == eth.polled == {}, "nothing is polled for a screen that is gone"
 
 

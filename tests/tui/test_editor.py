@@ -16,7 +16,7 @@ from multidrop.shell.programs.program_text import ProgramGrammar
 from multidrop.shell.state.store import Drafts
 from multidrop.tui.editor import MacroGrammar, grammar_of
 from multidrop.tui.screens.dialogs import Match
-from multidrop.tui.screens.edit import aligned
+from multidrop.tui.screens.program_rows import aligned
 from multidrop.tui.screens.program_rows import UPLOAD, Finder, files_in
 from multidrop.tui.texts import Texts
 

@@ -54,7 +54,7 @@ async def page(folder: Path, *, file: str = "a.mxt", size: tuple[int, int] = (80
 @pytest.fixture(autouse=True)
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr("multidrop.tui.screens.edit.PAUSE", 0.02)
+    monkeypatch.setattr("multidrop.tui.screens.program.PAUSE", 0.02)
     (tmp_path / "a.mxt").write_text(TEXT)
     return tmp_path
 
@@ -145,7 +145,7 @@ async def test_a_copy_is_kept_while_a_text_is_not_saved(folder: Path) -> None:
 
 
 async def test_the_end_of_the_app_keeps_a_copy_of_the_last_keys(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("multidrop.tui.screens.edit.PAUSE", 1000.0)
+    monkeypatch.setattr("multidrop.tui.screens.program.PAUSE", 1000.0)
     async with page(folder) as pilot:
         typed(pilot, "ctrl+end", "' last")
         await until(pilot, lambda: shown(pilot).editor.text.endswith("' last"))

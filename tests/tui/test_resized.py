@@ -73,6 +73,6 @@ async def test_other_signs_are_painted_at_once() -> None:
     async with demo(session) as (screen, _, _):
         shown = Shown(screen)
         for signs in (Signs.ASCII, Signs.FULL, Signs.BOXES):
-            screen.app.view.show_signs(signs)
+            screen.app.act.show_signs(signs)
             await screen.rest()
             await shown.agrees()

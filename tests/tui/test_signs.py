@@ -52,7 +52,7 @@ def test_the_signs_are_those_set_or_those_of_the_terminal(
 async def test_nothing_but_ascii_reaches_a_terminal_of_ascii(keys: tuple[str, ...]) -> None:
     session = demo_session()
     app = make_app(session)
-    app.view.show_signs(Signs.ASCII)
+    app.act.show_signs(Signs.ASCII)
     async with app.run_test(size=(120, 40)) as pilot:
         session.emit(*a_talk(session), *a_move(session))
         await press(pilot, *keys)

@@ -159,7 +159,7 @@ def test_snapshot_of_many_lines_in_ascii(snap_compare: Compare) -> None:
     buses[19].lost = TransportLost("unplugged")
 
     async def act(pilot: Pilot[int], session: FakeSession) -> None:
-        pilot.app.view.show_signs(Signs.ASCII)  # type: ignore[attr-defined]
+        pilot.app.act.show_signs(Signs.ASCII)  # type: ignore[attr-defined]
         await after("ctrl+t")(pilot, session)
 
     assert drawn(snap_compare, "80x24", act, session=FakeSession(*buses))
@@ -261,7 +261,7 @@ def stalled(session: FakeSession) -> None:
 
 def plotted(prepare: Callable[[FakeSession], None], *keys: str, signs: Signs = Signs.FULL) -> Act:
     async def act(pilot: Pilot[int], session: FakeSession) -> None:
-        pilot.app.view.show_signs(signs)  # type: ignore[attr-defined]
+        pilot.app.act.show_signs(signs)  # type: ignore[attr-defined]
         prepare(session)
         await settle(pilot)
         await pilot.press(*keys)
@@ -347,7 +347,7 @@ ROWS = tuple((1 + 6 * number, line) for number, line in enumerate(LINES))
 def programs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A folder with a program, and with one that has errors."""
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr("multidrop.tui.screens.edit.PAUSE", 0.02)
+    monkeypatch.setattr("multidrop.tui.screens.program.PAUSE", 0.02)
     (tmp_path / "shuttle.mxt").write_text(TEXT)
     (tmp_path / "wrong.mxt").write_text(TEXT.replace("MA 0", "MAX 0").replace("PR", "PRINT"))
 

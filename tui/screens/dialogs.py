@@ -70,7 +70,7 @@ class Over(ModalScreen[T], Generic[T]):
 
     BINDINGS: ClassVar[list[BindingType]] = [
         named_key("quit", "ctrl+q", "app.quit", "quit; asks if something moves"),
-        Binding("ctrl+c", "view.explain", show=False, priority=True),
+        Binding("ctrl+c", "act.explain", show=False, priority=True),
     ]
 
     def on_mount(self) -> None:

@@ -76,57 +76,6 @@ class Beside(Vertical):
             self._heading.put([row])
 
 
-class Reading(Framed):
-    """A screen with a transcript; the base of the main screen."""
-
-    BINDINGS: ClassVar[list[BindingType]] = [
-        named_key("look-back", "pageup", "look(-1)", "look back in the transcript"),
-        named_key("look-on", "pagedown", "look(1)", "look on in the transcript"),
-        named_key("oldest", "ctrl+home", "look_end(False)", "the beginning of the transcript"),
-        named_key("newest", "ctrl+end", "look_end(True)", "follow the transcript again"),
-        named_key("find", "ctrl+f", "find", "search the transcript"),
-        named_key("pause", "ctrl+s", "pause", "stop the scrolling, or let it go on"),
-        named_key("pick", "ctrl+y", "pick(0)", "pick lines of the transcript to copy; also Shift+Up"),
-        named_key("times", "", "act.run_line('/times')", "times of the lines in another form"),
-        named_key("filter-mine", "", "act.run_line('/filter mine')", "show only what you typed, and its replies"),
-        named_key("filter-off", "", "act.run_line('/filter off')", "show all lines"),
-        named_key("hex", "", "act.run_line('/hex')", "the bytes of the selected line beside its lines, or not"),
-        Binding("shift+up", "pick(-1)", show=False, priority=True),
-        Binding("shift+down", "pick(1)", show=False, priority=True),
-    ]
-
-    def __init__(self) -> None:
-        super().__init__()
-        self.reader = Reader(self.take_keys, id="reader")
-
-    @property
-    def transcript(self) -> Transcript:
-        raise NotImplementedError
-
-    def take_keys(self) -> None:
-        raise NotImplementedError
-
-    def on_descendant_focus(self, event: events.DescendantFocus) -> None:
-        if event.widget.id == "entry":
-            self.reader.close()
-
-    def action_look(self, pages: int) -> None:
-        self.transcript.look_page(pages)
-
-    def action_look_end(self, newest: bool) -> None:
-        self.transcript.look_end(newest)
-
-    def action_find(self) -> None:
-        self.reader.find(self.transcript)
-
-    def action_pause(self) -> None:
-        """Stop the scrolling, or let it go on."""
-        self.transcript.pause()
-
-    def action_pick(self, by: int) -> None:
-        self.reader.pick(self.transcript, by)
-
-
 WIDE = (110, 24)
 """Smallest width and height with a column of panels."""
 VERY_WIDE = 200
@@ -141,7 +90,7 @@ PANEL_SHARE = 0.5
 """Share of the transcript's height that a panel takes on a narrow screen."""
 
 
-class MainScreen(Reading):
+class MainScreen(Framed):
     """The main screen. It is given rows, and divides the room among them."""
 
     AUTO_FOCUS = "#entry"
@@ -157,21 +106,34 @@ class MainScreen(Reading):
         ("twin", "twin"),
     )
     BINDINGS: ClassVar[list[BindingType]] = [
-        Binding("escape", "view.end_tour", show=False, priority=True),
-        named_key("help", "f1", "view.help", "help for where you are"),
+        named_key("look-back", "pageup", "look(-1)", "look back in the transcript"),
+        named_key("look-on", "pagedown", "look(1)", "look on in the transcript"),
+        named_key("oldest", "ctrl+home", "look_end(False)", "the beginning of the transcript"),
+        named_key("newest", "ctrl+end", "look_end(True)", "follow the transcript again"),
+        named_key("find", "ctrl+f", "find", "search the transcript"),
+        named_key("pause", "ctrl+s", "pause", "stop the scrolling, or let it go on"),
+        named_key("pick", "ctrl+y", "pick(0)", "pick lines of the transcript to copy; also Shift+Up"),
+        named_key("times", "", "act.run_line('/times')", "times of the lines in another form"),
+        named_key("filter-mine", "", "act.run_line('/filter mine')", "show only what you typed, and its replies"),
+        named_key("filter-off", "", "act.run_line('/filter off')", "show all lines"),
+        named_key("hex", "", "act.run_line('/hex')", "the bytes of the selected line beside its lines, or not"),
+        Binding("shift+up", "pick(-1)", show=False, priority=True),
+        Binding("shift+down", "pick(1)", show=False, priority=True),
+        Binding("escape", "act.end_tour", show=False, priority=True),
+        named_key("help", "f1", "act.help", "help for where you are"),
         named_key("palette", "ctrl+p", "act.palette", "everything by name: type some letters of it"),
         named_key("drive", "ctrl+o", "act.choose_drive", "choose the drive that plain text goes to"),
         named_key("log", "", "act.log", "begin the session log, or end it"),
         named_key("twin", "ctrl+f2", "act.twin", "a twin beside each drive of the line, or none"),
         named_key("history", "ctrl+r", "act.search_history", "search the lines typed before; again: older"),
         *(
-            named_key(f"panel-{each.name}", each.key, f"view.panel('{each.name}')", f"panel: {each.about}")
+            named_key(f"panel-{each.name}", each.key, f"act.panel('{each.name}')", f"panel: {each.about}")
             for each in PANELS
         ),
         *(named_key(f"play-f{n}", f"f{n}", f"act.play('F{n}')", "play the macro on the key") for n in range(2, 13)),
         named_key("macro-page", "ctrl+k", "act.macro_page", "the next page of macros on F2 .. F12"),
-        named_key("repaint", "", "view.repaint", "paint the whole screen again"),
-        named_key("split", "ctrl+l", "view.split", "split the screen; then: type to the other half"),
+        named_key("repaint", "", "act.repaint", "paint the whole screen again"),
+        named_key("split", "ctrl+l", "act.split", "split the screen; then: type to the other half"),
         named_key("tab-before", "ctrl+pageup", "act.bus(-1)", "the line before"),
         named_key("tab-after", "ctrl+pagedown", "act.bus(1)", "the next line"),
         named_key("tab-left", "ctrl+shift+pageup", "act.run_line('/tab left')", "this tab to the left"),
@@ -197,6 +159,7 @@ class MainScreen(Reading):
         """The form of the times in the transcripts."""
         self.panels = Shown()
         self._hint = self._first_hint = ""
+        self.reader = Reader(self.take_keys, id="reader")
         self.entry = Entry(complete, history, typed, pasted, id="entry")
         self.menu = Menu(id="menu")
         self._stack = Vertical(id="pages")
@@ -344,6 +307,26 @@ class MainScreen(Reading):
 
     def take_keys(self) -> None:
         self.set_focus(self.entry)
+
+    def on_descendant_focus(self, event: events.DescendantFocus) -> None:
+        if event.widget.id == "entry":
+            self.reader.close()
+
+    def action_look(self, pages: int) -> None:
+        self.transcript.look_page(pages)
+
+    def action_look_end(self, newest: bool) -> None:
+        self.transcript.look_end(newest)
+
+    def action_find(self) -> None:
+        self.reader.find(self.transcript)
+
+    def action_pause(self) -> None:
+        """Stop the scrolling, or let it go on."""
+        self.transcript.pause()
+
+    def action_pick(self, by: int) -> None:
+        self.reader.pick(self.transcript, by)
 
     # The input line
 

@@ -86,7 +86,7 @@ class Page(Framed):
 
     BINDINGS: ClassVar[list[BindingType]] = [
         Binding("escape", "leave", show=False),
-        named_key("help", "f1", "view.help", "help for where you are"),
+        named_key("help", "f1", "act.help", "help for where you are"),
         Binding("ctrl+o", "act.choose_drive", show=False, priority=True),
         named_key("palette", "ctrl+p", "act.palette", "everything by name: type some letters of it"),
     ]

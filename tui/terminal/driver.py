@@ -1,14 +1,20 @@
-"""The input side of the terminal: it finds the stop. The output side is `tui.terminal.driver`.
+"""The terminal: its input side finds the stop, and its output side never waits.
 
-It looks for the stop key in the bytes as they arrive, before any parser and any queue: inside an endless paste, after
-half an escape sequence, under any dialog. The reading thread itself writes the stop, whatever the event loop is doing;
-then the app is called in the loop. `tui.terminal.keystream` parses all other input there in slices, so no amount of it
-delays a stop.
+The input side looks for the stop key in the bytes as they arrive, before any parser and any queue: inside an endless
+paste, after half an escape sequence, under any dialog. The reading thread itself writes the stop, whatever the event
+loop is doing; then the app is called in the loop. `tui.terminal.keystream` parses all other input there in slices, so
+no amount of it delays a stop.
+
+A thread writes to the terminal, and no frame waits in a queue for it. A frame goes out only when the terminal has
+swallowed the one before (`tui.frame_scheduler`). So a link that carries ten frames a second gets ten, the newest each
+time, and a key typed in between is shown after one frame, not after thirty. If Textual paints while the terminal accepts
+nothing, the writer drops frames, and repaints the whole screen once the terminal accepts output again. The event loop
+never waits for the terminal.
 """
 
 from __future__ import annotations
 
-import contextlib
+import fcntl
 import os
 import re
 import select
@@ -36,14 +42,6 @@ from multidrop.tui.frame_scheduler import Pace
 from multidrop.tui.terminal.canvas import Canvas, pieces_of
 from multidrop.tui.terminal.keystream import STOP, KeyStream
 
-# The terminal's output side: a thread writes to the terminal, and no frame waits in a queue for it.
-#
-# A frame goes out only when the terminal has swallowed the one before (`tui.frame_scheduler`). So a link that carries
-# ten frames a second gets ten, the newest each time, and a key typed in between is shown after one frame, not after
-# thirty. If Textual paints while the terminal accepts nothing, the writer drops frames, and repaints the whole screen
-# once the terminal accepts output again. The event loop never waits for the terminal.
-
-
 CURSOR_QUERY = "\x1b[6n"
 KEYBOARD_PROTOCOL = re.compile("\x1b\\[[<>][0-9]*u")
 HIDDEN_CURSOR = "\x1b[?25l"
@@ -51,10 +49,42 @@ COLOURS = {"standard": ColorSystem.STANDARD, "256": ColorSystem.EIGHT_BIT, "true
 """Ranges of colours, by the name that rich gives a terminal's."""
 AT_THE_END = 1.0
 """Seconds that the terminal gets at the end to take its output."""
+assert sys.platform != "win32"
+FULL_SCREEN = "\x1b[?1049h\x1b[?1004h"
+"""Switch to the alternate screen, and report changes of the focus."""
 
 
-class ScreenWriter(LinuxDriver):
-    """A Textual driver whose `write` never waits. `pace` gets the terminal's replies."""
+class Owner(Protocol):
+    """The functions of the app that the terminal calls."""
+
+    def stop_ahead(self) -> None:
+        """Write the stop to the wires. Called in the reading thread; `stop_all` follows in the loop."""
+
+    def stop_all(self) -> None:
+        """Handle the stop key."""
+
+    def interrupted(self) -> None:
+        """Handle the loss of the terminal."""
+
+    def dropped(self, text: str) -> None:
+        """Report a text that was typed before a stop and not parsed; a NUL in it is a key that is not text."""
+
+    def show_line(self, text: str, mark: str = ".") -> None:
+        """Show a line to the person at the terminal."""
+
+    def terminal_ready(self) -> None:
+        """Paint what waits for the terminal, which has swallowed the last frame."""
+
+
+class Terminal(LinuxDriver):
+    """A terminal on POSIX. Its `write` never waits; `pace` gets the terminal's replies."""
+
+    def __init__(self, *arguments: Any, **named: Any) -> None:
+        super().__init__(*arguments, **named)
+        app = cast(Owner, self._app)
+        self.keys = KeyStream(self.process_message, partial(app.show_line, mark="!"), app.dropped, self._more)
+
+    # Output
 
     def start_application_mode(self) -> None:
         stream = sys.__stdout__
@@ -118,11 +148,15 @@ class ScreenWriter(LinuxDriver):
 
     def _handed_over(self) -> bool:
         """True if the system has taken all output, and a serial line has sent it."""
-        return self._out.idle and not _unsent(self._descriptor)
+        if not self._out.idle:
+            return False
+        with suppress(OSError):  # else it is not a serial terminal
+            return not struct.unpack("i", fcntl.ioctl(self._descriptor, termios.TIOCOUTQ, b"\0" * 4))[0]
+        return True
 
     def _takes_again(self, loss: Loss) -> bytes:
         """Repaint when there is room again after dropped frames. Called in the writing thread."""
-        with contextlib.suppress(RuntimeError):  # the loop has ended
+        with suppress(RuntimeError):  # the loop has ended
             self._loop.call_soon_threadsafe(self.repaint)
         return b""
 
@@ -135,54 +169,7 @@ class ScreenWriter(LinuxDriver):
             self.mouse(self._mouse_on)
             self._app.refresh(layout=True)
 
-
-def _unsent(descriptor: int) -> int:
-    """Number of bytes that a serial terminal has not sent yet; 0 if unknown."""
-    if sys.platform == "win32":
-        return 0
-    import fcntl
-    import termios
-
-    with contextlib.suppress(OSError):
-        return int(struct.unpack("i", fcntl.ioctl(descriptor, termios.TIOCOUTQ, b"\0" * 4))[0])
-    return 0
-
-
-assert sys.platform != "win32"
-
-FULL_SCREEN = "\x1b[?1049h\x1b[?1004h"
-"""Switch to the alternate screen, and report changes of the focus."""
-
-
-class Owner(Protocol):
-    """The functions of the app that the terminal calls."""
-
-    def stop_ahead(self) -> None:
-        """Write the stop to the wires. Called in the reading thread; `stop_all` follows in the loop."""
-
-    def stop_all(self) -> None:
-        """Handle the stop key."""
-
-    def interrupted(self) -> None:
-        """Handle the loss of the terminal."""
-
-    def dropped(self, text: str) -> None:
-        """Report a text that was typed before a stop and not parsed; a NUL in it is a key that is not text."""
-
-    def show_line(self, text: str, mark: str = ".") -> None:
-        """Show a line to the person at the terminal."""
-
-    def terminal_ready(self) -> None:
-        """Paint what waits for the terminal, which has swallowed the last frame."""
-
-
-class Terminal(ScreenWriter):
-    """A terminal on POSIX."""
-
-    def __init__(self, *arguments: Any, **named: Any) -> None:
-        super().__init__(*arguments, **named)
-        app = cast(Owner, self._app)
-        self.keys = KeyStream(self.process_message, partial(app.show_line, mark="!"), app.dropped, self._more)
+    # Input
 
     def _sigcont_application(self, *_: object) -> None:
         """Handle SIGCONT in the loop: a signal handler may run while the writer's lock is held."""
