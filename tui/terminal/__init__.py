@@ -2,7 +2,7 @@
 
 The debt: what is used here of Textual 8 that is private to it, why, and the upstream change that would end each.
 
-- `driver.Terminal` and `ScreenWriter` extend `LinuxDriver` (`_enable_*`, `_patch_*`, `_must_signal_resume`): the stop
+- `driver.Terminal` extends `LinuxDriver` (`_enable_*`, `_patch_*`, `_must_signal_resume`): the stop
   is found in the bytes before any parser, and a write never waits. Ends with a driver whose input and output are given.
 - `keystream` feeds `_xterm_parser.XTermParser` and knows `_ansi_sequences`: the parser takes a stream whole; its rest
   cannot be dropped at a stop. Ends with a public parser that is fed in pieces and reset.

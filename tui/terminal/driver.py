@@ -7,9 +7,9 @@ no amount of it delays a stop.
 
 A thread writes to the terminal, and no frame waits in a queue for it. A frame goes out only when the terminal has
 swallowed the one before (`tui.frame_scheduler`). So a link that carries ten frames a second gets ten, the newest each
-time, and a key typed in between is shown after one frame, not after thirty. If Textual paints while the terminal accepts
-nothing, the writer drops frames, and repaints the whole screen once the terminal accepts output again. The event loop
-never waits for the terminal.
+time, and a key typed in between is shown after one frame, not after thirty. If Textual paints while the terminal
+accepts nothing, the writer drops frames, and repaints the whole screen once the terminal accepts output again. The
+event loop never waits for the terminal.
 """
 
 from __future__ import annotations
