@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import shlex
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import datetime
 from typing import TYPE_CHECKING, NamedTuple
@@ -12,9 +12,10 @@ from typing import TYPE_CHECKING, NamedTuple
 from rich.text import Text
 
 from multidrop.dialects.families import program_languages
-from multidrop.dialects.program_files import Entry, Problem, errors
+from multidrop.dialects.program_files import Entry, Part, Problem, errors
 from multidrop.shell.lines import join_target
-from multidrop.tui.editor import Mark
+from multidrop.shell.programs.edited_file import real_text
+from multidrop.tui.editor import Grammar, MacroGrammar, Mark
 from multidrop.tui.panels.view import Glance, name_of
 from multidrop.tui.readout import ProgramFacts
 from multidrop.tui.screen_model import Record
@@ -263,3 +264,44 @@ def run_choices(entries: Sequence[Entry], target: str, program: ProgramFacts) ->
     if program.break_point:
         found.append(Choice(f"Remove the break point {program.break_point}", with_target("/break", target, "off")))
     return [*found, Choice("List what the drive holds", with_target("/list", target))]
+
+
+# The lines of a file and those in a drive: which line of the file has which address, where both hold one program.
+
+
+Parts = Callable[[str], Sequence[Part]]
+
+
+def aligned(text: str, rows: Sequence[tuple[int, str]], parts: Parts) -> Mapping[int, int]:
+    """Return the line of the file, from 0, by address; empty unless the lines of the drive are there once, in a row."""
+    file = [(number, bare) for number, line in enumerate(text.split("\n")) if (bare := _bare(line, parts))]
+    held = [_bare(line, parts) for _, line in rows]
+    size = len(held)
+    found = [at for at in range(len(file) - size + 1) if size and [bare for _, bare in file[at : at + size]] == held]
+    if len(found) != 1:
+        return {}
+    return {address: number for (address, _), (number, _) in zip(rows, file[found[0] :], strict=False)}
+
+
+def _bare(line: str, parts: Parts) -> str:
+    """A line without its remark and its blanks, in capitals; `=` is a blank in most places."""
+    end = next((part.start for part in parts(line) if part.kind == "remark"), len(line))
+    return "".join(line[:end].upper().replace("=", " ").split())
+
+
+def product_of(session: Session) -> str:
+    return session.selected.product if session.selected is not None else ""
+
+
+def refusal(grammar: Grammar | None, text: OpenText) -> str:
+    """Say why a macro that is wrong is not saved; empty: it is saved. The old macro stays, and the text."""
+    if not isinstance(grammar, MacroGrammar) or not (found := grammar.check(real_text(text.text), "")):
+        return ""
+    return f"{found[0].line_for(text.name)}; not saved: the macro is as it was, and this text stays"
+
+
+def examined(grammar: Grammar, text: str, product: str, lines: tuple[tuple[int, str], ...]) -> Findings:
+    """Check a text and compare it with the lines of a drive. For a thread."""
+    problems = tuple(grammar.check(real_text(text), product))
+    addresses = tuple(aligned(text, lines, grammar.parts).items())
+    return Findings(problems, addresses, tuple(grammar.entries(text)))
