@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Any
 
 from multidrop.dialects import Diagnostic, DriveError, Refused, Stopped
 from multidrop.dialects.on_demand import imported
+from multidrop.drives.events import BusEvent, Changed
 from multidrop.shell.automation import ENDING, Automations, only_ends
 from multidrop.shell.connect.opening import open_buses
 from multidrop.shell.connect.settings import Settings
@@ -104,6 +105,21 @@ class Session(Workspace):
             self.log = None
         for bus in list(self.buses.values()):
             await self.forget(bus)
+
+    async def forget(self, bus: Bus) -> None:
+        """Close a bus and drop everything known of it, its twins too."""
+        self.twins.stop(bus)
+        await super().forget(bus)
+
+    def identified(self, bus: Bus) -> None:
+        """Note that the drives of a bus are found: its first one is selected there, and twins begin if wanted."""
+        super().identified(bus)
+        self.twins.identified(bus)
+
+    def _on_bus(self, bus: Bus, event: BusEvent) -> None:
+        super()._on_bus(bus, event)
+        if isinstance(event, Changed):
+            self.twins.changed(bus)
 
     # The path of a command
 

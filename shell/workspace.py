@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from multidrop.shell.connect.opening import Opened
     from multidrop.shell.connect.urls import Connection
     from multidrop.shell.raw import RawLine, Watched
-    from multidrop.shell.roles import Observer, OpenLog, RunningPlot, RunningTwins, Series
+    from multidrop.shell.roles import Observer, OpenLog, RunningPlot, Series
     from multidrop.simulator.serving.running import RunningFloor
 
 
@@ -79,9 +79,6 @@ class OpenBus:
 
 class Workspace(Channel):
     """What is open. Needs a running event loop, and belongs to its thread."""
-
-    twins: RunningTwins
-    """The twins of drives, which the session makes."""
 
     def __init__(self, settings: Settings, reconnect: bool = False) -> None:
         """Open nothing yet. `reconnect`: a bus that is lost is tried again until it is back or closed."""
@@ -143,7 +140,6 @@ class Workspace(Channel):
         record = self._open.get(bus)
         for observer in record.debuggers.values() if record is not None else ():
             observer.close()
-        self.twins.stop(bus)
         self._open.pop(bus, None)
         self.buses.pop(bus.name, None)
         self.addressed = {key for key in self.addressed if key[0] != bus.name}
@@ -264,7 +260,6 @@ class Workspace(Channel):
         if record := self._open.get(bus):
             record.selected = next(iter(bus.drives.values()), None)
         self.changed()
-        self.twins.identified(bus)
 
     def drive(self, bus: str = "", address: str | None = None) -> Drive:
         """Find the drive at an address (or label) of a bus, known or not; by default the selected one."""
@@ -371,7 +366,6 @@ class Workspace(Channel):
             self.publish(Notified(event.at, text, name, event.warning))
         elif isinstance(event, Changed):
             self.publish(StateChanged(event.at))
-            self.twins.changed(bus)
 
 
 def _in_order(opened: dict[Bus, OpenBus]) -> tuple[dict[Bus, OpenBus], dict[str, Bus]]:

@@ -14,7 +14,7 @@ from multidrop.shell.plots.request import PlotTarget, parse_rate, parse_series, 
 from multidrop.shell.streams.stdout import report, write
 
 if TYPE_CHECKING:
-    from multidrop.shell.workspace import Workspace
+    from multidrop.shell.session import Session
     from multidrop.transports import TransportLost
 
 
@@ -32,20 +32,20 @@ def run(
     )
 
 
-async def _until_ended(workspace: Workspace, target: PlotTarget, drives: Sequence[str], period: float) -> None:
+async def _until_ended(workspace: Session, target: PlotTarget, drives: Sequence[str], period: float) -> None:
     series = parse_series(workspace, drives)
     await read_first(workspace, series)
-    plotting = await begin(workspace, target, series, period)
-    write(sys.stderr, f"plotting to {plotting.where}, {plotting.rate}; Ctrl+C ends it")
-    if plotting.desk:
-        write(sys.stderr, f"at your desk: {plotting.desk}, then rerun {plotting.where}")
+    running, plot = await begin(workspace, target, series, period)
+    write(sys.stderr, f"plotting to {running.where}, {running.rate}; Ctrl+C ends it")
+    if running.desk:
+        write(sys.stderr, f"at your desk: {running.desk}, then rerun {running.where}")
     try:
-        await _ended(workspace, plotting.plot)
+        await _ended(workspace, plot)
     finally:
-        write(sys.stderr, await plotting.end())
+        write(sys.stderr, await running.end())
 
 
-async def _ended(workspace: Workspace, plot: Plot) -> None:
+async def _ended(workspace: Session, plot: Plot) -> None:
     """Wait until the plot fails, or a bus is lost for good. Raises that failure."""
     lost = runner.until(workspace, lambda: _lost(workspace))
     waits: list[asyncio.Task[object]] = [asyncio.create_task(plot.ended.wait()), asyncio.create_task(lost)]
@@ -57,7 +57,7 @@ async def _ended(workspace: Workspace, plot: Plot) -> None:
     raise _lost(workspace) or DriveError(plot.failure)
 
 
-def _lost(workspace: Workspace) -> TransportLost | None:
+def _lost(workspace: Session) -> TransportLost | None:
     """The loss of a bus that is not tried again."""
     trying = workspace.reconnections.trying
     return next((bus.lost for bus in workspace.buses.values() if bus.lost and bus.name not in trying), None)

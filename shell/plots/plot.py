@@ -10,7 +10,6 @@ from __future__ import annotations
 import asyncio
 import contextlib
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
 from datetime import datetime
 from functools import partial
 from typing import TYPE_CHECKING
@@ -34,7 +33,7 @@ from multidrop.shell.events import (
 from multidrop.shell.plots.file import SinkBroken
 from multidrop.shell.plots.request import PlotTarget, shown
 from multidrop.shell.plots.sink import AGREES, COLOURS, DIFFERS, RUNS, TWIN, Batch, Curve, Sink, State
-from multidrop.shell.roles import DIFFERENCE, Series
+from multidrop.shell.roles import DIFFERENCE, RunningPlot, Series
 from multidrop.shell.threads import in_thread
 from multidrop.transports.sockets import exposed
 
@@ -243,47 +242,26 @@ STATES, SPARING = 1.0, 2.0
 carries is asked for: a reading takes the time of four samples."""
 
 
-@dataclass(eq=False)
-class Plotting:
-    """A plot and its feed from a workspace."""
-
-    workspace: Workspace
-    plot: Plot
-    detach: Callable[[], None]
-    period: float
-
-    @property
-    def where(self) -> str:
-        return self.plot.target.text
-
-    @property
-    def desk(self) -> str:
-        """The line that a person types at another desk to see it."""
-        return self.plot.target.desk
-
-    @property
-    def rate(self) -> str:
-        """The rate of its samples that was asked for, in words."""
-        return shown(self.period)
-
-    async def end(self) -> str:
-        """End the plot; return one line about the result. Raises Diagnostic where it could not be written."""
-        if self in self.workspace.plots:
-            self.workspace.plots.remove(self)
-        self.detach()
-        return await self.plot.close()
-
-
-async def begin(workspace: Workspace, target: PlotTarget, series: Sequence[Series], period: float = MODEST) -> Plotting:
+async def begin(
+    workspace: Workspace, target: PlotTarget, series: Sequence[Series], period: float = MODEST
+) -> tuple[RunningPlot, Plot]:
     """Begin to plot drives and values, each every `period` s; 0: as fast as the line allows."""
     if not series:
         raise Diagnostic("no drive to plot", hint="/open URL opens a line of drives")
     plot = await Plot.open(target, clock=workspace.now, wall=workspace.wall)
-    plotting = Plotting(workspace, plot, attach(workspace, plot, series, period), period)
-    workspace.plots.append(plotting)
+    detach = attach(workspace, plot, series, period)
+
+    async def end() -> str:
+        if running in workspace.plots:
+            workspace.plots.remove(running)
+        detach()
+        return await plot.close()
+
+    running = RunningPlot(plot.target.text, plot.target.desk, shown(period), end)
+    workspace.plots.append(running)
     if target.serves and exposed(target.host):
         workspace.notify(f"other computers can read the plot at {target.text}; they need no password", warning=True)
-    return plotting
+    return running, plot
 
 
 def attach(workspace: Workspace, plot: Plot, series: Sequence[Series], period: float = MODEST) -> Callable[[], None]:

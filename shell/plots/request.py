@@ -25,7 +25,7 @@ from multidrop.shell.secrets import url_without_secrets
 
 if TYPE_CHECKING:
     from multidrop.drives.drive import Drive
-    from multidrop.shell.workspace import Workspace
+    from multidrop.shell.session import Session
 
 
 @dataclass(frozen=True)
@@ -110,7 +110,7 @@ def _viewer(text: str) -> PlotTarget:
 FORMS = "valid: ADDR, ADDR.VALUE or VALUE, with BUS: before ADDR if it is on another bus; as b, b.I1, VM"
 
 
-def parse_series(workspace: Workspace, texts: Sequence[str]) -> tuple[Series, ...]:
+def parse_series(workspace: Session, texts: Sequence[str]) -> tuple[Series, ...]:
     """Return the series of these texts; without a text, all drives of all buses. Sends nothing. Raises Diagnostic."""
     found: dict[Series, None] = {}
     for text in texts:
@@ -120,7 +120,7 @@ def parse_series(workspace: Workspace, texts: Sequence[str]) -> tuple[Series, ..
     return tuple(found)
 
 
-def _parse(workspace: Workspace, text: str) -> list[Series]:
+def _parse(workspace: Session, text: str) -> list[Series]:
     if drives := _drives(workspace, text):
         return [Series(bus, address) for bus, address in drives]
     target, dot, word = text.rpartition(".")
@@ -144,7 +144,7 @@ def _parse(workspace: Workspace, text: str) -> list[Series]:
     return found
 
 
-def _drives(workspace: Workspace, target: str) -> list[tuple[str, str]]:
+def _drives(workspace: Session, target: str) -> list[tuple[str, str]]:
     """The drives that `ADDR`, `BUS:ADDR` or `BUS:*` names; none if there is no such drive."""
     name, address = split_target(target)
     bus = workspace.buses.get(name or workspace.selected_bus)
@@ -157,7 +157,7 @@ def _drives(workspace: Workspace, target: str) -> list[tuple[str, str]]:
     return [] if found is None else [(bus.name, found)]
 
 
-def _valid(workspace: Workspace, target: str) -> str:
+def _valid(workspace: Session, target: str) -> str:
     bus, _ = split_target(target)
     name = bus or workspace.selected_bus
     if name not in workspace.buses:
@@ -165,19 +165,18 @@ def _valid(workspace: Workspace, target: str) -> str:
     return f"valid on {name}: {', '.join(workspace.buses[name].drives) or 'none'}"
 
 
-def _value(workspace: Workspace, bus: str, address: str, word: str, text: str) -> Series:
+def _value(workspace: Session, bus: str, address: str, word: str, text: str) -> Series:
     drive: Drive = workspace.buses[bus].drives[address]
     if not word:
         raise Diagnostic(f"no value in {text!r}", hint=FORMS)
     if word.lower() == DIFFERENCE:
-        twins = workspace.twins
-        if twins is None or not twins.running(workspace.buses[bus]):
+        if not workspace.twins.running(workspace.buses[bus]):
             raise Diagnostic(f"{drive.shown}: no twin runs that it could differ from", hint="/twin on begins one")
         return Series(bus, address, DIFFERENCE)
     return Series(bus, address, drive.family.values.check(drive.state, word))
 
 
-async def read_first(workspace: Workspace, series: Sequence[Series]) -> None:
+async def read_first(workspace: Session, series: Sequence[Series]) -> None:
     """Read each value once, as a person would, before it is polled. Raises the refusal of a drive that lacks it."""
     for bus, address, word in series:
         drive = workspace.buses[bus].drives[address]

@@ -101,7 +101,7 @@ async def plot(call: Call) -> None:
                 period = parse_rate(options.get("--rate", DEFAULT))
                 series = parse_series(workspace, texts)
                 await read_first(workspace, series)
-                begun = await begin(workspace, target, series, period)
+                begun, _ = await begin(workspace, target, series, period)
                 workspace.notify(f"plotting to {begun.where}, {begun.rate}")
                 if begun.desk:
                     workspace.notify(f"at your desk: {begun.desk}, then rerun {begun.where}")
