@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import NamedTuple, Protocol
+from collections.abc import Awaitable, Callable, Mapping
+from dataclasses import dataclass
+from typing import NamedTuple
 
 TIMES: Mapping[str, str] = {
     "off": "no times: more room for the lines",
@@ -39,21 +40,17 @@ class Filter(NamedTuple):
 EVERYTHING = Filter()
 
 
-class Transcripts(Protocol):
-    """The transcripts of a front end that has a screen."""
+@dataclass
+class Transcripts:
+    """What the transcripts of a front end with a screen can be asked."""
 
-    @property
-    def times(self) -> str:
-        """The form of the times, a word of `TIMES`."""
-
-    def set_times(self, form: str) -> None:
-        """Show times in another form."""
-
-    def choose(self, wanted: Filter) -> None:
-        """Show only some lines of the selected bus."""
-
-    async def save(self, path: str) -> str:
-        """Write the shown lines of the selected bus to a new file; return what was written. Raises Diagnostic."""
-
-    async def offer_unsent(self) -> None:
-        """Offer the lines that were held back or dropped last to a person, to be sent. Raises Diagnostic."""
+    times: Callable[[], str]
+    """Returns the form of the times, a word of `TIMES`."""
+    set_times: Callable[[str], None]
+    """Shows times in another form."""
+    choose: Callable[[Filter], None]
+    """Shows only some lines of the selected bus."""
+    save: Callable[[str], Awaitable[str]]
+    """Writes the shown lines of the selected bus to a new file; returns what was written. Raises Diagnostic."""
+    offer_unsent: Callable[[], Awaitable[None]]
+    """Offers the lines that were held back or dropped last to a person, to be sent. Raises Diagnostic."""

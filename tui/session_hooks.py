@@ -3,84 +3,18 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Awaitable, Callable, Sequence
+from collections.abc import Callable, Sequence
 from datetime import datetime, timedelta
-from typing import TYPE_CHECKING
 
 from multidrop.dialects import Diagnostic
 from multidrop.dialects.text import visible
 from multidrop.shell import new_file
 from multidrop.shell.channel import Field, Front
-from multidrop.shell.transcripts import Filter
+from multidrop.shell.transcripts import Filter, Transcripts
 from multidrop.tui.actions import Actions, Parts
-from multidrop.tui.outbox import Outbox
 from multidrop.tui.presenter import Presenter
 from multidrop.tui.screen_model import Record
-from multidrop.tui.screens.main_screen import MainScreen
 from multidrop.tui.widgets.transcript import MARKS
-
-if TYPE_CHECKING:
-    from multidrop.shell.session import Session
-
-
-class Transcripts:
-    """Implements `shell.transcripts.Transcripts`.
-
-    `offer` asks a person before lines are sent; `turn_deaf` discards keys that were typed before its question.
-    """
-
-    def __init__(
-        self,
-        main: MainScreen,
-        session: Session,
-        outbox: Outbox,
-        offer: Callable[[list[str], Callable[[list[str]], None]], Awaitable[None]],
-        turn_deaf: Callable[[], None],
-    ) -> None:
-        self._main, self._session, self._outbox = main, session, outbox
-        self._offer, self._turn_deaf = offer, turn_deaf
-
-    @property
-    def times(self) -> str:
-        return self._main.times
-
-    def set_times(self, form: str) -> None:
-        self._main.times = form
-        for page in (*self._main.pages.values(), self._main.beside.transcript):
-            page.set_times(form)
-
-    def choose(self, wanted: Filter) -> None:
-        """Show only some lines of the page that is shown."""
-        self._main.transcript.choose(wanted, typed=True)
-        self._main.transcript.look_end(newest=True)
-
-    async def save(self, path: str) -> str:
-        """Write the lines of the page that is shown to a new file. Raises Diagnostic."""
-        page = self._main.transcript
-        records = [page.records[number] for number in page.sight.numbers]
-        new_file.check(path)
-        now = self._session.now()
-        await asyncio.to_thread(_write, path, records, self._session.wall(now) - timedelta(seconds=now))
-        what = f", {page.sight.filter.words}" if page.sight.filter else ""
-        older = f"; {page.records.dropped} older ones were dropped before" if page.records.dropped else ""
-        return f"{len(records)} lines{what}, in {path}{older}"
-
-    async def offer_unsent(self) -> None:
-        """Offer the lines that were not sent. Raises Diagnostic if there are none."""
-        lines = self._outbox.unsent_lines()
-        if not lines:
-            raise Diagnostic("every line was sent", "/unsent", "it offers the lines that a failure or a stop held back")
-        self._turn_deaf()
-        await self._offer(lines, self._outbox.paste_again)
-
-
-def _write(path: str, records: Sequence[Record], zero: datetime) -> None:
-    """Write records to a new file. `zero`: the time of day at time 0 of the session's clock. Raises Diagnostic."""
-    lines = []
-    for record in records:
-        time = (zero + timedelta(seconds=record.at)).isoformat(" ", "milliseconds")
-        lines.append(f"{time}  {record.address:3} {MARKS[record.mark][0]} {visible(record.text)}\n")
-    new_file.write(path, "".join(lines))
 
 
 class Hooks:
@@ -96,7 +30,7 @@ class Hooks:
             edit=self._edit,
             screen=self._show_page,
             transcripts=Transcripts(
-                parts.main, parts.session, parts.outbox, parts.questions.paste, parts.keyboard.turn_deaf
+                lambda: parts.main.times, self._set_times, self._choose, self._save, self._offer_unsent
             ),
         )
 
@@ -131,3 +65,45 @@ class Hooks:
         """Take `/quit` as Ctrl+Q, which ends the app by itself."""
         self._parts.app.call_later(self._parts.app.action_quit)
         return False
+
+    # Transcripts
+
+    def _set_times(self, form: str) -> None:
+        main = self._parts.main
+        main.times = form
+        for page in (*main.pages.values(), main.beside.transcript):
+            page.set_times(form)
+
+    def _choose(self, wanted: Filter) -> None:
+        """Show only some lines of the page that is shown."""
+        self._parts.main.transcript.choose(wanted, typed=True)
+        self._parts.main.transcript.look_end(newest=True)
+
+    async def _save(self, path: str) -> str:
+        """Write the lines of the page that is shown to a new file. Raises Diagnostic."""
+        page, session = self._parts.main.transcript, self._parts.session
+        records = [page.records[number] for number in page.sight.numbers]
+        new_file.check(path)
+        now = session.now()
+        await asyncio.to_thread(_write, path, records, session.wall(now) - timedelta(seconds=now))
+        what = f", {page.sight.filter.words}" if page.sight.filter else ""
+        older = f"; {page.records.dropped} older ones were dropped before" if page.records.dropped else ""
+        return f"{len(records)} lines{what}, in {path}{older}"
+
+    async def _offer_unsent(self) -> None:
+        """Offer the lines that were not sent. Raises Diagnostic if there are none."""
+        outbox = self._parts.outbox
+        lines = outbox.unsent_lines()
+        if not lines:
+            raise Diagnostic("every line was sent", "/unsent", "it offers the lines that a failure or a stop held back")
+        self._parts.keyboard.turn_deaf()
+        await self._parts.questions.paste(lines, outbox.paste_again)
+
+
+def _write(path: str, records: Sequence[Record], zero: datetime) -> None:
+    """Write records to a new file. `zero`: the time of day at time 0 of the session's clock. Raises Diagnostic."""
+    lines = []
+    for record in records:
+        time = (zero + timedelta(seconds=record.at)).isoformat(" ", "milliseconds")
+        lines.append(f"{time}  {record.address:3} {MARKS[record.mark][0]} {visible(record.text)}\n")
+    new_file.write(path, "".join(lines))

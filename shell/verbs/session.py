@@ -160,7 +160,7 @@ def _transcripts(call: Call) -> Transcripts:
 async def times(call: Call) -> None:
     transcripts, forms = _transcripts(call), list(TIMES)
     words = call.words()
-    form = words[0] if words else forms[(forms.index(transcripts.times) + 1) % len(forms)]
+    form = words[0] if words else forms[(forms.index(transcripts.times()) + 1) % len(forms)]
     if form not in TIMES:
         raise call.wrong(f"no form {form}")
     transcripts.set_times(form)

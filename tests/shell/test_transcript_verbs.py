@@ -19,12 +19,15 @@ CELL = bus("press", party("a"), party("b"))
 class Shelf:
     """Notes what a verb asks of the screen."""
 
-    times = "clock"
+    form = "clock"
     wanted = EVERYTHING
     offered = 0
 
+    def times(self) -> str:
+        return self.form
+
     def set_times(self, form: str) -> None:
-        self.times = form
+        self.form = form
 
     def choose(self, wanted: Filter) -> None:
         self.wanted = wanted
@@ -73,7 +76,7 @@ async def test_a_wrong_line_changes_nothing(line: str, why: str, tmp_path: Path)
         shelf = cell.session.front.transcripts = Shelf()
         with pytest.raises(Diagnostic, match=why):
             await cell.session.run(line)
-        assert (shelf.wanted, shelf.times, shelf.offered) == (EVERYTHING, "clock", 0)
+        assert (shelf.wanted, shelf.form, shelf.offered) == (EVERYTHING, "clock", 0)
 
 
 async def test_times_go_round_and_are_kept(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -83,12 +86,12 @@ async def test_times_go_round_and_are_kept(tmp_path: Path, monkeypatch: pytest.M
     async with CellSession(tmp_path, CELL) as cell:
         shelf = cell.session.front.transcripts = Shelf()
         await cell.session.run("/times")
-        assert (shelf.times, settings.load().look.times) == ("start", "start")
+        assert (shelf.form, settings.load().look.times) == ("start", "start")
         await cell.session.run("/times last")
         assert file.read_text() == '# mine\n[screen]\ntheme = "multidrop-light"\ntimes = "last"\n'
         file.write_text("[[")
         await cell.session.run("/times off")
-        assert shelf.times == "off", "a broken configuration keeps nobody from working"
+        assert shelf.form == "off", "a broken configuration keeps nobody from working"
         said = [each for each in cell.events if isinstance(each, Notified)][-1]
         assert said.warning and "not kept" in said.text
         assert file.read_text() == "[["
