@@ -25,7 +25,6 @@ if TYPE_CHECKING:
     from multidrop.api.telemetry import AsyncTelemetry
     from multidrop.dialects.values import Readings
     from multidrop.drives.drive import Drive
-    from multidrop.drives.drive import Drive as Wire
 
 
 Lines = list[str]
@@ -47,8 +46,6 @@ class AsyncPrograms:
 
         `raw`: as they are stored. Raises Diagnostic for a file that exists.
         """
-        from multidrop.shell import new_file
-
         if file:
             new_file.check(file)
         shell = self._calls.shell
@@ -128,7 +125,7 @@ _WORD = re.compile(r"[A-Za-z]\w*", re.ASCII)
 class DriveFacts:
     """What is known of a drive without asking it."""
 
-    def __init__(self, calls: Calls, drive: Wire, axis: str) -> None:
+    def __init__(self, calls: Calls, drive: Drive, axis: str) -> None:
         self.drive = drive
         self.axis = axis
         """The axis that it moves and reads; empty: the first."""
@@ -180,7 +177,7 @@ class DriveFacts:
 class AsyncDrive(DriveFacts):
     """A drive of a session. Steps are the drive's own units: motor steps, or counts with its encoder in use."""
 
-    def __init__(self, calls: Calls, drive: Wire, axis: str = "") -> None:
+    def __init__(self, calls: Calls, drive: Drive, axis: str = "") -> None:
         super().__init__(calls, drive, axis)
         self._axis_known = not axis
         self.programs = AsyncPrograms(calls, drive)
