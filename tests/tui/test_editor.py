@@ -16,8 +16,7 @@ from multidrop.shell.programs.program_text import ProgramGrammar
 from multidrop.shell.state.store import Drafts
 from multidrop.tui.editor import MacroGrammar, grammar_of
 from multidrop.tui.screens.dialogs import Match
-from multidrop.tui.screens.program_rows import aligned
-from multidrop.tui.screens.program_rows import UPLOAD, Finder, files_in
+from multidrop.tui.screens.program_rows import UPLOAD, Finder, aligned, files_in
 from multidrop.tui.texts import Texts
 
 LINES = st.text(st.characters(min_codepoint=9, max_codepoint=0x17F, exclude_characters="\n\r"), max_size=40)
