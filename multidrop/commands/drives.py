@@ -118,9 +118,14 @@ def params_diff(chosen: argparse.Namespace) -> int:
     return code or (DIFFERS if differs else 0)
 
 
+def _named(chosen: argparse.Namespace) -> frozenset[str]:
+    """The parameters that are named, with commas between several."""
+    return frozenset(name.strip().upper() for name in ",".join(chosen.named).split(",") if name.strip())
+
+
 def params_restore(chosen: argparse.Namespace) -> int:
     options = Options(
-        named=frozenset(name.strip().upper() for each in chosen.named for name in each.split(",") if name.strip()),
+        named=_named(chosen),
         communication=chosen.communication,
         save=chosen.save,
         dry_run=chosen.dry_run,
@@ -147,7 +152,7 @@ def apply(chosen: argparse.Namespace) -> int:
         raise Diagnostic(f"--from {chosen.source} is for one drive", "snapshot apply", "--drive names one")
     cell = cells.load(chosen.file, settings.load().allowed)
     wanted = Options(
-        named=frozenset(name.strip().upper() for name in ",".join(chosen.named).split(",") if name.strip()),
+        named=_named(chosen),
         dry_run=chosen.dry_run,
         other_product=chosen.other_product,
     )

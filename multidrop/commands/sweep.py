@@ -9,7 +9,7 @@ import argparse
 import json
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from datetime import datetime
 from functools import partial
 
@@ -22,7 +22,7 @@ from multidrop.shell.signals import Interruption
 from multidrop.shell.streams.stdout import INTERRUPTED, StatusLine, write
 from multidrop.shell.sweeps import plan as planning
 from multidrop.shell.sweeps import workers
-from multidrop.shell.sweeps.failures import Failures, command, grouped, rows
+from multidrop.shell.sweeps.failures import Group, command, grouped, rows
 from multidrop.shell.sweeps.plan import Asked, Plan
 from multidrop.shell.sweeps.trial import Case, Result, bench
 from multidrop.shell.sweeps.variation import SEED, spelled
@@ -147,28 +147,28 @@ class Report:
             self._take(self._early.pop(number))
         seconds = time.perf_counter() - self._began
         interruption.came = False  # the next signal ends the search
-        failures = self._failures(interruption, LATE_SEARCH if code else SEARCH)
+        groups = self._groups(interruption, LATE_SEARCH if code else SEARCH)
         self.erase()
         if code not in (0, INTERRUPTED) and not self._reported:
-            return self._finish_junit(failures, seconds, code)
+            return self._finish_junit(groups, seconds, code)
         if self._json:
             summary = {"cases": len(self._reported), "failed": len(self._failed), "seconds": round(seconds, 3)}
             write(sys.stdout, json.dumps({"summary": summary}))
         else:
-            if failures.groups:
-                write(sys.stdout, *rows(self._plan, failures))
+            if groups:
+                write(sys.stdout, *rows(self._plan, groups, len(self._failed)))
             write(sys.stdout, f"{self._counted}, {len(self._failed)} failed, {seconds:.1f} s")
         if code:
             write(sys.stderr, f"ended after {self._counted} of {self._plan.count}; the others were not run")
         elif interruption.came:
             write(sys.stderr, "interrupted while simpler worlds were looked for")
-        return self._finish_junit(failures, seconds, code or (FAILED if self._failed else 0))
+        return self._finish_junit(groups, seconds, code or (FAILED if self._failed else 0))
 
     @property
     def _counted(self) -> str:
         return f"{len(self._reported)} case{'' if len(self._reported) == 1 else 's'}"
 
-    def _failures(self, interruption: Interruption, seconds: float) -> Failures:
+    def _groups(self, interruption: Interruption, seconds: float) -> list[Group]:
         """Put failures into groups; look for simpler worlds in this time, until there is a signal."""
         ready, until = bench(self._plan.job), time.perf_counter() + seconds
 
@@ -184,13 +184,11 @@ class Report:
 
         return grouped(self._plan, self._failed.values(), run)
 
-    def _finish_junit(self, failures: Failures, seconds: float, code: int) -> int:
+    def _finish_junit(self, groups: Sequence[Group], seconds: float, code: int) -> int:
         if not self._junit.wanted:
             return code
         commands = {
-            number: command(self._plan, group.world, group.failed)
-            for group in failures.groups
-            for number in group.numbers
+            number: command(self._plan, group.world, group.failed) for group in groups for number in group.numbers
         }
         cases = [self._junit_case(number, commands) for number in self._reported]
         if len(cases) < self._plan.count:

@@ -91,27 +91,17 @@ class Group:
         return result.failed == self.failed and all(small is None or small == value for small, value in pairs)
 
 
-@dataclass(frozen=True)
-class Failures:
-    """The groups, and how many further failures belong to none of them."""
-
-    groups: list[Group]
-    more: int
-
-
-def grouped(plan: Plan, failures: Iterable[Result], run: Run) -> Failures:
+def grouped(plan: Plan, failures: Iterable[Result], run: Run) -> list[Group]:
+    """Put failures into groups, MOST at most. `run` runs a case in search of a simpler world."""
     groups: list[Group] = []
-    more = 0
     for result in failures:
         case = plan.case(result.number)
         group = next((each for each in groups if each.explains(case, result)), None)
         if group is None and len(groups) < MOST:
             group = _simplest(plan, case, result, run, groups)
-        if group is None:
-            more += 1
-        else:
+        if group is not None:
             group.numbers.append(result.number)
-    return Failures(groups, more)
+    return groups
 
 
 def _simplest(plan: Plan, case: Case, result: Result, run: Run, groups: list[Group]) -> Group:
@@ -143,9 +133,10 @@ def command(plan: Plan, world: World, failed: int) -> str:
     return subprocess.list2cmdline(words) if sys.platform == "win32" else shlex.join(words)
 
 
-def rows(plan: Plan, failures: Failures) -> Iterator[str]:
+def rows(plan: Plan, groups: Sequence[Group], failed: int) -> Iterator[str]:
+    """The lines of the table of groups. `failed`: the number of all failed cases."""
     table = [("cases", "first", "seen", "simplest world that fails so")]
-    for each in failures.groups:
+    for each in groups:
         world = plan.settings((0, each.world))
         shown = " ".join(f"{name}={spelled(value)}" for name, value in world.items())
         table.append((str(len(each.numbers)), str(each.numbers[0]), each.why, shown or "the cell's own"))
@@ -153,7 +144,7 @@ def rows(plan: Plan, failures: Failures) -> Iterator[str]:
     for number, (cases, first, seen, shown) in enumerate(table):
         yield f"{cases:>{widths[0]}}  {first:>{widths[1]}}  {seen:{min(widths[2], WIDTH)}}  {shown}"
         if number:
-            group = failures.groups[number - 1]
+            group = groups[number - 1]
             yield f"{' ' * widths[0]}  {command(plan, group.world, group.failed)}"
-    if failures.more:
-        yield f"and {failures.more} further failed cases; --json lists all"
+    if more := failed - sum(len(each.numbers) for each in groups):
+        yield f"and {more} further failed cases; --json lists all"

@@ -5,7 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from multidrop.dialects import Diagnostic
-from multidrop.shell.sweeps.conditions import Outcome, parse
+from multidrop.shell.sweeps.trial import Outcome, parse_condition
 
 SEEN = Outcome(51198, (86, 81), ("at 51200", "7"), 1.5, "E")
 STAGE = Outcome((100, -200), ("?Moving",), (), 0.25, "until")
@@ -41,7 +41,7 @@ STAGE = Outcome((100, -200), ("?Moving",), (), 0.25, "until")
     ],
 )
 def test_a_condition_is_a_comparison_over_the_results(text: str, holds: bool) -> None:
-    assert parse(text, SEEN).holds(SEEN) is holds
+    assert parse_condition(text, SEEN).holds(SEEN) is holds
 
 
 @pytest.mark.parametrize(
@@ -56,7 +56,7 @@ def test_a_condition_is_a_comparison_over_the_results(text: str, holds: bool) ->
     ],
 )
 def test_a_controller_has_a_position_for_each_axis_and_texts_as_errors(text: str, holds: bool) -> None:
-    assert parse(text, STAGE).holds(STAGE) is holds
+    assert parse_condition(text, STAGE).holds(STAGE) is holds
 
 
 @pytest.mark.parametrize(
@@ -70,7 +70,7 @@ def test_a_controller_has_a_position_for_each_axis_and_texts_as_errors(text: str
     ],
 )
 def test_what_was_seen_is_said_in_the_words_of_conditions(text: str, seen: str) -> None:
-    assert parse(text, SEEN).seen(SEEN) == seen
+    assert parse_condition(text, SEEN).seen(SEEN) == seen
 
 
 @pytest.mark.parametrize(
@@ -95,18 +95,18 @@ def test_what_was_seen_is_said_in_the_words_of_conditions(text: str, seen: str) 
 )
 def test_a_wrong_condition_is_one_line(text: str, what: str) -> None:
     with pytest.raises(Diagnostic, match=what) as problem:
-        parse(text, SEEN)
+        parse_condition(text, SEEN)
     assert "\n" not in str(problem.value)
 
 
 def test_a_calculation_without_a_result_is_said() -> None:
     with pytest.raises(Diagnostic, match="/ 0 has no result"):
-        parse("position / errors_0 == 1".replace("errors_0", "(virtual_s - virtual_s)"), SEEN).holds(SEEN)
+        parse_condition("position / errors_0 == 1".replace("errors_0", "(virtual_s - virtual_s)"), SEEN).holds(SEEN)
 
 
 @given(st.text("positnerv_sd =[]()\"'+-<>!.,0123456789/*%@", max_size=30))
 def test_no_text_breaks_the_parser(text: str) -> None:
     try:
-        parse(text, SEEN).holds(SEEN)
+        parse_condition(text, SEEN).holds(SEEN)
     except Diagnostic as problem:
         assert "\n" not in str(problem)
