@@ -19,7 +19,7 @@ from multidrop.shell.events import By, Notified, Output, Progressed, SessionEven
 
 if TYPE_CHECKING:
     from multidrop.drives.drive import Drive
-    from multidrop.shell.transcripts import Transcripts
+    from multidrop.shell.roles import Transcripts
 
 
 T = TypeVar("T")

@@ -10,7 +10,7 @@ from multidrop.dialects import Diagnostic
 from multidrop.dialects.text import visible
 from multidrop.shell import new_file
 from multidrop.shell.channel import Field, Front
-from multidrop.shell.transcripts import Filter, Transcripts
+from multidrop.shell.roles import Filter, Transcripts
 from multidrop.tui.actions import Actions, Parts
 from multidrop.tui.presenter import Presenter
 from multidrop.tui.screen_model import Record

@@ -46,7 +46,7 @@ from multidrop.dialects import Diagnostic
 from multidrop.dialects.files import opened, split_lines, text_of, toml_of, utf8_of, why
 from multidrop.dialects.text import visible
 from multidrop.macros.atomic import write_atomically
-from multidrop.shell.transcripts import TIMES
+from multidrop.shell.roles import TIMES
 
 if TYPE_CHECKING:
     from multidrop.dialects import DriveState, Family

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from multidrop.shell import transcripts
+from multidrop.shell import roles
 from multidrop.shell.operations.arguments import WHAT, YES, drives
 from multidrop.shell.operations.operation import Arguments, Operation, typed
 
@@ -147,7 +147,7 @@ TIMES = Operation(
     configuration keeps the form for the next start.
     """,
     work="session:times",
-    words=transcripts.TIMES,
+    words=roles.TIMES,
     immediate=True,
     fits=has_transcript,
 )

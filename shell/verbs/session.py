@@ -19,7 +19,7 @@ from multidrop.shell.new_file import STANDARD_OUTPUT
 from multidrop.shell.operations.operation import Operation
 from multidrop.shell.operations.table import VERBS
 from multidrop.shell.operations.usage import split
-from multidrop.shell.transcripts import EVERYTHING, TIMES, Filter, Transcripts
+from multidrop.shell.roles import EVERYTHING, TIMES, Filter, Transcripts
 from multidrop.shell.verbs.call import Call, words
 
 if TYPE_CHECKING:

@@ -7,7 +7,7 @@ import pytest
 from multidrop.dialects import Diagnostic
 from multidrop.shell.connect import settings
 from multidrop.shell.events import Notified
-from multidrop.shell.transcripts import EVERYTHING, Filter
+from multidrop.shell.roles import EVERYTHING, Filter
 from tests.support.cases import for_each
 from tests.support.cell_session import CellSession, bus, party
 

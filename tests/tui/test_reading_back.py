@@ -9,7 +9,7 @@ from textual.pilot import Pilot
 from multidrop.dialects import Diagnostic
 from multidrop.drives.events import Unsolicited
 from multidrop.shell.events import By, Entered, OnBus, Printed
-from multidrop.shell.transcripts import Filter
+from multidrop.shell.roles import Filter
 from multidrop.tui.app import MultidropApp
 from multidrop.tui.outbox import BURST
 from multidrop.tui.screens.dialogs import LEAST, Confirm

@@ -15,8 +15,7 @@ from multidrop.drives.events import Conditioned, Sample, Traffic, Valued
 from multidrop.drives.stopping import Fate
 from multidrop.shell.events import Bytes, OnBus, Phase, Printed, ProgramRead, ProgramSeen, SettingsRead
 from multidrop.shell.prompt.complete import Completion
-from multidrop.shell.roles import Series
-from multidrop.shell.transcripts import Filter
+from multidrop.shell.roles import Filter, Series
 from multidrop.transports import TransportLost
 from multidrop.tui.screens.program import ProgramPage
 from multidrop.tui.widgets.theme import Signs

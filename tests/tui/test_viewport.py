@@ -5,7 +5,7 @@ from collections.abc import Iterable
 from hypothesis import given
 from hypothesis import strategies as st
 
-from multidrop.shell.transcripts import EVERYTHING, Filter
+from multidrop.shell.roles import EVERYTHING, Filter
 from multidrop.tui.screen_model import Record
 from multidrop.tui.widgets.viewport import Index, Picked, Records, Search, Shown, Sight
 from tests.support.cases import for_each

@@ -12,7 +12,7 @@ from textual.binding import Binding, BindingType
 from textual.containers import Horizontal, Vertical
 from textual.geometry import Size
 
-from multidrop.shell.transcripts import Filter
+from multidrop.shell.roles import Filter
 from multidrop.tui.keymap import named_key
 from multidrop.tui.panels.table import CONDITIONS, MOTION, PANELS, Panel, Shown, divided, fitting
 from multidrop.tui.screen_model import Record

@@ -11,8 +11,8 @@ from typing import NamedTuple
 from rich.cells import cell_len, chop_cells
 from textual import events
 
+from multidrop.shell.roles import Filter
 from multidrop.shell.streams.event_printer import laid_out
-from multidrop.shell.transcripts import Filter
 from multidrop.tui.screen_model import Record
 from multidrop.tui.text import at_words, fit, visible
 from multidrop.tui.widgets.lines import Lines, Row, Span, spread, width_of

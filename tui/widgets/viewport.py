@@ -13,7 +13,7 @@ from itertools import islice
 from typing import Protocol
 
 from multidrop.shell.lines import EVERYONE
-from multidrop.shell.transcripts import EVERYTHING, Filter
+from multidrop.shell.roles import EVERYTHING, Filter
 from multidrop.tui.screen_model import KEPT, Record
 
 # The records of one bus: the last ones, by number, as many as fit into a bound of lines and of text.
