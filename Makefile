@@ -9,7 +9,7 @@ WORKERS := $(shell $(PYTHON) -c 'import os; print((os.cpu_count() or 1) + 1)')
 PYTEST = $(BIN)/python -m pytest --dist worksteal -n $(WORKERS)
 PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check
 
-.PHONY: demo test quick nightly check format lint types types-here types-darwin types-win32 contracts measured coverage bench readme shipped pictures package fuzz soak snapshots clean
+.PHONY: demo test quick nightly check format lint types types-here types-darwin types-win32 contracts measured coverage bench readme shipped pictures package fuzz soak simulate snapshots clean
 
 demo: $(VENV)/.run
 	$(BIN)/multidrop demo
@@ -90,6 +90,10 @@ $(FUZZ)/.done: constraints.txt
 # Noise, kills and hours of work, judged and reported in soak/results: hours, or minutes with SOAK=short.
 soak: $(VENV)/.dev
 	SOAK=$(or $(SOAK),full) $(BIN)/python -m soak
+
+# Seeds of the whole program in simulated time: SEED=7 one, with its trace if it breaks a rule; SEEDS=1-200 a range.
+simulate: $(VENV)/.dev
+	$(BIN)/python -m soak.simulation $(if $(SEED),--seed $(SEED)) $(if $(SEEDS),--seeds $(SEEDS)) $(if $(STEPS),--steps $(STEPS))
 
 snapshots: $(VENV)/.dev
 	$(BIN)/python -m pytest tests -k snapshot --snapshot-update

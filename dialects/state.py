@@ -122,6 +122,9 @@ class DriveState:
     def stopped(self) -> None:
         """Record that a stop was written to the drive."""
 
+    def line_invalidated(self) -> None:
+        """Record that a half-sent line was made harmless, which a drive may take for an error."""
+
     def found_storing(self) -> None:
         self.programming = True
 

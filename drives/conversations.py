@@ -147,6 +147,8 @@ class Conversation(Generic[T]):
         self._stops = conversations.stops(state)
         self._unproven = ""
         """The last command, until a reply shows that it was executed."""
+        self._executed = ""
+        """The last command, once a reply has shown that it was executed."""
         self._request: Request | None = None
         """The request that it sends now."""
         self._ticket = 0
@@ -259,19 +261,27 @@ class Conversation(Generic[T]):
             self._on_ended(transaction)
         if self._all.witnesses.all:
             self._taken.append(transaction)
-        if request.kind not in ASKING:
+        if request.kind not in ASKING and (sent or reply.end is not End.STOPPED):
             self._unproven = "" if reply.acknowledged else request.text
+            self._executed = request.text if reply.acknowledged and request.kind is not Kind.PROGRAM else ""
         if reply.end is not End.STOPPED:
             return self._procedure.send(reply)
         if not self._cleaning_up:
             self._cleaning_up = True
             if sent:
                 self._state.reply_outstanding()
-            fate = "it is not known whether it was executed" if sent else "it was not sent"
-            return self._procedure.throw(Stopped(f"{self._name}: '{request.text}' was stopped; {fate}"))
+            return self._procedure.throw(Stopped(f"{self._name}: {self._fate(request.text, sent)}"))
         if sent:  # a second stop in the middle of the clean-up, which goes on
             return self._procedure.send(replace(reply, end=End.TIMEOUT))
         return self._request
+
+    def _fate(self, text: str, sent: bool) -> str:
+        """Describe what a stop leaves open: of the command that was sent last, not of what was asked about it."""
+        if self._executed:
+            return f"'{self._executed}' was executed before the stop"
+        if self._unproven or sent:
+            return f"'{self._unproven or text}' was stopped; it is not known whether it was executed"
+        return f"'{text}' was stopped; it was not sent"
 
     # The end
 

@@ -248,6 +248,9 @@ class Stopping:
             link.debris.stop_written(halt.data, link.line.transmitted)
             for drive in halt.affected:
                 drive.state.stopped()
+            if whole:  # every drive on the line has refused the rest of a line
+                for drive in self._roster.all_drives:
+                    drive.state.line_invalidated()
         if not halt.whole:
             conversations.stop(drive.state for drive in halt.affected)
 

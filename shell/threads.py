@@ -132,8 +132,18 @@ class BoundedWriter:
             self._changed.notify_all()
 
     def _run(self) -> None:
+        while self.turn():
+            pass
+
+    @property
+    def due(self) -> bool:
+        """Whether `turn` has something to do now."""
+        return bool(self._queue or self.closed or self._closing)
+
+    def turn(self) -> bool:
+        """Wait until something is due, and write once; False at the end. For the thread alone."""
         try:
-            while (data := self._next()) is not None:
+            if (data := self._next()) is not None:
                 written = self._write(data) if data else 0
                 with self._changed:
                     self.written += written
@@ -141,15 +151,17 @@ class BoundedWriter:
                     if data[written:]:
                         self._queue.appendleft(data[written:])
                     self._changed.notify_all()
+                return True
         except OSError as problem:
             self.problem = problem
             self.give_up()
         self._ended(self.problem)
+        return False
 
     def _next(self) -> bytes | None:
         """The bytes of the next write; None at the end. A loss waits until all before it is written."""
         with self._changed:
-            self._changed.wait_for(lambda: self._queue or self.closed or self._closing)
+            self._changed.wait_for(lambda: self.due)
             if self.closed or not self._queue:
                 return None
             data = b""

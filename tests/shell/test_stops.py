@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import pytest
 
-from multidrop.dialects import Motion, Stopped
+from multidrop.dialects import DriveError, Motion, Stopped
 from multidrop.drives.drive import confirmed_motion
 from multidrop.drives.stopping import Fate
 from multidrop.shell import stop_report
@@ -278,3 +278,60 @@ async def test_a_stop_in_the_middle_of_a_close_leaves_no_open_port_that_it_does_
         await asyncio.gather(closing, asking, return_exceptions=True)
         await asyncio.sleep(1.0)
         assert press.link.transport._open == ("press" in shop.session.buses)
+
+
+@pytest.mark.parametrize("em", [0, 1, 2, 3])
+async def test_the_error_of_a_line_that_a_stop_made_harmless_is_no_refusal_of_the_next(em, tmp_path):
+    """The stop makes the rest of a half-sent line overflow (error 20). A later move is not said to be refused."""
+    drive = f'personality = "LMDCM"\nset = {{ EM = {em}, CK = 1 }}'
+    async with CellSession(tmp_path, bus("press", drive)) as shop:
+        session = shop.session
+        typed = asyncio.ensure_future(session.run("MR 24"))
+        while b"MR 24" not in shop.written("press"):
+            await asyncio.sleep(0.0005)
+        session.stop("test")
+        with pytest.raises(DriveError):
+            await typed
+        await asyncio.sleep(3.0)
+        await session.run("/resume")
+        assert b"~~~~" in shop.written("press"), "the line was cut"
+        await session.run("MR 2700000")
+        assert shop.moving()
+        assert any("an old error, now cleared: error 20" in text for text in shop.told())
+
+
+NEW_LINE = ("MR 24000", 'PR "v",/x', "VM=1")
+"""A move, a print that the drive refuses, a setting that it refuses."""
+
+
+@pytest.mark.parametrize("em", [0, 1, 2, 3])
+@pytest.mark.parametrize("line", NEW_LINE)
+async def test_a_line_that_a_stop_cuts_off_is_reported_as_it_is_and_no_later_line_is_blamed_for_it(em, line, tmp_path):
+    """The stop comes at any moment of the line: of its bytes, of its reply, of what the host asks about it."""
+    drive = f'personality = "LMDCM"\nset = {{ EM = {em}, CK = 1 }}'
+    async with CellSession(tmp_path, bus("press", drive)) as shop:
+        session, device = shop.session, shop.device("press:!")
+        executed = []
+        execute = device.execute
+
+        def watched(text, *arguments, **named):
+            executed.append(str(text).strip())
+            return execute(text, *arguments, **named)
+
+        device.execute = watched
+        for moment in range(14):
+            executed.clear()
+            typed = asyncio.ensure_future(session.run(line))
+            await asyncio.sleep(moment * 0.007)
+            session.stop("test")
+            [ended] = await asyncio.gather(typed, return_exceptions=True)
+            await asyncio.sleep(3.0)
+            if isinstance(ended, Stopped) and "not sent" in str(ended):
+                assert line not in executed, ended
+            if isinstance(ended, Stopped) and "was executed" in str(ended).replace("whether it was executed", ""):
+                assert line in executed, ended
+            await session.run("/resume")
+            await session.run(f"MR {30000 + moment}")
+            assert f"MR {30000 + moment}" in executed
+            assert shop.moving()
+            await session.run("/wait stopped 20")

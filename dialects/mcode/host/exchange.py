@@ -8,7 +8,7 @@ from functools import lru_cache
 from typing import NoReturn
 
 from multidrop.dialects.codec import End, Kind, Priority, Procedure, Reply, Request
-from multidrop.dialects.errors import Inexpressible, NoAnswer, Refused
+from multidrop.dialects.errors import Inexpressible, NoAnswer, Refused, Stopped
 from multidrop.dialects.mcode.host import classify
 from multidrop.dialects.mcode.host.classify import INTEGER, NOTHING
 from multidrop.dialects.mcode.host.framing import ACK
@@ -147,6 +147,15 @@ def answered(state: MCodeState, request: Request) -> Procedure[Reply]:
     )
 
 
+def attempted(state: MCodeState, request: Request) -> Procedure[Reply]:
+    """Send a person's line as `answered` does. A stop that cuts it off leaves its error, if any, in the drive."""
+    try:
+        return (yield from answered(state, request))
+    except Stopped:
+        state.error_possible()
+        raise
+
+
 def note_error(state: MCodeState, reply: Reply) -> None:
     """Record what a reply shows of the error flag."""
     if reply.prompt or reply.flagged:
@@ -230,6 +239,7 @@ def check_error_flag(state: MCodeState, request: Request, silent: bool = False) 
     ended it. Otherwise the command was lost.
     """
     silent = silent and state.codec.em != 2
+    state.error_possible()  # until it is read: a stop may come in between
     asked = question(state, 'EF," ",BY' if silent else "EF", "[01] [01]" if silent else "[01]")
     try:
         reply = yield from answered(state, asked)

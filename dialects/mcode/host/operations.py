@@ -17,6 +17,7 @@ from multidrop.dialects.mcode.host.codec import EVERY_DRIVE, MCode
 from multidrop.dialects.mcode.host.exchange import (
     Sign,
     answered,
+    attempted,
     check_error_flag,
     check_printed,
     ends_in_program_mode,
@@ -324,7 +325,7 @@ def immediate(state: MCodeState, request: Request) -> Procedure[tuple[str, ...]]
     target = classify.target_of(request.text, state.rest)
     if displaces := classify.may_displace(request.text):
         state.heads_for(None)
-    reply = yield from answered(state, request)
+    reply = yield from attempted(state, request)
     if request.kind is Kind.LIST:
         # Print a mark after a list: EM 1 to 3 give a list no end.
         lines = reply.lines
@@ -349,7 +350,7 @@ def immediate(state: MCodeState, request: Request) -> Procedure[tuple[str, ...]]
 def _print(state: MCodeState, request: Request) -> Procedure[tuple[str, ...]]:
     """Send a person's print, signed so that no other line is taken for it."""
     request = signed(state, request)
-    reply = yield from answered(state, request)
+    reply = yield from attempted(state, request)
     if reply.end is End.SILENT:
         # Find the reason for an empty print: a refusal, or a loss (with EM=2, where not even a line feed is sent).
         if state.codec.em == 2:

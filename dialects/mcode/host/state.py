@@ -105,6 +105,14 @@ class MCodeState(DriveState):
         """Record a missing reply: it may be late, and the command may have arrived damaged and set the error flag."""
         self.reply_pending = self.error = True
 
+    def error_possible(self) -> None:
+        """Record that the error flag may be set, by a line whose outcome was not read: no later line is to blame."""
+        self.error = True
+
+    def line_invalidated(self) -> None:
+        """Record an overflow, which is error 20."""
+        self.error_possible()
+
     def program_started(self) -> None:
         """Record that a command that starts a program is on its way."""
         self.running, self.stepping = True, False

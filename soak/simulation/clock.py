@@ -1,0 +1,128 @@
+"""The one clock: an event loop whose time goes on only where nothing is ready, without descriptors and without threads.
+
+What the product does in a thread runs in the loop's thread here, after a time that the seed draws. A descriptor is a
+number that an object of the simulation has; that object says when it can be read or written.
+"""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable
+from concurrent.futures import Executor
+from random import Random
+from typing import Any
+
+LATE = 10.0
+"""The longest delay of a timer, s."""
+
+
+class Deadlock(AssertionError):
+    """Nothing is ready and no timer is set: something waits for ever."""
+
+
+class SimulatedLoop(asyncio.BaseEventLoop):
+    """An event loop in virtual time. `late`: the probability that a turn of the loop begins late."""
+
+    def __init__(self, rng: Random, late: float = 0.0) -> None:
+        super().__init__()
+        self.now = 0.0
+        self.turns = 0
+        self.late = late
+        self.defects: list[dict[str, Any]] = []
+        """Exceptions that nobody took."""
+        self._rng = rng
+        self._selector = self
+        """`BaseEventLoop` asks it what is ready, and how long to wait."""
+        self._readers: dict[int, asyncio.Handle] = {}
+        self._writers: dict[int, asyncio.Handle] = {}
+        self._descriptors = 1000
+        self.set_exception_handler(lambda loop, context: self.defects.append(context))
+
+    # What asyncio asks of a loop
+
+    def time(self) -> float:
+        """Virtual seconds, from 0."""
+        return self.now
+
+    def select(self, timeout: float | None) -> list[Any]:
+        """Let the time pass until the next timer; a starved loop sees it late."""
+        self.turns += 1
+        if timeout is None:
+            raise Deadlock("nothing is ready, and no timer is set")
+        self.now += max(0.0, timeout)
+        if self.late and self._rng.random() < self.late:
+            self.now += self._rng.random() ** 4 * LATE
+        return []
+
+    def close(self) -> None:
+        """Close the loop."""
+        self._readers.clear()
+        self._writers.clear()
+        super().close()
+
+    def _process_events(self, event_list: list[Any]) -> None:
+        """Do nothing: what becomes readable or writable calls back by itself."""
+
+    def _write_to_self(self) -> None:
+        """Do nothing: there is one thread."""
+
+    def run_in_executor(  # type: ignore[override]
+        self, executor: Executor | None, func: Callable[..., Any], *arguments: Any
+    ) -> asyncio.Future[Any]:
+        """Run blocking work in the loop's thread, after a short time."""
+        future = self.create_future()
+
+        def work() -> None:
+            if future.cancelled():
+                return  # the thread would run on, and nobody would see what it does: see `world`
+            try:
+                result = func(*arguments)
+            except Exception as error:  # of any kind: whoever awaits it takes it
+                future.set_exception(error)
+            else:
+                future.set_result(result)
+
+        self.call_later(self._rng.random() * 0.002, work)
+        return future
+
+    # Descriptors
+
+    def descriptor(self) -> int:
+        """A number for a new simulated descriptor."""
+        self._descriptors += 1
+        return self._descriptors
+
+    def add_reader(self, fd: int, callback: Callable[..., Any], *arguments: Any) -> None:  # type: ignore[override]
+        """Call back while a descriptor can be read."""
+        self._readers[fd] = asyncio.Handle(callback, arguments, self, None)
+        self.call_soon(self.readable, fd)
+
+    def remove_reader(self, fd: int) -> bool:  # type: ignore[override]
+        """Call back no longer."""
+        return self._removed(self._readers, fd)
+
+    def add_writer(self, fd: int, callback: Callable[..., Any], *arguments: Any) -> None:  # type: ignore[override]
+        """Call back while a descriptor can be written."""
+        self._writers[fd] = asyncio.Handle(callback, arguments, self, None)
+        self.call_soon(self.writable, fd)
+
+    def remove_writer(self, fd: int) -> bool:  # type: ignore[override]
+        """Call back no longer."""
+        return self._removed(self._writers, fd)
+
+    def readable(self, fd: int) -> None:
+        """Call the reader of a descriptor, if there is one."""
+        if (handle := self._readers.get(fd)) is not None:
+            handle._run()
+
+    def writable(self, fd: int) -> None:
+        """Call the writer of a descriptor, if there is one."""
+        if (handle := self._writers.get(fd)) is not None:
+            handle._run()
+
+    @staticmethod
+    def _removed(handles: dict[int, asyncio.Handle], fd: int) -> bool:
+        handle = handles.pop(fd, None)
+        if handle is not None:
+            handle.cancel()
+        return handle is not None

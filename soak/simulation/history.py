@@ -1,0 +1,92 @@
+"""What was typed, what the host said of it, and what the drives did: the history of one seed, for the judge.
+
+A command is known by its text, which is unique in a history. The drives' own record (`soak.judge.Witness`) says what
+they executed; the host's word is what the line's caller got, or the notice that it was not sent.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass, field
+from enum import Enum
+from hashlib import sha256
+
+UNSENT = re.compile(r"^not sent, as .*?: (.*)$")
+
+
+class Outcome(Enum):
+    """The host's word about a command."""
+
+    OPEN = "no word yet"
+    OK = "ok"
+    REFUSED = "refused"
+    NOT_SENT = "not sent"
+    UNKNOWN = "unknown"
+
+
+@dataclass
+class Command:
+    """A line that was typed. `stops`: the number of stops that were typed before it."""
+
+    text: str
+    line: str
+    """The line of drives."""
+    drive: str
+    typed: float
+    stops: int
+    expects: str = ""
+    """What it prints, if the reply is not damaged; empty: it is a command."""
+    outcome: Outcome = Outcome.OPEN
+    said: str = ""
+    began: float = -1.0
+    ended: float = -1.0
+
+
+@dataclass(frozen=True)
+class Executed:
+    """A line that a drive executed."""
+
+    at: float
+    line: str
+    drive: str
+    text: str
+
+
+@dataclass
+class History:
+    """Everything that happened, in its order."""
+
+    commands: dict[str, Command] = field(default_factory=dict)
+    executed: list[Executed] = field(default_factory=list)
+    stops: list[float] = field(default_factory=list)
+    """When the reads came that held the stop key."""
+    written: list[tuple[float, str, bytes]] = field(default_factory=list)
+    """Time, port and bytes of each write that the kernel took."""
+    notices: list[tuple[float, str]] = field(default_factory=list)
+    defects: list[str] = field(default_factory=list)
+    counts: dict[str, int] = field(default_factory=dict)
+    lines: list[str] = field(default_factory=list)
+    """The trace, for a person."""
+    keep: bool = False
+    _hash: object = field(default_factory=sha256)
+
+    def note(self, at: float, kind: str, text: str) -> None:
+        """Add to the trace."""
+        row = f"{at:.6f} {kind} {text}"
+        self._hash.update(row.encode())  # type: ignore[attr-defined]
+        if self.keep:
+            self.lines.append(row)
+
+    @property
+    def trace(self) -> str:
+        """A number of the trace: equal for equal histories."""
+        return str(self._hash.hexdigest()[:16])  # type: ignore[attr-defined]
+
+    def count(self, kind: str) -> None:
+        """Count a fault or an event."""
+        self.counts[kind] = self.counts.get(kind, 0) + 1
+
+    def unsent(self, notice: str) -> None:
+        """Take a notice that a line was not sent."""
+        if (found := UNSENT.match(notice)) is not None and (command := self.commands.get(found[1])) is not None:
+            command.outcome, command.said = Outcome.NOT_SENT, notice

@@ -1,0 +1,79 @@
+"""A person at the prompt: bytes of a terminal in random groupings, through the product's keyboard and queue of lines.
+
+The keyboard is the product's, without the thread that reads: each read of that thread is one call here. A read that
+holds the stop key calls `stop_ahead` at once, wherever the loop is; what the loop does with the bytes follows later.
+"""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable
+from random import Random
+
+from multidrop.shell.prompt.keyboard import STOP_KEY, Keyboard
+from multidrop.shell.prompt.terminal_input import at_keyboard
+from multidrop.shell.prompt.typed_lines import LineQueue
+from multidrop.shell.session import Session
+from soak.simulation.clock import SimulatedLoop
+
+PASTE = (b"\x1b[200~", b"\x1b[201~")
+
+
+class Person:
+    """Types at a session. `typed` is called with each read, before anything takes it."""
+
+    def __init__(
+        self, session: Session, loop: SimulatedLoop, rng: Random, typed: Callable[[bytes], None], lost: float = 0.0
+    ) -> None:
+        self.keyboard = Keyboard(-1, signals=False)
+        self.keyboard.stop_ahead, self.keyboard.stop = session.stop_ahead, self._stop
+        self.lines = LineQueue(session)
+        self._session, self._loop, self._rng, self._typed = session, loop, rng, typed
+        self._line = ""
+        self._at = 0.0
+        session.ask = lambda question: at_keyboard(self.keyboard, question)
+        self.keyboard.listen(self._listen)
+        self.working = loop.create_task(self.lines.run())
+
+    def type(self, data: bytes, spread: float = 0.0) -> None:
+        """Let bytes arrive: in reads of any size, within `spread` seconds, in their order."""
+        at = max(self._at, self._loop.now)
+        while data:
+            size = len(data) if not spread else self._rng.randrange(1, len(data) + 1)
+            piece, data = data[:size], data[size:]
+            at += self._rng.random() * spread
+            self._loop.call_at(at, self.read, piece)
+        self._at = at
+
+    def read(self, data: bytes) -> None:
+        """One read of the keyboard's thread."""
+        self._typed(data)
+        if STOP_KEY in data:
+            self.keyboard.stop_ahead()
+        self._loop.call_soon(self.keyboard._read, data)
+
+    def hang_up(self) -> None:
+        """The terminal goes away."""
+        self._loop.call_soon(self.keyboard._read, b"")
+
+    async def leave(self) -> None:
+        """Type nothing more."""
+        self.lines.close()
+        self.working.cancel()
+        await asyncio.gather(self.working, return_exceptions=True)
+
+    def _listen(self) -> None:
+        for char in self.keyboard.take():
+            if char in "\r\n":
+                line, self._line = self._line, ""
+                self.lines.enter(line)
+            elif char == "\x7f":
+                self._line = self._line[:-1]
+            elif char.isprintable():
+                self._line += char
+
+    def _stop(self, dropped: str) -> None:
+        lines, self._line = (self._line + dropped).splitlines(), ""
+        self._session.stop("Ctrl+X")
+        self.lines.stopped()
+        self.lines.show_unsent("a stop came", lines)

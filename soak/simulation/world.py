@@ -1,0 +1,391 @@
+"""The world of one seed: lines of drives with their wires and ports, a person at the prompt, and faults.
+
+A seed draws a machine (which lines, which drives), a climate (the probability of each fault), and a story: what the
+person types, and what happens meanwhile. All of it runs on the real session, its real lines and pipes, in one thread.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import shutil
+import tempfile
+from collections.abc import Awaitable, Callable, Iterator
+from contextlib import ExitStack
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from random import Random
+from typing import Any
+
+from multidrop.dialects import Diagnostic, DriveError
+from multidrop.shell.connect import opening
+from multidrop.shell.connect.settings import Settings, parse
+from multidrop.shell.connect.urls import Connection
+from multidrop.shell.events import Failed, Notified, Output, Printed
+from multidrop.shell.lines import TypedLine
+from multidrop.shell.session import Session
+from multidrop.simulator import cells
+from multidrop.simulator.cell.spec import Faults
+from multidrop.simulator.floor import Floor
+from multidrop.simulator.serving.running import RunningFloor
+from multidrop.transports import Transport, TransportLost, Unreachable
+from multidrop.transports.pipe import DescriptorPipe
+from soak.judge import Witness, Word, word
+from soak.languages import LANGUAGES, PROGRAM
+from soak.simulation.clock import SimulatedLoop
+from soak.simulation.history import Command, Executed, History, Outcome
+from soak.simulation.person import Person
+from soak.simulation.ports import Port, PortFaults
+from soak.simulation.threads import Scheduler
+from soak.simulation.wall import Wall
+
+STOP = b"\x18"
+WORDS = {
+    Word.DONE: Outcome.OK,
+    Word.UNCONFIRMED: Outcome.UNKNOWN,
+    Word.REFUSED: Outcome.REFUSED,
+    Word.NOT_EXECUTED: Outcome.NOT_SENT,
+    Word.UNKNOWN: Outcome.UNKNOWN,
+}
+LONGEST = 400.0
+"""Virtual seconds in which everything that was begun ends, once the faults are over."""
+
+
+@dataclass(frozen=True)
+class Place:
+    """A line of drives: its language, the names of its drives, and how it is opened."""
+
+    name: str
+    language: str
+    drives: tuple[str, ...]
+    em: int
+    checksum: int
+    baud: int
+    serial: bool
+
+    @property
+    def url(self) -> str:
+        """The URL that opens it."""
+        keys = [f"dialect={self.language}", "timeout=0.4", f"drives={','.join(self.drives)}" * bool(self.drives)]
+        keys += [f"baud={self.baud}"] * self.serial
+        target = f"serial:/dev/tty-{self.name}" if self.serial else f"tcp://{self.name}.plant:503"
+        return f"{target}?{'&'.join(filter(None, keys))}"
+
+    def cell(self) -> str:
+        """Its part of the cell file."""
+        language = LANGUAGES[self.language]
+        head = f'[[bus]]\nname = "{self.name}"\nbaud = {self.baud}\n'
+        tables = (
+            language.drive(each, self.em, self.checksum, bool(self.drives)) for each in self.drives or (language.alone,)
+        )
+        return head + "".join(f"[[bus.drive]]\n{table}" for table in tables)
+
+
+@dataclass(frozen=True)
+class Climate:
+    """The probabilities of a seed; `calm`: no faults but stops."""
+
+    calm: bool
+    wire: Faults
+    port: PortFaults
+    late: float
+    slow: float
+
+    @classmethod
+    def drawn(cls, rng: Random) -> Climate:
+        """Draw each fault's own probability."""
+
+        def chance(most: float) -> float:
+            return rng.random() ** 3 * most if rng.random() < 0.5 else 0.0
+
+        if rng.random() < 0.1:
+            return cls(True, Faults(), PortFaults(), 0.0, 0.0)
+        wire = Faults(
+            flip=chance(2e-3),
+            drop=chance(2e-3),
+            double=chance(2e-3),
+            insert=chance(2e-3),
+            late=chance(2e-2),
+            late_by=(0.01, 0.1 + chance(1.5)),
+            delay=(0.0, chance(0.5)),
+        )
+        port = PortFaults(chance(0.5), chance(0.5), chance(0.8), chance(0.5))
+        return cls(False, wire, port, chance(0.02), chance(0.3))
+
+
+def drawn_places(rng: Random) -> list[Place]:
+    """Draw a machine of one to three lines."""
+    places = []
+    for number in range(rng.choice((1, 1, 1, 2, 2, 3))):
+        language = rng.choice(("mcode", "mcode", "mcode", "pmx", "tmcl"))
+        party = language != "mcode" or rng.random() < 0.7
+        names = {"mcode": "abc", "pmx": ("01", "02", "03"), "tmcl": "123"}[language]
+        drives = tuple(names[: rng.randrange(1, 4)]) if party else ()
+        baud = rng.choice((9600, 9600, 19200, 38400, 115200))
+        em, checksum = rng.choice((0, 1, 1, 2, 3)), rng.choice((0, 1, 1, 1, 2)) if party else rng.choice((0, 1))
+        places.append(Place(f"l{number}", language, drives, em, checksum, baud, rng.random() < 0.8))
+    return places
+
+
+@dataclass
+class World:
+    """A machine, its person, and the history so far."""
+
+    seed: int
+    loop: SimulatedLoop
+    rng: Random
+    history: History
+    climate: Climate
+    places: list[Place]
+    folder: Path
+    wall: Wall
+    scheduler: Scheduler
+    floor: RunningFloor = field(init=False)
+    session: Session = field(init=False)
+    person: Person = field(init=False)
+    witnesses: dict[tuple[str, str], Witness] = field(default_factory=dict)
+    ports: dict[str, Port] = field(default_factory=dict)
+    serial: int = 0
+    stops: int = 0
+    """The number of stops that were typed, arrived or on their way."""
+
+    # Making
+
+    async def begin(self) -> None:
+        """Build the floor, open the session, and let the faults begin."""
+        (self.folder / "tick.mxt").write_text(PROGRAM)
+        cell = self.folder / "cell.toml"
+        cell.write_text(f"seed = {self.seed}\n" + "".join(place.cell() for place in self.places))
+        self.floor = RunningFloor(Floor(cells.load(str(cell))))
+        for placed in self.floor.floor.drives:
+            self._watch(placed.bus, placed.spec.name, placed.device)
+        self._open_session()
+        await self.session.open_all([place.name for place in self.places], lambda number, failure: None)
+        self.faults(True)
+
+    def _watch(self, line: str, drive: str, device: Any) -> None:
+        language = LANGUAGES[next(each.language for each in self.places if each.name == line)]
+        witness = self.witnesses[line, drive] = Witness(device, language.asks, language.refused)
+        seen = device.execute
+
+        def execute(text: Any, now: float, **how: Any) -> Any:
+            before = len(witness.executed)
+            answer = seen(text, now, **how)
+            for each in witness.executed[before:]:
+                self.history.executed.append(Executed(self.loop.now, line, drive, each))
+                self.history.note(self.loop.now, f"! {line}:{drive}", each)
+            return answer
+
+        device.execute = execute
+
+    def _open_session(self) -> None:
+        found = parse("".join(f'[connections.{each.name}]\nurl = "{each.url}"\n' for each in self.places), "world")
+        settings = replace(found, folder=self.folder / "config", state=self.folder / "state")
+        self.session = WatchedSession(settings, self)
+        self.session.subscribe(self._event)
+        self.person = Person(self.session, self.loop, self.rng, self._typed)
+
+    async def transport(
+        self, connection: Connection, port: str = "", within: float | None = None, baud: int | None = None
+    ) -> Transport:
+        """In place of the ports of this machine: a descriptor of the simulated kernel."""
+        name = (
+            connection.target.rpartition("-")[2] if connection.scheme == "serial" else connection.host.partition(".")[0]
+        )
+        await asyncio.sleep(self.rng.random() * 0.05)
+        if self.floor.floor.wires[name].hung_up or not self.floor.floor.connectable(name):
+            raise Unreachable(f"{connection.short}: not there")
+
+        def trace(way: str, data: bytes) -> None:
+            self.history.note(self.loop.now, f"{way} {name}", data.hex())
+            if way == ">":
+                self.history.written.append((self.loop.now, name, data))
+
+        made = self.ports[name] = Port(
+            connection.short,
+            self.loop,
+            self.floor,
+            name,
+            self.rng,
+            self.climate.port,
+            trace,
+            connection.scheme == "serial",
+        )
+        return DescriptorPipe(made)
+
+    def faults(self, on: bool) -> None:
+        """Let the faults begin or end."""
+        for name, wire in self.floor.floor.wires.items():
+            wire._faults, wire._rng = self.climate.wire if on else Faults(), Random(f"{self.seed} {name}")
+        self.loop.late = self.climate.late if on else 0.0
+        if not on:
+            for port in self.ports.values():
+                port._faults = PortFaults()
+
+    # What happens
+
+    def _event(self, event: object) -> None:
+        if isinstance(event, Notified | Failed | Printed | Output):
+            self.history.note(self.loop.now, type(event).__name__, event.text)
+            self.history.notices.append((self.loop.now, event.text))
+        if isinstance(event, Notified):
+            self.history.unsent(event.text)
+
+    def _typed(self, data: bytes) -> None:
+        self.history.note(self.loop.now, "key", data.hex())
+        if STOP in data:
+            self.history.stops.append(self.loop.now)
+
+    # The story
+
+    def command(self) -> str:
+        """Draw a line for a drive."""
+        place = self.rng.choice(self.places)
+        drive = self.rng.choice(place.drives or (LANGUAGES[place.language].alone,))
+        witness = self.witnesses[place.name, drive]
+        self.serial += 1
+        said = LANGUAGES[place.language].say(self.rng, self.serial, witness, self.floor.now())
+        target = f"@{place.name}:{drive if place.drives else ''} "
+        typed = f"{target}{said.text}"
+        if not said.prints:
+            self.history.commands[typed] = Command(said.text, place.name, drive, self.loop.now, self.stops)
+        return typed
+
+    async def step(self) -> None:
+        """Let one thing happen."""
+        rng, kind = self.rng, self.rng.random()
+        if kind < 0.55:
+            self.person.type(self.command().encode() + b"\r", rng.choice((0.0, 0.0, 0.01)))
+        elif kind < 0.75:
+            lines = b"".join(self.command().encode() + b"\r" for _ in range(rng.randrange(2, 5)))
+            self.person.type(lines, rng.choice((0.0, 0.02)))
+        elif kind < 0.83:
+            data = b"".join(self.command().encode() + b"\r" for _ in range(rng.randrange(0, 3)))
+            self.stops += 1
+            after = self.command().encode() + b"\r" if rng.random() < 0.5 else b""
+            self.person.type(data + STOP + after, rng.choice((0.0, 0.01)))
+            self.person.type(b"/resume\r", 0.0)
+        elif kind < 0.9:
+            self.person.type(rng.choice((b"/status\r", b"/wait stopped 3\r", b"/resume\r", b"\r", b"/sleep 0.2\r")))
+        elif not self.climate.calm:
+            await self._mishap()
+        await asyncio.sleep(rng.random() ** 2 * rng.choice((0.05, 0.6, 1.0, 2.0)))
+
+    async def _mishap(self) -> None:
+        rng = self.rng
+        place = rng.choice(self.places)
+        kind = rng.random()
+        if kind < 0.4:
+            self.history.count("unplugged")
+            self.floor.command(f"/sim unplug {place.name}")
+            self.loop.call_later(rng.random() * 5, self.floor.command, f"/sim plug {place.name}")
+        elif kind < 0.6:
+            self.history.count("clock of day")
+            self.wall.jump(rng.uniform(-4000, 4000))
+        else:
+            drive = rng.choice(place.drives or (LANGUAGES[place.language].alone,))
+            self.history.count("power")
+            with contextlib.suppress(Diagnostic):
+                self.floor.command(f"/sim power {place.name}:{drive} off")
+                self.loop.call_later(rng.random() * 5, self.floor.command, f"/sim power {place.name}:{drive} on")
+
+    async def end(self) -> None:
+        """End the faults, wait until nothing runs, and close."""
+        self.faults(False)
+        await asyncio.sleep(10.0)
+        deadline = self.loop.now + LONGEST
+        while self.person.lines.running or self.session._background:
+            if self.loop.now > deadline:
+                self.history.defects.append(f"still runs: {self.person.lines.running!r} {self.session._background}")
+                break
+            await asyncio.sleep(1.0)
+        await self.person.leave()
+        await self.session.close()
+        self.floor.close()
+        await asyncio.sleep(30.0)
+        left = [each for each in asyncio.all_tasks() if each is not asyncio.current_task()]
+        self.history.defects += [f"task left: {each.get_coro()}" for each in left]
+        self.history.defects += [f"thread left: {each.name}" for each in self.scheduler.running]
+
+
+class WatchedSession(Session):
+    """A session that notes what the caller of each line got."""
+
+    def __init__(self, settings: Settings, world: World) -> None:
+        super().__init__(settings, reconnect=True)
+        self._world = world
+
+    async def run(self, line: str | TypedLine, *arguments: Any, **named: Any) -> None:
+        """Run a line, and note its outcome."""
+        text = (line if isinstance(line, str) else line.typed).strip()
+        command = self._world.history.commands.get(text)
+        if command is None:
+            return await super().run(line, *arguments, **named)
+        command.began = self.now()
+        try:
+            await super().run(line, *arguments, **named)
+        except (DriveError, Diagnostic, TransportLost) as failure:
+            self._ended(command, failure)
+            raise
+        except asyncio.CancelledError:
+            command.outcome, command.said = Outcome.UNKNOWN, "cancelled"
+            raise
+        else:
+            self._ended(command, ())
+
+    def _ended(self, command: Command, result: tuple[str, ...] | BaseException) -> None:
+        command.ended, command.said = self.now(), str(result)
+        notices = [text for at, text in self._world.history.notices if at >= command.began]
+        command.outcome = WORDS[word(result, notices)]
+
+
+@contextlib.contextmanager
+def place_of_state() -> Iterator[Path]:
+    """A folder for the files of one world."""
+    folder = Path(tempfile.mkdtemp(prefix="simulate-", dir="/dev/shm" if Path("/dev/shm").is_dir() else None))
+    try:
+        yield folder
+    finally:
+        shutil.rmtree(folder, ignore_errors=True)
+
+
+def lived(seed: int, steps: int, keep: bool = False) -> World:
+    """Live one seed."""
+    rng = Random(seed)
+    climate, places = Climate.drawn(rng), drawn_places(rng)
+    history = History(keep=keep)
+    loops: list[SimulatedLoop] = []
+
+    def factory() -> SimulatedLoop:
+        loops.append(SimulatedLoop(Random(f"{seed} loop")))
+        return loops[0]
+
+    with place_of_state() as folder, asyncio.Runner(loop_factory=factory) as runner:
+        loop = runner.get_loop()
+        assert isinstance(loop, SimulatedLoop)
+        wall, scheduler = Wall(loop), Scheduler(loop, Random(f"{seed} threads"), climate.slow)
+        world = World(seed, loop, rng, history, climate, places, folder, wall, scheduler)
+
+        async def life() -> None:
+            await world.begin()
+            for _ in range(steps):
+                await world.step()
+            await world.end()
+
+        with ExitStack() as stack:
+            stack.enter_context(wall.installed())
+            stack.enter_context(scheduler.installed())
+            stack.enter_context(_replaced(opening, "_transport", world.transport))
+            runner.run(life())
+        history.defects += [str(each.get("exception") or each.get("message")) for each in loop.defects]
+    return world
+
+
+@contextlib.contextmanager
+def _replaced(module: Any, name: str, value: Callable[..., Awaitable[Any]]) -> Iterator[None]:
+    before = getattr(module, name)
+    setattr(module, name, value)
+    try:
+        yield
+    finally:
+        setattr(module, name, before)
