@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 import sys
 import time
-from collections.abc import Awaitable, Callable
+from collections.abc import Awaitable, Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -24,6 +24,7 @@ from multidrop.transports.ssh import FarPort
 
 if TYPE_CHECKING:
     from multidrop.drives.port_journal import Keeper
+    from multidrop.simulator.serving.in_process import SimBus
     from multidrop.simulator.serving.running import RunningFloor
     from multidrop.transports import Transport
 
@@ -103,10 +104,7 @@ async def open_port(connection: Connection) -> OpenedPort:
     """Open the byte pipe of a connection. Raises Unreachable, Diagnostic for a URL of several pipes or of none."""
     family, baud = connection.hints.family, connection.baud or _family(connection).baud
     if connection.scheme == "sim":
-        from multidrop.simulator.serving.in_process import connect
-
-        target = connection.target + (f"#{connection.bus}" if connection.bus else "")
-        found = await connect(target, settings.load().allowed if connection.target else ())
+        found = await _cell(connection)
         first, *others = found
         if others:
             for each in found:
@@ -194,12 +192,17 @@ async def _connected(connection: Connection) -> tuple[Transport, Reopen | None]:
     return transport, again if again.possible else None
 
 
-async def _simulated(connection: Connection, naming: Naming) -> list[Opened]:
+async def _cell(connection: Connection) -> Sequence[SimBus]:
+    """The buses of a simulated cell, or the one that is named."""
     from multidrop.simulator.serving.in_process import connect
 
     target = connection.target + (f"#{connection.bus}" if connection.bus else "")
+    return await connect(target, settings.load().allowed if connection.target else ())
+
+
+async def _simulated(connection: Connection, naming: Naming) -> list[Opened]:
     found = []
-    for each in await connect(target, settings.load().allowed if connection.target else ()):
+    for each in await _cell(connection):
         given = connection.hints
         hints = replace(
             given,
