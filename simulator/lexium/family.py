@@ -9,12 +9,11 @@ import re
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 from difflib import get_close_matches
-from functools import partial
 
 from multidrop.dialects.family import Motion
 from multidrop.dialects.mcode.manual.grammar import LineError, is_name, parse
 from multidrop.dialects.mcode.manual.statements import UNNAMED, canonical, size_of
-from multidrop.dialects.mcode.manual.table import Mnemonic, lookup, words
+from multidrop.dialects.mcode.manual.table import lookup, words
 from multidrop.dialects.values import VARIABLES, Reading, Scalar, Snapshot, Value, same
 from multidrop.simulator.cell.drive_keys import (
     WORLD_KEYS,
@@ -47,60 +46,48 @@ def read_drive(table: Table, folder: Folder) -> DriveSpec:
     name = table.text("name", "!")
     if not (len(name) == 1 and name.isascii() and (name.isalnum() or name == "!")):
         raise table.wrong("name", f"cannot be {quoted(name)}", "valid: one of a-z, A-Z, 0-9 or !")
-    points = MODELS[personality].points
+    model, known = MODELS[personality], words(personality)
+    counters = ["position", *(name for name in ("C1", "C2") if name in known and personality in known[name].products)]
     variables = table.table("variables", "[bus.drive.variables]")
     identity = table.table("identity", "[bus.drive.identity]")
     world = table.table("world", "[bus.drive.world]")
     world.only(*WORLD_KEYS)
+
+    def valid(name: str) -> bool:
+        return is_name(name) and lookup(name, personality) is None and len(name) <= model.longest_name
+
     return DriveSpec(
         **common,
         name=name,
         party=table.boolean("party", False),
-        variables=read_variables(variables, partial(_can_be_a_variable, personality), "as in Q1"),
-        identity=read_identity(identity, ("part", "version", "serial"), _counters(personality)),
+        variables=read_variables(variables, valid, "as in Q1"),
+        identity=read_identity(identity, ("part", "version", "serial"), dict.fromkeys(counters, 1)),
         set=read_settings(table.table("set", "set"), _checker(personality)),
-        world=read_world(world, points.inputs, points.analog),
+        world=read_world(world, model.points.inputs, model.points.analog),
     )
 
 
-def _can_be_a_variable(personality: str, name: str) -> bool:
-    return is_name(name) and lookup(name, personality) is None and len(name) <= MODELS[personality].longest_name
-
-
-def _counters(personality: str) -> dict[str, int]:
-    """The keys of its counters, each of one axis."""
-    known = words(personality)
-    return {"position": 1} | {name: 1 for name in ("C1", "C2") if name in known and personality in known[name].products}
-
-
 def _checker(personality: str) -> Check:
+    """Make the check of a mnemonic of `set`, and of its value."""
+
     def check(table: Table, word: str, value: Value) -> None:
-        _check_value(table, word, value, _settable(table, word, personality))
+        if (key := KEY_OF.get(word.upper())) is not None:
+            raise table.wrong(word, "has a key of its own", f'use "{key}"')
+        row = lookup(word, personality)
+        if row is None:
+            settable = [name for name, each in words(personality).items() if "W" in each.access and name.isalnum()]
+            near = get_close_matches(word.upper(), settable, n=1)
+            hint = f'did you mean "{near[0]}"?' if near else ""
+            raise table.wrong(quoted(word), f"is not an MCode mnemonic of an {personality}", hint)
+        if "W" not in row.access:
+            raise table.wrong(word, f"cannot be set ({row.title})")
+        encoder = table.values.get("EE") == 1 and not table.values.get("AS")
+        if isinstance(value, (int, float)) and not row.accepts(value, encoder):
+            low, high = row.bounds(encoder)
+            wanted = f"one of {', '.join(map(str, row.values))}" if row.values else f"from {low} to {high}"
+            raise table.wrong(word, f"must be {wanted}, not {shown(value)}")
 
     return check
-
-
-def _settable(table: Table, word: str, personality: str) -> Mnemonic:
-    """Find the row of a mnemonic that can be set. Raises Diagnostic."""
-    if (key := KEY_OF.get(word.upper())) is not None:
-        raise table.wrong(word, "has a key of its own", f'use "{key}"')
-    row = lookup(word, personality)
-    if row is None:
-        settable = [name for name, each in words(personality).items() if "W" in each.access and name.isalnum()]
-        near = get_close_matches(word.upper(), settable, n=1)
-        hint = f'did you mean "{near[0]}"?' if near else ""
-        raise table.wrong(quoted(word), f"is not an MCode mnemonic of an {personality}", hint)
-    if "W" not in row.access:
-        raise table.wrong(word, f"cannot be set ({row.title})")
-    return row
-
-
-def _check_value(table: Table, word: str, value: Value, row: Mnemonic) -> None:
-    encoder = table.values.get("EE") == 1 and not table.values.get("AS")
-    if isinstance(value, (int, float)) and not row.accepts(value, encoder):
-        low, high = row.bounds(encoder)
-        wanted = f"one of {', '.join(map(str, row.values))}" if row.values else f"from {low} to {high}"
-        raise table.wrong(word, f"must be {wanted}, not {shown(value)}")
 
 
 TRIPS = frozenset({"TA", "TC", "TI", "TM", "TP", "TR", "TT"})
@@ -128,6 +115,14 @@ def describe(snapshot: Snapshot) -> DriveText:
         remarks.insert(
             0, f"the unit is an {snapshot.product}; the simulator knows none, and {personality} is the nearest"
         )
+    texts = (("part", snapshot.part), ("version", snapshot.version), ("serial", snapshot.serial))
+    identity = [Entry(key, plain(text)) for key, text in texts if text]
+    identity += [Entry(key, count) for key, (count,) in snapshot.counters.items()]
+    world: dict[str, object] = {}
+    if snapshot.inputs:
+        world["inputs"] = [[0.0, n, level] for n, level in snapshot.inputs]
+    if snapshot.analog:
+        world["analog"] = [[0.0, snapshot.analog[0]]]
     return DriveText(
         personality=personality,
         name=snapshot.name,
@@ -137,8 +132,8 @@ def describe(snapshot: Snapshot) -> DriveText:
         program=lines,
         settings=[*_settings([each for each in readings if each.name not in variables], personality)],
         variables=[Entry(name, held) for name, held in variables.items()],
-        identity=[*_identity(snapshot)],
-        worlds={"": _world(snapshot)} if snapshot.inputs or snapshot.analog else {},
+        identity=identity,
+        worlds={"": world} if world else {},
         ethernet=model.ethernet,
         baud=snapshot.baud,
     )
@@ -179,7 +174,9 @@ def _settings(readings: list[Reading], personality: str) -> Iterator[Entry]:
         if row is not None:
             lists.setdefault(row[1], []).append(f"{row[2]},{_fields(each.value)}")
         elif _acceptable(each, personality) and not _unset(each, personality):
-            yield Entry(each.name, _plain(each.value), remark(each))
+            huge = isinstance(each.value, float) and abs(each.value) >= 2.0**63
+            held = _fields(each.value) if isinstance(each.value, tuple) else each.value
+            yield Entry(each.name, repr(each.value) if huge else held, remark(each))
     for name, rows in lists.items():
         yield Entry(name, rows)
 
@@ -202,12 +199,6 @@ def _acceptable(reading: Reading, personality: str) -> bool:
     return row.accepts(reading.value, True) or row.accepts(reading.value, False)
 
 
-def _plain(held: Value) -> Value:
-    if isinstance(held, float) and abs(held) >= 2.0**63:
-        return repr(held)
-    return _fields(held) if isinstance(held, tuple) else held
-
-
 def _fields(held: Value) -> str:
     return ",".join(map(str, held)) if isinstance(held, tuple) else str(held)
 
@@ -215,23 +206,6 @@ def _fields(held: Value) -> str:
 def _scalar(text: str) -> Scalar:
     text = text.strip().upper()
     return int(text) if re.fullmatch(r"-?\d+", text) else text
-
-
-def _identity(snapshot: Snapshot) -> Iterator[Entry]:
-    for key, text in (("part", snapshot.part), ("version", snapshot.version), ("serial", snapshot.serial)):
-        if text:
-            yield Entry(key, plain(text))
-    for key, (count,) in snapshot.counters.items():
-        yield Entry(key, count)
-
-
-def _world(snapshot: Snapshot) -> dict[str, object]:
-    world: dict[str, object] = {}
-    if snapshot.inputs:
-        world["inputs"] = [[0.0, n, level] for n, level in snapshot.inputs]
-    if snapshot.analog:
-        world["analog"] = [[0.0, snapshot.analog[0]]]
-    return world
 
 
 def program(spec: DriveSpec) -> StoredProgram:

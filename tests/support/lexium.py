@@ -90,3 +90,20 @@ def at(device: MCodeDevice, t: float, *words: str) -> list[str]:
 def rotor(device: MCodeDevice) -> int:
     """Where the rotor is, motor steps."""
     return round(device.motor.axis.rotor.position(device.now))
+
+
+def codes(device: MCodeDevice, *lines: str) -> list[int]:
+    """The error of each line, 0 for one that is taken; works in program mode too."""
+    found = []
+    for line in lines:
+        refused = device.execute(line, device.now).refused
+        found.append(int(device.memory.values["ER"]) if refused else 0)
+        device.errors.clear()
+    return found
+
+
+def closed_loop(*lines: str, mode: int = 1, **world: Any) -> MCodeDevice:
+    """A drive with hMT on, calibrated."""
+    device = drive(f"AS={mode}", *lines, **world)
+    device.advance(0.1)
+    return device

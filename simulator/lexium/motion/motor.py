@@ -268,36 +268,28 @@ class Motor:
 
     def update_jog(self) -> None:
         """Turn as the jog inputs and JE say now; a motion that may not begin is an error that no line has caused."""
+        t, before, wanted, values, inputs = self._timeline.now, self.jog, 0, self._memory.values, self.inputs
         try:
-            self._update_jog()
+            if values["JE"] and inputs.watched:
+                if values.get("CM"):
+                    raise Fault(JOG_IN_CLOCK_MODE)
+                wanted = inputs.wants(JOG_PLUS) - inputs.wants(JOG_MINUS)
+            if wanted == before or (not before and self.status.moving(t)):
+                return
+            self.jog = 0
+            self._timeline.replan()
+            if wanted:
+                self.axis.slew(wanted * int(values["VM"]), t)
+                self.jog = wanted
+            elif self.axis.kind == SLEW:
+                self.axis.slow_to(0, t)
+                self._core.thread.drop_motion()
         except Fault as fault:
             self._core.interpreter.raise_error(fault.code)
 
     def end_jog(self) -> None:
         """Forget the jog: its input, once released, then stops nothing that was begun since."""
         self.jog = 0
-
-    def _update_jog(self) -> None:
-        t, before, wanted = self._timeline.now, self.jog, self._wanted_jog()
-        if wanted == before or (not before and self.status.moving(t)):
-            return
-        self.jog = 0
-        self._timeline.replan()
-        if wanted:
-            self.axis.slew(wanted * int(self._memory.values["VM"]), t)
-            self.jog = wanted
-        elif self.axis.kind == SLEW:
-            self.axis.slow_to(0, t)
-            self._core.thread.drop_motion()
-
-    def _wanted_jog(self) -> int:
-        """The direction that the inputs ask for. Raises Fault (87) where the motor follows a clock."""
-        values, inputs = self._memory.values, self.inputs
-        if not values["JE"] or not inputs.watched:
-            return 0
-        if values.get("CM"):
-            raise Fault(JOG_IN_CLOCK_MODE)
-        return inputs.wants(JOG_PLUS) - inputs.wants(JOG_MINUS)
 
     def enable(self, on: int, t: float) -> None:
         """Carry out DE."""

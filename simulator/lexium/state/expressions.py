@@ -192,15 +192,12 @@ def _compile_function(word: str, operand: Read, radians: Read) -> Read:
 
 
 def _binary(op: str, left: Read, right: Read, floating: bool) -> Read:
-    if floating:
-        return _guarded(_FLOATING[op], left, right)
-    if op == "+":
+    if op == "+" and not floating:
         return lambda: ((whole(left()) + whole(right()) + 0x80000000) & 0xFFFFFFFF) - 0x80000000
-    apply = _WHOLE[op]
-    return lambda: apply(left(), right())
+    apply = (_FLOATING if floating else _WHOLE)[op]
+    if not floating:
+        return lambda: apply(left(), right())
 
-
-def _guarded(apply: Callable[[Value, Value], Value], left: Read, right: Read) -> Read:
     def read() -> Value:
         try:
             value = apply(left(), right())

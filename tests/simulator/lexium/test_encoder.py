@@ -1,8 +1,10 @@
 """The encoder with EE=1: counts, stalls, the check after a move, position maintenance. A count is 12.8 steps."""
 
+from __future__ import annotations
+
 import pytest
 
-from tests.support.lexium import at, drive, rotor, say
+from tests.support.lexium import at, closed_loop, drive, rotor, say
 
 
 def test_steps_that_a_blocked_rotor_does_not_follow_are_lost_in_open_loop():
@@ -183,3 +185,152 @@ def test_position_maintenance_goes_back_unless_it_was_a_stall_that_stops(mode, p
     device.world.push(push * 12.8, 2.0)
     assert at(device, 2.01, "C2") == [str(2048 + push)]
     assert at(device, 9.0, "C2", "ST") == [end, str(int(push > 15))]
+
+
+# Stalls in encoder mode: when one is found, what it stops, and when it is none.
+
+
+def test_a_stall_factor_that_is_set_below_the_error_is_a_stall_at_once():
+    device = drive("EE=1", "SF=1000", "SL 1000")
+    device.advance(1.0)
+    device.world.hold(True)
+    device.advance(1.0)
+    device.advance(1.5)
+    assert say(device, "PR ST", "SF=501", "PR ST", "SF=500", "PR ST", "PR ER", "PR MV") == ["0", "0", "1", "86", "0"]
+
+
+def test_ip_counts_what_the_rotor_has_lost_in_open_loop_for_no_stall():
+    device = drive("EE=1", "S", "EE=0", "MR 100000", stall_at=5000)
+    device.advance(3.0)
+    say(device, "IP")
+    device.world.push(-128, 3.0)
+    device.advance(4.0)
+    assert say(device, "PR EE", "PR C2", "PR ST", "PR EF") == ["1", "381", "0", "0"]
+
+
+def test_every_motion_may_stall_anew():
+    device = drive("EE=1", "MR 4000", stall_at=10000.0)
+    assert at(device, 1, "ST", "ER") == ["1", "86"]
+    say(device, "ST=0", "MR -400")
+    assert at(device, 2, "ST", "ER", "P") == ["0", "0", "381"]
+    say(device, "MR 4000")
+    assert at(device, 3, "ST", "ER", "P") == ["1", "86", "781"]
+
+
+def test_a_slew_that_is_held_up_stalls_once_until_it_has_turned_again():
+    device = drive("EE=1", "SM=1", "SL 4000", stall_at=10000.0)
+    assert at(device, 1, "ER") == ["86"]
+    for t, speed, code in ((2, 5000, "0"), (3, -4000, "0"), (5, 4000, "86"), (6, 0, "0"), (7, 4000, "86")):
+        say(device, f"SL {speed}")
+        assert at(device, t, "ER") == [code], speed
+
+
+def test_a_cleared_stall_of_a_pushed_rotor_is_told_again_at_the_next_push():
+    device = drive("EE=1", "PM=1", "SF=50")
+    for t, code, flag in ((1, "86", "1"), (2, "0", "1")):
+        device.world.push(1280, t - 1)
+        assert at(device, t, "ER", "ST") == [code, flag]
+    say(device, "ST=0")
+    device.world.push(1280, 2)
+    assert at(device, 3, "ER", "ST", "P") == ["86", "1", "300"]
+
+
+def test_without_encoder_mode_there_is_no_stall_whatever_is_set():
+    device = drive("SF=5", "SM=0", "MR 51200", stall_at=10000.0)
+    assert at(device, 2, "P", "ST", "ER", "MV") == ["51200", "0", "0", "0"]
+    assert say(device, "ST=0", "ST=1", "PR ST") == ["?21", "0"]
+
+
+def test_a_stall_stops_the_motor_where_the_factor_is_reached():
+    device = drive("EE=1", "SF=30", "MR 2048", personality="LMM", stall_at=2000 * 12.8)
+    assert at(device, 1, "P", "C1", "ST", "ER") == ["2000", str(2030 * 128 // 10), "1", "86"]
+    assert say(device, "PR ST", "MR -400") == ["1"], "neither reading ER nor the flag forbids or clears anything"
+    assert at(device, 2, "P", "ST", "ER") == ["1600", "1", "0"]
+    assert say(device, "EE=0", "PR ST", "ST=0", "PR ST") == ["1", "0"]
+
+
+def test_in_mode_1_a_stall_is_told_and_the_move_goes_on():
+    device = drive("EE=1", "SM=1", "MR 4000", stall_at=10000.0)
+    assert at(device, 0.5, "ST", "ER", "MV") == ["1", "86", "1"]
+    assert int(at(device, 0.9, "C1")[0]) > 51200
+
+
+def test_with_hmt_there_is_no_stall():
+    device = drive("EE=1", "AS=1", stall_at=10000.0)
+    device.advance(0.1)
+    say(device, "MR 51200")
+    assert at(device, 3, "ST", "LR", "ER") == ["0", "1", "104"]
+
+
+def test_hmt_takes_stalls_and_position_maintenance_out_of_force():
+    device = closed_loop("EE=1", "SF=10", "PM=1", "LG=2000000", "LT=60000", stall_at=50000)
+    say(device, "MA 100000")
+    assert at(device, 3.0, "ST", "ER") == ["0", "0"]
+
+
+@pytest.mark.parametrize(("mode", "made"), [(0, 2030), (1, 2048)])
+def test_a_bind_is_a_stall_when_sf_more_counts_were_made(mode, made):
+    device = drive("EE=1", "SF=30", f"SM={mode}", "MT=1000", "MR 2048", stall_at=2000 * 12.8)
+    assert at(device, 1.0, "C1", "C2", "ST", "ER", "MV") == [str(int(made * 12.8)), "2000", "1", "86", "0"]
+
+
+# Following a clock: trips, stalls, walls and locks on the way.
+
+
+FOLLOWING = ("IS=3,13,0", "IS=4,13,0", "FL=1")
+
+
+def pulses(count: int, start: float = 0.0, level: int = 0) -> list[list[float]]:
+    """Steps on input 3, two milliseconds each; plus with level 0 on input 4."""
+    edges = [[start + 0.001 * k, 3, k % 2] for k in range(2 * count)]
+    return [[start, 4, level], *edges]
+
+
+def test_a_trip_on_position_happens_while_following() -> None:
+    device = drive(*FOLLOWING, "TP=20,K1", "TE=2", program="PG 1\nLB K1\nPR P\nRT\nPG", inputs=pulses(30, 0.5))
+    device.advance(5)
+    assert [text for _, text in device.prints()] == ["20\r\n"]
+    assert say(device, "PR P", "PR TE") == ["30", "0"]
+
+
+def test_a_relative_trip_happens_again_and_again_while_following() -> None:
+    lines = (*FOLLOWING, "TR=10,K1", "TE=16")
+    device = drive(*lines, program="PG 1\nLB K1\nPR P\nRT\nPG", inputs=pulses(35, 0.5, level=1))
+    device.advance(5)
+    assert [text for _, text in device.prints()] == ["-10\r\n", "-20\r\n", "-30\r\n"]
+
+
+@pytest.mark.parametrize("mode", ["EE=0", "EE=1"])
+def test_a_rotor_that_follows_stands_at_a_wall_and_comes_back_from_it(mode: str) -> None:
+    inputs = [*pulses(100, 0.5), *pulses(60, 1, level=1)]
+    device = drive(*FOLLOWING, mode, "SF=60000", stall_at=51, inputs=inputs)
+    device.advance(0.9)
+    assert say(device, "PR C1", "PR C2") == ["100", "4"]
+    assert at(device, 5, "C1", "C2") == ["40", "-1"]
+
+
+def test_with_hmt_a_rotor_that_follows_makes_good_what_a_wall_has_kept_back() -> None:
+    inputs = [*pulses(100, 0.5), *pulses(60, 1, level=1)]
+    device = drive(*FOLLOWING, "AS=1", stall_at=51, inputs=inputs)
+    assert at(device, 0.9, "C1", "C2", "LL") == ["100", "4", "49"]
+    assert at(device, 5, "C1", "C2", "LL") == ["40", "3", "0"]
+
+
+def test_a_stall_while_following_is_one() -> None:
+    device = drive(*FOLLOWING, "EE=1", stall_at=51, inputs=pulses(1000, 0.5))
+    assert at(device, 0.9, "ST", "ER") == ["0", "0"]
+    assert at(device, 3, "ST", "ER") == ["1", "86"]
+
+
+def test_a_locked_rotor_follows_no_clock() -> None:
+    device = drive(*FOLLOWING, "AS=2", "LT=100", locked=[[0.1, 1.5]], inputs=pulses(100, 2))
+    device.advance(0.05)
+    say(device, "MR 5000")
+    assert at(device, 5, "LR", "P", "C1") == ["1", "5000", "5000"]
+
+
+def test_torque_mode_that_stands_follows_no_clock() -> None:
+    device = drive(*FOLLOWING, "AS=3", "TS=60000", inputs=pulses(100, 2))
+    device.escape(1.0)
+    (before,) = say(device, "PR P")
+    assert at(device, 5, "P") == [before]

@@ -1,8 +1,10 @@
 """Inputs that do something by themselves, outputs that follow the drive, filters, the analog input."""
 
+from __future__ import annotations
+
 import pytest
 
-from tests.support.lexium import drive, say
+from tests.support.lexium import at, drive, run, say
 
 
 def printed(device, until):
@@ -169,9 +171,9 @@ def test_general_outputs_do_as_they_are_told():
 def over(device, output, *times):
     """Whether an output is active at each of the times."""
     found = []
-    for at in times:
-        device.advance(at)
-        found.append(device.outputs(at)[output])
+    for when in times:
+        device.advance(when)
+        found.append(device.outputs(when)[output])
     return found
 
 
@@ -267,3 +269,121 @@ def test_the_points_of_an_mdrive_are_inputs_or_outputs():
     say(device, "SL 1000")
     assert device.outputs(device.now)[1] and device.outputs(device.now)[2]
     assert say(device, "O3=1") == ["?9"]
+
+
+# Outputs that follow motion, current and attention.
+
+
+def test_the_moving_output_waits_for_the_delays_after_any_motion():
+    device = drive("OS=1,17", "HT=200", "MT=100")
+    assert device.outputs(0.0)[1] is False
+    say(device, "SL 1000")
+    device.advance(0.5)
+    say(device, "SL 0")
+    assert [device.moving(0.51), device.outputs(0.51)[1], device.outputs(0.79)[1]] == [False, True, True]
+    assert device.outputs(0.81)[1] is False
+
+
+def test_the_attention_output_tells_the_holding_current_from_the_running_one():
+    device = drive()
+    run(device, "HT=200", "MT=100", "AO=512", "OS=1,29,0", "MR 51200", 0.1)
+    assert not device.outputs(device.now)[1]
+    device.advance(device.motor.axis.profile.end + 0.29)
+    assert not device.outputs(device.now)[1]
+    device.advance(device.now + 0.02)
+    assert device.outputs(device.now)[1]
+    run(device, "SL 1000", 1.0, "SL 0", 0.1)
+    assert not device.outputs(device.now)[1]
+    run(device, 1.0)
+    assert device.outputs(device.now)[1]
+    run(device, "DE=0")
+    assert not device.outputs(device.now)[1]
+
+
+def test_without_any_delay_the_current_stays_what_it_was_in_motion():
+    device = drive()
+    run(device, "HT=0", "MT=0", "AO=512", "OS=1,29,0", "MR 100", 5.0)
+    assert not device.outputs(device.now)[1]
+
+
+def test_a_lamp_on_the_velocity_changing_output_is_dark_at_constant_velocity():
+    device = drive("IS=1,5,0", "OS=1,20,0", "SL 2000000", inputs=((3.0, 1, 0),))
+    lit = []
+    for t in (1.0, 2.5, 4.0, 6.0):
+        device.advance(t)
+        lit.append(device.outputs(t)[1])
+    assert lit == [True, False, True, False] and say(device, "PR ER", "PR V") == ["91", "0"]
+
+
+def test_a_relay_is_set_when_a_range_of_motion_is_over():
+    device = drive("OS=1,16,1", program="PG 100\nMR 2000000\nH\nMR -1000000\nH\nO1=1\nPG")
+    say(device, "EX 100")
+    device.advance(5.4)
+    assert not device.outputs(5.4)[1] and device.output_lines.level(1, 5.4) == 0
+    assert at(device, 5.6, "P", "BY") == ["1000000", "0"]
+    assert device.outputs(5.6)[1] and device.output_lines.level(1, 5.6) == 1
+
+
+# Inputs with a function: set up, active at once, resets and stops.
+
+
+@pytest.mark.parametrize("before", ["IS=1,0,1", "IS=1,0,0"])
+def test_a_reset_input_that_is_active_when_it_is_set_up_resets_the_drive(before: str) -> None:
+    device = drive(before, "VM=5000", inputs=[[0.1, 1, 1]])
+    device.advance(1)
+    say(device, "IS=1,11,1")
+    assert at(device, 1.1, "VM") == ["768000"]
+
+
+def test_a_stop_input_that_is_active_when_it_is_set_up_stops_the_motor() -> None:
+    device = drive("SL 50000", inputs=[[0.5, 1, 0]])
+    device.advance(1)
+    say(device, "IS=1,5,0")
+    assert at(device, 2, "MV", "ER") == ["0", "91"]
+
+
+@pytest.mark.parametrize("level", [0, 1])
+def test_a_program_that_resets_its_drive_by_an_active_input_does_so_until_that_is_let_go(level: int) -> None:
+    program = f"PG 1\nLB SU\nIS=1,11,{level}\nPR I1\nPG"
+    device = drive(program=program, inputs=[[0.5, 1, level], [1.0, 1, 1 - level]])
+    device.advance(0.75)
+    assert device.boots > 10
+    device.advance(2)
+    before = device.boots
+    device.advance(3)
+    assert (device.boots, device.running) == (before, False)
+    assert say(device, "PR IS")[0] == f"IS = 1, 11, {level}"
+
+
+@pytest.mark.parametrize("line", ["OS=1,22,0", "OS=1,5,0", "OS=1,-1", "IS=1,16,0", "IS=1,9,0", "IS=5,0,0", "IS=6,1,0"])
+def test_a_type_that_an_input_or_output_cannot_have_is_error_8(line):
+    device = drive()
+    before = say(device, "PR OS", "PR IS")
+    assert say(device, line) == ["?8"]
+    assert say(device, "PR OS", "PR IS") == before
+
+
+def test_ip_takes_setups_back_and_leaves_outputs_alone():
+    device = drive("OS=3,17,1", "S")
+    assert say(device, "O2=1", "OS=3,16", "IP", "PR OS")[2:] == ["OS = 3, 17, 1"]
+    assert device.outputs(0.0) == {1: False, 2: True, 3: False}
+    device.reset(1.0)
+    assert device.outputs(1.0)[2] is False
+
+
+def test_a_switch_to_ground_runs_the_program_at_address_1_each_time():
+    device = drive("IS=4,4,0", inputs=((1.0, 4, 0), (1.2, 4, 1), (3.0, 4, 0)))
+    say(device, "PG1", "MR 20000", "H", "MR -20000", "H", "E", "PG")
+    assert at(device, 0.9, "P", "BY") == ["0", "0"]
+    assert int(at(device, 1.28, "P")[0]) > 19000
+    assert at(device, 2.0, "P", "BY") == ["0", "0"]
+    assert at(device, 3.1, "BY", "MV") == ["1", "1"]
+
+
+def test_a_reset_input_that_is_high_already_resets_when_it_is_set_up_so():
+    device = drive("R1=5", inputs=((0.0, 1, 1),))
+    device.advance(0.1)
+    assert say(device, "IS=1,11,1", "PR R1") == ["0"] and device.boots == 1
+    device = drive("R1=5", inputs=((0.0, 1, 0),))
+    device.advance(0.1)
+    assert say(device, "IS=1,11,1", "PR R1") == ["5"] and device.boots == 0

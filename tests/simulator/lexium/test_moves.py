@@ -1,9 +1,11 @@
 """The simulated drive's motion, and programs of the shapes that the manual's samples have (7.3.5, 9.1, 9.2, 9.3)."""
 
+from __future__ import annotations
+
 import pytest
 
 from multidrop.simulator.cell.spec import WorldSpec
-from tests.support.lexium import output, say, switched_on
+from tests.support.lexium import at, drive, output, prints_until, say, switched_on
 
 # Programs after the manual's samples.
 
@@ -124,13 +126,13 @@ def test_flags_of_a_move():
     device = switched_on(set={"HT": 200, "MT": 100})
     say(device, "MA 512000")
     end = device.motor.axis.profile.end
-    for at, flags in (
+    for when, flags in (
         (0.1, ["1", "1", "1"]),
         (end - 1e-6, ["1", "1", "1"]),
         (end, ["0", "1", "0"]),
         (end + 0.301, ["0", "0", "0"]),
     ):
-        device.advance(at)
+        device.advance(when)
         assert say(device, "PR MV", "PR MP", "PR VC") == flags
 
 
@@ -229,9 +231,9 @@ def test_a_limit_switch_ends_the_motion_as_lm_says(mode, beyond, runs):
 def test_an_input_is_filtered_and_its_level_is_not():
     device = switched_on(set={"D1": 50}, world=WorldSpec(inputs=((1.0, 1, 0), (1.01, 1, 1), (2.0, 1, 0))))
     seen = {}
-    for at in (0.5, 1.005, 1.06, 2.04, 2.06):
-        device.advance(at)
-        seen[at] = say(device, "PR I1", "PR IN")
+    for when in (0.5, 1.005, 1.06, 2.04, 2.06):
+        device.advance(when)
+        seen[when] = say(device, "PR I1", "PR IN")
     assert seen == {
         0.5: ["0", "15"],
         1.005: ["0", "14"],
@@ -247,3 +249,166 @@ def test_an_input_held_by_hand_is_seen():
     device.world.set_input(3, 0, 1.0)
     device.advance(1.0)
     assert say(device, "PR I3", "PR IN", "IS=3,0,1", "PR I3") == ["1", "11", "0"]
+
+
+# Velocities: slews, their limits, and their changes on the way.
+
+
+def test_the_direction_is_not_turned_on_the_way():
+    device = drive("MR 51200")
+    assert say(device, "RD=1", "PR RD") == ["?95", "0"]
+    device.advance(2)
+    say(device, "RD=1", "SL 1000")
+    assert say(device, "RD=0", "PR RD") == ["?95", "1"]
+
+
+def test_a_slew_goes_beyond_vm_up_to_what_the_microsteps_allow():
+    device = drive("VM=2000", "SL 20000")
+    assert at(device, 1, "V", "VC", "MP") == ["20000", "0", "0"]
+    refused = say(device, "SL 5000001", "SL -5000001", "SL 2560001", "SL", "SL 1,1", "SL Q1", "PR V")
+    assert refused == ["?21", "?21", "?77", "?24", "?24", "?30", "20000"]
+    assert say(device, "SL -2560000", "PR VC") == ["1"]
+    assert at(device, 4, "V") == ["-2560000"]
+    device = drive("EE=1")
+    assert say(device, "SL 200001", "SL -200001", "SL 200000") == ["?21", "?21"]
+
+
+def test_after_a_move_is_slowed_down_the_next_motion_waits():
+    device = drive("MA 512000")
+    device.advance(0.3)
+    assert say(device, "SL 0", "MR 100", "MA 0", "SL 5") == ["?85"] * 3
+    device.advance(2)
+    assert say(device, "MR 100") == []
+
+
+def test_a_new_top_speed_is_for_the_next_move():
+    device = drive("MA 1000000")
+    device.advance(0.5)
+    say(device, "VM=100000")
+    assert at(device, 0.9, "V") == ["768000"]
+    device.advance(3)
+    say(device, "MA 0")
+    assert at(device, 4, "V") == ["-100000"]
+
+
+def test_the_two_velocities_keep_apart_and_within_the_microsteps():
+    device = drive()
+    assert say(device, "VM=1000", "VM=999", "VI=768000", "VI=768001", "VI=0") == ["?23", "?23", "?22", "?22", "?21"]
+    assert say(device, "VM=2560001", "PR VM", "PR VI") == ["?21", "768000", "1000"]
+    say(device, "MS=16")
+    refused = say(device, "VM=160001", "VI=160001", "TS=160001", "SL 160001", "VI=160000", "PR VI")
+    assert refused == ["?77", "?77", "?77", "?77", "?22", "63"]
+    assert say(drive("EE=1"), "PR VI", "PR VM", "VM=200001", "VI=60000", "VM=78") == [
+        "78",
+        "60000",
+        "?21",
+        "?22",
+        "?23",
+    ]
+
+
+def test_velocity_and_its_changing_are_only_read_and_programs_branch_on_them():
+    program = "PG 1\nLB G1\nSL 5000\nH 10\nBR K9,V=5000\nE\nLB K9\nSL 100000\nH 20\nCL Q1,VC=1\nE\nLB Q1\nPR V\nRT\nPG"
+    device = drive("EX G1", program=program)
+    assert prints_until(device, 1) == ["25400"]
+    assert say(device, "V=1", "VC=1", "VR=1", "SN=1", "UV=1", "VT=1") == ["?25"] * 6
+
+
+@pytest.mark.parametrize(
+    ("lines", "line", "code"),
+    [
+        (["MS=4"], "VM=40001", "?77"),
+        (["MS=4"], "VM=2560001", "?21"),
+        ([], "VM=2560001", "?21"),
+        (["MS=10"], "TS=100001", "?77"),
+        (["MS=10"], "TS=46511", "?21"),
+        ([], "TS=2560001", "?21"),
+    ],
+)
+def test_a_velocity_that_the_microsteps_do_not_reach_is_error_77(lines, line, code):
+    assert say(drive(*lines), line) == [code]
+
+
+def test_velocities_up_to_ten_thousand_a_microstep_are_taken():
+    assert say(drive("MS=10"), "VM=100000", "TS=100000", "PR VM", "PR TS") == ["100000", "100000"]
+
+
+def test_vm_stays_above_vi_however_coarse_the_microsteps_become():
+    assert say(drive("VI=1000", "VM=1001"), "MS=1", "PR VI", "PR VM") == ["4", "5"]
+
+
+def test_a_slew_goes_faster_than_vm_and_changes_on_the_fly():
+    device = drive("VM=100000", "SL 200000")
+    assert at(device, 1.0, "V") == ["200000"]
+    say(device, "SL -1000")
+    assert at(device, 2.0, "V", "MV") == ["-1000", "1"]
+
+
+# Jog inputs: when a jog begins, ends and is taken up.
+
+
+def test_a_jog_ends_when_its_input_is_no_jog_input_any_more() -> None:
+    device = drive("IS=1,7,0", "JE=1", inputs=[[1.0, 1, 0]])
+    assert at(device, 2.5, "V") == ["768000"]
+    say(device, "IS=1,0,0")
+    assert at(device, 4, "V", "MV") == ["0", "0"]
+
+
+def test_a_jog_ends_when_its_input_becomes_a_clock_by_the_other_one() -> None:
+    device = drive("IS=3,8,0", "JE=1", inputs=[[1.0, 3, 0]])
+    assert at(device, 2.5, "V") == ["-768000"]
+    say(device, "IS=4,13,0")
+    assert at(device, 4, "V", "MV") == ["0", "0"]
+
+
+def test_a_jog_of_an_mdriveplus_ends_with_its_point() -> None:
+    device = drive("S1=7,0", "JE=1", personality="MDI", inputs=[[1.0, 1, 0]])
+    assert at(device, 2.5, "MV") == ["1"]
+    say(device, "S1=16,0")
+    assert at(device, 4, "MV") == ["0"]
+
+
+def test_an_active_input_turns_as_soon_as_it_is_a_jog_input() -> None:
+    device = drive("JE=1", inputs=[[0.5, 2, 0]])
+    device.advance(1)
+    say(device, "IS=2,8,0")
+    assert at(device, 2.5, "V") == ["-768000"]
+
+
+def test_setting_up_another_input_does_not_begin_a_jog_that_was_passed_over() -> None:
+    device = drive("IS=1,7,0", "JE=1", "MR 100000", inputs=[[0.1, 1, 0]])
+    device.advance(5)
+    say(device, "IS=2,1,0")
+    assert at(device, 6, "P", "MV") == ["100000", "0"]
+
+
+def test_jog_is_enabled_though_the_drive_is_disabled() -> None:
+    device = drive("IS=1,7,0", "DE=0", inputs=[[0.5, 1, 0]])
+    device.advance(1)
+    assert not device.execute("JE=1", 1.0).refused
+    assert say(device, "PR JE", "PR ER", "PR MV") == ["1", "94", "0"]
+
+
+@pytest.mark.parametrize("release", ["input", "JE=0"])
+def test_a_jog_that_ends_in_a_pause_is_not_taken_up(release: str) -> None:
+    ends = [[3.0, 1, 1]] if release == "input" else []
+    device = drive("IS=1,7,0", "JE=1", program="PG 1\nLB G1\nH 60000\nPG", inputs=[[0.5, 1, 0], *ends])
+    say(device, "EX G1")
+    device.advance(2)
+    say(device, "PS")
+    device.advance(3.5)
+    if release != "input":
+        say(device, release)
+    say(device, "RS")
+    assert at(device, 5, "V", "BY", "ER") == ["0", "1", "0"]
+
+
+def test_a_jog_that_lasts_through_a_pause_is_taken_up() -> None:
+    device = drive("IS=1,7,0", "JE=1", program="PG 1\nLB G1\nH 60000\nPG", inputs=[[0.5, 1, 0], [6.0, 1, 1]])
+    say(device, "EX G1")
+    device.advance(2)
+    say(device, "PS")
+    device.advance(3.5)
+    say(device, "RS")
+    assert at(device, 5, "V") == ["768000"]
+    assert at(device, 8, "V") == ["0"]
