@@ -93,7 +93,7 @@ class Power:
 
     def __init__(self, core: Core, motor: Motor, outputs: Outputs, nvm: Nvm) -> None:
         self._core, self._timeline = core, core.timeline
-        self._motor, self._outputs, self.nvm = motor, outputs, nvm
+        self._motor, self._outputs, self.nvm, self._bridges = motor, outputs, nvm, motor.bridges
         self.boots_at: float | None = None
         self.boots = 0
 
@@ -105,7 +105,7 @@ class Power:
     @property
     def on(self) -> bool:
         """Return whether it has power, and is up."""
-        return self._motor.bridges.powered
+        return self._bridges.powered
 
     def switch(self, on: bool) -> None:
         """Switch the drive on or off now. What NVM holds stays."""
@@ -127,7 +127,7 @@ class Power:
         self.boots_at = self._timeline.now + ETHERNET_BOOT
 
     def come_up(self) -> None:
-        self._motor.bridges.powered, self.boots_at = True, None
+        self._bridges.powered, self.boots_at = True, None
         self.boots += 1
         self.boot()
 
@@ -162,4 +162,4 @@ class Power:
         self._motor.stop(self._timeline.now)
         self._core.thread.finish()
         self._motor.trips.clear()
-        self._motor.bridges.powered, self.boots_at = False, None
+        self._bridges.powered, self.boots_at = False, None

@@ -51,7 +51,7 @@ class Prints:
     def __init__(self, serial: str, drive: EventLoop, variables: Variables) -> None:
         core, self._variables, self._motor, self._outputs = drive.core, variables, drive.motor, drive.output_lines
         self._memory, self._program, self._timeline = core.memory, core.program, core.timeline
-        self._printer, self._errors = core.printer, core.errors
+        self._printer, self._errors, self._bridges = core.printer, core.errors, drive.bridges
         values, model, texts = core.values, core.model, self._text
         self._shapes: Mapping[str, Item] = {
             "ER": self._error,
@@ -196,7 +196,7 @@ class Prints:
 
     def _voltage(self, option: int) -> str:
         """Status, then the volts (manual 5.1.142; status 0 both good, 1 no auxiliary, 2 no +V, 3 neither)."""
-        auxiliary, supply = self._memory.model.auxiliary, self._motor.bridges.supply
+        auxiliary, supply = self._memory.model.auxiliary, self._bridges.supply
         status = (0 if auxiliary else 1) + (0 if supply else 2)
         bridge = VOLTS if supply else 0
         volts = {1: (AUXILIARY_VOLTS,), 2: (bridge,)}.get(option, (AUXILIARY_VOLTS, bridge) if auxiliary else (bridge,))
