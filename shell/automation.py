@@ -57,7 +57,7 @@ class Automation:
     """The stops of its drives, once they are written."""
 
     def has(self, claim: Claim) -> bool:
-        """Whether a drive is one of those that it claimed or started."""
+        """True if a drive is one of those that it claimed or started."""
         own = [*self.claims, *((drive.link, drive.address) for drive in self.started)]
         return any(
             each[0] is claim[0] and (each[1] == claim[1] or each[1] in GLOBAL or claim[1] in GLOBAL) for each in own
@@ -236,7 +236,7 @@ def _by_link(started: Iterable[Drive]) -> dict[Link, list[Drive]]:
 
 
 def only_ends(drive: Drive, text: str) -> bool:
-    """Whether a line that counts as a start can only end motion, as a velocity of 0."""
+    """True if a line that counts as a start can only end motion, as a velocity of 0."""
     guards = drive.family.guards
     return guards is not None and guards.only_ends(text)
 

@@ -35,7 +35,7 @@ class Tasks:
 
     @property
     def busy(self) -> bool:
-        """Whether any work runs."""
+        """True if any work runs."""
         return bool(self._running)
 
     async def run(self, work: Coroutine[Any, Any, T]) -> T:
@@ -90,7 +90,7 @@ class Channel:
 
     def __init__(self) -> None:
         self.front = Front()
-        """What the front end can be asked."""
+        """The front end, as far as it can be asked."""
         self._callbacks: tuple[Callback, ...] = ()
         self._apart = isolated("a front end")
 
@@ -165,7 +165,7 @@ Fill = Callable[[str, Sequence[Field]], Awaitable[Mapping[str, str] | None]]
 
 @dataclass
 class Front:
-    """What a session can ask of its front end. None: the front end cannot do that."""
+    """The functions of a front end that a session calls. None: the front end cannot do that."""
 
     ask: Ask | None = None
     """Asks its person; None: it has none."""

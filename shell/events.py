@@ -222,7 +222,7 @@ class Phase(Enum):
 
     @property
     def waits(self) -> bool:
-        """Whether the program goes on only at a command."""
+        """True if the program goes on only at a command."""
         return self is not Phase.EXECUTES
 
 

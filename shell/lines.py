@@ -78,7 +78,7 @@ def parse(line: str) -> TypedLine | None:
 
 
 def each_names_one_drive(lines: Iterable[str]) -> bool:
-    """Whether every line goes to one drive, or waits for those; a line that cannot be parsed does not."""
+    """True if every line goes to one drive, or waits for those; a line that cannot be parsed does not."""
     try:
         parsed = [parse(line) for line in lines]
     except Diagnostic:

@@ -1,4 +1,4 @@
-"""What a session remembers of drives: names in their programs, lines that they printed, actions while it records."""
+"""The memory of a session: names in their programs, lines that they printed, actions while it records."""
 
 from __future__ import annotations
 
@@ -93,7 +93,7 @@ class Lately:
         _begun.set(self._count)
 
     async def finds(self, text: str, seconds: float) -> bool:
-        """Whether a line contains the text: since the sender's last line, or within a time, s."""
+        """True if a line contains the text: since the sender's last line, or within a time, s."""
         begun = _begun.get()
         since = self._typed if begun is None else begun
         with contextlib.suppress(TimeoutError):
@@ -148,7 +148,7 @@ class Observing:
             observed.moving.append((found.at, found.velocity != 0))
 
     def _has(self, bus: str, address: str, word: str) -> bool:
-        """Whether a drive can be asked for a word."""
+        """True if a drive can be asked for a word."""
         found = self._buses().get(bus)
         drive = found.drives.get(address) if found is not None else None
         return drive is not None and drive.family.question(word) is not None

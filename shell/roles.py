@@ -1,4 +1,4 @@
-"""What a session holds and does not make: plots, a log, the observation of a program, transcripts on a screen."""
+"""Parts that a session holds and others make: plots, a log, the observation of a program, transcripts on a screen."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ class Series(NamedTuple):
 
     @property
     def of_motion(self) -> bool:
-        """Whether it needs samples of position and velocity."""
+        """True if it needs samples of position and velocity."""
         return self.word in ("", DIFFERENCE)
 
     @property
@@ -103,7 +103,7 @@ EVERYTHING = Filter()
 
 @dataclass
 class Transcripts:
-    """What the transcripts of a front end with a screen can be asked."""
+    """The functions of the transcripts on a screen."""
 
     times: Callable[[], str]
     """Returns the form of the times, a word of `TIMES`."""

@@ -63,17 +63,17 @@ class Tally:
 
     @property
     def stand(self) -> bool:
-        """Whether every drive was read at velocity 0 since the stop, and without a program that runs."""
+        """True if every drive was read at velocity 0 since the stop, and without a program that runs."""
         return all(each.fate is Fate.STANDING for each in self.found)
 
     @property
     def urgent(self) -> bool:
-        """Whether a drive may move that this program cannot stop."""
+        """True if a drive may move that this program cannot stop."""
         return self.vain or bool(self.of(Fate.NOT_KNOWN) or self.of(Fate.NOT_REACHED))
 
     @property
     def sure(self) -> bool:
-        """Whether every drive was read since the stop, or was started again."""
+        """True if every drive was read since the stop, or was started again."""
         return all(each.fate in (Fate.STANDING, Fate.STARTED) for each in self.found)
 
 

@@ -62,7 +62,7 @@ class Condition:
         return f"{self.word}{self.sign}{self.value}"
 
     def holds(self, seen: int) -> bool:
-        """Whether a value that was read fits."""
+        """True if a value that was read fits."""
         return SIGNS[self.sign](seen, self.value)
 
 
@@ -278,13 +278,13 @@ async def _read(bus: Bus) -> None:
 
 
 def _program(drive: Drive, now: float) -> Running | None:
-    """Whether a program runs in a drive, if that was read lately and after its last start."""
+    """True if a program runs in a drive, if that was read lately and after its last start."""
     running = drive.running
     return running if running is not None and running.at > max(now - PROGRAM_FRESH, drive.started_at) else None
 
 
 def _answers(drive: Drive) -> bool:
-    """Whether a drive can be asked now: a drive in program mode would store the question."""
+    """True if a drive can be asked now: a drive in program mode would store the question."""
     return not drive.programming and not drive.transferring
 
 
@@ -293,7 +293,7 @@ def _last_contact(drive: Drive) -> float:
 
 
 def _fresh(drive: Drive, since: float) -> bool:
-    """Whether a drive was read after its last start, at most FRESH before `since`, and its bus still works."""
+    """True if a drive was read after its last start, at most FRESH before `since`, and its bus still works."""
     seen = drive.seen
     return seen is not None and seen.at > max(since - FRESH, drive.started_at) and not drive.link.away
 

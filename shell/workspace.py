@@ -1,4 +1,4 @@
-"""What is open: buses and their drives, the selection, macros, log, plots; and the stop of all of it.
+"""The open buses and their drives, the selection, macros, log and plots; and the stop of all of it.
 
 An open bus is one record, `OpenBus`: it has all that is known of the bus, and goes as one when that is closed.
 
@@ -78,7 +78,7 @@ class OpenBus:
 
 
 class Workspace(Channel):
-    """What is open. Needs a running event loop, and belongs to its thread."""
+    """The open buses and the selection. Needs a running event loop, and belongs to its thread."""
 
     def __init__(self, settings: Settings, reconnect: bool = False) -> None:
         """Open nothing yet. `reconnect`: a bus that is lost is tried again until it is back or closed."""
@@ -96,14 +96,14 @@ class Workspace(Channel):
         self.stopped_at = float("-inf")
         """The time of the last stop, s of the session's clock."""
         self.opening: list[BeingOpened] = []
-        """What is being opened, and no stop reaches yet."""
+        """The URLs that are being opened, which no stop reaches yet."""
         self.tasks, self.questions = Tasks(self.changed), Questions(self)
         self.addressed: set[tuple[str, str]] = set()
         """(bus, address) of every drive that this session sent a line to; `/wait` waits for them."""
         self.macros = MacroStore(settings.macros, settings.project_macros)
         self.recorder = Recorder()
         self.lately = Lately()
-        """What drives printed lately."""
+        """The last lines that drives printed."""
         self.subscribe(self.lately.take)
         self.subscribe(Observing(self.recorder, lambda: self.buses).take)
         self.names = KnownNames()
@@ -111,7 +111,7 @@ class Workspace(Channel):
         self.log: OpenLog | None = None
         self.plots: list[RunningPlot] = []
         self.plotted: tuple[Series, ...] = ()
-        """What the screen plots; empty: the selected drive."""
+        """The series that the screen plots; empty: the selected drive."""
         self.playing: list[Playing] = []
         """The macros that play; a macro follows the one that plays it."""
         self.dropped: list[str] = []
@@ -339,7 +339,7 @@ class Workspace(Channel):
 
     @property
     def busy(self) -> bool:
-        """Whether anything runs that a stop would end: a script, a macro, a wait, a download."""
+        """True if anything runs that a stop would end: a script, a macro, a wait, a download."""
         return self.tasks.busy
 
     @property

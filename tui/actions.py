@@ -59,7 +59,7 @@ class Actions:
         self._parts = parts
 
     def check_action(self, action: str, parameters: tuple[object, ...]) -> bool:
-        """Whether an action is possible: Escape ends the tour unless it closes something."""
+        """True if an action is possible: Escape ends the tour unless it closes something."""
         entry = self._parts.main.entry
         if action == "end_tour":
             return self._parts.tour.on and self._parts.app.focused is entry and not entry.listing.open

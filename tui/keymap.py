@@ -62,7 +62,7 @@ class Keymap:
     keys: dict[str, str] = field(default_factory=dict)
     """The keys by name, as Textual spells them; several are separated by commas."""
     about: dict[str, str] = field(default_factory=dict)
-    """What each does."""
+    """The meaning of each."""
     changed: dict[str, str] = field(default_factory=dict)
     """Those that differ from the program's own."""
     troubles: list[str] = field(default_factory=list)
@@ -156,7 +156,7 @@ class FunctionKeys:
             self._on.setdefault(macro.page, {}).setdefault(macro.key, []).append(macro.name)
 
     def held(self, key: str, now: float) -> bool:
-        """Whether a press is the repetition of a held key, which plays nothing: else a macro would begin anew."""
+        """True if a press is the repetition of a held key, which plays nothing: else a macro would begin anew."""
         before, self._pressed = self._pressed, (key, now)
         return before[0] == key and now - before[1] < HELD
 

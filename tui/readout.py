@@ -1,4 +1,4 @@
-"""What was read of one drive: values with their times, and the state that they allow to claim."""
+"""The readings of one drive: values with their times, and the state that they allow to claim."""
 
 from __future__ import annotations
 
@@ -140,7 +140,7 @@ class Beside:
     """None: they agree."""
 
     def behind(self, last: Point | None) -> bool:
-        """Whether the samples have gone on without predictions."""
+        """True if the samples have gone on without predictions."""
         return self.predicted is not None and last is not None and last.at - self.predicted.at > BEHIND
 
     def take(self, event: Predicted | Diverged | Agreed) -> None:
@@ -273,7 +273,7 @@ class Readout:
 
     @property
     def stopped_since(self) -> bool:
-        """Whether a stop came after the last value was read."""
+        """True if a stop came after the last value was read."""
         return self.last is not None and self.last.at <= self.program.stopped_at
 
     def overtaken(self, now: float) -> bool:
@@ -295,7 +295,7 @@ class Readout:
 
     @property
     def in_trouble(self) -> bool:
-        """Whether an axis has an error or a limit, as last read."""
+        """True if an axis has an error or a limit, as last read."""
         return any(each.trouble or (each.conditions is not None and each.conditions.error) for each in self.axes)
 
     @property

@@ -233,7 +233,7 @@ class ScreenModel:
     def __init__(self, current: Callable[[], str], opened: Callable[[], Container[str]]) -> None:
         self.buses: dict[str, BusFacts] = {}
         self.traces, self.look = Traces(), Look()
-        """What is plotted, and how a person looks at it."""
+        """The plotted samples, and how a person looks at them."""
         self.changed = True
         """Buses, drives, selection or latch may have changed."""
         self.trouble = ""

@@ -1,4 +1,4 @@
-"""What a session asks of the screen: questions, forms, pages, the editor, changes of transcripts, the end."""
+"""The answers of the screen to its session: questions, forms, pages, the editor, changes of transcripts, the end."""
 
 from __future__ import annotations
 

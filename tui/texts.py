@@ -64,7 +64,7 @@ class Texts:
         return [text for text in self._open.values() if text.changed]
 
     def due(self, text: OpenText) -> bool:
-        """Whether the copy of a text is not the text."""
+        """True if the copy of a text is not the text."""
         return self._drafts is not None and (text.kept is not None if not text.changed else text.kept != text.text)
 
     def keep(self, text: OpenText) -> None:

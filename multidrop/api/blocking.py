@@ -49,7 +49,7 @@ class Session:
         self.awaited = AsyncSession(urls, yes=yes, notice=self._notices)
         self.thread = LoopThread()
         self.leaving = contextlib.ExitStack()
-        """What ends after everything is closed, and before the thread does."""
+        """The contexts that end after everything is closed, and before the thread does."""
         try:
             self.call(self.awaited.open)
         except BaseException:
@@ -194,7 +194,7 @@ class Drive(DriveFacts):
 
     @property
     def moving(self) -> bool:
-        """Whether it moves, read now."""
+        """True if it moves, read now."""
         return self.call(self.awaited.moving)
 
     @property

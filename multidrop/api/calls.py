@@ -48,12 +48,12 @@ class Calls:
 
     @property
     def opened(self) -> bool:
-        """Whether the session is open."""
+        """True if the session is open."""
         return self._shell is not None
 
     @property
     def accepted(self) -> bool:
-        """Whether the session is open, and not being closed."""
+        """True if the session is open, and not being closed."""
         return self._shell is not None and not self._closing
 
     @property

@@ -123,7 +123,7 @@ _WORD = re.compile(r"[A-Za-z]\w*", re.ASCII)
 
 
 class DriveFacts:
-    """What is known of a drive without asking it."""
+    """The facts of a drive that are known without asking it."""
 
     def __init__(self, calls: Calls, drive: Drive, axis: str) -> None:
         self.drive = drive

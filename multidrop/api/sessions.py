@@ -33,7 +33,7 @@ class Run:
 
     file: str
     results: tuple[Result, ...]
-    """What each line sent and printed; lines that only steer have none."""
+    """The result of each line; lines that only steer have none."""
 
     @property
     def printed(self) -> list[str]:

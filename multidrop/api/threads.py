@@ -32,7 +32,7 @@ class LoopThread:
 
     @property
     def alive(self) -> bool:
-        """Whether the loop runs."""
+        """True if the loop runs."""
         return self._thread.is_alive()
 
     def begin(self, work: Coroutine[Any, Any, T]) -> concurrent.futures.Future[T]:

@@ -29,7 +29,7 @@ a line has one; in brackets none is needed. Functions read the tables of familie
 
 
 class Operation(NamedTuple):
-    """What a person can ask for: by a verb in a session, by a command, or by both."""
+    """A task of the product: a verb in a session, a command, or both."""
 
     usage: str = ""
     """Name and arguments of the verb, in the notation of `multidrop.shell.operations.usage`; empty: no verb."""

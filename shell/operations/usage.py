@@ -115,7 +115,7 @@ def _items(text: str) -> list[str]:
 
 
 def _is_group(item: str) -> bool:
-    """Whether brackets go around the whole: `[X]`, not `[HOST:]PORT`."""
+    """True if brackets go around the whole: `[X]`, not `[HOST:]PORT`."""
     depths = [item[: n + 1].count("[") - item[: n + 1].count("]") for n in range(len(item))]
     return item[0] == "[" and 0 not in depths[:-1]
 

@@ -29,7 +29,7 @@ YOUNG = 1
 
 
 def at_rest(workspace: Workspace) -> bool:
-    """Whether nothing runs, and the last reading of every drive showed velocity 0."""
+    """True if nothing runs, and the last reading of every drive showed velocity 0."""
     readings = [drive.seen for bus in workspace.buses.values() for drive in bus.all_drives if drive.seen is not None]
     return not workspace.busy and not any(reading.velocity for reading in readings)
 

@@ -178,9 +178,9 @@ class PromptQuestion:
         """The open question; empty: there is none."""
         self._text: asyncio.Future[str | None] | None = None
         self.open = Condition(lambda: self._given is not None)
-        """Whether keys answer."""
+        """True if keys answer."""
         self.taking = Condition(lambda: self._text is not None)
-        """Whether the next line is an answer."""
+        """True if the next line is an answer."""
         app.key_processor.before_key_press += lambda _: self._ahead()
 
     async def ask(self, question: str) -> bool:

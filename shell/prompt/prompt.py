@@ -197,7 +197,7 @@ class Prompt:
             worker.result()
 
     async def _may_quit(self) -> bool:
-        """Whether to end. While drives move or may move, only a second question in a row returns True."""
+        """Return True to end. While drives move or may move, only a second question in a row returns True."""
         now = (self._session.stops, self._lines.count)
         if self._asked == now:
             return True

@@ -69,7 +69,7 @@ def _waiting(descriptor: int) -> int:
 
 
 def in_foreground(descriptor: int) -> bool:
-    """Whether the descriptor is a terminal with this process in its foreground."""
+    """True if the descriptor is a terminal with this process in its foreground."""
     try:
         return os.isatty(descriptor) and os.tcgetpgrp(descriptor) == os.getpgrp()
     except OSError:

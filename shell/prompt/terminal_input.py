@@ -1,4 +1,4 @@
-"""What a person or a pipe enters at a terminal without a prompt: lines, the answer to a question, the values of a form.
+"""The input of a person or a pipe at a terminal without a prompt: lines, the answer to a question, the values of a form.
 
 An answer is one key. Keys that were typed before the question could be read answer nothing.
 """
@@ -240,5 +240,5 @@ def at_terminal(title: str, fields: Sequence[Field]) -> dict[str, str] | None:
 
 
 def can_ask() -> bool:
-    """Whether a person sees questions and can answer them."""
+    """True if a person sees questions and can answer them."""
     return sys.stdin.isatty() and sys.stderr.isatty()

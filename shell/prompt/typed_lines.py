@@ -104,7 +104,7 @@ def _lock(descriptor: int) -> bool:
 
 
 def _is_at(descriptor: int, path: Path) -> bool:
-    """Whether the path still names the open file: another process may have cut it."""
+    """True if the path still names the open file: another process may have cut it."""
     with contextlib.suppress(OSError):
         return os.path.samestat(os.fstat(descriptor), os.stat(path))
     return False
@@ -251,7 +251,7 @@ def shown(line: str) -> str:
 
 
 def _concurrent(line: Line) -> bool:
-    """Whether a line runs beside those that are typed after it."""
+    """True if a line runs beside those that are typed after it."""
     if not line.verb:
         return False
     from multidrop.shell.operations.table import VERBS  # late: the first frame of the screen needs no verb

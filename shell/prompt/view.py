@@ -1,4 +1,4 @@
-"""What the prompt shows: lines above it, the toolbar below it, completions and history.
+"""The view of the prompt: lines above it, the toolbar below it, completions and history.
 
 Lines above the prompt are collected, bounded in number, and shown at most ten times a second. They replace standard
 output and standard error while the prompt runs. They are written in chunks, as fast as the terminal takes them, and

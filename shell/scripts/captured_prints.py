@@ -1,4 +1,4 @@
-"""What drives and verbs print while a script runs."""
+"""The prints of drives and verbs while a script runs."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ class Hearing:
         return self._heard()[-most:]
 
     async def finds(self, text: str, seconds: float) -> bool:
-        """Whether a line contains the text, now or within a time, s."""
+        """True if a line contains the text, now or within a time, s."""
         with contextlib.suppress(TimeoutError):
             async with asyncio.timeout(seconds):
                 while not any(text in line for line in self._heard()):

@@ -67,7 +67,7 @@ class Place:
         return pinned(line, *self._at)
 
     def _is_address(self, word: str) -> bool:
-        """Whether a word is the address of a drive on the macro's bus, and neither a bus nor a role."""
+        """True if a word is the address of a drive on the macro's bus, and neither a bus nor a role."""
         return ":" not in word and played_by(word) not in self._workspace.buses
 
     def target(self, target: str) -> str:
@@ -226,7 +226,7 @@ class Execution:
 
     @property
     def _quits(self) -> bool:
-        """Whether a `/quit` ends it; the lines after an early end are executed all the same."""
+        """True if a `/quit` ends it; the lines after an early end are executed all the same."""
         return self.session.quitting and not self.is_over
 
     async def play(

@@ -214,7 +214,7 @@ class _Aftermath:
 
     @property
     def stopped(self) -> bool:
-        """Whether a stop of everything came since its beginning."""
+        """True if a stop of everything came since its beginning."""
         return self._session.stops != self._execution.stops
 
     def _warn(self, text: str) -> None:

@@ -123,7 +123,7 @@ def lines_of(body: Sequence[Node]) -> Iterator[ScriptLine]:
 
 @dataclass(frozen=True)
 class Result:
-    """What one line did. `sent` is the line with its values; `bus` and `drive` are empty for a verb."""
+    """The result of one line. `sent` is the line with its values; `bus` and `drive` are empty for a verb."""
 
     line: ScriptLine
     sent: str
@@ -184,7 +184,7 @@ class Ending:
     at: str = ""
     """The place where it ended early; empty: it played to its end."""
     standings: tuple[Standing, ...] = ()
-    """Where its drives stand after an early end."""
+    """The places of its drives after an early end."""
 
     def fact(self) -> dict[str, Any]:
         """The end as an object for programs."""

@@ -323,7 +323,7 @@ class _Checker:
             raise Diagnostic(f"{link.shown} would call itself: {way}", word, "use /repeat")
 
     def _unknown(self, text: str) -> bool:
-        """Whether the text takes a value that is only known when the line is executed."""
+        """True if the text takes a value that is only known when the line is executed."""
         return any(self._names.get(name, "") is None for name in value_names(text))
 
     def _try(self, line: ScriptLine, work: Callable[[str], T]) -> T | None:

@@ -170,5 +170,5 @@ def _parsed(text: str, rest: str, names: Collection[str], parsing: Callable[[str
 
 @cache
 def _is_word(name: str) -> bool:
-    """Whether a name in capitals is a word of a family; then it is not clear what is meant."""
+    """True if a name in capitals is a word of a family; then it is not clear what is meant."""
     return name == name.upper() and any(family.language.knows(name) for family in FAMILIES.values())

@@ -26,7 +26,7 @@ MOST = 1_000_000_000
 
 
 def _parsed(call: Call) -> tuple[str, list[str], dict[str, str], list[str]]:
-    """What to do, the flags, the options with values, and the other words. Raises Diagnostic."""
+    """The action, the flags, the options with values, and the other words. Raises Diagnostic."""
     if "".join(call.split()[:1]) not in ("read", "save", "backup", "diff", "restore"):
         raise call.wrong()
     (what, *words), options = call.sort(FLAGS, VALUES, listed=True)

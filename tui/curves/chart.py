@@ -124,13 +124,13 @@ class Look:
         self.cursor: float | None = None
         """The time of the cursor; only while paused."""
         self.zoom = 1
-        """How many times the values are magnified."""
+        """The magnification of the values."""
         self.apart = False
         """Each drive has a plot of its own."""
         self.hidden: set[str] = set()
         """The words whose plots are hidden."""
         self.charts: dict[tuple[str, str, int], Chart] = {}
-        """What was drawn, by word, drive and width."""
+        """The charts that were drawn, by word, drive and width."""
 
     @property
     def span(self) -> float:

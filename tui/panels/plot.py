@@ -31,7 +31,7 @@ class Line(NamedTuple):
     unit: str
     number: int
     twin: bool = False
-    """What the drive's twin predicts."""
+    """A prediction of the drive's twin."""
 
     @property
     def stroke(self) -> int:
@@ -95,7 +95,7 @@ def groups(view: View) -> list[Group]:
 
 
 def _recent(view: View, predicted: Quantity) -> bool:
-    """Whether a twin has predicted in the time that is shown, also one that has ended since."""
+    """True if a twin has predicted in the time that is shown, also one that has ended since."""
     look, trace = view.model.look, view.model.traces.get(predicted)
     end = view.now if look.paused_at is None else look.paused_at
     return trace is not None and trace.at[-1] >= end - look.span
@@ -432,7 +432,7 @@ def _shares(moving: Sequence[Shown], room: int) -> list[int]:
 
 
 def _is_switch(shown: Shown) -> bool:
-    """Whether a chart has only values between 0 and 1, which need few rows."""
+    """True if a chart has only values between 0 and 1, which need few rows."""
     return shown.group.word not in PLOTTED and all(low >= 0 and high <= 1 for low, high in shown.moving.values())
 
 

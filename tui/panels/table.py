@@ -53,7 +53,7 @@ def _end_of(path: str, width: int) -> str:
 
 
 MOTION, CONDITIONS, PLOT = "motion", "conditions", "plot"
-"""What a panel can want: position and velocity; lamps, errors and programs; samples as fast as the wire allows."""
+"""The wants of a panel: position and velocity; lamps, errors and programs; samples as fast as the wire allows."""
 
 
 class Panel(NamedTuple):
@@ -137,9 +137,6 @@ class Shown:
         if not wide or on:
             self._alone = name if on else ""
         return on
-
-    def wants(self, wide: bool) -> frozenset[str]:
-        return frozenset().union(*(panel.wants for panel in self.panels(wide)))
 
 
 HEAD = 1

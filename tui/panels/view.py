@@ -41,7 +41,7 @@ class Glance:
     """The axes whose position does not count since a restart."""
 
     def counts(self, axis: Readout) -> bool:
-        """Whether the position of an axis is not known to have lost its reference."""
+        """True if the position of an axis is not known to have lost its reference."""
         return not self.unreferenced & {axis.axis, ""}
 
     def state(self) -> State:

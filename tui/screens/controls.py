@@ -49,7 +49,7 @@ class Jog:
             self._busy = now
 
     def allows(self, readout: Readout, axis: Readout, state: State, now: float, *, idle: bool) -> bool:
-        """Whether a press at this time counts; one that does not is dropped."""
+        """True if a press at this time counts; one that does not is dropped."""
         self.look(now, idle=idle)
         repeated = now - self._pressed < REPETITION
         self._pressed = now
@@ -201,7 +201,7 @@ class ControlsPage(AskingPage):
         return rows
 
     def _readiness(self, why: str) -> Span:
-        """Whether the next press moves, or why not; with the presses that were dropped."""
+        """True if the next press moves, or why not; with the presses that were dropped."""
         count = self._jog.dropped
         presses = "1 press" if count == 1 else f"{count} presses"
         dropped = f"; {presses} dropped ({self._jog.why})" if count else ""

@@ -39,7 +39,7 @@ class Beside(Vertical):
         super().__init__(id="beside")
         self.display = False
         self.bus, self.address = "", ""
-        """What it shows: a line, and the one drive on it; an empty address is all of the line."""
+        """The line that it shows, and the one drive on it; an empty address is all of the line."""
         self._heading = Lines(id="beside-head")
         self.transcript = Half(clock)
 

@@ -93,7 +93,7 @@ class Page(Framed):
     KEYS: ClassVar[Sequence[tuple[str, str]]] = ()
     """The keys of this page with their meanings."""
     WANTS: ClassVar[frozenset[str]] = frozenset()
-    """What must be polled while it is shown, in the words of `tui.panels.table`."""
+    """The readings that it needs while it is shown, in the words of `tui.panels.table`."""
 
     PARTS: ClassVar[Mapping[str, str | int | None]] = {}
     """The parts that are rows, from top to bottom, with their heights; None: as the style sheet has it."""
@@ -178,7 +178,7 @@ class AskingPage(Page):
         return Begun(kind, self.host.session.stops, self.host.session.place, name, lines)
 
     def overtaken(self, begun: Begun) -> bool:
-        """Whether a stop, or another drive, came since something was begun."""
+        """True if a stop, or another drive, came since something was begun."""
         return begun[1:3] != (self.host.session.stops, self.host.session.place)
 
 

@@ -36,7 +36,7 @@ class SettingsTable:
     words: str = ""
     only_differing: bool = False
     other: tuple[str, dict[str, Value]] | None = None
-    """What the settings are compared with: its name, and its values."""
+    """The other side of a comparison: its name, and its values."""
     at: int = 0
     shown: list[Setting] = field(default_factory=list)
     found: Readings | None = None

@@ -188,7 +188,7 @@ def drive_choices(session: Session, glances: Callable[[Bus], list[Glance]]) -> t
 def leaving(
     session: Session, moving: Sequence[str], waiting: int, unsaved: Sequence[str] = ()
 ) -> tuple[list[str], Answers]:
-    """What quitting would leave unfinished (empty: no need to ask), and the possible answers.
+    """The work that quitting would leave unfinished (empty: no need to ask), and the possible answers.
 
     `moving` has a line for each drive that moves, or may; `waiting` is the number of typed lines that were not sent.
     """

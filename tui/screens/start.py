@@ -247,7 +247,7 @@ class Start(Over[None]):
 
 
 TRY = "try PR P, MR 51200 and @b PR P, each with Enter; /tour walks through everything"
-"""What an empty demo cell offers."""
+"""A hint for an empty demo cell."""
 
 
 class Opener:

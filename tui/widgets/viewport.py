@@ -98,7 +98,7 @@ BY_ITSELF = frozenset("<↑↓")
 
 
 def concerns(wanted: Filter, record: Record) -> bool:
-    """Whether a record is of the drive and of the person that are wanted, whatever it says."""
+    """True if a record is of the drive and of the person that are wanted, whatever it says."""
     by_itself = record.mark in BY_ITSELF
     of_drive = record.address in (wanted.address, *EVERYONE) or not (record.address or by_itself)
     of_person = record.mark == "!" or (record.mine and not by_itself)
