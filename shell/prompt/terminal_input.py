@@ -1,4 +1,4 @@
-"""The input of a person or a pipe at a terminal without a prompt: lines, the answer to a question, the values of a form.
+"""The input of a person or a pipe without a prompt: lines, the answer to a question, the values of a form.
 
 An answer is one key. Keys that were typed before the question could be read answer nothing.
 """
