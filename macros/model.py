@@ -130,17 +130,18 @@ def declared(lines: Sequence[tuple[str, str]]) -> tuple[Parameter, ...]:
     own = {match["name"] for _, line in lines if (match := _SET.match(line.strip()))}
     found: dict[str, tuple[Parameter, str]] = {}
     plain_ones: dict[str, None] = {}
-    for where, match in ((where, match) for where, line in lines for match in _PLACE.finditer(line) if match["name"]):
-        name = match["name"]
-        plain_ones.setdefault(name)
-        if match["type"] is None:
-            continue
-        parameter = _defined(name, match["type"], f"{where}: {match[0]}")
-        before, first = found.setdefault(name, (parameter, where))
-        if before != parameter:
-            hint = f"write {{{name}}} in one of them, or the same type in both"
-            place = first.rpartition(", ")[2].rpartition(": ")[2]
-            raise Diagnostic(f"{match[0]} differs from {name} in {place}", where, hint)
+    for where, line in lines:
+        for match in _PLACE.finditer(line):
+            if name := match["name"]:
+                plain_ones.setdefault(name)
+            if match["type"] is None:
+                continue
+            parameter = _defined(name, match["type"], f"{where}: {match[0]}")
+            before, first = found.setdefault(name, (parameter, where))
+            if before != parameter:
+                hint = f"write {{{name}}} in one of them, or the same type in both"
+                place = first.rpartition(", ")[2].rpartition(": ")[2]
+                raise Diagnostic(f"{match[0]} differs from {name} in {place}", where, hint)
     return tuple(found[n][0] if n in found else Parameter(n) for n in plain_ones if n in found or n not in own)
 
 

@@ -199,9 +199,8 @@ class MacroStore:
 
     def rename(self, name: str, new: str) -> Path:
         """Give a macro another name: in the file, and of the file. Its key stays."""
-        old = self.path(name)
         path = self.copy(name, new, keep_key=True)
-        _unlink(old)
+        self.delete(name)
         return path
 
     def free_name(self, name: str) -> str:
@@ -223,7 +222,12 @@ class MacroStore:
 
     def delete(self, name: str) -> Path:
         path = self.path(name)
-        _unlink(path)
+        try:
+            path.unlink()
+        except FileNotFoundError:
+            raise Diagnostic(f"no macro {path.stem!r}", str(path.parent)) from None
+        except OSError as error:
+            raise Diagnostic(f"cannot delete the file ({error.strerror})", str(path)) from None
         return path
 
 
@@ -258,15 +262,6 @@ def _write(path: Path, text: str) -> None:
     except OSError as error:
         what = f"cannot write the file ({error.strerror or error})"
         raise Diagnostic(what, str(path), "the old file is unchanged") from None
-
-
-def _unlink(path: Path) -> None:
-    try:
-        path.unlink()
-    except FileNotFoundError:
-        raise Diagnostic(f"no macro {path.stem!r}", str(path.parent)) from None
-    except OSError as error:
-        raise Diagnostic(f"cannot delete the file ({error.strerror})", str(path)) from None
 
 
 def _unreadable(path: Path, error: OSError) -> Diagnostic:

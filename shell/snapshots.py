@@ -34,12 +34,14 @@ async def save(workspace: Workspace, file: str) -> None:
     buses = [await _bus(workspace, bus, failures) for bus in workspace.buses.values()]
     text = write(buses)
     new_file.write(file, text, workspace.output)
-    for place, drive in ((f"{bus.name}:{drive.name}", drive) for bus in buses for drive in bus.drives):
-        for remark in drive.remarks:
-            workspace.notify(f"{place}: {remark}", warning=True)
-        if drive.unread:
-            names = ", ".join(name for name, _ in drive.unread)
-            workspace.notify(f"{place}: not read: {names}; the file says why", warning=True)
+    for bus in buses:
+        for drive in bus.drives:
+            place = f"{bus.name}:{drive.name}"
+            for remark in drive.remarks:
+                workspace.notify(f"{place}: {remark}", warning=True)
+            if drive.unread:
+                names = ", ".join(name for name, _ in drive.unread)
+                workspace.notify(f"{place}: not read: {names}; the file says why", warning=True)
     count = sum(len(bus.drives) for bus in buses)
     opens = "" if file == new_file.STANDARD_OUTPUT else f"; sim:{file} opens it"
     workspace.notify(f"{count} drive{'s' * (count != 1)}{new_file.place(file)}{opens}", outcome=True)
