@@ -40,8 +40,9 @@ class Store:
         text = json.dumps(content, indent=indent) + ("\n" if indent else "")
         write_atomically(self.folder / name, text.encode(), 0o600, synced=synced)
         if self._most:
-            for old in sorted(self.folder.glob("*.json"), key=lambda each: each.stat().st_mtime)[: -self._most]:
-                old.unlink(missing_ok=True)
+            with contextlib.suppress(OSError):  # this file is written, whichever session deletes the old ones
+                for old in sorted(self.folder.glob("*.json"), key=lambda each: each.stat().st_mtime)[: -self._most]:
+                    old.unlink()
 
     def load(self, name: str, parse: Callable[[Any], T]) -> T:
         """Parse a file. Raises OSError, and Damaged where `parse` fails."""

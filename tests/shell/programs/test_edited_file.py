@@ -131,3 +131,16 @@ def test_a_damaged_draft_is_none_and_a_full_disk_is_a_diagnostic(tmp_path: Path)
     (tmp_path / "other").write_text("a file, no folder")
     with pytest.raises(Diagnostic, match="no copy"):
         Drafts(tmp_path / "other").keep(Copy(file, "x", "12:40"))
+
+
+def test_a_draft_is_kept_where_an_old_one_cannot_be_deleted(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    drafts = Drafts(tmp_path)
+    for number in range(50):
+        drafts.keep(Copy(f"{number}.mxt", "x", "12:40"))
+
+    def gone(*_: object, **__: object) -> None:
+        raise FileNotFoundError(2, "deleted by another session")
+
+    monkeypatch.setattr(Path, "unlink", gone)
+    drafts.keep(Copy("new.mxt", "y", "12:41"))
+    assert drafts.find("new.mxt") == Copy("new.mxt", "y", "12:41")
