@@ -22,7 +22,7 @@ from multidrop.dialects.pmx.host.codec import Pmx
 from multidrop.dialects.tmcl.host.codec import Tmcl
 from multidrop.drives.line import Line
 from multidrop.macros.model import Macro
-from multidrop.macros.toml_format import format_macro, parse_macro, with_value
+from multidrop.macros.toml_format import format_macro, parse_macro, with_values
 from multidrop.macros.vendor import exported, imported
 from multidrop.shell import lines
 from multidrop.shell.connect import settings, urls
@@ -168,7 +168,7 @@ def _macro(text: str) -> None:
     macro = parse_macro(text, "m.toml")
     assert isinstance(macro, Macro)
     assert parse_macro(format_macro(macro), "m.toml") == macro
-    parse_macro(with_value(text, "key", "F9", "m.toml"), "m.toml")
+    parse_macro(with_values(text, {"key": "F9"}, "m.toml"), "m.toml")
 
 
 def _keys(text: str) -> None:
