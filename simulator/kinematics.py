@@ -237,7 +237,7 @@ class Profile(NamedTuple):
         """Find the crossing within one segment, in which the velocity does not change its sign."""
         direction, end = segment.direction, segment.end
         begin = max(after, segment.start)
-        if (position - self.position(begin)) * direction < 0:
+        if (position - segment.position_at(begin)) * direction < 0:
             return None
         if end < inf and (position - self.position(end)) * direction > 0:
             return None

@@ -102,14 +102,9 @@ class Power:
         self.nvm.erase()
         self.restart()
 
-    @property
-    def on(self) -> bool:
-        """Return whether it has power, and is up."""
-        return self._bridges.powered
-
     def switch(self, on: bool) -> None:
         """Switch the drive on or off now. What NVM holds stays."""
-        if on == (self.on or self.boots_at is not None):
+        if on == (self._bridges.powered or self.boots_at is not None):
             return
         if on:
             self._core.world.powered_up(self._timeline.now)

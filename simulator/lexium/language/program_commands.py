@@ -268,8 +268,13 @@ class ProgramCommands:
     def _break_point(self, statement: Statement) -> Action:
         """BP with a place and how often; BP=0 takes it away; BP alone breaks a running program (manual 5.1.13)."""
         breaks_here = self._memory.model.break_here
+
+        def break_here() -> None:
+            self._check_unlocked()
+            self._interpreter.break_here()
+
         if not statement.arguments and breaks_here:
-            return self._break_here
+            return break_here
         target, count = pair(statement)
         if not is_place(target):
             raise Fault(E.ILLEGAL_DATA)
@@ -288,34 +293,27 @@ class ProgramCommands:
 
         return set_up
 
-    def _break_here(self) -> None:
-        self._check_unlocked()
-        self._interpreter.break_here()
-
     # CP (manual 5.1.23): CP; CP <0/1>; CP <label>; CP <0/1>,<label>; CP S also saves.
 
     def _clear(self, statement: Statement) -> Action:
         arguments, takes_option = statement.arguments, self._memory.model.clears_variables
         if len(arguments) > (2 if takes_option else 1):
             raise Fault(E.ILLEGAL_DATA)
-        if arguments == (Name("S"),) and takes_option:
-            return self._clear_and_save
-        if len(arguments) == 1 and arguments[0] in OPTIONS and takes_option:
-            return lambda: self._clear_locked(variables=arguments[0] == Number(1))
-        option = arguments[0] if len(arguments) == 2 else Number(0)
+        saves = arguments == (Name("S"),) and takes_option
+        all_of_it = len(arguments) == 1 and arguments[0] in OPTIONS and takes_option
+        option = arguments[0] if all_of_it or len(arguments) == 2 else Number(0)
         if option not in OPTIONS:
             raise Fault(E.OUT_OF_RANGE)
-        target = arguments[-1] if arguments else None
-        return lambda: self._clear_from(target, variables=option == Number(1))
+        target = None if saves or all_of_it or not arguments else arguments[-1]
 
-    def _clear_and_save(self) -> None:
-        self._clear_from(None, variables=False)
-        self._nvm.save()
+        def clear() -> None:
+            if all_of_it:  # only CP without a parameter opens a lock (manual 5.1.75)
+                self._check_unlocked()
+            self._clear_from(target, variables=option == Number(1))
+            if saves:
+                self._nvm.save()
 
-    def _clear_locked(self, variables: bool) -> None:
-        """CP 0 and CP 1: all of program memory; only CP without a parameter opens a lock (manual 5.1.75)."""
-        self._check_unlocked()
-        self._clear_from(None, variables)
+        return clear
 
     def _clear_from(self, target: Argument | None, variables: bool) -> None:
         memory, interpreter = self._memory, self._interpreter

@@ -350,6 +350,9 @@ class Axis:
 
     def check_ramps(self) -> None:
         """Check that a motion may begin with these S-curves. Raises Fault (98, 99) for too steep a middle."""
+        values = self._memory.values
+        if values.get("AT", LINEAR) == LINEAR == values.get("DT", LINEAR):
+            return
         for shape, rate, code in (("AT", "A", E.NO_ACCELERATION_FITS), ("DT", "D", E.NO_DECELERATION_FITS)):
             if self._shape(shape, rate) is None:
                 raise Fault(code)

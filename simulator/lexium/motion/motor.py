@@ -203,7 +203,9 @@ class Motor:
         switches = self.limits.switches
         switches.clear()
         if not self._memory.values.get("CM"):
-            switches.update([DIRECTIONS[kind] for kind in self.inputs.active_types() if kind in DIRECTIONS])
+            for kind in self.inputs.active_types():
+                if kind in DIRECTIONS:
+                    switches.add(DIRECTIONS[kind])
 
     def input_changed(self, kind: int, active: bool, t: float) -> None:
         """Act on an input of a type that acts on motion."""
