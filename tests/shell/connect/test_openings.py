@@ -67,6 +67,16 @@ async def test_nothing_is_selected_before_the_first_url_is_open_unless_a_person_
     await floor.session.close()
 
 
+async def test_a_bus_that_was_closed_before_its_turn_is_not_selected(tmp_path):
+    floor = Floor(tmp_path, dead=-3.0, fast=0.5)
+    opening = asyncio.create_task(floor.session.open_all(["/dead", "/fast"], lambda number, why: None))
+    await asyncio.sleep(1.0)
+    await floor.session.run("/close fast")
+    await opening
+    assert floor.session.selected_bus == "" and not floor.session.buses
+    await floor.session.close()
+
+
 async def test_a_dead_url_holds_back_no_other_and_is_reported(tmp_path):
     floor, failures = Floor(tmp_path, dead=-30.0, fast=0.5), []
     opening = asyncio.create_task(
