@@ -122,7 +122,8 @@ class Outbox:
         if lane.failed:
             self._hold(lane, lane.failed)
         elif lane.running is None and (task := self._next(lane)) is not None:
-            self._watch(self._send(lane, task))
+            loop = asyncio.get_running_loop()
+            loop.call_soon(lambda: self._watch(self._send(lane, task)))  # after the line is written: it costs 60 us
 
     async def _send(self, lane: Lane, task: asyncio.Task[bool] | None) -> None:
         """Send the lines that wait in a lane; its first line runs already."""
