@@ -88,11 +88,9 @@ class _Reader:
     """Gives each result to its line: what a drive prints belongs to the last line for it."""
 
     def __init__(self) -> None:
-        self._steps: list[Step] = []
+        self._found = Steps()
         self._last: dict[tuple[str, str], Step] = {}
         self._newest: Step | None = None
-        self._skipped: dict[str, None] = {}
-        self._polls: list[Exchange] = []
         self._polled: dict[str, Exchange] = {}
         """The last request of each bus, where that is a poll."""
 
@@ -103,7 +101,7 @@ class _Reader:
         if entry.kind == "typed":
             self._typed(where, entry)
         elif entry.kind == "stop":
-            self._steps.append(Step(where, entry.time, "", sent=True))
+            self._found.steps.append(Step(where, entry.time, "", sent=True))
         elif entry.kind == "printed" and place in self._last:
             self._last[place].printed.append(entry.text)
         elif entry.kind == "sent" and not entry.poll and place in self._last:
@@ -124,15 +122,15 @@ class _Reader:
         self._newest = step = Step(where, entry.time, text, entry.bus, entry.drive)
         verb = "" if entry.bus else text.split()[0]
         if entry.raw:
-            self._skipped["lines in raw mode"] = None
+            self._found.skipped["lines in raw mode"] = None
         elif entry.bus:
             self._last[entry.bus, entry.drive] = step
-            self._steps.append(step)
+            self._found.steps.append(step)
         elif verb in (*WAITS, WORLD):
             step.sent = True
-            self._steps.append(step)
+            self._found.steps.append(step)
         elif verb not in RUNS_LINES:
-            self._skipped[verb] = None
+            self._found.skipped[verb] = None
 
     def _traffic(self, where: str, entry: Entry) -> None:
         data = entry.text.encode("latin-1")
@@ -143,14 +141,16 @@ class _Reader:
         self._polled.pop(entry.bus, None)
         if entry.poll:
             self._polled[entry.bus] = poll = Exchange(where, entry.time, entry.bus, entry.drive, data)
-            self._polls.append(poll)
+            self._found.polls.append(poll)
 
     def whole(self) -> Steps:
-        sent = [step for step in self._steps if step.sent]
+        found = self._found
+        sent = [step for step in found.steps if step.sent]
         for step in sent:
             if HIDDEN in step.text:
                 raise Diagnostic("holds a secret that the log does not have", step.where, "the log ends before it")
-        return Steps(sent, self._skipped, len(self._steps) - len(sent), self._polls)
+        found.steps, found.unsent = sent, len(found.steps) - len(sent)
+        return found
 
 
 def compared(step: Step, printed: list[str], failed: str, moving: bool) -> str:

@@ -204,21 +204,18 @@ class Positions:
             at = (each.at - self._first).total_seconds()
             if began + at > loop.time():
                 await asyncio.sleep(began + at - loop.time())
-            self._take(each, at)
+            if isinstance(each, Step) and (not each.text or each.drive in EVERYONE):  # a stop, or a line for all
+                for (bus, _), place in self._places.items():
+                    if each.bus in ("", bus):
+                        place.disturbed(at, each.text)
+            elif (own := self._places.get((each.bus, each.drive))) is not None:
+                measured = list(own.decoding.take(each) if isinstance(each, Exchange) else printed(each, own.drive))
+                if isinstance(each, Step) and not measured:
+                    own.disturbed(at, each.text)
+                for found in measured:
+                    self._report(own, own.take(found, at))
         for place in self._places.values():
             self._report(place, place.end())
-
-    def _take(self, each: Exchange | Step, at: float) -> None:
-        if isinstance(each, Step) and (not each.text or each.drive in EVERYONE):  # a stop, or a line for all
-            for (bus, _), place in self._places.items():
-                if each.bus in ("", bus):
-                    place.disturbed(at, each.text)
-        elif (own := self._places.get((each.bus, each.drive))) is not None:
-            measured = list(own.decoding.take(each) if isinstance(each, Exchange) else printed(each, own.drive))
-            if isinstance(each, Step) and not measured:
-                own.disturbed(at, each.text)
-            for found in measured:
-                self._report(own, own.take(found, at))
 
     def _report(self, place: _Place, news: Iterator[Diverged]) -> None:
         for each in news:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from multidrop.dialects import Diagnostic, DriveError
 from multidrop.shell.batch import runner
-from multidrop.shell.plots.plot import Plot, begin
+from multidrop.shell.plots.plot import begin
 from multidrop.shell.plots.request import PlotTarget, parse_rate, parse_series, parse_target, read_first
 from multidrop.shell.streams.stdout import report, write
 
@@ -40,21 +40,16 @@ async def _until_ended(workspace: Session, target: PlotTarget, drives: Sequence[
     if running.desk:
         write(sys.stderr, f"at your desk: {running.desk}, then rerun {running.where}")
     try:
-        await _ended(workspace, plot)
+        lost = runner.until(workspace, lambda: _lost(workspace))
+        waits: list[asyncio.Task[object]] = [asyncio.create_task(plot.ended.wait()), asyncio.create_task(lost)]
+        try:
+            await asyncio.wait(waits, return_when=asyncio.FIRST_COMPLETED)
+        finally:
+            for each in waits:
+                each.cancel()
+        raise _lost(workspace) or DriveError(plot.failure)
     finally:
         write(sys.stderr, await running.end())
-
-
-async def _ended(workspace: Session, plot: Plot) -> None:
-    """Wait until the plot fails, or a bus is lost for good. Raises that failure."""
-    lost = runner.until(workspace, lambda: _lost(workspace))
-    waits: list[asyncio.Task[object]] = [asyncio.create_task(plot.ended.wait()), asyncio.create_task(lost)]
-    try:
-        await asyncio.wait(waits, return_when=asyncio.FIRST_COMPLETED)
-    finally:
-        for each in waits:
-            each.cancel()
-    raise _lost(workspace) or DriveError(plot.failure)
 
 
 def _lost(workspace: Session) -> TransportLost | None:

@@ -197,14 +197,11 @@ class LineLimit:
 
     def missing(self, now: float) -> int:
         """The number of dropped lines, once one may be published in their place; 0 otherwise."""
-        if not self.dropped or not self._room(now):
+        if not self.dropped or self.left + (now - self.at) * LINES < 1:
             return 0
         self.left, self.at = self.left + min(BURST, (now - self.at) * LINES) - 1, now
         dropped, self.dropped = self.dropped, 0
         return dropped
-
-    def _room(self, now: float) -> bool:
-        return self.left + (now - self.at) * LINES >= 1
 
 
 Put = Callable[[str, float, bool, Fields], None]
@@ -235,7 +232,14 @@ class DriveFeed:
         elif isinstance(event, Silent):
             self._say_state(event.at, SILENT)
         else:
-            self._conditions(event)
+            self._program = program_of(event.conditions)
+            self._no_current = any(each.no_current for each in event.conditions)
+            if self._state:
+                known = str(self._state["value"])
+                self._say_state(event.at, self._motion() if self._moving and known != SILENT else known)
+            if (error := error_of(event.conditions)) != self._error:
+                self._error = error
+                self._put("error", event.at, True, error)
 
     def lost(self, at: float) -> None:
         self._program = None
@@ -258,17 +262,6 @@ class DriveFeed:
         if any(self._moving.values()):
             return MOVING
         return NO_CURRENT if self._no_current else AT_REST
-
-    def _conditions(self, event: Conditioned) -> None:
-        self._program = program_of(event.conditions)
-        self._no_current = any(each.no_current for each in event.conditions)
-        if self._state:
-            known = str(self._state["value"])
-            self._say_state(event.at, self._motion() if self._moving and known != SILENT else known)
-        error = error_of(event.conditions)
-        if error != self._error:
-            self._error = error
-            self._put("error", event.at, True, error)
 
     def _say_state(self, at: float, word: str) -> None:
         state: Fields = {"value": word} if self._program is None else {"value": word, "program": self._program}
