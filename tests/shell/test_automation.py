@@ -51,6 +51,12 @@ async def macro(session, *lines):
     await session.run("/play m")
 
 
+@pytest.fixture
+async def shop(tmp_path):
+    async with CellSession(tmp_path, *FLOOR) as made:
+        yield made
+
+
 @pytest.mark.parametrize("runs", [script, sent, macro])
 @pytest.mark.parametrize(
     ("ending", "failure"),
@@ -78,152 +84,135 @@ async def test_whatever_ends_it_early_stops_what_it_started_and_nothing_else(run
         await shop.session.run("@gantry:c SL 100", By.SCRIPT)
 
 
-async def test_what_it_starts_behind_a_stop_and_a_resume_is_stopped_too(tmp_path):
-    async with CellSession(tmp_path, *FLOOR) as shop:
-        with pytest.raises(Refused):
-            await sent(
-                shop.session,
-                *(GO["press:a"], GO["gantry:c"], "/stop", "/resume", "/wait stopped 9", "/sleep 1"),
-                *(GO["gantry:d"], GO["press:a"], "@press:a XX 1"),
-            )
-        assert shop.moving() == set()
-        assert shop.warned()[-2].startswith("stopped gantry:d, press:a: ")
-
-
-async def test_reads_never_count(tmp_path):
-    async with CellSession(tmp_path, *FLOOR) as shop:
-        for line in GO.values():
-            await shop.session.run(line)
-        shop.events.clear()
-        with pytest.raises(DriveError):
-            await sent(
-                shop.session, "@press:a PR P", "@eth: PR P,V", "@stages:00 PX", "@gantry:c VM=700000", "/wait stopped 1"
-            )
-        assert shop.moving() == set(GO)
-        assert not [text for text in shop.told() if "stop" in text and "/wait" not in text]
-
-
-async def test_a_stop_without_a_name_says_what_else_it_stopped(tmp_path):
-    async with CellSession(tmp_path, *FLOOR) as shop:
-        for name in ("press:b", "gantry:d"):
-            await shop.session.run(GO[name])
-        with pytest.raises(DriveError):
-            await script(shop.session, GO["press:a"], GO["gantry:c"], "/sleep 1", "/wait stopped 1")
-        assert shop.moving() == {"gantry:d"}
-        assert shop.warned()[-2:] == [
-            "stopped press:a, gantry:c: all 3 read velocity 0",
-            "stopped as well, because the stop of their line has no name: press:b",
-        ]
-
-
-async def test_a_line_to_all_is_all(tmp_path):
-    async with CellSession(tmp_path, *FLOOR) as shop:
-        with pytest.raises(DriveError):
-            await script(shop.session, "@press:* SL 50000", "@stages:* JX+", "/sleep 1", "/wait stopped 1")
-        assert shop.moving() == set()
-        assert shop.warned()[-1] == "stopped press, stages: all 4 read velocity 0"
-
-
-async def test_a_program_counts_when_it_is_executed_and_not_when_it_is_stored(tmp_path):
-    async with CellSession(tmp_path, *FLOOR) as shop:
-        await shop.session.run(GO["press:b"])
-        (tmp_path / "p.mxt").write_text("PG 1\nLB G1\nSL 20000\nH\nE\nPG\n")
-        store = (f"/download {tmp_path / 'p.mxt'} press:a", "@gantry:c PG 1", "@gantry:c MR 100", "@gantry:c PG")
-        with pytest.raises(Refused):
-            await script(shop.session, *store, "@press:a PR XX")
-        assert shop.moving() == {"press:b"}
-        with pytest.raises(Refused):
-            await script(shop.session, "@press:a EX G1", "/sleep 1", "@press:a PR XX")
-        assert shop.moving() == set()
-        assert shop.warned()[-2].startswith("stopped press:a: ")
-
-
-async def test_what_could_not_be_reached_is_named(tmp_path):
-    async with CellSession(tmp_path, *FLOOR) as shop:
-        with pytest.raises(TransportLost):
-            async with shop.session.automations.run():
-                await run_lines(shop.session, [GO["press:a"], GO["gantry:c"], "/sleep 1"])
-                shop.world("/sim unplug press")
-                await asyncio.sleep(1.0)
-                await shop.session.run("@press:a PR P")
-        assert shop.moving() == {"press:a"}
-        assert shop.warned()[-2:] == [
-            "stopped gantry:c: gantry:c reads velocity 0",
-            "press: stop not sent (lost): a started 2 s ago and not read since - use the E-stop",
-        ]
-
-
-async def test_lines_do_not_end_well_where_their_bus_was_lost_in_a_pause(tmp_path):
-    async with CellSession(tmp_path, *FLOOR) as shop:
-        asyncio.get_running_loop().call_later(1.0, shop.world, "/sim unplug press")
-        with pytest.raises(TransportLost):
-            await sent(shop.session, GO["press:a"], "/sleep 6")
-        assert "press: stop not sent (lost)" in shop.warned()[-1]
-
-
-async def test_an_automation_that_ends_well_leaves_what_it_moved(tmp_path):
-    async with CellSession(tmp_path, *FLOOR) as shop:
-        await sent(shop.session, *GO.values())
-        assert shop.moving() == set(GO) and shop.warned() == []
-
-
-async def test_a_macro_within_a_script_belongs_to_it(tmp_path):
-    async with CellSession(tmp_path, *FLOOR) as shop:
-        shop.session.macros.save(Macro("m", (Step(0.0, GO["press:b"]), Step(0.0, "@press:b PR XX"))))
-        with pytest.raises(Refused):
-            await script(shop.session, GO["gantry:c"], "/play m")
-        assert shop.moving() == set()
-        assert [text for text in shop.warned() if text.startswith("stopped ")] == [
-            "stopped gantry:c, press:b: all 3 read velocity 0",
-            "stopped as well, because the stop of their line has no name: press:a",
-        ]
-
-
-async def test_a_stop_of_everything_is_not_followed_by_another(tmp_path):
-    async with CellSession(tmp_path, *FLOOR) as shop:
-        running = asyncio.create_task(macro(shop.session, GO["press:a"], "/sleep 100"))
-        await asyncio.sleep(1.0)
-        shop.session.stop()
-        with pytest.raises(Stopped):
-            await running
-        await asyncio.sleep(2.0)
-        assert not [text for text in shop.warned() if text.startswith("stopped")] and shop.session.latched
-
-
-async def test_an_interruption_is_written_at_once_and_stops_what_was_started_alone(tmp_path):
-    async with CellSession(tmp_path, *FLOOR) as shop:
-        await shop.session.run(GO["gantry:d"])
-        running = asyncio.create_task(macro(shop.session, GO["press:a"], GO["gantry:c"], "/sleep 100"))
-        await asyncio.sleep(1.0)
-        shop.events.clear()
-        shop.session.interrupt()
-        assert (shop.written("press"), shop.written("gantry")) == (b"\x1b", b"c\x1b\n")
-        assert (shop.written("eth"), shop.written("stages")) == (b"", b"")
-        with pytest.raises(asyncio.CancelledError):
-            await running
-        await asyncio.sleep(2.0)
-        assert (
-            shop.moving() == {"gantry:d"}
-            and len(shop.session.automations.interrupted) == 2
-            and not shop.session.latched
+async def test_what_it_starts_behind_a_stop_and_a_resume_is_stopped_too(shop):
+    with pytest.raises(Refused):
+        await sent(
+            shop.session,
+            *(GO["press:a"], GO["gantry:c"], "/stop", "/resume", "/wait stopped 9", "/sleep 1"),
+            *(GO["gantry:d"], GO["press:a"], "@press:a XX 1"),
         )
+    assert shop.moving() == set()
+    assert shop.warned()[-2].startswith("stopped gantry:d, press:a: ")
 
 
-async def test_an_operators_lines_go_on_beside_a_macro_that_fails(tmp_path):
-    async with CellSession(tmp_path, *FLOOR) as shop:
-        asked = [asyncio.create_task(shop.session.run(f"@gantry:d PR {n}")) for n in range(20)]
-        with pytest.raises(DriveError):
-            await macro(shop.session, GO["gantry:c"], "@gantry:c PR XX")
-        done = await asyncio.gather(*asked, return_exceptions=True)
-        assert sum(isinstance(each, Stopped) for each in done) <= 1, "at most the one that was on the wire"
-        assert shop.moving() == set()
+async def test_reads_never_count(shop):
+    for line in GO.values():
+        await shop.session.run(line)
+    shop.events.clear()
+    with pytest.raises(DriveError):
+        await sent(
+            shop.session, "@press:a PR P", "@eth: PR P,V", "@stages:00 PX", "@gantry:c VM=700000", "/wait stopped 1"
+        )
+    assert shop.moving() == set(GO)
+    assert not [text for text in shop.told() if "stop" in text and "/wait" not in text]
 
 
-async def test_two_stops_of_single_drives_are_both_repeated(tmp_path):
-    async with CellSession(tmp_path, *FLOOR) as shop:
-        gantry = shop.session.buses["gantry"]
-        shop.events.clear()
-        gantry.stop([gantry.drives["c"]])
-        gantry.stop([gantry.drives["d"]])
-        await gantry.stopped()
-        assert shop.written("gantry").count(b"c\x1b\n") == 2 and shop.written("gantry").count(b"d\x1b\n") == 2
+async def test_a_stop_without_a_name_says_what_else_it_stopped(shop):
+    for name in ("press:b", "gantry:d"):
+        await shop.session.run(GO[name])
+    with pytest.raises(DriveError):
+        await script(shop.session, GO["press:a"], GO["gantry:c"], "/sleep 1", "/wait stopped 1")
+    assert shop.moving() == {"gantry:d"}
+    assert shop.warned()[-2:] == [
+        "stopped press:a, gantry:c: all 3 read velocity 0",
+        "stopped as well, because the stop of their line has no name: press:b",
+    ]
+
+
+async def test_a_line_to_all_is_all(shop):
+    with pytest.raises(DriveError):
+        await script(shop.session, "@press:* SL 50000", "@stages:* JX+", "/sleep 1", "/wait stopped 1")
+    assert shop.moving() == set()
+    assert shop.warned()[-1] == "stopped press, stages: all 4 read velocity 0"
+
+
+async def test_a_program_counts_when_it_is_executed_and_not_when_it_is_stored(tmp_path, shop):
+    await shop.session.run(GO["press:b"])
+    (tmp_path / "p.mxt").write_text("PG 1\nLB G1\nSL 20000\nH\nE\nPG\n")
+    store = (f"/download {tmp_path / 'p.mxt'} press:a", "@gantry:c PG 1", "@gantry:c MR 100", "@gantry:c PG")
+    with pytest.raises(Refused):
+        await script(shop.session, *store, "@press:a PR XX")
+    assert shop.moving() == {"press:b"}
+    with pytest.raises(Refused):
+        await script(shop.session, "@press:a EX G1", "/sleep 1", "@press:a PR XX")
+    assert shop.moving() == set()
+    assert shop.warned()[-2].startswith("stopped press:a: ")
+
+
+async def test_what_could_not_be_reached_is_named(shop):
+    with pytest.raises(TransportLost):
+        async with shop.session.automations.run():
+            await run_lines(shop.session, [GO["press:a"], GO["gantry:c"], "/sleep 1"])
+            shop.world("/sim unplug press")
+            await asyncio.sleep(1.0)
+            await shop.session.run("@press:a PR P")
+    assert shop.moving() == {"press:a"}
+    assert shop.warned()[-2:] == [
+        "stopped gantry:c: gantry:c reads velocity 0",
+        "press: stop not sent (lost): a started 2 s ago and not read since - use the E-stop",
+    ]
+
+
+async def test_lines_do_not_end_well_where_their_bus_was_lost_in_a_pause(shop):
+    asyncio.get_running_loop().call_later(1.0, shop.world, "/sim unplug press")
+    with pytest.raises(TransportLost):
+        await sent(shop.session, GO["press:a"], "/sleep 6")
+    assert "press: stop not sent (lost)" in shop.warned()[-1]
+
+
+async def test_an_automation_that_ends_well_leaves_what_it_moved(shop):
+    await sent(shop.session, *GO.values())
+    assert shop.moving() == set(GO) and shop.warned() == []
+
+
+async def test_a_macro_within_a_script_belongs_to_it(shop):
+    shop.session.macros.save(Macro("m", (Step(0.0, GO["press:b"]), Step(0.0, "@press:b PR XX"))))
+    with pytest.raises(Refused):
+        await script(shop.session, GO["gantry:c"], "/play m")
+    assert shop.moving() == set()
+    assert [text for text in shop.warned() if text.startswith("stopped ")] == [
+        "stopped gantry:c, press:b: all 3 read velocity 0",
+        "stopped as well, because the stop of their line has no name: press:a",
+    ]
+
+
+async def test_a_stop_of_everything_is_not_followed_by_another(shop):
+    running = asyncio.create_task(macro(shop.session, GO["press:a"], "/sleep 100"))
+    await asyncio.sleep(1.0)
+    shop.session.stop()
+    with pytest.raises(Stopped):
+        await running
+    await asyncio.sleep(2.0)
+    assert not [text for text in shop.warned() if text.startswith("stopped")] and shop.session.latched
+
+
+async def test_an_interruption_is_written_at_once_and_stops_what_was_started_alone(shop):
+    await shop.session.run(GO["gantry:d"])
+    running = asyncio.create_task(macro(shop.session, GO["press:a"], GO["gantry:c"], "/sleep 100"))
+    await asyncio.sleep(1.0)
+    shop.events.clear()
+    shop.session.interrupt()
+    assert (shop.written("press"), shop.written("gantry")) == (b"\x1b", b"c\x1b\n")
+    assert (shop.written("eth"), shop.written("stages")) == (b"", b"")
+    with pytest.raises(asyncio.CancelledError):
+        await running
+    await asyncio.sleep(2.0)
+    assert shop.moving() == {"gantry:d"} and len(shop.session.automations.interrupted) == 2 and not shop.session.latched
+
+
+async def test_an_operators_lines_go_on_beside_a_macro_that_fails(shop):
+    asked = [asyncio.create_task(shop.session.run(f"@gantry:d PR {n}")) for n in range(20)]
+    with pytest.raises(DriveError):
+        await macro(shop.session, GO["gantry:c"], "@gantry:c PR XX")
+    done = await asyncio.gather(*asked, return_exceptions=True)
+    assert sum(isinstance(each, Stopped) for each in done) <= 1, "at most the one that was on the wire"
+    assert shop.moving() == set()
+
+
+async def test_two_stops_of_single_drives_are_both_repeated(shop):
+    gantry = shop.session.buses["gantry"]
+    shop.events.clear()
+    gantry.stop([gantry.drives["c"]])
+    gantry.stop([gantry.drives["d"]])
+    await gantry.stopped()
+    assert shop.written("gantry").count(b"c\x1b\n") == 2 and shop.written("gantry").count(b"d\x1b\n") == 2

@@ -45,89 +45,87 @@ def silent(shop):
     return not (shop.written("press") or shop.written("stages"))
 
 
-async def test_without_anybody_to_ask_nothing_is_sent_and_the_refusal_names_yes(tmp_path):
-    async with opened(tmp_path) as shop:
-        for line, part in GUARDED.items():
-            with pytest.raises(Diagnostic, match=f"{part}.*nothing was sent; --yes agrees to it"):
-                await shop.session.run(line)
-        assert silent(shop)
+@pytest.fixture
+async def shop(tmp_path):
+    async with opened(tmp_path) as made:
+        yield made
 
 
-async def test_no_sends_nothing_and_yes_sends_once(tmp_path):
-    async with opened(tmp_path) as shop:
-        for answer in (False, True):
-            person = Person(shop, answer)
-            if answer:
-                await shop.session.run("@a CP")
-            else:
-                with pytest.raises(Diagnostic, match="the answer was no"):
-                    await shop.session.run("@a CP")
-                assert silent(shop)
-            assert person.asked == ["press:a: 'CP' erases the program"]
-        assert shop.written("press").count(b"CP") == 1
+async def test_without_anybody_to_ask_nothing_is_sent_and_the_refusal_names_yes(shop):
+    for line, part in GUARDED.items():
+        with pytest.raises(Diagnostic, match=f"{part}.*nothing was sent; --yes agrees to it"):
+            await shop.session.run(line)
+    assert silent(shop)
 
 
-async def test_a_stop_while_it_asks_is_sent_and_the_line_is_not(tmp_path):
-    async with opened(tmp_path) as shop:
-        person = Person(shop, None)
-        asking = asyncio.create_task(shop.session.run("@* MR 512000"))
-        await asyncio.sleep(1.0)
-        shop.session.stop()
-        with pytest.raises(Stopped):
-            await asking
-        assert person.asked and shop.session.latched
-        assert b"\x1b" in shop.written("press") and b"MR" not in shop.written("press") and not shop.moving()
-
-
-async def test_a_script_and_a_macro_ask_nobody(tmp_path):
-    async with opened(tmp_path) as shop:
-        person = Person(shop, True)
-        with pytest.raises(Diagnostic, match="a script cannot ask, nothing was sent; --yes agrees beforehand"):
-            await shop.session.run("@a CP", By.SCRIPT)
-        with pytest.raises(Diagnostic, match="a macro cannot ask"):
-            await play(shop.session, Macro("wipe", (Step(0.0, "@a CP"),)), {})
-        assert person.asked == [] and silent(shop)
-        shop.session.questions.agreed = True
-        await shop.session.run("@a CP", By.SCRIPT)
-        assert b"CP" in shop.written("press") and person.asked == []
-
-
-async def test_a_refused_line_is_not_recorded(tmp_path):
-    async with opened(tmp_path) as shop:
-        await shop.session.run("/record wipe")
-        with pytest.raises(Diagnostic):
+async def test_no_sends_nothing_and_yes_sends_once(shop):
+    for answer in (False, True):
+        person = Person(shop, answer)
+        if answer:
             await shop.session.run("@a CP")
-        await shop.session.run("@a PR P")
-        await shop.session.run("/record stop")
-        assert [step.line for step in shop.session.macros.load("wipe").steps] == ["@press:a PR P"]
+        else:
+            with pytest.raises(Diagnostic, match="the answer was no"):
+                await shop.session.run("@a CP")
+            assert silent(shop)
+        assert person.asked == ["press:a: 'CP' erases the program"]
+    assert shop.written("press").count(b"CP") == 1
 
 
-async def test_stops_are_sent_without_a_question(tmp_path):
-    async with opened(tmp_path) as shop:
-        person = Person(shop, False)
-        for line in ("@* SL 0", "@a SL 0", "@stages:* ABORT", "@stages:* SR0=0", "/stop"):
-            await shop.session.run(line)
-        assert person.asked == []
+async def test_a_stop_while_it_asks_is_sent_and_the_line_is_not(shop):
+    person = Person(shop, None)
+    asking = asyncio.create_task(shop.session.run("@* MR 512000"))
+    await asyncio.sleep(1.0)
+    shop.session.stop()
+    with pytest.raises(Stopped):
+        await asking
+    assert person.asked and shop.session.latched
+    assert b"\x1b" in shop.written("press") and b"MR" not in shop.written("press") and not shop.moving()
 
 
-async def test_a_line_in_program_mode_is_stored_and_needs_no_yes(tmp_path):
-    async with opened(tmp_path) as shop:
-        for line in ("@a PG 1", "@a AS=3", "@a E", "@a PG"):
-            await shop.session.run(line)
-        assert b"AS=3" in shop.written("press")
+async def test_a_script_and_a_macro_ask_nobody(shop):
+    person = Person(shop, True)
+    with pytest.raises(Diagnostic, match="a script cannot ask, nothing was sent; --yes agrees beforehand"):
+        await shop.session.run("@a CP", By.SCRIPT)
+    with pytest.raises(Diagnostic, match="a macro cannot ask"):
+        await play(shop.session, Macro("wipe", (Step(0.0, "@a CP"),)), {})
+    assert person.asked == [] and silent(shop)
+    shop.session.questions.agreed = True
+    await shop.session.run("@a CP", By.SCRIPT)
+    assert b"CP" in shop.written("press") and person.asked == []
 
 
-async def test_the_configuration_takes_guards_away_and_adds_words(tmp_path):
-    async with opened(tmp_path) as shop:
-        found = settings.parse('[guards]\noff = ["cp", "*"]\nalso = ["S"]', "multidrop.toml")
-        shop.session.settings = found
+async def test_a_refused_line_is_not_recorded(shop):
+    await shop.session.run("/record wipe")
+    with pytest.raises(Diagnostic):
         await shop.session.run("@a CP")
-        await shop.session.run("@* P=0")
-        await shop.session.run("@* MR 0")
-        with pytest.raises(Diagnostic, match=r"'S' is sent: \[guards\] also has S; nothing was sent"):
-            await shop.session.run("@a S")
-        with pytest.raises(Diagnostic, match="'FD' erases all"):
-            await shop.session.run("@a FD")
+    await shop.session.run("@a PR P")
+    await shop.session.run("/record stop")
+    assert [step.line for step in shop.session.macros.load("wipe").steps] == ["@press:a PR P"]
+
+
+async def test_stops_are_sent_without_a_question(shop):
+    person = Person(shop, False)
+    for line in ("@* SL 0", "@a SL 0", "@stages:* ABORT", "@stages:* SR0=0", "/stop"):
+        await shop.session.run(line)
+    assert person.asked == []
+
+
+async def test_a_line_in_program_mode_is_stored_and_needs_no_yes(shop):
+    for line in ("@a PG 1", "@a AS=3", "@a E", "@a PG"):
+        await shop.session.run(line)
+    assert b"AS=3" in shop.written("press")
+
+
+async def test_the_configuration_takes_guards_away_and_adds_words(shop):
+    found = settings.parse('[guards]\noff = ["cp", "*"]\nalso = ["S"]', "multidrop.toml")
+    shop.session.settings = found
+    await shop.session.run("@a CP")
+    await shop.session.run("@* P=0")
+    await shop.session.run("@* MR 0")
+    with pytest.raises(Diagnostic, match=r"'S' is sent: \[guards\] also has S; nothing was sent"):
+        await shop.session.run("@a S")
+    with pytest.raises(Diagnostic, match="'FD' erases all"):
+        await shop.session.run("@a FD")
 
 
 @pytest.mark.parametrize(

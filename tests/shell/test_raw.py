@@ -53,21 +53,25 @@ async def say(shop, *lines):
     return rows(shop)
 
 
-async def test_opening_writes_nothing(tmp_path):
-    async with opened(tmp_path) as shop:
-        await asyncio.sleep(10.0)
-        assert shop.written("line") == b"" and shop.session.buses["line"].drives == {}
+@pytest.fixture
+async def shop(tmp_path):
+    async with opened(tmp_path) as made:
+        yield made
 
 
-async def test_text_goes_out_with_its_terminator_and_every_byte_is_shown(tmp_path):
-    async with opened(tmp_path) as shop:
-        await say(shop, "/raw show text")
-        assert await say(shop, "PR P") == ["PR P\\r\\n", "0\\r\\n", ">"]
-        assert rows(shop, outgoing=True) == ["PR P\\r"]
-        await say(shop, "/raw show hex", "/raw end none")
-        assert await say(shop, "PR P", "/bytes CR") == ["50 52 20 50", "0D 0A", "30 0D 0A", "3E"]
-        await say(shop, "/raw show both")
-        assert await say(shop, "/bytes 0D") == ["\\r\\n".ljust(24) + " 0D 0A", ">".ljust(24) + " 3E"]
+async def test_opening_writes_nothing(shop):
+    await asyncio.sleep(10.0)
+    assert shop.written("line") == b"" and shop.session.buses["line"].drives == {}
+
+
+async def test_text_goes_out_with_its_terminator_and_every_byte_is_shown(shop):
+    await say(shop, "/raw show text")
+    assert await say(shop, "PR P") == ["PR P\\r\\n", "0\\r\\n", ">"]
+    assert rows(shop, outgoing=True) == ["PR P\\r"]
+    await say(shop, "/raw show hex", "/raw end none")
+    assert await say(shop, "PR P", "/bytes CR") == ["50 52 20 50", "0D 0A", "30 0D 0A", "3E"]
+    await say(shop, "/raw show both")
+    assert await say(shop, "/bytes 0D") == ["\\r\\n".ljust(24) + " 0D 0A", ">".ljust(24) + " 3E"]
 
 
 async def test_a_line_with_an_at_sign_is_text(tmp_path):
@@ -200,48 +204,45 @@ async def test_where_no_drive_replies_the_line_stays_raw(tmp_path):
         assert await say(shop, '/bytes 61 "PR P" LF') != []
 
 
-async def test_automation_in_raw_mode_stops_the_line_when_it_ends_early(tmp_path):
-    async with opened(tmp_path) as shop:
-        with pytest.raises(Diagnostic):
-            async with shop.session.automations.run():
-                await shop.session.run("SL 20000", By.SCRIPT)
-                await asyncio.sleep(0.5)
-                raise Diagnostic("failed")
-        device = shop.device("line:!")
-        await asyncio.sleep(0.5)
-        assert not moves(device, device.now)
-        shop.events.clear()
-        with pytest.raises(Diagnostic):
-            async with shop.session.automations.run():
-                await shop.session.run("PR P", By.SCRIPT)
-                raise Diagnostic("failed")
-        assert shop.written("line") == b"PR P\r"  # a print starts nothing
+async def test_automation_in_raw_mode_stops_the_line_when_it_ends_early(shop):
+    with pytest.raises(Diagnostic):
+        async with shop.session.automations.run():
+            await shop.session.run("SL 20000", By.SCRIPT)
+            await asyncio.sleep(0.5)
+            raise Diagnostic("failed")
+    device = shop.device("line:!")
+    await asyncio.sleep(0.5)
+    assert not moves(device, device.now)
+    shop.events.clear()
+    with pytest.raises(Diagnostic):
+        async with shop.session.automations.run():
+            await shop.session.run("PR P", By.SCRIPT)
+            raise Diagnostic("failed")
+    assert shop.written("line") == b"PR P\r"  # a print starts nothing
 
 
-async def test_a_guarded_text_asks_and_an_address_is_refused(tmp_path):
-    async with opened(tmp_path) as shop:
-        for line, part in {"FD": "erases all", "aCP": "erases the program", "@line:a PR P": "has no address a"}.items():
-            with pytest.raises(Diagnostic, match=part):
-                await shop.session.run(line)
-        assert shop.written("line") == b""
-        await shop.session.run("@line: PR P")
-        assert shop.written("line") == b"PR P\r"
+async def test_a_guarded_text_asks_and_an_address_is_refused(shop):
+    for line, part in {"FD": "erases all", "aCP": "erases the program", "@line:a PR P": "has no address a"}.items():
+        with pytest.raises(Diagnostic, match=part):
+            await shop.session.run(line)
+    assert shop.written("line") == b""
+    await shop.session.run("@line: PR P")
+    assert shop.written("line") == b"PR P\r"
 
 
-async def test_text_on_its_way_is_on_record_until_it_has_left(tmp_path):
-    async with opened(tmp_path) as shop:
-        link = shop.session.buses["line"].link
-        link.line.byte_time = 0.1
-        await shop.session.run("MR 512")
-        assert link.cut == "MR 512\r"
-        await asyncio.sleep(1.0)
-        assert link.cut == ""
-        await shop.session.run("/bytes 4D 52")
-        await asyncio.sleep(5.0)
-        assert link.cut == "MR"
-        await shop.session.run("/bytes CR")
-        await asyncio.sleep(1.0)
-        assert link.cut == ""
+async def test_text_on_its_way_is_on_record_until_it_has_left(shop):
+    link = shop.session.buses["line"].link
+    link.line.byte_time = 0.1
+    await shop.session.run("MR 512")
+    assert link.cut == "MR 512\r"
+    await asyncio.sleep(1.0)
+    assert link.cut == ""
+    await shop.session.run("/bytes 4D 52")
+    await asyncio.sleep(5.0)
+    assert link.cut == "MR"
+    await shop.session.run("/bytes CR")
+    await asyncio.sleep(1.0)
+    assert link.cut == ""
 
 
 async def test_a_line_that_was_lost_comes_back_raw(tmp_path):
@@ -255,39 +256,37 @@ async def test_a_line_that_was_lost_comes_back_raw(tmp_path):
         assert await say(shop, "/raw show text", "PR P") == ["PR P\\r\\n", "0\\r\\n", ">"]
 
 
-async def test_what_a_port_cannot_do_is_one_clear_line(tmp_path):
-    async with opened(tmp_path) as shop:
-        for line in ("/raw baud 19200", "/raw dtr on", "/raw rts off", "/raw break"):
-            with pytest.raises(Diagnostic, match="has no baud rate, DTR, RTS or break; valid on a serial port"):
-                await shop.session.run(line)
-        for line in (
-            "/raw baud",
-            "/raw dtr",
-            "/raw dtr up",
-            "/raw break 0",
-            "/raw baud x",
-            "/raw end x",
-            "/raw nonsense",
-        ):
-            with pytest.raises(Diagnostic, match="usage|baud rate|break takes"):
-                await shop.session.run(line)
-        for line in ("/raw on", "/bytes 5", "/bytes", '/bytes "€"', "€"):
-            with pytest.raises(Diagnostic):
-                await shop.session.run(line)
-        assert shop.written("line") == b""
-        await shop.session.run("/raw off")
-        for line in ("/raw off", "/bytes 0D", "/raw end lf"):
-            with pytest.raises(Diagnostic, match="not in raw mode"):
-                await shop.session.run(line)
+async def test_what_a_port_cannot_do_is_one_clear_line(shop):
+    for line in ("/raw baud 19200", "/raw dtr on", "/raw rts off", "/raw break"):
+        with pytest.raises(Diagnostic, match="has no baud rate, DTR, RTS or break; valid on a serial port"):
+            await shop.session.run(line)
+    for line in (
+        "/raw baud",
+        "/raw dtr",
+        "/raw dtr up",
+        "/raw break 0",
+        "/raw baud x",
+        "/raw end x",
+        "/raw nonsense",
+    ):
+        with pytest.raises(Diagnostic, match="usage|baud rate|break takes"):
+            await shop.session.run(line)
+    for line in ("/raw on", "/bytes 5", "/bytes", '/bytes "€"', "€"):
+        with pytest.raises(Diagnostic):
+            await shop.session.run(line)
+    assert shop.written("line") == b""
+    await shop.session.run("/raw off")
+    for line in ("/raw off", "/bytes 0D", "/raw end lf"):
+        with pytest.raises(Diagnostic, match="not in raw mode"):
+            await shop.session.run(line)
 
 
-async def test_a_stop_drops_text_that_was_typed_before_it(tmp_path):
-    async with opened(tmp_path) as shop:
-        since = shop.session.stops
-        shop.session.stop()
-        with pytest.raises(Stopped):
-            await shop.session.run("SL 50000", since=since)
-        assert b"SL" not in shop.written("line")
+async def test_a_stop_drops_text_that_was_typed_before_it(shop):
+    since = shop.session.stops
+    shop.session.stop()
+    with pytest.raises(Stopped):
+        await shop.session.run("SL 50000", since=since)
+    assert b"SL" not in shop.written("line")
 
 
 def test_bytes_are_written_as_hex_names_and_text():

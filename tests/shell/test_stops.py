@@ -62,67 +62,69 @@ def no_front_end(shop, monkeypatch):
     return set()
 
 
+@pytest.fixture
+async def shop(tmp_path):
+    async with CellSession(tmp_path, *FLOOR) as made:
+        yield made
+
+
 @pytest.mark.parametrize("defect", [no_transport, no_taking_back, no_dialect, no_line, no_watcher, no_front_end])
-async def test_what_fails_on_one_line_keeps_no_other_from_its_stop(defect, tmp_path, monkeypatch):
-    async with CellSession(tmp_path, *FLOOR) as shop:
-        await all_moving(shop)
-        runs = asyncio.create_task(shop.session.run("/sleep 1000"))
-        await asyncio.sleep(0.5)
-        spared = defect(shop, monkeypatch)
-        shop.session.stop("test")
-        assert shop.session.latched
-        with pytest.raises(Stopped):
-            await runs
-        await asyncio.sleep(2.0)
-        assert shop.moving() == spared
-        assert {each.name for each in shop.session.tally().of(Fate.NOT_REACHED)} == spared
-        if defect is no_transport:
-            await shop.session.forget(shop.session.bus("press"))  # which is about to repeat the stop
-            return
-        monkeypatch.undo()
-        shop.session.stop("again")
-        await asyncio.sleep(2.0)
-        assert shop.moving() == set()
+async def test_what_fails_on_one_line_keeps_no_other_from_its_stop(defect, monkeypatch, shop):
+    await all_moving(shop)
+    runs = asyncio.create_task(shop.session.run("/sleep 1000"))
+    await asyncio.sleep(0.5)
+    spared = defect(shop, monkeypatch)
+    shop.session.stop("test")
+    assert shop.session.latched
+    with pytest.raises(Stopped):
+        await runs
+    await asyncio.sleep(2.0)
+    assert shop.moving() == spared
+    assert {each.name for each in shop.session.tally().of(Fate.NOT_REACHED)} == spared
+    if defect is no_transport:
+        await shop.session.forget(shop.session.bus("press"))  # which is about to repeat the stop
+        return
+    monkeypatch.undo()
+    shop.session.stop("again")
+    await asyncio.sleep(2.0)
+    assert shop.moving() == set()
 
 
-async def test_the_bytes_are_on_every_wire_before_anybody_hears_of_it(tmp_path):
-    async with CellSession(tmp_path, *FLOOR) as shop:
-        heard = []
-        written = {}
-        for name, each in shop.session.buses.items():
-            write = each.link.transport.write
-            each.link.transport.write = lambda data, name=name, write=write: (
-                written.setdefault(name, data),
-                write(data),
-            )
-        shop.session.subscribe(lambda event: heard.append((event, set(written))))
-        shop.session.stop()
-        assert heard and all(reached == {"press", "eth", "stages"} for _, reached in heard)
-        assert any(isinstance(event, OnBus) for event, _ in heard)
+async def test_the_bytes_are_on_every_wire_before_anybody_hears_of_it(shop):
+    heard = []
+    written = {}
+    for name, each in shop.session.buses.items():
+        write = each.link.transport.write
+        each.link.transport.write = lambda data, name=name, write=write: (
+            written.setdefault(name, data),
+            write(data),
+        )
+    shop.session.subscribe(lambda event: heard.append((event, set(written))))
+    shop.session.stop()
+    assert heard and all(reached == {"press", "eth", "stages"} for _, reached in heard)
+    assert any(isinstance(event, OnBus) for event, _ in heard)
 
 
-async def test_a_defect_in_a_stop_is_logged_and_not_swallowed(tmp_path, monkeypatch, caplog):
-    async with CellSession(tmp_path, *FLOOR) as shop:
-        no_transport(shop, monkeypatch)
-        shop.session.stop()
-        assert "the stop of press failed" in caplog.text and "KeyError: 'a defect'" in caplog.text
-        assert any(text.startswith("press: stop not sent (a defect: KeyError)") for text in shop.warned())
+async def test_a_defect_in_a_stop_is_logged_and_not_swallowed(monkeypatch, caplog, shop):
+    no_transport(shop, monkeypatch)
+    shop.session.stop()
+    assert "the stop of press failed" in caplog.text and "KeyError: 'a defect'" in caplog.text
+    assert any(text.startswith("press: stop not sent (a defect: KeyError)") for text in shop.warned())
 
 
-async def test_stopped_is_said_when_every_drive_was_read_at_velocity_0_and_not_before(tmp_path):
-    async with CellSession(tmp_path, *FLOOR) as shop:
-        await all_moving(shop)
-        await asyncio.sleep(0.5)
-        shop.session.stop()
-        assert stop_report.words(shop.session.tally()) == "5 not read yet"
-        seen = set()
-        while not shop.session.tally().stand:
-            await asyncio.sleep(0.01)
-            seen.add(stop_report.words(shop.session.tally()))
-            standing = {each.name for each in shop.session.tally().of(Fate.STANDING)}
-            assert not standing & {name.replace("eth:!", "eth") for name in shop.moving()}
-        assert stop_report.words(shop.session.tally()) == "all 5 read velocity 0" and len(seen) > 2
-        assert stop_report.headline(shop.session.tally()).startswith("■ STOPPED   all 5 read velocity 0")
+async def test_stopped_is_said_when_every_drive_was_read_at_velocity_0_and_not_before(shop):
+    await all_moving(shop)
+    await asyncio.sleep(0.5)
+    shop.session.stop()
+    assert stop_report.words(shop.session.tally()) == "5 not read yet"
+    seen = set()
+    while not shop.session.tally().stand:
+        await asyncio.sleep(0.01)
+        seen.add(stop_report.words(shop.session.tally()))
+        standing = {each.name for each in shop.session.tally().of(Fate.STANDING)}
+        assert not standing & {name.replace("eth:!", "eth") for name in shop.moving()}
+    assert stop_report.words(shop.session.tally()) == "all 5 read velocity 0" and len(seen) > 2
+    assert stop_report.headline(shop.session.tally()).startswith("■ STOPPED   all 5 read velocity 0")
 
 
 async def test_a_lost_bus_is_named_with_how_its_drives_were_last_seen(tmp_path):

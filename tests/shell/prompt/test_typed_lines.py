@@ -54,75 +54,75 @@ class Typist:
         await asyncio.gather(self._work, return_exceptions=True)
 
 
-async def test_lines_run_one_after_the_other():
-    async with Typist() as typist:
-        typist.queue.enter("MR 1\nMR 2")
-        await asyncio.sleep(1.5)
-        assert typist.session.done == ["MR 1"] and typist.queue.running == "MR 2"
-        await asyncio.sleep(1.0)
-        assert typist.session.done == ["MR 1", "MR 2"] and typist.queue.running == ""
+@pytest.fixture
+async def typist():
+    async with Typist() as made:
+        yield made
 
 
-async def test_a_text_with_a_hidden_line_is_not_sent_and_a_paste_with_cr_has_lines():
-    async with Typist() as typist:
-        for text in ("PR P\u2028MR 1", "PR P\x0bMR 1\nMR 2", "# x\rMR 1\nMR 2", "PR P\x85MR 1"):
-            typist.queue.enter(text)
-        await asyncio.sleep(3.0)
-        assert typist.session.done == [] and len(typist.session.notices) == 4
-        assert typist.session.notices[0].startswith("line 1: line separator (U+2028)")
-        typist.queue.enter("MR 1\rMR 2")
-        await asyncio.sleep(3.0)
-        assert typist.session.done == ["MR 1", "MR 2"]
+async def test_lines_run_one_after_the_other(typist):
+    typist.queue.enter("MR 1\nMR 2")
+    await asyncio.sleep(1.5)
+    assert typist.session.done == ["MR 1"] and typist.queue.running == "MR 2"
+    await asyncio.sleep(1.0)
+    assert typist.session.done == ["MR 1", "MR 2"] and typist.queue.running == ""
 
 
-async def test_a_failed_line_holds_back_the_rest_of_its_burst_only():
-    async with Typist() as typist:
-        typist.queue.enter("bad\nMR 1")
-        for line in ("MR 2", "MR 3"):
-            await asyncio.sleep(BURST * 0.9)
-            typist.queue.enter(line)
+async def test_a_text_with_a_hidden_line_is_not_sent_and_a_paste_with_cr_has_lines(typist):
+    for text in ("PR P\u2028MR 1", "PR P\x0bMR 1\nMR 2", "# x\rMR 1\nMR 2", "PR P\x85MR 1"):
+        typist.queue.enter(text)
+    await asyncio.sleep(3.0)
+    assert typist.session.done == [] and len(typist.session.notices) == 4
+    assert typist.session.notices[0].startswith("line 1: line separator (U+2028)")
+    typist.queue.enter("MR 1\rMR 2")
+    await asyncio.sleep(3.0)
+    assert typist.session.done == ["MR 1", "MR 2"]
+
+
+async def test_a_failed_line_holds_back_the_rest_of_its_burst_only(typist):
+    typist.queue.enter("bad\nMR 1")
+    for line in ("MR 2", "MR 3"):
         await asyncio.sleep(BURST * 0.9)
-        typist.queue.enter("MR 4")
-        assert typist.session.notices == [f"not sent, as 'bad' failed: MR {n}" for n in (1, 2, 3, 4)]
-        await asyncio.sleep(BURST * 1.1)
-        typist.queue.enter("MR 5")
-        await asyncio.sleep(2.0)
-        assert typist.session.done == ["MR 5"]
+        typist.queue.enter(line)
+    await asyncio.sleep(BURST * 0.9)
+    typist.queue.enter("MR 4")
+    assert typist.session.notices == [f"not sent, as 'bad' failed: MR {n}" for n in (1, 2, 3, 4)]
+    await asyncio.sleep(BURST * 1.1)
+    typist.queue.enter("MR 5")
+    await asyncio.sleep(2.0)
+    assert typist.session.done == ["MR 5"]
 
 
-async def test_a_stop_drops_what_waits_and_takes_new_lines():
-    async with Typist() as typist:
-        typist.queue.enter("MR 1\nMR 2")
-        await asyncio.sleep(0.1)
-        typist.session.stops += 1
-        typist.queue.stopped()
-        typist.queue.enter("MR 3")
-        await asyncio.sleep(3.0)
-        assert typist.session.notices == ["not sent, as a stop came: MR 2"]
-        assert typist.session.done == ["MR 1", "MR 3"]  # the session ends the running line; this one's fake does not
+async def test_a_stop_drops_what_waits_and_takes_new_lines(typist):
+    typist.queue.enter("MR 1\nMR 2")
+    await asyncio.sleep(0.1)
+    typist.session.stops += 1
+    typist.queue.stopped()
+    typist.queue.enter("MR 3")
+    await asyncio.sleep(3.0)
+    assert typist.session.notices == ["not sent, as a stop came: MR 2"]
+    assert typist.session.done == ["MR 1", "MR 3"]  # the session ends the running line; this one's fake does not
 
 
-async def test_a_line_that_a_stop_ended_holds_back_nothing_typed_after_that_stop():
-    async with Typist() as typist:
-        typist.queue.enter("bad")
-        await asyncio.sleep(0.1)
-        typist.session.stops += 1
-        typist.queue.stopped()
-        typist.queue.enter("MR 1")
-        await asyncio.sleep(3.0)
-        assert (typist.session.done, typist.session.notices) == (["MR 1"], [])
+async def test_a_line_that_a_stop_ended_holds_back_nothing_typed_after_that_stop(typist):
+    typist.queue.enter("bad")
+    await asyncio.sleep(0.1)
+    typist.session.stops += 1
+    typist.queue.stopped()
+    typist.queue.enter("MR 1")
+    await asyncio.sleep(3.0)
+    assert (typist.session.done, typist.session.notices) == (["MR 1"], [])
 
 
-async def test_stop_and_quit_wait_for_no_line_and_a_macro_for_those_of_its_burst_only():
-    async with Typist() as typist:
-        typist.queue.enter("MR 1\n/play m\n/stop\n/quit")
-        assert typist.session.started == ["/stop", "/quit"]
-        assert typist.queue.count == 3  # /quit does not count
-        await asyncio.sleep(0.9)
-        typist.queue.enter("/play n")
-        assert typist.session.started == ["/stop", "/quit", "/play n"]
-        await asyncio.sleep(0.2)
-        assert (typist.session.done, typist.session.started[3:]) == (["MR 1"], ["/play m"])
+async def test_stop_and_quit_wait_for_no_line_and_a_macro_for_those_of_its_burst_only(typist):
+    typist.queue.enter("MR 1\n/play m\n/stop\n/quit")
+    assert typist.session.started == ["/stop", "/quit"]
+    assert typist.queue.count == 3  # /quit does not count
+    await asyncio.sleep(0.9)
+    typist.queue.enter("/play n")
+    assert typist.session.started == ["/stop", "/quit", "/play n"]
+    await asyncio.sleep(0.2)
+    assert (typist.session.done, typist.session.started[3:]) == (["MR 1"], ["/play m"])
 
 
 async def test_of_many_lines_the_first_are_shown_and_the_rest_counted():
@@ -132,11 +132,10 @@ async def test_of_many_lines_the_first_are_shown_and_the_rest_counted():
     assert typist.session.notices[-1] == "7 more lines were not sent"
 
 
-async def test_what_is_entered_while_buses_open_waits_for_them_but_stop_and_quit():
-    async with Typist() as typist:
-        typist.queue.opening = True
-        typist.queue.enter("/play m\n/stop\n/quit")
-        assert typist.session.started == ["/stop", "/quit"]
-        typist.queue.opening = False
-        await asyncio.sleep(0.01)
-        assert typist.session.started == ["/stop", "/quit", "/play m"]
+async def test_what_is_entered_while_buses_open_waits_for_them_but_stop_and_quit(typist):
+    typist.queue.opening = True
+    typist.queue.enter("/play m\n/stop\n/quit")
+    assert typist.session.started == ["/stop", "/quit"]
+    typist.queue.opening = False
+    await asyncio.sleep(0.01)
+    assert typist.session.started == ["/stop", "/quit", "/play m"]

@@ -40,6 +40,12 @@ class Shop(CellSession):
         return report(caught.value).replace(f"{self.folder}/", "")
 
 
+@pytest.fixture
+async def shop(tmp_path):
+    async with Shop(tmp_path) as made:
+        yield made
+
+
 @pytest.mark.parametrize(
     ("text", "printed"),
     [
@@ -57,10 +63,9 @@ class Shop(CellSession):
         ("/repeat 5\n/print 1\n/quit\n/end", ["1"]),
     ],
 )
-async def test_blocks_and_values(text, printed, tmp_path):
-    async with Shop(tmp_path) as shop:
-        await shop.run(text, COUNT="4")
-        assert shop.printed() == printed
+async def test_blocks_and_values(text, printed, shop):
+    await shop.run(text, COUNT="4")
+    assert shop.printed() == printed
 
 
 @pytest.mark.parametrize(
@@ -75,10 +80,9 @@ async def test_blocks_and_values(text, printed, tmp_path):
         "-5 % 3 == 1",
     ],
 )
-async def test_a_check_that_holds(line, tmp_path):
-    async with Shop(tmp_path) as shop:
-        await shop.run(f"/set goal 700000\n/assert {line}\n")
-        assert [(each.line.number, each.ok, each.check) for each in shop.results] == [(2, True, True)]
+async def test_a_check_that_holds(line, shop):
+    await shop.run(f"/set goal 700000\n/assert {line}\n")
+    assert [(each.line.number, each.ok, each.check) for each in shop.results] == [(2, True, True)]
 
 
 @pytest.mark.parametrize(
@@ -91,23 +95,21 @@ async def test_a_check_that_holds(line, tmp_path):
         ('/expect "READY" 2.5', 's.txt:2: /expect "READY" 2.5: wanted "READY" within 2.5 s, seen "going READ"'),
     ],
 )
-async def test_a_check_that_fails_names_place_wanted_and_seen_and_stops_what_moves(line, said, tmp_path):
-    async with Shop(tmp_path) as shop:
-        await shop.session.run("@b SL 1000")  # an operator's
-        words = await shop.failure(f'@a PR "going READ"\n{line}\nMR 100', CheckFailed)
-        assert words == said
-        assert exit_code(CheckFailed()) == 1
-        assert [each.ok for each in shop.results] == [True, False]
-        assert shop.moving() == {"press:b"}
+async def test_a_check_that_fails_names_place_wanted_and_seen_and_stops_what_moves(line, said, shop):
+    await shop.session.run("@b SL 1000")  # an operator's
+    words = await shop.failure(f'@a PR "going READ"\n{line}\nMR 100', CheckFailed)
+    assert words == said
+    assert exit_code(CheckFailed()) == 1
+    assert [each.ok for each in shop.results] == [True, False]
+    assert shop.moving() == {"press:b"}
 
 
-async def test_an_expectation_sees_what_comes_by_itself_and_not_the_scripts_own_words(tmp_path):
-    async with Shop(tmp_path) as shop:
-        program = '@a PG 100\n@a LB G1\n@a H 1500\n@a PR "READY"\n@a E\n@a PG\n'
-        await shop.run(f'{program}@a EX G1\n/print READY\n/expect "READY" 5\n/expect "READY"')
-        assert shop.session.now() > 1.5
-        assert shop.printed() == ["READY"]
-        assert shop.results[-2].printed == ("READY",)
+async def test_an_expectation_sees_what_comes_by_itself_and_not_the_scripts_own_words(shop):
+    program = '@a PG 100\n@a LB G1\n@a H 1500\n@a PR "READY"\n@a E\n@a PG\n'
+    await shop.run(f'{program}@a EX G1\n/print READY\n/expect "READY" 5\n/expect "READY"')
+    assert shop.session.now() > 1.5
+    assert shop.printed() == ["READY"]
+    assert shop.results[-2].printed == ("READY",)
 
 
 @pytest.mark.parametrize(
@@ -126,46 +128,41 @@ async def test_an_expectation_sees_what_comes_by_itself_and_not_the_scripts_own_
         ("/set n 999999999\n/repeat 9\n/set n n * n\n/end", "s.txt:3: 999999999 * 999999999 is beyond 1e+15"),
     ],
 )
-async def test_what_only_shows_when_it_is_executed_sends_nothing(text, said, tmp_path):
-    async with Shop(tmp_path) as shop:
-        assert (await shop.failure(text, Diagnostic)).startswith(said)
-        assert not shop.moving()
+async def test_what_only_shows_when_it_is_executed_sends_nothing(text, said, shop):
+    assert (await shop.failure(text, Diagnostic)).startswith(said)
+    assert not shop.moving()
 
 
-async def test_a_drive_in_program_mode_is_not_asked(tmp_path):
-    async with Shop(tmp_path) as shop:
-        said = await shop.failure("@a PG 100\n/assert @a P == 0")
-        assert "s.txt:2: press:a is in program mode" in said
+async def test_a_drive_in_program_mode_is_not_asked(shop):
+    said = await shop.failure("@a PG 100\n/assert @a P == 0")
+    assert "s.txt:2: press:a is in program mode" in said
 
 
-async def test_a_called_file_has_the_values_given_to_it_and_those_of_the_command_line(tmp_path):
-    async with Shop(tmp_path) as shop:
-        called = tmp_path / "c.txt"
-        called.write_text("/print {x} {all}\n/set x 7\n/if x > 6\n/assert P == {y}\n/end")
-        said = await shop.failure(f'/set x 1\n/repeat 2\n/call {called} x="a b" y={{x}}\n/end', CheckFailed, all="*")
-        assert said == "s.txt:3: c.txt:4: /assert P == 1: wanted == 1, seen 0"
-        assert shop.printed() == ["a b *"]
+async def test_a_called_file_has_the_values_given_to_it_and_those_of_the_command_line(tmp_path, shop):
+    called = tmp_path / "c.txt"
+    called.write_text("/print {x} {all}\n/set x 7\n/if x > 6\n/assert P == {y}\n/end")
+    said = await shop.failure(f'/set x 1\n/repeat 2\n/call {called} x="a b" y={{x}}\n/end', CheckFailed, all="*")
+    assert said == "s.txt:3: c.txt:4: /assert P == 1: wanted == 1, seen 0"
+    assert shop.printed() == ["a b *"]
 
 
-async def test_a_called_macro_is_played(tmp_path):
-    async with Shop(tmp_path) as shop:
-        shop.session.macros.save(Macro("say", (Step(0.0, 'PR "{word}"'),)))
-        await shop.run("/set w 5\n/call say word={w}")
-        assert shop.printed() == ["5"]
-        assert "no line takes the value wrod" in await shop.failure("/call say wrod=5", Diagnostic)
+async def test_a_called_macro_is_played(shop):
+    shop.session.macros.save(Macro("say", (Step(0.0, 'PR "{word}"'),)))
+    await shop.run("/set w 5\n/call say word={w}")
+    assert shop.printed() == ["5"]
+    assert "no line takes the value wrod" in await shop.failure("/call say wrod=5", Diagnostic)
 
 
-async def test_a_stop_ends_a_loop_that_sends_nothing(tmp_path):
-    async with Shop(tmp_path) as shop:
-        running = asyncio.create_task(shop.session.tasks.run(shop.run("/repeat 1000000000\n/set x 1\n/end")))
+async def test_a_stop_ends_a_loop_that_sends_nothing(shop):
+    running = asyncio.create_task(shop.session.tasks.run(shop.run("/repeat 1000000000\n/set x 1\n/end")))
+    await asyncio.sleep(0)
+    for _ in range(20):
         await asyncio.sleep(0)
-        for _ in range(20):
-            await asyncio.sleep(0)
-        shop.session.stop()
-        with pytest.raises(Stopped):
-            await running
-        with pytest.raises(Stopped):
-            await shop.run("/assert P == 0")
+    shop.session.stop()
+    with pytest.raises(Stopped):
+        await running
+    with pytest.raises(Stopped):
+        await shop.run("/assert P == 0")
 
 
 async def test_the_reports_agree(tmp_path, capsys):
