@@ -14,7 +14,7 @@ import time
 import pexpect
 import pytest
 
-from tests.support.front_door import Home
+from tests.support.front_door import Home, read_to_end
 from tests.support.processes import Running, Tap, environment
 from tests.support.until import PATIENCE
 
@@ -198,9 +198,7 @@ def test_the_stop_key_in_a_download_leaves_a_drive_that_listens(shop, tapped):
     child.send('PR "EM is ",EM," and R2 is ",R2\r')
     child.expect("EM is 1 and R2 is 0\r\n")
     child.send("/quit\r")
-    child.expect(pexpect.EOF)
-    child.close()
-    assert child.exitstatus == 0
+    assert read_to_end(child) == 0
     stored, stopped = tap.written().split(b"\x1b", 1)
     assert re.search(rb"aR1=\d+[\x80-\xff](\n~*)?$", stored.rstrip(b"\n"))
     assert b"R1=" not in stopped and stopped.index(b"aPG") < stopped.index(b"aEM=1")
@@ -214,9 +212,7 @@ def test_a_script_that_is_stopped_in_a_download_leaves_a_drive_that_listens(shop
     child = shop.terminal("run", script, "--on", url, columns=120)
     tap.wait_for(b"R1=5")
     child.send("\x18") if how == "the stop key" else child.kill(signal.SIGTERM)
-    child.expect(pexpect.EOF)
-    child.close()
-    assert child.exitstatus == (4 if how == "the stop key" else 130)
+    assert read_to_end(child) == (4 if how == "the stop key" else 130)
     assert "SL" not in tap.written().decode("latin-1")
     tap, url = tapped("slow", "party=1&timeout=3")
     eventually(lambda: shop.run("send", url, "PR EM", "PR P", "PR BY") == (0, "1\n0\n0\n", ""))
@@ -234,9 +230,7 @@ def test_a_line_that_is_half_sent_when_the_stop_comes_moves_nothing(shop):
         while b"MR 512" not in heard:
             heard += wire.recv(100)
         child.send("\x18")
-        child.expect(pexpect.EOF)
-    child.close()
-    assert child.exitstatus == 4
+        assert read_to_end(child) == 4
     url = f"tcp://127.0.0.1:{shop.port('echo')}?drives=a&party=1&em=0&checksum=0&timeout=20"
     assert shop.run("send", url, "PR P", "PR V")[:2] == (0, "0\n0\n")
 
@@ -247,9 +241,7 @@ def test_the_stop_key_in_a_macro_is_exit_4_and_the_drive_stands(shop):
     child.expect("moves")
     child.send("\x18")
     child.expect("stopped before it was done\r\n")
-    child.expect(pexpect.EOF)
-    child.close()
-    assert child.exitstatus == 4
+    assert read_to_end(child) == 4
     assert 0 < standing(shop, shop.url("press", "a,b"), "b") < 51200000
 
 

@@ -10,6 +10,7 @@ import pexpect
 import pyte
 import pytest
 
+from tests.support.front_door import read_to_end
 from tests.support.hostile_drive import ACTING, HOSTILE, OVERRIDE, hostile_url  # noqa: F401
 from tests.support.processes import environment
 from tests.support.until import PATIENCE
@@ -56,9 +57,7 @@ def test_a_drive_is_shown_on_a_terminal_and_not_obeyed(hostile_url, tmp_path, do
     child.send(f"/log {log}\r/drives\r/status\r")
     read_until(lambda: log.exists() and "at rest: P=51200" in log.read_text())
     child.send("/quit\r")
-    child.expect(pexpect.EOF)
-    child.close()
-    assert child.exitstatus == 0
+    assert read_to_end(child) == 0
     assert rb"\x1b]52" in seen.getvalue()
     assert [each for each in ACTING if each in seen.getvalue()] == []
 

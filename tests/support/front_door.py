@@ -154,6 +154,16 @@ class Home:
             assert self.sim.end() == 0 or sys.platform == "win32", self.sim.errors
 
 
+def read_to_end(child: Any) -> int:
+    """Read a terminal until its process has ended; return the exit code, negative for a signal."""
+    import pexpect
+
+    child.expect(pexpect.EOF)
+    child.wait()  # to close its terminal before that would end it by a signal
+    child.close()
+    return int(child.exitstatus if child.exitstatus is not None else -child.signalstatus)
+
+
 @pytest.fixture
 def home(tmp_path: Path) -> Iterator[Home]:
     """The folder of the test, whose processes end with it."""

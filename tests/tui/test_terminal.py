@@ -13,6 +13,7 @@ from pathlib import Path
 import pexpect
 import pytest
 
+from tests.support.front_door import read_to_end
 from tests.support.paths import SUPPORT
 from tests.support.until import PATIENCE
 
@@ -37,9 +38,7 @@ class Screen:
         return self.told.read_text().split("\n")[:-1] if self.told.exists() else []
 
     def ends(self) -> int:
-        self.child.expect(pexpect.EOF)
-        self.child.close()
-        return -self.child.signalstatus if self.child.exitstatus is None else self.child.exitstatus
+        return read_to_end(self.child)
 
 
 @pytest.fixture

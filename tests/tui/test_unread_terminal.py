@@ -5,10 +5,10 @@ from __future__ import annotations
 import os
 import signal
 
-import pexpect
 import pyte
 import pytest
 
+from tests.support.front_door import read_to_end
 from tests.support.served_cell import FLOOD, LOG, SIGNALS, Shop, ends, until
 
 pytestmark = [pytest.mark.process, pytest.mark.skipif(os.name != "posix", reason="pseudo-terminals")]
@@ -61,5 +61,4 @@ def test_the_screen_is_whole_when_it_is_read_again(shop, stuck):
     until(lambda: shop.velocity() == 0, "the drive was not stopped")
     shows(stuck, lambda screen: any("all 2 read velocity 0" in line for line in screen))
     stuck.send("\x11")
-    stuck.expect(pexpect.EOF)
-    assert ends(stuck) == 0
+    assert read_to_end(stuck) == 0

@@ -4,12 +4,12 @@ import asyncio
 import os
 import signal
 
-import pexpect
 import pytest
 
 from multidrop.dialects import Stopped
 from multidrop.drives.drive import confirmed_motion
 from tests.support.cell_session import CellSession, bus, party, pmx
+from tests.support.front_door import read_to_end
 from tests.support.processes import Running
 from tests.support.served_cell import until
 from tests.support.virtual import in_virtual_time
@@ -83,9 +83,7 @@ def test_the_prompt_asks_once_while_a_drive_moves(shop, end):
     child.send(end)
     child.expect("/quit again leaves them moving")
     child.send(end)
-    child.expect(pexpect.EOF)
-    child.close()
-    assert child.exitstatus == 0 and shop.velocity() == 5000
+    assert read_to_end(child) == 0 and shop.velocity() == 5000
 
 
 @pytest.mark.skipif(os.name != "posix", reason="pseudo-terminals")
@@ -95,9 +93,7 @@ def test_the_prompt_ends_at_once_where_nothing_moves(shop, keys, early):
     if not early:  # else some of it before the process holds the terminal
         child.expect("b>")
     child.send(keys)
-    child.expect(pexpect.EOF)
-    child.close()
-    assert child.exitstatus == 0
+    assert read_to_end(child) == 0
 
 
 def test_a_pipe_is_not_asked(shop):
@@ -120,9 +116,7 @@ def test_a_signal_stops_what_a_macro_started_and_not_what_an_operator_did(shop, 
         child.send(f"{typed}\r")
     until(lambda: shop.velocity() == 5000, "it does not move")
     child.kill(signal.SIGTERM)
-    child.expect(pexpect.EOF)
-    child.close()
-    assert child.exitstatus == 130
+    assert read_to_end(child) == 130
     assert shop.velocity() == (0 if mine else 5000)
     assert ("stopped b: b reads velocity 0" in child.before) is mine
 

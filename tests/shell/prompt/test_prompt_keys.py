@@ -6,11 +6,11 @@ import os
 import signal
 import time
 
-import pexpect
 import pytest
 
 from multidrop.shell.prompt.terminal_input import PAUSE
 from tests.support.cases import for_each
+from tests.support.front_door import read_to_end
 from tests.support.processes import Tap
 from tests.support.served_cell import SIGNALS, ends, until
 
@@ -147,8 +147,7 @@ def test_the_stop_key_works_while_a_silent_server_is_opened(shop, silent):
     silent.wait_for(b"VR")
     child.send("MR 51200\r/quit\r\x18")
     child.expect("not sent, as a stop came: MR 51200")
-    child.expect(pexpect.EOF)
-    assert ends(child) == 4
+    assert read_to_end(child) == 4
     written = silent.written()
     assert b"\x1b" in written and b"MR 51200" not in written
 
@@ -163,8 +162,7 @@ def test_what_is_open_already_is_stopped_and_seen_to_stand_while_another_line_is
     other.expect("b>")
     other.send("\x18")
     other.expect("press: b: stopped, velocity 0")
-    other.expect(pexpect.EOF)
-    assert ends(other) == 4
+    assert read_to_end(other) == 4
     assert shop.velocity() == 0
 
 
@@ -172,8 +170,7 @@ def test_the_stop_key_works_while_send_opens_a_silent_server(shop, silent):
     child = shop.terminal("send", f"tcp://127.0.0.1:{silent.port}?timeout=600", "MR 51200")
     silent.wait_for(b"VR")
     child.send("\x18")
-    child.expect(pexpect.EOF)
-    assert ends(child) == 4
+    assert read_to_end(child) == 4
     assert b"\x1b" in silent.written() and b"MR" not in silent.written()
 
 

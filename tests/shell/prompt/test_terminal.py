@@ -1,7 +1,8 @@
 """The prompt in a real terminal, on a simulated cell."""
 
-import pexpect
 import pytest
+
+from tests.support.front_door import read_to_end
 
 pytestmark = pytest.mark.process
 
@@ -19,17 +20,13 @@ def test_a_person_works_at_the_prompt_and_stops_with_one_key(home):
     child.expect("Ctrl.X: stop sent to every drive")
     child.expect("b: stopped, velocity 0")
     child.send("\x04")
-    child.expect(pexpect.EOF)
-    child.close()
-    assert child.exitstatus == 0
+    assert read_to_end(child) == 0
 
 
 def test_what_cannot_be_opened_ends_the_prompt_before_it_begins(home):
     child = home.terminal("shell", "/dev/does-not-exist")
     child.expect("/dev/does-not-exist")
-    child.expect(pexpect.EOF)
-    child.close()
-    assert child.exitstatus == 3
+    assert read_to_end(child) == 3
 
 
 def test_a_signal_ends_the_prompt(home):
@@ -38,6 +35,4 @@ def test_a_signal_ends_the_prompt(home):
     child.send("/record m\r")
     child.expect("recording m; /record stop ends it")
     child.kill(15)
-    child.expect(pexpect.EOF)
-    child.close()
-    assert child.exitstatus == 130
+    assert read_to_end(child) == 130

@@ -12,9 +12,9 @@ import signal
 import struct
 import termios
 
-import pexpect
 import pytest
 
+from tests.support.front_door import read_to_end
 from tests.support.served_cell import FLOOD, LOG, ends, until
 
 pytestmark = [pytest.mark.process, pytest.mark.skipif(os.name != "posix", reason="pseudo-terminals")]
@@ -74,9 +74,8 @@ def test_ctrl_s_stops_no_output_while_a_script_runs_and_the_terminal_is_given_ba
     child.expect("more")
     assert not termios.tcgetattr(child.fileno())[0] & termios.IXON
     child.send("\x18")
-    child.expect(pexpect.EOF)
-    assert ends(child) == 4
-    assert termios.tcgetattr(child.fileno()) == before
+    until(lambda: not child.isalive(), "it does not end")
+    assert child.exitstatus == 4 and termios.tcgetattr(child.fileno()) == before
 
 
 def test_a_terminal_that_is_read_again_is_told_how_much_it_missed(shop):
@@ -85,8 +84,7 @@ def test_a_terminal_that_is_read_again_is_told_how_much_it_missed(shop):
     assert missing(child) > 1
     child.expect("noise noise")
     child.send("\x18")
-    child.expect(pexpect.EOF)
-    assert ends(child) == 4
+    assert read_to_end(child) == 4
     until(lambda: shop.velocity() == 0, "it was not stopped")
 
 
@@ -121,8 +119,7 @@ def test_a_prompt_whose_terminal_is_read_again_says_what_is_missing_and_goes_on(
     child.send('@press:b PR "go","ing on"\r')
     child.expect("going on")
     child.send("/quit\r")
-    child.expect(pexpect.EOF)
-    assert ends(child) == 0
+    assert read_to_end(child) == 0
 
 
 def test_what_became_of_a_stop_is_not_among_the_lines_that_are_missing(shop):

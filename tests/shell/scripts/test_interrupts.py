@@ -5,11 +5,10 @@ import signal
 import sys
 from pathlib import Path
 
-import pexpect
 import pytest
 
 from tests.support.cell_session import TCP, bus, party
-from tests.support.front_door import Home
+from tests.support.front_door import Home, read_to_end
 from tests.support.served_cell import until
 from tests.support.until import PATIENCE
 
@@ -108,9 +107,7 @@ def test_the_stop_key_on_the_terminal_of_a_script_is_exit_4(shop):
     child.send("\x18")
     child.expect("stop: all 2 read velocity 0")
     child.expect("script.txt:4: stopped before it was done")
-    child.expect(pexpect.EOF)
-    child.close()
-    assert child.exitstatus == 4
+    assert read_to_end(child) == 4
     assert shop.standing() == (0, "0\n0\n", "")
 
 
