@@ -272,11 +272,12 @@ def test_a_disk_that_hangs_is_waited_for_once_and_what_has_no_room_is_counted(tm
     monkeypatch.setattr(BoundedWriter, "wait", lambda *given: waits.append(given) or wait(*given))
     for number in range(30):
         made.put(b"%09d\n" % number)
+    made.put(b"three\nentries\nof one event\n", 3)
     assert len(waits) == 1
     works.set()
     made.close()
     lines = (tmp_path / "a").read_text().split("\n")
-    assert lines[:3] == ["head", "first", "000000000"] and lines[-2:] == ["20 missing", ""] and len(lines) == 14
+    assert lines[:3] == ["head", "first", "000000000"] and lines[-2:] == ["23 missing", ""] and len(lines) == 14
 
 
 def test_a_session_has_a_log_of_its_own_where_the_configuration_says_so(tmp_path):

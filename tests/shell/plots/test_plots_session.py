@@ -15,6 +15,7 @@ from multidrop.dialects import Diagnostic
 from multidrop.dialects.values import Conditions, Lamp
 from multidrop.drives.events import BusEvent, Conditioned, Ended, Sample, Sent, Unsolicited, Valued
 from multidrop.drives.telemetry import Value
+from multidrop.shell.batch import runner
 from multidrop.shell.connect.settings import Settings
 from multidrop.shell.events import By, Entered, Failed, Notified, OnBus, Output, Printed, SessionEvent
 from multidrop.shell.plots import plot
@@ -23,6 +24,7 @@ from multidrop.shell.plots.request import parse_rate, parse_target
 from multidrop.shell.roles import Series
 from multidrop.shell.workspace import Workspace
 from tests.support.cell_session import CellSession, bus, party
+from tests.support.until import PATIENCE
 from tests.support.virtual import in_virtual_time
 
 # What is typed
@@ -202,6 +204,12 @@ def test_a_plot_that_ends_by_itself_ends_its_polling_and_says_so_once() -> None:
     assert session.narrated == ["plotting ended: the disk is full"]
     assert session.callbacks == [] and session.buses["eth"].polled == []
     detach()
+
+
+async def test_a_line_that_was_lost_before_anybody_waits_for_it_ends_the_wait() -> None:
+    session = Session()
+    await asyncio.wait_for(runner.until(session, lambda: "lost"), PATIENCE)  # type: ignore[arg-type]
+    assert session.callbacks == []
 
 
 def test_a_bus_that_is_not_open_cannot_be_plotted() -> None:
