@@ -268,8 +268,13 @@ class ParametersPage(AskingPage):
         if pending is not None and not self._painted:
             return  # an Enter that was typed before the lines were seen
         self._pending = None
-        if pending is not None:
-            self._send(pending)
+        if pending is not None and self.overtaken(pending):
+            self.say("nothing was sent: a stop or another drive came in between")
+        elif pending is not None:
+            for line in pending.lines:
+                self.host.outbox.type(line)
+            self._reading = True
+            self.say(f"sent: {', '.join(pending.lines)}", "dim")
         elif (row := self._table.chosen) is not None:
             self.action_ask(EDIT, row.reading.name, row.value.strip('[]"'))
 
@@ -335,20 +340,9 @@ class ParametersPage(AskingPage):
             raise Diagnostic("the settings of the drive are not read", name, "/params read reads them")
         planned: Edit = edit(drive.family.values.parameters, drive.state, present, name, parsed(text))
         self._close("")
-        self._plan(planned.lines, planned.warning)
-
-    def _plan(self, lines: tuple[str, ...], warning: str) -> None:
-        self._pending, self._painted = self.begin(EDIT, lines=lines), False
-        self.say(f"Enter sends {', '.join(lines)}{f' - {warning}' if warning else ''}   Esc: nothing")
-
-    def _send(self, pending: Begun) -> None:
-        if self.overtaken(pending):
-            self.say("nothing was sent: a stop or another drive came in between")
-            return
-        for line in pending.lines:
-            self.host.outbox.type(line)
-        self._reading = True
-        self.say(f"sent: {', '.join(pending.lines)}", "dim")
+        self._pending, self._painted = self.begin(EDIT, lines=planned.lines), False
+        warning = f" - {planned.warning}" if planned.warning else ""
+        self.say(f"Enter sends {', '.join(planned.lines)}{warning}   Esc: nothing")
 
     def _close(self, said: str) -> None:
         self._asked, self._pending = None, None
