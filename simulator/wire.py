@@ -177,9 +177,10 @@ def resample(data: bytes, sent: float, received: float) -> bytes:
 
 
 def harmed(data: bytes, faults: Faults, rng: Random) -> bytes:
-    """Return the bytes with some of them lost, doubled and with a bit flipped, and with others inserted."""
-    if not faults.harmful:
-        return data
+    """Return the bytes with some of them lost, doubled and with a bit flipped, and with others inserted.
+
+    To be called for harmful faults only: it draws from the source for every byte.
+    """
     out = bytearray()
     for byte in data:
         if faults.insert and rng.random() < faults.insert:
@@ -275,6 +276,7 @@ class Wire:
         self.hung_up = False
         self._ports = tuple(ports)
         self._faults = faults or Faults()
+        self._harmful = self._faults.harmful
         self._rng = rng or Random(0)
         self._byte_time = BITS_A_BYTE / baud if baud else 0.0
         self._coming: deque[tuple[float, bytes, int]] = deque()
@@ -291,16 +293,16 @@ class Wire:
         """Time of the next event: a byte arrives at the drives or at the host, or a drive does something by itself."""
         if self._outdated:
             self._ports_due = self._earliest()
-        times = [] if self._ports_due == inf else [self._ports_due]
+        first = self._ports_due
         if (received := self._merger.deadline) is not None:
-            times.append(received)
+            first = min(first, received)
         if self._hang_up_at is not None:
-            times.append(self._hang_up_at)
+            first = min(first, self._hang_up_at)
         if self._coming and not self._held:
-            times.append(self._coming[0][0])
+            first = min(first, self._coming[0][0])
         if self._overheard:
-            times.append(self._overheard[0][0])
-        return min(times, default=None)
+            first = min(first, self._overheard[0][0])
+        return None if first == inf else first
 
     def receive(self, data: bytes, now: float, baud: int | None = None, source: int = 0) -> None:
         """Take bytes that an endpoint's client has written. `baud`: the client's baud rate, if known."""
@@ -360,7 +362,9 @@ class Wire:
                     port.overhear(data, now)
                     self._collect(who, now)
         received += self._merger.take(now)
-        return b"" if self.hung_up else harmed(received, self._faults, self._rng)
+        if self.hung_up:
+            return b""
+        return harmed(received, self._faults, self._rng) if self._harmful else received
 
     def _carry(self, now: float) -> bytes:
         """Bring the host's due bytes to the drives; give what endpoints receive meanwhile.
@@ -377,7 +381,7 @@ class Wire:
                 break
             _, data, source = self._coming.popleft()
             self._count(source, -len(data))
-            self._arrive(harmed(data, self._faults, self._rng), at)
+            self._arrive(harmed(data, self._faults, self._rng) if self._harmful else data, at)
         return received
 
     @property
@@ -447,7 +451,7 @@ class Wire:
         for at, data, overheard in sent:
             if high and not self._merger.busy(who, at):
                 at += self._rng.uniform(low, high)
-            for late, piece in pieces(data, self._faults, self._rng):
+            for late, piece in pieces(data, self._faults, self._rng) if self._faults.late else ((0.0, data),):
                 sent_as = resample(piece, port.baud, self.baud) if port.baud else piece
                 at = end = self._merger.send(who, at + late, sent_as)
             if overheard and len(self._ports) > 1:

@@ -174,13 +174,20 @@ class RunningFloor:
         self._set_alarm()
 
     def _set_alarm(self) -> None:
+        deadline = self.floor.deadline
+        if self._wake is not None and deadline == self._deadline:
+            return  # most replies change nothing of what happens next
         if self._wake is not None:
             self._wake.cancel()
             self._wake = None
-        self._deadline = self.floor.deadline
-        if self._deadline is not None and not self._closed:
-            at = max(self._origin + self._deadline / self._speed, self.loop.time() + SHORTEST_SLEEP)
-            self._wake = self.loop.call_at(at, self._turn)
+        self._deadline = deadline
+        if deadline is not None and not self._closed:
+            at = max(self._origin + deadline / self._speed, self.loop.time() + SHORTEST_SLEEP)
+            self._wake = self.loop.call_at(at, self._wake_up)
+
+    def _wake_up(self) -> None:
+        self._wake = None
+        self._turn()
 
 
 class Client(Listener):
