@@ -17,9 +17,8 @@ from multidrop.simulator.cell.spec import Value as Setting
 from multidrop.simulator.cell.table import Folder, Table, quoted
 from multidrop.simulator.cell.writer import DriveText, Entry, remark
 from multidrop.simulator.family import Family, Place, Shadow, Snapshots, StoredProgram, Unit
-from multidrop.simulator.tmcl.module import TmclModule
+from multidrop.simulator.tmcl.module import TmclModule, TmclPort
 from multidrop.simulator.tmcl.motor import STORED
-from multidrop.simulator.tmcl.port import TmclPort
 from multidrop.simulator.world import World
 
 VERSION_FORM = re.compile(r"\d{4}V\d{3}", re.ASCII)

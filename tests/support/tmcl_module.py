@@ -5,8 +5,7 @@ from __future__ import annotations
 from multidrop.dialects.tmcl.host import codec
 from multidrop.dialects.tmcl.manual import commands
 from multidrop.simulator.cell.spec import DriveSpec, WorldSpec
-from multidrop.simulator.tmcl.module import TmclModule
-from multidrop.simulator.tmcl.port import TmclPort
+from multidrop.simulator.tmcl.module import TmclModule, TmclPort
 from multidrop.simulator.world import World
 
 

@@ -1,9 +1,11 @@
 """The table of MCode instructions: each compiles its statement into a closure that carries it out.
 
 `compile` is the one way from a statement to an action, for typed lines and program lines alike. What is wrong with the
-form of a line is raised as Fault when it is compiled; what is wrong with a value, when it runs.
-The instructions on programs are in `program_commands`, those of the motor and with several settings in
-`motor_commands`, PR in `prints`.
+form of a line is raised as Fault when it is compiled; what is wrong with a value, when it runs. The instructions on
+programs are in `program_commands`, those of the motor and with several settings in `motor_commands`.
+
+PR prints numbers, texts, and the lists of parameters, variables and set-ups. Manual 5.1.4, 5.1.64, 5.1.78, 5.1.93,
+5.1.97, 5.1.101, 5.1.102, 5.1.119, 5.1.122, 5.1.134, 5.1.141, 5.1.142.
 """
 
 from __future__ import annotations
@@ -24,11 +26,6 @@ from multidrop.simulator.lexium.state.errors import CRLF, Fault
 from multidrop.simulator.lexium.state.expressions import FLOATS, Read, Value, whole, wrap
 from multidrop.simulator.lexium.state.memory import slot
 from multidrop.simulator.lexium.state.program_memory import Action
-
-# PR: numbers, texts, and the lists of parameters, variables and set-ups.
-#
-# Manual 5.1.4, 5.1.64, 5.1.78, 5.1.93, 5.1.97, 5.1.101, 5.1.102, 5.1.119, 5.1.122, 5.1.134, 5.1.141, 5.1.142.
-
 
 PRINTED_INPUTS = (1, 2, 3, 4, 6)
 Item = Callable[[], str]

@@ -1,7 +1,7 @@
 """The variables and flags of a simulated drive, and the forms of arguments that several instructions share.
 
 A plain variable is a number in memory with the range that the table of mnemonics gives it. The others have a reader or
-a writer, those of motion in `motion_variables`. Compiled lines get closures from `reader` and `writer`, which raise
+a writer (`MotionVariables` has those of motion). Compiled lines get closures from `reader` and `writer`, which raise
 Fault: 20 unknown, 21 wrong value, 25 read only, 30 not there, 32 a label, 35 cannot be read, 37 not in this drive.
 """
 
@@ -22,9 +22,6 @@ from multidrop.simulator.lexium.state.expressions import PI, Read, Value, compil
 from multidrop.simulator.lexium.state.interpreter import Core
 from multidrop.simulator.lexium.state.memory import BANKED, slot, within
 from multidrop.simulator.lexium.state.program_memory import Action
-
-# The variables and flags of motion that are more than a number in memory with a range.
-
 
 Write = Callable[[Value], None]
 

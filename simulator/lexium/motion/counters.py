@@ -1,8 +1,11 @@
-"""The position counters: C1 (motor steps), C2 (encoder counts), P, which is one of them; and the limits on it.
+"""The position counters: C1 (motor steps), C2 (encoder counts), P, which is one of them; the limits and trips on it.
 
 Positions inside are motor steps since power-up; a counter is these plus an offset, so setting P moves nothing. C1
 follows the command, C2 the rotor. A counter rolls over at the ends of 32 bits. Limits are switches on inputs (IS types
 2 and 3) and positions in software (LS). Manual 5.1.16, 5.1.17, 5.1.76, 5.1.78, 5.1.95.
+
+Trips are subroutines that run when something happens. TE arms them and loses a trip's bit when it happens. When a trip
+on position or time will happen is solved from the motion, not looked for. Manual 5.1.122 to 5.1.132.
 """
 
 from __future__ import annotations
@@ -158,11 +161,6 @@ class Limits:
             back = counters.passing(place, t, -direction)
             t = inf if back == inf else nextafter(back, inf)
         return inf if t == inf else counters.passing(place, t, direction)
-
-
-# Trips: subroutines that run when something happens. TE arms them and loses a trip's bit when it happens.
-#
-# When a trip on position or time will happen is solved from the motion, not looked for. Manual 5.1.122 to 5.1.132.
 
 
 INPUT, POSITION, CAPTURE, TIME, RELATIVE, HMT, POWER = 1, 2, 4, 8, 16, 32, 64

@@ -1,15 +1,21 @@
-"""hMT, the closed loop of an LMDC drive: lead and lag, the locked rotor, calibration; and its torque mode.
+"""The functions that know where the rotor is: those of the encoder (EE=1), hMT (AS=1, 2) and torque mode (AS=3).
 
-With AS=1 and 2 the drive knows how far the rotor lags the command (LL) and makes that good as MU says (the way
-it catches up is in `rotor`). LD and LG are errors (106, 107). A rotor at rest for LT at the bounds (CB) is
-locked: error 104, and the bridges are off until CF. A TA that waits for one of these takes the error's place. With
-MU=1 or 2, where a move is to end on time, one that ends without its rotor is error 108. In torque mode (AS=3) the motor
-turns at TS towards TD, as long as TQ is more than the load needs. Manual 5.1.2, 5.1.6, 5.1.18, 5.1.20, 5.1.72 to
-5.1.79, 5.1.87, 5.1.122 to 5.1.131, section 8.
+hMT is the closed loop of an LMDC drive: lead and lag, the locked rotor, calibration. With AS=1 and 2 the drive knows
+how far the rotor lags the command (LL) and makes that good as MU says (the way it catches up is in `rotor`). LD and LG
+are errors (106, 107). A rotor at rest for LT at the bounds (CB) is locked: error 104, and the bridges are off until CF.
+A TA that waits for one of these takes the error's place. With MU=1 or 2, where a move is to end on time, one that ends
+without its rotor is error 108. In torque mode (AS=3) the motor turns at TS towards TD, as long as TQ is more than the
+load needs. Manual 5.1.2, 5.1.6, 5.1.18, 5.1.20, 5.1.72 to 5.1.79, 5.1.87, 5.1.122 to 5.1.131, section 8.
 
 Chosen where the manual is silent: calibration takes `CALIBRATION` when AS leaves 0 (at power-up it is done by the time
 of the sign-on). 16 is in AF while there is lead or lag, 64 once that has been made good. Lead and lag are counted
 against the direction of the last motion.
+
+With EE=1 and without hMT an encoder detects stalls, checks the end of a move and maintains the position. The error is
+how far the rotor is from where the last motion should have put it. A stall is an error of SF (86, ST=1); with SM=0 it
+stops the motor. MT after the end of MA or MR the error must be within DB; otherwise it is made good at VI, while MA and
+MR are refused (93), unless it is a stall and SM=0; if that does not help it is error 92. With PM=1 the same happens
+whenever the standing rotor is pushed out of DB. Manual 5.1.28, 5.1.100, 5.1.116, 5.1.118, 5.1.120, 7.3.7.
 """
 
 from __future__ import annotations
@@ -24,15 +30,6 @@ from multidrop.simulator.lexium.motion.counters import Limits, Trips
 from multidrop.simulator.lexium.motion.rotor import FOLLOWING, STANDING, TOUCH
 from multidrop.simulator.lexium.state.errors import Event, Fault, nothing, when
 from multidrop.simulator.lexium.state.interpreter import Core
-
-# What an encoder is for with EE=1 and without hMT: stalls, the check at the end of a move, position maintenance.
-#
-# The error is how far the rotor is from where the last motion should have put it. A stall is an error of SF (86,
-# ST=1); with SM=0 it stops the motor. MT after the end of MA or MR the error must be within DB; otherwise it is made
-# good at VI, while MA and MR are refused (93), unless it is a stall and SM=0; if that does not help it is error 92.
-# With PM=1 the same happens whenever the standing rotor is pushed out of DB. Manual 5.1.28, 5.1.100, 5.1.116, 5.1.118,
-# 5.1.120, 7.3.7.
-
 
 NEAR = 1e-3
 """Steps that are rounding where a distance is compared."""

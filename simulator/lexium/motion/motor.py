@@ -5,6 +5,13 @@ axis in turn. The device asks `next` for the next event and lets it happen; `loo
 The configuration test (SC) makes half a turn and compares what the encoder has seen of it. The jog inputs (types 7 and
 8) turn at VM while one of them is active and JE=1; chosen where the manual is silent: a jog does not change another
 motion, and both inputs at once cancel each other. Manual 3.4.3, 5.1.64, 5.1.103, 5.1.112, 5.1.115, 7.2.3.
+
+Current and temperature. The current is RC while the motor turns and for MT and HT after it, then HC (RC stays where
+both are 0); in torque mode TQ; with AS=2 what the load asks for, a quarter of RC at least; none while the bridges are
+off. The bridge heats up towards 35 degrees C and 25 more at full current without load, in proportion to (1 + load) and
+to the square of the current, with a time constant of 300 s; the controller half as much. These figures are plausible,
+no more: loads of 1 and more at currents near 100 % reach WT (71) and the limit of 85 (72, bridges off). The times of
+both are solved. Manual 5.1.51, 5.1.55, 5.1.67, 5.1.86, 5.1.109, 5.1.143.
 """
 
 from __future__ import annotations
@@ -23,16 +30,6 @@ from multidrop.simulator.lexium.motion.inputs import HOME, JOG_MINUS, JOG_PLUS, 
 from multidrop.simulator.lexium.motion.rotor import Rotor
 from multidrop.simulator.lexium.state.errors import CRLF, Event, Fault, nothing, when
 from multidrop.simulator.lexium.state.interpreter import Core
-
-# Current and temperature of a simulated drive.
-#
-# The current is RC while the motor turns and for MT and HT after it, then HC (RC stays where both are 0); in torque
-# mode TQ; with AS=2 what the load asks for, a quarter of RC at least; none while the bridges are off. The bridge heats
-# up towards 35 degrees C and 25 more at full current without load, in proportion to (1 + load) and to the square of
-# the current, with a time constant of 300 s; the controller half as much. These figures are plausible, no more: loads
-# of 1 and more at currents near 100 % reach WT (71) and the limit of 85 (72, bridges off). The times of both are
-# solved. Manual 5.1.51, 5.1.55, 5.1.67, 5.1.86, 5.1.109, 5.1.143.
-
 
 AMBIENT, RISE, TIME_CONSTANT = 35.0, 25.0, 300.0
 HOTTEST = 85.0

@@ -28,6 +28,14 @@ Decisions where the manual is silent (facts that a unit may correct):
 - ESC while single-stepping ends the program like any ESC; space and CR at the begin of a line are the stepping keys.
 
 There is no clock: bytes and times come in, bytes with times go out. Times are seconds, and never go back.
+
+Replies have echo mode, ACK and NAK, checksums, prompts, prints. Tables 7.1 to 7.4 of the MCode manual follow one rule.
+A reply consists of a *head*, the printed lines, and in EM=0 a prompt. The head acknowledges the line: CR LF without
+checksum, and ACK or NAK in its place with checksum. EM=3 puts the received command before the head; EM=2 has no head.
+Without checksum one byte from 0x80 on before the terminator is taken for the check byte of a client that always sends
+one.
+
+This is the drive's side. It shares nothing with the host's parser of these tables, so that each tests the other.
 """
 
 from __future__ import annotations
@@ -38,16 +46,6 @@ from typing import NamedTuple
 from multidrop.dialects.mcode.manual.errors import ErrorNumber
 from multidrop.simulator.lexium.device import MCodeDevice
 from multidrop.simulator.wire import BITS_A_BYTE, Transmission
-
-# Lines carried out on a drive, and the replies to them: echo mode, ACK and NAK, checksums, prompts, prints.
-#
-# Tables 7.1 to 7.4 of the MCode manual follow one rule. A reply consists of a *head*, the printed lines, and in EM=0 a
-# prompt. The head acknowledges the line: CR LF without checksum, and ACK or NAK in its place with checksum. EM=3 puts
-# the received command before the head; EM=2 has no head. Without checksum one byte from 0x80 on before the terminator
-# is taken for the check byte of a client that always sends one.
-#
-# This is the drive's side. It shares nothing with the host's parser of these tables, so that each tests the other.
-
 
 CRLF = b"\r\n"
 ACK, NAK = b"\x06", b"\x15"

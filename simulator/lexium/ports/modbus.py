@@ -1,15 +1,31 @@
-"""One client's connection to a simulated drive over Modbus/TCP: bytes and times in, bytes out.
+"""One client's connection to a simulated drive over Modbus/TCP, and the drive's registers: bytes in, bytes out.
 
-Theory of operation. A message is seven bytes of header (transaction, protocol, length, unit) and a PDU. A whole
-message is carried out, in order, when its last byte arrives, however the bytes were cut up. Each gets one reply, with
-its own transaction and unit, whatever the unit is. A message of another protocol is skipped. After an impossible length
-(less than a unit and a function, or more than a PDU of 253 bytes) the begin of the next message is unknown: the port is
+Theory of operation. A message is seven bytes of header (transaction, protocol, length, unit) and a PDU. A whole message
+is carried out, in order, when its last byte arrives, however the bytes were cut up. Each gets one reply, with its own
+transaction and unit, whatever the unit is. A message of another protocol is skipped. After an impossible length (less
+than a unit and a function, or more than a PDU of 253 bytes) the begin of the next message is unknown: the port is
 `closed`, and the client should be disconnected once the replies so far are sent. A drive without power takes and sends
 nothing.
 
 Function codes 1, 2, 3, 5, 16, 43/14, 65 and 66; any other is exception 1. A structure that the standard calls wrong (a
 length, a byte count or a count that does not fit) is exception 3. Nothing here shares code with the host's framing.
 (Modbus/TCP manual 3.2 and 4; MODBUS application protocol V1.1b3, 6; docs/rulings.md.)
+
+Registers, inputs, coils and named functions are the drive's state, seen from Modbus. Everything goes through the lines
+that MCode/TCP would send to the device. So a value has one range, one side effect and one error by either way; a
+register has a range of its own as well, and a write must satisfy both. Exceptions: 2, there is no such register in that
+direction; 3, a wrong value or count, or a part of a value; 4, the drive refuses (ER says why). A value that the drive
+itself finds out of range is a 3 too, and sets ER as on MCode/TCP. (Modbus/TCP manual 4 and 5; docs/rulings.md.)
+
+Decisions where the manual is silent (facts that a unit may correct):
+
+- IC and DC take the address of the variable's (first) register: they have room for one byte only.
+- TA holds the mask in its low word and the address of the subroutine in its high word.
+- TS is the divider: the drive's speed is 10 MHz / (TS + 2). Each side has its own range for it; 0 is 0 on both.
+- S, IP, CF and SC have their effect with any value. O1 to O3 can be read (4.2.2, note).
+- What a product does not support (an encoder's register in open loop) is refused by the drive: exception 4, ER 37.
+- Registers are no lines: in program mode they are read and written, not stored.
+- Two registers of one byte each are written one after the other, once both values are in range.
 """
 
 from __future__ import annotations
@@ -21,24 +37,6 @@ from multidrop.dialects.mcode.manual.grammar import Name, Number
 from multidrop.dialects.modbus.manual.registers import AT, REGISTERS, Register
 from multidrop.simulator.lexium.device import Answer, MCodeDevice
 from multidrop.simulator.lexium.motion.counters import HMT, RELATIVE
-
-# The registers, inputs, coils and named functions of a simulated Ethernet drive: its state, seen from Modbus.
-#
-# Everything goes through the lines that MCode/TCP would send to the device. So a value has one range, one side effect
-# and one error by either way; a register has a range of its own as well, and a write must satisfy both. Exceptions: 2,
-# there is no such register in that direction; 3, a wrong value or count, or a part of a value; 4, the drive refuses
-# (ER says why). A value that the drive itself finds out of range is a 3 too, and sets ER as on MCode/TCP. (Modbus/TCP
-# manual 4 and 5; docs/rulings.md.)
-#
-# Decisions where the manual is silent (facts that a unit may correct):
-#
-# - IC and DC take the address of the variable's (first) register: they have room for one byte only. - TA holds the
-# mask in its low word and the address of the subroutine in its high word. - TS is the divider: the drive's speed is 10
-# MHz / (TS + 2). Each side has its own range for it; 0 is 0 on both. - S, IP, CF and SC have their effect with any
-# value. O1 to O3 can be read (4.2.2, note). - What a product does not support (an encoder's register in open loop) is
-# refused by the drive: exception 4, ER 37. - Registers are no lines: in program mode they are read and written, not
-# stored. - Two registers of one byte each are written one after the other, once both values are in range.
-
 
 ILLEGAL_ADDRESS, ILLEGAL_VALUE, FAILURE = 2, 3, 4
 VALUE_ERRORS = frozenset({21, 22, 23, 76, 77})

@@ -1,11 +1,16 @@
 """Program execution in virtual time, program mode, and the core of a drive that every other part is built on.
 
-Theory of operation. When a program starts, its lines are compiled to closures (`LinkedProgram`). Each line takes
-effect at the time at which it begins and then takes the drive's instruction time; the next line begins after that.
-`run` executes everything that is due before a time at which something else happens. A part that changes what else may
-happen (a motion, a trip, an input) calls `timeline.replan`, and `run` comes back so that the next event can be worked
-out again. So the order of all events is that of their exact times, however time is advanced.
-Manual 3.3, 5.1.13, 5.1.22, 5.1.42, 5.1.91, 5.1.98.
+Theory of operation. When a program starts, its lines are compiled to closures (`LinkedProgram`). Each line takes effect
+at the time at which it begins and then takes the drive's instruction time; the next line begins after that. `run`
+executes everything that is due before a time at which something else happens. A part that changes what else may happen
+(a motion, a trip, an input) calls `timeline.replan`, and `run` comes back so that the next event can be worked out
+again. So the order of all events is that of their exact times, however time is advanced. Manual 3.3, 5.1.13, 5.1.22,
+5.1.42, 5.1.91, 5.1.98.
+
+The thread of a running program knows which line comes next and when, the stack of subroutines, holds and pauses. H does
+not poll: a program that holds for a motion is not alive until the motion is over. A trip or the error handler is a
+subroutine that is called between two lines; a hold that it interrupts goes on after its RT. Manual 5.1.22, 5.1.35,
+5.1.50, 5.1.103, 5.1.111, 5.1.112.
 """
 
 from __future__ import annotations
@@ -21,13 +26,6 @@ from multidrop.simulator.lexium.state.errors import CRLF, ErrorFlag, Fault, Prin
 from multidrop.simulator.lexium.state.memory import TABLE_SIZE, Memory
 from multidrop.simulator.lexium.state.program_memory import Action, LinkedProgram, Program
 from multidrop.simulator.world import World
-
-# The thread of a running program: which line comes next and when, the stack of subroutines, holds and pauses.
-#
-# H does not poll: a program that holds for a motion is not alive until the motion is over. A trip or the error handler
-# is a subroutine that is called between two lines; a hold that it interrupts goes on after its RT. Manual 5.1.22,
-# 5.1.35, 5.1.50, 5.1.103, 5.1.111, 5.1.112.
-
 
 STACK_DEPTH = 10
 """How deep subroutines may be nested (of the maker's older drives; the manual does not say)."""
