@@ -159,30 +159,49 @@ class Changed(NamedTuple):
 BusEvent = Sent | Ended | Unsolicited | Notice | Traffic | Sample | Valued | Conditioned | Silent | Lost | Changed
 
 
+E = TypeVar("E")
 Watcher = Callable[[BusEvent], None]
 
 
-class EventQueue:
-    """Publishes events in their order. A watcher that fails affects neither the others nor the caller."""
+class Publisher(Generic[E]):
+    """Passes events to its subscribers, in the order of subscription. `name` is theirs in the log of defects.
+
+    A subscriber that fails affects neither the others nor the caller.
+    """
 
     def __init__(self, name: str) -> None:
+        self._callbacks: tuple[Callable[[E], None], ...] = ()
+        self._isolated = isolated(name)
+
+    def subscribe(self, callback: Callable[[E], None]) -> Callable[[], None]:
+        """Call back with every event, from the event loop. The function returned ends the subscription."""
+        self._callbacks = (*self._callbacks, callback)
+
+        def leave() -> None:
+            if callback in self._callbacks:
+                at = self._callbacks.index(callback)
+                self._callbacks = self._callbacks[:at] + self._callbacks[at + 1 :]
+
+        return leave
+
+    def publish(self, event: E) -> None:
+        callbacks, over = iter(self._callbacks), False
+        while not over:  # after a subscriber that fails, the next one
+            with self._isolated:
+                for callback in callbacks:
+                    callback(event)
+                over = True
+
+
+class EventQueue(Publisher[BusEvent]):
+    """Publishes events of a bus in their order, also those that a subscriber causes."""
+
+    def __init__(self, name: str) -> None:
+        super().__init__(f"a watcher of {name}")
         self.held = False
         """`publish` only collects events; the one who holds them calls `tell`."""
         self._events: deque[BusEvent] = deque()
-        self._watchers: tuple[Watcher, ...] = ()
         self._telling = False
-        self._isolated = isolated(f"a watcher of {name}")
-
-    def watch(self, watcher: Watcher) -> Callable[[], None]:
-        """Add a watcher; the function returned removes it."""
-        self._watchers = (*self._watchers, watcher)
-
-        def forget() -> None:
-            if watcher in self._watchers:
-                at = self._watchers.index(watcher)
-                self._watchers = self._watchers[:at] + self._watchers[at + 1 :]
-
-        return forget
 
     def collect(self, event: BusEvent) -> None:
         """Add an event; `tell` publishes it."""
@@ -200,15 +219,15 @@ class EventQueue:
             return
         self._telling = True
         try:
-            event, watchers, over = self._events.popleft(), iter(self._watchers), False
-            while not over:  # after a watcher that fails, the next one
+            event, callbacks, over = self._events.popleft(), iter(self._callbacks), False
+            while not over:  # after a subscriber that fails, the next one
                 with self._isolated:
                     while True:
-                        for watcher in watchers:
-                            watcher(event)
+                        for callback in callbacks:
+                            callback(event)
                         if not self._events:
                             break
-                        event, watchers = self._events.popleft(), iter(self._watchers)
+                        event, callbacks = self._events.popleft(), iter(self._callbacks)
                     over = True
         finally:
             self._telling = False

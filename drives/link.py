@@ -76,7 +76,7 @@ class Link:
         self._waiting: dict[int, OnAnswer] = {}
         self._advancing = self._further = False
         self._news = EventQueue(name)
-        self.watch, self.publish = self._news.watch, self._news.publish
+        self.watch, self.publish = self._news.subscribe, self._news.publish
         self._timer: asyncio.TimerHandle | None = None
         self._answering = isolated(f"a conversation on {name}")
 

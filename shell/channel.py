@@ -14,7 +14,7 @@ from functools import partial
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from multidrop.dialects import Diagnostic, Procedure, Stopped
-from multidrop.drives.events import isolated
+from multidrop.drives.events import Publisher
 from multidrop.shell.events import By, Notified, Output, Progressed, SessionEvent, StateChanged
 
 if TYPE_CHECKING:
@@ -85,33 +85,13 @@ def _current() -> asyncio.Task[Any] | None:
 Callback = Callable[[SessionEvent], None]
 
 
-class Channel:
-    """Publishes events to its subscribers, in the order of subscription. A failing subscriber delays no other."""
+class Channel(Publisher[SessionEvent]):
+    """Publishes the events of a session on its clock."""
 
     def __init__(self) -> None:
+        super().__init__("a front end")
         self.front = Front()
         """The front end, as far as it can be asked."""
-        self._callbacks: tuple[Callback, ...] = ()
-        self._apart = isolated("a front end")
-
-    def subscribe(self, callback: Callback) -> Callable[[], None]:
-        """Call back with every event, from the event loop. The function returned ends the subscription."""
-        self._callbacks = (*self._callbacks, callback)
-
-        def leave() -> None:
-            if callback in self._callbacks:
-                at = self._callbacks.index(callback)
-                self._callbacks = self._callbacks[:at] + self._callbacks[at + 1 :]
-
-        return leave
-
-    def publish(self, event: SessionEvent) -> None:
-        callbacks, over = iter(self._callbacks), False
-        while not over:  # after a subscriber that fails, the next one
-            with self._apart:
-                for callback in callbacks:
-                    callback(event)
-                over = True
 
     def output(self, text: str, *, columns: bool = False) -> None:
         """Publish a line of a verb's result. `columns`: a screen breaks it between words."""
