@@ -276,7 +276,6 @@ class Wire:
         self.hung_up = False
         self._ports = tuple(ports)
         self._faults = faults or Faults()
-        self._harmful = self._faults.harmful
         self._rng = rng or Random(0)
         self._byte_time = BITS_A_BYTE / baud if baud else 0.0
         self._coming: deque[tuple[float, bytes, int]] = deque()
@@ -364,7 +363,7 @@ class Wire:
         received += self._merger.take(now)
         if self.hung_up:
             return b""
-        return harmed(received, self._faults, self._rng) if self._harmful else received
+        return harmed(received, self._faults, self._rng) if self._faults.harmful else received
 
     def _carry(self, now: float) -> bytes:
         """Bring the host's due bytes to the drives; give what endpoints receive meanwhile.
@@ -381,7 +380,7 @@ class Wire:
                 break
             _, data, source = self._coming.popleft()
             self._count(source, -len(data))
-            self._arrive(harmed(data, self._faults, self._rng) if self._harmful else data, at)
+            self._arrive(harmed(data, self._faults, self._rng) if self._faults.harmful else data, at)
         return received
 
     @property
