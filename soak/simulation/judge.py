@@ -44,8 +44,12 @@ def _unsent(world: World) -> Iterator[str]:
     times = _times(world)
     for each in world.history.commands.values():
         count = times[each.line, each.drive, each.text]
-        if count and each.outcome in (Outcome.NOT_SENT, Outcome.REFUSED):
-            yield _said(each, count)
+        if not count or each.outcome not in (Outcome.NOT_SENT, Outcome.REFUSED):
+            continue
+        if each.outcome is Outcome.REFUSED and world.climate.wire.harmful and not world.checked(each.line):
+            world.history.count("excepted: an error of noise on a line without a checksum")
+            continue
+        yield _said(each, count)
 
 
 def _done(world: World) -> Iterator[str]:

@@ -41,7 +41,7 @@ class Person:
         while data:
             size = len(data) if not spread else self._rng.randrange(1, len(data) + 1)
             piece, data = data[:size], data[size:]
-            at += self._rng.random() * spread
+            at += 1e-6 + self._rng.random() * spread  # timers of one moment have no order
             self._loop.call_at(at, self.read, piece)
         self._at = at
 

@@ -149,6 +149,11 @@ class World:
     stops: int = 0
     """The number of stops that were typed, arrived or on their way."""
 
+    def checked(self, line: str) -> bool:
+        """Whether a checksum protects a line."""
+        place = next(each for each in self.places if each.name == line)
+        return place.checksum > 0 and LANGUAGES[place.language].checked
+
     # Making
 
     async def begin(self) -> None:

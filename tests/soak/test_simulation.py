@@ -12,8 +12,7 @@ from soak.simulation.judge import broken
 from soak.simulation.world import lived
 from tests.support.paths import ROOT
 
-SEEDS = (3, 9, 137)
-"""137: error 20 of a line that a stop had made harmless was taken for the refusal of a move."""
+SEEDS = (3, 9, 137, 472, 882)
 
 
 @pytest.mark.parametrize("seed", SEEDS)

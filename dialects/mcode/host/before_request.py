@@ -13,7 +13,14 @@ from multidrop.dialects.codec import End, Kind, Procedure, Request
 from multidrop.dialects.errors import Inexpressible, NoAnswer
 from multidrop.dialects.mcode.host import classify
 from multidrop.dialects.mcode.host.codec import MCode
-from multidrop.dialects.mcode.host.exchange import answered, question, read_error, refused, synchronise, value
+from multidrop.dialects.mcode.host.exchange import (
+    printed_value,
+    question,
+    read_error,
+    refused,
+    synchronise,
+    value,
+)
 from multidrop.dialects.mcode.host.framing import NAK
 from multidrop.dialects.mcode.host.identity import activate_party, asked, find, find_in_text, look_in, pinged
 from multidrop.dialects.mcode.host.state import MCodeState, Place, described, unknown, who
@@ -43,8 +50,7 @@ def before_request(state: MCodeState, request: Request) -> Procedure[Request]:
 def value_of(state: MCodeState, items: str, form: str) -> Procedure[str]:
     """Print values for the host's own use; `form` is a regular expression for them."""
     yield from before_request(state, question(state, items, form))
-    reply = yield from answered(state, question(state, items, form))
-    return value(state, reply)
+    return (yield from printed_value(state, items, form))
 
 
 def confirm_drive(state: MCodeState, text: str, fate: str) -> Procedure[None]:

@@ -19,7 +19,7 @@ from multidrop.dialects.codec import Decoded, End, Kind, Procedure, Reply, Reque
 from multidrop.dialects.debugging import Debugging, Look, Neighbours, Row, Stepped
 from multidrop.dialects.errors import Diagnostic, Inexpressible, NoAnswer, Refused
 from multidrop.dialects.mcode.host.codec import MCode
-from multidrop.dialects.mcode.host.exchange import answered, question, value
+from multidrop.dialects.mcode.host.exchange import printed_value
 from multidrop.dialects.mcode.host.framing import printable
 from multidrop.dialects.mcode.host.operations import flag, listing, perform
 from multidrop.dialects.mcode.host.state import MCodeState, who
@@ -327,8 +327,8 @@ def hold(text: str) -> float | None:
 
 def _settled(state: MCodeState) -> Procedure[bool]:
     """Whether an H for motion is over: it waits for MV=0, then MT; MP=0 comes later still (5.1.50)."""
-    reply = yield from answered(state, question(state, 'MV," ",MP," ",MT', r"[01] [01] \d{1,5}"))
-    moving, positioning, settling = value(state, reply).split()
+    said = yield from printed_value(state, 'MV," ",MP," ",MT', r"[01] [01] \d{1,5}")
+    moving, positioning, settling = said.split()
     return moving == "0" and "0" in (positioning, settling)
 
 

@@ -173,6 +173,13 @@ def check_printed(state: MCodeState, reply: Reply, refusal: str = "") -> None:
         raise NoAnswer(f"{who(state)} does not reply ({reply.end.value})")
 
 
+def printed_value(state: MCodeState, items: str, form: str) -> Procedure[str]:
+    """Print values for the host's own use. Raises NoAnswer where nothing is printed, Refused."""
+    reply = yield from answered(state, question(state, items, form))
+    check_printed(state, reply)
+    return value(state, reply)
+
+
 def _raise_damaged(state: MCodeState, request: Request, reply: Reply) -> NoReturn:
     state.reply_lost()
     raise NoAnswer(

@@ -14,10 +14,10 @@ from multidrop.dialects.mcode.host.before_request import before_request, value_o
 from multidrop.dialects.mcode.host.codec import EVERY_DRIVE
 from multidrop.dialects.mcode.host.exchange import (
     REPEATS,
-    answered,
     check_printed,
     note_error,
     print_mark,
+    printed_value,
     question,
     sign,
     value,
@@ -257,8 +257,7 @@ def ready(state: MCodeState) -> Procedure[str]:
     if state.programming:
         return f"{who(state)} is in program mode and would store the settings: PG ends that"
     yield from before_request(state, question(state, "MV", "[01]"))
-    reply = yield from answered(state, question(state, "MV,BY,TE", r"[01][01]\d{1,3}"))
-    said = value(state, reply)
+    said = yield from printed_value(state, "MV,BY,TE", r"[01][01]\d{1,3}")
     if said[:1] == "1":
         return f"{who(state)} moves: stop it first"
     if said[1:2] == "1":
