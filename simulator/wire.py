@@ -287,6 +287,11 @@ class Wire:
         self._ports_due = inf
         self._outdated = True
 
+    def disturb(self, faults: Faults, rng: Random | None = None) -> None:
+        """Have these faults from now on; `rng`: drawn from another source of chance."""
+        self._faults, self._harmful = faults, faults.harmful
+        self._rng = rng or self._rng
+
     @property
     def deadline(self) -> float | None:
         """Time of the next event: a byte arrives at the drives or at the host, or a drive does something by itself."""

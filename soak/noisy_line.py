@@ -139,7 +139,7 @@ class NoisyLine:
 
     def _fault(self, faults: Faults) -> None:
         wire = self.wire
-        wire._faults, wire._rng = faults, Random(self.setup.seed)
+        wire.disturb(faults, Random(self.setup.seed))
         after = faults.hangup_after
         wire._hang_up_at = None if after is None else self.floor.now() + after
         self.floor._turn()

@@ -221,7 +221,7 @@ class World:
     def faults(self, on: bool) -> None:
         """Let the faults begin or end."""
         for name, wire in self.floor.floor.wires.items():
-            wire._faults, wire._rng = self.climate.wire if on else Faults(), Random(f"{self.seed} {name}")
+            wire.disturb(self.climate.wire if on else Faults(), Random(f"{self.seed} {name}"))
         self.loop.late = self.climate.late if on else 0.0
         if not on:
             for port in self.ports.values():

@@ -10,6 +10,4 @@ NONE = Faults()
 
 def disturb(wire: Wire, faults: Faults = NONE, seed: int | None = None) -> None:
     """Give a wire these faults; `seed`: and another source of chance."""
-    wire._faults = faults
-    if seed is not None:
-        wire._rng = Random(seed)
+    wire.disturb(faults, None if seed is None else Random(seed))

@@ -67,7 +67,7 @@ async def test_noise_never_steps_twice(tmp_path: Path, em: int, seed: int) -> No
     async with CellSession(tmp_path, bus("line", ethernet(EM=em))) as it:
         taken = Taken(it.device("line:!"))
         wire = next(iter(it.session.cells.values())).floor.wires["line"]
-        wire._faults, wire._rng = Faults(flip=2e-3, drop=2e-3), Random(seed)
+        wire.disturb(Faults(flip=2e-3, drop=2e-3), Random(seed))
         for _ in range(16):
             told: Exception | None = None
             it.events.clear()

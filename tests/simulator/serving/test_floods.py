@@ -305,7 +305,7 @@ def wire(baud: int, em: int, more: str = "", **faults: object) -> tuple[Wire, ob
     )
     made = floor.wires["w"]
     if faults:
-        made._faults = Faults(**faults)  # type: ignore[arg-type]
+        made.disturb(Faults(**faults))  # type: ignore[arg-type]
     return made, floor.drives[0].device
 
 
