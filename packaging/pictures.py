@@ -26,7 +26,7 @@ from textual.pilot import Pilot
 from multidrop.shell.connect.settings import Settings
 from multidrop.shell.session import Session
 from multidrop.tui.app import MultidropApp
-from multidrop.tui.assist import ShellAssist
+from multidrop.tui.assist import Assist
 from tests.support.virtual import VirtualLoop
 
 PICTURES = ROOT / "docs" / "pictures"
@@ -96,7 +96,7 @@ async def _take(size: tuple[int, int], scene: Sequence[Step]) -> str:
         session = Session(settings)
         try:
             with mock.patch.object(Session, "wall", _wall):
-                app = MultidropApp(session, ["sim:"], ShellAssist(session, settings))
+                app = MultidropApp(session, ["sim:"], Assist(session, settings))
                 app.theme = "multidrop-dark"
                 async with app.run_test(size=size) as pilot:
                     while len(session.buses) < 3 or not all(bus.drives for bus in session.buses.values()):

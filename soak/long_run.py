@@ -154,6 +154,7 @@ def in_real_time(minutes: float) -> tuple[dict[str, Any], list[str]]:
 
 async def _shown(folder: Path, seconds: float) -> tuple[dict[str, Any], list[str]]:
     from multidrop.tui.app import MultidropApp
+    from multidrop.tui.assist import Assist
 
     _write(folder, served=True)
     spec = cells.load(str(folder / "cell.toml"))
@@ -165,7 +166,8 @@ async def _shown(folder: Path, seconds: float) -> tuple[dict[str, Any], list[str
         session = _session(folder)
         stack.push_async_callback(session.close)
         urls = [f"serial:{folder / bus.name}?baud=19200&drives=a,b" for bus in spec.buses]
-        pilot = await stack.enter_async_context(MultidropApp(session, urls).run_test(size=(100, 40)))
+        app = MultidropApp(session, urls, Assist(session, session.settings))
+        pilot = await stack.enter_async_context(app.run_test(size=(100, 40)))
         while len([bus for bus in session.buses.values() if bus.drives]) < TABS:
             await pilot.pause(0.1)
         with contextlib.chdir(folder):

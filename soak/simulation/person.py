@@ -31,7 +31,7 @@ class Person:
         self._session, self._loop, self._rng, self._typed = session, loop, rng, typed
         self._line = ""
         self._at = 0.0
-        session.ask = lambda question: at_keyboard(self.keyboard, question)
+        session.front.ask = lambda question: at_keyboard(self.keyboard, question)
         self.keyboard.listen(self._listen)
         self.working = loop.create_task(self.lines.run())
 
