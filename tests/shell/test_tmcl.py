@@ -150,9 +150,10 @@ async def test_a_stop_ends_the_program_of_a_module_before_its_motor(session):
     session.stop("Ctrl+X")
     told = await confirmed(session)
     assert not module(session).program.running and any("1: stopped, velocity 0" in text for text in told)
-    place = module(session).motor.read(1, module(session)._now)
+    now, motor = next(iter(session.cells.values())).now, module(session).motor
+    place = motor.read(1, now())
     await asyncio.sleep(5.0)
-    assert module(session).motor.read(1, module(session)._now) == place
+    assert motor.read(1, now()) == place
 
 
 async def test_a_stop_reaches_a_module_that_is_in_download_mode_and_moves(session):
