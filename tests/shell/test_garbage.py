@@ -11,7 +11,8 @@ from multidrop.dialects import DriveError, NoAnswer, Refused
 from multidrop.shell.connect.settings import Settings
 from multidrop.shell.events import Printed
 from multidrop.shell.session import Session
-from tests.support.virtual import in_virtual_time
+
+pytestmark = pytest.mark.virtual
 
 CHATTER = 'PG 1\nLB SU\nPR "Logic 000"\nH 200\nBR SU\nE\nPG\n'
 
@@ -68,69 +69,57 @@ def desk(tmp_path):
 @pytest.mark.parametrize("faults", ["flip = 4e-3", "drop = 1e-2", "flip = 4e-3\ndrop = 5e-3"])
 @pytest.mark.parametrize("em", [0, 1, 3])
 @pytest.mark.parametrize("ck", [1, 2])
-def test_on_a_bad_line_a_checksum_keeps_every_number_right_and_every_success_true(desk, em, ck, faults, nightly):
-    @in_virtual_time
-    async def exchanges():
-        bad = desk()
-        await bad.open(
-            f'seed = 3\n[[bus]]\nname = "w"\n[bus.faults]\n{faults}\n' + drive("a", em, ck) + drive("b", em, ck), "a,b"
-        )
-        chance, numbers, taken = random.Random(5), 0, 0
-        lines = 200 if nightly else 80
-        for _ in range(lines):
-            name, number = chance.choice("ab"), chance.randint(-(2**31), 2**31 - 1)
-            held = bad.devices[name].memory.values
-            if (printed := await bad.run(f"@{name} R1={number}")) is not None:
-                assert (printed, held["R1"]) == ([], number)
-                taken += 1
-            if (printed := await bad.run(f"@{name} PR R1")) is not None:
-                assert printed == [str(held["R1"])]
-                numbers += 1
-        assert min(taken, numbers) > 0.3 * lines
-        await bad.session.close()
-        assert asyncio.all_tasks() == {asyncio.current_task()}
-
-    exchanges()
+async def test_on_a_bad_line_a_checksum_keeps_every_number_right_and_every_success_true(desk, em, ck, faults, nightly):
+    bad = desk()
+    await bad.open(
+        f'seed = 3\n[[bus]]\nname = "w"\n[bus.faults]\n{faults}\n' + drive("a", em, ck) + drive("b", em, ck), "a,b"
+    )
+    chance, numbers, taken = random.Random(5), 0, 0
+    lines = 200 if nightly else 80
+    for _ in range(lines):
+        name, number = chance.choice("ab"), chance.randint(-(2**31), 2**31 - 1)
+        held = bad.devices[name].memory.values
+        if (printed := await bad.run(f"@{name} R1={number}")) is not None:
+            assert (printed, held["R1"]) == ([], number)
+            taken += 1
+        if (printed := await bad.run(f"@{name} PR R1")) is not None:
+            assert printed == [str(held["R1"])]
+            numbers += 1
+    assert min(taken, numbers) > 0.3 * lines
+    await bad.session.close()
+    assert asyncio.all_tasks() == {asyncio.current_task()}
 
 
 @pytest.mark.wide
 @pytest.mark.parametrize("em", [0, 1, 2, 3])
 @pytest.mark.parametrize("ck", [0, 1, 2])
-def test_garbage_is_a_failure_that_is_told_and_nothing_else(desk, em, ck, nightly):
-    @in_virtual_time
-    async def exchanges():
-        bad = desk()
-        faults = "[bus.faults]\nflip = 8e-3\ndrop = 4e-3\n"
-        await bad.open(f'[[bus]]\nname = "w"\n{faults}' + drive("a", em, ck) + drive("b", em, ck), "a,b")
-        for _ in range(60 if nightly else 25):
-            for line in ("@a PR P", "@b VM=500000", "@a PR AL", "@b PR ZZ", "@b PR IS"):
-                await bad.run(line)  # raises nothing but what a person is told
-        await bad.session.close()
-
-    exchanges()
+async def test_garbage_is_a_failure_that_is_told_and_nothing_else(desk, em, ck, nightly):
+    bad = desk()
+    faults = "[bus.faults]\nflip = 8e-3\ndrop = 4e-3\n"
+    await bad.open(f'[[bus]]\nname = "w"\n{faults}' + drive("a", em, ck) + drive("b", em, ck), "a,b")
+    for _ in range(60 if nightly else 25):
+        for line in ("@a PR P", "@b VM=500000", "@a PR AL", "@b PR ZZ", "@b PR IS"):
+            await bad.run(line)  # raises nothing but what a person is told
+    await bad.session.close()
 
 
 @pytest.mark.wide
 @pytest.mark.parametrize(("em", "ck"), [(em, ck) for em in (0, 1, 2, 3) for ck in (0, 1, 2)])
 @pytest.mark.parametrize("baud", [0, 9600])
-def test_a_drive_whose_program_prints_all_the_time_is_opened_and_obeys(desk, em, ck, baud):
-    @in_virtual_time
-    async def work():
-        busy = desk()
-        (busy.folder / "chatter.mxt").write_text(CHATTER)
-        program = drive("a", em, ck, 'program = "chatter.mxt"\n')
-        await busy.open(f'[[bus]]\nname = "w"\nbaud = {baud}\n{program}', "a")
-        device, session = busy.devices["a"], busy.session
-        assert device.running
-        for line, printed in (("PR P", ["0"]), ("VM=500000", []), ("PR VM", ["500000"]), ("MR 5000", [])):
-            assert await busy.run(line) == printed, line
-        assert await busy.run("/wait stopped") == []
-        with pytest.raises((Refused, NoAnswer)):
-            await session.run("VM=5")
-        assert await busy.run("PR P") == ["5000"]
-        session.stop()
-        await session.buses["w"].stopped()
-        assert not device.running
-        await session.close()
-
-    work()
+async def test_a_drive_whose_program_prints_all_the_time_is_opened_and_obeys(desk, em, ck, baud):
+    busy = desk()
+    (busy.folder / "chatter.mxt").write_text(CHATTER)
+    program = drive("a", em, ck, 'program = "chatter.mxt"\n')
+    await busy.open(f'[[bus]]\nname = "w"\nbaud = {baud}\n{program}', "a")
+    device, session = busy.devices["a"], busy.session
+    assert device.running
+    for line, printed in (("PR P", ["0"]), ("VM=500000", []), ("PR VM", ["500000"]), ("MR 5000", [])):
+        assert await busy.run(line) == printed, line
+    assert await busy.run("/wait stopped") == []
+    with pytest.raises((Refused, NoAnswer)):
+        await session.run("VM=5")
+    assert await busy.run("PR P") == ["5000"]
+    session.stop()
+    await session.buses["w"].stopped()
+    assert not device.running
+    await session.close()

@@ -10,7 +10,6 @@ import pytest
 from multidrop.transports import Lost, Received, Transport, TransportLost, Unreachable, telnet
 from multidrop.transports.rfc2217 import Rfc2217Pipe, negotiated
 from multidrop.transports.telnet import OPTION, REPLY, Control, Setting, message, parsed
-from tests.support.virtual import in_virtual_time
 
 pytestmark = pytest.mark.virtual
 
@@ -97,26 +96,18 @@ async def test_opening_takes_no_longer_than_the_replies() -> None:
     ("ignores", "named"),
     [((DTR, RTS), "DTR, RTS"), ((DTR,), "DTR"), ((Setting.PURGE,), "a purge"), ((Setting.CONTROL,), "flow control")],
 )
-def test_a_wish_without_an_answer_is_said_once_and_the_port_is_open(
+async def test_a_wish_without_an_answer_is_said_once_and_the_port_is_open(
     ignores: tuple[tuple[int, int] | int, ...], named: str
 ) -> None:
-    @in_virtual_time
-    async def test() -> None:
-        pipe = await opened(Server(ignores))
-        remark = pipe.limits
-        assert remark.startswith("the server does not confirm") and named in remark
-
-    test()
+    pipe = await opened(Server(ignores))
+    remark = pipe.limits
+    assert remark.startswith("the server does not confirm") and named in remark
 
 
 @pytest.mark.parametrize("late", range(1, 9))
-def test_replies_may_come_in_any_order_and_byte_by_byte(late: int) -> None:
-    @in_virtual_time
-    async def test() -> None:
-        pipe = await opened(Server(late=late))
-        assert bool(pipe.limits) == (8 % late > 0)  # the last replies of some never come
-
-    test()
+async def test_replies_may_come_in_any_order_and_byte_by_byte(late: int) -> None:
+    pipe = await opened(Server(late=late))
+    assert bool(pipe.limits) == (8 % late > 0)  # the last replies of some never come
 
 
 @pytest.mark.parametrize(
@@ -128,16 +119,12 @@ def test_replies_may_come_in_any_order_and_byte_by_byte(late: int) -> None:
         (lambda: Server((Setting.BAUD,)), "the baud rate 9600; "),
     ],
 )
-def test_a_needed_setting_that_is_refused_is_named(server: Callable[[], Server], reason: str) -> None:
-    @in_virtual_time
-    async def test() -> None:
-        refusing = server()
-        with pytest.raises(Unreachable) as caught:
-            await opened(refusing)
-        assert str(caught.value).startswith(f"{refusing.name}: the server does not accept {reason}")
-        assert refusing.closed
-
-    test()
+async def test_a_needed_setting_that_is_refused_is_named(server: Callable[[], Server], reason: str) -> None:
+    refusing = server()
+    with pytest.raises(Unreachable) as caught:
+        await opened(refusing)
+    assert str(caught.value).startswith(f"{refusing.name}: the server does not accept {reason}")
+    assert refusing.closed
 
 
 async def test_a_server_of_another_kind_is_said_to_be_one() -> None:

@@ -12,12 +12,10 @@ from tests.support.cell_session import CellSession, bus, party, pmx
 from tests.support.front_door import read_to_end
 from tests.support.processes import Running
 from tests.support.served_cell import until
-from tests.support.virtual import in_virtual_time
 
-pytestmark = pytest.mark.process
+pytestmark = [pytest.mark.virtual, pytest.mark.process]
 
 
-@in_virtual_time
 async def test_what_moves_is_found_by_a_quick_look_and_what_does_not_answer_is_not_known(tmp_path):
     floor = (bus("press", party("a"), party("b"), party("c")), bus("line", party("d")), bus("stages", pmx("00")))
     async with CellSession(tmp_path, *floor) as shop:
@@ -37,7 +35,6 @@ async def test_what_moves_is_found_by_a_quick_look_and_what_does_not_answer_is_n
         assert found[3].startswith("stages:00 moves at ") and len(found) == 4
 
 
-@in_virtual_time
 async def test_a_fresh_reading_is_not_asked_for_again(tmp_path):
     async with CellSession(tmp_path, bus("press", party("a"))) as shop:
         await confirmed_motion(shop.session.selected)
@@ -49,7 +46,6 @@ async def test_a_fresh_reading_is_not_asked_for_again(tmp_path):
         assert await shop.session.in_motion() == ["a moves at 5000 a second"], "what was sent since makes it old"
 
 
-@in_virtual_time
 async def test_what_a_stop_ends_is_waited_for_and_no_reason_to_ask(tmp_path):
     async def macro():
         try:
@@ -124,7 +120,6 @@ def test_a_signal_stops_what_a_macro_started_and_not_what_an_operator_did(shop, 
 DWELLS = 'program_text = """\nPG 1\nLB G1\nH 60000\nBR G1\nE\nPG\n"""'
 
 
-@in_virtual_time
 async def test_a_program_that_dwells_is_a_reason_to_ask_and_one_that_was_stopped_is_not(tmp_path):
     async with CellSession(tmp_path, bus("press", f"{party('a')}\n{DWELLS}", party("b"))) as shop:
         await shop.session.run("@a EX G1")

@@ -18,6 +18,8 @@ from multidrop.shell.log.writer import SessionLog
 from tests.support.cell_session import CellSession, bus, party
 from tests.support.virtual import in_virtual_time
 
+pytestmark = pytest.mark.virtual
+
 AT = datetime(2026, 11, 22, tzinfo=UTC)
 PRESS = bus("press", party("a"), party("b"))
 
@@ -85,7 +87,6 @@ def test_a_log_that_was_written_replays_without_a_difference(tmp_path, fast):
     recorded_and_replayed(tmp_path, fast)
 
 
-@in_virtual_time
 async def test_another_answer_is_shown_and_the_rest_goes_on_and_the_end_is_exit_1(tmp_path, capsys):
     async with Cell(tmp_path, PRESS) as cell:
         with pytest.raises(DriveError, match="1 of 3 lines gave another answer"):
@@ -94,7 +95,6 @@ async def test_another_answer_is_shown_and_the_rest_goes_on_and_the_end_is_exit_
         assert text.endswith("log:2: press:a PR R1: then 5; now 0")
 
 
-@in_virtual_time
 async def test_the_first_difference_in_an_error_ends_it(tmp_path):
     async with Cell(tmp_path, PRESS) as cell:
         with pytest.raises(DriveError, match=r"log:\d+: press:a ZZ 1: then no error; now .*error 60"):
@@ -104,7 +104,6 @@ async def test_the_first_difference_in_an_error_ends_it(tmp_path):
             await taken(cell, tmp_path, typed("PR P", failed="a refused: error 20"), typed("MR 1000"))
 
 
-@in_virtual_time
 async def test_numbers_of_a_drive_that_may_move_are_not_compared_until_a_wait(tmp_path, capsys):
     async with Cell(tmp_path, PRESS) as cell:
         moving = [typed("MR 5000"), typed("PR P", "17"), typed("PR P", "3", drive="b"), verb("/wait stopped")]
@@ -116,7 +115,6 @@ async def test_numbers_of_a_drive_that_may_move_are_not_compared_until_a_wait(tm
         ]
 
 
-@in_virtual_time
 async def test_what_it_moved_is_stopped_at_the_end(tmp_path):
     async with Cell(tmp_path, PRESS) as cell:
         async with cell.session.automations.run():
@@ -124,7 +122,6 @@ async def test_what_it_moved_is_stopped_at_the_end(tmp_path):
         assert cell.moving() == set() and "SL 20000" in cell.lines()[0]
 
 
-@in_virtual_time
 async def test_the_pauses_of_the_log_are_kept_unless_it_is_fast(tmp_path):
     lines = [typed("PR R1", "0"), typed("PR R1", "0", after=100.0)]
     async with Cell(tmp_path, PRESS) as cell:
@@ -135,14 +132,12 @@ async def test_the_pauses_of_the_log_are_kept_unless_it_is_fast(tmp_path):
             lines = [typed("PR R1", "0"), typed("PR R1", "0", after=100.0)]
 
 
-@in_virtual_time
 async def test_a_stop_in_the_log_is_a_stop_and_automation_goes_on(tmp_path):
     async with Cell(tmp_path, PRESS) as cell:
         await taken(cell, tmp_path, typed("SL 20000"), [entry("stop", "stop", "", "")], typed("PR V", "0"))
         assert cell.session.stops == 1 and not cell.session.latched and cell.moving() == set()
 
 
-@in_virtual_time
 async def test_a_stop_of_a_person_ends_it_for_good(tmp_path):
     async with Cell(tmp_path, PRESS) as cell:
         cell.session.stop()
@@ -174,7 +169,6 @@ async def asked(tmp_path, answer, *entries):
         return questions, cell.told(), cell.lines()
 
 
-@in_virtual_time
 async def test_real_drives_and_what_moves_them_are_listed_and_asked_about(tmp_path):
     log = [typed("MR 100"), typed("PR R1", "0"), typed("PR R1", "0", drive="b"), verb("/sim push a 5")]
     (question, refusal), told, lines = await asked(tmp_path, False, *log)
@@ -185,7 +179,6 @@ async def test_real_drives_and_what_moves_them_are_listed_and_asked_about(tmp_pa
     assert lines == ["@press:a MR 100"]
 
 
-@in_virtual_time
 async def test_a_drive_or_bus_that_is_not_there_is_named_before_anything_is_sent(tmp_path):
     async with Cell(tmp_path, PRESS, bus("line", party("x"))) as cell:
         for place, text in ((("c", "press"), "drive press:c"), (("a", "other"), "bus other")):
@@ -248,7 +241,6 @@ def test_answers_are_compared(tmp_path, then, now, moving, same):
     assert (compared(step, now, "", moving) == "") is same
 
 
-@in_virtual_time
 async def test_a_log_that_cannot_be_opened_leaves_the_one_that_runs(tmp_path):
     async with Cell(tmp_path, PRESS) as cell:
         await cell.session.run(f"/log {tmp_path / 'day.log'}")

@@ -12,7 +12,8 @@ from multidrop.dialects import DriveError
 from multidrop.transports import TransportLost
 from tests.support.cell_session import ETHERNET, CellSession, bus, party
 from tests.support.mcode_drives import Witness
-from tests.support.virtual import in_virtual_time
+
+pytestmark = pytest.mark.virtual
 
 ORDINARY, ALL = 2, 60
 WAITS = (0.001, 0.01, 0.05, 0.3, 1.0, 3.0)
@@ -78,7 +79,6 @@ class Day:
 @pytest.mark.parametrize(
     "seed", [pytest.param(n, marks=() if n < ORDINARY else pytest.mark.nightly) for n in range(ALL)]
 )
-@in_virtual_time
 async def test_every_bus_comes_back_and_nothing_is_executed_twice(tmp_path: Path, seed: int) -> None:
     random = Random(seed)
     modes = {"EM": random.randrange(3), "CK": random.randrange(2), "ES": random.choice((0, 1, 3))}
