@@ -1,4 +1,4 @@
-"""Three people at three drives of one noisy party line, and a program that prints: what is told is true.
+"""People at the drives of a noisy party line, and a NAK that noise makes: what is told is true, nothing is done twice.
 
 A sample of what was run at length (`tests/noisy_wire.py`): no value is told as another drive's, as an older one or as a
 program's, and nothing is executed twice. Without a checksum a digit may be damaged, which nothing can tell.

@@ -1,4 +1,4 @@
-"""What a stop cuts off is not shown as a line of a program's; what a program prints is."""
+"""What a stop cuts off or a killed session leaves is no line of a program's; what a program prints is."""
 
 import asyncio
 from dataclasses import replace

@@ -1,4 +1,4 @@
-"""The command line from outside: usage, help, exit codes that need no drive."""
+"""The command line from outside, and the package: usage, help, exit codes that need no drive, public names."""
 
 import importlib
 import subprocess

@@ -1,4 +1,4 @@
-"""What is written changes the terminal's screen into the new picture, with few bytes. The terminal is pyte's."""
+"""What is written changes the terminal's screen into the new picture, with few bytes; the compositor leaves none out."""
 
 from __future__ import annotations
 

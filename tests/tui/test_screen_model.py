@@ -1,4 +1,4 @@
-"""The screen's memory, and what it may claim of a drive."""
+"""The screen's memory: what it may claim of a drive, and the bytes of a bus that it keeps."""
 
 from __future__ import annotations
 
