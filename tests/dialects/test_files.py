@@ -1,4 +1,4 @@
-"""Files that people name: read whole within limits and divided into lines by one rule, or refused in one line."""
+"""Files that people name are read by one rule or refused in one line; text from elsewhere acts on no terminal."""
 
 import asyncio
 import os

@@ -1,7 +1,7 @@
-"""People at the drives of a noisy party line, and a NAK that noise makes: what is told is true, nothing is done twice.
+"""People at the drives of a noisy party line, and a NAK that noise makes: what is told is true.
 
-A sample of what was run at length (`tests/noisy_wire.py`): no value is told as another drive's, as an older one or as a
-program's, and nothing is executed twice. Without a checksum a digit may be damaged, which nothing can tell.
+A sample of what was run at length (`tests/support/noisy_wire.py`): no value is told as another drive's, as an older one
+or as a program's, and nothing is executed twice. Without a checksum a digit may be damaged, which nothing can tell.
 """
 
 import pytest

@@ -1,4 +1,4 @@
-"""The relay's two sides in memory: frames, credit, and the drop that goes ahead of what was sent before it."""
+"""The relay's two sides in memory: frames, credit, the drop that goes ahead of what was sent, signs of life."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What is written changes the terminal's screen into the new picture, with few bytes; the compositor leaves none out."""
+"""What is written makes the terminal's screen the new picture, with few bytes; the compositor leaves none out."""
 
 from __future__ import annotations
 

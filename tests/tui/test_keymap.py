@@ -1,4 +1,4 @@
-"""Keys under the names of functions: read, changed by the configuration, refused where they clash or stop."""
+"""Keys under the names of functions: read, changed, refused where they clash or stop; pages of function keys."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The pages of macros and of traffic: what they show, and the lines that their keys send."""
+"""The pages of macros and of traffic, and a macro in the editor: what they show, and what their keys send."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Pages in front of the main screen, and the panels that keys show and hide."""
+"""Pages in front of the main screen, panels that keys show and hide, and the split screen."""
 
 import pytest
 

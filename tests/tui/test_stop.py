@@ -1,4 +1,4 @@
-"""Ctrl+X stops: from every screen, in every state, before any queue."""
+"""Ctrl+X stops: from every screen, in every state, before any queue, ahead of the event loop."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What is believed of an answer: NAK, ACK, prompts, restarts, prints that come to nothing."""
+"""What is believed of a reply: NAK, ACK, prompts, restarts, prints that come to nothing, lists that come late."""
 
 from dataclasses import replace
 

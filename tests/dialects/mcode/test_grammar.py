@@ -1,4 +1,4 @@
-"""MCode lines: tokens and statements."""
+"""MCode lines: tokens, statements, and the canonical spelling of each."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The table of mnemonics: complete against the facts, and right in the values that were looked up by hand."""
+"""The tables of mnemonics and errors: complete against the facts, and right in the values looked up by hand."""
 
 import csv
 import re

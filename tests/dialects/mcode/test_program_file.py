@@ -1,4 +1,4 @@
-"""Program files: what is sent, what is left out, what is refused before anything is sent."""
+"""Program files: what is sent, what is left out, what is refused, and a file made of what is in a drive."""
 
 from __future__ import annotations
 

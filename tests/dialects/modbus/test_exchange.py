@@ -1,4 +1,4 @@
-"""What is typed over Modbus: which requests it makes, what is printed, how refusals and silence are told."""
+"""What is typed over Modbus: its requests, what is printed, refusals and silence; the conditions of a drive."""
 
 from __future__ import annotations
 

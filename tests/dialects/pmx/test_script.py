@@ -1,4 +1,4 @@
-"""A-SCRIPT: what is read, what is told of what is wrong, compiled lines and back."""
+"""A-SCRIPT: what is read, what is told of what is wrong, compiled lines and back, and the canonical spelling."""
 
 from __future__ import annotations
 
