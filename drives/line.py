@@ -16,6 +16,7 @@ the operating system accepts a line at once and sends it slowly.
 
 from __future__ import annotations
 
+import re
 from bisect import insort
 from collections.abc import Container, Iterable, Sequence
 from dataclasses import dataclass
@@ -69,11 +70,12 @@ class Flight:
         `default`: the line's timeout, s.
         """
         patience, own = self.request.codec.quiet_time(self.request, buffer), self.request.timeout
-        if (
-            self.request.signed and own is not None
-        ):  # it ends by itself: a line with a longer timeout gives it that much
-            slow = max(0.0, default - DEFAULT_TIMEOUT)
-            patience, own = patience + slow, own + slow
+        slow = default - DEFAULT_TIMEOUT
+        if slow > 0 and own is not None and self.request.signed:
+            # It ends by itself: a line with a longer timeout gives it that much, until its own print has come.
+            own += slow
+            if not re.search(self.request.expect or "", buffer.decode("latin-1")):
+                patience += slow
         since = max(self.received_at, self.transmitted_at)
         quiet = since + patience
         if self.request.kind is Kind.COMMAND:

@@ -61,6 +61,13 @@ def test_a_signed_print_is_awaited_longer_on_a_line_whose_timeout_is_longer(time
     assert [each[2] for each in LineRun(line, 9.0, {4.0: b"\r\n7~1\r\n"}).ended] == [end]
 
 
+def test_a_longer_timeout_does_not_delay_a_print_that_has_come():
+    line = Line(QUIETLY, timeout=20.0)
+    line.ask(request('PR P,"~1"', kind=Kind.QUIET, timeout=0.25, expect=r"(-?\d+)~1", signed=True))
+    [(at, _, end, _)] = LineRun(line, 60.0, {0.5: b"\r\n5~1\r\n"}).ended
+    assert (at < 1.0, end) == (True, End.DONE)
+
+
 def test_the_wires_own_time_is_added_to_the_timeout():
     line = Line(QUIETLY, baud=9600, timeout=1.0)
     line.ask(request("PR P"))
