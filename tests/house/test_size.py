@@ -1,4 +1,4 @@
-"""Classes stay small: at most 40 methods, those of our own base classes included."""
+"""Classes, files and functions stay small: at most 40 methods (inherited ones included), 500 lines, 60 lines."""
 
 import ast
 
@@ -46,3 +46,17 @@ def test_no_class_has_more_than_40_methods_with_those_it_inherits():
         "bases are followed across files"
     )
     assert {name: count for name, count in counted.items() if count > MOST} == {}
+
+
+def test_no_file_has_more_than_500_lines_and_no_function_more_than_60():
+    files = {path: path.read_text(encoding="utf-8") for room in ROOMS for path in (ROOT / room).rglob("*.py")}
+    assert [str(path) for path, text in files.items() if text.count("\n") > 500] == []
+    functions = [
+        f"{path}:{node.name}"
+        for path, text in files.items()
+        for node in ast.walk(ast.parse(text))
+        if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef)
+        and node.end_lineno is not None
+        and node.end_lineno - node.lineno >= 60
+    ]
+    assert functions == []
