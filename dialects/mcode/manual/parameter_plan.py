@@ -12,10 +12,19 @@ from math import ceil
 
 from multidrop.dialects.errors import Diagnostic
 from multidrop.dialects.mcode.manual import parameters as manual
-from multidrop.dialects.mcode.manual import parameters as rules
 from multidrop.dialects.mcode.manual.mnemonic import CLOSED_LOOP, EXPANDED, MDRIVE_PLUS
 from multidrop.dialects.mcode.manual.parameters import CLOCKS, COUNTED, SHARED, TORQUE, TRIPS, WIRE, writable
-from multidrop.dialects.values import Change, Permission, Plan, Readings, Value, number, reference_lost, same
+from multidrop.dialects.values import (
+    COMMUNICATION,
+    Change,
+    Permission,
+    Plan,
+    Readings,
+    Value,
+    number,
+    reference_lost,
+    same,
+)
 
 IN_UNITS = COUNTED - {"MS"} | {"BL", "LS0", "LS1", "TP", "TR"}
 """Settings in the unit of motion: steps or encoder counts."""
@@ -221,9 +230,9 @@ class Steps:
                 self.send(name, self.goal[name])
 
     def send(self, name: str, value: Value, temporary: bool = False) -> None:
-        new = name not in self.now and rules.row_of(name, self.product) is None
+        new = name not in self.now and manual.row_of(name, self.product) is None
         before, counted = self.now.get(name), self.counting
-        self.changes.append(Change(name, before, value, rules.line(name, value, new), temporary))
+        self.changes.append(Change(name, before, value, manual.line(name, value, new), temporary))
         self.now[name] = value
         if name == "MS":
             self.forget(COUNTED - {"MS"})
@@ -292,7 +301,7 @@ def plan(product: str, present: Readings, wanted: Mapping[str, Value], allowed: 
     reasons = {name: impossible(name, value, now, present.labels) for name, value in changed.items()}
     cannot = {name: reason for name, reason in reasons.items() if reason}
     asked = {name: value for name, value in changed.items() if name not in cannot and name not in allowed.named}
-    reasons = {name: rules.risk(name, value, now) for name, value in asked.items()}
+    reasons = {name: risk(name, value, now) for name, value in asked.items()}
     withheld = {name: why for name, why in reasons.items() if why and not (name in WIRE and allowed.communication)}
     goal = _goal(product, present, given, withheld, cannot)
     steps = Steps(product, present.values, goal)
@@ -318,7 +327,7 @@ def _goal(
     goal = {name: value for name, value in wanted.items() if name not in withheld and name not in impossible}
     counts = manual.counting({**now, **goal})
     changed = {name: value for name, value in goal.items() if not same(value, now.get(name))}
-    goal |= {name: rules.checked(name, value, product, counts, present.labels) for name, value in changed.items()}
+    goal |= {name: manual.checked(name, value, product, counts, present.labels) for name, value in changed.items()}
     # Settings that are not wanted keep their values: but MS scales some, and a change of the unit hides them.
     kept: Mapping[str, Value] = {name: value for name, value in now.items() if name not in COUNTED}
     if counts == manual.counting(now):
@@ -339,7 +348,7 @@ def _leave_counts(steps: Steps) -> None:
     if steps.counting and steps.goal.get("AS"):
         steps.keep(["EE"])
         steps.send("EE", 0, temporary=True)
-    if steps.goal.get("AS") == 0 or steps.now.get("AS") == rules.TORQUE:
+    if steps.goal.get("AS") == 0 or steps.now.get("AS") == TORQUE:
         steps.reach("AS")
 
 
@@ -437,3 +446,52 @@ def _points(steps: Steps) -> None:
             steps.send(name, (free, *held[1:]), temporary=True)
     for name in names:
         steps.reach(name, PAIRS.get(name, name))
+
+
+SWITCHES = {
+    "JE": "inputs of the jog types turn the motor then",
+    "FL": "the motor follows the clock inputs then",
+    "CM": "the motor follows the clock then",
+    "PM": "the drive then moves back to its position by itself",
+}
+"""Flags that can move the motor when they are set."""
+
+
+def risk(name: str, value: Value, now: Mapping[str, Value | None]) -> str:
+    """The reason for which a setting is only written when a person names it; empty: there is none.
+
+    `now` has the drive's present values.
+    """
+    torque = now.get("AS") == TORQUE
+    if name in WIRE:
+        return COMMUNICATION
+    if name in manual.UNIT:
+        return "it belongs to the motor unit"
+    if name == "LK":
+        return "only CP or FD opens a lock again" if value else "it opens the program"
+    if name == "DE":
+        return "it switches the motor's current"
+    if name == "AS":
+        return "it can turn the motor"
+    if name in SWITCHES and value:
+        return SWITCHES[name]
+    if name in ("TD", "TQ", "TS") and torque:
+        return "in torque mode (AS=3) it turns the motor"
+    if name == "MU" and now.get("AS"):
+        return "the drive may make up lost steps at once"
+    if name == "EE" and now.get("PM"):
+        return SWITCHES["PM"]
+    if name in TRIPS and isinstance(value, tuple) and isinstance(value[1], int) and value[1]:
+        return "it calls an address, which may hold another program's line"
+    point = name.startswith(tuple(manual.LISTS)) or manual.POINT.fullmatch(name) is not None
+    if not point or name.startswith(("LS", "OS")) or not isinstance(value, tuple):
+        return ""
+    kind = value[0]
+    if kind == manual.GO:
+        return "the input starts a program"
+    if kind == manual.RESET:
+        return "the input restarts the drive"
+    if kind in (manual.JOG_PLUS, manual.JOG_MINUS) and now.get("JE"):
+        return SWITCHES["JE"]
+    follows = now.get("FL") or now.get("CM")
+    return "the motor follows the clock inputs" if kind in CLOCKS and follows else ""

@@ -28,7 +28,7 @@ from multidrop.dialects.mcode.manual.mnemonic import (
 )
 from multidrop.dialects.mcode.manual.table import lookup, words
 from multidrop.dialects.mcode.manual.table_system import COMMUNICATION_WORDS
-from multidrop.dialects.values import COMMUNICATION, IO, PARAMETERS, VARIABLES, Reading, Scalar, Value, number
+from multidrop.dialects.values import IO, PARAMETERS, VARIABLES, Reading, Scalar, Value, number
 
 WIRE = frozenset(row.name for row in COMMUNICATION_WORDS)
 """Communication settings."""
@@ -152,7 +152,7 @@ def form_of(row: Mnemonic) -> Form:
 # The rules for writing one setting of an MCode drive: the line, its range, and what needs a person's word.
 #
 # A plain restore leaves alone what can move the motor or start a program by itself, what belongs to the motor unit,
-# and what sets up communication. `risk` gives the reason. (MCode reference, section 5; rulings in docs/rulings.md.)
+# and what sets up communication. `risk` of the plan gives the reason. (MCode reference, section 5; docs/rulings.md.)
 
 
 TORQUE = 3
@@ -169,16 +169,9 @@ PAIRED = frozenset({"S5", "S7", "S8", "S13"})
 PRINT_FORMAT = (16, 16, 1, 1)
 """The highest fields of PF."""
 MOST_REPEATS = 65000
-SWITCHES = {
-    "JE": "inputs of the jog types turn the motor then",
-    "FL": "the motor follows the clock inputs then",
-    "CM": "the motor follows the clock then",
-    "PM": "the drive then moves back to its position by itself",
-}
-"""Flags that can move the motor when they are set."""
 LONGEST_NUMBER = 40
 _SETUP = re.compile(r"(IS|OS|LS)(\d)")
-_POINT = re.compile(r"S\d+")
+POINT = re.compile(r"S\d+")
 
 
 def row_of(name: str, product: str) -> Mnemonic | None:
@@ -258,7 +251,7 @@ def _fields_of(name: str) -> int | None:
         return 2
     if name in FIELDS:
         return FIELDS[name]
-    return (2 if name in PAIRED else 3) if _POINT.fullmatch(name) else None
+    return (2 if name in PAIRED else 3) if POINT.fullmatch(name) else None
 
 
 def _out_of_range(name: str, value: Value, row: Mnemonic, counts: bool) -> Diagnostic:
@@ -271,43 +264,3 @@ def writable(value: Value) -> bool:
     """Whether a drive's line can hold a number of this size."""
     exact = value if isinstance(value, float) else 0.0
     return isfinite(exact) and abs(exact) <= FLOAT_HIGH and len(_scalar(exact)) <= LONGEST_NUMBER
-
-
-def risk(name: str, value: Value, now: Mapping[str, Value | None]) -> str:
-    """The reason for which a setting is only written when a person names it; empty: there is none.
-
-    `now` has the drive's present values.
-    """
-    torque = now.get("AS") == TORQUE
-    if name in WIRE:
-        return COMMUNICATION
-    if name in UNIT:
-        return "it belongs to the motor unit"
-    if name == "LK":
-        return "only CP or FD opens a lock again" if value else "it opens the program"
-    if name == "DE":
-        return "it switches the motor's current"
-    if name == "AS":
-        return "it can turn the motor"
-    if name in SWITCHES and value:
-        return SWITCHES[name]
-    if name in ("TD", "TQ", "TS") and torque:
-        return "in torque mode (AS=3) it turns the motor"
-    if name == "MU" and now.get("AS"):
-        return "the drive may make up lost steps at once"
-    if name == "EE" and now.get("PM"):
-        return SWITCHES["PM"]
-    if name in TRIPS and isinstance(value, tuple) and isinstance(value[1], int) and value[1]:
-        return "it calls an address, which may hold another program's line"
-    point = name.startswith(tuple(LISTS)) or _POINT.fullmatch(name) is not None
-    if not point or name.startswith(("LS", "OS")) or not isinstance(value, tuple):
-        return ""
-    kind = value[0]
-    if kind == GO:
-        return "the input starts a program"
-    if kind == RESET:
-        return "the input restarts the drive"
-    if kind in (JOG_PLUS, JOG_MINUS) and now.get("JE"):
-        return SWITCHES["JE"]
-    follows = now.get("FL") or now.get("CM")
-    return "the motor follows the clock inputs" if kind in CLOCKS and follows else ""
