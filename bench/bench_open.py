@@ -30,7 +30,7 @@ from sim_process import ROOT, all_served, served
 from multidrop.dialects import Hints
 from multidrop.drives.bus import Bus
 from multidrop.drives.events import BusEvent, Traffic
-from multidrop.shell.connect.settings import Settings
+from multidrop.shell.configuration import Settings
 from multidrop.shell.session import Session
 from multidrop.transports.serial_port import open_serial
 

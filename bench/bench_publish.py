@@ -28,7 +28,7 @@ import paho.mqtt.client as mqtt
 from report import Row, compared, main
 from sim_process import ROOT, all_served, busy
 
-from multidrop.shell.connect.settings import MqttSettings
+from multidrop.shell.configuration import MqttSettings
 from multidrop.shell.publishing.broker import WINDOW, Connection, Message, parse_target
 from multidrop.shell.publishing.publisher import Backlog, Publisher
 

@@ -24,8 +24,8 @@ from sim_process import served
 
 from multidrop.dialects.mcode.host.framing import sealed
 from multidrop.dialects.mcode.manual.statements import NAMES
+from multidrop.shell.configuration import Settings
 from multidrop.shell.connect.opening import open_buses
-from multidrop.shell.connect.settings import Settings
 from multidrop.shell.connect.urls import parse
 from multidrop.shell.finding.scanning import NothingFound, Scanning
 from multidrop.shell.session import Session

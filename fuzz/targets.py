@@ -24,8 +24,8 @@ from multidrop.drives.line import Line
 from multidrop.macros.model import Macro
 from multidrop.macros.toml_format import format_macro, parse_macro, with_values
 from multidrop.macros.vendor import exported, imported
-from multidrop.shell import lines
-from multidrop.shell.connect import settings, urls
+from multidrop.shell import configuration, line_syntax
+from multidrop.shell.connect import urls
 from multidrop.simulator import cells
 from multidrop.simulator.floor import Floor
 
@@ -200,8 +200,8 @@ def _check(text: str) -> None:
 
 def _typed(text: str) -> None:
     """A typed line: parsed, then carried out as far as its first request in every family."""
-    parsed = lines.parse(text)
-    if not isinstance(parsed, lines.DriveLine):
+    parsed = line_syntax.parse(text)
+    if not isinstance(parsed, line_syntax.DriveLine):
         return
     for family in FAMILIES.values():
         state = family.new_state(family.codec, ADDRESSES[family.name])
@@ -229,7 +229,7 @@ TARGETS: Mapping[str, Target] = {
     "port": port,
     "modbus_port": modbus_port,
     "url": _quietly(urls.parse),
-    "configuration": _quietly(lambda text: settings.parse(text, "multidrop.toml")),
+    "configuration": _quietly(lambda text: configuration.parse(text, "multidrop.toml")),
     "cell": _quietly(_cell),
     "macro": _quietly(_macro),
     "keys": _quietly(_keys),

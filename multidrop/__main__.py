@@ -33,11 +33,13 @@ def _guarded(arguments: Sequence[str], own: bool) -> int:
         code = _run(arguments, own)
         sys.stdout.flush()
     except KeyboardInterrupt:
-        from multidrop.shell.streams.stdout import INTERRUPTED, final
+        from multidrop.shell.exit_codes import INTERRUPTED
+        from multidrop.shell.streams.stdout import final
 
         return final(INTERRUPTED)
     except BrokenPipeError:  # the reader of the output is gone
-        from multidrop.shell.streams.stdout import READER_GONE, silence
+        from multidrop.shell.exit_codes import READER_GONE
+        from multidrop.shell.streams.stdout import silence
 
         silence(sys.stdout)
         return READER_GONE

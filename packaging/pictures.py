@@ -23,7 +23,7 @@ sys.path.insert(0, str(ROOT))
 from textual import _time
 from textual.pilot import Pilot
 
-from multidrop.shell.connect.settings import Settings
+from multidrop.shell.configuration import Settings
 from multidrop.shell.session import Session
 from multidrop.tui.app import MultidropApp
 from multidrop.tui.assist import Assist

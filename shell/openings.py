@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 from multidrop.dialects import Diagnostic, DriveError
 from multidrop.shell.connect.opening import port_name
 from multidrop.shell.connect.urls import Connection, parse
-from multidrop.shell.lines import EVERYONE, split_target
+from multidrop.shell.line_syntax import EVERYONE, split_target
 from multidrop.shell.raw import RawLine
 from multidrop.shell.state import crash_marks
 from multidrop.shell.workspace import BeingOpened

@@ -14,8 +14,8 @@ from multidrop.dialects.program_files import Held, Stored
 from multidrop.shell import new_file
 from multidrop.shell.channel import Channel, running, transferring
 from multidrop.shell.events import Phase, ProgramRead, ProgramSeen
-from multidrop.shell.lines import EVERYONE
-from multidrop.shell.state.store import Copy, Sources
+from multidrop.shell.line_syntax import EVERYONE
+from multidrop.shell.state.backups import Copy, Sources
 
 if TYPE_CHECKING:
     from multidrop.drives.drive import Drive

@@ -15,7 +15,7 @@ from multidrop.dialects.codec import at_priority
 from multidrop.drives.events import Conditioned, Sample, Unsolicited
 from multidrop.macros import Recorder
 from multidrop.shell.events import OnBus, Printed, SessionEvent
-from multidrop.shell.lines import join_target
+from multidrop.shell.line_syntax import join_target
 from multidrop.transports import TransportLost
 
 if TYPE_CHECKING:

@@ -19,10 +19,19 @@ from multidrop.dialects import Diagnostic, DriveError, Refused, Stopped
 from multidrop.dialects.on_demand import imported
 from multidrop.drives.events import BusEvent, Changed
 from multidrop.shell.automation import ENDING, Automations, only_ends
+from multidrop.shell.configuration import Settings
 from multidrop.shell.connect.opening import open_buses
-from multidrop.shell.connect.settings import Settings
 from multidrop.shell.events import FAILURES, By, Entered, Failed, Printed
-from multidrop.shell.lines import EVERYONE, DriveLine, Place, TypedLine, VerbLine, join_target, parse, split_target
+from multidrop.shell.line_syntax import (
+    EVERYONE,
+    DriveLine,
+    Place,
+    TypedLine,
+    VerbLine,
+    join_target,
+    parse,
+    split_target,
+)
 from multidrop.shell.openings import Openings
 from multidrop.shell.operations.table import find
 from multidrop.shell.playing import played_by

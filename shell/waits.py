@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 
 from multidrop.dialects import Diagnostic, DriveError
 from multidrop.drives.drive import REST, confirmed_motion
-from multidrop.shell.lines import EVERYONE
+from multidrop.shell.line_syntax import EVERYONE
 from multidrop.shell.stop_report import UNCONFIRMED, last_seen
 from multidrop.transports import TransportLost
 

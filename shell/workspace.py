@@ -20,10 +20,10 @@ from multidrop.drives.events import BusEvent, Changed, Lost, Notice, Unsolicited
 from multidrop.macros import MacroStore, Recorder
 from multidrop.shell import stop_report
 from multidrop.shell.channel import Channel, Questions, Tasks
+from multidrop.shell.configuration import Settings
 from multidrop.shell.connect.reconnect import Reconnections
-from multidrop.shell.connect.settings import Settings
 from multidrop.shell.events import Failed, Notified, OnBus, StateChanged
-from multidrop.shell.lines import EVERYONE, Place, join_target
+from multidrop.shell.line_syntax import EVERYONE, Place, join_target
 from multidrop.shell.playing import Playing, played_by
 from multidrop.shell.remembered import KnownNames, Lately, Observing
 

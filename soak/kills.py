@@ -23,10 +23,10 @@ from typing import Any
 
 from multidrop.dialects import Diagnostic
 from multidrop.macros import MacroStore
-from multidrop.shell.connect.settings import Settings
+from multidrop.shell.configuration import Settings
 from multidrop.shell.events import Notified
 from multidrop.shell.log.files import entry_of
-from multidrop.shell.prompt.typed_lines import History
+from multidrop.shell.prompt.line_queue import History
 from multidrop.shell.session import Session
 from multidrop.simulator import cells
 from multidrop.simulator.floor import Floor

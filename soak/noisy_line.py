@@ -18,8 +18,8 @@ from typing import Any
 
 from multidrop.dialects import DriveError
 from multidrop.drives.events import Notice
+from multidrop.shell.configuration import Settings
 from multidrop.shell.connect.opening import open_port
-from multidrop.shell.connect.settings import Settings
 from multidrop.shell.connect.urls import parse
 from multidrop.shell.session import Session
 from multidrop.shell.sharing.server import SharedPort

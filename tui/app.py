@@ -28,7 +28,7 @@ from textual.message import Message
 from textual.screen import Screen
 
 from multidrop.drives.events import Unsolicited
-from multidrop.shell.connect.settings import DEFAULT_LOOK, Look
+from multidrop.shell.configuration import DEFAULT_LOOK, Look
 from multidrop.shell.events import Failed, OnBus, Printed, SessionEvent, StateChanged
 from multidrop.tui.actions import Actions, Parts
 from multidrop.tui.assist import Assist

@@ -10,11 +10,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
 from multidrop.dialects.on_demand import imported
-from multidrop.shell.state.store import Drafts
+from multidrop.shell.state.backups import Drafts
 from multidrop.tui.text import ago
 
 if TYPE_CHECKING:
-    from multidrop.shell.connect.settings import Settings
+    from multidrop.shell.configuration import Settings
     from multidrop.shell.prompt.complete import Completion
     from multidrop.shell.session import Session
 
@@ -38,7 +38,7 @@ class Assist:
     """The help that the prompt gives, too."""
 
     def __init__(self, session: Session, settings: Settings) -> None:
-        from multidrop.shell.prompt.typed_lines import History
+        from multidrop.shell.prompt.line_queue import History
 
         self._session, self._settings = session, settings
         self._history = History(settings.history)

@@ -19,7 +19,7 @@ from multidrop.tui.app import MultidropApp
 from multidrop.tui.assist import Assist
 
 if TYPE_CHECKING:
-    from multidrop.shell.connect.settings import Settings
+    from multidrop.shell.configuration import Settings
     from multidrop.shell.session import Session
 
 
@@ -30,7 +30,7 @@ def run(urls: Sequence[str], reconnect: bool = True, raw: bool = False, twin: bo
 
     Raises Diagnostic if there is no terminal, or if the configuration is wrong.
     """
-    from multidrop.shell.connect.settings import load
+    from multidrop.shell.configuration import load
     from multidrop.shell.prompt.keyboard import SWITCH
 
     if not (sys.stdin.isatty() and sys.stdout.isatty()):

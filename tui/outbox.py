@@ -18,8 +18,8 @@ from collections.abc import Callable, Coroutine, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
-from multidrop.shell.lines import Place, pinned
-from multidrop.shell.prompt.typed_lines import BURST, Line
+from multidrop.shell.line_syntax import Place, pinned
+from multidrop.shell.prompt.line_queue import BURST, Line
 
 if TYPE_CHECKING:
     from multidrop.shell.session import Session

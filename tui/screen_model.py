@@ -33,7 +33,7 @@ from multidrop.shell.events import (
     StateChanged,
     TwinEvent,
 )
-from multidrop.shell.lines import EVERYONE
+from multidrop.shell.line_syntax import EVERYONE
 from multidrop.tui.curves.chart import Look
 from multidrop.tui.curves.samples import Traces
 from multidrop.tui.readout import READ, Readout, State

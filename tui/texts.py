@@ -9,7 +9,7 @@ from pathlib import Path
 
 from multidrop.dialects import Diagnostic
 from multidrop.shell.programs.edited_file import EditedFile, real_text
-from multidrop.shell.state.store import Copy, Drafts
+from multidrop.shell.state.backups import Copy, Drafts
 
 
 @dataclass

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 
 from multidrop.dialects.files import split_lines
 from multidrop.shell.events import FAILURES
-from multidrop.shell.lines import Place
+from multidrop.shell.line_syntax import Place
 from multidrop.tui.assist import Assist
 from multidrop.tui.outbox import Outbox, not_sent
 from multidrop.tui.screen_model import Record, ScreenModel

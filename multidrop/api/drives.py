@@ -13,7 +13,7 @@ from multidrop.dialects import Diagnostic, Motion, Refused
 from multidrop.drives.drive import still
 from multidrop.shell import new_file, program_listing, stop_report, waits
 from multidrop.shell.events import By
-from multidrop.shell.lines import join_target
+from multidrop.shell.line_syntax import join_target
 from multidrop.shell.params import file as files
 from multidrop.shell.params.work import Difference, Options, differences, restore
 from multidrop.shell.programs import transfers

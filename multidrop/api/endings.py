@@ -16,6 +16,7 @@ import threading
 from collections.abc import Callable
 from typing import Protocol
 
+from multidrop.shell.exit_codes import READER_GONE
 from multidrop.shell.signals import SIGNALS
 from multidrop.shell.streams import stdout
 
@@ -74,7 +75,7 @@ def flush_printed() -> None:
 def _exit(number: int, _: object) -> None:
     if stdout.reader_left():
         stdout.silence(sys.stdout)  # or the interpreter fails as it flushes
-        raise SystemExit(stdout.READER_GONE)
+        raise SystemExit(READER_GONE)
     raise SystemExit(SIGNALLED + number)
 
 

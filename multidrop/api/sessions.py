@@ -18,7 +18,7 @@ from multidrop.dialects import Diagnostic
 from multidrop.shell import stop_report
 from multidrop.shell.automation import settled
 from multidrop.shell.channel import Front
-from multidrop.shell.connect.settings import load
+from multidrop.shell.configuration import load
 from multidrop.shell.events import By, Notified, SessionEvent
 from multidrop.shell.session import Session as Shell
 
@@ -168,7 +168,7 @@ class AsyncSession:
 
     def found(self, address: str) -> Drive:
         """The drive at an address, if there is one. Raises Diagnostic, NoAnswer."""
-        from multidrop.shell.lines import EVERYONE, split_target
+        from multidrop.shell.line_syntax import EVERYONE, split_target
 
         bus, own = split_target(address)
         drive = self.shell.drive(bus, own or None)

@@ -10,7 +10,7 @@ from types import TracebackType
 from multidrop.api.threads import LoopThread
 from multidrop.dialects import Diagnostic
 from multidrop.dialects.families import TABLE
-from multidrop.shell.connect import settings
+from multidrop.shell import configuration
 from multidrop.simulator import cells
 from multidrop.simulator.cell.spec import BusSpec, Cell, Endpoint
 from multidrop.simulator.floor import Floor
@@ -104,7 +104,7 @@ class SimulatedCell:
 def _read(file: str | os.PathLike[str], text: str) -> Cell:
     if text:
         return cells.read(text, os.fspath(file) or "cell")
-    return cells.load(os.fspath(file), settings.load().allowed) if os.fspath(file) else cells.demo()
+    return cells.load(os.fspath(file), configuration.load().allowed) if os.fspath(file) else cells.demo()
 
 
 def _everywhere(bus: BusSpec, ethernet: bool) -> BusSpec:

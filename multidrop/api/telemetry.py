@@ -207,7 +207,7 @@ def read_rrd(file: str | Path, *, twin: bool = False) -> Samples:
 
     Raises Diagnostic for another file, for one without such samples, and without rerun.
     """
-    from multidrop.shell.plots.sink import load
+    from multidrop.shell.plots.rerun_calls import load
 
     load()
     path = Path(file)
@@ -250,7 +250,7 @@ def _series(entity: str, twin: bool) -> tuple[str, str, str] | None:
 
     `twin`: of `/BUS/ADDRESS/AXIS/twin/position`.
     """
-    from multidrop.shell.plots.sink import TWIN
+    from multidrop.shell.plots.rerun_calls import TWIN
 
     *parts, what = entity.strip("/").replace("\\", "").split("/")
     of_twin = len(parts) > 1 and parts[-1] == TWIN

@@ -5,7 +5,8 @@ from __future__ import annotations
 import sys
 from typing import TYPE_CHECKING
 
-from multidrop.shell.streams.stdout import exit_code, report, write
+from multidrop.shell.exit_codes import exit_code
+from multidrop.shell.streams.stdout import report, write
 
 if TYPE_CHECKING:
     from multidrop.dialects import Diagnostic

@@ -11,10 +11,9 @@ from multidrop.dialects import Diagnostic
 from multidrop.dialects.families import program_language_of, program_languages
 from multidrop.dialects.files import program_text_of
 from multidrop.dialects.program_files import errors
-from multidrop.shell import new_file, program_listing, snapshots
+from multidrop.shell import configuration, new_file, program_listing, snapshots
 from multidrop.shell.batch import runner
-from multidrop.shell.connect import settings
-from multidrop.shell.lines import split_target
+from multidrop.shell.line_syntax import split_target
 from multidrop.shell.new_file import STANDARD_OUTPUT
 from multidrop.shell.params import file as files
 from multidrop.shell.params import replacement, work
@@ -150,7 +149,7 @@ def apply(chosen: argparse.Namespace) -> int:
     """Put the state of one drive of a cell file onto a replacement; report a wrong file before anything is opened."""
     if chosen.source and is_several(chosen.drive):
         raise Diagnostic(f"--from {chosen.source} is for one drive", "snapshot apply", "--drive names one")
-    cell = cells.load(chosen.file, settings.load().allowed)
+    cell = cells.load(chosen.file, configuration.load().allowed)
     wanted = Options(
         named=_named(chosen),
         dry_run=chosen.dry_run,

@@ -35,7 +35,7 @@ def shell(chosen: argparse.Namespace) -> int:
 def send(chosen: argparse.Namespace) -> int:
     with importing():
         from multidrop.shell.batch import runner
-        from multidrop.shell.lines import each_names_one_drive, targets
+        from multidrop.shell.line_syntax import each_names_one_drive, targets
         from multidrop.shell.prompt.terminal_input import run_lines
 
     lazy, tried = each_names_one_drive(chosen.lines), targets(chosen.lines)
@@ -57,7 +57,7 @@ def send(chosen: argparse.Namespace) -> int:
 def run(chosen: argparse.Namespace) -> int:
     from multidrop.macros import MacroStore
     from multidrop.shell.batch.report import Report
-    from multidrop.shell.connect.settings import Settings
+    from multidrop.shell.configuration import Settings
     from multidrop.shell.scripts.reading import read_script
 
     if not (chosen.on or chosen.role):
@@ -75,7 +75,7 @@ def run(chosen: argparse.Namespace) -> int:
     except Diagnostic as problem:
         return refused(report, problem)
     from multidrop.shell.batch import runner
-    from multidrop.shell.lines import targets
+    from multidrop.shell.line_syntax import targets
     from multidrop.shell.scripts.executor import run_script
     from multidrop.shell.scripts.model import lines_of
 

@@ -18,8 +18,8 @@ from typing import TYPE_CHECKING
 
 from multidrop.dialects import Diagnostic
 from multidrop.dialects.text import visible
-from multidrop.shell.connect import settings
-from multidrop.shell.lines import join_target
+from multidrop.shell import configuration
+from multidrop.shell.line_syntax import join_target
 from multidrop.shell.log import files, steps
 from multidrop.shell.log.files import KINDS, TRAFFIC, Entry, Line
 from multidrop.shell.raw import text_of
@@ -109,7 +109,7 @@ def _reported(work: Callable[[], None]) -> int:
 
 def _path(chosen: argparse.Namespace) -> Path:
     """The log that is named, or the newest. Raises Diagnostic."""
-    return Path(chosen.file) if chosen.file else files.newest(settings.load())
+    return Path(chosen.file) if chosen.file else files.newest(configuration.load())
 
 
 def _wanted(chosen: argparse.Namespace) -> Callable[[Entry], bool]:

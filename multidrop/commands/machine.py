@@ -17,8 +17,8 @@ from multidrop.dialects import Diagnostic
 from multidrop.dialects.files import bounded, opened, split_lines, toml_of, utf8_of, why
 from multidrop.dialects.text import visible
 from multidrop.macros import MacroStore
-from multidrop.shell.connect import settings
-from multidrop.shell.connect.settings import Settings
+from multidrop.shell import configuration
+from multidrop.shell.configuration import Settings
 from multidrop.shell.new_file import STANDARD_OUTPUT
 from multidrop.shell.secrets import HIDDEN, holds_password, toml_without_secrets, url_without_secrets, without_secrets
 from multidrop.shell.streams.stdout import write
@@ -29,14 +29,14 @@ WRONG = 2
 
 
 def path(chosen: argparse.Namespace) -> int:
-    write(sys.stdout, str(settings.config_file()))
+    write(sys.stdout, str(configuration.config_file()))
     return 0
 
 
 def show(chosen: argparse.Namespace) -> int:
     """Print every setting as TOML; a remark marks those that the file does not set."""
-    found = settings.load()
-    for line in shown(found, _keys(found), _text(settings.config_file())):
+    found = configuration.load()
+    for line in shown(found, _keys(found), _text(configuration.config_file())):
         write(sys.stdout, line)
     return 0
 
@@ -54,7 +54,7 @@ def shown(found: Settings, keys: dict[str, str], text: str) -> list[str]:
         remarks = {key: REFUSED if key in refused else "" if key in has else "   # default" for key in values}
         return ["", f"[{table}]", *(f"{key} = {tomlkit.item(values[key]).as_string()}{remarks[key]}" for key in values)]
 
-    lines = [f"# {settings.config_file()}" + ("" if text else " does not exist: all settings are the defaults")]
+    lines = [f"# {configuration.config_file()}" + ("" if text else " does not exist: all settings are the defaults")]
     for name, each in found.connections.items():
         url = url_without_secrets(each.url) if holds_password(each.url) else each.url
         lines += ["", f"[connections.{name}]", f"url = {tomlkit.item(url).as_string()}"]
@@ -76,8 +76,8 @@ def shown(found: Settings, keys: dict[str, str], text: str) -> list[str]:
 
 def check(chosen: argparse.Namespace) -> int:
     """Report what is wrong; exit code 0 if nothing is."""
-    found = settings.load()
-    text = _text(settings.config_file())
+    found = configuration.load()
+    text = _text(configuration.config_file())
     from multidrop.tui.app import bindings
     from multidrop.tui.keymap import keymap
     from multidrop.tui.widgets.theme import wrong_theme
@@ -86,10 +86,10 @@ def check(chosen: argparse.Namespace) -> int:
     look = found.look
     troubles = [*keymap(bindings(), look.keys).troubles, *wrong_theme(look.theme), *found.mqtt.unreadable()]
     for trouble in troubles:
-        write(sys.stderr, str(settings.placed(trouble, text, str(settings.config_file()))))
+        write(sys.stderr, str(configuration.placed(trouble, text, str(configuration.config_file()))))
     if not troubles:
         state = "is right" if text else "does not exist: all settings are the defaults"
-        write(sys.stdout, f"{settings.config_file()} {state}")
+        write(sys.stdout, f"{configuration.config_file()} {state}")
     return WRONG if troubles else 0
 
 
@@ -196,18 +196,18 @@ def _terminal() -> Iterator[str]:
 
 
 def _configuration() -> Iterator[str]:
-    path = settings.config_file()
+    path = configuration.config_file()
     yield str(path)
     yield from _contents(path)
     try:
-        settings.load()
+        configuration.load()
     except Diagnostic as problem:
         yield f"problem: {problem}"
 
 
 def _macros() -> Iterator[str]:
     """The names of the macros; the problem of a file in place of its contents."""
-    store = MacroStore(settings.config_folder() / "macros")
+    store = MacroStore(configuration.config_folder() / "macros")
     yield str(store.folder)
     try:
         names = store.names()
@@ -235,7 +235,7 @@ def _ports() -> Iterator[str]:
 
 def _state() -> Iterator[str]:
     """The files of the state folder. Their contents stay: the history has what was typed."""
-    folder = settings.state_folder()
+    folder = configuration.state_folder()
     yield str(folder)
     try:
         files = sorted(path for path in folder.rglob("*") if path.is_file())

@@ -14,8 +14,9 @@ from multidrop.dialects.files import bounded, utf8, why
 from multidrop.macros import Macro, MacroStore, format_macro, missing
 from multidrop.macros.store import begin_draft, finish_draft, listed
 from multidrop.shell import macro_changes
-from multidrop.shell.connect.settings import Settings
-from multidrop.shell.streams.stdout import INTERRUPTED, write
+from multidrop.shell.configuration import Settings
+from multidrop.shell.exit_codes import INTERRUPTED
+from multidrop.shell.streams.stdout import write
 
 if TYPE_CHECKING:
     from multidrop.shell.session import Session

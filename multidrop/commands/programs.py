@@ -86,11 +86,11 @@ def drive(cell: str | None, personality: str | None) -> DriveSpec:
     """
     from dataclasses import replace
 
-    from multidrop.shell.connect import settings
+    from multidrop.shell import configuration
     from multidrop.simulator import cells
     from multidrop.simulator.cell.spec import DriveSpec
 
-    spec = DriveSpec() if cell is None else cells.placed(cell, settings.load().allowed).spec
+    spec = DriveSpec() if cell is None else cells.placed(cell, configuration.load().allowed).spec
     return spec if personality is None else replace(spec, personality=personality)
 
 

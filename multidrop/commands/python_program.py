@@ -30,10 +30,11 @@ from multidrop.dialects import Diagnostic, Stopped
 from multidrop.dialects.files import bytes_of
 from multidrop.shell.batch.report import Report
 from multidrop.shell.events import FAILURES, Entered, Output, Printed, SessionEvent
+from multidrop.shell.exit_codes import INTERRUPTED, exit_code
 from multidrop.shell.prompt.keyboard import on_stop_key
 from multidrop.shell.scripts.model import Result, ScriptLine
 from multidrop.shell.signals import SIGNALS, early_ends
-from multidrop.shell.streams.stdout import INTERRUPTED, exit_code, lost_reader, why_interrupted, work_done, write
+from multidrop.shell.streams.stdout import lost_reader, why_interrupted, work_done, write
 
 T = TypeVar("T")
 

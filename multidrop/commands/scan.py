@@ -9,8 +9,8 @@ from dataclasses import replace
 from functools import partial
 
 from multidrop.dialects import Diagnostic
+from multidrop.shell import configuration
 from multidrop.shell.batch import runner
-from multidrop.shell.connect import settings
 from multidrop.shell.connect.opening import open_buses
 from multidrop.shell.connect.urls import parse
 from multidrop.shell.finding.rescuing import Rescue
@@ -20,7 +20,7 @@ from multidrop.shell.session import Session
 
 def run(chosen: argparse.Namespace) -> int:
     if chosen.save:
-        settings.check_new(chosen.save)
+        configuration.check_new(chosen.save)
     return runner.run([], partial(_scan, chosen), agreed=chosen.yes, unsolicited=False)
 
 
@@ -47,7 +47,7 @@ def _conclude(as_json: bool, session: Session, found: list[FoundDrive], name: st
     same = [each for each in found if _form(each) == _form(found[0])]
     url = url_of(same)
     if name:
-        path = settings.save(name, url)
+        path = configuration.save(name, url)
         session.notify(f"{path}: connection {name} is saved: {url}", outcome=True)
     elif not as_json:
         session.notify(f"open with: multidrop shell {shlex.quote(url)}", outcome=True)

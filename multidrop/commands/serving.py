@@ -23,14 +23,14 @@ def sim(chosen: argparse.Namespace) -> int:
     import asyncio
     from pathlib import Path
 
-    from multidrop.shell.connect import settings
+    from multidrop.shell import configuration
     from multidrop.shell.streams.stdout import finish, nonblocking
     from multidrop.simulator.serving.command import serve
 
     async def body() -> int:
         with nonblocking() as streams:
             try:
-                allow = (*map(Path, chosen.allow), *(settings.load().allowed if chosen.cell else ()))
+                allow = (*map(Path, chosen.allow), *(configuration.load().allowed if chosen.cell else ()))
                 out = sys.stdout
                 await serve(chosen.cell, json=chosen.json, speed=chosen.speed, stdin=sys.stdin, stdout=out, allow=allow)
             except Diagnostic as problem:

@@ -15,11 +15,12 @@ from functools import partial
 
 from multidrop.commands import fail
 from multidrop.dialects import Diagnostic
+from multidrop.shell import configuration
 from multidrop.shell.batch.report import Case as JUnitCase
 from multidrop.shell.batch.report import JUnitFile
-from multidrop.shell.connect import settings
+from multidrop.shell.exit_codes import INTERRUPTED
 from multidrop.shell.signals import Interruption
-from multidrop.shell.streams.stdout import INTERRUPTED, StatusLine, write
+from multidrop.shell.streams.stdout import StatusLine, write
 from multidrop.shell.sweeps import plan as planning
 from multidrop.shell.sweeps import workers
 from multidrop.shell.sweeps.failures import Group, command, grouped, rows
@@ -63,7 +64,7 @@ def run(chosen: argparse.Namespace) -> int:
 
 def _agree(address: str, yes: bool, what: str, interruption: Interruption) -> None:
     """Return once a person has agreed to a cluster: by `--yes`, now, or before. Raises Diagnostic."""
-    known = settings.load().clusters
+    known = configuration.load().clusters
     if yes or address in known:
         return
     import asyncio
@@ -77,7 +78,7 @@ def _agree(address: str, yes: bool, what: str, interruption: Interruption) -> No
         raise Diagnostic(f"{what}; nothing was connected", where, "--yes agrees to it")
     if not answer:
         raise Diagnostic("the answer was no, so nothing was connected", where)
-    path = settings.keep("sweep", "clusters", [*known, address])
+    path = configuration.keep("sweep", "clusters", [*known, address])
     write(sys.stderr, f"{path}: sweep.clusters has {address} from now on")
 
 

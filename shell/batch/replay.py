@@ -22,7 +22,7 @@ from multidrop.dialects import Diagnostic, DriveError, Stopped
 from multidrop.shell import waits
 from multidrop.shell.automation import outcome, settled
 from multidrop.shell.events import By, Printed, SessionEvent
-from multidrop.shell.lines import EVERYONE, join_target
+from multidrop.shell.line_syntax import EVERYONE, join_target
 from multidrop.shell.log.steps import WORLD, Step, Steps, compared, errors_differ
 from multidrop.shell.openings import model
 from multidrop.shell.streams.stdout import write

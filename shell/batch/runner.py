@@ -13,27 +13,18 @@ from contextlib import nullcontext
 from functools import partial
 from typing import TYPE_CHECKING
 
-from multidrop.shell import stop_report
+from multidrop.shell import configuration, stop_report
 from multidrop.shell.automation import outcome, settled
 from multidrop.shell.channel import Front
-from multidrop.shell.connect import settings
 from multidrop.shell.events import FAILURES, SessionEvent, StateChanged
+from multidrop.shell.exit_codes import INTERRUPTED, exit_code
 from multidrop.shell.log.writer import begin as begin_log
 from multidrop.shell.prompt.keyboard import on_signals, on_stop_key
 from multidrop.shell.prompt.terminal_input import asker
 from multidrop.shell.session import Session
 from multidrop.shell.signals import early_ends
 from multidrop.shell.streams.event_printer import Printer
-from multidrop.shell.streams.stdout import (
-    INTERRUPTED,
-    exit_code,
-    finish,
-    nonblocking,
-    report,
-    why_interrupted,
-    work_done,
-    write,
-)
+from multidrop.shell.streams.stdout import finish, nonblocking, report, why_interrupted, work_done, write
 
 if TYPE_CHECKING:
     from multidrop.shell.workspace import Workspace
@@ -67,7 +58,7 @@ def run(
     line on standard error.
     """
     try:
-        found = settings.load()
+        found = configuration.load()
     except FAILURES as failure:
         write(sys.stderr, report(failure))
         return exit_code(failure)

@@ -15,7 +15,7 @@ from multidrop.dialects import Diagnostic, Family, Hints
 from multidrop.dialects.families import DEFAULT, FAMILIES
 from multidrop.drives.bus import Bus
 from multidrop.drives.line import DEFAULT_TIMEOUT
-from multidrop.shell.connect import settings
+from multidrop.shell import configuration
 from multidrop.shell.connect.reconnect import LoginAgain, Reopen, SerialAgain, host_again, simulated
 from multidrop.shell.connect.urls import Connection
 from multidrop.shell.state.port_state import PortState
@@ -197,7 +197,7 @@ async def _cell(connection: Connection) -> Sequence[SimBus]:
     from multidrop.simulator.serving.in_process import connect
 
     target = connection.target + (f"#{connection.bus}" if connection.bus else "")
-    return await connect(target, settings.load().allowed if connection.target else ())
+    return await connect(target, configuration.load().allowed if connection.target else ())
 
 
 async def _simulated(connection: Connection, naming: Naming) -> list[Opened]:

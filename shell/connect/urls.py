@@ -20,7 +20,7 @@ from multidrop.shell.secrets import holds_password, url_without_secrets, without
 from multidrop.transports.ssh import WAYS, wrong_path
 
 if TYPE_CHECKING:
-    from multidrop.shell.connect.settings import SavedConnection
+    from multidrop.shell.configuration import SavedConnection
 
 
 DEFAULT_PORTS = {scheme: form.port or None for scheme, form in URL_FORMS.items() if form.port is not None}

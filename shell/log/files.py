@@ -23,7 +23,7 @@ from multidrop.dialects.files import opened, why
 from multidrop.shell.secrets import without_secrets
 
 if TYPE_CHECKING:
-    from multidrop.shell.connect.settings import Settings
+    from multidrop.shell.configuration import Settings
 
 
 FORMAT = 1

@@ -13,7 +13,7 @@ from pathlib import Path
 
 from multidrop.dialects import Diagnostic
 from multidrop.dialects.text import visible
-from multidrop.shell.lines import WAITS
+from multidrop.shell.line_syntax import WAITS
 from multidrop.shell.log.files import BEGIN, TRAFFIC, Entry, Line, whole
 from multidrop.shell.secrets import HIDDEN
 

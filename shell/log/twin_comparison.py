@@ -16,7 +16,7 @@ from multidrop.dialects.text import whole
 from multidrop.drives.drive import Drive
 from multidrop.drives.events import Sample
 from multidrop.shell.events import Diverged
-from multidrop.shell.lines import EVERYONE, join_target
+from multidrop.shell.line_syntax import EVERYONE, join_target
 from multidrop.shell.log.steps import Exchange, Step
 from multidrop.shell.twins.comparing import LIMIT, Verdict
 from multidrop.shell.twins.pair import Compared

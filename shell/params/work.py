@@ -30,7 +30,7 @@ from multidrop.dialects.values import (
 )
 from multidrop.shell import new_file
 from multidrop.shell.channel import running, transferring
-from multidrop.shell.lines import split_target
+from multidrop.shell.line_syntax import split_target
 from multidrop.shell.params import file as files
 from multidrop.transports import TransportLost
 

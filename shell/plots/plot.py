@@ -32,7 +32,7 @@ from multidrop.shell.events import (
 )
 from multidrop.shell.plots.file import SinkBroken
 from multidrop.shell.plots.request import PlotTarget, shown
-from multidrop.shell.plots.sink import AGREES, COLOURS, DIFFERS, RUNS, TWIN, Batch, Curve, Sink, State
+from multidrop.shell.plots.rerun_calls import AGREES, COLOURS, DIFFERS, RUNS, TWIN, Batch, Curve, Sink, State
 from multidrop.shell.roles import DIFFERENCE, RunningPlot, Series
 from multidrop.shell.threads import in_thread
 from multidrop.transports.sockets import exposed

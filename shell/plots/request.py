@@ -19,7 +19,7 @@ from urllib.parse import urlsplit
 from multidrop.dialects import Diagnostic
 from multidrop.drives.telemetry import FASTEST, MODEST
 from multidrop.shell.connect.urls import listening
-from multidrop.shell.lines import EVERYONE, split_target
+from multidrop.shell.line_syntax import EVERYONE, split_target
 from multidrop.shell.roles import DIFFERENCE, Series
 from multidrop.shell.secrets import url_without_secrets
 

@@ -23,8 +23,8 @@ from multidrop.drives.drive import still
 from multidrop.shell.channel import running, transferring
 from multidrop.shell.events import By, Printed
 from multidrop.shell.program_listing import check_one, read
+from multidrop.shell.state.backups import Copy, Sources, write_backup
 from multidrop.shell.state.crash_marks import marked
-from multidrop.shell.state.store import Copy, Sources, write_backup
 
 if TYPE_CHECKING:
     from multidrop.drives.drive import Drive

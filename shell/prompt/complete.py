@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from multidrop.dialects import Diagnostic
-from multidrop.shell.lines import EVERYONE, DriveLine, VerbLine, parse
+from multidrop.shell.line_syntax import EVERYONE, DriveLine, VerbLine, parse
 from multidrop.shell.operations.offers import PLACEHOLDERS, Found, meant, offered, spoken, targets, verbs
 from multidrop.shell.operations.table import VERBS
 from multidrop.shell.operations.usage import following, narrowed

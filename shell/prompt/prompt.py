@@ -1,6 +1,6 @@
 """The prompt: prompt_toolkit over a session, with history, completion, hints and the stop key.
 
-The prompt is always visible. Lines run in the background one after the other (`shell.prompt.typed_lines`), with macros
+The prompt is always visible. Lines run in the background one after the other (`shell.prompt.line_queue`), with macros
 and plots beside them: a line typed while a macro plays is sent at once, and the lines of a paste keep their order.
 
 On a POSIX terminal the keys are held from the beginning, before anything is opened (`shell.prompt.keyboard`). So the
@@ -28,21 +28,22 @@ from prompt_toolkit.search import stop_search
 
 from multidrop.dialects import Diagnostic
 from multidrop.dialects.files import lines_of
+from multidrop.shell import configuration
 from multidrop.shell.automation import outcome, settled
 from multidrop.shell.channel import Front
-from multidrop.shell.connect import settings
 from multidrop.shell.events import FAILURES, Progressed, SessionEvent, StateChanged
+from multidrop.shell.exit_codes import INTERRUPTED, exit_code
 from multidrop.shell.log.writer import begin as begin_log
 from multidrop.shell.prompt.collector import at_rest, collected_at_rest
 from multidrop.shell.prompt.keyboard import Keyboard, on_signals, terminal
 from multidrop.shell.prompt.keys import KeyboardInput, PromptQuestion
+from multidrop.shell.prompt.line_queue import History, LineQueue, shown
 from multidrop.shell.prompt.terminal_input import filled
-from multidrop.shell.prompt.typed_lines import History, LineQueue, shown
 from multidrop.shell.prompt.view import LinesAbove, SessionCompleter, SharedHistory, Toolbar
 from multidrop.shell.session import Session
 from multidrop.shell.signals import early_ends
 from multidrop.shell.streams.event_printer import Printer
-from multidrop.shell.streams.stdout import INTERRUPTED, exit_code, finish, nonblocking, report, write
+from multidrop.shell.streams.stdout import finish, nonblocking, report, write
 
 FIRST_FRAME = 0.05
 """The longest wait for the first frame, s."""
@@ -57,7 +58,7 @@ def run(
     are opened in raw mode. `twin`: each drive gets a twin.
     """
     try:
-        found = settings.load()
+        found = configuration.load()
     except FAILURES as failure:
         write(sys.stderr, report(failure))
         return exit_code(failure)

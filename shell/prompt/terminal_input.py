@@ -17,7 +17,7 @@ from multidrop.dialects import Diagnostic
 from multidrop.dialects.files import LARGEST, check_line, split_lines
 from multidrop.dialects.text import visible
 from multidrop.shell.channel import Ask, Field
-from multidrop.shell.lines import uncommented
+from multidrop.shell.line_syntax import uncommented
 from multidrop.shell.prompt.keyboard import Keyboard, on_stop_key
 from multidrop.shell.streams.stdout import write
 

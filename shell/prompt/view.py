@@ -26,7 +26,7 @@ from multidrop.shell import stop_report
 from multidrop.shell.events import Progressed
 from multidrop.shell.openings import model
 from multidrop.shell.prompt import complete
-from multidrop.shell.prompt.typed_lines import History, LineQueue
+from multidrop.shell.prompt.line_queue import History, LineQueue
 from multidrop.shell.session import Session
 from multidrop.shell.streams.output_streams import LineStream, Outlet
 from multidrop.shell.threads import Loss

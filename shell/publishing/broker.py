@@ -21,7 +21,7 @@ from multidrop.dialects import Diagnostic
 from multidrop.dialects.files import why
 from multidrop.dialects.on_demand import importing
 from multidrop.dialects.text import visible
-from multidrop.shell.connect.settings import MqttSettings
+from multidrop.shell.configuration import MqttSettings
 from multidrop.shell.threads import in_thread
 from multidrop.transports import Unreachable
 

@@ -17,7 +17,7 @@ from multidrop.drives.drive import Drive
 from multidrop.macros import checked_values, fill
 from multidrop.shell import waits
 from multidrop.shell.events import FAILURES, By, Failed
-from multidrop.shell.lines import join_target, pinned, split_target
+from multidrop.shell.line_syntax import join_target, pinned, split_target
 from multidrop.shell.playing import Playing, StepProgress, cast, played_by
 from multidrop.shell.scripts import words
 from multidrop.shell.scripts.captured_prints import Hearing

@@ -15,7 +15,7 @@ from dataclasses import dataclass, field
 from typing import NamedTuple
 
 from multidrop.dialects import Diagnostic
-from multidrop.shell.lines import EVERYONE, split_target
+from multidrop.shell.line_syntax import EVERYONE, split_target
 
 Value = int | float | str
 LARGEST = 10**15

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from multidrop.dialects import Diagnostic, Inexpressible, NoAnswer
 from multidrop.macros import Macro, fill, value_names
 from multidrop.shell.automation import Claim, only_ends
-from multidrop.shell.lines import DriveLine, parse
+from multidrop.shell.line_syntax import DriveLine, parse
 from multidrop.shell.macro_arguments import check_bus, only_bus, unbound
 from multidrop.shell.playing import NO_ROLES, cast, played_by
 from multidrop.shell.scripts.model import CallFile, CallMacro, If, MacroScript, Node, Repeat, Script, ScriptLine

@@ -17,7 +17,7 @@ from multidrop.dialects.files import bounded, bytes_of, lines_of, utf8, why
 from multidrop.macros import Macro, MacroStore, check_name, checked_values, fill, parse_macro, value_names
 from multidrop.macros.model import Parameter, plain, written
 from multidrop.macros.toml_format import in_text
-from multidrop.shell.lines import VerbLine, parse, uncommented
+from multidrop.shell.line_syntax import VerbLine, parse, uncommented
 from multidrop.shell.operations.table import find
 from multidrop.shell.scripts import words
 from multidrop.shell.scripts.expression import evaluate, unknowns

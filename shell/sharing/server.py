@@ -15,13 +15,15 @@ from functools import partial
 from typing import Any, cast
 
 from multidrop.dialects import Diagnostic, StopPiece
-from multidrop.shell.connect import settings
+from multidrop.shell import configuration
 from multidrop.shell.connect.opening import OpenedPort, open_port
 from multidrop.shell.connect.reconnect import FIRST, next_pause
 from multidrop.shell.connect.urls import listening, parse
 from multidrop.shell.events import FAILURES
+from multidrop.shell.exit_codes import exit_code
 from multidrop.shell.prompt.keyboard import on_signals, on_stop_key
-from multidrop.shell.sharing.exchange import (
+from multidrop.shell.sharing.stop_bytes import StopBytes, stop_bytes
+from multidrop.shell.sharing.writer_turns import (
     NEVER,
     NOT_REACHED,
     Action,
@@ -34,8 +36,7 @@ from multidrop.shell.sharing.exchange import (
     Stop,
     Write,
 )
-from multidrop.shell.sharing.stop_bytes import StopBytes, stop_bytes
-from multidrop.shell.streams.stdout import exit_code, finish, nonblocking, report, write
+from multidrop.shell.streams.stdout import finish, nonblocking, report, write
 from multidrop.transports import PortControl, TransportLost
 from multidrop.transports.sockets import explain, exposed, host_port, set_socket_options
 from multidrop.transports.telnet import Control, Setting
@@ -339,7 +340,7 @@ async def _run(url: str, address: str, as_json: bool) -> int:
 async def _share(url: str, address: str, as_json: bool, over: asyncio.Event) -> None:
     """Lend the port until a signal (`over`). Raises the loss of a port that cannot be found again."""
     host, port = listening(address)
-    connection = parse(url, settings.load().connections)
+    connection = parse(url, configuration.load().connections)
     if connection.scheme == "udp":
         raise Diagnostic("datagrams cannot be shared", url, "an Ethernet drive takes several clients itself")
     if connection.hints.family:

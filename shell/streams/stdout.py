@@ -20,27 +20,10 @@ from collections.abc import Callable
 from shutil import get_terminal_size
 from typing import TextIO
 
-from multidrop.dialects import Diagnostic, DriveError, Stopped
 from multidrop.dialects.text import visible
+from multidrop.shell.exit_codes import INTERRUPTED, READER_GONE
 from multidrop.shell.streams import output_streams
 from multidrop.shell.streams.output_streams import Outlet
-from multidrop.transports import TransportLost
-
-CODES: tuple[tuple[type[BaseException], int], ...] = (
-    (Stopped, 4),
-    (DriveError, 1),
-    (Diagnostic, 2),
-    (TransportLost, 3),
-)
-"""Exit codes by failure; the first match counts. An interruption has 130."""
-INTERRUPTED = 130
-READER_GONE = 141
-"""The exit code if the reader of standard output is gone: that of SIGPIPE."""
-
-
-def exit_code(failure: BaseException) -> int:
-    return next(code for kind, code in CODES if isinstance(failure, kind))
-
 
 LONGEST = 800
 """The longest message, in characters: it may quote a typed text of any length."""

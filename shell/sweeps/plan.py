@@ -16,7 +16,7 @@ from random import Random
 from multidrop.dialects import Diagnostic
 from multidrop.dialects.families import program_language_of
 from multidrop.dialects.files import program_text_of
-from multidrop.shell.connect import settings
+from multidrop.shell import configuration
 from multidrop.shell.sweeps.trial import Case, Job, bench
 from multidrop.shell.sweeps.variation import (
     OWN_KEYS,
@@ -93,7 +93,7 @@ def make(asked: Asked) -> Plan:
     language = asked.language or program_language_of(asked.file)
     program = program_text_of(asked.file)
     default = PROGRAMS[language].drive
-    allow = settings.load().allowed if asked.cell else ()
+    allow = configuration.load().allowed if asked.cell else ()
     bare = Placed("", "", default, {"personality": default.personality, "name": default.name})
     everyone = [bare] if asked.cell is None else cells.matching(asked.cell.partition("#")[0], allow)
     names = {name: each for each in everyone for name in _names(each)}

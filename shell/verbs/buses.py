@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 
 from multidrop.dialects import Diagnostic, Inexpressible
 from multidrop.dialects.text import whole
-from multidrop.shell.connect import settings
+from multidrop.shell import configuration
 from multidrop.shell.finding import scanning
-from multidrop.shell.lines import split_target
+from multidrop.shell.line_syntax import split_target
 from multidrop.shell.openings import model
 from multidrop.shell.raw import TERMINATORS, Form, RawLine, Watched, parse_bytes
 from multidrop.shell.verbs.call import Call
@@ -113,7 +113,7 @@ async def tab(call: Call) -> None:
 async def keep(call: Call) -> None:
     name, *bus = call.words()
     url = call.session.openings.url_of(call.session.bus("".join(bus)))
-    path = settings.save(name, url)
+    path = configuration.save(name, url)
     call.session.notify(f"{path}: connection {name} is saved: {url}", outcome=True)
 
 

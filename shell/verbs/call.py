@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from multidrop.dialects import Diagnostic
 from multidrop.shell.events import By
-from multidrop.shell.lines import split_target
+from multidrop.shell.line_syntax import split_target
 from multidrop.shell.operations.operation import Operation
 from multidrop.shell.operations.usage import limits, split
 

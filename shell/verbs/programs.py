@@ -11,7 +11,7 @@ from multidrop.dialects.families import program_language_of
 from multidrop.dialects.program_files import errors
 from multidrop.drives.drive import Drive
 from multidrop.shell import new_file, program_listing
-from multidrop.shell.lines import split_target
+from multidrop.shell.line_syntax import split_target
 from multidrop.shell.programs import debugging, transfers
 from multidrop.shell.programs.checking import examine
 from multidrop.shell.programs.debugging import LEFT, Debugger

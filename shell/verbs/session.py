@@ -10,8 +10,7 @@ from typing import TYPE_CHECKING, NamedTuple
 from multidrop.dialects import Diagnostic, Stopped
 from multidrop.dialects.families import DEFAULT, FAMILIES, languages
 from multidrop.dialects.family import Language
-from multidrop.shell import stop_report, waits
-from multidrop.shell.connect import settings
+from multidrop.shell import configuration, stop_report, waits
 from multidrop.shell.events import By
 from multidrop.shell.log import files
 from multidrop.shell.log.writer import SessionLog
@@ -167,7 +166,7 @@ async def times(call: Call) -> None:
     kept = ""
     if call.by is By.OPERATOR:
         try:
-            await asyncio.to_thread(settings.keep, "screen", "times", form)
+            await asyncio.to_thread(configuration.keep, "screen", "times", form)
         except Diagnostic as problem:
             kept = f"; not kept for the next start ({problem})"
     call.session.notify(f"times: {form}, {TIMES[form]}{kept}", warning=bool(kept))

@@ -11,8 +11,8 @@ from collections.abc import Callable
 from random import Random
 
 from multidrop.shell.prompt.keyboard import STOP_KEY, Keyboard
+from multidrop.shell.prompt.line_queue import LineQueue
 from multidrop.shell.prompt.terminal_input import at_keyboard
-from multidrop.shell.prompt.typed_lines import LineQueue
 from multidrop.shell.session import Session
 from soak.simulation.clock import SimulatedLoop
 

@@ -18,11 +18,11 @@ from random import Random
 from typing import Any
 
 from multidrop.dialects import Diagnostic, DriveError
+from multidrop.shell.configuration import Settings, parse
 from multidrop.shell.connect import opening
-from multidrop.shell.connect.settings import Settings, parse
 from multidrop.shell.connect.urls import Connection
 from multidrop.shell.events import Failed, Notified, Output, Printed
-from multidrop.shell.lines import TypedLine
+from multidrop.shell.line_syntax import TypedLine
 from multidrop.shell.session import Session
 from multidrop.simulator import cells
 from multidrop.simulator.cell.spec import Faults

@@ -29,7 +29,7 @@ from multidrop.dialects.text import visible
 from multidrop.macros import MacroStore
 from multidrop.macros.toml_format import parse_macro
 from multidrop.macros.vendor import imported
-from multidrop.shell.connect import settings
+from multidrop.shell import configuration
 from multidrop.shell.log import files as log_files
 from multidrop.shell.params import file as params_file
 from multidrop.shell.programs.edited_file import EditedFile
@@ -100,7 +100,7 @@ def test_every_reader_refuses_a_hidden_line(hidden: str) -> None:
         lambda text: pmx_file.read(f"X100\n;{text}\nEND\n", "x"),
         lambda text: parse_macro(f'name = "m"\n# {text}\n[[step]]\nline = "PR P"\n', "x"),
         lambda text: imported(f"F2 MR 1^M\n; {text}\n", "x"),
-        lambda text: settings.parse(f"[log]\n# {text}\n", "x"),
+        lambda text: configuration.parse(f"[log]\n# {text}\n", "x"),
         lambda text: cells.read(f'seed = 1\n# {text}\n[[bus]]\nname = "a"\n', "x", Path()),
     ):
         with pytest.raises(Diagnostic, match=rf"^x:2\b.*U\+{ord(hidden):04X}"):

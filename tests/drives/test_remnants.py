@@ -10,8 +10,8 @@ from multidrop.dialects.codec import Kind
 from multidrop.dialects.mcode.host.codec import MCode
 from multidrop.drives.events import Unsolicited
 from multidrop.drives.inbox import LASTS, Debris
+from multidrop.shell.configuration import Settings
 from multidrop.shell.connect.opening import open_buses
-from multidrop.shell.connect.settings import Settings
 from multidrop.shell.events import OnBus
 from multidrop.shell.session import Session
 from tests.support.cell_session import CellSession, bus, party

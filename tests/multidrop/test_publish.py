@@ -15,7 +15,7 @@ from typing import Any
 
 import pytest
 
-from multidrop.shell.connect.settings import MqttSettings
+from multidrop.shell.configuration import MqttSettings
 from multidrop.shell.publishing import broker as broker_module
 from multidrop.shell.publishing import publisher as publisher_module
 from multidrop.shell.publishing.broker import Connection, Message, parse_target

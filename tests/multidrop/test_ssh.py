@@ -17,7 +17,7 @@ import pytest
 
 import multidrop
 from multidrop.__main__ import main
-from multidrop.shell.connect.settings import Settings
+from multidrop.shell.configuration import Settings
 from multidrop.shell.session import Session
 from multidrop.shell.signals import early_ends
 from multidrop.transports import Transport, TransportLost, Unreachable

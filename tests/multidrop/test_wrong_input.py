@@ -26,8 +26,9 @@ from multidrop.dialects.mcode.host.state import MCodeState
 from multidrop.dialects.pmx.host.operations import INTEGER as PMX_INTEGER
 from multidrop.dialects.text import whole
 from multidrop.macros import parse_macro
-from multidrop.shell.connect import settings, urls
-from multidrop.shell.connect.settings import Settings
+from multidrop.shell import configuration
+from multidrop.shell.configuration import Settings
+from multidrop.shell.connect import urls
 from multidrop.shell.events import FAILURES
 from multidrop.shell.plots.request import parse_target
 from multidrop.shell.session import Session
@@ -265,7 +266,7 @@ CONFIG = '[connections.press]\nurl = "sim:#pmx"\nnames = { a = "gantry" }\n'
 
 
 def saved(text: str) -> list[str]:
-    return [each.url for each in settings.parse(text, "multidrop.toml").connections.values()]
+    return [each.url for each in configuration.parse(text, "multidrop.toml").connections.values()]
 
 
 READERS: dict[str, tuple[str, Callable[[str], object]]] = {

@@ -2,7 +2,7 @@
 
 import pytest
 
-from multidrop.shell.lines import parse, pinned
+from multidrop.shell.line_syntax import parse, pinned
 
 
 @pytest.mark.parametrize(

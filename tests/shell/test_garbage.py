@@ -8,7 +8,7 @@ import random
 import pytest
 
 from multidrop.dialects import DriveError, NoAnswer, Refused
-from multidrop.shell.connect.settings import Settings
+from multidrop.shell.configuration import Settings
 from multidrop.shell.events import Printed
 from multidrop.shell.session import Session
 

@@ -7,7 +7,7 @@ import pytest
 
 from multidrop.dialects import Diagnostic, Stopped
 from multidrop.macros import Macro, Step
-from multidrop.shell.connect import settings
+from multidrop.shell import configuration
 from multidrop.shell.events import By
 from multidrop.shell.scripts.executor import play
 from tests.support.cell_session import CellSession, bus, party, pmx
@@ -117,7 +117,7 @@ async def test_a_line_in_program_mode_is_stored_and_needs_no_yes(shop):
 
 
 async def test_the_configuration_takes_guards_away_and_adds_words(shop):
-    found = settings.parse('[guards]\noff = ["cp", "*"]\nalso = ["S"]', "multidrop.toml")
+    found = configuration.parse('[guards]\noff = ["cp", "*"]\nalso = ["S"]', "multidrop.toml")
     shop.session.settings = found
     await shop.session.run("@a CP")
     await shop.session.run("@* P=0")
@@ -140,7 +140,7 @@ async def test_the_configuration_takes_guards_away_and_adds_words(shop):
 )
 def test_a_wrong_key_or_word_is_named(text, part):
     with pytest.raises(Diagnostic, match=rf"^multidrop.toml:\d: {part}"):
-        settings.parse(text, "multidrop.toml")
+        configuration.parse(text, "multidrop.toml")
 
 
 def test_send_and_run_refuse_with_2_before_a_byte_is_sent(multidrop, tmp_path):

@@ -9,7 +9,7 @@ import pytest
 
 from multidrop.dialects import Diagnostic, DriveError, Inexpressible, Refused, Stopped
 from multidrop.drives.events import Sample, Traffic, Unsolicited
-from multidrop.shell.connect.settings import Settings
+from multidrop.shell.configuration import Settings
 from multidrop.shell.events import FAILURES, By, Notified, OnBus, Output, Printed
 from multidrop.shell.session import Session
 from multidrop.simulator.cells import load

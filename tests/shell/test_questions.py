@@ -5,7 +5,7 @@ import asyncio
 import pytest
 
 from multidrop.dialects import Diagnostic, Stopped
-from multidrop.shell.connect.settings import Settings
+from multidrop.shell.configuration import Settings
 from multidrop.shell.prompt.terminal_input import PAUSE, Answer, at_lines
 from multidrop.shell.session import Session
 

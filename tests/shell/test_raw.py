@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from multidrop.dialects import Diagnostic, NoAnswer, Stopped
 from multidrop.macros import Macro, Step
-from multidrop.shell.connect.settings import Settings
+from multidrop.shell.configuration import Settings
 from multidrop.shell.events import By, Bytes
 from multidrop.shell.raw import Form, hex_of, parse_bytes, text_of
 from multidrop.shell.scripts.executor import play

@@ -6,7 +6,7 @@ import pytest
 
 from multidrop.dialects import DriveError, Inexpressible, NoAnswer, Refused, Stopped
 from multidrop.drives.events import Traffic
-from multidrop.shell.connect.settings import SavedConnection, Settings
+from multidrop.shell.configuration import SavedConnection, Settings
 from multidrop.shell.events import Failed, Notified, OnBus, Output, Printed
 from multidrop.shell.session import Session
 from multidrop.transports import TransportLost

@@ -9,7 +9,7 @@ import pytest
 
 from multidrop.dialects import Diagnostic, DriveError, Stopped
 from multidrop.shell import snapshots
-from multidrop.shell.connect.settings import Settings
+from multidrop.shell.configuration import Settings
 from multidrop.shell.events import Notified
 from multidrop.shell.programs import transfers
 from multidrop.shell.session import Session

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from multidrop.dialects import Diagnostic
-from multidrop.shell.connect import settings
+from multidrop.shell import configuration
 from multidrop.shell.events import Notified
 from multidrop.shell.roles import EVERYTHING, Filter
 from tests.support.cases import for_each
@@ -86,7 +86,7 @@ async def test_times_go_round_and_are_kept(tmp_path: Path, monkeypatch: pytest.M
     async with CellSession(tmp_path, CELL) as cell:
         shelf = cell.session.front.transcripts = Shelf()
         await cell.session.run("/times")
-        assert (shelf.form, settings.load().look.times) == ("start", "start")
+        assert (shelf.form, configuration.load().look.times) == ("start", "start")
         await cell.session.run("/times last")
         assert file.read_text() == '# mine\n[screen]\ntheme = "multidrop-light"\ntimes = "last"\n'
         file.write_text("[[")

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from multidrop.drives.events import Traffic
-from multidrop.shell.connect.settings import Settings
+from multidrop.shell.configuration import Settings
 from multidrop.shell.events import Failed, Notified, OnBus, Output, Printed
 from multidrop.shell.session import Session
 

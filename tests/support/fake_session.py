@@ -24,10 +24,10 @@ from multidrop.drives.stopping import Fate
 from multidrop.drives.telemetry import Value
 from multidrop.shell.channel import Front
 from multidrop.shell.events import By, Entered, Failed, Notified, OnBus, Printed, SessionEvent, StateChanged
-from multidrop.shell.lines import Place, TypedLine
+from multidrop.shell.line_syntax import Place, TypedLine
 from multidrop.shell.prompt.complete import Completion
 from multidrop.shell.roles import RunningPlot, Series
-from multidrop.shell.state.store import Drafts
+from multidrop.shell.state.backups import Drafts
 from multidrop.shell.stop_report import Found, Tally
 from multidrop.transports import TransportLost, Unreachable
 from multidrop.tui.app import MultidropApp

@@ -10,7 +10,7 @@ from pathlib import Path
 from textual.driver import Driver
 from textual.pilot import Pilot
 
-from multidrop.shell.connect.settings import Settings
+from multidrop.shell.configuration import Settings
 from multidrop.shell.session import Session
 from multidrop.tui.app import MultidropApp
 from multidrop.tui.assist import Assist

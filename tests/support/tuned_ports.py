@@ -7,8 +7,8 @@ from typing import Any
 
 from multidrop.dialects.families import FAMILIES
 from multidrop.drives.bus import Bus
+from multidrop.shell.configuration import Settings
 from multidrop.shell.connect.opening import Opened
-from multidrop.shell.connect.settings import Settings
 from multidrop.shell.events import Notified, Output, Progressed
 from multidrop.shell.session import Session
 from multidrop.simulator.cells import read

@@ -13,7 +13,7 @@ from multidrop.dialects import Diagnostic
 from multidrop.dialects.families import program_languages
 from multidrop.dialects.program_files import Part
 from multidrop.shell.programs.program_text import ProgramGrammar
-from multidrop.shell.state.store import Drafts
+from multidrop.shell.state.backups import Drafts
 from multidrop.tui.editor import MacroGrammar, grammar_of
 from multidrop.tui.screens.dialogs import Match
 from multidrop.tui.screens.program_rows import UPLOAD, Finder, aligned, files_in

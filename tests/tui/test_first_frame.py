@@ -16,7 +16,7 @@ import asyncio, sys
 from multidrop.tui.app import MultidropApp
 from multidrop.tui.assist import Assist
 from multidrop.tui.launch import driver
-from multidrop.shell.connect.settings import load
+from multidrop.shell.configuration import load
 from multidrop.shell.prompt.collector import collected_at_rest
 from multidrop.shell.log.writer import begin
 from multidrop.shell.session import Session

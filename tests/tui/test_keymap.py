@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from textual.binding import Binding
 
-from multidrop.shell.connect.settings import Look
+from multidrop.shell.configuration import Look
 from multidrop.tui.app import MultidropApp, bindings
 from multidrop.tui.keymap import FunctionKeys, keymap, read_key
 from multidrop.tui.screens.all_drives import AllDrives

@@ -12,7 +12,7 @@ from textual import events
 from textual.pilot import Pilot
 
 from multidrop.shell.events import Phase, ProgramRead, ProgramSeen
-from multidrop.shell.state.store import Copy, Drafts
+from multidrop.shell.state.backups import Copy, Drafts
 from multidrop.tui.app import MultidropApp
 from multidrop.tui.screens.dialogs import Confirm, Search
 from multidrop.tui.screens.program import ProgramPage

@@ -17,7 +17,7 @@ from textual.screen import Screen
 
 from multidrop.dialects import Diagnostic
 from multidrop.dialects.on_demand import imported
-from multidrop.shell.lines import Place
+from multidrop.shell.line_syntax import Place
 from multidrop.tui.frame_scheduler import Frames
 from multidrop.tui.keymap import FunctionKeys, named_key
 from multidrop.tui.outbox import Outbox

@@ -13,7 +13,7 @@ from rich.text import Text
 
 from multidrop.dialects.families import program_languages
 from multidrop.dialects.program_files import Entry, Part, Problem, errors
-from multidrop.shell.lines import join_target
+from multidrop.shell.line_syntax import join_target
 from multidrop.shell.programs.edited_file import real_text
 from multidrop.tui.editor import Grammar, MacroGrammar, Mark
 from multidrop.tui.panels.view import Glance, name_of

@@ -19,7 +19,7 @@ from textual.filter import LineFilter
 from textual.theme import BUILTIN_THEMES, Theme
 
 from multidrop.dialects.text import visible
-from multidrop.shell.connect.settings import Look
+from multidrop.shell.configuration import Look
 from multidrop.tui.curves.raster import INKS, Ink
 
 DARK = Theme(

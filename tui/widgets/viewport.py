@@ -12,7 +12,7 @@ from collections.abc import Iterator, Sequence
 from itertools import islice
 from typing import Protocol
 
-from multidrop.shell.lines import EVERYONE
+from multidrop.shell.line_syntax import EVERYONE
 from multidrop.shell.roles import EVERYTHING, Filter
 from multidrop.tui.screen_model import KEPT, Record
 

@@ -12,9 +12,9 @@ import pytest
 
 from multidrop.dialects import DriveError
 from multidrop.drives.bus import Bus
+from multidrop.shell.configuration import Settings
 from multidrop.shell.connect.opening import Opened
 from multidrop.shell.connect.reconnect import LOGIN, LoginAgain
-from multidrop.shell.connect.settings import Settings
 from multidrop.shell.connect.urls import Connection, parse
 from multidrop.shell.events import Notified
 from multidrop.shell.finding.scanning import NothingFound, Scanning

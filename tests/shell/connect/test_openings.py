@@ -6,8 +6,8 @@ import pytest
 
 from multidrop.dialects import Diagnostic, Hints, NoAnswer
 from multidrop.shell import stop_report
+from multidrop.shell.configuration import Settings
 from multidrop.shell.connect.opening import Opened
-from multidrop.shell.connect.settings import Settings
 from multidrop.shell.session import Session
 from multidrop.transports import Unreachable
 from tests.support.cell_session import CellSession, bus, party

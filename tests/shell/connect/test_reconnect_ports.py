@@ -16,8 +16,8 @@ from typing import Any
 import pytest
 
 from multidrop.dialects import Diagnostic
+from multidrop.shell.configuration import Settings
 from multidrop.shell.connect.reconnect import Absent, SerialAgain
-from multidrop.shell.connect.settings import Settings
 from multidrop.shell.events import Notified, Printed
 from multidrop.shell.session import Session
 from multidrop.simulator.cells import load

@@ -3,7 +3,7 @@
 import pytest
 
 from multidrop.dialects import Diagnostic
-from multidrop.shell.connect.settings import load
+from multidrop.shell.configuration import load
 from multidrop.shell.session import Session
 
 pytestmark = pytest.mark.virtual

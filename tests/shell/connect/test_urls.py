@@ -3,8 +3,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from multidrop.dialects import Diagnostic, Hints
+from multidrop.shell.configuration import SavedConnection
 from multidrop.shell.connect.opening import port_name
-from multidrop.shell.connect.settings import SavedConnection
 from multidrop.shell.connect.urls import KEYS, SCHEMES, parse
 from multidrop.shell.finding.scanning import port_of
 

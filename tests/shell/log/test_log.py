@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from multidrop.dialects import Diagnostic, Priority
 from multidrop.drives.events import Ended, Sent, Traffic, Unsolicited
-from multidrop.shell.connect.settings import LogSettings, Settings, parse
+from multidrop.shell.configuration import LogSettings, Settings, parse
 from multidrop.shell.events import By, Entered, Failed, Notified, OnBus, Output, Printed, StateChanged
 from multidrop.shell.log import files, writer
 from multidrop.shell.log.files import KINDS, TRAFFIC, Entry, entry_of, line_of

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from multidrop.shell.connect.settings import Settings
+from multidrop.shell.configuration import Settings
 from multidrop.shell.session import Session
 from tests.support.macro_shop import Shop
 

@@ -3,7 +3,7 @@
 import pytest
 
 from multidrop.dialects import Diagnostic
-from multidrop.shell.connect.settings import Settings
+from multidrop.shell.configuration import Settings
 from multidrop.shell.events import By
 from multidrop.shell.session import Session
 

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from multidrop.dialects import Refused
-from multidrop.shell.connect.settings import Settings
+from multidrop.shell.configuration import Settings
 from multidrop.shell.events import Notified
 from multidrop.shell.session import Session
 

@@ -9,7 +9,7 @@ import pytest
 
 from multidrop.dialects import Diagnostic, DriveError, NoAnswer, Refused, Stopped
 from multidrop.drives.events import Traffic
-from multidrop.shell.connect.settings import Settings
+from multidrop.shell.configuration import Settings
 from multidrop.shell.events import Notified, OnBus, Output
 from multidrop.shell.params import file as files
 from multidrop.shell.params.file import read

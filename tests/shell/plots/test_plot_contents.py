@@ -15,7 +15,7 @@ from multidrop.drives.events import Sample, Valued
 from multidrop.shell.events import Predicted
 from multidrop.shell.plots.plot import Plot, attach
 from multidrop.shell.plots.request import PlotTarget, parse_series, parse_target, read_first
-from multidrop.shell.plots.sink import DIFFERS, LINES, PALE, RUNS, TWIN, drives_of, layout
+from multidrop.shell.plots.rerun_calls import DIFFERS, LINES, PALE, RUNS, TWIN, drives_of, layout
 from multidrop.shell.roles import DIFFERENCE, Series
 from tests.support.cell_session import CellSession, bus, party
 from tests.support.plot_file import contents

@@ -16,7 +16,7 @@ from multidrop.dialects.values import Conditions, Lamp
 from multidrop.drives.events import BusEvent, Conditioned, Ended, Sample, Sent, Unsolicited, Valued
 from multidrop.drives.telemetry import Value
 from multidrop.shell.batch import runner
-from multidrop.shell.connect.settings import Settings
+from multidrop.shell.configuration import Settings
 from multidrop.shell.events import By, Entered, Failed, Notified, OnBus, Output, Printed, SessionEvent
 from multidrop.shell.plots import plot
 from multidrop.shell.plots.plot import Plot, attach, begin

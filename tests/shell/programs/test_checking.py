@@ -11,7 +11,7 @@ import pytest
 
 from multidrop.dialects import Diagnostic, Inexpressible
 from multidrop.macros import atomic
-from multidrop.shell.connect.settings import Settings
+from multidrop.shell.configuration import Settings
 from multidrop.shell.events import Notified, Output
 from multidrop.shell.programs.checking import examine, rewrite
 from multidrop.shell.session import Session

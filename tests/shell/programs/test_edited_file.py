@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from multidrop.dialects import Diagnostic
 from multidrop.shell.programs.edited_file import ChangedMeanwhile, EditedFile, edited, real_text
-from multidrop.shell.state.store import Copy, Drafts
+from multidrop.shell.state.backups import Copy, Drafts
 
 
 @pytest.mark.parametrize(

@@ -8,7 +8,7 @@ import pytest
 
 from multidrop.dialects import Diagnostic
 from multidrop.shell.events import Progressed
-from multidrop.shell.state.store import write_backup
+from multidrop.shell.state.backups import write_backup
 from tests.support.cell_session import CellSession, bus, pmx
 from tests.support.transfers import FILE, LISTED, LONG, SLOW, kept, load, shop_with
 

@@ -6,14 +6,14 @@ import sys
 
 import pytest
 
-from multidrop.shell.prompt import typed_lines
-from multidrop.shell.prompt.typed_lines import History
+from multidrop.shell.prompt import line_queue
+from multidrop.shell.prompt.line_queue import History
 from tests.support.until import PATIENCE
 
 
 @pytest.fixture
 def three_kept(monkeypatch):
-    monkeypatch.setattr(typed_lines, "KEPT", 3)
+    monkeypatch.setattr(line_queue, "KEPT", 3)
 
 
 def test_lines_are_kept_between_runs_oldest_first(tmp_path):
@@ -77,14 +77,14 @@ def test_a_link_stays_a_link_and_the_file_behind_it_is_cut(tmp_path, three_kept)
 
 def test_a_line_that_another_process_adds_while_the_file_is_cut_is_kept(tmp_path, monkeypatch, three_kept):
     ours, theirs = filled(tmp_path / "history"), History(tmp_path / "history")
-    write = typed_lines.write_atomically
+    write = line_queue.write_atomically
 
     def slow(path, data, mode):
         theirs.append("PR P")  # it cannot have the lock, and writes to the file that goes
         write(path, data, mode)
 
     with monkeypatch.context() as patch:
-        patch.setattr(typed_lines, "write_atomically", slow)
+        patch.setattr(line_queue, "write_atomically", slow)
         ours.lines()
     theirs.append("PR V")
     assert ours.lines() == ["MR 6", "PR P", "PR V"]
@@ -93,7 +93,7 @@ def test_a_line_that_another_process_adds_while_the_file_is_cut_is_kept(tmp_path
 @pytest.mark.process
 def test_two_processes_lose_no_line(tmp_path):
     script = (
-        "import sys; from multidrop.shell.prompt.typed_lines import History\n"
+        "import sys; from multidrop.shell.prompt.line_queue import History\n"
         "kept = History(__import__('pathlib').Path(sys.argv[1]))\n"
         "for n in range(200): kept.append(f'{sys.argv[2]} {n}'); n % 20 or kept.lines()\n"
     )

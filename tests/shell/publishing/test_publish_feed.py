@@ -12,7 +12,7 @@ import pytest
 
 from multidrop.dialects import Diagnostic
 from multidrop.drives.events import Unsolicited
-from multidrop.shell.connect.settings import Settings
+from multidrop.shell.configuration import Settings
 from multidrop.shell.events import Notified, OnBus
 from multidrop.shell.publishing.broker import Message
 from multidrop.shell.publishing.command import AGAIN, open_later, open_lines

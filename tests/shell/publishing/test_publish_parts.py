@@ -16,8 +16,8 @@ from hypothesis import strategies as st
 from multidrop.dialects import Diagnostic
 from multidrop.dialects.values import UNREAD, Conditions
 from multidrop.drives.events import Conditioned, Sample
-from multidrop.shell.connect import settings
-from multidrop.shell.connect.settings import MqttSettings
+from multidrop.shell import configuration
+from multidrop.shell.configuration import MqttSettings
 from multidrop.shell.log.files import Entry
 from multidrop.shell.publishing import feed
 from multidrop.shell.publishing.broker import Message, Target, parse_target
@@ -250,7 +250,7 @@ def test_a_line_is_an_entry_of_the_log_without_secrets_and_of_bounded_length() -
 def test_the_login_is_read_and_paths_begin_at_the_configuration(tmp_path: Path) -> None:
     (tmp_path / "secret").write_text("hunter2\n")
     where = str(tmp_path / "multidrop.toml")
-    found = settings.parse('[mqtt]\nusername = "u"\npassword_file = "secret"\nca = "/etc/ca.pem"\n', where).mqtt
+    found = configuration.parse('[mqtt]\nusername = "u"\npassword_file = "secret"\nca = "/etc/ca.pem"\n', where).mqtt
     assert found == MqttSettings("u", password_file=str(tmp_path / "secret"), ca="/etc/ca.pem")
     assert found.secret() == "hunter2"
     assert [*found.unreadable()] == ["mqtt.ca: /etc/ca.pem cannot be read: No such file or directory"]
@@ -270,7 +270,7 @@ def test_the_login_is_read_and_paths_begin_at_the_configuration(tmp_path: Path) 
 )
 def test_a_wrong_login_is_said_by_its_line_and_without_its_value(text: str, says: str) -> None:
     with pytest.raises(Diagnostic) as caught:
-        settings.parse(text, "multidrop.toml")
+        configuration.parse(text, "multidrop.toml")
     assert says in str(caught.value) and "4711" not in str(caught.value)
 
 

@@ -7,8 +7,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from multidrop.dialects.text import visible
-from multidrop.shell.sharing.exchange import SILENT, Close, Exchange, Send, Stop, Write
 from multidrop.shell.sharing.stop_bytes import stop_bytes
+from multidrop.shell.sharing.writer_turns import SILENT, Close, Exchange, Send, Stop, Write
 from multidrop.transports import telnet
 from multidrop.transports.telnet import OPTION, Setting, message
 from tests.support.shared_exchange import ADA, BOB, EVE, MST, ROR, Port

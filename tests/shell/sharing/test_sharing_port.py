@@ -21,9 +21,9 @@ from multidrop.shell.connect.opening import open_port
 from multidrop.shell.connect.urls import parse
 from multidrop.shell.sharing import server
 from multidrop.shell.sharing.client import Client, Input, Request
-from multidrop.shell.sharing.exchange import NOT_REACHED, TURN, Say
 from multidrop.shell.sharing.server import SharedPort
 from multidrop.shell.sharing.stop_bytes import stop_bytes
+from multidrop.shell.sharing.writer_turns import NOT_REACHED, TURN, Say
 from multidrop.transports import TransportLost, Unreachable, telnet
 from multidrop.transports.rfc2217 import open_rfc2217
 from multidrop.transports.telnet import OPTION, Setting, message

@@ -8,8 +8,8 @@ from multidrop.dialects import Codec, Diagnostic
 from multidrop.dialects.mcode.host.codec import MCode
 from multidrop.dialects.pmx.host.codec import Pmx
 from multidrop.dialects.tmcl.host.codec import Tmcl
-from multidrop.shell.sharing.exchange import NEVER, NOT_REACHED, OWED
 from multidrop.shell.sharing.stop_bytes import CERTAIN, NOTICED, stop_bytes
+from multidrop.shell.sharing.writer_turns import NEVER, NOT_REACHED, OWED
 from multidrop.transports import telnet
 from multidrop.transports.telnet import OPTION, REPLY, Setting, message
 from tests.support.shared_exchange import ADA, BOB, MST, ROR, Port

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from multidrop.shell.sharing.exchange import TURN, WAITING, Action, Close, Send, Set, Stop, Write
+from multidrop.shell.sharing.writer_turns import TURN, WAITING, Action, Close, Send, Set, Stop, Write
 from multidrop.transports import telnet
 from multidrop.transports.telnet import OPTION, REPLY, Control, Setting, message
 from tests.support.shared_exchange import ADA, BOB, EVE, HELLO, Port

@@ -11,8 +11,9 @@ import pytest
 from multidrop.dialects import Diagnostic, DriveError, Inexpressible, NoAnswer, Refused, Stopped
 from multidrop.drives.events import Unsolicited
 from multidrop.shell.events import Failed, Notified, OnBus, Output, Printed
+from multidrop.shell.exit_codes import exit_code
 from multidrop.shell.streams.event_printer import Printer
-from multidrop.shell.streams.stdout import ReaderWatch, exit_code, report, write
+from multidrop.shell.streams.stdout import ReaderWatch, report, write
 from multidrop.transports import TransportLost, Unreachable
 
 

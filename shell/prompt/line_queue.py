@@ -25,7 +25,7 @@ from multidrop.dialects.files import lines_of
 from multidrop.dialects.text import visible
 from multidrop.macros.atomic import write_atomically
 from multidrop.shell.events import FAILURES
-from multidrop.shell.lines import NOWHERE, DriveLine, Place, TypedLine, VerbLine, parse
+from multidrop.shell.line_syntax import NOWHERE, DriveLine, Place, TypedLine, VerbLine, parse
 
 if sys.platform != "win32":
     import fcntl

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from multidrop.dialects import Diagnostic
-from multidrop.shell.connect import settings
+from multidrop.shell import configuration
 
 
 @pytest.fixture
@@ -18,7 +18,7 @@ def folder(tmp_path, monkeypatch):
 
 
 def test_no_file_is_an_empty_configuration(folder):
-    found = settings.load()
+    found = configuration.load()
     assert found.connections == {}
     assert (found.macros, found.history) == (folder / "macros", folder.parent / "state" / "history")
 
@@ -26,7 +26,7 @@ def test_no_file_is_an_empty_configuration(folder):
 def test_connections_have_a_url_and_names_for_their_drives(folder):
     text = '[connections.press]\nurl = "/dev/ttyUSB0?drives=a"\nnames = { a = "gantry" }\n'
     (folder / "multidrop.toml").write_text(text)
-    found = settings.load().connections["press"]
+    found = configuration.load().connections["press"]
     assert (found.name, found.url, found.names) == ("press", "/dev/ttyUSB0?drives=a", {"a": "gantry"})
 
 
@@ -47,7 +47,7 @@ def test_connections_have_a_url_and_names_for_their_drives(folder):
 def test_a_mistake_is_told_with_the_file_and_the_key(folder, text, named):
     (folder / "multidrop.toml").write_text(text)
     with pytest.raises(Diagnostic) as caught:
-        settings.load()
+        configuration.load()
     assert str(caught.value).startswith(str(folder / "multidrop.toml"))
     assert named in str(caught.value)
 
@@ -55,19 +55,19 @@ def test_a_mistake_is_told_with_the_file_and_the_key(folder, text, named):
 def test_a_file_that_cannot_be_read_is_named(folder):
     (folder / "multidrop.toml").mkdir()
     with pytest.raises(Diagnostic, match="multidrop.toml: cannot be read"):
-        settings.load()
+        configuration.load()
 
 
 def test_without_the_variables_the_platform_says_where(monkeypatch):
     monkeypatch.delenv("MULTIDROP_CONFIG_DIR", raising=False)
     monkeypatch.setenv("XDG_CONFIG_HOME", "/somewhere")
-    assert settings.config_file() == Path("/somewhere/multidrop/multidrop.toml")
+    assert configuration.config_file() == Path("/somewhere/multidrop/multidrop.toml")
 
 
 @pytest.mark.parametrize("label", ["\x1b[31mred", "left\u202e", "a\x9b2J"])
 def test_a_name_that_would_act_on_a_terminal_is_refused(label):
     with pytest.raises(Diagnostic, match="control characters"):
-        settings.parse(f"[connections.a]\nurl = 'sim:'\nnames = {{ a = {json.dumps(label)} }}\n", "multidrop.toml")
+        configuration.parse(f"[connections.a]\nurl = 'sim:'\nnames = {{ a = {json.dumps(label)} }}\n", "multidrop.toml")
 
 
 @pytest.mark.parametrize(
@@ -85,7 +85,7 @@ def test_a_name_that_would_act_on_a_terminal_is_refused(label):
 def test_what_is_wrong_is_reported_with_its_line(folder, text, line):
     (folder / "multidrop.toml").write_text(text)
     with pytest.raises(Diagnostic) as failure:
-        settings.load()
+        configuration.load()
     assert failure.value.where == f"{folder / 'multidrop.toml'}:{line}"
 
 
@@ -100,9 +100,9 @@ def file(tmp_path, monkeypatch):
 
 def test_a_connection_is_added_and_remarks_stay(file):
     file.write_text(OLD)
-    assert settings.save("clamp", "serial:/dev/ttyUSB0?baud=9600") == file
+    assert configuration.save("clamp", "serial:/dev/ttyUSB0?baud=9600") == file
     assert file.read_text().startswith(OLD)
-    assert {name: each.url for name, each in settings.load().connections.items()} == {
+    assert {name: each.url for name, each in configuration.load().connections.items()} == {
         "press": "serial:/dev/ttyS0",
         "clamp": "serial:/dev/ttyUSB0?baud=9600",
     }
@@ -110,21 +110,21 @@ def test_a_connection_is_added_and_remarks_stay(file):
 
 
 def test_a_new_file_is_made(file):
-    settings.save("clamp", "sim:")
-    assert settings.load().connections["clamp"].url == "sim:"
+    configuration.save("clamp", "sim:")
+    assert configuration.load().connections["clamp"].url == "sim:"
 
 
 @pytest.mark.parametrize(("name", "why"), [("press", "exists already"), ("a b", "not a name"), ("", "not a name")])
 def test_a_name_that_exists_or_is_none_is_refused_and_nothing_changes(file, name, why):
     file.write_text(OLD)
     with pytest.raises(Diagnostic, match=why):
-        settings.check_new(name)
+        configuration.check_new(name)
     with pytest.raises(Diagnostic, match=why):
-        settings.save(name, "sim:")
+        configuration.save(name, "sim:")
     assert file.read_text() == OLD
 
 
 def test_a_folder_that_cannot_be_written_is_named(file):
     file.mkdir()
     with pytest.raises(Diagnostic, match="multidrop.toml"):
-        settings.save("clamp", "sim:")
+        configuration.save("clamp", "sim:")

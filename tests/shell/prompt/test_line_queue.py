@@ -6,8 +6,8 @@ from typing import Any
 import pytest
 
 from multidrop.dialects import Refused
-from multidrop.shell.lines import TypedLine
-from multidrop.shell.prompt.typed_lines import BURST, SHOWN, LineQueue
+from multidrop.shell.line_syntax import TypedLine
+from multidrop.shell.prompt.line_queue import BURST, SHOWN, LineQueue
 
 pytestmark = pytest.mark.virtual
 
