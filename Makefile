@@ -48,9 +48,9 @@ types-darwin types-win32: types-%: $(VENV)/.dev
 contracts: $(VENV)/.dev
 	$(BIN)/lint-imports
 
-# What failed beside others runs once more alone (docs/decisions/0050); the first run has named it: it is a defect.
+# Each test runs once: one that fails on a busy machine is a defect (docs/decisions/0050).
 measured: $(VENV)/.dev
-	$(PYTEST) --cov --cov-report= || { [ $$? -eq 1 ] && $(BIN)/python -m pytest --last-failed --last-failed-no-failures none; }
+	$(PYTEST) --cov --cov-report=
 
 coverage: measured
 	$(BIN)/coverage report

@@ -12,6 +12,7 @@ from multidrop.cli import parse, run
 from multidrop.commands.log import Following, joined, text
 from multidrop.shell.log.files import Entry, line_of, whole
 from multidrop.shell.log.writer import Disk
+from tests.support.until import PATIENCE
 
 AT = datetime(2026, 11, 22, 12, 41, 6, 20115, tzinfo=UTC)
 
@@ -119,6 +120,13 @@ def test_pieces_of_several_buses_and_after_an_end_of_line_stay_apart(tmp_path):
     assert [each.entry.text for each in joined(whole(tmp_path / "log"))] == ["a", "bc\n", "d"]
 
 
+@pytest.fixture
+def waited_for(monkeypatch):
+    """An entry is written before `put` returns, however busy the machine is."""
+    monkeypatch.setattr("multidrop.shell.log.writer.PATIENCE", PATIENCE)
+
+
+@pytest.mark.usefixtures("waited_for")
 def test_following_gives_each_line_once_whole_and_across_rotation(tmp_path):
     path = tmp_path / "log"
     disk = Disk(path, 300, 4, lambda: b"", lambda number: b"")
@@ -135,6 +143,7 @@ def test_following_gives_each_line_once_whole_and_across_rotation(tmp_path):
     disk.close()
 
 
+@pytest.mark.usefixtures("waited_for")
 def test_parts_that_went_before_they_were_read_are_noticed(tmp_path):
     disk = Disk(tmp_path / "log", 300, 2, lambda: b"", lambda number: b"")
     following = Following(tmp_path / "log")
