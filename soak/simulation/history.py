@@ -14,6 +14,14 @@ from hashlib import sha256
 UNSENT = re.compile(r"^not sent, as .*?: (.*)$")
 
 
+@dataclass(frozen=True)
+class Stop:
+    """A read that held the stop key. `forms`: by line that could be written, the bytes of which one had to go first."""
+
+    at: float
+    forms: dict[str, tuple[bytes, ...]]
+
+
 class Outcome(Enum):
     """The host's word about a command."""
 
@@ -58,8 +66,10 @@ class History:
 
     commands: dict[str, Command] = field(default_factory=dict)
     executed: list[Executed] = field(default_factory=list)
-    stops: list[float] = field(default_factory=list)
-    """When the reads came that held the stop key."""
+    stops: list[Stop] = field(default_factory=list)
+    """The reads that held the stop key."""
+    untrue: list[str] = field(default_factory=list)
+    """Drives that were said to stand, and moved."""
     written: list[tuple[float, str, bytes]] = field(default_factory=list)
     """Time, port and bytes of each write that the kernel took."""
     notices: list[tuple[float, str]] = field(default_factory=list)

@@ -10,6 +10,8 @@ from dataclasses import dataclass
 from soak.simulation.history import Command, Outcome
 from soak.simulation.world import World
 
+SOON = 0.05
+"""The time, s, in which the kernel takes a stop: a line that takes nothing meanwhile is lost, or flooded."""
 Check = Callable[[World], Iterator[str]]
 
 
@@ -67,11 +69,26 @@ def _nothing_before(world: World) -> Iterator[str]:
     for each in world.history.commands.values():
         if each.stops >= len(world.history.stops):
             continue
-        stop = world.history.stops[each.stops]
+        stop = world.history.stops[each.stops].at
         text = re.compile(rb"(?<![0-9A-Za-z])" + re.escape(each.text.encode()) + rb"(?![0-9])")
         for at, line, data in world.history.written:
             if at > stop and line == each.line and text.search(data):
                 yield f"{_said(each, 1)}: typed at {each.typed:.3f}, stop at {stop:.3f}, written at {at:.3f}"
+
+
+def _first(world: World) -> Iterator[str]:
+    """What leaves next on a line that can be written is its stop."""
+    for stop in world.history.stops:
+        for line, forms in stop.forms.items():
+            after = [(at, data) for at, port, data in world.history.written if port == line and at >= stop.at]
+            if after and after[0][0] <= stop.at + SOON:
+                begun = after[0][1]
+                if not any(form.startswith(begun) or begun.startswith(form) for form in forms):
+                    yield f"{line}: stop at {stop.at:.6f}, {begun!r} left at {after[0][0]:.6f}"
+
+
+def _true(world: World) -> Iterator[str]:
+    yield from world.history.untrue
 
 
 def _ends(world: World) -> Iterator[str]:
@@ -83,6 +100,8 @@ RULES = (
     Rule("denied", "What was said to be not sent, or refused, was not executed.", "What is said is true", _unsent),
     Rule("lost", "What was said to be done was executed.", "What is said is true", _done),
     Rule("after a stop", "Nothing that was typed before a stop leaves after it.", "The stop", _nothing_before),
+    Rule("first", "What leaves next on a line that can be written is its stop.", "The stop", _first),
+    Rule("stopped", "A drive that is said to be stopped does not move.", "What is said is true", _true),
     Rule("ends", "Every wait ends; no task and no thread is left.", "Ends", _ends),
 )
 

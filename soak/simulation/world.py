@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import re
 import shutil
 import tempfile
 from collections.abc import Awaitable, Callable, Iterator
@@ -18,6 +19,8 @@ from random import Random
 from typing import Any
 
 from multidrop.dialects import Diagnostic, DriveError
+from multidrop.drives.bus import Bus
+from multidrop.drives.stopping import stop_forms
 from multidrop.shell.configuration import Settings, parse
 from multidrop.shell.connect import opening
 from multidrop.shell.connect.urls import Connection
@@ -33,13 +36,14 @@ from multidrop.transports.pipe import DescriptorPipe
 from soak.judge import Witness, Word, word
 from soak.languages import LANGUAGES, PROGRAM
 from soak.simulation.clock import SimulatedLoop
-from soak.simulation.history import Command, Executed, History, Outcome
+from soak.simulation.history import Command, Executed, History, Outcome, Stop
 from soak.simulation.person import Person
 from soak.simulation.ports import Port, PortFaults
 from soak.simulation.threads import Scheduler
 from soak.simulation.wall import Wall
 
 STOP = b"\x18"
+STOPPED = re.compile(r"(?:(\w+): )(?:(\w+): )?stopped, velocity 0 ")
 WORDS = {
     Word.DONE: Outcome.OK,
     Word.UNCONFIRMED: Outcome.UNKNOWN,
@@ -235,11 +239,33 @@ class World:
             self.history.notices.append((self.loop.now, event.text))
         if isinstance(event, Notified):
             self.history.unsent(event.text)
+            if (found := STOPPED.match(event.text)) is not None:
+                self._judge_stopped(found[1], found[2] or "")
+
+    def _judge_stopped(self, line: str, drive: str) -> None:
+        """Note a drive that is said to stand and moves, unless a line has started it since the stop."""
+        now = self.floor.now()
+        for placed in self.floor.floor.drives:
+            if placed.bus != line or (drive and placed.spec.name != drive):
+                continue
+            since = self.history.stops[-1].at if self.history.stops else 0.0
+            name = placed.spec.name
+            started = any(
+                each.at >= since and (each.line, each.drive) == (line, name) for each in self.history.executed
+            )
+            if not started and any(each.velocity for each in placed.unit.shadow.motion(now)):
+                self.history.untrue.append(f"{self.loop.now:.3f} {line}:{name} is said to be stopped, and moves")
 
     def _typed(self, data: bytes) -> None:
         self.history.note(self.loop.now, "key", data.hex())
         if STOP in data:
-            self.history.stops.append(self.loop.now)
+            forms = {name: self._forms(bus) for name, bus in self.session.buses.items() if not bus.link.lost}
+            self.history.stops.append(Stop(self.loop.now, {name: each for name, each in forms.items() if each}))
+
+    def _forms(self, bus: Bus) -> tuple[bytes, ...]:
+        """What a stop of a line may begin with; empty where a frame that has begun leaves whole before it."""
+        forms = stop_forms(bus.roster)
+        return () if forms.framed else (forms.immediate, forms.unterminated)
 
     # The story
 

@@ -188,7 +188,7 @@ CHILD = """
 import asyncio, os, sys
 from datetime import UTC, datetime
 from multidrop.drives.events import Sample
-from multidrop.shell.plots import plot as plots, sink
+from multidrop.shell.plots import plot as plots, rerun_calls
 from multidrop.shell.plots.plot import Plot
 from multidrop.shell.plots.request import parse_target
 
@@ -205,7 +205,7 @@ async def main(to, limit):
         if plot.ended.is_set():
             break
         if number == 100:
-            plots.BATCH_TIMEOUT, sink.FLUSH = 2.0, 1.0  # not before: a viewer that has just begun may be slow
+            plots.BATCH_TIMEOUT, rerun_calls.FLUSH = 2.0, 1.0  # not before: a viewer that has just begun may be slow
             print("plotting", flush=True)
         await asyncio.sleep(0.01)
 
