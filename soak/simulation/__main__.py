@@ -39,7 +39,7 @@ def main() -> int:
 
 
 def _one(seed: int, steps: int) -> int:
-    world = lived(seed, steps, keep=True)
+    world = lived(seed, range(steps), keep=True)
     found = broken(world)
     if found:
         print("\n".join(world.history.lines))
@@ -52,7 +52,7 @@ def _one(seed: int, steps: int) -> int:
 def _range(seeds: range, steps: int) -> int:
     counts: Counter[str] = Counter()
     for seed in seeds:
-        world = lived(seed, steps)
+        world = lived(seed, range(steps))
         counts["commands"] += len(world.history.commands)
         counts["virtual s"] += round(world.loop.now)
         counts.update(world.history.counts)

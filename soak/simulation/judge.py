@@ -48,7 +48,7 @@ def _unsent(world: World) -> Iterator[str]:
         count = times[each.line, each.drive, each.text]
         if not count or each.outcome not in (Outcome.NOT_SENT, Outcome.REFUSED):
             continue
-        if each.outcome is Outcome.REFUSED and world.climate.wire.harmful and not world.checked(each.line):
+        if each.outcome is Outcome.REFUSED and world.climate.wire.harmful and not world.place(each.line).checked:
             world.history.count("excepted: an error of noise on a line without a checksum")
             continue
         yield _said(each, count)

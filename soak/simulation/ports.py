@@ -8,28 +8,18 @@ from __future__ import annotations
 
 import errno
 from collections.abc import Callable
-from dataclasses import dataclass
 from random import Random
 
 from multidrop.simulator.serving.running import RunningFloor
+from soak.simulation.climate import Climate
 from soak.simulation.clock import SimulatedLoop
 
 ROOM = 4095
 """Bytes that a tty takes before a write has to wait."""
 
 
-@dataclass
-class PortFaults:
-    """Probabilities of what the kernel and the cable do, each by read or write."""
-
-    part: float = 0.0
-    """A write takes a part."""
-    full: float = 0.0
-    """A write is not taken now."""
-    split: float = 0.0
-    """A read brings a part of what is there."""
-    late: float = 0.0
-    """A read is late by up to 20 ms, and brings what came meanwhile with it."""
+# A write takes a part, or nothing now; a read brings a part of what is there, or comes up to 20 ms late with what came
+# meanwhile: the kinds "part", "full", "split" and "late read" of the climate.
 
 
 class Port:
@@ -42,12 +32,12 @@ class Port:
         floor: RunningFloor,
         bus: str,
         rng: Random,
-        faults: PortFaults,
+        climate: Climate,
         trace: Callable[[str, bytes], None],
         flushes: bool = True,
     ) -> None:
         self._name, self._loop, self._floor, self._bus = name, loop, floor, bus
-        self._rng, self._faults, self._trace, self._flushes = rng, faults, trace, flushes
+        self._rng, self.climate, self._trace, self._flushes = rng, climate, trace, flushes
         self._descriptor = loop.descriptor()
         self._received = bytearray()
         self._source = floor.source()
@@ -74,7 +64,7 @@ class Port:
                 raise OSError(errno.EIO, "Input/output error")
             raise BlockingIOError(errno.EAGAIN, "no bytes")
         size = len(self._received)
-        if size > 1 and self._rng.random() < self._faults.split:
+        if size > 1 and self._rng.random() < self.climate["split"]:
             size = self._rng.randrange(1, size)
         data = bytes(self._received[:size])
         del self._received[:size]
@@ -88,11 +78,11 @@ class Port:
         if self._gone or self.closed:
             raise OSError(errno.EIO, "Input/output error")
         room = ROOM - self.unsent()
-        if room <= 0 or self._rng.random() < self._faults.full:
+        if room <= 0 or self._rng.random() < self.climate["full"]:
             self._loop.call_later(0.001 + self._rng.random() * 0.01, self._loop.writable, self._descriptor)
             raise BlockingIOError(errno.EAGAIN, "no room")
         size = min(len(data), room)
-        if size > 1 and self._rng.random() < self._faults.part:
+        if size > 1 and self._rng.random() < self.climate["part"]:
             size = self._rng.randrange(1, size)
         if size < len(data):
             self._loop.call_later(0.001 + self._rng.random() * 0.01, self._loop.writable, self._descriptor)
@@ -145,7 +135,7 @@ class Port:
         if self._waiting:
             return
         self._waiting = True
-        late = self._rng.random() * 0.02 if self._rng.random() < self._faults.late else 0.0
+        late = self._rng.random() * 0.02 if self._rng.random() < self.climate["late read"] else 0.0
         self._loop.call_later(late, self._readable)
 
     def _readable(self) -> None:

@@ -11,9 +11,10 @@ import contextlib
 import re
 import shutil
 import tempfile
-from collections.abc import Awaitable, Callable, Iterator
+from collections.abc import Awaitable, Callable, Collection, Iterable, Iterator
 from contextlib import ExitStack
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from pathlib import Path
 from random import Random
 from typing import Any
@@ -35,14 +36,16 @@ from multidrop.transports import Transport, TransportLost, Unreachable
 from multidrop.transports.pipe import DescriptorPipe
 from soak.judge import Witness, Word, word
 from soak.languages import LANGUAGES, PROGRAM
+from soak.simulation.climate import Climate
 from soak.simulation.clock import SimulatedLoop
 from soak.simulation.history import Command, Executed, History, Outcome, Stop
 from soak.simulation.person import Person
-from soak.simulation.ports import Port, PortFaults
+from soak.simulation.places import Place, drawn_places
+from soak.simulation.ports import Port
+from soak.simulation.story import STOP, tell
 from soak.simulation.threads import Scheduler
 from soak.simulation.wall import Wall
 
-STOP = b"\x18"
 STOPPED = re.compile(r"(?:(\w+): )(?:(\w+): )?stopped, velocity 0 ")
 WORDS = {
     Word.DONE: Outcome.OK,
@@ -55,89 +58,12 @@ LONGEST = 400.0
 """Virtual seconds in which everything that was begun ends, once the faults are over."""
 
 
-@dataclass(frozen=True)
-class Place:
-    """A line of drives: its language, the names of its drives, and how it is opened."""
-
-    name: str
-    language: str
-    drives: tuple[str, ...]
-    em: int
-    checksum: int
-    baud: int
-    serial: bool
-
-    @property
-    def url(self) -> str:
-        """The URL that opens it."""
-        keys = [f"dialect={self.language}", "timeout=0.4", f"drives={','.join(self.drives)}" * bool(self.drives)]
-        keys += [f"baud={self.baud}"] * self.serial
-        target = f"serial:/dev/tty-{self.name}" if self.serial else f"tcp://{self.name}.plant:503"
-        return f"{target}?{'&'.join(filter(None, keys))}"
-
-    def cell(self) -> str:
-        """Its part of the cell file."""
-        language = LANGUAGES[self.language]
-        head = f'[[bus]]\nname = "{self.name}"\nbaud = {self.baud}\n'
-        tables = (
-            language.drive(each, self.em, self.checksum, bool(self.drives)) for each in self.drives or (language.alone,)
-        )
-        return head + "".join(f"[[bus.drive]]\n{table}" for table in tables)
-
-
-@dataclass(frozen=True)
-class Climate:
-    """The probabilities of a seed; `calm`: no faults but stops."""
-
-    calm: bool
-    wire: Faults
-    port: PortFaults
-    late: float
-    slow: float
-
-    @classmethod
-    def drawn(cls, rng: Random) -> Climate:
-        """Draw each fault's own probability."""
-
-        def chance(most: float) -> float:
-            return rng.random() ** 3 * most if rng.random() < 0.5 else 0.0
-
-        if rng.random() < 0.1:
-            return cls(True, Faults(), PortFaults(), 0.0, 0.0)
-        wire = Faults(
-            flip=chance(2e-3),
-            drop=chance(2e-3),
-            double=chance(2e-3),
-            insert=chance(2e-3),
-            late=chance(2e-2),
-            late_by=(0.01, 0.1 + chance(1.5)),
-            delay=(0.0, chance(0.5)),
-        )
-        port = PortFaults(chance(0.5), chance(0.5), chance(0.8), chance(0.5))
-        return cls(False, wire, port, chance(0.02), chance(0.3))
-
-
-def drawn_places(rng: Random) -> list[Place]:
-    """Draw a machine of one to three lines."""
-    places = []
-    for number in range(rng.choice((1, 1, 1, 2, 2, 3))):
-        language = rng.choice(("mcode", "mcode", "mcode", "pmx", "tmcl"))
-        party = language != "mcode" or rng.random() < 0.7
-        names = {"mcode": "abc", "pmx": ("01", "02", "03"), "tmcl": "123"}[language]
-        drives = tuple(names[: rng.randrange(1, 4)]) if party else ()
-        baud = rng.choice((9600, 9600, 19200, 38400, 115200))
-        em, checksum = rng.choice((0, 1, 1, 2, 3)), rng.choice((0, 1, 1, 1, 2)) if party else rng.choice((0, 1))
-        places.append(Place(f"l{number}", language, drives, em, checksum, baud, rng.random() < 0.8))
-    return places
-
-
 @dataclass
 class World:
     """A machine, its person, and the history so far."""
 
     seed: int
     loop: SimulatedLoop
-    rng: Random
     history: History
     climate: Climate
     places: list[Place]
@@ -149,16 +75,21 @@ class World:
     person: Person = field(init=False)
     witnesses: dict[tuple[str, str], Witness] = field(default_factory=dict)
     ports: dict[str, Port] = field(default_factory=dict)
-    serial: int = 0
+    step: int = 0
+    said: int = 0
+    """The number of commands that this step has typed."""
     stops: int = 0
     """The number of stops that were typed, arrived or on their way."""
 
-    def checked(self, line: str) -> bool:
-        """Whether a checksum protects a line."""
-        place = next(each for each in self.places if each.name == line)
-        return place.checksum > 0 and LANGUAGES[place.language].checked
+    def place(self, line: str) -> Place:
+        """A line of the machine."""
+        return next(each for each in self.places if each.name == line)
 
     # Making
+
+    @cached_property
+    def _opening(self) -> Random:
+        return Random(f"{self.seed} opening")
 
     async def begin(self) -> None:
         """Build the floor, open the session, and let the faults begin."""
@@ -173,7 +104,7 @@ class World:
         self.faults(True)
 
     def _watch(self, line: str, drive: str, device: Any) -> None:
-        language = LANGUAGES[next(each.language for each in self.places if each.name == line)]
+        language = LANGUAGES[self.place(line).language]
         witness = self.witnesses[line, drive] = Witness(device, language.asks, language.refused)
         seen = device.execute
 
@@ -192,7 +123,7 @@ class World:
         settings = replace(found, folder=self.folder / "config", state=self.folder / "state")
         self.session = WatchedSession(settings, self)
         self.session.subscribe(self._event)
-        self.person = Person(self.session, self.loop, self.rng, self._typed)
+        self.person = Person(self.session, self.loop, Random(f"{self.seed} person"), self._typed)
 
     async def transport(
         self, connection: Connection, port: str = "", within: float | None = None, baud: int | None = None
@@ -201,7 +132,7 @@ class World:
         name = (
             connection.target.rpartition("-")[2] if connection.scheme == "serial" else connection.host.partition(".")[0]
         )
-        await asyncio.sleep(self.rng.random() * 0.05)
+        await asyncio.sleep(self._opening.random() * 0.05)
         if self.floor.floor.wires[name].hung_up or not self.floor.floor.connectable(name):
             raise Unreachable(f"{connection.short}: not there")
 
@@ -215,8 +146,8 @@ class World:
             self.loop,
             self.floor,
             name,
-            self.rng,
-            self.climate.port,
+            Random(f"{self.seed} port {name} {len(self.history.written)}"),
+            self.climate,
             trace,
             connection.scheme == "serial",
         )
@@ -225,11 +156,11 @@ class World:
     def faults(self, on: bool) -> None:
         """Let the faults begin or end."""
         for name, wire in self.floor.floor.wires.items():
-            wire.disturb(self.climate.wire if on else Faults(), Random(f"{self.seed} {name}"))
-        self.loop.late = self.climate.late if on else 0.0
+            wire.disturb(self.climate.wire if on else Faults(), Random(f"{self.seed} wire {name}"))
+        self.loop.late = self.climate["late timer"] if on else 0.0
         if not on:
             for port in self.ports.values():
-                port._faults = PortFaults()
+                port.climate = Climate(self.seed)
 
     # What happens
 
@@ -269,56 +200,17 @@ class World:
 
     # The story
 
-    def command(self) -> str:
-        """Draw a line for a drive."""
-        place = self.rng.choice(self.places)
-        drive = self.rng.choice(place.drives or (LANGUAGES[place.language].alone,))
-        witness = self.witnesses[place.name, drive]
-        self.serial += 1
-        said = LANGUAGES[place.language].say(self.rng, self.serial, witness, self.floor.now())
-        target = f"@{place.name}:{drive if place.drives else ''} "
-        typed = f"{target}{said.text}"
+    def command(self, rng: Random) -> bytes:
+        """Draw a line for a drive, and its Enter."""
+        place = rng.choice(self.places)
+        drive = rng.choice(place.names)
+        self.said += 1
+        serial = self.step * 100 + self.said
+        said = LANGUAGES[place.language].say(rng, serial, self.witnesses[place.name, drive], self.floor.now())
+        typed = f"@{place.name}:{drive if place.drives else ''} {said.text}"
         if not said.prints:
             self.history.commands[typed] = Command(said.text, place.name, drive, self.loop.now, self.stops)
-        return typed
-
-    async def step(self) -> None:
-        """Let one thing happen."""
-        rng, kind = self.rng, self.rng.random()
-        if kind < 0.55:
-            self.person.type(self.command().encode() + b"\r", rng.choice((0.0, 0.0, 0.01)))
-        elif kind < 0.75:
-            lines = b"".join(self.command().encode() + b"\r" for _ in range(rng.randrange(2, 5)))
-            self.person.type(lines, rng.choice((0.0, 0.02)))
-        elif kind < 0.83:
-            data = b"".join(self.command().encode() + b"\r" for _ in range(rng.randrange(0, 3)))
-            self.stops += 1
-            after = self.command().encode() + b"\r" if rng.random() < 0.5 else b""
-            self.person.type(data + STOP + after, rng.choice((0.0, 0.01)))
-            self.person.type(b"/resume\r", 0.0)
-        elif kind < 0.9:
-            self.person.type(rng.choice((b"/status\r", b"/wait stopped 3\r", b"/resume\r", b"\r", b"/sleep 0.2\r")))
-        elif not self.climate.calm:
-            await self._mishap()
-        await asyncio.sleep(rng.random() ** 2 * rng.choice((0.05, 0.6, 1.0, 2.0)))
-
-    async def _mishap(self) -> None:
-        rng = self.rng
-        place = rng.choice(self.places)
-        kind = rng.random()
-        if kind < 0.4:
-            self.history.count("unplugged")
-            self.floor.command(f"/sim unplug {place.name}")
-            self.loop.call_later(rng.random() * 5, self.floor.command, f"/sim plug {place.name}")
-        elif kind < 0.6:
-            self.history.count("clock of day")
-            self.wall.jump(rng.uniform(-4000, 4000))
-        else:
-            drive = rng.choice(place.drives or (LANGUAGES[place.language].alone,))
-            self.history.count("power")
-            with contextlib.suppress(Diagnostic):
-                self.floor.command(f"/sim power {place.name}:{drive} off")
-                self.loop.call_later(rng.random() * 5, self.floor.command, f"/sim power {place.name}:{drive} on")
+        return typed.encode() + b"\r"
 
     async def end(self) -> None:
         """End the faults, wait until nothing runs, and close."""
@@ -380,10 +272,9 @@ def place_of_state() -> Iterator[Path]:
         shutil.rmtree(folder, ignore_errors=True)
 
 
-def lived(seed: int, steps: int, keep: bool = False) -> World:
-    """Live one seed."""
-    rng = Random(seed)
-    climate, places = Climate.drawn(rng), drawn_places(rng)
+def lived(seed: int, steps: Iterable[int], keep: bool = False, without: Collection[str] = ()) -> World:
+    """Live one seed: these steps of its story, `without` these kinds of faults."""
+    climate, places = Climate.drawn(seed, without), drawn_places(Random(f"{seed} places"))
     history = History(keep=keep)
     loops: list[SimulatedLoop] = []
 
@@ -394,13 +285,13 @@ def lived(seed: int, steps: int, keep: bool = False) -> World:
     with place_of_state() as folder, asyncio.Runner(loop_factory=factory) as runner:
         loop = runner.get_loop()
         assert isinstance(loop, SimulatedLoop)
-        wall, scheduler = Wall(loop), Scheduler(loop, Random(f"{seed} threads"), climate.slow)
-        world = World(seed, loop, rng, history, climate, places, folder, wall, scheduler)
+        wall, scheduler = Wall(loop), Scheduler(loop, Random(f"{seed} threads"), climate["slow thread"])
+        world = World(seed, loop, history, climate, places, folder, wall, scheduler)
 
         async def life() -> None:
             await world.begin()
-            for _ in range(steps):
-                await world.step()
+            for step in steps:
+                await tell(world, step)
             await world.end()
 
         with ExitStack() as stack:

@@ -1,0 +1,99 @@
+"""The story of a seed: what the person does, and what happens to the machine, one act a step.
+
+Each step draws from a random source of its own. So a step does the same whether the steps before it are told or left
+out, which is what shrinking rests on.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+from collections.abc import Callable
+from dataclasses import dataclass
+from random import Random
+from typing import TYPE_CHECKING
+
+from multidrop.dialects import Diagnostic
+
+if TYPE_CHECKING:
+    from soak.simulation.world import World
+
+STOP = b"\x18"
+
+
+@dataclass(frozen=True)
+class Act:
+    """Something that can happen in a step. `fault`: never in a calm seed. `weight`: how often, beside the others."""
+
+    name: str
+    weight: float
+    do: Callable[[World, Random], None]
+    fault: bool = False
+
+
+def one_line(world: World, rng: Random) -> None:
+    """Type a command."""
+    world.person.type(world.command(rng), rng.choice((0.0, 0.0, 0.01)))
+
+
+def several_lines(world: World, rng: Random) -> None:
+    """Type several commands at once."""
+    world.person.type(b"".join(world.command(rng) for _ in range(rng.randrange(2, 5))), rng.choice((0.0, 0.02)))
+
+
+def stop(world: World, rng: Random) -> None:
+    """Type the stop key, before and after commands."""
+    before = b"".join(world.command(rng) for _ in range(rng.randrange(0, 3)))
+    world.stops += 1
+    after = world.command(rng) if rng.random() < 0.5 else b""
+    world.person.type(before + STOP + after, rng.choice((0.0, 0.01)))
+    world.person.type(b"/resume\r", 0.0)
+
+
+def verb(world: World, rng: Random) -> None:
+    """Type a verb that reads or waits."""
+    world.person.type(rng.choice((b"/status\r", b"/wait stopped 3\r", b"/resume\r", b"\r", b"/sleep 0.2\r")), 0.0)
+
+
+def unplug(world: World, rng: Random) -> None:
+    """Pull the cable of a line, for a while."""
+    name = rng.choice(world.places).name
+    world.floor.command(f"/sim unplug {name}")
+    world.loop.call_later(rng.random() * 5, world.floor.command, f"/sim plug {name}")
+
+
+def power_off(world: World, rng: Random) -> None:
+    """Take the power of a drive away, for a while."""
+    place = rng.choice(world.places)
+    drive = f"{place.name}:{rng.choice(place.names)}"
+    with contextlib.suppress(Diagnostic):
+        world.floor.command(f"/sim power {drive} off")
+        world.loop.call_later(rng.random() * 5, world.floor.command, f"/sim power {drive} on")
+
+
+def clock_jumps(world: World, rng: Random) -> None:
+    """Let the clock of day jump."""
+    world.wall.jump(rng.uniform(-4000, 4000))
+
+
+ACTS = (
+    Act("a line", 55, one_line),
+    Act("several lines", 20, several_lines),
+    Act("stop", 8, stop),
+    Act("verb", 7, verb),
+    Act("power off", 4, power_off),
+    Act("unplug", 4, unplug, fault=True),
+    Act("clock jumps", 2, clock_jumps, fault=True),
+)
+
+
+async def tell(world: World, step: int) -> None:
+    """Let one thing happen, and time pass."""
+    rng = Random(f"{world.seed} step {step}")
+    world.step, world.said = step, 0
+    act = rng.choices(ACTS, [each.weight for each in ACTS])[0]
+    pause = rng.random() ** 2 * rng.choice((0.05, 0.6, 1.0, 2.0))
+    if not act.fault or not world.climate.calm:
+        world.history.count(act.name)
+        act.do(world, rng)
+    await asyncio.sleep(pause)
