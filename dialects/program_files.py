@@ -236,7 +236,7 @@ class Word(NamedTuple):
 
 
 class UserName(NamedTuple):
-    """A name that a program gives: `kind` is label, variable, subroutine or program."""
+    """A name that a program gives: `kind` is label, variable, constant, subroutine or program."""
 
     word: str
     """As a message writes it: `G1`, `SUB 3`."""

@@ -161,6 +161,7 @@ TOKENS = {
     "program": "label",
     "subroutine": "label",
     "variable": "variable",
+    "constant": "variable",
     "text": "string",
     "remark": "comment",
 }
@@ -171,6 +172,7 @@ _ITEMS = {
     "label": types.CompletionItemKind.Reference,
     "subroutine": types.CompletionItemKind.Function,
     "variable": types.CompletionItemKind.Variable,
+    "constant": types.CompletionItemKind.Constant,
     "starts": types.CompletionItemKind.Event,
 }
 _SYMBOLS = {
@@ -178,6 +180,7 @@ _SYMBOLS = {
     "subroutine": types.SymbolKind.Function,
     "label": types.SymbolKind.Key,
     "variable": types.SymbolKind.Variable,
+    "constant": types.SymbolKind.Constant,
 }
 _WORD = re.compile(r"\w+|.", re.DOTALL)
 _FENCES = re.compile(r"`+")

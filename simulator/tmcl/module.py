@@ -9,7 +9,7 @@ module drops an unfinished message after a pause. Ruling: the pause is 0.5 s; th
 
 from __future__ import annotations
 
-from contextlib import suppress
+from collections.abc import Mapping
 from dataclasses import dataclass
 from math import inf
 from struct import Struct
@@ -25,10 +25,13 @@ from multidrop.dialects.tmcl.manual.commands import (
     Global,
     Move,
     Parameter,
+    Running,
     Search,
     Status,
     Version,
 )
+from multidrop.dialects.tmcl.manual.instructions import CONTROL, MEMORY, Wait
+from multidrop.dialects.tmcl.manual.program_file import compiled, read
 from multidrop.simulator.cell.spec import DriveSpec
 from multidrop.simulator.tmcl.motor import STORED, Motor, Phase, ReferenceSearch
 from multidrop.simulator.tmcl.program import Program
@@ -39,15 +42,18 @@ VERSION = "1241V115"
 BANK = 0
 EVENTS_AT_ONCE = 100
 """Events of one moment after which time goes on."""
+REACHED_INTERRUPT, LEFT_INTERRUPT, RIGHT_INTERRUPT = 3, 27, 28
+"""The interrupts of motor 0: target reached, left switch, right switch."""
 
 
 @dataclass(frozen=True)
 class Answer:
-    """What the module replies with; `text` in place of a frame's fields."""
+    """What the module replies with; `text` or a stored line in place of a frame's fields."""
 
     status: Status = Status.DONE
     value: int = 0
     text: str = ""
+    line: Call | None = None
 
 
 class Refused(Exception):
@@ -69,11 +75,10 @@ class TmclModule:
         self.powered = False
         self.motor = Motor(world)
 
-        def line(call: Call, now: float) -> None:
-            with suppress(Refused):
-                self._execute(call, now)
-
-        self.program = Program(line, self.motor, lambda: self._search is not None)
+        self.program = Program(self._line, self._waited, self._signals)
+        if spec.program:
+            name = spec.program_name or "program"
+            self.program.load({each.at: each.call for each in compiled(read(spec.program, name))})
         self._search: ReferenceSearch | None = None
         self._notify = 0
         self._notices: list[tuple[float, int]] = []
@@ -119,7 +124,7 @@ class TmclModule:
     def execute(self, call: Call, now: float) -> Answer | None:
         """Carry out a command of a host; its reply, or None where it gives none."""
         self.advance(now)
-        if self.program.storing and call.command != Command.END_DOWNLOAD:
+        if self.program.storing and call.command < CONTROL:
             return Answer(Status.STORED if self.program.store(call) else Status.MAXIMUM_EXCEEDED, call.value)
         try:
             answer = self._execute(call, now)
@@ -150,6 +155,31 @@ class TmclModule:
     def world_changed(self) -> None:
         """Do nothing: `advance` looks at all of the world."""
 
+    def _line(self, call: Call, now: float) -> tuple[int, int]:
+        """Carry out a line of the program; its status and value."""
+        try:
+            answer = self._execute(call, now)
+        except Refused as refused:
+            return refused.status, 0
+        return Status.DONE, answer.value if answer is not None else 0
+
+    def _waited(self, call: Call, now: float) -> bool:
+        """Whether what a WAIT waits for has come."""
+        home, right, left = self.motor.shaft.switches(now)
+        over: Mapping[int, bool] = {
+            Wait.POS: self.motor.reached(now),
+            Wait.REFSW: home,
+            Wait.LIMSW: right or left,
+            Wait.RFS: self._search is None,
+        }
+        return over.get(call.type, True)
+
+    def _signals(self, now: float) -> dict[int, bool]:
+        """The states whose beginning is an interrupt, by its number."""
+        _, right, left = self.motor.shaft.switches(now)
+        reached = self.motor.positioning and self.motor.reached(now)
+        return {REACHED_INTERRUPT: reached, LEFT_INTERRUPT: left, RIGHT_INTERRUPT: right}
+
     def _execute(self, call: Call, now: float) -> Answer | None:
         match call.command:
             case Command.VERSION:
@@ -170,6 +200,10 @@ class TmclModule:
                 return Answer(value=self._global_parameter(call))
         if call.command not in tuple(Command):
             raise Refused(Status.INVALID_COMMAND)
+        if call.command == Command.READ_PROGRAM:
+            if call.value not in range(MEMORY):
+                raise Refused(Status.INVALID_VALUE)
+            return Answer(line=self.program.line(call.value))
         if call.command in range(Command.STOP_PROGRAM, Command.VERSION):
             return Answer(value=self._program_command(call, now))
         if call.command == Command.NOTIFY:  # when the motor reaches its target (command 138)
@@ -182,19 +216,27 @@ class TmclModule:
         return Answer(value=self._motor_command(call, now))
 
     def _program_command(self, call: Call, now: float) -> int:
+        program = self.program
+        if program.storing and call.command in (Command.RUN, Command.STEP):
+            raise Refused(Status.NOT_AVAILABLE)
         match call.command:
             case Command.STOP_PROGRAM | Command.RESET_PROGRAM:
-                self.program.halt(reset=call.command == Command.RESET_PROGRAM)
+                program.halt(reset=call.command == Command.RESET_PROGRAM)
             case Command.RUN:
-                self.program.run(now, call.value if call.type else None)
+                program.run(now, call.value if call.type else None)
             case Command.STEP:
-                self.program.step(now)
+                program.step(now)
             case Command.DOWNLOAD:
-                self.program.download(max(0, call.value))
+                program.download(call.value)
             case Command.END_DOWNLOAD:
-                self.program.storing = False
+                program.storing = False
             case Command.PROGRAM_STATUS:
-                return int(self.program.running)
+                mode = Running.STORES if program.storing else int(program.running)
+                place = mode << 24 | int(program.waiting) << 16 | program.counter
+                states = (mode, place, program.accumulator, program.x)
+                if call.type not in range(len(states)):
+                    raise Refused(Status.WRONG_TYPE)
+                return states[call.type]
         return call.value
 
     def _motor_command(self, call: Call, now: float) -> int:
@@ -266,13 +308,14 @@ class TmclModule:
     def _global_parameter(self, call: Call) -> int:
         if call.motor != BANK:
             raise Refused(Status.INVALID_VALUE)
+        states = (int(self.program.running), int(self.program.storing), self.program.counter)
+        if call.type in range(Global.PROGRAM_STATUS, Global.PROGRAM_STATUS + len(states)):
+            if call.command != Command.GGP:
+                raise Refused(Status.WRONG_TYPE)
+            return states[call.type - Global.PROGRAM_STATUS]
         row = GLOBAL.get(call.type)
         if row is None:
             raise Refused(Status.WRONG_TYPE)
-        if call.type == Global.PROGRAM_STATUS:
-            if call.command != Command.GGP:
-                raise Refused(Status.WRONG_TYPE)
-            return int(self.program.running)
         if call.command == Command.SGP:
             _in_range(row, call.value)
             self._global[call.type] = call.value
@@ -374,6 +417,9 @@ class TmclPort(Port):
             return
         if answer.text:
             self._say(now, bytes([host]) + answer.text.encode("ascii"))
+        elif answer.line is not None:
+            line = answer.line
+            self._say(now, self._frame(line.type, line.motor, line.value, line.command, host))
         else:
             self._say(now, self._frame(answer.status, command, answer.value, address, host))
 

@@ -20,6 +20,7 @@ from multidrop.dialects.errors import Inexpressible
 from multidrop.dialects.state import DriveState, Owed
 from multidrop.dialects.tmcl.manual import commands
 from multidrop.dialects.tmcl.manual.commands import Call, Command, Search, Status, Version, accepted
+from multidrop.dialects.tmcl.manual.instructions import spelled
 
 LENGTH = 9
 _FIELDS = Struct(">BBBBi")
@@ -42,6 +43,12 @@ def frame_of(address: int, call: Call) -> bytes:
 def parse_reply(frame: bytes) -> Frame | None:
     """The fields of a reply; None where its checksum is wrong."""
     return Frame(*_FIELDS.unpack(frame[:-1])) if _sealed(frame[:-1]) == frame else None
+
+
+def line_in(frame: bytes) -> Call:
+    """The stored line in the reply to command 134: it has the places of module, status, command and value."""
+    _, *fields = _FIELDS.unpack(frame[:-1])
+    return Call(*fields)
 
 
 def call_of(frame: bytes) -> tuple[int, Call]:
@@ -116,7 +123,11 @@ class Tmcl(Codec):
             fields = parse_reply(frame)
             if fields is None:
                 return None
-            if (fields.module, fields.command) != (address, call.command) or fields.status == Status.TARGET_REACHED:
+            own = (fields.module, fields.command) == (address, call.command)
+            if call.command == Command.READ_PROGRAM and not own and fields.command != Command.NOTIFY:
+                line = spelled(line_in(frame))
+                return Decoded(Reply((line,), acknowledged=True, body=frame), end, tuple(strays))
+            if not own or fields.status == Status.TARGET_REACHED:
                 strays.append(_described(fields))
                 continue
             if request.gather:  # a refusal proves as much as a value

@@ -71,7 +71,7 @@ def _replied(state: TmclState, request: Request) -> Procedure[Reply]:
     """The reply to a request; a reply that is not awaited to its end is lost."""
     try:
         reply = yield request
-        status = status_of(reply)
+        status = status_of(reply) if call_of(request.body)[1].command != Command.READ_PROGRAM else None
         if status == Status.STORED:
             state.found_storing()
             state.note(f"{who(state)} is in download mode and stored '{request.text}'; {END} or a stop ends that")
@@ -171,6 +171,7 @@ def motors(state: TmclState, priority: Priority = Priority.OPERATOR) -> Procedur
     return count
 
 
+PROGRAM = Call(Command.PROGRAM_STATUS)
 LACKS = (Status.INVALID_COMMAND, Status.WRONG_TYPE, Status.INVALID_VALUE)
 """The statuses of a module that does not know a command or a parameter."""
 
@@ -267,13 +268,18 @@ def moving(state: TmclState) -> Procedure[bool]:
 
 def busy(state: TmclState) -> Procedure[bool]:
     """Whether its program runs; a module that knows neither question has none."""
-    for call in (Call(Command.PROGRAM_STATUS), Call(Command.GGP, Global.PROGRAM_STATUS)):
+    for call in (Call(Command.GGP, Global.PROGRAM_STATUS), PROGRAM):
         try:
-            return (yield from read(state, call)) == Running.RUNS
+            return mode_of((yield from read(state, call))) == Running.RUNS
         except Refused as refused:
             if refused.code not in LACKS:
                 raise
     return False
+
+
+def mode_of(value: int) -> int:
+    """What a program does, in the reply to command 135: all of it, or its upper byte; and in global parameter 128."""
+    return value if value in tuple(Running) else value >> 24 & 0xFF
 
 
 def status(state: TmclState) -> Procedure[tuple[str, ...]]:
@@ -347,9 +353,6 @@ def _found(state: TmclState) -> Procedure[bool]:
     """Ask one module for its version and count its motors; whether it replied."""
     for _ in range(TRIES):
         reply = yield state.codec.request(state.address, "136 1, 0, 0", IDENTITY)
-        if status_of(reply) == Status.STORED:
-            yield from _end_download(state, "found in download mode, where it stored one command more")
-            reply = yield state.codec.request(state.address, "136 1, 0, 0", IDENTITY)
         damaged = reply.end is End.REFUSED and int(reply.text) == Status.WRONG_CHECKSUM
         if reply.end in (End.DONE, End.REFUSED) and not damaged:
             break
@@ -360,8 +363,17 @@ def _found(state: TmclState) -> Procedure[bool]:
         state.identified(f"TMCM-{number >> 16}", f"{number >> 8 & 0xFF}.{number & 0xFF:02}")
     else:
         state.identified("TMCL module", "")
+    reply = yield state.codec.request(state.address, "135 0, 0, 0", PROGRAM)
+    if reply.end is End.DONE and mode_of(int(reply.text)) == Running.STORES:
+        yield from _end_download(state, "found in download mode")
     try:
         yield from motors(state)
+        if state.programming:  # it stores what it is asked, and does not know that question
+            state.executes()
+            state.owes_nothing()
+            state.motors_counted(0)
+            yield from _end_download(state, "found in download mode, where it stored one command more")
+            yield from motors(state)
     except NoAnswer as error:
         state.note(f"{who(state)}: its motors are not counted; a stop is for {MOST_MOTORS} ({error})")
     return True

@@ -39,6 +39,7 @@ class Command(IntEnum):
     RESET_PROGRAM = 131
     DOWNLOAD = 132
     END_DOWNLOAD = 133
+    READ_PROGRAM = 134
     PROGRAM_STATUS = 135
     VERSION = 136
     FACTORY = 137
@@ -68,6 +69,7 @@ class Running(IntEnum):
     RUNS = 1
     STEPS = 2
     RESET = 3
+    STORES = 4
 
 
 class Version(IntEnum):
@@ -172,7 +174,8 @@ class Call:
         """Whether the value of its reply is what was asked for."""
         if self.command == Command.RFS:
             return self.type == Search.STATUS
-        return self.command in (Command.VERSION, Command.PROGRAM_STATUS) or (self.row is not None and self.row.prints)
+        asks = (Command.VERSION, Command.PROGRAM_STATUS, Command.READ_PROGRAM)
+        return self.command in asks or (self.row is not None and self.row.prints)
 
     @property
     def moves(self) -> bool:
@@ -199,6 +202,7 @@ NEVER_MOVE = frozenset(
         Command.RESET_PROGRAM,
         Command.DOWNLOAD,
         Command.END_DOWNLOAD,
+        Command.READ_PROGRAM,
         Command.PROGRAM_STATUS,
         Command.VERSION,
         Command.NOTIFY,
@@ -351,6 +355,8 @@ class Global(IntEnum):
     HOST_ADDRESS = 76
     AUTOSTART = 77
     PROGRAM_STATUS = 128
+    DOWNLOAD_MODE = 129
+    PROGRAM_COUNTER = 130
 
 
 @dataclass(frozen=True)

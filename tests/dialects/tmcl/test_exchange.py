@@ -86,7 +86,7 @@ def state(shop):
 
 def test_identification_reads_version_and_motors_and_moves_nothing(shop, state):
     assert (state.address, state.product, state.version, state.motors) == ("1", "TMCM-1241", "1.15", 1)
-    assert {data[1] for data in shop.written} <= {Command.VERSION, Command.GAP}
+    assert {data[1] for data in shop.written} <= {Command.VERSION, Command.PROGRAM_STATUS, Command.GAP}
 
 
 def test_several_modules_are_found_and_one_that_is_absent_is_named():
