@@ -389,12 +389,12 @@ class Program:
             if at <= t:
                 come.add(number)
                 self._start_timer(number, t)
-        number = min((each for each in come if each in self._enabled and each in self._vectors), default=None)
-        if number is None or ALL not in self._enabled or self._context is not None:
+        first = min((each for each in come if each in self._enabled and each in self._vectors), default=None)
+        if first is None or ALL not in self._enabled or self._context is not None:
             return
         state = (self.counter, self.accumulator, self.x, self._zero, self._order)
         self._context = Context(*state, self._waits, self._due)
-        self.counter, self._waits, self._due = self._vectors[number], None, t + LINE_TIME
+        self.counter, self._waits, self._due = self._vectors[first], None, t + LINE_TIME
 
     def _return(self) -> None:
         if self._context is not None:
