@@ -21,6 +21,16 @@ FAULTS = {
     "full": 0.5,
     "split": 0.8,
     "late read": 0.5,
+    # of the network, each segment, datagram, connection or reply
+    "net late": 0.05,
+    "slow connect": 0.3,
+    "refused": 0.3,
+    "datagram lost": 0.1,
+    "datagram doubled": 0.05,
+    "datagram late": 0.1,
+    "reply late": 0.1,
+    "reply again": 0.1,
+    "reply of another": 0.05,
     # of the loop and of threads, each turn or step
     "late timer": 0.02,
     "slow thread": 0.3,

@@ -7,10 +7,14 @@ number that an object of the simulation has; that object says when it can be rea
 from __future__ import annotations
 
 import asyncio
+import socket
 from collections.abc import Callable
 from concurrent.futures import Executor
 from random import Random
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from soak.simulation.network import Network
 
 LATE = 10.0
 """The longest delay of a timer, s."""
@@ -35,7 +39,9 @@ class SimulatedLoop(asyncio.BaseEventLoop):
         """`BaseEventLoop` asks it what is ready, and how long to wait."""
         self._readers: dict[int, asyncio.Handle] = {}
         self._writers: dict[int, asyncio.Handle] = {}
-        self._descriptors = 1000
+        self.descriptors = 1000
+        """The number of the last one."""
+        self.network: Network
         self.set_exception_handler(lambda loop, context: self.defects.append(context))
 
     # What asyncio asks of a loop
@@ -85,12 +91,37 @@ class SimulatedLoop(asyncio.BaseEventLoop):
         self.call_later(self._rng.random() * 0.002, work)
         return future
 
+    # The network
+
+    async def getaddrinfo(  # type: ignore[override]
+        self, host: str, port: int, *, type: int = 0, **how: Any
+    ) -> list[tuple[Any, ...]]:
+        """Look up a host: each has one address, which is its name."""
+        await asyncio.sleep(self._rng.random() * 0.001)
+        return [(socket.AF_INET, type, 0, "", (host, port))]
+
+    async def sock_connect(self, sock: Any, address: Any) -> None:
+        """Connect a socket of the simulation."""
+        await self.network.connect(sock, address)
+
+    async def create_server(  # type: ignore[override]
+        self, protocol_factory: Any, host: str, port: int
+    ) -> Any:
+        """Listen."""
+        return self.network.listen(protocol_factory, host, port)
+
+    async def create_datagram_endpoint(  # type: ignore[override]
+        self, protocol_factory: Any, local_addr: tuple[str, int]
+    ) -> Any:
+        """Take datagrams."""
+        return self.network.datagrams(protocol_factory, local_addr)
+
     # Descriptors
 
     def descriptor(self) -> int:
         """A number for a new simulated descriptor."""
-        self._descriptors += 1
-        return self._descriptors
+        self.descriptors += 1
+        return self.descriptors
 
     def add_reader(self, fd: int, callback: Callable[..., Any], *arguments: Any) -> None:  # type: ignore[override]
         """Call back while a descriptor can be read."""

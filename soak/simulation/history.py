@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 from enum import Enum
 from hashlib import sha256
 
-UNSENT = re.compile(r"^not sent, as .*?: (.*)$")
+UNSENT = re.compile(r"^not sent, as (?:'.*?' failed|.*?): (.*)$")
 
 
 @dataclass(frozen=True)
@@ -20,6 +20,10 @@ class Stop:
 
     at: float
     forms: dict[str, tuple[bytes, ...]]
+    rests: dict[str, int] = field(default_factory=dict)
+    """By line, the bytes of a message that had begun to leave, which leave before it."""
+    who: str = ""
+    """Whose stop it was; empty: this person's."""
 
 
 class Outcome(Enum):
@@ -46,6 +50,8 @@ class Command:
     """What it prints, if the reply is not damaged; empty: it is a command."""
     outcome: Outcome = Outcome.OPEN
     said: str = ""
+    who: str = ""
+    """Who typed it; empty: this person."""
     began: float = -1.0
     ended: float = -1.0
 
@@ -72,6 +78,8 @@ class History:
     """Drives that were said to stand, and moved."""
     written: list[tuple[float, str, bytes]] = field(default_factory=list)
     """Time, port and bytes of each write that the kernel took."""
+    opened: list[tuple[float, str]] = field(default_factory=list)
+    """Time and line of each descriptor that was opened."""
     notices: list[tuple[float, str]] = field(default_factory=list)
     defects: list[str] = field(default_factory=list)
     counts: dict[str, int] = field(default_factory=dict)

@@ -67,22 +67,24 @@ def _done(world: World) -> Iterator[str]:
 def _nothing_before(world: World) -> Iterator[str]:
     """Bytes of a command that was typed before a stop leave after it."""
     for each in world.history.commands.values():
-        if each.stops >= len(world.history.stops):
+        stops = [stop.at for stop in world.history.stops if stop.who == each.who]
+        if each.stops >= len(stops):
             continue
-        stop = world.history.stops[each.stops].at
+        stop = stops[each.stops]
         text = re.compile(rb"(?<![0-9A-Za-z])" + re.escape(each.text.encode()) + rb"(?![0-9])")
         for at, line, data in world.history.written:
-            if at > stop and line == each.line and text.search(data):
+            if at > stop and line == each.line + each.who and text.search(data):
                 yield f"{_said(each, 1)}: typed at {each.typed:.3f}, stop at {stop:.3f}, written at {at:.3f}"
 
 
 def _first(world: World) -> Iterator[str]:
-    """What leaves next on a line that can be written is its stop."""
+    """What leaves next on a line that can be written is its stop, after the rest of a message that must leave whole."""
     for stop in world.history.stops:
         for line, forms in stop.forms.items():
             after = [(at, data) for at, port, data in world.history.written if port == line and at >= stop.at]
             if after and after[0][0] <= stop.at + SOON:
-                begun = after[0][1]
+                begun = b"".join(data for at, data in after if at <= stop.at + SOON)
+                begun = begun[stop.rests[line] :]
                 if not any(form.startswith(begun) or begun.startswith(form) for form in forms):
                     yield f"{line}: stop at {stop.at:.6f}, {begun!r} left at {after[0][0]:.6f}"
 

@@ -22,85 +22,122 @@ ROOM = 4095
 # meanwhile: the kinds "part", "full", "split" and "late read" of the climate.
 
 
-class Port:
-    """An open descriptor of a simulated bus. `flushes`: what has not left can be taken back, as on a tty."""
+Trace = Callable[[str, bytes], None]
+"""Notes the bytes that were written (">") or read ("<")."""
 
-    def __init__(
-        self,
-        name: str,
-        loop: SimulatedLoop,
-        floor: RunningFloor,
-        bus: str,
-        rng: Random,
-        climate: Climate,
-        trace: Callable[[str, bytes], None],
-        flushes: bool = True,
-    ) -> None:
-        self._name, self._loop, self._floor, self._bus = name, loop, floor, bus
-        self._rng, self.climate, self._trace, self._flushes = rng, climate, trace, flushes
-        self._descriptor = loop.descriptor()
-        self._received = bytearray()
-        self._source = floor.source()
-        self._gone = False
-        self._waiting = False
+
+class Descriptor:
+    """An open descriptor: what is common to a tty and a socket."""
+
+    def __init__(self, loop: SimulatedLoop, rng: Random, climate: Climate, trace: Trace) -> None:
+        self.loop, self.rng, self.climate, self.trace = loop, rng, climate, trace
         self.closed = False
-        self._detach = floor.attach(bus, self)
-
-    # The kernel's side of a descriptor
-
-    @property
-    def name(self) -> str:
-        """The name for a person."""
-        return self._name
+        self.rest = 0
+        """Bytes of a write that has begun and that the kernel has not taken."""
+        self._descriptor = loop.descriptor()
+        self._waiting = False
 
     def fileno(self) -> int:
         """The descriptor."""
         return self._descriptor
 
-    def read(self) -> bytes | None:
+    def piece(self, arrived: bytearray, most: int) -> bytes:
+        """Take a piece of the bytes that have come."""
+        size = min(len(arrived), most)
+        if size > 1 and self.rng.random() < self.climate["split"]:
+            size = self.rng.randrange(1, size)
+        data = bytes(arrived[:size])
+        del arrived[:size]
+        self.trace("<", data)
+        return data
+
+    def taken(self, data: bytes | memoryview, room: int, busy: bool = True) -> int:
+        """The number of bytes of a write that are taken now; all or a part unless `busy`. Raises BlockingIOError."""
+        if room <= 0 or (busy and self.rng.random() < self.climate["full"]):
+            self.loop.call_later(0.001 + self.rng.random() * 0.01, self.loop.writable, self._descriptor)
+            raise BlockingIOError(errno.EAGAIN, "no room")
+        size = min(len(data), room)
+        if size > 1 and self.rng.random() < self.climate["part"]:
+            size = self.rng.randrange(1, size)
+        if size < len(data):
+            self.loop.call_later(0.001 + self.rng.random() * 0.01, self.loop.writable, self._descriptor)
+        self.rest = len(data) - size
+        self.trace(">", bytes(data[:size]))
+        return size
+
+    def wake(self) -> None:
+        """Let the reader read, perhaps late."""
+        if self._waiting:
+            return
+        self._waiting = True
+        late = self.rng.random() * 0.02 if self.rng.random() < self.climate["late read"] else 0.0
+        self.loop.call_later(late, self._readable)
+
+    def _readable(self) -> None:
+        self._waiting = False
+        self.loop.readable(self._descriptor)
+
+
+class Port(Descriptor):
+    """An open tty on the wire of a bus. What has not left can be taken back."""
+
+    def __init__(
+        self,
+        loop: SimulatedLoop,
+        floor: RunningFloor,
+        bus: str,
+        rng: Random,
+        climate: Climate,
+        trace: Trace,
+        baud: int | None = None,
+    ) -> None:
+        super().__init__(loop, rng, climate, trace)
+        self.baud = baud
+        self._floor, self._bus = floor, bus
+        self._received = bytearray()
+        self._source = floor.source()
+        self._gone = False
+        self._detach = floor.attach(bus, self)
+
+    # The kernel's side of a descriptor
+
+    def recv(self, most: int) -> bytes:
         """Bytes that have come."""
         if not self._received:
             if self._gone:
                 raise OSError(errno.EIO, "Input/output error")
             raise BlockingIOError(errno.EAGAIN, "no bytes")
-        size = len(self._received)
-        if size > 1 and self._rng.random() < self.climate["split"]:
-            size = self._rng.randrange(1, size)
-        data = bytes(self._received[:size])
-        del self._received[:size]
+        data = self.piece(self._received, most)
         if self._received or self._gone:
-            self._wake()
-        self._trace("<", data)
+            self.wake()
         return data
 
-    def write(self, data: bytes | memoryview) -> int:
+    def send(self, data: bytes | memoryview) -> int:
         """Take bytes, as many as there is room for."""
         if self._gone or self.closed:
             raise OSError(errno.EIO, "Input/output error")
-        room = ROOM - self.unsent()
-        if room <= 0 or self._rng.random() < self.climate["full"]:
-            self._loop.call_later(0.001 + self._rng.random() * 0.01, self._loop.writable, self._descriptor)
-            raise BlockingIOError(errno.EAGAIN, "no room")
-        size = min(len(data), room)
-        if size > 1 and self._rng.random() < self.climate["part"]:
-            size = self._rng.randrange(1, size)
-        if size < len(data):
-            self._loop.call_later(0.001 + self._rng.random() * 0.01, self._loop.writable, self._descriptor)
-        self._trace(">", bytes(data[:size]))
-        self._floor.write(self._bus, bytes(data[:size]), self._source)
+        size = self.taken(data, ROOM - self.unsent())
+        self._floor.write(self._bus, bytes(data[:size]), self._source, self.baud)
         return size
+
+    @property
+    def readable(self) -> bool:
+        """Whether a read does not wait."""
+        return bool(self._received or self._gone)
+
+    @property
+    def writable(self) -> bool:
+        """Whether a write does not wait."""
+        return self._gone or self.unsent() < ROOM
 
     def unsent(self) -> int:
         """Bytes that the kernel holds."""
         return self._floor.floor.wires[self._bus].queued(self._source)
 
-    def drop(self) -> int:
+    def drop(self) -> None:
         """Take back what the kernel holds."""
-        return self._floor.retract(self._bus, self._source) if self._flushes and not self._gone else 0
-
-    def explain(self, error: OSError | None) -> str:
-        """The reason of a break."""
-        return "unplugged" if error is not None else "closed by the other end"
+        if not self._gone:
+            self._floor.retract(self._bus, self._source)
 
     def close(self) -> None:
         """Close the descriptor."""
@@ -114,12 +151,12 @@ class Port:
         """Take bytes from the wire."""
         if not self._gone and not self.closed:
             self._received += data
-            self._wake()
+            self.wake()
 
     def unplugged(self) -> None:
         """The adapter is pulled: reads and writes fail from now on."""
         self._gone = True
-        self._wake()
+        self.wake()
 
     def plugged(self) -> None:
         """Do nothing: a descriptor of a pulled adapter stays dead."""
@@ -130,14 +167,3 @@ class Port:
 
     def connectable(self) -> None:
         """Do nothing: somebody has to connect anew."""
-
-    def _wake(self) -> None:
-        if self._waiting:
-            return
-        self._waiting = True
-        late = self._rng.random() * 0.02 if self._rng.random() < self.climate["late read"] else 0.0
-        self._loop.call_later(late, self._readable)
-
-    def _readable(self) -> None:
-        self._waiting = False
-        self._loop.readable(self._descriptor)

@@ -14,6 +14,7 @@ from random import Random
 from typing import TYPE_CHECKING
 
 from multidrop.dialects import Diagnostic
+from soak.simulation import acts_connections
 
 if TYPE_CHECKING:
     from soak.simulation.world import World
@@ -84,6 +85,7 @@ ACTS = (
     Act("power off", 4, power_off),
     Act("unplug", 4, unplug, fault=True),
     Act("clock jumps", 2, clock_jumps, fault=True),
+    *(Act(*each) for each in acts_connections.ACTS),
 )
 
 

@@ -11,40 +11,46 @@ import contextlib
 import re
 import shutil
 import tempfile
-from collections.abc import Awaitable, Callable, Collection, Iterable, Iterator
-from contextlib import ExitStack
+from collections.abc import Collection, Iterable, Iterator
+from contextlib import AsyncExitStack, ExitStack
 from dataclasses import dataclass, field, replace
-from functools import cached_property
 from pathlib import Path
 from random import Random
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from multidrop.dialects import Diagnostic, DriveError
 from multidrop.drives.bus import Bus
 from multidrop.drives.stopping import stop_forms
 from multidrop.shell.configuration import Settings, parse
-from multidrop.shell.connect import opening
-from multidrop.shell.connect.urls import Connection
 from multidrop.shell.events import Failed, Notified, Output, Printed
 from multidrop.shell.line_syntax import TypedLine
 from multidrop.shell.session import Session
+from multidrop.shell.sharing.server import SharedPort
+from multidrop.shell.sharing.writer_turns import Say
 from multidrop.simulator import cells
 from multidrop.simulator.cell.spec import Faults
 from multidrop.simulator.floor import Floor
+from multidrop.simulator.serving.endpoints import serve_bus
 from multidrop.simulator.serving.running import RunningFloor
-from multidrop.transports import Transport, TransportLost, Unreachable
-from multidrop.transports.pipe import DescriptorPipe
+from multidrop.transports import TransportLost, telnet
+from multidrop.transports.relay import Kind, frame
 from soak.judge import Witness, Word, word
 from soak.languages import LANGUAGES, PROGRAM
 from soak.simulation.climate import Climate
 from soak.simulation.clock import SimulatedLoop
+from soak.simulation.far import share
 from soak.simulation.history import Command, Executed, History, Outcome, Stop
+from soak.simulation.kernel import WHO, Kernel
+from soak.simulation.network import Network
 from soak.simulation.person import Person
-from soak.simulation.places import Place, drawn_places
-from soak.simulation.ports import Port
+from soak.simulation.places import SERIAL, Place, drawn_places
+from soak.simulation.ports import Trace
 from soak.simulation.story import STOP, tell
 from soak.simulation.threads import Scheduler
 from soak.simulation.wall import Wall
+
+if TYPE_CHECKING:
+    from soak.simulation.acts_connections import Other
 
 STOPPED = re.compile(r"(?:(\w+): )(?:(\w+): )?stopped, velocity 0 ")
 WORDS = {
@@ -54,6 +60,8 @@ WORDS = {
     Word.NOT_EXECUTED: Outcome.NOT_SENT,
     Word.UNKNOWN: Outcome.UNKNOWN,
 }
+HARMLESS = {"flip": 0.0, "drop": 0.0, "double": 0.0, "insert": 0.0}
+"""Bytes on a network are not damaged: TCP repairs or ends the connection, and a damaged datagram is dropped."""
 LONGEST = 400.0
 """Virtual seconds in which everything that was begun ends, once the faults are over."""
 
@@ -74,7 +82,13 @@ class World:
     session: Session = field(init=False)
     person: Person = field(init=False)
     witnesses: dict[tuple[str, str], Witness] = field(default_factory=dict)
-    ports: dict[str, Port] = field(default_factory=dict)
+    network: Network = field(init=False)
+    kernel: Kernel = field(init=False)
+    others: list[Other] = field(default_factory=list)
+    """Other people, who share lines."""
+    shares: dict[str, SharedPort] = field(default_factory=dict)
+    """What lends the ports of lines to several people."""
+    stack: AsyncExitStack = field(default_factory=AsyncExitStack)
     step: int = 0
     said: int = 0
     """The number of commands that this step has typed."""
@@ -87,9 +101,23 @@ class World:
 
     # Making
 
-    @cached_property
-    def _opening(self) -> Random:
-        return Random(f"{self.seed} opening")
+    def __post_init__(self) -> None:
+        self.network = self.loop.network = Network(self.loop, Random(f"{self.seed} network"), Climate(self.seed))
+        self.kernel = Kernel(self.loop, self.seed, self.climate, self.network, self._notebook)
+
+    def _notebook(self, who: str, line: str) -> Trace:
+        """Note what is written to a line, and read; what a computer that lends it does is seen on its wire."""
+        if who == "far":
+            return lambda way, data: self.history.note(self.loop.now, f"{way} {line} far", data.hex())
+        name = f"{line}{who}"
+        self.history.opened.append((self.loop.now, name))
+
+        def trace(way: str, data: bytes) -> None:
+            self.history.note(self.loop.now, f"{way} {name}", data.hex())
+            if way == ">":
+                self.history.written.append((self.loop.now, name, data))
+
+        return trace
 
     async def begin(self) -> None:
         """Build the floor, open the session, and let the faults begin."""
@@ -99,6 +127,13 @@ class World:
         self.floor = RunningFloor(Floor(cells.load(str(cell))))
         for placed in self.floor.floor.drives:
             self._watch(placed.bus, placed.spec.name, placed.device)
+        for place in self.places:
+            if place.kind in SERIAL:
+                self.kernel.adapter(self.floor, place.name, place.link)
+            if place.kind == "rfc2217":
+                await self.lend(place)
+        for bus in self.floor.floor.cell.buses:
+            await serve_bus(self.floor, bus, self.stack)
         self._open_session()
         await self.session.open_all([place.name for place in self.places], lambda number, failure: None)
         self.faults(True)
@@ -118,68 +153,65 @@ class World:
 
         device.execute = execute
 
-    def _open_session(self) -> None:
+    async def lend(self, place: Place) -> None:
+        """Lend the port of a line, as a computer beside it does."""
+        token = WHO.set("far")
+        url = f"serial:{place.link}?baud={place.baud}&dialect={place.language}"
+        try:
+            self.shares[place.name] = await share(url, place.language, place.host, 2217, self._lent)
+        finally:
+            WHO.reset(token)
+
+    def _lent(self, said: Say) -> None:
+        self.history.note(self.loop.now, "share", f"{said.client} {said.event} {said.detail}")
+
+    def settings(self, folder: Path) -> Settings:
+        """The settings of a person, who has the connections of all lines."""
         found = parse("".join(f'[connections.{each.name}]\nurl = "{each.url}"\n' for each in self.places), "world")
-        settings = replace(found, folder=self.folder / "config", state=self.folder / "state")
-        self.session = WatchedSession(settings, self)
-        self.session.subscribe(self._event)
+        return replace(found, folder=folder / "config", state=folder / "state")
+
+    def another(self, place: Place, who: str) -> Session:
+        """A session of another person, which opens a line that is shared."""
+        made = WatchedSession(self.settings(self.folder / who), self)
+        made.subscribe(lambda event: self.heard(event, who))
+        return made
+
+    def _open_session(self) -> None:
+        self.session = WatchedSession(self.settings(self.folder), self)
+        self.session.subscribe(self.heard)
         self.person = Person(self.session, self.loop, Random(f"{self.seed} person"), self._typed)
-
-    async def transport(
-        self, connection: Connection, port: str = "", within: float | None = None, baud: int | None = None
-    ) -> Transport:
-        """In place of the ports of this machine: a descriptor of the simulated kernel."""
-        name = (
-            connection.target.rpartition("-")[2] if connection.scheme == "serial" else connection.host.partition(".")[0]
-        )
-        await asyncio.sleep(self._opening.random() * 0.05)
-        if self.floor.floor.wires[name].hung_up or not self.floor.floor.connectable(name):
-            raise Unreachable(f"{connection.short}: not there")
-
-        def trace(way: str, data: bytes) -> None:
-            self.history.note(self.loop.now, f"{way} {name}", data.hex())
-            if way == ">":
-                self.history.written.append((self.loop.now, name, data))
-
-        made = self.ports[name] = Port(
-            connection.short,
-            self.loop,
-            self.floor,
-            name,
-            Random(f"{self.seed} port {name} {len(self.history.written)}"),
-            self.climate,
-            trace,
-            connection.scheme == "serial",
-        )
-        return DescriptorPipe(made)
 
     def faults(self, on: bool) -> None:
         """Let the faults begin or end."""
         for name, wire in self.floor.floor.wires.items():
-            wire.disturb(self.climate.wire if on else Faults(), Random(f"{self.seed} wire {name}"))
+            faults = self.climate.wire if self.place(name).noisy else replace(self.climate.wire, **HARMLESS)
+            wire.disturb(faults if on else Faults(), Random(f"{self.seed} wire {name}"))
         self.loop.late = self.climate["late timer"] if on else 0.0
+        self.kernel.quiet(self.climate if on else Climate(self.seed))
         if not on:
-            for port in self.ports.values():
-                port.climate = Climate(self.seed)
+            self.network.heal()
+            for adapter in self.kernel.adapters:
+                adapter.held = False
 
     # What happens
 
-    def _event(self, event: object) -> None:
+    def heard(self, event: object, who: str = "") -> None:
+        """Take what a session says."""
         if isinstance(event, Notified | Failed | Printed | Output):
             self.history.note(self.loop.now, type(event).__name__, event.text)
             self.history.notices.append((self.loop.now, event.text))
         if isinstance(event, Notified):
             self.history.unsent(event.text)
             if (found := STOPPED.match(event.text)) is not None:
-                self._judge_stopped(found[1], found[2] or "")
+                self._judge_stopped(found[1], found[2] or "", who)
 
-    def _judge_stopped(self, line: str, drive: str) -> None:
+    def _judge_stopped(self, line: str, drive: str, who: str) -> None:
         """Note a drive that is said to stand and moves, unless a line has started it since the stop."""
         now = self.floor.now()
         for placed in self.floor.floor.drives:
             if placed.bus != line or (drive and placed.spec.name != drive):
                 continue
-            since = self.history.stops[-1].at if self.history.stops else 0.0
+            since = max((each.at for each in self.history.stops if each.who == who), default=0.0)
             name = placed.spec.name
             started = any(
                 each.at >= since and (each.line, each.drive) == (line, name) for each in self.history.executed
@@ -188,29 +220,50 @@ class World:
                 self.history.untrue.append(f"{self.loop.now:.3f} {line}:{name} is said to be stopped, and moves")
 
     def _typed(self, data: bytes) -> None:
-        self.history.note(self.loop.now, "key", data.hex())
+        self.typed(data, self.session)
+
+    def typed(self, data: bytes, session: Session, who: str = "") -> None:
+        """Take what somebody types; at a stop, note what has to leave next on each line."""
+        self.history.note(self.loop.now, f"key{who}", data.hex())
         if STOP in data:
-            forms = {name: self._forms(bus) for name, bus in self.session.buses.items() if not bus.link.lost}
-            self.history.stops.append(Stop(self.loop.now, {name: each for name, each in forms.items() if each}))
+            buses = {name: bus for name, bus in session.buses.items() if not bus.link.lost}
+            forms = {f"{name}{who}": self._forms(bus) for name, bus in buses.items()}
+            rests = {f"{name}{who}": self.kernel.rest(f"{name}{who}") for name in buses}
+            self.history.stops.append(Stop(self.loop.now, forms, rests, who))
 
     def _forms(self, bus: Bus) -> tuple[bytes, ...]:
-        """What a stop of a line may begin with; empty where a frame that has begun leaves whole before it."""
-        forms = stop_forms(bus.roster)
-        return () if forms.framed else (forms.immediate, forms.unterminated)
+        """What a stop of a line may begin with."""
+        forms, kind = stop_forms(bus.roster), self.place(bus.name).kind
+        found = (forms.immediate,) if forms.framed else (forms.immediate, forms.unterminated)
+        if kind == "rfc2217":
+            purge = b"" if forms.framed else telnet.message(telnet.Setting.PURGE, telnet.PURGE_UNSENT)
+            return tuple(purge + telnet.escaped(each) for each in found)
+        if kind == "ssh":
+            drop = b"" if forms.framed else frame(Kind.DROP)
+            return tuple(drop + bytes((Kind.DATA,)) for each in found)
+        return found
 
     # The story
 
-    def command(self, rng: Random) -> bytes:
-        """Draw a line for a drive, and its Enter."""
-        place = rng.choice(self.places)
+    def command(self, rng: Random, place: Place | None = None, who: str = "", stops: int | None = None) -> bytes:
+        """Draw a line for a drive, and its Enter. `who` types it, after so many stops of his own."""
+        place = place or rng.choice(self.places)
         drive = rng.choice(place.names)
         self.said += 1
         serial = self.step * 100 + self.said
         said = LANGUAGES[place.language].say(rng, serial, self.witnesses[place.name, drive], self.floor.now())
         typed = f"@{place.name}:{drive if place.drives else ''} {said.text}"
         if not said.prints:
-            self.history.commands[typed] = Command(said.text, place.name, drive, self.loop.now, self.stops)
+            self.history.commands[typed] = Command(
+                said.text, place.name, drive, self.loop.now, self.stops if stops is None else stops, who=who
+            )
         return typed.encode() + b"\r"
+
+    def stop(self) -> None:
+        """Type the stop key."""
+        self.stops += 1
+        self.person.type(STOP, 0.0)
+        self.person.type(b"/resume\r", 0.0)
 
     async def end(self) -> None:
         """End the faults, wait until nothing runs, and close."""
@@ -224,10 +277,16 @@ class World:
             await asyncio.sleep(1.0)
         await self.person.leave()
         await self.session.close()
+        for other in self.others:
+            await other.leave()
+        for shared in self.shares.values():
+            await shared.close()
+        await self.stack.aclose()
         self.floor.close()
         await asyncio.sleep(30.0)
         left = [each for each in asyncio.all_tasks() if each is not asyncio.current_task()]
         self.history.defects += [f"task left: {each.get_coro()}" for each in left]
+        self.history.defects += [f"open: {each!r}" for each in self.kernel.descriptors.values() if not each.closed]
         self.history.defects += [f"thread left: {each.name}" for each in self.scheduler.running]
 
 
@@ -297,17 +356,7 @@ def lived(seed: int, steps: Iterable[int], keep: bool = False, without: Collecti
         with ExitStack() as stack:
             stack.enter_context(wall.installed())
             stack.enter_context(scheduler.installed())
-            stack.enter_context(_replaced(opening, "_transport", world.transport))
+            stack.enter_context(world.kernel.installed())
             runner.run(life())
         history.defects += [str(each.get("exception") or each.get("message")) for each in loop.defects]
     return world
-
-
-@contextlib.contextmanager
-def _replaced(module: Any, name: str, value: Callable[..., Awaitable[Any]]) -> Iterator[None]:
-    before = getattr(module, name)
-    setattr(module, name, value)
-    try:
-        yield
-    finally:
-        setattr(module, name, before)

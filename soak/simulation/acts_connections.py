@@ -1,0 +1,136 @@
+"""What happens to connections, and another person who shares a line."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable
+from contextvars import copy_context
+from random import Random
+from typing import TYPE_CHECKING
+
+from soak.simulation.kernel import WHO, Adapter
+from soak.simulation.person import Person
+
+if TYPE_CHECKING:
+    from soak.simulation.places import Place
+    from soak.simulation.world import World
+
+LONG = 12.0
+"""The longest time that a host is away or dark, s: longer than a system waits for it."""
+SECOND = "2"
+"""The other person, as `WHO`."""
+
+
+class Other:
+    """Another person, with a session of his own on a line that is shared."""
+
+    def __init__(self, world: World, place: Place) -> None:
+        self.place, self._world = place, world
+        self.stops = 0
+        self.session = world.another(place, SECOND)
+        self.person = Person(self.session, world.loop, Random(f"{world.seed} other"), self._typed)
+        self._opening = world.loop.create_task(self.session.open_all([place.name], lambda number, failure: None))
+
+    def _typed(self, data: bytes) -> None:
+        self._world.typed(data, self.session, SECOND)
+
+    async def leave(self) -> None:
+        """Close the session."""
+        await asyncio.wait([self._opening])
+        await self.person.leave()
+        await self.session.close()
+
+
+def _host(world: World, rng: Random) -> str:
+    """A line that a network leads to, as its host; empty if there is none."""
+    hosts = [place.host for place in world.places if place.kind != "serial"]
+    return rng.choice(hosts) if hosts else ""
+
+
+def cut(world: World, rng: Random) -> None:
+    """Reset the connections of a host, perhaps in the middle of an exchange."""
+    world.person.type(world.command(rng), 0.0)
+    world.loop.call_later(rng.random() ** 2 * 0.3, world.network.cut, _host(world, rng))
+
+
+def dark(world: World, rng: Random) -> None:
+    """Let a host vanish without a word, and come back."""
+    world.network.darken(_host(world, rng), rng.random() ** 4 * LONG)
+    world.person.type(world.command(rng), 0.0)
+
+
+def restart(world: World, rng: Random) -> None:
+    """Let a server end and begin again."""
+    world.network.refuse(_host(world, rng), rng.random() ** 4 * LONG)
+
+
+def replug(world: World, rng: Random) -> None:
+    """Pull adapters and plug them in again in another order: each may get the number of another."""
+    for adapter in world.kernel.adapters:
+        world.floor.command(f"/sim unplug {adapter.line}")
+    for adapter in rng.sample(world.kernel.adapters, len(world.kernel.adapters)):
+        world.loop.call_later(rng.random() * 2, world.floor.command, f"/sim plug {adapter.line}")
+
+
+def busy(world: World, rng: Random) -> None:
+    """Pull an adapter; another program opens its port before it is back, and closes it after a while."""
+    if not world.kernel.adapters:
+        return
+    adapter = rng.choice(world.kernel.adapters)
+    world.floor.command(f"/sim unplug {adapter.line}")
+    adapter.held = True
+    world.loop.call_later(rng.random(), world.floor.command, f"/sim plug {adapter.line}")
+    world.loop.call_later(rng.random() * 8, _release, adapter)
+
+
+def _release(adapter: Adapter) -> None:
+    adapter.held = False
+
+
+def stop_while_away(world: World, rng: Random) -> None:
+    """Type a command, lose a line, and type the stop before the line is back."""
+    place = rng.choice(world.places)
+    world.person.type(world.command(rng, place), 0.0)
+    away = 0.05 + rng.random() ** 2 * 6
+    if place.kind == "serial":
+        world.loop.call_later(0.03, world.floor.command, f"/sim unplug {place.name}")
+        world.loop.call_later(0.03 + away, world.floor.command, f"/sim plug {place.name}")
+    else:
+        world.loop.call_later(0.03, world.network.refuse, place.host, away)
+    world.loop.call_later(0.03 + rng.random() * away, world.stop)
+
+
+def another(world: World, rng: Random) -> None:
+    """Another person types at a line that is shared: a command, or a stop."""
+    places = [place for place in world.places if place.kind == "rfc2217"]
+    if not places:
+        return
+    if not world.others:
+        context = copy_context()
+        context.run(WHO.set, SECOND)
+        world.others.append(context.run(Other, world, places[0]))
+    [other] = world.others
+    if rng.random() < 0.4:
+        other.stops += 1
+        other.person.type(b"\x18", 0.0)
+    else:
+        other.person.type(world.command(rng, other.place, SECOND, other.stops), 0.0)
+
+
+def stop_at_the_share(world: World, rng: Random) -> None:
+    """Type the stop at the computer that lends a line."""
+    for shared in world.shares.values():
+        shared.stop()
+
+
+ACTS: tuple[tuple[str, float, Callable[[World, Random], None], bool], ...] = (
+    ("connection cut", 1.5, cut, True),
+    ("half-open", 1.5, dark, True),
+    ("server restarts", 1.5, restart, True),
+    ("adapters replugged", 0.7, replug, True),
+    ("port busy", 0.7, busy, True),
+    ("stop while away", 1, stop_while_away, True),
+    ("another person", 5, another, False),
+    ("stop at the share", 1, stop_at_the_share, False),
+)
+"""Name, weight, deed, and whether it is a fault: see `story.Act`."""
