@@ -91,9 +91,12 @@ $(FUZZ)/.done: constraints.txt
 soak: $(VENV)/.dev
 	SOAK=$(or $(SOAK),full) $(BIN)/python -m soak
 
-# Seeds of the whole program in simulated time: SEED=7 one, with its trace if it breaks a rule; SEEDS=1-200 a range.
+# Seeds of the whole program in simulated time: SEED=7 one; SEEDS=1-200 a range on all cores (JOBS=2: on two), which
+# RESUME=FILE takes up again; STEPS=60: longer. ONLY=3,9 WITHOUT=flip,late: what a failure was shrunk to. See CONTRIBUTING.
 simulate: $(VENV)/.dev
-	$(BIN)/python -m soak.simulation $(if $(SEED),--seed $(SEED)) $(if $(SEEDS),--seeds $(SEEDS)) $(if $(STEPS),--steps $(STEPS))
+	$(BIN)/python -m soak.simulation $(if $(SEED),--seed $(SEED)) $(if $(SEEDS),--seeds $(SEEDS)) \
+	  $(if $(STEPS),--steps $(STEPS)) $(if $(ONLY),--only $(ONLY)) $(if $(WITHOUT),--without '$(WITHOUT)') \
+	  $(if $(JOBS),--jobs $(JOBS)) $(if $(RESUME),--resume $(RESUME)) $(if $(MUTANT),--mutant $(MUTANT))
 
 snapshots: $(VENV)/.dev
 	$(BIN)/python -m pytest tests -k snapshot --snapshot-update

@@ -1,68 +1,95 @@
-"""Live seeds and judge them. Run: `make simulate SEED=7`, `make simulate SEEDS=1-200`, with `STEPS=60` for longer ones.
+"""Live seeds and judge them. Run: `make simulate SEED=7`, or SEEDS=1-200 on all cores; STEPS=60 for longer stories.
 
-The last line of a seed is the same in every run of it. A range prints only the seeds that broke, then the counts.
+A seed that breaks a rule is shrunk to the fewest steps and kinds of faults. Its trace follows, the command that lives
+just these again (ONLY=, WITHOUT=), and the one line of the seed. RESUME=FILE keeps the results of a range, so that it
+can be taken up again. MUTANT=NAME plants a defect first, and ends at the seed that catches it; MUTANT=all tries each.
 """
 
 from __future__ import annotations
 
 import argparse
-from collections import Counter
+import sys
+from pathlib import Path
 
-from soak.simulation.judge import broken
-from soak.simulation.world import World, lived
-
-STEPS = 30
-
-
-def verdict(world: World) -> str:
-    """The line of a seed."""
-    rules = dict.fromkeys(rule.name for rule, _ in broken(world))
-    said = f"broke {', '.join(rules)}" if rules else "held"
-    history = world.history
-    return (
-        f"seed {world.seed}: {said}, {world.loop.now:.1f} virtual s, {len(history.commands)} commands, "
-        f"trace {history.trace}"
-    )
+from soak.simulation.climate import FAULTS
+from soak.simulation.judge import judged
+from soak.simulation.runs import STEPS, Figures, lives, run, verdict
+from soak.simulation.shrinking import Life, shrunk
+from soak.simulation.trace import readable
 
 
-def main() -> int:
-    """Live the seeds of the arguments; return 1 if one broke."""
+def main(arguments: list[str] | None = None) -> int:
+    """Live the seeds of the arguments; return 1 if one broke, 2 for wrong arguments."""
     parser = argparse.ArgumentParser(prog="make simulate", description=__doc__)
     parser.add_argument("--seed", type=int)
-    parser.add_argument("--seeds", help="a range, A-B")
+    parser.add_argument("--seeds", default="1-100", help="a range, A-B")
     parser.add_argument("--steps", type=int, default=STEPS)
-    chosen = parser.parse_args()
+    parser.add_argument("--only", type=_numbers, help="the only steps that are told: 3,9,12")
+    parser.add_argument("--without", type=_kinds, default=(), help="kinds of faults that are left out: flip,late")
+    parser.add_argument("--jobs", type=int, default=0, help="processes; one a core unless given")
+    parser.add_argument("--resume", type=Path, help="a file of results to take up again")
+    parser.add_argument("--until-broken", action="store_true", help="end at the first seed that breaks a rule")
+    chosen = parser.parse_args(arguments)
+    steps = chosen.only if chosen.only is not None else tuple(range(chosen.steps))
     if chosen.seed is not None:
-        return _one(chosen.seed, chosen.steps)
-    first, _, last = (chosen.seeds or "1-100").partition("-")
-    return _range(range(int(first), int(last or first) + 1), chosen.steps)
+        return _one(Life(chosen.seed, steps, chosen.without), whole=chosen.only is None)
+    first, _, last = chosen.seeds.partition("-")
+    try:
+        return _range(range(int(first), int(last or first) + 1), chosen)
+    except ValueError as problem:
+        print(problem, file=sys.stderr)
+        return 2
 
 
-def _one(seed: int, steps: int) -> int:
-    world = lived(seed, range(steps), keep=True)
-    found = broken(world)
-    if found:
-        print("\n".join(world.history.lines))
-    for rule, text in found:
-        print(f"{rule.name}: {text}")
+def _numbers(text: str) -> tuple[int, ...]:
+    return tuple(map(int, filter(None, text.split(","))))
+
+
+def _kinds(text: str) -> tuple[str, ...]:
+    kinds = tuple(filter(None, text.split(",")))
+    if unknown := [each for each in kinds if each not in FAULTS]:
+        raise argparse.ArgumentTypeError(f"no kind of fault {unknown[0]}; valid: {', '.join(FAULTS)}")
+    return kinds
+
+
+def _one(life: Life, whole: bool) -> int:
+    """Live a seed; shrink a whole story that breaks a rule, and show what is left of it."""
+    world = life.live()
+    found = judged(world)
+    for name in found.rules[:1]:
+        life = shrunk(life, name) if whole else life
+        _show(life)
     print(verdict(world))
-    return int(bool(found))
+    return int(bool(found.breaches))
 
 
-def _range(seeds: range, steps: int) -> int:
-    counts: Counter[str] = Counter()
-    for seed in seeds:
-        world = lived(seed, range(steps))
-        counts["commands"] += len(world.history.commands)
-        counts["virtual s"] += round(world.loop.now)
-        counts.update(world.history.counts)
-        if found := broken(world):
-            counts["broken"] += 1
-            print(verdict(world), flush=True)
-            for rule, text in found:
-                print(f"  {rule.name}: {text}", flush=True)
-    print(f"{len(seeds)} seeds: " + ", ".join(f"{number} {name}" for name, number in counts.items()))
-    return int(counts["broken"] > 0)
+def _show(life: Life) -> None:
+    world = life.live(keep=True)
+    print("\n".join(readable(world)))
+    for rule, text in judged(world).breaches:
+        print(f"{rule.name} ({rule.sentence} docs/safety.md, {rule.promise!r}): {text}")
+    print(f"again: {life.command}")
+
+
+def _range(seeds: range, chosen: argparse.Namespace) -> int:
+    """Live a range; shrink the first seed that breaks each rule."""
+    figures, seen = Figures(), set[str]()
+    for each in run(lives(seeds, chosen.steps), chosen.jobs, chosen.resume):
+        figures.add(each)
+        if not each.breaches:
+            continue
+        print(each.line)
+        for name, text in each.breaches:
+            print(f"  {name}: {text}")
+        if chosen.until_broken:
+            return 1
+        name = each.breaches[0][0]
+        if name not in seen:
+            seen.add(name)
+            print(f"  again: {shrunk(Life(each.seed, tuple(range(chosen.steps))), name).command}")
+        sys.stdout.flush()
+    print("\n".join(figures.rows()))
+    return int(figures.broken > 0)
 
 
 if __name__ == "__main__":

@@ -16,6 +16,8 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from soak.simulation.network import Network
 
+MOST_TURNS = 5_000_000
+"""Turns of the loop that no seed takes."""
 LATE = 10.0
 """The longest delay of a timer, s."""
 
@@ -55,6 +57,8 @@ class SimulatedLoop(asyncio.BaseEventLoop):
         self.turns += 1
         if timeout is None:
             raise Deadlock("nothing is ready, and no timer is set")
+        if self.turns > MOST_TURNS:
+            raise Deadlock(f"the loop turns for ever, at {self.now:.1f} s")
         self.now += max(0.0, timeout)
         if self.late and self._rng.random() < self.late:
             self.now += self._rng.random() ** 4 * LATE

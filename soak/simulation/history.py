@@ -10,6 +10,7 @@ import re
 from dataclasses import dataclass, field
 from enum import Enum
 from hashlib import sha256
+from math import inf
 
 UNSENT = re.compile(r"^not sent, as (?:'.*?' failed|.*?): (.*)$")
 
@@ -46,8 +47,6 @@ class Command:
     drive: str
     typed: float
     stops: int
-    expects: str = ""
-    """What it prints, if the reply is not damaged; empty: it is a command."""
     outcome: Outcome = Outcome.OPEN
     said: str = ""
     who: str = ""
@@ -66,6 +65,40 @@ class Executed:
     text: str
 
 
+@dataclass(frozen=True)
+class Damage:
+    """Bytes on a wire that noise changed."""
+
+    at: float
+    before: bytes
+    after: bytes
+
+
+@dataclass
+class Held:
+    """A value that a drive held. `restarts`: those of the drive so far."""
+
+    line: str
+    drive: str
+    number: str
+    at: float
+    restarts: int
+    until: float = inf
+
+
+@dataclass(frozen=True)
+class Shown:
+    """A value that was shown as a drive's. `began`: when the question began that it answers; `form`: its print."""
+
+    line: str
+    drive: str
+    text: str
+    form: str
+    began: float
+    at: float
+    restarts: int
+
+
 @dataclass
 class History:
     """Everything that happened, in its order."""
@@ -80,11 +113,23 @@ class History:
     """Time, port and bytes of each write that the kernel took."""
     opened: list[tuple[float, str]] = field(default_factory=list)
     """Time and line of each descriptor that was opened."""
+    received: dict[str, list[tuple[float, bytes]]] = field(default_factory=dict)
+    """Time and bytes of each read, by line."""
+    damage: dict[str, list[Damage]] = field(default_factory=dict)
+    """What noise changed, by line."""
+    questions: dict[str, str] = field(default_factory=dict)
+    """Typed lines that ask for a value, and what they print: `{}` stands for the value."""
+    asked: int = 0
+    """The number of times that one was typed."""
+    held: list[Held] = field(default_factory=list)
+    shown: list[Shown] = field(default_factory=list)
+    exchanges: int = 0
+    """Requests that have ended."""
     notices: list[tuple[float, str]] = field(default_factory=list)
     defects: list[str] = field(default_factory=list)
     counts: dict[str, int] = field(default_factory=dict)
-    lines: list[str] = field(default_factory=list)
-    """The trace, for a person."""
+    lines: list[tuple[float, str, str]] = field(default_factory=list)
+    """The trace: times, kinds and texts."""
     keep: bool = False
     _hash: object = field(default_factory=sha256)
 
@@ -93,7 +138,7 @@ class History:
         row = f"{at:.6f} {kind} {text}"
         self._hash.update(row.encode())  # type: ignore[attr-defined]
         if self.keep:
-            self.lines.append(row)
+            self.lines.append((at, kind, text))
 
     @property
     def trace(self) -> str:
@@ -103,6 +148,13 @@ class History:
     def count(self, kind: str) -> None:
         """Count a fault or an event."""
         self.counts[kind] = self.counts.get(kind, 0) + 1
+
+    def holds(self, held: Held) -> None:
+        """Note the value that a drive holds from now on."""
+        for each in self.held:
+            if (each.line, each.drive, each.until) == (held.line, held.drive, inf):
+                each.until = held.at
+        self.held.append(held)
 
     def unsent(self, notice: str) -> None:
         """Take a notice that a line was not sent."""

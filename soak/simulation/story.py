@@ -97,5 +97,6 @@ async def tell(world: World, step: int) -> None:
     pause = rng.random() ** 2 * rng.choice((0.05, 0.6, 1.0, 2.0))
     if not act.fault or not world.climate.calm:
         world.history.count(act.name)
+        world.history.note(world.loop.now, "step", f"{step}: {act.name}")
         act.do(world, rng)
     await asyncio.sleep(pause)

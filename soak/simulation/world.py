@@ -8,11 +8,14 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import logging
 import re
 import shutil
 import tempfile
-from collections.abc import Collection, Iterable, Iterator
+from collections import Counter
+from collections.abc import Callable, Collection, Iterable, Iterator
 from contextlib import AsyncExitStack, ExitStack
+from contextvars import ContextVar
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from random import Random
@@ -20,14 +23,15 @@ from typing import TYPE_CHECKING, Any
 
 from multidrop.dialects import Diagnostic, DriveError
 from multidrop.drives.bus import Bus
+from multidrop.drives.events import LOG, Ended
 from multidrop.drives.stopping import stop_forms
 from multidrop.shell.configuration import Settings, parse
-from multidrop.shell.events import Failed, Notified, Output, Printed
+from multidrop.shell.events import Failed, Notified, OnBus, Output, Printed
 from multidrop.shell.line_syntax import TypedLine
 from multidrop.shell.session import Session
 from multidrop.shell.sharing.server import SharedPort
 from multidrop.shell.sharing.writer_turns import Say
-from multidrop.simulator import cells
+from multidrop.simulator import cells, wire
 from multidrop.simulator.cell.spec import Faults
 from multidrop.simulator.floor import Floor
 from multidrop.simulator.serving.endpoints import serve_bus
@@ -37,9 +41,9 @@ from multidrop.transports.relay import Kind, frame
 from soak.judge import Witness, Word, word
 from soak.languages import LANGUAGES, PROGRAM
 from soak.simulation.climate import Climate
-from soak.simulation.clock import SimulatedLoop
+from soak.simulation.clock import Deadlock, SimulatedLoop
 from soak.simulation.far import share
-from soak.simulation.history import Command, Executed, History, Outcome, Stop
+from soak.simulation.history import Command, Damage, Executed, Held, History, Outcome, Shown, Stop
 from soak.simulation.kernel import WHO, Kernel
 from soak.simulation.network import Network
 from soak.simulation.person import Person
@@ -62,8 +66,21 @@ WORDS = {
 }
 HARMLESS = {"flip": 0.0, "drop": 0.0, "double": 0.0, "insert": 0.0}
 """Bytes on a network are not damaged: TCP repairs or ends the connection, and a damaged datagram is dropped."""
+HARMED = wire.harmed
+NUMBER = r"\d{7,8}"
+"""A unique value."""
 LONGEST = 400.0
 """Virtual seconds in which everything that was begun ends, once the faults are over."""
+ASKED: ContextVar[tuple[str, float] | None] = ContextVar("asked", default=None)
+"""The question that runs in this task, and when it began; None: none that the judge knows."""
+
+
+class WireRandom(Random):
+    """The source of chance of the wire of one line."""
+
+    def __init__(self, seed: int, line: str) -> None:
+        super().__init__(f"{seed} wire {line}")
+        self.line = line
 
 
 @dataclass
@@ -94,6 +111,8 @@ class World:
     """The number of commands that this step has typed."""
     stops: int = 0
     """The number of stops that were typed, arrived or on their way."""
+    _powered: Counter[tuple[str, str]] = field(default_factory=Counter)
+    """How often the power of each drive was switched."""
 
     def place(self, line: str) -> Place:
         """A line of the machine."""
@@ -116,6 +135,8 @@ class World:
             self.history.note(self.loop.now, f"{way} {name}", data.hex())
             if way == ">":
                 self.history.written.append((self.loop.now, name, data))
+            else:
+                self.history.received.setdefault(line, []).append((self.loop.now, data))
 
         return trace
 
@@ -151,7 +172,25 @@ class World:
                 self.history.note(self.loop.now, f"! {line}:{drive}", each)
             return answer
 
-        device.execute = execute
+        switched = device.power
+
+        def power(on: bool, now: float) -> None:
+            self._powered[line, drive] += 1
+            switched(on, now)
+
+        device.execute, device.power = execute, power
+
+    def restarts(self, line: str, drive: str) -> int:
+        """How often a drive has lost what it held."""
+        return self._powered[line, drive] + int(getattr(self.witnesses[line, drive].device, "boots", 0))
+
+    def harmed(self, data: bytes, faults: Faults, rng: Random) -> bytes:
+        """In place of the noise of a wire: the same noise, and a note of what it changed."""
+        after = HARMED(data, faults, rng)
+        if after != data and isinstance(rng, WireRandom):
+            self.history.damage.setdefault(rng.line, []).append(Damage(self.loop.now, data, after))
+            self.history.count("bytes damaged")
+        return after
 
     async def lend(self, place: Place) -> None:
         """Lend the port of a line, as a computer beside it does."""
@@ -183,9 +222,9 @@ class World:
 
     def faults(self, on: bool) -> None:
         """Let the faults begin or end."""
-        for name, wire in self.floor.floor.wires.items():
+        for name, each in self.floor.floor.wires.items():
             faults = self.climate.wire if self.place(name).noisy else replace(self.climate.wire, **HARMLESS)
-            wire.disturb(faults if on else Faults(), Random(f"{self.seed} wire {name}"))
+            each.disturb(faults if on else Faults(), WireRandom(self.seed, name))
         self.loop.late = self.climate["late timer"] if on else 0.0
         self.kernel.quiet(self.climate if on else Climate(self.seed))
         if not on:
@@ -197,6 +236,9 @@ class World:
 
     def heard(self, event: object, who: str = "") -> None:
         """Take what a session says."""
+        if isinstance(event, OnBus):
+            self.history.exchanges += isinstance(event.event, Ended)
+            return
         if isinstance(event, Notified | Failed | Printed | Output):
             self.history.note(self.loop.now, type(event).__name__, event.text)
             self.history.notices.append((self.loop.now, event.text))
@@ -204,6 +246,11 @@ class World:
             self.history.unsent(event.text)
             if (found := STOPPED.match(event.text)) is not None:
                 self._judge_stopped(found[1], found[2] or "", who)
+        if isinstance(event, Printed) and (asked := ASKED.get()) is not None:
+            names = self.place(event.bus).names
+            drive = event.address if event.address in names else names[0]
+            form, began, restarts = self.history.questions[asked[0]], asked[1], self.restarts(event.bus, drive)
+            self.history.shown.append(Shown(event.bus, drive, event.text, form, began, self.loop.now, restarts))
 
     def _judge_stopped(self, line: str, drive: str, who: str) -> None:
         """Note a drive that is said to stand and moves, unless a line has started it since the stop."""
@@ -253,7 +300,13 @@ class World:
         serial = self.step * 100 + self.said
         said = LANGUAGES[place.language].say(rng, serial, self.witnesses[place.name, drive], self.floor.now())
         typed = f"@{place.name}:{drive if place.drives else ''} {said.text}"
-        if not said.prints:
+        if said.prints:
+            number = re.findall(NUMBER, said.prints)[0]
+            self.history.questions[typed] = said.prints.replace(number, "{}")
+            self.history.asked += 1
+            restarts = self.restarts(place.name, drive)
+            self.history.holds(Held(place.name, drive, number, self.loop.now, restarts))
+        else:
             self.history.commands[typed] = Command(
                 said.text, place.name, drive, self.loop.now, self.stops if stops is None else stops, who=who
             )
@@ -300,7 +353,9 @@ class WatchedSession(Session):
     async def run(self, line: str | TypedLine, *arguments: Any, **named: Any) -> None:
         """Run a line, and note its outcome."""
         text = (line if isinstance(line, str) else line.typed).strip()
-        command = self._world.history.commands.get(text)
+        history = self._world.history
+        command = history.commands.get(text)
+        ASKED.set((text, self.now()) if text in history.questions else None)
         if command is None:
             return await super().run(line, *arguments, **named)
         command.began = self.now()
@@ -310,7 +365,7 @@ class WatchedSession(Session):
             self._ended(command, failure)
             raise
         except asyncio.CancelledError:
-            command.outcome, command.said = Outcome.UNKNOWN, "cancelled"
+            command.outcome, command.said, command.ended = Outcome.UNKNOWN, "cancelled", self.now()
             raise
         else:
             self._ended(command, ())
@@ -319,6 +374,8 @@ class WatchedSession(Session):
         command.ended, command.said = self.now(), str(result)
         notices = [text for at, text in self._world.history.notices if at >= command.began]
         command.outcome = WORDS[word(result, notices)]
+        where = f"{command.line}:{command.drive} {command.text!r}"
+        self._world.history.note(command.ended, "host", f"{where}: {command.outcome.value} ({command.said})")
 
 
 @contextlib.contextmanager
@@ -357,6 +414,40 @@ def lived(seed: int, steps: Iterable[int], keep: bool = False, without: Collecti
             stack.enter_context(wall.installed())
             stack.enter_context(scheduler.installed())
             stack.enter_context(world.kernel.installed())
-            runner.run(life())
+            stack.enter_context(_replaced(wire, "harmed", world.harmed))
+            stack.enter_context(_logged(history))
+            try:
+                runner.run(life())
+            except Deadlock as defect:
+                history.defects.append(str(defect))
         history.defects += [str(each.get("exception") or each.get("message")) for each in loop.defects]
     return world
+
+
+@contextlib.contextmanager
+def _replaced(module: Any, name: str, value: Callable[..., Any]) -> Iterator[None]:
+    before = getattr(module, name)
+    setattr(module, name, value)
+    try:
+        yield
+    finally:
+        setattr(module, name, before)
+
+
+@contextlib.contextmanager
+def _logged(history: History) -> Iterator[None]:
+    """Take what the product writes to its log of defects."""
+
+    class Defects(logging.Handler):
+        def emit(self, record: logging.LogRecord) -> None:
+            cause = record.exc_info[1] if record.exc_info else ""
+            history.defects.append(f"{record.getMessage()}: {cause!r}")
+
+    handler, propagated = Defects(logging.ERROR), LOG.propagate
+    LOG.addHandler(handler)
+    LOG.propagate = False
+    try:
+        yield
+    finally:
+        LOG.propagate = propagated
+        LOG.removeHandler(handler)

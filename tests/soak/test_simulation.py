@@ -1,21 +1,35 @@
-"""The whole program in simulated time: a seed is one history, whatever the order of sets, and the rules hold in it."""
+"""The whole program in simulated time: the rules hold in the history of each seed, and a seed has one history."""
 
 from __future__ import annotations
 
+import re
 import subprocess
 import sys
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import pytest
 
-from soak.simulation.__main__ import verdict
-from soak.simulation.judge import broken
+from soak.simulation import shrinking
+from soak.simulation.__main__ import main
+from soak.simulation.climate import FAULTS
+from soak.simulation.history import Command, Damage, Executed, Held, History, Outcome, Shown
+from soak.simulation.judge import RULES, Judgement, broken
+from soak.simulation.outcomes import OUTCOMES
+from soak.simulation.places import Place
+from soak.simulation.rule import Granted, Rule
+from soak.simulation.runs import derived, lives, result, run, verdict
+from soak.simulation.seeds import DERIVED, FIXED
+from soak.simulation.shrinking import Life, shrunk
+from soak.simulation.trace import readable
 from soak.simulation.world import lived
 from tests.support.paths import ROOT
 
-SEEDS = (3, 9, 137, 472, 882)
+SAFETY = (ROOT / "docs" / "safety.md").read_text()
 
 
-@pytest.mark.parametrize("seed", SEEDS)
+@pytest.mark.parametrize("seed", [*FIXED, *derived(DERIVED)])
 def test_the_rules_hold(seed: int) -> None:
     world = lived(seed, range(30))
     assert broken(world) == []
@@ -28,3 +42,166 @@ def test_a_seed_gives_the_same_history_in_another_process_with_other_hashes() ->
     command = (sys.executable, "-m", "soak.simulation", "--seed", "3", "--steps", "20")
     there = subprocess.run(command, cwd=ROOT, env={"PYTHONHASHSEED": "77"}, capture_output=True, text=True, check=True)
     assert there.stdout.splitlines()[-1] == here
+
+
+# Rules
+
+
+def _promised(where: str) -> bool:
+    """Whether docs/safety.md has a heading or a line in bold of this name, or a decision this number."""
+    if re.fullmatch(r"\d{4}", where):
+        return bool(list((ROOT / "docs" / "decisions").glob(f"{where}-*.md")))
+    return f"## {where}\n" in SAFETY or f"**{where}.**" in SAFETY
+
+
+@pytest.mark.parametrize("rule", RULES, ids=lambda rule: rule.name)
+def test_each_rule_and_each_of_its_exceptions_is_written_where_it_says(rule: Rule) -> None:
+    assert _promised(rule.promise), rule.promise
+    for grant in rule.grants:
+        assert _promised(grant.by), grant.by
+
+
+def test_docs_list_every_rule_by_its_name_and_its_sentence() -> None:
+    assert [f"| {rule.name} | {rule.sentence} |" for rule in RULES] == re.findall(
+        r"^\| [^|]+ \| [^|]+\. \|$", SAFETY[SAFETY.index("## The judge of a simulated session") :], re.M
+    )
+
+
+def found(history: History, checksum: int = 1) -> dict[str, list[str | Granted]]:
+    """What the rules of commands and values find on a line of two drives, `a` and `b`."""
+    place = Place("l", "mcode", ("a", "b"), 1, checksum, 9600, True)
+    world: Any = SimpleNamespace(history=history, place=lambda line: place)
+    return {rule.name: list(rule.check(world)) for rule in OUTCOMES if list(rule.check(world))}
+
+
+def told(outcome: Outcome, executions: int, noise: tuple[bytes, bytes] | None = None) -> History:
+    """A command from 1 s to 2 s, executed so often; `noise`: what it changed meanwhile."""
+    command = Command("MR 7", "l", "a", 0.9, 0, outcome, began=1.0, ended=2.0)
+    history = History(commands={"@l:a MR 7": command}, executed=[Executed(1.5, "l", "a", "MR 7")] * executions)
+    if noise is not None:
+        history.damage["l"] = [Damage(1.4, *noise)]
+    return history
+
+
+@pytest.mark.parametrize(
+    ("rule", "history"),
+    [
+        ("twice", told(Outcome.UNKNOWN, 2)),
+        ("denied", told(Outcome.NOT_SENT, 1)),
+        ("refused", told(Outcome.REFUSED, 1)),
+        ("lost", told(Outcome.OK, 0)),
+    ],
+)
+def test_a_breach_about_a_command_is_seen(rule: str, history: History) -> None:
+    [[name, [breach]]] = found(history).items()
+    assert (name, type(breach)) == (rule, str)
+    history.damage["l"] = [Damage(9.0, b"1", b"2")]
+    assert found(history, checksum=0) == {rule: [breach]}, "noise at another time excepts nothing"
+
+
+@pytest.mark.parametrize(
+    ("history", "checksum", "grant"),
+    [
+        (told(Outcome.UNKNOWN, 2, (b"\x06", b"\x15")), 1, "a NAK of noise"),
+        (told(Outcome.UNKNOWN, 2, (b"8", b"7")), 0, "a damaged command without a checksum"),
+        (told(Outcome.NOT_SENT, 1, (b"8", b"7")), 0, "a damaged command without a checksum"),
+        (told(Outcome.REFUSED, 1, (b">", b"?")), 0, "a refusal of noise, without a checksum"),
+        (told(Outcome.OK, 0, (b"7", b"8")), 0, "a damaged command without a checksum"),
+        (told(Outcome.OK, 0, (b"", b"\x06")), 1, "an ACK of noise"),
+    ],
+)
+def test_what_no_host_can_know_is_granted(history: History, checksum: int, grant: str) -> None:
+    [[each]] = found(history, checksum).values()
+    assert isinstance(each, Granted)
+    assert each.grant.name == grant
+
+
+def test_with_a_checksum_noise_alone_excepts_nothing() -> None:
+    for history in (told(Outcome.NOT_SENT, 1, (b"8", b"7")), told(Outcome.OK, 0, (b"7", b"8"))):
+        [[each]] = found(history).values()
+        assert isinstance(each, str)
+
+
+def test_a_command_that_became_another_one_with_a_right_checksum_is_granted() -> None:
+    history = told(Outcome.OK, 0)
+    history.executed.append(Executed(1.5, "l", "a", "MR 8"))
+    [[each]] = found(history).values()
+    assert isinstance(each, Granted)
+    assert each.grant.name == "a checksum of seven or eight bits"
+
+
+def shown(text: str, drive: str = "a", restarts: int = 0) -> History:
+    """A value that was shown as a drive's from 5 s to 6 s: `a` held 70000001, then 70000002; `b` 70000003."""
+    history = History(shown=[Shown("l", drive, text, "v{}", 5.0, 6.0, restarts)])
+    for drive, number, at in (("a", "70000001", 1.0), ("b", "70000003", 1.0), ("a", "70000002", 4.0)):
+        history.holds(Held("l", drive, number, at, 0))
+    return history
+
+
+def test_a_value_of_the_drive_at_that_time_is_right() -> None:
+    assert not found(shown("v70000002"))
+    assert not found(shown("v0", restarts=1))
+
+
+@pytest.mark.parametrize("text", ["v70000001", "v70000003", "tick 50000012", "70000002", "v0", "v7000000"])
+def test_any_other_value_is_a_breach(text: str) -> None:
+    [[each]] = found(shown(text)).values()
+    assert isinstance(each, str)
+
+
+def test_a_damaged_value_is_granted_without_a_checksum_and_where_the_checksum_is_right() -> None:
+    history = shown("v70000009")
+    history.damage["l"] = [Damage(5.5, b"2", b"9")]
+    [[bare]] = found(history, checksum=0).values()
+    [[wrong]] = found(history).values()
+    line = b"v70000009"
+    history.received["l"] = [(5.5, line[:4]), (5.6, line[4:] + bytes([-sum(line) & 0x7F | 0x80]) + b"\r\n\x06")]
+    [[right]] = found(history).values()
+    assert [type(each) for each in (bare, wrong, right)] == [Granted, str, Granted]
+
+
+# Runs
+
+
+def test_a_failure_is_shrunk_to_the_steps_and_faults_that_it_needs(monkeypatch: pytest.MonkeyPatch) -> None:
+    rule = RULES[0]
+    monkeypatch.setattr(
+        shrinking, "judged", lambda world: Judgement([(rule, "")] if len(world.history.stops) > 1 else [])
+    )
+    seed = next(seed for seed in range(1, 50) if len(lived(seed, range(20)).history.stops) > 2)
+    life = shrunk(Life(seed, tuple(range(20))), rule.name)
+    assert len(life.steps) == 2
+    assert not set(lived(seed, ()).climate.chances) - set(life.without)
+    assert life.command.startswith(f"make simulate SEED={seed} ONLY={life.steps[0]},{life.steps[1]}")
+
+
+def test_a_trace_shows_keys_and_bytes_as_text_and_in_hex_and_both_records() -> None:
+    rows = "\n".join(readable(Life(3, tuple(range(6))).live(keep=True)))
+    assert re.search(r"^ +\d+\.\d{6} key +'.*\\r' +[0-9a-f ]+$", rows, re.M)
+    assert re.search(r"^ +\d+\.\d{6} > l\d +'.*' +[0-9a-f ]+$", rows, re.M)
+    assert re.search(r"^l\d:.* '.*', typed at .*; the host: ok.*; the drive executed at \d", rows, re.M)
+
+
+@pytest.mark.process
+def test_a_run_is_taken_up_again(tmp_path: Path) -> None:
+    todo, file = lives(range(1, 6), 5), tmp_path / "results"
+    whole = [each.line for each in run(todo, jobs=1, resume=file)]
+    rows = file.read_text().splitlines(keepends=True)
+    file.write_text("".join(rows[:3]) + rows[3][:40])
+    assert [each.line for each in run(todo, jobs=2, resume=file)] == whole
+    assert len(file.read_text().splitlines()) == len(rows)
+    with pytest.raises(ValueError, match="results of another run"):
+        list(run(lives(range(1, 6), 6), resume=file))
+
+
+def test_a_seed_ends_with_its_one_line(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["--seed", "3", "--steps", "5"]) == 0
+    line = capsys.readouterr().out
+    assert re.fullmatch(r"seed 3: held, \d+\.\d virtual s, \d+ commands, trace [0-9a-f]{16}\n", line)
+    assert main(["--seed", "3", "--only", "0,1,2,3,4", "--without", next(iter(FAULTS))]) in (0, 1)
+    assert result(Life(3, tuple(range(5)))).line == line.strip()
+
+
+def test_a_kind_of_fault_that_does_not_exist_is_refused() -> None:
+    with pytest.raises(SystemExit):
+        main(["--seed", "3", "--without", "rain"])

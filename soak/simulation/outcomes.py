@@ -1,0 +1,196 @@
+"""Rules of commands and values: the host's word about each, against the record of the drive that it was for.
+
+Noise excepts little. Each byte that the simulated noise changed is in the history. So a grant holds only where noise
+damaged that line in the time of that command; with a checksum only where the noise made what no host can know.
+"""
+
+from __future__ import annotations
+
+import re
+from bisect import bisect_left
+from collections.abc import Iterator
+
+from soak.languages import TICKS
+from soak.simulation.history import Command, Damage, Held, History, Outcome, Shown
+from soak.simulation.rule import Grant, Granted, Rule
+from soak.simulation.world import NUMBER, World
+
+ACK, NAK = b"\x06", b"\x15"
+AFTER = 2.0
+"""The longest time, s, between a damaged byte of a line and the end of that line: late bytes, and a slow wire."""
+
+SEVEN_BITS = Grant("a checksum of seven or eight bits", "The checksum of CK has seven bits")
+NOISY_ACK = Grant("an ACK of noise", "An ACK without its command")
+NOISY_NAK = Grant("a NAK of noise", "A NAK of noise together with a lost ACK")
+BARE_REFUSAL = Grant("a refusal of noise, without a checksum", "A refusal without a checksum")
+BARE_COMMAND = Grant("a damaged command without a checksum", "Noise on the line")
+BARE_VALUE = Grant("a damaged value without a checksum", "Noise on the line")
+
+
+def _executions(world: World) -> dict[tuple[str, str, str], list[float]]:
+    """The times at which each drive executed each line."""
+    found: dict[tuple[str, str, str], list[float]] = {}
+    for each in world.history.executed:
+        found.setdefault((each.line, each.drive, each.text), []).append(each.at)
+    return found
+
+
+def _cases(world: World) -> Iterator[tuple[Command, list[float], str]]:
+    """Every command that was typed once, when it was executed, and both in words."""
+    executions = _executions(world)
+    for each in world.history.commands.values():
+        times = executions.get((each.line, each.drive, each.text), [])
+        where = f"{each.line}:{each.drive} {each.text!r}"
+        yield each, times, f"{where}: {each.outcome.value} ({each.said}), executed {len(times)} times"
+
+
+def _damage(history: History, line: str, since: float, until: float) -> list[Damage]:
+    """What noise changed on a line in a time."""
+    found = history.damage.get(line, [])
+    begin = bisect_left(found, since, key=lambda each: each.at)
+    return found[begin : bisect_left(found, until, key=lambda each: each.at)]
+
+
+def _made(history: History, command: Command, byte: bytes) -> bool:
+    """Whether noise made a byte in the time of a command."""
+    found = _damage(history, command.line, command.began, command.ended)
+    return any(each.after.count(byte) > each.before.count(byte) for each in found)
+
+
+def _became(world: World, line: str, at: float) -> bool:
+    """Whether noise can have made another line of what left: on a line without a checksum."""
+    return not world.place(line).checked and bool(_damage(world.history, line, at - AFTER, at))
+
+
+def _twice(world: World) -> Iterator[str | Granted]:
+    for command, times, words in _cases(world):
+        if len(times) < 2:
+            continue
+        if any(_became(world, command.line, at) for at in times):
+            yield Granted(BARE_COMMAND, words)
+        elif _made(world.history, command, NAK):
+            yield Granted(NOISY_NAK, words)
+        else:
+            yield words
+
+
+def _denied(world: World) -> Iterator[str | Granted]:
+    for command, times, words in _cases(world):
+        if times and command.outcome is Outcome.NOT_SENT:
+            yield Granted(BARE_COMMAND, words) if _became(world, command.line, times[0]) else words
+
+
+def _refused(world: World) -> Iterator[str | Granted]:
+    for command, times, words in _cases(world):
+        if times and command.outcome is Outcome.REFUSED:
+            bare = not world.place(command.line).checked
+            noise = _damage(world.history, command.line, command.began - AFTER, command.ended)
+            yield Granted(BARE_REFUSAL, words) if bare and noise else words
+
+
+def _lost(world: World) -> Iterator[str | Granted]:
+    for command, times, words in _cases(world):
+        if times or command.outcome is not Outcome.OK:
+            continue
+        if not world.place(command.line).checked:
+            noise = _damage(world.history, command.line, command.began - AFTER, command.ended)
+            yield Granted(BARE_COMMAND, words) if noise else words
+        elif _made(world.history, command, ACK):
+            yield Granted(NOISY_ACK, words)
+        elif _executed_as_another(world, command):
+            yield Granted(SEVEN_BITS, words)
+        else:
+            yield words
+
+
+def _executed_as_another(world: World, command: Command) -> bool:
+    """Whether a drive of the line executed, in the time of a command, what nobody sent."""
+    sent = {(each.line, each.text) for each in world.history.commands.values()}
+    return any(
+        (each.line, each.text) not in sent
+        for each in world.history.executed
+        if each.line == command.line and command.began <= each.at <= command.ended
+    )
+
+
+# Values
+
+
+def _credited(world: World) -> Iterator[str | Granted]:
+    history = world.history
+    numbers = {each.number: each for each in history.held}
+    for shown in history.shown:
+        own = [each for each in history.held if (each.line, each.drive) == (shown.line, shown.drive)]
+        own = [each for each in own if each.at <= shown.at]
+        if any(shown.form.format(each.number) == shown.text for each in own if each.until > shown.began):
+            continue
+        words = f"{shown.line}:{shown.drive} printed {shown.text!r}, asked at {shown.began:.3f}"
+        if origin := _origin(shown, numbers):
+            yield f"{words}: {origin}"
+        elif own and own[-1].restarts == shown.restarts:
+            yield _never_held(world, shown, f"{words}: it never held that")
+
+
+def _origin(shown: Shown, numbers: dict[str, Held]) -> str:
+    """Say whose value was shown, if it is another drive's, an older one, or a program's."""
+    for number in re.findall(NUMBER, shown.text):
+        if (held := numbers.get(number)) is not None:
+            return f"{held.line}:{held.drive} held it from {held.at:.3f} to {held.until:.3f}"
+        if TICKS <= int(number) < TICKS + 1_000_000:
+            return "a program printed it"
+    return ""
+
+
+def _never_held(world: World, shown: Shown, words: str) -> str | Granted:
+    """Except a value that noise damaged, where no checksum showed that, or where it was right."""
+    place, history = world.place(shown.line), world.history
+    if not _damage(history, shown.line, shown.began - AFTER, shown.at):
+        return words
+    if not place.checked:
+        return Granted(BARE_VALUE, words)
+    heard = b"".join(data for at, data in history.received.get(shown.line, []) if shown.began <= at <= shown.at)
+    right = _sealed_frame if place.language == "tmcl" else _sealed_line
+    return Granted(SEVEN_BITS, words) if right(heard, shown.text) else words
+
+
+def _sealed_line(heard: bytes, text: str) -> bool:
+    """Whether a line of MCode with this text came with a right check byte: all seven-bit sums are 0."""
+    lines = re.split(rb"[\n\x06\x15]", heard.replace(b"\r", b""))
+    return any(text.encode("latin-1") in each and each[-1] & 0x80 and not sum(each) & 0x7F for each in lines)
+
+
+def _sealed_frame(heard: bytes, text: str) -> bool:
+    """Whether a TMCL frame with this value came with a right check byte: the sum of the eight bytes before."""
+    frames = (heard[at : at + 9] for at in range(len(heard) - 8))
+    return any(
+        sum(each[:8]) & 0xFF == each[8] and str(int.from_bytes(each[4:8], "big", signed=True)) == text
+        for each in frames
+    )
+
+
+NOISE = "Noise on the line"
+OUTCOMES = (
+    Rule(
+        "twice",
+        "No command is executed twice.",
+        "What is never done twice",
+        _twice,
+        (BARE_COMMAND, NOISY_NAK),
+    ),
+    Rule("denied", "What was said to be not sent was not executed.", NOISE, _denied, (BARE_COMMAND,)),
+    Rule("refused", "What was said to be refused was not executed.", NOISE, _refused, (BARE_REFUSAL,)),
+    Rule(
+        "lost",
+        "What was said to be done was executed.",
+        NOISE,
+        _lost,
+        (BARE_COMMAND, NOISY_ACK, SEVEN_BITS),
+    ),
+    Rule(
+        "credited",
+        "A value is credited to the drive that gave it, and to the question that asked for it.",
+        NOISE,
+        _credited,
+        (BARE_VALUE, SEVEN_BITS),
+    ),
+)

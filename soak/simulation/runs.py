@@ -1,0 +1,146 @@
+"""Runs of many seeds: side by side on all cores, in their order, and taken up again where they ended."""
+
+from __future__ import annotations
+
+import json
+import multiprocessing
+import os
+import statistics
+import subprocess
+import time
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from dataclasses import asdict, dataclass, field
+from functools import partial
+from hashlib import sha256
+from pathlib import Path
+from typing import TextIO
+
+from multidrop import __version__
+from soak.simulation.judge import judged
+from soak.simulation.shrinking import Life
+from soak.simulation.world import World
+
+STEPS = 30
+"""The steps of a story, unless told."""
+ROOT = Path(__file__).parents[2]
+
+
+@dataclass(frozen=True)
+class Result:
+    """What came of a seed. `took`: seconds of a core."""
+
+    seed: int
+    line: str
+    breaches: list[tuple[str, str]]
+    """The name of each rule that broke, and how."""
+    commands: int
+    exchanges: int
+    virtual: float
+    took: float
+    counts: dict[str, int] = field(default_factory=dict)
+
+
+def verdict(world: World) -> str:
+    """The one line of a seed, the same in every run of it."""
+    rules = judged(world).rules
+    said = f"broke {', '.join(rules)}" if rules else "held"
+    commands = len(world.history.commands) + world.history.asked
+    seconds, trace = world.loop.now, world.history.trace
+    return f"seed {world.seed}: {said}, {seconds:.1f} virtual s, {commands} commands, trace {trace}"
+
+
+def result(life: Life) -> Result:
+    """Live and judge."""
+    began = time.process_time()
+    world = life.live()
+    found, history = judged(world), world.history
+    return Result(
+        life.seed,
+        verdict(world),
+        [(rule.name, text) for rule, text in found.breaches],
+        len(history.commands) + history.asked,
+        history.exchanges,
+        world.loop.now,
+        time.process_time() - began,
+        history.counts | found.granted,
+    )
+
+
+def run(lives: Sequence[Life], jobs: int = 0, resume: Path | None = None) -> Iterator[Result]:
+    """Yield the result of each, in their order. `jobs`: 0 stands for one a core. `resume`: a file of results.
+
+    Raises ValueError where the file is of another program or other lives.
+    """
+    known, file = _taken_up(lives, resume) if resume is not None else ([], None)
+    yield from known
+    left = lives[len(known) :]
+    jobs = min(jobs or os.cpu_count() or 1, len(left))
+    with multiprocessing.get_context("fork").Pool(max(1, jobs)) as pool:
+        for each in pool.imap(result, left, chunksize=2) if jobs > 1 else map(result, left):
+            if file is not None:
+                print(json.dumps(asdict(each)), file=file, flush=True)
+            yield each
+    if file is not None:
+        file.close()
+
+
+def _taken_up(lives: Sequence[Life], path: Path) -> tuple[list[Result], TextIO]:
+    """The results that a file has, and the file to append the others to; a row that was cut off goes."""
+    head = json.dumps({"of": identity(), "first": lives[0].seed, "steps": len(lives[0].steps)})
+    rows = path.read_text().splitlines(keepends=True) if path.exists() else []
+    whole = [row for row in rows if row.endswith("\n")]
+    if whole and whole[0] != f"{head}\n":
+        raise ValueError(f"{path}: has results of another run: {whole[0].strip()}; name another file")
+    file = path.open("w")
+    file.writelines(whole or [f"{head}\n"])
+    return [Result(**json.loads(row)) for row in whole[1:]][: len(lives)], file
+
+
+def identity() -> str:
+    """The commit of the tree; where it has none, the version."""
+    git = ("git", "-C", str(ROOT), "rev-parse", "HEAD")
+    try:
+        found = subprocess.run(git, capture_output=True, text=True).stdout.strip()
+    except OSError:
+        found = ""
+    return found or __version__
+
+
+def derived(count: int) -> list[int]:
+    """Seeds that follow from the commit, so that each commit tries others, and each run of it the same."""
+    digest = sha256(identity().encode()).digest()
+    return [int.from_bytes(sha256(digest + bytes([number])).digest()[:3], "big") for number in range(count)]
+
+
+class Figures:
+    """The sums of a run."""
+
+    def __init__(self) -> None:
+        self.broken = 0
+        self.counts: Counter[str] = Counter()
+        self._rows: list[tuple[int, int, float, float]] = []
+
+    def add(self, each: Result) -> None:
+        """Add a result."""
+        self.broken += bool(each.breaches)
+        self.counts.update(each.counts)
+        self._rows.append((each.commands, each.exchanges, each.virtual, each.took))
+
+    def rows(self) -> Iterator[str]:
+        """The figures, a row each."""
+        commands, exchanges, virtual, took = (list(each) for each in zip(*self._rows, strict=True))
+        yield (
+            f"{len(took)} seeds, {self.broken} broke a rule; {sum(commands)} commands, {sum(exchanges)} exchanges, "
+            f"{sum(virtual) / 3600:.1f} virtual hours"
+        )
+        yield ", ".join(f"{number} {name}" for name, number in sorted(self.counts.items()))
+        yield (
+            f"{sum(exchanges) / sum(took):.0f} exchanges a second of one core; "
+            f"a median seed has {statistics.median(commands):.0f} commands and takes {statistics.median(took):.3f} s"
+        )
+
+
+def lives(seeds: Sequence[int], steps: int = STEPS) -> list[Life]:
+    """The whole story of each seed."""
+    return list(map(partial(Life, steps=tuple(range(steps))), seeds))

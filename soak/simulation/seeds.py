@@ -1,0 +1,13 @@
+"""Seeds that every run lives: those that broke a rule once, each with what it found. A seed joins with the mend."""
+
+from __future__ import annotations
+
+FIXED = {
+    3: "error 20 of a half-sent line, which the drive reported for the next move",
+    9: "the error of a line that a stop cut off, which the next line was blamed for",
+    137: "the same, where the stop came before the outcome was read",
+    472: "a value that a drive does not print, which ended the prompt at /status",
+    882: "the same, which a wait took for rest",
+}
+DERIVED = 12
+"""The number of seeds that follow from the commit."""
