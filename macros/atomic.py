@@ -15,7 +15,7 @@ def write_atomically(path: Path, data: bytes, mode: int = 0o666, *, synced: bool
     A new file in the same folder replaces the old one only once all of it is on the disk. A link stays a link. Not
     `synced`: it survives the process, not the machine, and takes microseconds.
     """
-    path.parent.mkdir(parents=True, exist_ok=True)
+    make_folder(path.parent, synced=synced)
     target = Path(os.path.realpath(path))
     beside = target.with_name(f".{target.name}.{os.urandom(4).hex()}.tmp")
     try:
@@ -59,6 +59,15 @@ def create_atomically(path: Path, data: bytes) -> None:
             beside.unlink()
     with contextlib.suppress(OSError):
         sync_folder(path.parent)
+
+
+def make_folder(folder: Path, *, synced: bool = True) -> None:
+    """Make a folder and those above it. `synced`: their names survive a power cut."""
+    made = [each for each in (folder, *folder.parents) if not each.exists()]
+    folder.mkdir(parents=True, exist_ok=True)
+    for each in made if synced else ():
+        with contextlib.suppress(OSError):
+            sync_folder(each.parent)
 
 
 def _take_over(old: Path, new: int) -> None:

@@ -18,7 +18,7 @@ from typing import NamedTuple
 from multidrop.dialects.errors import Diagnostic
 from multidrop.dialects.files import bounded, opened, utf8
 from multidrop.dialects.text import visible
-from multidrop.macros.atomic import create_atomically, write_atomically
+from multidrop.macros.atomic import create_atomically, make_folder, write_atomically
 from multidrop.macros.model import FIRST_PAGE, KEYS, Macro, check, check_name, describe_clash, page_order
 from multidrop.macros.toml_format import format_macro, parse_macro, with_values
 
@@ -245,7 +245,7 @@ def _create(path: Path, text: str) -> None:
     if path.is_symlink():
         return _write(path, text)  # it leads nowhere yet: the file is elsewhere
     try:
-        path.parent.mkdir(parents=True, exist_ok=True)
+        make_folder(path.parent)
     except OSError as error:
         raise Diagnostic(f"cannot make the folder ({error.strerror or error})", str(path.parent)) from None
     try:

@@ -10,7 +10,7 @@ from urllib.parse import quote
 
 from multidrop.dialects import Diagnostic
 from multidrop.dialects.files import why
-from multidrop.macros.atomic import create_atomically
+from multidrop.macros.atomic import create_atomically, make_folder
 from multidrop.shell.state.store import Store, digest
 
 if TYPE_CHECKING:
@@ -92,7 +92,7 @@ def write_backup(state: Path, at: datetime, bus: str, address: str, ending: str,
     parts = (f"{at:%Y-%m-%d-%H%M%S}", quote(bus, safe=""), quote(address, safe=""))
     name = "-".join(filter(None, parts))
     try:
-        folder.mkdir(parents=True, exist_ok=True)
+        make_folder(folder)
         path, number = folder / f"{name}{ending}", 1
         while True:
             try:

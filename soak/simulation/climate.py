@@ -34,6 +34,10 @@ FAULTS = {
     # of the loop and of threads, each turn or step
     "late timer": 0.02,
     "slow thread": 0.3,
+    # of the disk, each operation
+    "disk full": 0.2,
+    "fsync refused": 0.2,
+    "slow disk": 0.02,
 }
 """The greatest probability of each kind (`delay`: the longest turn of a drive, s)."""
 

@@ -10,8 +10,11 @@ import asyncio
 import socket
 from collections.abc import Callable
 from concurrent.futures import Executor
+from contextvars import copy_context
 from random import Random
 from typing import TYPE_CHECKING, Any
+
+from soak.simulation.process import PROCESS, Killed, Process, gone
 
 if TYPE_CHECKING:
     from soak.simulation.network import Network
@@ -44,7 +47,13 @@ class SimulatedLoop(asyncio.BaseEventLoop):
         self.descriptors = 1000
         """The number of the last one."""
         self.network: Network
-        self.set_exception_handler(lambda loop, context: self.defects.append(context))
+        self._made = 0
+        """The number of tasks so far."""
+        self.set_exception_handler(self._defect)
+
+    def _defect(self, loop: asyncio.AbstractEventLoop, context: dict[str, Any]) -> None:
+        if not isinstance(context.get("exception"), Killed):
+            self.defects.append(context)
 
     # What asyncio asks of a loop
 
@@ -120,6 +129,47 @@ class SimulatedLoop(asyncio.BaseEventLoop):
         """Take datagrams."""
         return self.network.datagrams(protocol_factory, local_addr)
 
+    # Processes
+
+    def _call_soon(self, callback: Any, args: Any, context: Any) -> asyncio.Handle:
+        handle: asyncio.Handle = super()._call_soon(callback, args, context)  # type: ignore[misc]
+        if gone(handle._context):  # type: ignore[attr-defined]
+            handle.cancel()
+        return handle
+
+    def call_at(self, when: float, callback: Any, *args: Any, context: Any = None) -> asyncio.TimerHandle:
+        """Call at a time, unless the process that wants it is dead then."""
+        timer = super().call_at(when, callback, *args, context=context)
+        if gone(timer._context):  # type: ignore[attr-defined]
+            timer.cancel()
+        return timer
+
+    def create_task(self, coro: Any, *, name: Any = None, context: Any = None) -> asyncio.Task[Any]:
+        """Make a task; one of a dead process never begins."""
+        task = super().create_task(coro, name=name, context=context)
+        process = (copy_context() if context is None else context).get(PROCESS)
+        if process is not None:
+            self._made += 1
+            task.of = (process, self._made)  # type: ignore[attr-defined]
+            if process.dead:
+                process.bury(task)
+        return task
+
+    def tasks_of(self, process: Process) -> list[asyncio.Task[Any]]:
+        """The tasks of a process that are not done, in the order in which they began."""
+        found = [each for each in asyncio.all_tasks(self) if getattr(each, "of", (None, 0))[0] is process]
+        return sorted(found, key=lambda each: each.of[1])  # type: ignore[attr-defined]
+
+    def forget(self, process: Process) -> None:
+        """Call back nothing of a process any more."""
+        of = [*self._ready, *self._scheduled, *self._readers.values(), *self._writers.values()]  # type: ignore[attr-defined]
+        for handle in of:
+            if not handle.cancelled() and handle._context.get(PROCESS) is process:
+                handle.cancel()
+        for watched in (self._readers, self._writers):
+            for fd in [fd for fd, handle in watched.items() if handle.cancelled()]:
+                del watched[fd]
+
     # Descriptors
 
     def descriptor(self) -> int:
@@ -129,6 +179,8 @@ class SimulatedLoop(asyncio.BaseEventLoop):
 
     def add_reader(self, fd: int, callback: Callable[..., Any], *arguments: Any) -> None:  # type: ignore[override]
         """Call back while a descriptor can be read."""
+        if gone(copy_context()):
+            return
         self._readers[fd] = asyncio.Handle(callback, arguments, self, None)
         self.call_soon(self.readable, fd)
 
@@ -138,6 +190,8 @@ class SimulatedLoop(asyncio.BaseEventLoop):
 
     def add_writer(self, fd: int, callback: Callable[..., Any], *arguments: Any) -> None:  # type: ignore[override]
         """Call back while a descriptor can be written."""
+        if gone(copy_context()):
+            return
         self._writers[fd] = asyncio.Handle(callback, arguments, self, None)
         self.call_soon(self.writable, fd)
 

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from multidrop.shell.sharing.writer_turns import Say
     from multidrop.transports.ssh import FarPort
     from soak.simulation.kernel import Kernel
+    from soak.simulation.process import Process
 
 LOGIN = 0.3
 """The longest time of a login, s."""
@@ -48,6 +49,10 @@ class SshProgram:
         self._theirs.trace = lambda way, data: None
         wait = max(0.0, host.dark - kernel.loop.now) + kernel.rng.random() * LOGIN
         kernel.loop.call_later(min(wait, 5.0), self._log_in)
+
+    def own(self, process: Process | None) -> None:
+        """End with a process: its end of the pipe is closed then."""
+        self._near.owner = process
 
     def _log_in(self) -> None:
         host, now = self._kernel.network.host(self._far.host), self._kernel.loop.now

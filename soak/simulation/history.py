@@ -12,6 +12,7 @@ from enum import Enum
 from hashlib import sha256
 from math import inf
 
+KILLED = "killed before it was said"
 UNSENT = re.compile(r"^not sent, as (?:'.*?' failed|.*?): (.*)$")
 
 
@@ -126,16 +127,24 @@ class History:
     exchanges: int = 0
     """Requests that have ended."""
     notices: list[tuple[float, str]] = field(default_factory=list)
+    lives: int = 0
+    """The number of processes that have run."""
+    power: bool = False
+    """The kill that is armed is a power cut."""
+    unreadable: list[str] = field(default_factory=list)
+    """Files that a session could not read at its start."""
     defects: list[str] = field(default_factory=list)
     counts: dict[str, int] = field(default_factory=dict)
     lines: list[tuple[float, str, str]] = field(default_factory=list)
     """The trace: times, kinds and texts."""
     keep: bool = False
+    folder: str = ""
+    """The folder of the world's files, which has another name in each run: the trace leaves it out."""
     _hash: object = field(default_factory=sha256)
 
     def note(self, at: float, kind: str, text: str) -> None:
         """Add to the trace."""
-        row = f"{at:.6f} {kind} {text}"
+        row = f"{at:.6f} {kind} {text.replace(self.folder, '~') if self.folder else text}"
         self._hash.update(row.encode())  # type: ignore[attr-defined]
         if self.keep:
             self.lines.append((at, kind, text))
@@ -155,6 +164,12 @@ class History:
             if (each.line, each.drive, each.until) == (held.line, held.drive, inf):
                 each.until = held.at
         self.held.append(held)
+
+    def killed(self, at: float) -> None:
+        """Nobody says any more what became of the lines that were typed."""
+        for command in self.commands.values():
+            if command.outcome is Outcome.OPEN and not command.who:
+                command.outcome, command.said, command.ended = Outcome.UNKNOWN, KILLED, at
 
     def unsent(self, notice: str) -> None:
         """Take a notice that a line was not sent."""

@@ -45,6 +45,10 @@ def _true(world: World) -> Iterator[str]:
     yield from world.history.untrue
 
 
+def _readable(world: World) -> Iterator[str]:
+    yield from world.history.unreadable
+
+
 def _ends(world: World) -> Iterator[str]:
     yield from world.history.defects
 
@@ -56,7 +60,13 @@ RULES = (
     ),
     Rule("first", "What leaves next on a line that can be written is its stop.", "What a stop promises", _first),
     Rule("stopped", "A drive that is said to be stopped does not move.", "What a stop promises", _true),
-    Rule("ends", "Every wait ends; no task, thread or defect is left.", "What a report means", _ends),
+    Rule("ends", "Every wait ends; no task, thread, file, lock or defect is left.", "What a report means", _ends),
+    Rule(
+        "files",
+        "A session reads every file that the one before has left.",
+        "What a report means",
+        _readable,
+    ),
 )
 
 

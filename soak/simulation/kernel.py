@@ -24,6 +24,7 @@ from multidrop.transports import relay, serial_port, serial_ports, sockets, ssh_
 from soak.simulation.far import SshProgram
 from soak.simulation.network import Network, Socket
 from soak.simulation.ports import Descriptor, Port, Trace
+from soak.simulation.process import PROCESS, Process, operate, outside
 
 if TYPE_CHECKING:
     from multidrop.transports.ssh import FarPort
@@ -109,9 +110,26 @@ class Kernel:
     # Made by the product
 
     def _add(self, made: Any) -> Any:
+        """Keep a descriptor. Each read and write of a process is an operation that a kill may meet."""
         self.descriptors = {number: each for number, each in self.descriptors.items() if not each.closed}
+        made.owner = PROCESS.get()
+        if made.owner is not None:
+            receive, send = made.recv, made.send
+            made.recv = lambda *given: operate(lambda: outside(receive, *given))
+            made.send = lambda data: operate(lambda: outside(send, data), lambda: outside(send, self._torn(data)))
         self.descriptors[made.fileno()] = made
         return made
+
+    def _torn(self, data: Any) -> Any:
+        return data[: self.rng.randrange(1, len(data) + 1)] if len(data) else data
+
+    def close_all(self, process: Process, power: bool) -> None:
+        """Close the descriptors of a dead process. What a tty holds goes out, unless the computer has no power."""
+        for each in self.descriptors.values():
+            if each.owner is process and not each.closed:
+                if power and isinstance(each, Port):
+                    outside(each.drop)
+                outside(each.close)
 
     def _rng(self) -> Random:
         return Random(f"{self._seed} descriptor {self.loop.descriptors}")
@@ -145,14 +163,16 @@ class Kernel:
 
     def ssh(self, far: FarPort, baud: int, way: str) -> SshProgram:
         """Start the program `ssh`."""
-        return SshProgram(self, far, baud)
+        made = outside(SshProgram, self, far, baud)
+        made.own(PROCESS.get())
+        return made
 
     @staticmethod
     def as_far(work: Callable[[], Any]) -> Any:
         """Do something as a computer that lends a port."""
         token = WHO.set("far")
         try:
-            return work()
+            return outside(work)
         finally:
             WHO.reset(token)
 

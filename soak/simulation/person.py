@@ -8,32 +8,43 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Callable
+from contextvars import Context
 from random import Random
 
 from multidrop.shell.prompt.keyboard import STOP_KEY, Keyboard
-from multidrop.shell.prompt.line_queue import LineQueue
+from multidrop.shell.prompt.line_queue import History, LineQueue
 from multidrop.shell.prompt.terminal_input import at_keyboard
 from multidrop.shell.session import Session
 from soak.simulation.clock import SimulatedLoop
+from soak.simulation.process import Process
 
 PASTE = (b"\x1b[200~", b"\x1b[201~")
 
 
 class Person:
-    """Types at a session. `typed` is called with each read, before anything takes it."""
+    """Types at the session of a process. `typed` is called with each read, before anything takes it."""
 
     def __init__(
-        self, session: Session, loop: SimulatedLoop, rng: Random, typed: Callable[[bytes], None], lost: float = 0.0
+        self,
+        session: Session,
+        loop: SimulatedLoop,
+        rng: Random,
+        typed: Callable[[bytes], None],
+        process: Process | None = None,
     ) -> None:
         self.keyboard = Keyboard(-1, signals=False)
         self.keyboard.stop_ahead, self.keyboard.stop = session.stop_ahead, self._stop
-        self.lines = LineQueue(session)
+        self.lines, self.history = LineQueue(session), History(session.settings.history)
+        self._process = process
         self._session, self._loop, self._rng, self._typed = session, loop, rng, typed
         self._line = ""
         self._at = 0.0
         session.front.ask = lambda question: at_keyboard(self.keyboard, question)
         self.keyboard.listen(self._listen)
         self.working = loop.create_task(self.lines.run())
+
+    def _context(self) -> Context | None:
+        return self._process.context.copy() if self._process is not None else None
 
     def type(self, data: bytes, spread: float = 0.0) -> None:
         """Let bytes arrive: in reads of any size, within `spread` seconds, in their order."""
@@ -42,7 +53,7 @@ class Person:
             size = len(data) if not spread else self._rng.randrange(1, len(data) + 1)
             piece, data = data[:size], data[size:]
             at += 1e-6 + self._rng.random() * spread  # timers of one moment have no order
-            self._loop.call_at(at, self.read, piece)
+            self._loop.call_at(at, self.read, piece, context=self._context())
         self._at = at
 
     def read(self, data: bytes) -> None:
@@ -54,7 +65,7 @@ class Person:
 
     def hang_up(self) -> None:
         """The terminal goes away."""
-        self._loop.call_soon(self.keyboard._read, b"")
+        self._loop.call_soon(self.keyboard._read, b"", context=self._context())
 
     async def leave(self) -> None:
         """Type nothing more."""
@@ -66,6 +77,7 @@ class Person:
         for char in self.keyboard.take():
             if char in "\r\n":
                 line, self._line = self._line, ""
+                self.history.append(line)
                 self.lines.enter(line)
             elif char == "\x7f":
                 self._line = self._line[:-1]

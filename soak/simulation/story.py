@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING
 
 from multidrop.dialects import Diagnostic
 from soak.simulation import acts_connections
+from soak.simulation.acts_kill import files, kill, power_cut
 
 if TYPE_CHECKING:
     from soak.simulation.world import World
@@ -83,6 +84,9 @@ ACTS = (
     Act("stop", 8, stop),
     Act("verb", 7, verb),
     Act("power off", 4, power_off),
+    Act("files", 4, files),
+    Act("kill", 2, kill),
+    Act("PC power cut", 1, power_cut),
     Act("unplug", 4, unplug, fault=True),
     Act("clock jumps", 2, clock_jumps, fault=True),
     *(Act(*each) for each in acts_connections.ACTS),
@@ -90,7 +94,8 @@ ACTS = (
 
 
 async def tell(world: World, step: int) -> None:
-    """Let one thing happen, and time pass."""
+    """Let one thing happen, once a session is there, and time pass."""
+    await world.ready.wait()
     rng = Random(f"{world.seed} step {step}")
     world.step, world.said = step, 0
     act = rng.choices(ACTS, [each.weight for each in ACTS])[0]

@@ -15,6 +15,7 @@ from typing import Any
 
 from multidrop.shell import threads
 from soak.simulation.clock import SimulatedLoop
+from soak.simulation.process import PROCESS, Process
 
 SLOW = 2.0
 """The longest time of a slow step, s."""
@@ -38,6 +39,10 @@ class Scheduler:
         """Take a step after a while."""
         long = self._rng.random() < self._slow
         self._loop.call_later(self._rng.random() * (SLOW if long else 0.0005), step)
+
+    def forget(self, process: Process) -> None:
+        """End the threads of a dead process."""
+        self.running -= {each for each in self.running if each.process is process}
 
     @contextlib.contextmanager
     def installed(self) -> Iterator[None]:
@@ -89,7 +94,7 @@ class Thread:
         self, scheduler: Scheduler, target: Callable[[], None], name: str = "", daemon: bool = False, args: Any = ()
     ) -> None:
         self.ident: int | None = None
-        self.name = name
+        self.name, self.process = name, PROCESS.get()
         self._scheduler, self._target, self._args = scheduler, target, args
 
     def start(self) -> None:

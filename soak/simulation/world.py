@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import io
 import logging
 import re
 import shutil
@@ -15,8 +16,9 @@ import tempfile
 from collections import Counter
 from collections.abc import Callable, Collection, Iterable, Iterator
 from contextlib import AsyncExitStack, ExitStack
-from contextvars import ContextVar
+from contextvars import Context, ContextVar
 from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
 from random import Random
 from typing import TYPE_CHECKING, Any
@@ -28,6 +30,7 @@ from multidrop.drives.stopping import stop_forms
 from multidrop.shell.configuration import Settings, parse
 from multidrop.shell.events import Failed, Notified, OnBus, Output, Printed
 from multidrop.shell.line_syntax import TypedLine
+from multidrop.shell.log import files, writer
 from multidrop.shell.session import Session
 from multidrop.shell.sharing.server import SharedPort
 from multidrop.shell.sharing.writer_turns import Say
@@ -42,13 +45,16 @@ from soak.judge import Witness, Word, word
 from soak.languages import LANGUAGES, PROGRAM
 from soak.simulation.climate import Climate
 from soak.simulation.clock import Deadlock, SimulatedLoop
+from soak.simulation.disk import Disk
 from soak.simulation.far import share
+from soak.simulation.files_left import unreadable
 from soak.simulation.history import Command, Damage, Executed, Held, History, Outcome, Shown, Stop
 from soak.simulation.kernel import WHO, Kernel
 from soak.simulation.network import Network
 from soak.simulation.person import Person
 from soak.simulation.places import SERIAL, Place, drawn_places
 from soak.simulation.ports import Trace
+from soak.simulation.process import Process
 from soak.simulation.story import STOP, tell
 from soak.simulation.threads import Scheduler
 from soak.simulation.wall import Wall
@@ -83,6 +89,10 @@ class WireRandom(Random):
         self.line = line
 
 
+AWAY = 20.0
+"""The longest time until a killed session is started again, s; a PC without power takes at least as long."""
+
+
 @dataclass
 class World:
     """A machine, its person, and the history so far."""
@@ -95,9 +105,13 @@ class World:
     folder: Path
     wall: Wall
     scheduler: Scheduler
+    disk: Disk
     floor: RunningFloor = field(init=False)
+    process: Process = field(init=False)
     session: Session = field(init=False)
     person: Person = field(init=False)
+    ready: asyncio.Event = field(default_factory=asyncio.Event)
+    """A session is open, and somebody types at it."""
     witnesses: dict[tuple[str, str], Witness] = field(default_factory=dict)
     network: Network = field(init=False)
     kernel: Kernel = field(init=False)
@@ -155,8 +169,7 @@ class World:
                 await self.lend(place)
         for bus in self.floor.floor.cell.buses:
             await serve_bus(self.floor, bus, self.stack)
-        self._open_session()
-        await self.session.open_all([place.name for place in self.places], lambda number, failure: None)
+        await self._live()
         self.faults(True)
 
     def _watch(self, line: str, drive: str, device: Any) -> None:
@@ -206,8 +219,9 @@ class World:
 
     def settings(self, folder: Path) -> Settings:
         """The settings of a person, who has the connections of all lines."""
-        found = parse("".join(f'[connections.{each.name}]\nurl = "{each.url}"\n' for each in self.places), "world")
-        return replace(found, folder=folder / "config", state=folder / "state")
+        text = "".join(f'[connections.{each.name}]\nurl = "{each.url}"\n' for each in self.places)
+        text += "[log]\nalways = true\nmegabytes = 0.02\nfiles = 3\n" * (Random(f"{self.seed} log").random() < 0.2)
+        return replace(parse(text, "world"), folder=folder / "config", state=folder / "state")
 
     def another(self, place: Place, who: str) -> Session:
         """A session of another person, which opens a line that is shared."""
@@ -215,10 +229,55 @@ class World:
         made.subscribe(lambda event: self.heard(event, who))
         return made
 
-    def _open_session(self) -> None:
-        self.session = WatchedSession(self.settings(self.folder), self)
+    # Lives of the session
+
+    async def _live(self) -> None:
+        """Start a process with a session on what the disk holds, and open the lines."""
+        lives = self.history.lives = self.history.lives + 1
+        self.history.unreadable += unreadable(self.folder, f"life {lives}", self.history)
+        self.process = process = Process(4000 + lives, self.loop)
+        process.at_death += (self._died, partial(self.disk.close_all, process), partial(self.scheduler.forget, process))
+        process.run(self._open_session, process)
+        session = self.session
+        process.routines = lambda: [
+            each._procedure for bus in session.buses.values() for each in bus._conversations.under_way
+        ]
+        opening = process.start(session.open_all([place.name for place in self.places], lambda number, failure: None))
+        await asyncio.wait((opening, process.death), return_when=asyncio.FIRST_COMPLETED)
+        if not process.dead:
+            self.ready.set()
+
+    def _open_session(self, process: Process) -> None:
+        files.PROCESS = process.number
+        self.session = WatchedSession(self.settings(self.folder), self, process)
         self.session.subscribe(self.heard)
-        self.person = Person(self.session, self.loop, Random(f"{self.seed} person"), self._typed)
+        writer.begin(self.session)
+        rng = Random(f"{self.seed} person {self.history.lives}")
+        self.person = Person(self.session, self.loop, rng, self._typed, process)
+
+    def kill(self, operations: int, moment: str, power: bool = False) -> None:
+        """Kill the session at an operation from now; `power`: the PC loses its power there."""
+        self.history.power = power
+        self.process.arm(operations, moment)
+
+    def _died(self) -> None:
+        """The kernel closes its ports; what it had to say of a line is not known."""
+        self.ready.clear()
+        power = self.history.power
+        self.history.note(self.loop.now, "killed", "power" * power)
+        self.history.count("power cuts" if power else "kills")
+        self.history.killed(self.loop.now)
+        self.stops = sum(not stop.who for stop in self.history.stops)
+        self.kernel.close_all(self.process, power)
+        rng = Random(f"{self.seed} life {self.history.lives}")
+        if power:
+            self.loop.call_soon(self.disk.cut_power, rng, context=Context())
+        away = rng.random() ** 2 * AWAY + power * AWAY
+        self.loop.create_task(self._again(away), context=Context())
+
+    async def _again(self, away: float) -> None:
+        await asyncio.sleep(away)
+        await self._live()
 
     def faults(self, on: bool) -> None:
         """Let the faults begin or end."""
@@ -236,6 +295,8 @@ class World:
 
     def heard(self, event: object, who: str = "") -> None:
         """Take what a session says."""
+        if not who and self.process.dead:
+            return
         if isinstance(event, OnBus):
             self.history.exchanges += isinstance(event.event, Ended)
             return
@@ -271,7 +332,7 @@ class World:
 
     def typed(self, data: bytes, session: Session, who: str = "") -> None:
         """Take what somebody types; at a stop, note what has to leave next on each line."""
-        self.history.note(self.loop.now, f"key{who}", data.hex())
+        self.history.note(self.loop.now, f"key{who}", data.replace(bytes(self.folder), b"~").hex())
         if STOP in data:
             buses = {name: bus for name, bus in session.buses.items() if not bus.link.lost}
             forms = {f"{name}{who}": self._forms(bus) for name, bus in buses.items()}
@@ -319,7 +380,9 @@ class World:
         self.person.type(b"/resume\r", 0.0)
 
     async def end(self) -> None:
-        """End the faults, wait until nothing runs, and close."""
+        """End the faults, wait until nothing runs, and close; after kills once more, as the next session does."""
+        await self.ready.wait()
+        self.process.arm(0, "")
         self.faults(False)
         await asyncio.sleep(10.0)
         deadline = self.loop.now + LONGEST
@@ -327,9 +390,13 @@ class World:
             if self.loop.now > deadline:
                 self.history.defects.append(f"still runs: {self.person.lines.running!r} {self.session._background}")
                 break
+            self.person.type(b"n")  # the answer to a question, if there is one
             await asyncio.sleep(1.0)
-        await self.person.leave()
-        await self.session.close()
+        await self._close()
+        if self.history.lives > 1:
+            await self._live()
+            await self._close()
+        self.history.unreadable += unreadable(self.folder, "the end", self.history)
         for other in self.others:
             await other.leave()
         for shared in self.shares.values():
@@ -342,13 +409,23 @@ class World:
         self.history.defects += [f"open: {each!r}" for each in self.kernel.descriptors.values() if not each.closed]
         self.history.defects += [f"thread left: {each.name}" for each in self.scheduler.running]
 
+    async def _close(self) -> None:
+        """Close the session in an orderly way."""
+        await self.process.start(self.person.leave())
+        await self.process.start(self.session.close())
+        self.history.defects += [f"file left: {each.path}" for each in self.disk.open.values()]
+
 
 class WatchedSession(Session):
     """A session that notes what the caller of each line got."""
 
-    def __init__(self, settings: Settings, world: World) -> None:
+    def __init__(self, settings: Settings, world: World, process: Process | None = None) -> None:
         super().__init__(settings, reconnect=True)
-        self._world = world
+        self._world, self._process = world, process
+
+    @property
+    def _dead(self) -> bool:
+        return self._process is not None and self._process.dead
 
     async def run(self, line: str | TypedLine, *arguments: Any, **named: Any) -> None:
         """Run a line, and note its outcome."""
@@ -365,12 +442,15 @@ class WatchedSession(Session):
             self._ended(command, failure)
             raise
         except asyncio.CancelledError:
-            command.outcome, command.said, command.ended = Outcome.UNKNOWN, "cancelled", self.now()
+            if not self._dead:
+                command.outcome, command.said, command.ended = Outcome.UNKNOWN, "cancelled", self.now()
             raise
         else:
             self._ended(command, ())
 
     def _ended(self, command: Command, result: tuple[str, ...] | BaseException) -> None:
+        if self._dead:
+            return
         command.ended, command.said = self.now(), str(result)
         notices = [text for at, text in self._world.history.notices if at >= command.began]
         command.outcome = WORDS[word(result, notices)]
@@ -402,7 +482,9 @@ def lived(seed: int, steps: Iterable[int], keep: bool = False, without: Collecti
         loop = runner.get_loop()
         assert isinstance(loop, SimulatedLoop)
         wall, scheduler = Wall(loop), Scheduler(loop, Random(f"{seed} threads"), climate["slow thread"])
-        world = World(seed, loop, history, climate, places, folder, wall, scheduler)
+        history.folder = str(folder)
+        disk = Disk(f"{folder}/", loop, wall, climate, Random(f"{seed} disk"), partial(_noted, history, loop))
+        world = World(seed, loop, history, climate, places, folder, wall, scheduler, disk)
 
         async def life() -> None:
             await world.begin()
@@ -413,15 +495,21 @@ def lived(seed: int, steps: Iterable[int], keep: bool = False, without: Collecti
         with ExitStack() as stack:
             stack.enter_context(wall.installed())
             stack.enter_context(scheduler.installed())
+            stack.enter_context(disk.installed())
             stack.enter_context(world.kernel.installed())
             stack.enter_context(_replaced(wire, "harmed", world.harmed))
             stack.enter_context(_logged(history))
+            stack.enter_context(contextlib.redirect_stderr(io.StringIO()))  # the questions of the prompt
             try:
                 runner.run(life())
             except Deadlock as defect:
                 history.defects.append(str(defect))
         history.defects += [str(each.get("exception") or each.get("message")) for each in loop.defects]
     return world
+
+
+def _noted(history: History, loop: SimulatedLoop, what: str, path: str) -> None:
+    history.note(loop.now, f"disk {what}", path)
 
 
 @contextlib.contextmanager
