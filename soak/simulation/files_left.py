@@ -29,7 +29,7 @@ def _state(state: Path, history: History) -> Iterator[str]:
         if (
             path.parent.name == "backups"
             and path.suffix != ".tmp"
-            and not path.read_text().startswith(("'", "*", "#", "//"))
+            and not path.read_text().startswith(("'", "*", "#", "//", ";"))
         ):
             yield f"{name} is damaged"
         if ENDING in path.name:

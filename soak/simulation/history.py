@@ -12,6 +12,8 @@ from enum import Enum
 from hashlib import sha256
 from math import inf
 
+from soak.simulation.told import Told
+
 KILLED = "killed before it was said"
 UNSENT = re.compile(r"^not sent, as (?:'.*?' failed|.*?): (.*)$")
 
@@ -26,6 +28,8 @@ class Stop:
     """By line, the bytes of a message that had begun to leave, which leave before it."""
     who: str = ""
     """Whose stop it was; empty: this person's."""
+    written: int = 0
+    """The number of writes before it."""
 
 
 class Outcome(Enum):
@@ -133,6 +137,8 @@ class History:
     """The kill that is armed is a power cut."""
     unreadable: list[str] = field(default_factory=list)
     """Files that a session could not read at its start."""
+    told: Told = field(default_factory=Told)
+    """What was told to run by itself."""
     defects: list[str] = field(default_factory=list)
     counts: dict[str, int] = field(default_factory=dict)
     lines: list[tuple[float, str, str]] = field(default_factory=list)

@@ -8,6 +8,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 from soak.simulation.outcomes import OUTCOMES
+from soak.simulation.promises import PROMISES
 from soak.simulation.rule import Rule
 from soak.simulation.world import World
 
@@ -33,11 +34,12 @@ def _first(world: World) -> Iterator[str]:
     """What leaves next on a line that can be written is its stop, after the rest of a message that must leave whole."""
     for stop in world.history.stops:
         for line, forms in stop.forms.items():
-            after = [(at, data) for at, port, data in world.history.written if port == line and at >= stop.at]
+            after = [(at, data) for at, port, data in world.history.written[stop.written :] if port == line]
             if after and after[0][0] <= stop.at + SOON:
                 begun = b"".join(data for at, data in after if at <= stop.at + SOON)
-                begun = begun[stop.rests[line] :]
-                if not any(form.startswith(begun) or begun.startswith(form) for form in forms):
+                rest = stop.rests[line]  # of a message that leaves whole; other rests are dropped
+                left = [begun, *filter(None, [begun[rest:]])]
+                if not any(form.startswith(each) or each.startswith(form) for form in forms for each in left):
                     yield f"{line}: stop at {stop.at:.6f}, {begun!r} left at {after[0][0]:.6f}"
 
 
@@ -55,6 +57,7 @@ def _ends(world: World) -> Iterator[str]:
 
 RULES = (
     *OUTCOMES,
+    *PROMISES,
     Rule(
         "after a stop", "Nothing that was typed before a stop leaves after it.", "What a stop promises", _nothing_before
     ),

@@ -57,7 +57,7 @@ def _made(history: History, command: Command, byte: bytes) -> bool:
     return any(each.after.count(byte) > each.before.count(byte) for each in found)
 
 
-def _became(world: World, line: str, at: float) -> bool:
+def became(world: World, line: str, at: float) -> bool:
     """Whether noise can have made another line of what left: on a line without a checksum."""
     return not world.place(line).checked and bool(_damage(world.history, line, at - AFTER, at))
 
@@ -66,7 +66,7 @@ def _twice(world: World) -> Iterator[str | Granted]:
     for command, times, words in _cases(world):
         if len(times) < 2:
             continue
-        if any(_became(world, command.line, at) for at in times):
+        if any(became(world, command.line, at) for at in times):
             yield Granted(BARE_COMMAND, words)
         elif _made(world.history, command, NAK):
             yield Granted(NOISY_NAK, words)
@@ -77,7 +77,7 @@ def _twice(world: World) -> Iterator[str | Granted]:
 def _denied(world: World) -> Iterator[str | Granted]:
     for command, times, words in _cases(world):
         if times and command.outcome is Outcome.NOT_SENT:
-            yield Granted(BARE_COMMAND, words) if _became(world, command.line, times[0]) else words
+            yield Granted(BARE_COMMAND, words) if became(world, command.line, times[0]) else words
 
 
 def _refused(world: World) -> Iterator[str | Granted]:

@@ -11,6 +11,7 @@ from collections.abc import Callable
 from contextvars import Context
 from random import Random
 
+from multidrop.shell.events import StateChanged
 from multidrop.shell.prompt.keyboard import STOP_KEY, Keyboard
 from multidrop.shell.prompt.line_queue import History, LineQueue
 from multidrop.shell.prompt.terminal_input import at_keyboard
@@ -41,6 +42,8 @@ class Person:
         self._at = 0.0
         session.front.ask = lambda question: at_keyboard(self.keyboard, question)
         self.keyboard.listen(self._listen)
+        self._stops = session.stops
+        session.subscribe(self._noticed)
         self.working = loop.create_task(self.lines.run())
 
     def _context(self) -> Context | None:
@@ -79,13 +82,25 @@ class Person:
                 line, self._line = self._line, ""
                 self.history.append(line)
                 self.lines.enter(line)
+            elif char == "\x03":
+                self._interrupt()
             elif char == "\x7f":
                 self._line = self._line[:-1]
             elif char.isprintable():
                 self._line += char
 
-    def _stop(self, dropped: str) -> None:
+    def _interrupt(self) -> None:
+        """Ctrl+C: stop while anything runs, else clear the line, as the prompt does."""
+        if self._session.busy:
+            self._stop("", "Ctrl+C")
+        self._line = ""
+
+    def _stop(self, dropped: str, why: str = "Ctrl+X") -> None:
         lines, self._line = (self._line + dropped).splitlines(), ""
-        self._session.stop("Ctrl+X")
-        self.lines.stopped()
+        self._session.stop(why)
         self.lines.show_unsent("a stop came", lines)
+
+    def _noticed(self, event: object) -> None:
+        if isinstance(event, StateChanged) and self._stops != self._session.stops:
+            self._stops = self._session.stops
+            self.lines.stopped()

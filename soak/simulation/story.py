@@ -8,29 +8,21 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-from collections.abc import Callable
-from dataclasses import dataclass
 from random import Random
 from typing import TYPE_CHECKING
 
 from multidrop.dialects import Diagnostic
 from soak.simulation import acts_connections
+from soak.simulation.act import Act
+from soak.simulation.acts.automation import AUTOMATION
+from soak.simulation.acts.files import FILES
+from soak.simulation.acts.hand import HAND
 from soak.simulation.acts_kill import files, kill, power_cut
 
 if TYPE_CHECKING:
     from soak.simulation.world import World
 
 STOP = b"\x18"
-
-
-@dataclass(frozen=True)
-class Act:
-    """Something that can happen in a step. `fault`: never in a calm seed. `weight`: how often, beside the others."""
-
-    name: str
-    weight: float
-    do: Callable[[World, Random], None]
-    fault: bool = False
 
 
 def one_line(world: World, rng: Random) -> None:
@@ -90,6 +82,9 @@ ACTS = (
     Act("unplug", 4, unplug, fault=True),
     Act("clock jumps", 2, clock_jumps, fault=True),
     *(Act(*each) for each in acts_connections.ACTS),
+    *AUTOMATION,
+    *FILES,
+    *HAND,
 )
 
 

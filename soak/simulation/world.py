@@ -8,13 +8,11 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-import io
 import logging
 import re
 import shutil
 import tempfile
-from collections import Counter
-from collections.abc import Callable, Collection, Iterable, Iterator
+from collections.abc import Collection, Coroutine, Iterable, Iterator
 from contextlib import AsyncExitStack, ExitStack
 from contextvars import Context, ContextVar
 from dataclasses import dataclass, field, replace
@@ -43,6 +41,8 @@ from multidrop.transports import TransportLost, telnet
 from multidrop.transports.relay import Kind, frame
 from soak.judge import Witness, Word, word
 from soak.languages import LANGUAGES, PROGRAM
+from soak.simulation.acts.seams import SEAMS
+from soak.simulation.acts.watching import WatchedPath, wrote
 from soak.simulation.climate import Climate
 from soak.simulation.clock import Deadlock, SimulatedLoop
 from soak.simulation.disk import Disk
@@ -125,8 +125,10 @@ class World:
     """The number of commands that this step has typed."""
     stops: int = 0
     """The number of stops that were typed, arrived or on their way."""
-    _powered: Counter[tuple[str, str]] = field(default_factory=Counter)
-    """How often the power of each drive was switched."""
+    cut: dict[tuple[str, str], list[float]] = field(default_factory=dict)
+    """When the power of each drive was switched."""
+    beside_it: list[asyncio.Task[None]] = field(default_factory=list)
+    """What runs beside the prompt."""
 
     def place(self, line: str) -> Place:
         """A line of the machine."""
@@ -149,6 +151,8 @@ class World:
             self.history.note(self.loop.now, f"{way} {name}", data.hex())
             if way == ">":
                 self.history.written.append((self.loop.now, name, data))
+                if not who:
+                    wrote(self, line, data)
             else:
                 self.history.received.setdefault(line, []).append((self.loop.now, data))
 
@@ -188,14 +192,14 @@ class World:
         switched = device.power
 
         def power(on: bool, now: float) -> None:
-            self._powered[line, drive] += 1
+            self.cut.setdefault((line, drive), []).append(self.loop.now)
             switched(on, now)
 
         device.execute, device.power = execute, power
 
     def restarts(self, line: str, drive: str) -> int:
         """How often a drive has lost what it held."""
-        return self._powered[line, drive] + int(getattr(self.witnesses[line, drive].device, "boots", 0))
+        return len(self.cut.get((line, drive), ())) + int(getattr(self.witnesses[line, drive].device, "boots", 0))
 
     def harmed(self, data: bytes, faults: Faults, rng: Random) -> bytes:
         """In place of the noise of a wire: the same noise, and a note of what it changed."""
@@ -268,6 +272,7 @@ class World:
         self.history.count("power cuts" if power else "kills")
         self.history.killed(self.loop.now)
         self.stops = sum(not stop.who for stop in self.history.stops)
+        self.beside_it.clear()
         self.kernel.close_all(self.process, power)
         rng = Random(f"{self.seed} life {self.history.lives}")
         if power:
@@ -333,11 +338,13 @@ class World:
     def typed(self, data: bytes, session: Session, who: str = "") -> None:
         """Take what somebody types; at a stop, note what has to leave next on each line."""
         self.history.note(self.loop.now, f"key{who}", data.replace(bytes(self.folder), b"~").hex())
+        if data[:1] in (b"y", b"Y"):
+            self.history.told.yes.append(self.loop.now)
         if STOP in data:
             buses = {name: bus for name, bus in session.buses.items() if not bus.link.lost}
             forms = {f"{name}{who}": self._forms(bus) for name, bus in buses.items()}
             rests = {f"{name}{who}": self.kernel.rest(f"{name}{who}") for name in buses}
-            self.history.stops.append(Stop(self.loop.now, forms, rests, who))
+            self.history.stops.append(Stop(self.loop.now, forms, rests, who, len(self.history.written)))
 
     def _forms(self, bus: Bus) -> tuple[bytes, ...]:
         """What a stop of a line may begin with."""
@@ -348,7 +355,7 @@ class World:
             return tuple(purge + telnet.escaped(each) for each in found)
         if kind == "ssh":
             drop = b"" if forms.framed else frame(Kind.DROP)
-            return tuple(drop + bytes((Kind.DATA,)) for each in found)
+            return tuple(beat + drop + bytes((Kind.DATA,)) for each in found for beat in (b"", frame(Kind.BEAT)))
         return found
 
     # The story
@@ -379,16 +386,25 @@ class World:
         self.person.type(STOP, 0.0)
         self.person.type(b"/resume\r", 0.0)
 
+    @property
+    def _beside(self) -> list[asyncio.Task[None]]:
+        return [each for each in self.beside_it if not each.done()]
+
+    def beside(self, work: Coroutine[Any, Any, None]) -> None:
+        """Let work of the session's process run beside the prompt."""
+        self.beside_it.append(self.process.start(work))
+
     async def end(self) -> None:
         """End the faults, wait until nothing runs, and close; after kills once more, as the next session does."""
         await self.ready.wait()
         self.process.arm(0, "")
         self.faults(False)
+        self.person.type(b"/plot off\r/twin off\r")
         await asyncio.sleep(10.0)
         deadline = self.loop.now + LONGEST
-        while self.person.lines.running or self.session._background:
+        while still := self.person.lines.running or self.session._background or self._beside:
             if self.loop.now > deadline:
-                self.history.defects.append(f"still runs: {self.person.lines.running!r} {self.session._background}")
+                self.history.defects.append(f"still runs: {still!r}")
                 break
             self.person.type(b"n")  # the answer to a question, if there is one
             await asyncio.sleep(1.0)
@@ -422,10 +438,16 @@ class WatchedSession(Session):
     def __init__(self, settings: Settings, world: World, process: Process | None = None) -> None:
         super().__init__(settings, reconnect=True)
         self._world, self._process = world, process
+        self.path = WatchedPath(self, world)
 
     @property
     def _dead(self) -> bool:
         return self._process is not None and self._process.dead
+
+    def stop(self, why: str = "stop") -> None:
+        """Stop everything, and note it."""
+        self._world.history.told.halts.append(self.now())
+        super().stop(why)
 
     async def run(self, line: str | TypedLine, *arguments: Any, **named: Any) -> None:
         """Run a line, and note its outcome."""
@@ -497,9 +519,10 @@ def lived(seed: int, steps: Iterable[int], keep: bool = False, without: Collecti
             stack.enter_context(scheduler.installed())
             stack.enter_context(disk.installed())
             stack.enter_context(world.kernel.installed())
-            stack.enter_context(_replaced(wire, "harmed", world.harmed))
+            stack.enter_context(contextlib.chdir(folder))
+            for seam in ((wire, "harmed", world.harmed), *SEAMS):
+                stack.enter_context(_replaced(*seam))
             stack.enter_context(_logged(history))
-            stack.enter_context(contextlib.redirect_stderr(io.StringIO()))  # the questions of the prompt
             try:
                 runner.run(life())
             except Deadlock as defect:
@@ -513,7 +536,7 @@ def _noted(history: History, loop: SimulatedLoop, what: str, path: str) -> None:
 
 
 @contextlib.contextmanager
-def _replaced(module: Any, name: str, value: Callable[..., Any]) -> Iterator[None]:
+def _replaced(module: Any, name: str, value: Any) -> Iterator[None]:
     before = getattr(module, name)
     setattr(module, name, value)
     try:

@@ -1,0 +1,21 @@
+"""An act: something that can happen in a step of a story."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from random import Random
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from soak.simulation.world import World
+
+
+@dataclass(frozen=True)
+class Act:
+    """Something that can happen in a step. `fault`: never in a calm seed. `weight`: how often, beside the others."""
+
+    name: str
+    weight: float
+    do: Callable[[World, Random], None]
+    fault: bool = False

@@ -1,0 +1,120 @@
+"""The lines of the acts in each language: settings and motions with values that no other line has."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from random import Random
+from typing import TYPE_CHECKING
+
+from soak.simulation.places import Place
+
+if TYPE_CHECKING:
+    from soak.simulation.world import World
+
+STOP = b"\x18"
+
+
+@dataclass(frozen=True)
+class Phrases:
+    """The lines of a language. `{}` takes a number; `first` and `first_motion` are the least ones."""
+
+    value: str
+    first: int
+    motion: str
+    first_motion: int
+    print: str
+    """Prints the value."""
+    question: str
+    """The same in an expression."""
+    wrong: str
+    """Refused by the drive."""
+    settings: str
+    """A file of settings with the value."""
+    restored: str
+    """What a restore of it sends."""
+    guarded: tuple[str, ...] = ()
+    """Lines that ask first, and that leave a drive usable after a yes."""
+    denied: tuple[str, ...] = ()
+    """Lines that ask first, and get no yes here."""
+    program: str = ""
+    """A program with the value; `{label}` takes a name."""
+    acting: str = ""
+    """A line before it that starts motion."""
+    ending: str = ""
+    by_hand: tuple[str, ...] = ()
+    """Lines that store a program by hand."""
+    endless: bool = False
+    """The motion goes on until something ends it."""
+
+
+PHRASES = {
+    "mcode": Phrases(
+        "R2={}",
+        40_000_000,
+        "SL {}",
+        100_000,
+        "PR R2",
+        "R2",
+        "VM=-1",
+        '[drive]\nlanguage = "MCode"\n[variables]\nR2 = {}\n',
+        "R2={}",
+        ("IP", "CP", "BD=19"),
+        ("FD", "PY=0", 'DN="z"', "LK=1", "AS=3", "UG"),
+        "PG 300\nLB K{label}\nR2={value}\nMR {label}\nH\nE\nPG\n",
+        "SL {}\n",
+        ".mxt",
+        ("PG 500", "LB H{label}", "R2={value}", "MR {value}", "E", "PG"),
+        True,
+    ),
+    "pmx": Phrases(
+        "V2={}",
+        40_000_000,
+        "X{}",
+        50_000_000,
+        "V2",
+        "V2",
+        "JOYENA=1",
+        '[drive]\nlanguage = "PMX"\n[parameters]\nV40 = {}\n',
+        "V40={}",
+        ("STORE",),
+        ("DN=77", "DB=3"),
+        "V5={value}\nDELAY={label}\nEND\n",
+        "",
+        ".prg",
+    ),
+    "tmcl": Phrases(
+        "SAP 194, 0, {}",
+        900_000,
+        "MVP ABS, 0, {}",
+        800_000,
+        "GAP 194, 0",
+        "[GAP 194, 0]",
+        "SAP 140, 0, 99",
+        '[drive]\nlanguage = "TMCL"\n[parameters]\n194 = {}\n',
+        "SAP 194, 0, {}",
+        ("STAP 4, 0",),
+        ("SGP 66, 0, 9", "SGP 65, 0, 3"),
+    ),
+}
+PHRASES["modbus"] = replace(
+    PHRASES["mcode"], guarded=("IP",), denied=("AS=3",), program="", acting="", ending="", by_hand=(), endless=False
+)
+
+
+def number(world: World) -> int:
+    """A number that no other line of this history has."""
+    world.said += 1
+    return world.step * 100 + world.said
+
+
+def target(place: Place, drive: str) -> str:
+    """A drive as a verb takes it."""
+    return f"{place.name}:{drive if place.drives else ''}"
+
+
+def drawn(world: World, rng: Random, fits: Callable[[Phrases], object] = bool) -> tuple[Place, str]:
+    """Draw a drive, if possible one whose language fits."""
+    fitting = [each for each in world.places if fits(PHRASES[each.language])]
+    place = rng.choice(fitting or world.places)
+    return place, rng.choice(place.names)

@@ -1,0 +1,48 @@
+"""Where the acts at the prompt end: no recording of rerun, no question on a terminal that nobody has.
+
+The product imports the work of a verb at its first use. Here all of it is imported first: what the clock of day is put
+in place of must not depend on what a seed before this one has used.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import multidrop.shell.plots.plot
+import multidrop.shell.prompt.terminal_input
+import multidrop.shell.publishing.feed
+import multidrop.shell.scripts.executor
+import multidrop.shell.snapshots
+import multidrop.shell.twins.pair
+import multidrop.shell.verbs.buses
+import multidrop.shell.verbs.call
+import multidrop.shell.verbs.drives
+import multidrop.shell.verbs.macros
+import multidrop.shell.verbs.programs
+import multidrop.shell.verbs.session
+from multidrop.shell.plots.request import PlotTarget
+
+
+class NoRecording:
+    """In place of a recording of rerun: takes every batch."""
+
+    offset = 0.0
+
+    def __init__(self, target: PlotTarget) -> None:
+        self.target = target
+
+    def send(self, batch: object) -> None:
+        """Take a batch."""
+
+    def close(self) -> None:
+        """Close nothing."""
+
+
+def ignored(*_: object, **__: object) -> None:
+    """Write nothing."""
+
+
+SEAMS: tuple[tuple[Any, str, Any], ...] = (
+    (multidrop.shell.plots.plot, "Sink", NoRecording),
+    (multidrop.shell.prompt.terminal_input, "write", ignored),
+)

@@ -1,0 +1,151 @@
+"""What the acts at the prompt come to, watched where each line and each verb of a session passes.
+
+Typed lines and those of macros and scripts go one way (`Session.run`, `LinePath`). Here each is told from the other: a
+line for a drive in program mode is stored, a text for a line in raw mode is only written, and a verb that works by
+itself has an end, after which its drives are looked at.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import re
+from collections.abc import Awaitable
+from typing import TYPE_CHECKING, Any
+
+from multidrop.dialects import Diagnostic, DriveError
+from multidrop.drives.stopping import stop_forms
+from multidrop.shell.events import By
+from multidrop.shell.line_syntax import DriveLine, VerbLine
+from multidrop.shell.session import LinePath
+from soak.simulation.acts.phrases import PHRASES
+from soak.simulation.told import Put, Run
+
+if TYPE_CHECKING:
+    from multidrop.shell.session import Session
+    from soak.simulation.history import Executed
+    from soak.simulation.world import World
+
+SETTLED = 5.0
+"""The time, s, after an early end in which its stops are confirmed, or a trouble is said."""
+TROUBLE = re.compile(
+    r"NOT KNOWN|NOT REACHED|STILL |stop not sent|could not be read|slows down|trying again|not reached"
+)
+
+
+class WatchedPath(LinePath):
+    """The way of the lines of a session, watched."""
+
+    def __init__(self, session: Session, world: World) -> None:
+        super().__init__(session)
+        self._world = world
+
+    async def verb(self, parsed: VerbLine, by: By) -> None:
+        """Run a verb; one that works by itself has an end."""
+        run = self._world.history.told.runs.get(parsed.typed.strip())
+        work = super().verb(parsed, by)
+        await (work if run is None else watched(self._world, run, work))
+
+    async def text(self, parsed: DriveLine, by: By) -> None:
+        """Pass a text on; note it where it is stored, or written as it is."""
+        put = self._put(parsed)
+        try:
+            await super().text(parsed, by)
+        except BaseException:
+            if put is not None:
+                put.sent = False
+            raise
+        if put is not None:
+            put.sent = True
+
+    def _put(self, parsed: DriveLine) -> Put | None:
+        session, history = self._session, self._world.history
+        typed = parsed.typed.strip()
+        with contextlib.suppress(Diagnostic, DriveError):
+            bus = session.bus(parsed.bus)
+            if bus.name in session.raw:
+                history.commands.pop(typed, None)
+                put = Put(session.now(), bus.name, "", str(parsed.text))
+                history.told.raw.append(put)
+                return put
+            drive = session.drive(bus.name, parsed.address)
+            if drive.programming and (command := history.commands.pop(typed, None)) is not None:
+                put = Put(session.now(), command.line, command.drive, command.text)
+                history.told.stored.append(put)
+                return put
+        return None
+
+
+def wrote(world: World, line: str, data: bytes) -> None:
+    """Take what left on a line: in raw mode it is what was typed, or a stop."""
+    told = world.history.told
+    if line in world.session.raw:
+        forms = stop_forms(world.session.buses[line].roster)
+        parts = (forms.immediate, forms.unterminated, forms.invalidate, *(each.data for each in forms.repeats))
+        told.raw_stops.setdefault(line, {}).update(dict.fromkeys(filter(None, parts)))
+        told.raw_written.setdefault(line, bytearray()).extend(data)
+
+
+async def watched(world: World, run: Run, work: Awaitable[Any]) -> None:
+    """Do the work of a run, and note its end; after an early one look at the drives."""
+    run.began, run.failure = world.loop.now, ""
+    if run.download is not None:
+        run.download.old = held(world, run.download.line, run.download.drive)
+    try:
+        await work
+    except BaseException as failure:
+        run.failure = str(failure) or type(failure).__name__
+        world.loop.call_later(SETTLED, examine, world, run, world.loop.now)
+        raise
+    finally:
+        run.ended = world.loop.now
+        world.history.note(run.ended, "run", f"{run.typed}: {run.failure or 'done'}")
+        if run.download is not None:
+            run.download.new = held(world, run.download.line, run.download.drive)
+
+
+def held(world: World, line: str, drive: str) -> tuple[str, ...]:
+    """The program that a drive holds: its own memory."""
+    device = world.witnesses[line, drive].device
+    if world.place(line).language in ("mcode", "modbus"):
+        return tuple(f"{each.address} {each.text}" for _, each in sorted(device.program.lines.items()))
+    if world.place(line).language == "tmcl":
+        return ()  # its programs are not downloaded here
+    memory = device.programs.memory
+    return tuple(f"{at} {memory.line(at)}" for at, code in enumerate(memory.code) if code is not None)
+
+
+def examine(world: World, run: Run, ended: float) -> None:
+    """Look at the drives after an early end: what the run had moved stands, and what others had moved goes on."""
+    told, now = world.history.told, world.floor.now()
+    last = {(each.line, each.drive): each for each in world.history.executed}
+    for placed in world.floor.floor.drives:
+        line, drive = placed.bus, placed.spec.name
+        before = last.get((line, drive))
+        if before is None or placed.unit.shadow is None:
+            continue
+        moves = any(each.velocity for each in placed.unit.shadow.motion(now))
+        text = f"{line}:{drive} after {run.typed!r} ({run.failure}) ended at {ended:.3f}"
+        if (line, drive, before.text) in run.moves and run.began <= before.at:
+            if moves and not _said(world, line, run.began, TROUBLE):
+                told.unstopped.append(f"{text}: {before.text!r} goes on")
+        elif not moves and before.at < ended and _only_ended_by(world, run, before):
+            told.stopped_too.append(f"{text}: {before.text!r} was not of it, and was stopped")
+
+
+def _only_ended_by(world: World, run: Run, started: Executed) -> bool:
+    """Whether nothing but the end of a run can have ended a motion that goes on for ever."""
+    told, place = world.history.told, world.place(started.line)
+    if not PHRASES[place.language].endless or not started.text.startswith("SL "):
+        return False
+    others = (each for each in told.runs.values() if each is not run and each.failure and each.ended >= started.at)
+    return not (
+        any(each >= started.at for each in told.halts)
+        or any(others)
+        or world.climate.wire.harmful
+        or any(at >= started.at for at in world.cut.get((started.line, started.drive), []))
+        or _said(world, started.line, started.at, re.compile("stopped as well|trying again|was lost|restart"))
+    )
+
+
+def _said(world: World, line: str, since: float, words: re.Pattern[str]) -> bool:
+    return any(at >= since and line in text and words.search(text) for at, text in world.history.notices)

@@ -1,0 +1,74 @@
+"""Rules of what runs by itself, of questions, of program mode and of raw mode: what `Told` has, against the record."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+
+from soak.simulation.outcomes import BARE_COMMAND, became
+from soak.simulation.rule import Granted, Rule
+from soak.simulation.told import Put
+from soak.simulation.world import World
+
+
+def _automation(world: World) -> Iterator[str]:
+    yield from world.history.told.unstopped
+    yield from world.history.told.stopped_too
+
+
+def _asked(world: World) -> Iterator[str | Granted]:
+    told = world.history.told
+    for guarded in told.guarded:
+        for each in world.history.executed:
+            if (each.line, each.drive, each.text) not in guarded.texts or each.at < guarded.typed:
+                continue
+            if guarded.asks and any(guarded.typed <= yes <= each.at for yes in told.yes):
+                continue
+            words = f"{each.line}:{each.drive} {each.text!r}, typed at {guarded.typed:.3f}, executed without a yes"
+            yield Granted(BARE_COMMAND, words) if became(world, each.line, each.at) else words
+
+
+def _stored(world: World) -> Iterator[str | Granted]:
+    for put in world.history.told.stored:
+        for each in world.history.executed:
+            if (each.line, each.drive, each.text) == (put.line, put.drive, put.text) and each.at >= put.at:
+                words = f"{put.line}:{put.drive} {put.text!r} of program mode, executed at {each.at:.3f}"
+                yield Granted(BARE_COMMAND, words) if became(world, each.line, each.at) else words
+
+
+def _raw(world: World) -> Iterator[str]:
+    """Each text leaves as often as it was typed, whole or, where the line was lost, not; and nothing else leaves."""
+    told = world.history.told
+    for line, data in told.raw_written.items():
+        written = bytes(data)
+        puts: list[Put] = [put for put in told.raw if put.line == line]
+        for put in puts:
+            typed = sum(each.text == put.text for each in puts)
+            left = len(re.findall(rb"(?<![ -~])" + re.escape(put.text.encode()) + rb"(?![ -~])", written))
+            if left > typed:
+                yield f"{line}: {put.text!r} left {left} times, and was typed {typed} times"
+
+
+PROMISES = (
+    Rule(
+        "automation",
+        "Drives that automation moved are stopped at its early end, and no others.",
+        "What a report means",
+        _automation,
+    ),
+    Rule(
+        "asked",
+        "A line that asks first is executed after a yes only.",
+        "Lines that ask first",
+        _asked,
+        (BARE_COMMAND,),
+    ),
+    Rule(
+        "stored",
+        "In program mode a line is stored, not executed.",
+        "Lines that ask first",
+        _stored,
+        (BARE_COMMAND,),
+    ),
+    Rule("raw", "What leaves in raw mode is what was typed, and stops.", "What a report means", _raw),
+)

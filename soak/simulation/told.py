@@ -1,0 +1,89 @@
+"""What was told to run by itself, and what else the acts at the prompt promise: for the judge.
+
+A macro, a script, a download and a restore are a `Run` each. Their lines are commands like typed ones, except for those
+of a macro that plays several times, which `Told.repeated` has with the number of times.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+Line = tuple[str, str, str]
+"""A line of drives, a drive on it, and a text."""
+
+
+@dataclass
+class Download:
+    """A program file for a drive. `old` and `new`: what the drive held as it began, and at its end."""
+
+    line: str
+    drive: str
+    file: str
+    text: str
+    old: tuple[str, ...] = ()
+    new: tuple[str, ...] = ()
+
+
+@dataclass
+class Run:
+    """Something that sends lines by itself. `typed`: the line that begins it."""
+
+    name: str
+    typed: str
+    texts: dict[Line, None] = field(default_factory=dict)
+    """What it may send."""
+    moves: dict[Line, None] = field(default_factory=dict)
+    """Those of them that start motion."""
+    on_stop: dict[Line, None] = field(default_factory=dict)
+    """What it may send after its early end."""
+    download: Download | None = None
+    began: float = -1.0
+    ended: float = -1.0
+    failure: str = ""
+    """Why it ended early; empty: it did not."""
+
+
+@dataclass
+class Guarded:
+    """Lines that are sent after a yes only. `asks` False: nobody is asked."""
+
+    typed: float
+    texts: tuple[Line, ...]
+    asks: bool = True
+
+
+@dataclass
+class Put:
+    """A line that a drive stores or a port takes as it is. `sent` None: no word yet."""
+
+    at: float
+    line: str
+    drive: str
+    text: str
+    sent: bool | None = None
+
+
+@dataclass
+class Told:
+    """All of it, in its order."""
+
+    runs: dict[str, Run] = field(default_factory=dict)
+    """By the typed line."""
+    repeated: dict[Line, int] = field(default_factory=dict)
+    """How often a drive may execute a line."""
+    guarded: list[Guarded] = field(default_factory=list)
+    yes: list[float] = field(default_factory=list)
+    """When a yes was typed."""
+    halts: list[float] = field(default_factory=list)
+    """When everything was stopped."""
+    stored: list[Put] = field(default_factory=list)
+    """Lines for a drive in program mode."""
+    raw: list[Put] = field(default_factory=list)
+    """Texts for a line in raw mode."""
+    raw_written: dict[str, bytearray] = field(default_factory=dict)
+    raw_stops: dict[str, dict[bytes, None]] = field(default_factory=dict)
+    """The parts of a stop of a line in raw mode."""
+    unstopped: list[str] = field(default_factory=list)
+    """Drives that went on after the early end of what had moved them."""
+    stopped_too: list[str] = field(default_factory=list)
+    """Drives that an early end stopped, although it had not moved them."""
