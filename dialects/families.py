@@ -49,7 +49,16 @@ TABLE: Mapping[str, Row] = {
             ("ascript", "a-script", "pmx"),
         ),
     ),
-    "tmcl": Row("multidrop.dialects.tmcl.family:TMCL"),
+    "tmcl": Row(
+        "multidrop.dialects.tmcl.family:TMCL",
+        files=ProgramFiles(
+            "TMCL",
+            (".tmc",),
+            "multidrop.dialects.tmcl.manual.program_file",
+            "multidrop.dialects.tmcl.manual.editing",
+            ("tmcl",),
+        ),
+    ),
 }
 FAMILIES: Mapping[str, Family[Any]] = OnDemand({name: row.record for name, row in TABLE.items()})
 """By name. Nothing tries one family after another: a URL names the family, or the drives are `DEFAULT`."""

@@ -32,7 +32,7 @@ TABLE: Mapping[str, Row] = {
         "multidrop.simulator.lexium.program_run:RUNS",
     ),
     "pmx": Row("multidrop.simulator.pmx.family:PMX", ("PMX",), "multidrop.simulator.pmx.program_run:RUNS"),
-    "tmcl": Row("multidrop.simulator.tmcl.family:TMCL", ("TMCM",)),
+    "tmcl": Row("multidrop.simulator.tmcl.family:TMCL", ("TMCM",), "multidrop.simulator.tmcl.program_run:RUNS"),
 }
 FAMILIES: Mapping[str, Family] = OnDemand({name: row.record for name, row in TABLE.items()})
 """By name."""

@@ -9,7 +9,12 @@ from __future__ import annotations
 import re
 
 from multidrop.dialects.family import Motion
+from multidrop.dialects.files import split_lines
+from multidrop.dialects.program_files import errors
+from multidrop.dialects.tmcl.manual import program_file
 from multidrop.dialects.tmcl.manual.commands import AXIS, BAUDS, GLOBAL, Axis, Global, Parameter
+from multidrop.dialects.tmcl.manual.instructions import spelled
+from multidrop.dialects.tmcl.manual.program_file import ProgramLine
 from multidrop.dialects.values import Snapshot, Value
 from multidrop.simulator.cell.drive_keys import common_keys, read_identity, read_settings, read_world
 from multidrop.simulator.cell.spec import DriveSpec
@@ -31,8 +36,8 @@ NO_INPUTS = (1,)
 def read_drive(table: Table, folder: Folder) -> DriveSpec:
     """Read the table of one module. Raises Diagnostic."""
     common = common_keys(table, folder)
-    if common["program"]:
-        raise table.wrong("program", "is for other drives", "leave it out: direct mode runs no program")
+    if wrong := errors(program_file.check(common["program"])):
+        raise table.wrong("program", f"has an error in line {wrong[0].line}: {wrong[0].what}", wrong[0].hint)
     name = table.text("name", "1")
     if not (
         name.isascii() and name.isdigit() and str(int(name)) == name and int(name) in GLOBAL[Global.ADDRESS].limits
@@ -93,6 +98,7 @@ def describe(snapshot: Snapshot) -> DriveText:
             *(f"not in set: {each.name} = {each.value}" for each in readings if _parameter(each.name) is None),
         ],
         unread=snapshot.readings.unread,
+        program=_program(snapshot),
         settings=[Entry(each.name, each.value, remark(each)) for each in readings if _parameter(each.name) is not None],
         identity=[
             *([Entry("version", snapshot.version)] if snapshot.version else []),
@@ -106,6 +112,24 @@ def wanted(spec: DriveSpec) -> dict[str, Value]:
     """The settings of a module in a cell file, but not its baud rate, which would cut the line off at once."""
     settings = {name: held for name, held in spec.set.items() if not isinstance(held, tuple) and name != BAUD}
     return {ADDRESS: int(spec.name), **settings}
+
+
+def program(spec: DriveSpec) -> StoredProgram:
+    """The program of a module in a cell file: each line as the module lists it, and the lines of its file."""
+    if not spec.program:
+        return StoredProgram()
+    lines = program_file.compiled(program_file.read(spec.program, spec.program_name))
+    listed = tuple(f"{each.at}  {spelled(each.call)}" for each in lines)
+    return StoredProgram(listed, tuple(split_lines(spec.program.strip("\n"))))
+
+
+def _program(snapshot: Snapshot) -> list[str]:
+    """The program as its file where that gives the same memory, else with labels that the host has made."""
+    held = dict(snapshot.program)
+    if snapshot.remarked and not errors(program_file.check("\n".join(snapshot.remarked))):
+        return list(snapshot.remarked)
+    made = program_file.assembled([ProgramLine(number, text) for number, text in enumerate(held.values(), 1)])
+    return program_file.disassembled(dict(zip(held, (each.call for each in made.lines), strict=True)))
 
 
 def build(spec: DriveSpec, place: Place) -> Unit:
@@ -128,6 +152,6 @@ TMCL = Family(
     name="tmcl",
     read_drive=read_drive,
     build=build,
-    snapshots=Snapshots(describe, wanted, lambda spec: StoredProgram()),
+    snapshots=Snapshots(describe, wanted, program),
     addressed=True,
 )

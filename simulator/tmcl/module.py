@@ -75,7 +75,7 @@ class TmclModule:
         self.powered = False
         self.motor = Motor(world)
 
-        self.program = Program(self._line, self._waited, self._signals)
+        self.program = Program(self.carry_out, self._waited, self._signals)
         if spec.program:
             name = spec.program_name or "program"
             self.program.load({each.at: each.call for each in compiled(read(spec.program, name))})
@@ -155,8 +155,8 @@ class TmclModule:
     def world_changed(self) -> None:
         """Do nothing: `advance` looks at all of the world."""
 
-    def _line(self, call: Call, now: float) -> tuple[int, int]:
-        """Carry out a line of the program; its status and value."""
+    def carry_out(self, call: Call, now: float) -> tuple[int, int]:
+        """Carry out a command of the direct mode as a line of the program; its status and value."""
         try:
             answer = self._execute(call, now)
         except Refused as refused:

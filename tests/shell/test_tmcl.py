@@ -7,7 +7,7 @@ import itertools
 
 import pytest
 
-from multidrop.dialects import Diagnostic, DriveError, Inexpressible, NoAnswer, Refused, Stopped
+from multidrop.dialects import DriveError, Inexpressible, NoAnswer, Refused, Stopped
 from multidrop.dialects.families import TABLE
 from multidrop.drives.events import Sample, Unsolicited
 from multidrop.drives.stopping import stop_forms
@@ -92,11 +92,6 @@ async def test_position_and_velocity_are_polled(session):
     assert first[-1].velocity == 5000
     assert all(one.position < two.position for one, two in itertools.pairwise(first))
     assert {each.position for each in samples if each.address == "7"} == {0}
-
-
-async def test_programs_do_not_exist(session):
-    with pytest.raises((Diagnostic, Inexpressible), match="the host loads no programs into TMCL modules"):
-        await say(session, "@1 MST 0", "/list")
 
 
 async def test_help_and_completion_are_those_of_the_module(session):

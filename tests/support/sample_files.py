@@ -9,6 +9,7 @@ from tests.support.paths import ROOT
 FOLDER = ROOT / "tests" / "programs"
 MCODE = sorted(FOLDER.glob("*.mxt"))
 PMX = sorted(FOLDER.glob("*.prg"))
+TMCL = sorted(FOLDER.glob("*.tmc"))
 
 
 def product_of(file: Path) -> str:

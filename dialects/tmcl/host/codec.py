@@ -257,6 +257,12 @@ class TmclState(DriveState):
     relative: dict[int, int] = field(default_factory=dict)
     """Axis parameter 127 of each motor: from where MVP REL counts; a motor without an entry: not known."""
 
+    halted: bool = False
+    """This session has halted its program between two lines, and has not let it go on."""
+
+    def program_halted(self, halted: bool) -> None:
+        self.halted = halted
+
     def reply_lost(self, command: int) -> None:
         self.lost_commands.add(command)
         self.reply_outstanding()
@@ -294,6 +300,7 @@ class TmclState(DriveState):
     def stopped(self) -> None:
         """A stop ends download mode; its replies may be late."""
         self.executes()
+        self.halted = False
         self.lost_commands |= STOPS
         self.reply_outstanding()
 

@@ -34,6 +34,7 @@ from multidrop.dialects.tmcl.manual.commands import (
     Status,
     Version,
 )
+from multidrop.dialects.tmcl.manual.instructions import CONTROL
 
 # One request, and proof that its reply belongs to no other one; the motors of a module.
 #
@@ -183,7 +184,7 @@ def perform(state: TmclState, text: str) -> Procedure[tuple[str, ...]]:
     """
     request, call = parsed(state, text)
     if state.programming or call.command == Command.DOWNLOAD:
-        yield from _store(state, request, call)
+        yield from store(state, request, call)
         return ()
     if call.command == Command.FACTORY or (
         call.command in (Command.SAP, Command.RSAP) and call.type == Axis.RELATIVE_FROM
@@ -203,19 +204,21 @@ def parsed(state: TmclState, text: str) -> tuple[Request, Call]:
     return state.codec.request(state.address, text.strip(), call), call
 
 
-def _store(state: TmclState, request: Request, call: Call) -> Procedure[None]:
+def store(state: TmclState, request: Request, call: Call, by_hand: bool = True) -> Procedure[None]:
     """Begin a download, store a line, or end the download; nothing else may go to the module meanwhile."""
     if not state.programming:
         yield from synchronised(state, request)
         state.found_storing()
-        state.remark(f"{who(state)}: download mode: every command is stored until {END}, or a stop")
+        if by_hand:
+            state.remark(f"{who(state)}: download mode: every command is stored until {END}, or a stop")
     begins, ends = call.command == Command.DOWNLOAD, call.command == Command.END_DOWNLOAD
     reply = yield replace(request, kind=Kind.PROGRAM)
     status = status_of(reply)
     if status is None:
         state.reply_lost(call.command)
         raise NoAnswer(f"{who(state)}: it is not known whether '{request.text}' was stored; it was sent once")
-    if status == Status.STORED or (begins and status == Status.DONE):
+    control = call.command >= CONTROL and not ends
+    if status == Status.STORED or (status == Status.DONE and control):  # a module executes a control command
         return
     if status == Status.DONE or begins:
         state.executes()

@@ -11,8 +11,10 @@ from functools import partial
 
 from multidrop.dialects.codec import Priority, Procedure
 from multidrop.dialects.errors import Diagnostic, Refused
+from multidrop.dialects.program_files import Held
 from multidrop.dialects.tmcl.host.codec import TmclState
-from multidrop.dialects.tmcl.host.operations import motors, moving, perform, read, who
+from multidrop.dialects.tmcl.host.operations import busy, motors, moving, perform, read, who
+from multidrop.dialects.tmcl.host.programs import read_held
 from multidrop.dialects.tmcl.manual.commands import (
     AXIS,
     BAUDS,
@@ -265,6 +267,13 @@ def take(state: TmclState, progress: Progress) -> Procedure[Snapshot]:
     remarks = []
     if active := (yield from moving(state)):
         remarks.append("moving while it was read: its position is one of that moment")
+    if runs := (yield from busy(state)):
+        remarks.append("its program ran while it was read")
+    try:
+        held = yield from read_held(state, (), lambda done, total: None)
+    except Refused as refused:
+        held = Held()
+        remarks.append(f"its program was not read: {refused}")
     if (count := (yield from motors(state))) > 1:
         remarks.append(f"it has {count} motors; a simulated module has one")
     code = readings.values.get(f"G{int(Global.BAUD)}")
@@ -277,7 +286,8 @@ def take(state: TmclState, progress: Progress) -> Procedure[Snapshot]:
         baud=BAUDS.get(code, 0) if isinstance(code, int) else 0,
         readings=readings,
         counters={"position": ((yield from read(state, Call(Command.GAP, Axis.ACTUAL_POSITION, 0))),)},
-        active=active,
+        program=tuple((line.at, line.text) for line in held.lines),
+        active=active or runs,
         remarks=tuple(remarks),
     )
 

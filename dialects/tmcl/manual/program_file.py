@@ -182,7 +182,9 @@ def _command(made: Assembled, line: Divided, word: Piece) -> Call | None:
         return None
     row = fields_of(word.text)
     if row is None:
-        made.wrong(line.number, word, *unknown(word.text))
+        what, hint = unknown(word.text)
+        label = line.fields and fields_of(line.fields[0].text.partition(" ")[0]) and NAME.fullmatch(word.text)
+        made.wrong(line.number, word, what, f"a label ends with a colon: {word.text}:" if label else hint)
         return None
     number, fields = row
     if len(line.fields) != len(fields):
@@ -222,7 +224,8 @@ def _refuse(made: Assembled, line: Divided, given: Piece, wanted: Field) -> None
         made.wrong(line.number, given, f"{wanted.name} is missing", wanted.hint)
     elif wanted.label and NAME.fullmatch(given.text) and given.text.upper() not in made.constants:
         near = difflib.get_close_matches(given.text.upper(), list(made.labels), 1, 0.6)
-        made.wrong(line.number, given, f"no label {given.text}", f"is {near[0]} meant?" if near else wanted.hint)
+        hint = f"is {near[0]} meant? (in any letters)" if near else wanted.hint
+        made.wrong(line.number, given, f"no label {given.text}", hint)
     else:
         made.wrong(line.number, given, f"{wanted.name} cannot be {given.text!r}", wanted.hint)
 

@@ -1,0 +1,420 @@
+"""The program in a module: read line by line, downloaded and read back, run, stepped and observed.
+
+Theory of operation. Between 132 and 133 a module stores every command but the control commands, from the address in
+132 on; so nothing else goes to it, and each line is sent once. A line after the last one is overwritten with an empty
+one, as the maker's IDE does, so that the rest of a longer program is not reached. Command 134 replies with the seven
+bytes of a stored line, without status and command number; only an exchange that is in step can tell it from a late
+reply, so a mark follows each doubtful one. What the module does is in global parameters 128 and 130.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
+from typing import Any
+
+from multidrop.dialects.codec import Procedure
+from multidrop.dialects.debugging import Debugging, Look, Neighbours, Row, Stepped
+from multidrop.dialects.errors import Diagnostic, DriveError, Inexpressible, Refused, Stopped
+from multidrop.dialects.family import Programs, Progress
+from multidrop.dialects.files import SourceLine, split_lines
+from multidrop.dialects.program_files import Difference, Held, Stored
+from multidrop.dialects.text import whole
+from multidrop.dialects.tmcl.host.codec import TmclState, call_of, line_in, parse_reply
+from multidrop.dialects.tmcl.host.operations import LACKS, answered, busy, moving, perform, read, store, who
+from multidrop.dialects.tmcl.manual import program_file
+from multidrop.dialects.tmcl.manual.commands import Call, Command, Global
+from multidrop.dialects.tmcl.manual.instructions import EMPTY, MEMORY, Word, spelled
+
+ERASED = 255
+"""The number of a line in memory that was never written, in some modules."""
+BLANK = 64
+"""Empty lines in a row after which the memory is taken for empty: routines may begin at several addresses."""
+OVER = Call(EMPTY)
+
+
+def read_line(state: TmclState, at: int) -> Procedure[Call]:
+    """Read one line of the memory. Raises Refused or NoAnswer."""
+    request = state.codec.request(state.address, f"134 0, 0, {at}", Call(Command.READ_PROGRAM, value=at))
+    reply = yield from answered(state, request)
+    fields = parse_reply(reply.body)
+    if fields is not None and (fields.module, fields.command) == (call_of(request.body)[0], Command.READ_PROGRAM):
+        raise Refused(f"{who(state)} reads no line of its program to a host")
+    found = line_in(reply.body)
+    return OVER if found.command in (EMPTY, ERASED) else found
+
+
+def read_memory(state: TmclState, last: int, progress: Progress) -> Procedure[Mapping[int, Call]]:
+    """Read the stored lines, at least up to address `last`."""
+    found: dict[int, Call] = {}
+    blank = at = 0
+    while at < MEMORY and (blank < BLANK or at <= last):
+        progress(at, min(max(at + BLANK - blank, last + 1), MEMORY))
+        try:
+            call = yield from read_line(state, at)
+        except Refused as refused:
+            if at and refused.code in LACKS:  # the end of a smaller memory
+                break
+            raise
+        if call.command == EMPTY:
+            blank += 1
+        else:
+            blank, found[at] = 0, call
+        at += 1
+    return found
+
+
+def held_of(memory: Mapping[int, Call]) -> Held:
+    return Held(tuple(Stored(at, spelled(call)) for at, call in sorted(memory.items())))
+
+
+def calls_of(held: Held) -> dict[int, Call]:
+    """The lines of the memory that `held_of` wrote."""
+    made = program_file.assembled([program_file.ProgramLine(n, line.text) for n, line in enumerate(held.lines, 1)])
+    return {line.at: placed.call for line, placed in zip(held.lines, made.lines, strict=True)}
+
+
+def read_held(state: TmclState, lines: Sequence[SourceLine], progress: Progress) -> Procedure[Held]:
+    return held_of((yield from read_memory(state, len(program_file.compiled(lines)) if lines else -1, progress)))
+
+
+def listing(state: TmclState, start: str = "") -> Procedure[tuple[str, ...]]:
+    held = yield from read_held(state, (), lambda done, total: None)
+    first = whole(start, 0, MEMORY) or 0
+    return tuple(f"{line.at}  {line.text}" for line in held.lines if line.at >= first)
+
+
+def readable(held: Held) -> tuple[str, ...]:
+    """List each line with its address and, where a jump goes there, its label."""
+    calls = calls_of(held)
+    texts = [line for line in program_file.disassembled(calls) if not line.endswith(":")]
+    labels = {line.removesuffix(":") for line in program_file.disassembled(calls) if line.endswith(":")}
+    width = max((len(program_file.label_of(at)) + 2 for at in calls if program_file.label_of(at) in labels), default=0)
+    return tuple(
+        f"{at}  {f'{name}:' if (name := program_file.label_of(at)) in labels else '':{width}}{texts[at].strip()}"
+        for at in sorted(calls)
+    )
+
+
+def upload(state: TmclState, raw: bool) -> Procedure[tuple[str, ...]]:
+    held = yield from read_held(state, (), lambda done, total: None)
+    held.check_program(who(state))
+    return file_of(state, held, raw)
+
+
+def file_of(_: TmclState, held: Held, raw: bool) -> tuple[str, ...]:
+    """The lines of a file that gives this memory: with labels, or `raw` with addresses."""
+    calls = calls_of(held)
+    if not raw:
+        return tuple(program_file.disassembled(calls))
+    return tuple(spelled(calls.get(at, OVER)) for at in range(max(calls, default=-1) + 1))
+
+
+# Download
+
+
+def download(
+    state: TmclState, lines: Sequence[SourceLine], held: Held | None, progress: Progress
+) -> Procedure[Sequence[SourceLine]]:
+    """Store a program from address 0 on, and an empty line after it. Raises Refused or NoAnswer.
+
+    Ends download mode in every case. `held`: what was just read; its lines beyond the file stay.
+    """
+    stored = program_file.compiled(lines)
+    if state.programming:
+        raise Refused(f"{who(state)} is in download mode; 133 0, 0, 0 ends that (nothing was sent)")
+    if not stored:
+        return lines
+    if (yield from busy(state)):
+        raise Refused(f"{who(state)}: its program runs; 128 0, 0, 0 ends it (nothing was sent)")
+    sent = [(each.source, each.call) for each in stored] + [(0, OVER)] * (len(stored) < MEMORY)
+    done, fate = 0, "cut off"
+    try:
+        yield from store(state, *_line(state, Call(Command.DOWNLOAD)), by_hand=False)
+        for source, call in sent:
+            progress(done, len(stored))
+            try:
+                yield from store(state, *_line(state, call))
+            except DriveError as error:
+                error.args = (f"line {source}: {error}" if source else str(error),)
+                raise
+            done += bool(source)
+        yield from store(state, *_line(state, Call(Command.END_DOWNLOAD)))
+        fate = "done"
+    except DriveError as error:
+        fate = "cut off" if isinstance(error, Stopped) else "told"  # the caller of a stopped one may have gone
+        error.args = (f"{error}; {_incomplete(state, done, len(stored))}",)
+        raise
+    finally:
+        if fate == "cut off":
+            state.note(f"{who(state)}: the download was cut off: {_incomplete(state, done, len(stored))}")
+        if state.programming:
+            yield from _leave(state)
+    progress(len(stored), len(stored))
+    _say_what_stays(state, held, len(stored))
+    return lines
+
+
+def _line(state: TmclState, call: Call) -> tuple[Any, Call]:
+    return state.codec.request(state.address, spelled(call), call), call
+
+
+def _leave(state: TmclState) -> Procedure[None]:
+    """End a download that failed; a failure of this is noted, for the download's own is the one to raise."""
+    try:
+        yield from store(state, *_line(state, Call(Command.END_DOWNLOAD)))
+    except DriveError as error:
+        state.note(str(error))
+
+
+def _incomplete(state: TmclState, done: int, total: int) -> str:
+    if not done:
+        return f"no line of the file is known to be stored in {who(state)}"
+    return f"{done} of {total} lines are stored: the program in {who(state)} is incomplete"
+
+
+def _say_what_stays(state: TmclState, held: Held | None, end: int) -> None:
+    rest = [line.at for line in held.lines if line.at > end] if held is not None else []
+    if rest:
+        count = f"{len(rest)} lines" if len(rest) > 1 else "1 line"
+        state.remark(f"{who(state)}: {count} from address {rest[0]} on stay as they were: the file does not reach them")
+
+
+def end(state: TmclState) -> Procedure[bool]:
+    """End the program, and stop the motors that it has started; whether it ran.
+
+    Raises Refused where a motor moves without a program.
+    """
+    runs = yield from busy(state)
+    moves = yield from moving(state)
+    if not runs and moves:
+        raise Refused(f"{who(state)} moves: stop it first (nothing was sent)")
+    if runs:
+        yield from perform(state, "128 0, 0, 0")
+        for motor in range(max(state.motors, 1)):
+            yield from perform(state, f"MST {motor}")
+            with suppress(Refused):  # a module without reference search
+                yield from perform(state, f"RFS STOP, {motor}")
+    return runs
+
+
+def differences(
+    state: TmclState,  # noqa: ARG001
+    lines: Sequence[SourceLine],
+    held: Held,
+    before: Held | None = None,  # noqa: ARG001
+) -> tuple[Difference, ...]:
+    """Compare the lines of a file with the stored ones, and see that an empty line follows them."""
+    stored, there = program_file.compiled(lines), {line.at: line.text for line in held.lines}
+    found = [
+        Difference(each.source, text, each.at, there.get(each.at, spelled(OVER)))
+        for each in stored
+        if (text := spelled(each.call)) != there.get(each.at, spelled(OVER))
+    ]
+    if stored and (more := there.get(len(stored))) is not None:
+        found.append(Difference(0, "", len(stored), more))
+    return tuple(found)
+
+
+def to_send(state: TmclState, lines: Sequence[SourceLine], held: Held) -> Procedure[str]:
+    yield from ()
+    found = differences(state, lines, held)
+    if not found:
+        return ""
+    return f"line {found[0].number} differs" if found[0].number else "the module holds more lines"
+
+
+def start(lines: Sequence[SourceLine], label: str) -> str:
+    """The line that runs a program from a label, or an address of the file. Raises Diagnostic."""
+    made = program_file.assembled(lines)
+    address = made.labels.get(label.upper(), whole(label, 0, max(len(made.lines) - 1, 0)))
+    if address is None or address >= len(made.lines):
+        raise Diagnostic(
+            f"no label {label} in the file", "", f"labels: {', '.join(made.labels) or 'none; 0 is its first line'}"
+        )
+    return program_file.run_at(address)
+
+
+def refreshed(text: str, _: Held) -> tuple[str, ...]:
+    return tuple(split_lines(text.removesuffix("\x1a").removesuffix("\n")))
+
+
+def annotated(text: str, held: Held) -> tuple[str, ...]:
+    """The lines of a file, each with its address where it gives a line of the memory."""
+    lines = refreshed(text, held)
+    made = program_file.assembled([program_file.ProgramLine(number, line) for number, line in enumerate(lines, 1)])
+    places = {each.source: each.at for each in made.lines}
+    width = len(str(len(made.lines)))
+    return tuple(f"{places.get(number, ''):>{width}}  {line}".rstrip() for number, line in enumerate(lines, 1))
+
+
+PROGRAM_FILES: Programs[TmclState] = Programs(
+    listing=listing,
+    readable=readable,
+    upload=upload,
+    read=read_held,
+    file=file_of,
+    executed=lambda lines: (),
+    size=lambda lines: len(program_file.compiled(lines)),
+    end=end,
+    download=download,
+    differences=differences,
+    to_send=to_send,
+    start=start,
+    refreshed=refreshed,
+    annotated=annotated,
+    remark="//",
+)
+
+
+# Observation
+
+
+NO_PLACE = "does not report the address of its next line (global parameter 130)"
+
+
+def stored_rows(state: TmclState) -> Procedure[tuple[Row, ...]]:
+    held = yield from read_held(state, (), lambda done, total: None)
+    return rows(held)
+
+
+def rows(held: Held) -> tuple[Row, ...]:
+    return tuple(Row(*line) for line in held.lines)
+
+
+def address_of(place: str) -> int:
+    """The address that a place names. Raises Diagnostic."""
+    found = whole(place or "0", 0, MEMORY - 1)
+    if found is None:
+        raise Diagnostic(f"no line {place}", "", f"valid: an address, 0 to {MEMORY - 1}; /list shows them")
+    return found
+
+
+def idle(state: TmclState, place: str, neighbours: Neighbours | None) -> Procedure[None]:
+    address = address_of(place)
+    if neighbours is None and address:
+        raise Inexpressible(f"{who(state)}: single step begins with line 0: no command sets another; nothing was sent")
+    if (yield from busy(state)):
+        raise Refused(f"{who(state)}: its program runs already; not started; 128 0, 0, 0 ends it")
+
+
+def trace(state: TmclState, place: str) -> Procedure[None]:
+    state.program_halted(False)
+    yield from perform(state, program_file.run_at(address_of(place)))
+
+
+def begin(state: TmclState, place: str) -> Procedure[None]:  # noqa: ARG001
+    yield from perform(state, "131 0, 0, 0")
+    state.program_halted(True)
+
+
+def look(state: TmclState, place: str) -> Procedure[Look]:  # noqa: ARG001
+    runs = yield from busy(state)
+    state.program_halted(state.halted and not runs)
+    if not runs and not state.halted:
+        return Look(False)
+    return Look(True, state.halted, (yield from counter(state)))
+
+
+def counter(state: TmclState) -> Procedure[int | None]:
+    """The address of the next line; None where the module does not tell."""
+    try:
+        return (yield from read(state, Call(Command.GGP, Global.PROGRAM_COUNTER)))
+    except Refused as refused:
+        if refused.code in LACKS:
+            return None
+        raise
+
+
+def waits(state: TmclState, place: str, last: Row | None) -> Procedure[None]:  # noqa: ARG001
+    if not state.halted or (yield from busy(state)):
+        raise Refused(f"{who(state)}: its program is not known to be halted; nothing was sent")
+
+
+def step(state: TmclState, listed: Sequence[Row]) -> Procedure[Stepped]:
+    """Execute the next line; a program that comes to STOP, or to its end, is over."""
+    at = yield from counter(state)
+    if at is None:
+        raise Inexpressible(f"{who(state)} {NO_PLACE}; nothing was sent")
+    row = next((each for each in listed if each.address == at), Row(at, ""))
+    yield from perform(state, "130 0, 0, 0")
+    state.program_halted(bool(row.text) and row.text != Word.STOP.name)
+    return Stepped(row)
+
+
+def go_on(state: TmclState, place: str) -> Procedure[None]:  # noqa: ARG001
+    state.program_halted(False)
+    yield from perform(state, "129 0, 0, 0")
+
+
+def break_now(state: TmclState, place: str) -> Procedure[None]:  # noqa: ARG001
+    if not (yield from busy(state)):
+        raise Refused(f"{who(state)}: its program does not run; nothing was sent")
+    yield from perform(state, "128 0, 0, 0")
+    state.program_halted(True)
+
+
+def no_break(state: TmclState, *_: object) -> Procedure[None]:
+    what = "TMCL has no break points: /break now halts a program; program test --break has them"
+    raise Inexpressible(f"{who(state)}: {what}; nothing was sent")
+    yield  # a procedure
+
+
+def never_broken(*_: object) -> Procedure[int | None]:
+    return None
+    yield  # a procedure
+
+
+def check_names(state: TmclState, names: Sequence[str]) -> None:  # noqa: ARG001
+    for name in names:
+        watched_call(name)
+
+
+def watched_call(name: str) -> Call:
+    """The command that reads a watched name: `A`, `X`, a user variable `V5`, or an axis parameter `AP1`, `AP1/2`."""
+    registers = {"A": 2, "X": 3}
+    if name in registers:
+        return Call(Command.PROGRAM_STATUS, registers[name])
+    head = "AP" if name.startswith("AP") else "V" if name.startswith("V") else ""
+    number, _, motor = name.removeprefix(head).partition("/")
+    if head and (found := whole(number, 0, 255)) is not None and (head == "AP" or "/" not in name):
+        if head == "V":
+            return Call(Command.GGP, found, 2)
+        if (axis := whole(motor or "0", 0, 5)) is not None:
+            return Call(Command.GAP, found, axis)
+    raise Diagnostic(f"{name} cannot be watched", "", "valid: A, X, V0 to V255, AP and a parameter, as AP1 or AP1/2")
+
+
+def watched(state: TmclState, names: Sequence[str]) -> Procedure[Mapping[str, str]]:
+    found = {}
+    for name in names:
+        try:
+            found[name] = str((yield from read(state, watched_call(name))))
+        except Refused as refused:
+            if refused.code not in LACKS:
+                raise
+    return found
+
+
+DEBUGGING = Debugging(
+    listing=stored_rows,
+    rows=rows,
+    entry=lambda listed: "0",
+    address=lambda listed, place: whole(place, 0, MEMORY - 1),
+    idle=idle,
+    trace=trace,
+    begin=begin,
+    waits=waits,
+    forget=lambda state: state.program_halted(False),
+    step=step,
+    go_on=go_on,
+    look=look,
+    break_at=no_break,
+    break_off=no_break,
+    break_now=break_now,
+    broken=never_broken,
+    hold=lambda text: 0.0,
+    names=check_names,
+    values=watched,
+    traced=lambda line: None,
+)

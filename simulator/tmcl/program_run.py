@@ -1,0 +1,242 @@
+"""A TMCL program file run on one simulated module, in virtual time: no clock, no wire, no event loop.
+
+The program runs from its first line, or from a label. The run ends when the program ends, when nothing can ever happen
+any more, or when its time is over.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from math import inf
+from typing import Any
+
+from multidrop.dialects import Diagnostic
+from multidrop.dialects.files import split_lines
+from multidrop.dialects.text import whole
+from multidrop.dialects.tmcl.manual import program_file
+from multidrop.dialects.tmcl.manual.commands import Axis, Call, Command, Search, Status
+from multidrop.dialects.tmcl.manual.instructions import Word
+from multidrop.dialects.tmcl.manual.program_file import Assembled
+from multidrop.simulator.cell.spec import DriveSpec
+from multidrop.simulator.program_run import (
+    LONGEST,
+    MOST_LINES,
+    NO_DEBUGGING,
+    Debugging,
+    Event,
+    Line,
+    Load,
+    Programs,
+    Recorder,
+    Summary,
+    Values,
+    break_point,
+    counted,
+    next_look,
+)
+from multidrop.simulator.tmcl.module import TmclModule
+from multidrop.simulator.tmcl.program import ALL_PORTS, USERS
+from multidrop.simulator.world import World
+
+_MOTIONS = frozenset({Command.ROR, Command.ROL, Command.MVP, Word.MVPA, Word.ROLA, Word.RORA})
+_SETS = frozenset({Command.SAP, Word.AAP})
+
+
+@dataclass(frozen=True)
+class Failed(Event):
+    """A line that was not carried out: the line of the file, and why."""
+
+    line: int
+    text: str
+    why: str
+
+    def fact(self, real: float) -> dict[str, Any]:
+        return {"t": round(self.t, 6), "error": self.why, "line": self.line, "text": self.text}
+
+    def lines(self, file: str, real: float) -> Iterator[Line]:
+        yield Line(f"{file}:{self.line}: {self.text} at {self.t:.4f} s: {self.why}", problem=True)
+
+
+@dataclass(frozen=True)
+class Output(Event):
+    """An output that the program has set: its port, 255 for all of them, and the value."""
+
+    port: int
+    value: int
+
+    def fact(self, real: float) -> dict[str, Any]:
+        return {"t": round(self.t, 6), "port": self.port, "value": self.value}
+
+    def lines(self, file: str, real: float) -> Iterator[Line]:
+        where = "all outputs" if self.port == ALL_PORTS else f"output {self.port}"
+        yield Line(f"{self.t:10.4f}  {where} = {self.value}")
+
+
+class ProgramRun:
+    """One file on one module. Raises Diagnostic for a module that refuses its settings, or holds fewer lines."""
+
+    def __init__(self, spec: DriveSpec, made: Assembled, name: str, source: Sequence[str]) -> None:
+        from multidrop.simulator.families import TABLE
+
+        if spec.personality not in TABLE["tmcl"].personalities:
+            valid = ", ".join(TABLE["tmcl"].personalities)
+            raise Diagnostic(f"a {spec.personality} does not run TMCL", name, f"valid: {valid}")
+        self._name, self._made, self._text = name, made, source
+        self._device = TmclModule(replace(spec, program="", program_name=""), World(spec.world))
+        self._program = self._device.program
+        self._program.load({each.at: each.call for each in made.lines})
+        self._source = {each.at: each.source for each in made.lines}
+        self._recorder: Recorder | None = None
+        self._begun: tuple[float, int] = (0.0, 0)
+        self._events: list[Event] = []
+        self._moves = 0
+        self._errors: list[str] = []
+        self._ended_at = 0.0
+        self.now = 0.0
+
+    def run(self, start: str = "", until: float | None = None, debugging: Debugging = NO_DEBUGGING) -> Iterator[Event]:
+        """Run from a label or an address; a Summary is the last event. Raises Diagnostic."""
+        address = self._address(start)
+        if debugging.wanted:
+            self._recorder = self._recorded(debugging)
+        self._program.before, self._program.after = self._before, self._after
+        self._program.run(0.0, address)
+        limit = LONGEST if until is None else until
+        most = MOST_LINES if until is None else inf
+        stuck = False
+        while self._program.running and self.now < limit and self._program.executed < most:
+            due = self._device.deadline
+            stuck = due is None
+            self.now = next_look(due, self.now, limit)
+            self._device.advance(self.now)
+            yield from self._news()
+        yield self._summary(until, stuck)
+
+    def _address(self, start: str) -> int:
+        if not self._made.lines:
+            raise Diagnostic("no line to run", self._name, "a program has one command at least")
+        found = self._made.labels.get(start.upper(), whole(start or "0", 0, len(self._made.lines) - 1))
+        if found is None:
+            raise Diagnostic(f"no label {start}", self._name, f"valid: {', '.join(self._made.labels) or '0'}")
+        return found
+
+    # Debugging
+
+    def _recorded(self, debugging: Debugging) -> Recorder:
+        points = {}
+        for each in debugging.breaks:
+            point = break_point(each, self._name, "LINE, LABEL, or either with ,PASSES")
+            points[self._line_of(point.place)] = point
+        names = {name.upper(): self._reader(name.upper()) for name in debugging.watch}
+        return Recorder(debugging, self._text, points, partial(self._values, names or {"A": "A", "X": "X"}))
+
+    def _line_of(self, place: str) -> int:
+        at = self._made.labels.get(place.upper())
+        number = self._source.get(at, 0) if at is not None else whole(place, 0, 999_999)
+        if number not in self._source.values():
+            raise Diagnostic(f"no command to break at {place}", self._name, "valid: a line of the file, or a label")
+        assert number is not None
+        return number
+
+    def _reader(self, name: str) -> Call | str:
+        """How a watched name is read: a register by its name, else by a command. Raises Diagnostic."""
+        number = whole(name[1:], 0, 255) if name.startswith("V") else None
+        axis = whole(name[2:], 0, 255) if name.startswith("AP") else None
+        if name in ("A", "X"):
+            return name
+        if number is not None:
+            return Call(Command.GGP, number, USERS)
+        if axis is not None:
+            return Call(Command.GAP, axis)
+        hint = "valid: A, X, V0 to V255, AP and a parameter, as AP1"
+        raise Diagnostic(f"no variable {name} to watch", self._name, hint)
+
+    def _values(self, names: Mapping[str, Call | str]) -> Values:
+        registers = {"A": self._program.accumulator, "X": self._program.x}
+        return {name: registers[how] if isinstance(how, str) else self._read(how) for name, how in names.items()}
+
+    def _read(self, call: Call) -> int:
+        status, value = self._device.carry_out(call, self._begun[0])
+        return value if status == Status.DONE else 0
+
+    # The run
+
+    def _before(self, t: float, at: int) -> bool:
+        self._begun = t, self._source.get(at, 0)
+        recorder = self._recorder
+        if recorder is None or not recorder.reaches(self._begun[1]):
+            return False
+        recorder.breaks(t, self._begun[1], self._shown(self._begun[1]))
+        return True
+
+    def _after(self, t: float, call: Call) -> None:
+        self._ended_at = t
+        self._moves += _begins_motion(call)
+        if call.command == Word.SIO and call.motor == USERS and not self._failed_now(t):
+            self._events.append(Output(t, call.type, call.value))
+        if self._recorder is not None and not self._recorder.full:
+            _, line = self._begun
+            self._recorder.after(t, line, self._shown(line), self._recorder.changed())
+
+    def _failed_now(self, t: float) -> bool:
+        return bool(self._program.failures) and self._program.failures[-1].t == t
+
+    def _shown(self, number: int) -> str:
+        line = self._text[number - 1] if 0 < number <= len(self._text) else ""
+        return line[: program_file.remark_at(line)].strip()
+
+    def _news(self) -> Iterator[Event]:
+        """Yield what was executed, set and not carried out since the last look, in the order of time."""
+        news, self._events = self._events, []
+        if self._recorder is not None:
+            news += self._recorder.take()
+        for each in self._program.failures:
+            line = self._source.get(each.at, 0)
+            news.append(Failed(each.t, line, self._shown(line), each.why))
+            self._errors.append(each.why)
+        self._program.failures.clear()
+        yield from sorted(news, key=lambda each: each.t)
+
+    def _summary(self, until: float | None, stuck: bool) -> Summary:
+        running, errors = self._program.running, tuple(self._errors)
+        broken = self._recorder is not None and self._recorder.broken
+        t = self.now if running else self._begun[0] if broken else self._ended_at
+        position = self._read_axis(Axis.ACTUAL_POSITION)
+        moving = self._read_axis(Axis.ACTUAL_VELOCITY) != 0
+        ended = "break" if broken else "until" if running else "error" if errors else "END"
+        failed = counted(len(errors), "error") if errors else "no errors"
+        lines = self._program.executed
+        return Summary(
+            ended=ended,
+            t=t,
+            position=position,
+            moves=self._moves,
+            instructions=lines,
+            errors=errors,
+            lines_at=tuple(each for each in (self._source.get(self._program.counter, 0),) if running),
+            moving=moving,
+            given_up=running and until is None,
+            stuck=running and stuck,
+            counts=f"position {position}, {counted(self._moves, 'motion')}, {counted(lines, 'line')}, {failed}",
+            turning="the motor still turns; WAIT POS before STOP waits for it" if moving and ended == "END" else "",
+        )
+
+    def _read_axis(self, parameter: Axis) -> int:
+        return self._device.carry_out(Call(Command.GAP, parameter), self.now)[1]
+
+
+def _begins_motion(call: Call) -> bool:
+    if call.command in _SETS:
+        return call.type in (Axis.TARGET_POSITION, Axis.TARGET_VELOCITY)
+    return call.command in _MOTIONS or (call.command, call.type) == (Command.RFS, Search.START)
+
+
+def read(text: str, file: str) -> Load:
+    """Read the text of a file. Raises Diagnostic."""
+    made, source = program_file.assembled(program_file.read(text, file)), split_lines(text)
+    return lambda spec: ProgramRun(spec, made, file, source)
+
+
+RUNS = Programs(drive=DriveSpec(personality="TMCM", name="1"), read=read)
