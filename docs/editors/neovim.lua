@@ -1,14 +1,16 @@
 -- Neovim 0.7 to 0.10: put this into ~/.config/nvim/plugin/multidrop.lua.
 vim.api.nvim_create_autocmd({ "BufRead", "BufNewFile" }, {
-  pattern = { "*.mxt", "*.prg", "*.asc" },
+  pattern = { "*.mxt", "*.prg", "*.asc", "*.tmc" },
   callback = function(args)
-    vim.bo[args.buf].filetype = args.file:lower():match("%.mxt$") and "mcode" or "ascript"
+    local types = { mxt = "mcode", tmc = "tmcl" }
+    vim.bo[args.buf].filetype = types[args.file:lower():match("%.(%w+)$")] or "ascript"
   end,
 })
 vim.api.nvim_create_autocmd("FileType", {
-  pattern = { "mcode", "ascript" },
+  pattern = { "mcode", "ascript", "tmcl" },
   callback = function(args)
-    vim.bo[args.buf].commentstring = vim.bo[args.buf].filetype == "mcode" and "' %s" or "; %s"
+    local remarks = { mcode = "' %s", tmcl = "// %s" }
+    vim.bo[args.buf].commentstring = remarks[vim.bo[args.buf].filetype] or "; %s"
     vim.bo[args.buf].omnifunc = "v:lua.vim.lsp.omnifunc"
     local config = { name = "multidrop", cmd = { "multidrop", "lsp" }, root_dir = vim.fn.getcwd() }
     if vim.lsp.start then

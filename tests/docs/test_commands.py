@@ -26,7 +26,7 @@ from tests.support.until import PATIENCE
 pytestmark = pytest.mark.process
 
 BLOCK = re.compile(r"^```console\n(.*?)^```", re.S | re.M)
-FILE = re.compile(r"^```\w*\n([#';] ([\w-]+\.\w+)\n.*?)^```", re.S | re.M)
+FILE = re.compile(r"^```\w*\n((?:[#';]|//) ([\w-]+\.\w+)\n.*?)^```", re.S | re.M)
 
 
 PLAIN = re.compile(r"multidrop (send|program) (?:[^|&;<>$`\"']|'[^']*')*$")

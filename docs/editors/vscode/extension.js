@@ -7,7 +7,7 @@ exports.activate = () => {
   const settings = workspace.getConfiguration("multidrop");
   const server = { command: settings.get("command"), args: ["lsp"] };
   client = new LanguageClient("multidrop", "multidrop", server, {
-    documentSelector: [{ language: "mcode" }, { language: "ascript" }],
+    documentSelector: [{ language: "mcode" }, { language: "ascript" }, { language: "tmcl" }],
     initializationOptions: { personality: settings.get("personality") },
   });
   return client.start();
