@@ -396,7 +396,9 @@ class _ConditionPoller(_Poller[str]):
 
     async def _read_parts(self, address: str, due: _Due) -> None:
         """Read the parts of a drive that are due, and publish its conditions."""
-        drive, known = self._roster.drives[address], self._known.get(address)
+        drive, known = self._roster.drives.get(address), self._known.get(address)
+        if drive is None or address not in self.periods:
+            return  # nobody wants them any more
         if known is None or known.drive is not drive:  # another drive is at this address
             known = self._known[address] = _Facts(drive)
         values = drive.family.values

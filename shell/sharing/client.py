@@ -129,10 +129,17 @@ class Client:
         return True
 
     def overtaken(self) -> bytes:
-        """Take the bytes that wait for its turn, which a stop has overtaken; requests stay."""
+        """Take the bytes that wait for its turn, which a stop has overtaken; requests stay.
+
+        A purge that waits is done: the stop drops what has not left. After the stop it would drop the stop itself.
+        """
         waiting = tuple(self.waiting)
         self.waiting.clear()
-        self.waiting.extend(each for each in waiting if isinstance(each, Request))
+        for each in waiting:
+            if isinstance(each, Request) and each.setting == Setting.PURGE:
+                self.reply(each.setting, each.value)
+            elif isinstance(each, Request):
+                self.waiting.append(each)
         return b"".join(each for each in waiting if isinstance(each, bytes))
 
     # To the client

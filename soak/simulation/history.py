@@ -131,6 +131,8 @@ class History:
     exchanges: int = 0
     """Requests that have ended."""
     notices: list[tuple[float, str]] = field(default_factory=list)
+    deaths: list[float] = field(default_factory=list)
+    """When a process was killed."""
     lives: int = 0
     """The number of processes that have run."""
     power: bool = False
@@ -173,6 +175,7 @@ class History:
 
     def killed(self, at: float) -> None:
         """Nobody says any more what became of the lines that were typed."""
+        self.deaths.append(at)
         for command in self.commands.values():
             if command.outcome is Outcome.OPEN and not command.who:
                 command.outcome, command.said, command.ended = Outcome.UNKNOWN, KILLED, at

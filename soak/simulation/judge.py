@@ -35,7 +35,8 @@ def _first(world: World) -> Iterator[str]:
     for stop in world.history.stops:
         for line, forms in stop.forms.items():
             after = [(at, data) for at, port, data in world.history.written[stop.written :] if port == line]
-            if after and after[0][0] <= stop.at + SOON:
+            killed = any(stop.at <= at <= stop.at + SOON for at in world.history.deaths)
+            if after and after[0][0] <= stop.at + SOON and not (killed and not stop.who):
                 begun = b"".join(data for at, data in after if at <= stop.at + SOON)
                 rest = stop.rests[line]  # of a message that leaves whole; other rests are dropped
                 left = [begun, *filter(None, [begun[rest:]])]

@@ -22,6 +22,7 @@ AFTER = 2.0
 SEVEN_BITS = Grant("a checksum of seven or eight bits", "The checksum of CK has seven bits")
 NOISY_ACK = Grant("an ACK of noise", "An ACK without its command")
 NOISY_NAK = Grant("a NAK of noise", "A NAK of noise together with a lost ACK")
+DOUBLED = Grant("a datagram that arrives twice", "A datagram that arrives twice")
 BARE_REFUSAL = Grant("a refusal of noise, without a checksum", "A refusal without a checksum")
 BARE_COMMAND = Grant("a damaged command without a checksum", "Noise on the line")
 BARE_VALUE = Grant("a damaged value without a checksum", "Noise on the line")
@@ -70,8 +71,16 @@ def _twice(world: World) -> Iterator[str | Granted]:
             yield Granted(BARE_COMMAND, words)
         elif _made(world.history, command, NAK):
             yield Granted(NOISY_NAK, words)
+        elif _doubled(world, command):
+            yield Granted(DOUBLED, words)
         else:
             yield words
+
+
+def _doubled(world: World, command: Command) -> bool:
+    """Whether the network delivered the datagram of a command twice."""
+    place = world.place(command.line)
+    return any(host == place.host and command.text.encode() in data for host, data in world.network.doubled)
 
 
 def _denied(world: World) -> Iterator[str | Granted]:
@@ -175,7 +184,7 @@ OUTCOMES = (
         "No command is executed twice.",
         "What is never done twice",
         _twice,
-        (BARE_COMMAND, NOISY_NAK),
+        (BARE_COMMAND, NOISY_NAK, DOUBLED),
     ),
     Rule("denied", "What was said to be not sent was not executed.", NOISE, _denied, (BARE_COMMAND,)),
     Rule("refused", "What was said to be refused was not executed.", NOISE, _refused, (BARE_REFUSAL,)),

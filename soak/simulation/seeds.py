@@ -8,6 +8,8 @@ FIXED = {
     137: "the same, where the stop came before the outcome was read",
     472: "a value that a drive does not print, which ended the prompt at /status",
     882: "the same, which a wait took for rest",
+    2027: "a stop through a shared port, dropped by the purge before it in the same read",
+    2177: "the conditions of a drive that nobody wanted any more, which were read as that was said",
 }
 DERIVED = 12
 """The number of seeds that follow from the commit."""

@@ -49,6 +49,23 @@ class Watched(CellSession):
         return self
 
 
+async def test_conditions_that_nobody_wants_any_more_as_their_reading_begins_are_not_read(tmp_path):
+    async with Watched(tmp_path, party("a"), "a") as cell:
+        await asyncio.sleep(2)
+        telemetry = cell.session.buses["line"].telemetry
+        begin = telemetry._conditions._begin
+
+        def begun(*given: Any) -> None:
+            begin(*given)
+            cell.watch.close()
+
+        telemetry._conditions._begin = begun
+        before = len(read(cell))
+        await asyncio.sleep(5)
+        assert len(read(cell)) <= before + 1
+        assert cell.told() == []
+
+
 async def test_a_serial_drive_is_one_print_a_second_and_its_settings_once(tmp_path):
     async with Watched(tmp_path, party("a"), "a") as cell:
         await asyncio.sleep(10)

@@ -70,7 +70,8 @@ def test_docs_list_every_rule_by_its_name_and_its_sentence() -> None:
 def found(history: History, checksum: int = 1) -> dict[str, list[str | Granted]]:
     """What the rules of commands and values find on a line of two drives, `a` and `b`."""
     place = Place("l", "mcode", ("a", "b"), 1, checksum, 9600, True)
-    world: Any = SimpleNamespace(history=history, place=lambda line: place)
+    network = SimpleNamespace(doubled=[])
+    world: Any = SimpleNamespace(history=history, network=network, place=lambda line: place)
     return {rule.name: list(rule.check(world)) for rule in OUTCOMES if list(rule.check(world))}
 
 

@@ -12,7 +12,7 @@ from typing import ClassVar
 
 from multidrop.dialects.codec import Codec, Decoded, End, Kind, Reply, Request, StopPiece
 from multidrop.dialects.errors import Inexpressible
-from multidrop.dialects.pmx.manual.table import reads, starts_motion
+from multidrop.dialects.pmx.manual.table import lookup, reads, starts_motion
 from multidrop.dialects.state import DriveState
 
 LONGEST = 62
@@ -23,6 +23,8 @@ GAP = 0.03
 """Seconds of quiet after a command of a stop, so that its reply does not collide with the next command."""
 FACTORY = "00"
 """The device number of a new unit."""
+DONE, VALUE = "OK", "(?!OK$).*"
+"""The reply to a command that reads nothing, and to one that reads (manual 9). A late one of the other kind is none."""
 WRITES_FLASH = re.compile(r"STORE|SA\d+=", re.ASCII)
 MARKED = re.compile(r"\?Q(\d\d)?\d{3}", re.ASCII)
 """The reply to a sync mark (`exchange`)."""
@@ -54,7 +56,8 @@ class Pmx(Codec):
         if size > LONGEST:
             raise Inexpressible(f"the command has {size} characters with its number, {LONGEST} are sent at most")
         timeout = FLASH if WRITES_FLASH.match(text) else None
-        return Request(address, text, Kind.PRINT if reads(text) else Kind.COMMAND, self, timeout=timeout)
+        kind, expect = (Kind.PRINT, VALUE) if reads(text) else (Kind.COMMAND, DONE if lookup(text) else None)
+        return Request(address, text, kind, self, timeout=timeout, expect=expect)
 
     def encode(self, request: Request) -> bytes:
         return self._command(request.address, request.text)

@@ -60,7 +60,7 @@ PHRASES = {
         '[drive]\nlanguage = "MCode"\n[variables]\nR2 = {}\n',
         "R2={}",
         ("IP", "CP", "BD=19"),
-        ("FD", "PY=0", 'DN="z"', "LK=1", "AS=3", "UG"),
+        ("FD", 'DN="z"', "LK=1", "AS=3", "UG"),
         "PG 300\nLB K{label}\nR2={value}\nMR {label}\nH\nE\nPG\n",
         "SL {}\n",
         ".mxt",

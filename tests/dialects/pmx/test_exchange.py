@@ -99,6 +99,17 @@ def test_an_answer_is_the_same_whole_and_byte_by_byte(text, data):
     assert codec.decode(asked, whole).used == len(whole)
 
 
+@pytest.mark.parametrize(
+    ("text", "heard", "found"), [("V2=5", b"0\rOK\r", "OK"), ("X1000", b"1\rOK\r", "OK"), ("V1", b"OK\r7\r", "7")]
+)
+def test_a_late_answer_of_the_other_kind_is_none(text, heard, found):
+    codec = Pmx()
+    request = codec.request("00", text)
+    decoded = codec.decode(request, heard)
+    assert decoded.reply.lines == (found,) and len(decoded.strays) == 1
+    assert codec.decode(request, heard[: heard.index(b"\r") + 1]) is None
+
+
 def test_an_answer_that_is_damaged_is_told_from_none():
     asked = Pmx().request("00", "PX")
     assert Pmx().on_timeout(asked, b"").reply.end is Pmx().on_timeout(asked, b"\n\0").reply.end is End.TIMEOUT

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from multidrop.shell.sharing.writer_turns import TURN, WAITING, Action, Close, Send, Set, Stop, Write
+from multidrop.shell.sharing.writer_turns import TURN, WAITING, Action, Close, Purge, Send, Set, Stop, Write
 from multidrop.transports import telnet
 from multidrop.transports.telnet import OPTION, REPLY, Control, Setting, message
 from tests.support.shared_exchange import ADA, BOB, EVE, HELLO, Port
@@ -229,3 +229,11 @@ def test_a_client_that_never_waits_for_replies_is_dropped_and_its_stop_still_pas
     assert len(port.exchange.clients[ADA].waiting) <= WAITING + 400
     later = port.exchange.receive(ADA, flood(400) + b"\x1bMR 1\r", 0.0)
     assert isinstance(later[0], Stop) and not [each for each in later if isinstance(each, Write)]
+
+
+def test_a_purge_and_a_stop_in_one_read_do_not_drop_the_stop() -> None:
+    port = agreed(Port(slow=True), ADA)
+    port.send(ADA, b"MR 51200\r")
+    actions = port.exchange.receive(ADA, message(Setting.PURGE, 2) + b"\x1b", 0.0)
+    assert [type(each) for each in actions if isinstance(each, Stop | Purge)] == [Stop]
+    assert Send(ADA, message(Setting.PURGE + REPLY, 2)) in actions
