@@ -24,9 +24,9 @@ from tests.support.virtual import VirtualLoop
 STARTS = frozenset({"subprocess.Popen", "os.fork", "os.forkpty", "os.posix_spawn", "os.system"})
 """Audit events of the interpreter, each of which is the start of a process."""
 
-REPEATING = ("wide", "slow", "nightly")
-"""Markers of tests that go the same ways again with other values. Coverage is not measured in them, nor in those of
-hypothesis: measuring makes the product two to three times slower, and they show no line that others do not."""
+REPEATING = ("wide", "nightly")
+"""Markers of products of parameters, which go the same ways again. Coverage is not measured in them: measuring makes
+the product two to three times slower."""
 
 _running: list[pytest.Item] = []
 """The test that runs, its fixtures included."""
@@ -129,8 +129,7 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
     """Leave out what only the nightly run takes, and spread what waits."""
     _leave_out(config, items)
     for item in items:
-        drawn = hasattr(getattr(item, "obj", None), "hypothesis")
-        if drawn or any(item.get_closest_marker(name) for name in REPEATING):
+        if any(item.get_closest_marker(name) for name in REPEATING):
             item.add_marker("no_cover")
     items[:] = _spread(items)
 
