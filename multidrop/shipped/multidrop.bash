@@ -105,11 +105,11 @@ _shtab_multidrop_log_replay___against_COMPGEN=_shtab_compgen_files
 _shtab_multidrop_report__o_COMPGEN=_shtab_compgen_files
 _shtab_multidrop_report___output_COMPGEN=_shtab_compgen_files
 
-_shtab_multidrop_program_check___language_choices=(mcode pmx)
+_shtab_multidrop_program_check___language_choices=(mcode pmx tmcl)
 _shtab_multidrop_program_check___personality_choices=(LMDOM LMDCM LMDOE LMDCE LMM MDI MDIE MDIX)
-_shtab_multidrop_program_test___language_choices=(mcode pmx)
-_shtab_multidrop_program_test___personality_choices=(LMDOM LMDCM LMDOE LMDCE LMM MDI MDIE MDIX PMX)
-_shtab_multidrop_program_sweep___language_choices=(mcode pmx)
+_shtab_multidrop_program_test___language_choices=(mcode pmx tmcl)
+_shtab_multidrop_program_test___personality_choices=(LMDOM LMDCM LMDOE LMDCE LMM MDI MDIE MDIX PMX TMCM)
+_shtab_multidrop_program_sweep___language_choices=(mcode pmx tmcl)
 _shtab_multidrop_program_pos_0_choices=(check test sweep list upload download)
 _shtab_multidrop_params_pos_0_choices=(backup diff restore)
 _shtab_multidrop_macro_pos_0_choices=(list show play edit describe rename copy delete key import export)
