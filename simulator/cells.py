@@ -87,7 +87,9 @@ class Reader:
         return bus
 
     def _drive(self, table: Table, folder: Folder) -> DriveSpec:
-        table.only(*DRIVE_KEYS)
+        name = table.values.get("personality")
+        own = self._families[name].keys if isinstance(name, str) and name in self._families else ()
+        table.only(*DRIVE_KEYS, *own)
         personality = table.choice("personality", tuple(self._families))
         return self._families[personality].read_drive(table, folder)
 

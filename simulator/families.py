@@ -32,7 +32,21 @@ TABLE: Mapping[str, Row] = {
         "multidrop.simulator.lexium.program_run:RUNS",
     ),
     "pmx": Row("multidrop.simulator.pmx.family:PMX", ("PMX",), "multidrop.simulator.pmx.program_run:RUNS"),
-    "tmcl": Row("multidrop.simulator.tmcl.family:TMCL", ("TMCM",), "multidrop.simulator.tmcl.program_run:RUNS"),
+    "tmcl": Row(
+        "multidrop.simulator.tmcl.family:TMCL",
+        (
+            "TMCM",
+            "TMCM-1140",
+            "TMCM-1141",
+            "TMCM-1161",
+            "TMCM-1240",
+            "TMCM-1241",
+            "TMCM-1276",
+            "TMCM-3110",
+            "TMCM-6110",
+        ),
+        "multidrop.simulator.tmcl.program_run:RUNS",
+    ),
 }
 FAMILIES: Mapping[str, Family] = OnDemand({name: row.record for name, row in TABLE.items()})
 """By name."""

@@ -116,3 +116,5 @@ class Family:
     addressed: bool = False
     snapshots: Snapshots | None = None
     """None: a unit cannot become a drive in a cell file."""
+    keys: tuple[str, ...] = ()
+    """Keys of `[[bus.drive]]` that only its drives have."""

@@ -75,6 +75,8 @@ class DriveSpec:
     identity: Identity = Identity()
     world: WorldSpec = WorldSpec()
     further: tuple[WorldSpec, ...] = ()
+    any_address: bool = False
+    """A TMCL module that replies to every address."""
 
     def assignments(self) -> Iterator[tuple[str, str]]:
         """Yield `set` as pairs of name and value, in order; `IS = ["1,1,0", "2,2,0"]` gives two pairs."""

@@ -1,36 +1,46 @@
 """The family of the TMCL modules: built from a cell file's `[[bus.drive]]` table, which is read and written here.
 
-`set` has parameters in EEPROM by number: `4 = 51200` is an axis parameter, `G75 = 5` a global one of bank 0. A module
-as it was read from a unit becomes such a table, and a table the settings to write to a unit.
+`set` has parameters in EEPROM by number: `4 = 51200` is an axis parameter, `4_1` that of motor 1, `G75 = 5` a global
+one of bank 0; `variables` has user variables of bank 2 by number. A module as it was read from a unit becomes such a
+table, and a table the settings to write to a unit.
 """
 
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
+from functools import partial
 
 from multidrop.dialects.family import Motion
 from multidrop.dialects.files import split_lines
 from multidrop.dialects.program_files import errors
 from multidrop.dialects.tmcl.manual import program_file
-from multidrop.dialects.tmcl.manual.commands import AXIS, BAUDS, GLOBAL, Axis, Global, Parameter
+from multidrop.dialects.tmcl.manual.commands import Axis, Global
 from multidrop.dialects.tmcl.manual.instructions import spelled
+from multidrop.dialects.tmcl.manual.modules import BAUDS, GLOBAL, MODULES, PREFIX, USERS, Module, Parameter, module_of
 from multidrop.dialects.tmcl.manual.program_file import ProgramLine
 from multidrop.dialects.values import Snapshot, Value
-from multidrop.simulator.cell.drive_keys import common_keys, read_identity, read_settings, read_world
+from multidrop.simulator.cell.drive_keys import (
+    WORLD_KEYS,
+    common_keys,
+    read_identity,
+    read_settings,
+    read_variables,
+    read_worlds,
+)
 from multidrop.simulator.cell.spec import DriveSpec
 from multidrop.simulator.cell.spec import Value as Setting
 from multidrop.simulator.cell.table import Folder, Table, quoted
 from multidrop.simulator.cell.writer import DriveText, Entry, remark
 from multidrop.simulator.family import Family, Place, Shadow, Snapshots, StoredProgram, Unit
-from multidrop.simulator.tmcl.module import TmclModule, TmclPort
-from multidrop.simulator.tmcl.motor import STORED
-from multidrop.simulator.world import World
+from multidrop.simulator.tmcl.module import TmclModule, storable, worlds_of
+from multidrop.simulator.tmcl.port import TmclPort
 
 VERSION_FORM = re.compile(r"\d{4}V\d{3}", re.ASCII)
 GLOBAL_PREFIX = "G"
-WORLD_KEYS = ("home", "limit_plus", "limit_minus", "stall_at", "load", "locked")
-NO_INPUTS = (1,)
-"""A range that `read_world` needs and no key uses: the module has no inputs but its switches."""
+COUNTS = 4095
+"""The end of scale of an analog input."""
+VARIABLES = tuple(map(str, USERS))
 
 
 def read_drive(table: Table, folder: Folder) -> DriveSpec:
@@ -45,13 +55,14 @@ def read_drive(table: Table, folder: Folder) -> DriveSpec:
         raise table.wrong("name", f"cannot be {quoted(name)}", "valid: the address of a module, 1 to 255")
     if table.boolean("party", False):
         raise table.wrong("party", "is for MCode drives", "leave it out: a module always has an address")
-    world = table.table("world", "[bus.drive.world]")
-    world.only(*WORLD_KEYS)
-    settings = read_settings(table.table("set", "set"), _check_setting)
-    if table.table("variables", "[bus.drive.variables]").values:
-        raise table.wrong("variables", "is for other drives", "leave it out: direct mode has none")
+    module = module_of(common["personality"])
+    world, *further = read_worlds(
+        table.table("world", "[bus.drive.world]"), _names(module), WORLD_KEYS, inputs_of(module), COUNTS
+    )
+    settings = read_settings(table.table("set", "set"), partial(_check_setting, module))
+    variables = table.table("variables", "[bus.drive.variables]")
     rows = table.table("identity", "[bus.drive.identity]")
-    identity = read_identity(rows, ("version",), {"position": 1})
+    identity = read_identity(rows, ("version",), {"position": module.motors})
     if identity.version and not VERSION_FORM.fullmatch(identity.version):
         hint = "valid: module and firmware, as in 1241V115"
         raise rows.wrong("version", f"cannot be {quoted(identity.version)}", hint)
@@ -59,28 +70,51 @@ def read_drive(table: Table, folder: Folder) -> DriveSpec:
         **common,
         name=name,
         set=settings,
+        variables=read_variables(
+            variables, lambda name: name in VARIABLES, "valid: user variables by number, 0 to 255"
+        ),
         identity=identity,
-        world=read_world(world, NO_INPUTS, 0),
+        world=world,
+        further=tuple(further),
+        any_address=table.boolean("any_address", False),
     )
 
 
-def _check_setting(table: Table, word: str, value: Setting) -> None:
-    row = _parameter(word.upper())
+def _names(module: Module) -> tuple[str, ...]:
+    """The names of a module's motors in `world`, and for `/sim`."""
+    return tuple(map(str, range(module.motors)))
+
+
+def inputs_of(module: Module) -> tuple[int, ...]:
+    """The inputs of a module in its world: its ports from 1."""
+    return tuple(port + 1 for port in module.inputs)
+
+
+def _check_setting(module: Module, table: Table, word: str, value: Setting) -> None:
+    row = _parameter(module, word.upper())
     if row is None:
-        hint = "valid: axis parameters by number, such as 4 = 51200; global ones with a G, such as G75 = 5"
+        hint = (
+            "valid: axis parameters by number, such as 4 = 51200 (4_1: motor 1); global ones with a G, such as G75 = 5"
+        )
         raise table.wrong(quoted(word), "is not a parameter in EEPROM", hint)
     if not isinstance(value, int) or value not in row.limits:
-        raise table.wrong(quoted(word), f"cannot be {value}", f"valid: {row.limits[0]} to {row.limits[-1]}")
+        raise table.wrong(quoted(word), f"cannot be {value}", f"valid: {row.valid}")
 
 
-def _parameter(word: str) -> Parameter | None:
+NAME = re.compile(r"(G?)(0|[1-9]\d{0,2})(?:_([1-9]))?", re.ASCII)
+
+
+def _parameter(module: Module, word: str) -> Parameter | None:
     """The parameter that a key names, of those that EEPROM holds; the address has a key of its own."""
-    number = word.removeprefix(GLOBAL_PREFIX)
-    if not (number.isascii() and number.isdigit() and len(number) < 4 and str(int(number)) == number):
+    found = NAME.fullmatch(word)
+    if found is None or int(found[3] or 0) >= (1 if found[1] else module.motors):
         return None
-    if word.startswith(GLOBAL_PREFIX):
-        return GLOBAL.get(int(number)) if int(number) not in (Global.ADDRESS, Global.PROGRAM_STATUS) else None
-    return AXIS[int(number)] if int(number) in STORED else None
+    number = int(found[2])
+    if found[1]:
+        row = module.banks[0].get(number)
+        return row if row is not None and row.writable and number != Global.ADDRESS else None
+    row = module.axis.get(number)
+    return row if row is not None and storable(number, row) else None
 
 
 ADDRESS = f"{GLOBAL_PREFIX}{int(Global.ADDRESS)}"
@@ -89,20 +123,24 @@ BAUD = f"{GLOBAL_PREFIX}{int(Global.BAUD)}"
 
 
 def describe(snapshot: Snapshot) -> DriveText:
+    personality = snapshot.product if snapshot.product.removeprefix(f"{PREFIX}-") in MODULES else PREFIX
+    module = module_of(personality)
     readings = [each for each in snapshot.readings.readings if each.name != ADDRESS]
+    held = [each for each in readings if _parameter(module, each.name) is not None]
+    counters = {key: counts[: module.motors] for key, counts in snapshot.counters.items()}
     return DriveText(
-        personality="TMCM",
+        personality=personality,
         name=snapshot.name,
         remarks=[
             *snapshot.remarks,
-            *(f"not in set: {each.name} = {each.value}" for each in readings if _parameter(each.name) is None),
+            *(f"not in set: {each.name} = {each.value}" for each in readings if each not in held),
         ],
         unread=snapshot.readings.unread,
         program=_program(snapshot),
-        settings=[Entry(each.name, each.value, remark(each)) for each in readings if _parameter(each.name) is not None],
+        settings=[Entry(each.name, each.value, remark(each)) for each in held],
         identity=[
             *([Entry("version", snapshot.version)] if snapshot.version else []),
-            *(Entry(key, counts[0]) for key, counts in snapshot.counters.items()),
+            *(Entry(key, list(counts) if module.motors > 1 else counts[0]) for key, counts in counters.items()),
         ],
         baud=snapshot.baud,
     )
@@ -133,19 +171,30 @@ def _program(snapshot: Snapshot) -> list[str]:
 
 
 def build(spec: DriveSpec, place: Place) -> Unit:
-    world = World(spec.world)
-    device = TmclModule(spec, world, place.baud)
-    port = TmclPort(device, any_baud=place.baud not in BAUDS.values())
-    return Unit(device=device, port=port, worlds={"": world}, shadow=_shadow(device), single_supply=True)
+    worlds = worlds_of(spec)
+    device = TmclModule(spec, worlds, place.baud)
+    names = _names(device.table) if len(worlds) > 1 else ("",)
+    return Unit(
+        device=device,
+        port=TmclPort(device, any_baud=place.baud not in BAUDS.values()),
+        worlds=dict(zip(names, worlds, strict=True)),
+        inputs=inputs_of(device.table),
+        counts=COUNTS,
+        shadow=_shadow(device, names),
+        single_supply=True,
+    )
 
 
-def _shadow(device: TmclModule) -> Shadow:
-    motor = device.motor
+def _shadow(device: TmclModule, names: Sequence[str]) -> Shadow:
+    motors = dict(zip(names, device.motors, strict=True))
 
     def motion(now: float) -> tuple[Motion, ...]:
-        return (Motion(motor.read(Axis.ACTUAL_POSITION, now), motor.read(Axis.ACTUAL_VELOCITY, now)),)
+        return tuple(
+            Motion(motor.read(Axis.ACTUAL_POSITION, now), motor.read(Axis.ACTUAL_VELOCITY, now), name)
+            for name, motor in motors.items()
+        )
 
-    return Shadow(lambda: None, motion, lambda _, position, now: motor.stand_at(position, now))
+    return Shadow(lambda: None, motion, lambda name, position, now: motors[name].stand_at(position, now))
 
 
 TMCL = Family(
@@ -154,4 +203,5 @@ TMCL = Family(
     build=build,
     snapshots=Snapshots(describe, wanted, program),
     addressed=True,
+    keys=("any_address",),
 )

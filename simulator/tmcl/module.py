@@ -1,49 +1,46 @@
-"""A simulated TMCL module: one motor, global parameters, EEPROM, the commands of the direct mode, and its port.
+"""A simulated TMCL module: its motors, global parameters, EEPROM, and the commands of the direct mode.
 
-Rulings where the manuals are silent: a reply's value is the target for MVP and the value of the request for the other
-commands that set something; global parameters are kept without power; the module is a TMCM-1241 by its version.
-
-The port takes nine bytes and sends nine bytes. A request for another address gets no reply. Framing is by count; the
-module drops an unfinished message after a pause. Ruling: the pause is 0.5 s; the manuals give none.
+Rulings where the manuals are silent: a reply's value is the target for MVP REL, and the value of the request for the
+other commands that read nothing, refused ones too; global parameters of bank 0 are kept without power, user variables
+(bank 2) as STGP stored them.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from math import inf
-from struct import Struct
 
 from multidrop.dialects.tmcl.manual.commands import (
-    AXIS,
-    BAUDS,
     FACTORY_CODE,
-    GLOBAL,
     Axis,
     Call,
     Command,
     Global,
     Move,
-    Parameter,
     Running,
     Search,
     Status,
     Version,
 )
 from multidrop.dialects.tmcl.manual.instructions import CONTROL, MEMORY, Wait
+from multidrop.dialects.tmcl.manual.modules import BAUDS, GLOBAL, TEMPERATURE, VOLTAGE, Parameter, module_of
 from multidrop.dialects.tmcl.manual.program_file import compiled, read
-from multidrop.simulator.cell.spec import DriveSpec
-from multidrop.simulator.tmcl.motor import STORED, Motor, Phase, ReferenceSearch
+from multidrop.simulator.cell.spec import DriveSpec, WorldSpec
+from multidrop.simulator.tmcl.motor import Motor
 from multidrop.simulator.tmcl.program import Program
-from multidrop.simulator.wire import Port, Transmission
 from multidrop.simulator.world import World
 
-VERSION = "1241V115"
-BANK = 0
+USER_BANK = 2
+DIGITAL, ANALOG, OUTPUTS = 0, 1, 2
+"""The banks of GIO; SIO has the last one."""
+ALL_PORTS = 255
+VOLTS, DEGREES = 240, 25
+"""The supply voltage in tenths of a volt and the temperature in degrees Celsius that a module measures."""
 EVENTS_AT_ONCE = 100
 """Events of one moment after which time goes on."""
-REACHED_INTERRUPT, LEFT_INTERRUPT, RIGHT_INTERRUPT = 3, 27, 28
-"""The interrupts of motor 0: target reached, left switch, right switch."""
+REACHED_INTERRUPT, LEFT_INTERRUPT, RIGHT_INTERRUPT, INPUT_INTERRUPT = 3, 27, 28, 39
+"""The first interrupts for a reached target, a left and a right switch of a motor, and an input."""
 
 
 @dataclass(frozen=True)
@@ -63,32 +60,59 @@ class Refused(Exception):
         self.status = status
 
 
+def worlds_of(spec: DriveSpec) -> list[World]:
+    """The surroundings of each motor of a module."""
+    given = (spec.world, *spec.further)
+    return [World(each) for each in (*given, *[WorldSpec()] * (module_of(spec.personality).motors - len(given)))]
+
+
 class TmclModule:
     """One module, powered up at time 0. `set` of its spec is checked. `baud` is its baud rate if that sets no other."""
 
-    def __init__(self, spec: DriveSpec, world: World, baud: int = 0) -> None:
-        position = spec.identity.counters.get("position", (0,))[0]
-        axis = {int(name): int(value) for name, value in spec.set.items() if name.isdigit()}  # type: ignore[arg-type]
-        module = {int(name[1:]): int(value) for name, value in spec.set.items() if not name.isdigit()}  # type: ignore[arg-type]
-        self.world = world
-        self._version_text = spec.identity.version or VERSION
+    def __init__(self, spec: DriveSpec, worlds: Sequence[World], baud: int = 0) -> None:
+        self.table = module_of(spec.personality)
+        self.worlds = worlds
         self.powered = False
-        self.motor = Motor(world)
+        self.any_address = spec.any_address
+        """It replies to every address, 0 included."""
+        self.motors = [Motor(world, self.table) for world in worlds]
 
         self.program = Program(self.carry_out, self._waited, self._signals)
         if spec.program:
             name = spec.program_name or "program"
             self.program.load({each.at: each.call for each in compiled(read(spec.program, name))})
-        self._search: ReferenceSearch | None = None
+        self._version_text = spec.identity.version or self.table.version
         self._notify = 0
         self._notices: list[tuple[float, int]] = []
         self._now = 0.0
-        self._axis = {number: AXIS[number].fresh for number in STORED} | axis
-        code = next((code for code, each in BAUDS.items() if each == baud), 0)
-        self._global = {number: row.fresh for number, row in GLOBAL.items()}
-        self._global |= {Global.BAUD: code, **module, Global.ADDRESS: int(spec.name)}
+        self._outputs = dict.fromkeys(self.table.outputs, 0)
+        self._variables: dict[int, int] = {}
+        self._fresh()
+        self._kept_variables.update({int(number): value for number, value in spec.variables.items()})
+        for name, value in spec.set.items():
+            self._preset(name, int(value))  # type: ignore[arg-type]
+        self._global[Global.ADDRESS] = int(spec.name)
+        if f"G{int(Global.BAUD)}" not in spec.set:
+            self._global[Global.BAUD] = next((code for code, each in BAUDS.items() if each == baud), 0)
         self.power(True, 0.0)
-        self.motor.stand_at(position, 0.0)
+        for motor, position in zip(self.motors, spec.identity.counters.get("position", ()), strict=False):
+            motor.stand_at(position, 0.0)
+
+    def _fresh(self) -> None:
+        """Set what EEPROM holds to the factory's values."""
+        stored = {number: row.fresh for number, row in self.table.axis.items() if storable(number, row)}
+        self._axis = [dict(stored) for _ in self.motors]
+        self._global = {number: row.fresh for number, row in {**GLOBAL, **self.table.banks[0]}.items()}
+        self._interrupts = dict.fromkeys(self.table.banks[3], 0)
+        self._kept_variables: dict[int, int] = {}
+
+    def _preset(self, name: str, value: int) -> None:
+        """Put a setting of the cell file into EEPROM: `4`, `4_1` for motor 1, `G75`."""
+        number, _, motor = name.partition("_")
+        if name.isdigit() or motor:
+            self._axis[int(motor or 0)][int(number)] = value
+        else:
+            self._global[int(name[1:])] = value
 
     def __getitem__(self, parameter: Global) -> int:
         return self._global[parameter]
@@ -129,7 +153,7 @@ class TmclModule:
         try:
             answer = self._execute(call, now)
         except Refused as refused:
-            return Answer(refused.status)
+            return Answer(refused.status, call.value)
         self._live(now)
         return answer
 
@@ -138,14 +162,17 @@ class TmclModule:
         if on == self.powered:
             return
         self.powered = on
-        self._search, self._notify = None, 0
+        self._notify = 0
         self._notices.clear()
         self.program.halt(reset=True)
         self.program.storing = False
-        if on:
-            self.world.powered_up(now)
-            self.motor.parameters.update(self._axis)
-        self.motor.power(on, now)
+        for world, motor, stored in zip(self.worlds, self.motors, self._axis, strict=True):
+            if on:
+                world.powered_up(now)
+                motor.parameters.update(stored)
+            motor.power(on, now)
+        self._outputs = dict.fromkeys(self._outputs, 0)
+        self._variables = dict(self._kept_variables)
         if on and self._global[Global.AUTOSTART]:
             self.program.run(now)
 
@@ -165,20 +192,26 @@ class TmclModule:
 
     def _waited(self, call: Call, now: float) -> bool:
         """Whether what a WAIT waits for has come."""
-        home, right, left = self.motor.shaft.switches(now)
+        if call.motor >= len(self.motors):
+            return True
+        motor = self.motors[call.motor]
+        home, right, left = motor.shaft.switches(now)
         over: Mapping[int, bool] = {
-            Wait.POS: self.motor.reached(now),
+            Wait.POS: motor.reached(now),
             Wait.REFSW: home,
             Wait.LIMSW: right or left,
-            Wait.RFS: self._search is None,
+            Wait.RFS: motor.search is None,
         }
         return over.get(call.type, True)
 
     def _signals(self, now: float) -> dict[int, bool]:
         """The states whose beginning is an interrupt, by its number."""
-        _, right, left = self.motor.shaft.switches(now)
-        reached = self.motor.positioning and self.motor.reached(now)
-        return {REACHED_INTERRUPT: reached, LEFT_INTERRUPT: left, RIGHT_INTERRUPT: right}
+        found = {INPUT_INTERRUPT + port: bool(level) for port, level in self._inputs(now).items()}
+        for n, motor in enumerate(self.motors):
+            _, right, left = motor.shaft.switches(now)
+            found[REACHED_INTERRUPT + n] = motor.positioning and motor.reached(now)
+            found |= {LEFT_INTERRUPT + 2 * n: left, RIGHT_INTERRUPT + 2 * n: right}
+        return found
 
     def _execute(self, call: Call, now: float) -> Answer | None:
         match call.command:
@@ -191,13 +224,14 @@ class TmclModule:
             case Command.FACTORY:
                 if call.value != FACTORY_CODE:
                     raise Refused(Status.INVALID_VALUE)
-                self._axis = {number: AXIS[number].fresh for number in STORED}
-                self._global = {number: row.fresh for number, row in GLOBAL.items()}
+                self._fresh()
                 self.power(False, now)
                 self.power(True, now)
                 return None
             case Command.SGP | Command.GGP | Command.STGP | Command.RSGP:
                 return Answer(value=self._global_parameter(call))
+            case Command.SIO | Command.GIO:
+                return Answer(value=self._port(call, now))
         if call.command not in tuple(Command):
             raise Refused(Status.INVALID_COMMAND)
         if call.command == Command.READ_PROGRAM:
@@ -206,14 +240,14 @@ class TmclModule:
             return Answer(line=self.program.line(call.value))
         if call.command in range(Command.STOP_PROGRAM, Command.VERSION):
             return Answer(value=self._program_command(call, now))
-        if call.command == Command.NOTIFY:  # when the motor reaches its target (command 138)
-            if call.value not in (0, 1):
+        if call.command == Command.NOTIFY:  # when motors reach their targets (command 138)
+            if call.value not in range(1 << len(self.motors)):
                 raise Refused(Status.INVALID_VALUE)
             self._notify = call.value
             return Answer(value=call.value)
-        if call.motor != 0:
-            raise Refused(Status.INVALID_VALUE)
-        return Answer(value=self._motor_command(call, now))
+        if call.motor >= len(self.motors):
+            raise Refused(self.table.wrong_motor)
+        return Answer(value=self._motor_command(self.motors[call.motor], call, now))
 
     def _program_command(self, call: Call, now: float) -> int:
         program = self.program
@@ -239,109 +273,152 @@ class TmclModule:
                 return states[call.type]
         return call.value
 
-    def _motor_command(self, call: Call, now: float) -> int:
+    def _motor_command(self, motor: Motor, call: Call, now: float) -> int:
+        """Carry out a command for a motor; the value of its reply."""
         match call.command:
             case Command.ROR | Command.ROL:
                 velocity = call.value if call.command == Command.ROR else -call.value
-                self._start(Axis.TARGET_VELOCITY, velocity, now)
+                self._start(motor, Axis.TARGET_VELOCITY, velocity, now)
             case Command.MST:
-                self._start(Axis.TARGET_VELOCITY, 0, now)
+                self._start(motor, Axis.TARGET_VELOCITY, 0, now)
             case Command.MVP:
-                return self._move(call, now)
+                if call.type not in (Move.ABS, Move.REL):
+                    raise Refused(Status.WRONG_TYPE)
+                motor.end_search()
+                if call.type == Move.REL:
+                    motor.go_by(call.value, now)
+                    return motor.read(Axis.TARGET_POSITION, now)
+                motor.go(call.value, now)
             case Command.RFS:
-                return self._reference(call, now)
+                return self._reference(motor, call, now)
             case _:
-                return self._axis_parameter(call, now)
+                return self._axis_parameter(motor, call, now)
         return call.value
 
-    def _start(self, parameter: Axis, value: int, now: float) -> None:
+    def _start(self, motor: Motor, parameter: Axis, value: int, now: float) -> None:
         """Set a parameter that starts a motion; it ends a reference search."""
-        _in_range(AXIS[parameter], value)
-        self._search = None
-        self.motor.write(parameter, value, now)
+        _in_range(self.table.axis[parameter], value)
+        motor.end_search()
+        motor.write(parameter, value, now)
 
-    def _move(self, call: Call, now: float) -> int:
-        if call.type not in (Move.ABS, Move.REL):
-            raise Refused(Status.WRONG_TYPE)
-        self._search = None
-        if call.type == Move.ABS:
-            self.motor.go(call.value, now)
-        else:
-            self.motor.go_by(call.value, now)
-        return self.motor.read(Axis.TARGET_POSITION, now)
-
-    def _reference(self, call: Call, now: float) -> int:
+    def _reference(self, motor: Motor, call: Call, now: float) -> int:
         if call.type not in tuple(Search):
             raise Refused(Status.WRONG_TYPE)
         if call.type == Search.STATUS:
-            return int(self._search is not None)
+            return motor.search.number if motor.search is not None else 0
         if call.type == Search.START:
-            self._search = ReferenceSearch(self.motor, self.motor.parameters[Axis.SEARCH_MODE], now)
-        elif self._search is not None:
-            self._search = None
-            self.motor.rotate(0, now)
-        return 0
+            motor.seek(now)
+        elif motor.search is not None:
+            motor.end_search()
+            motor.rotate(0, now)
+        return call.value
 
-    def _axis_parameter(self, call: Call, now: float) -> int:
-        row = AXIS.get(call.type)
+    def _axis_parameter(self, motor: Motor, call: Call, now: float) -> int:
+        row = self.table.axis.get(call.type)
         if row is None:
             raise Refused(Status.WRONG_TYPE)
         match call.command:
             case Command.GAP:
-                return self.motor.read(call.type, now)
+                return motor.read(call.type, now)
             case Command.SAP:
                 if not row.writable:
                     raise Refused(Status.WRONG_TYPE)
                 _in_range(row, call.value)
                 if call.type in STARTERS:
-                    self._search = None
-                self.motor.write(call.type, call.value, now)
+                    motor.end_search()
+                motor.write(call.type, call.value, now)
                 return call.value
-        if call.type not in self._axis:
+        if not storable(call.type, row):
             raise Refused(Status.WRONG_TYPE)
+        stored = self._axis[call.motor]
         if call.command == Command.STAP:
-            self._axis[call.type] = self.motor.parameters[call.type]
+            stored[call.type] = motor.parameters[call.type]
         else:
-            self.motor.write(call.type, self._axis[call.type], now)
-        return 0
+            motor.write(call.type, stored[call.type], now)
+        return call.value
 
     def _global_parameter(self, call: Call) -> int:
-        if call.motor != BANK:
+        if call.motor > max(self.table.banks):
             raise Refused(Status.INVALID_VALUE)
-        states = (int(self.program.running), int(self.program.storing), self.program.counter)
-        if call.type in range(Global.PROGRAM_STATUS, Global.PROGRAM_STATUS + len(states)):
-            if call.command != Command.GGP:
-                raise Refused(Status.WRONG_TYPE)
-            return states[call.type - Global.PROGRAM_STATUS]
-        row = GLOBAL.get(call.type)
-        if row is None:
+        row = self.table.banks.get(call.motor, {}).get(call.type)
+        if row is None or (call.command == Command.SGP and not row.writable):
             raise Refused(Status.WRONG_TYPE)
-        if call.command == Command.SGP:
-            _in_range(row, call.value)
-            self._global[call.type] = call.value
+        held = {0: self._global, USER_BANK: self._variables}.get(call.motor, self._interrupts)
+        match call.command:
+            case Command.SGP:
+                _in_range(row, call.value)
+                held[call.type] = call.value
+            case Command.GGP:
+                return (
+                    self._program_state(call.type) if call.motor == 0 and not row.writable else held.get(call.type, 0)
+                )
+            case Command.STGP if call.motor == USER_BANK:
+                self._kept_variables[call.type] = held.get(call.type, 0)
+            case Command.RSGP if call.motor == USER_BANK:
+                held[call.type] = self._kept_variables.get(call.type, 0)
+        return call.value
+
+    def _program_state(self, number: int) -> int:
+        """A global parameter that shows the program's state."""
+        program = self.program
+        states = {Global.PROGRAM_STATUS: program.running, Global.DOWNLOAD_MODE: program.storing}
+        return int(states.get(Global(number), program.counter))
+
+    def _port(self, call: Call, now: float) -> int:
+        """Set an output, or read a port."""
+        if call.motor not in (DIGITAL, ANALOG, OUTPUTS) or (call.command == Command.SIO and call.motor != OUTPUTS):
+            raise Refused(Status.INVALID_VALUE)
+        if call.motor == ANALOG:
+            return self._measured(call.type, now)
+        ports = self._outputs if call.motor == OUTPUTS else self._inputs(now)
+        if call.type == ALL_PORTS:
+            if call.command == Command.GIO:
+                return sum(level << port for port, level in ports.items())
+            self._outputs = {port: call.value >> port & 1 for port in ports}
             return call.value
-        return self._global[call.type] if call.command == Command.GGP else 0
+        if call.type not in ports:
+            raise Refused(Status.WRONG_TYPE)
+        if call.command == Command.GIO:
+            return ports[call.type]
+        _in_range(OUTPUT, call.value)
+        self._outputs[call.type] = call.value
+        return call.value
+
+    def _inputs(self, now: float) -> Mapping[int, int]:
+        """Digital inputs, by port; port n is input n + 1 of the world."""
+        return {port: int(any(world.level(port + 1, now) for world in self.worlds)) for port in self.table.inputs}
+
+    def _measured(self, port: int, now: float) -> int:
+        if port not in self.table.analog:
+            raise Refused(Status.WRONG_TYPE)
+        if port in (VOLTAGE, TEMPERATURE):
+            return VOLTS if port == VOLTAGE else DEGREES
+        return self.worlds[self.table.analog.index(port)].analog(now)
 
     def _next_event(self, after: float) -> float:
-        return min((at for at in (*self.motor.events(after), self.program.due) if at > after), default=inf)
+        events = [at for motor in self.motors for at in motor.events(after)]
+        if self.program.running:  # an input may be an interrupt
+            events += [at for world in self.worlds if (at := world.next_change(after)) is not None]
+        return min((at for at in (*events, self.program.due) if at > after), default=inf)
 
     def _live(self, t: float) -> None:
         if not self.powered:
             return
-        if self._search is None:
-            self.motor.live(t)
-        else:
-            self.motor.shaft.settle(t)
-            self._search.live(t)
-            if self._search.phase is Phase.DONE:
-                self._search = None
-        if self._notify and self.motor.positioning and self.motor.reached(t):
-            self._notices.append((t, self._notify))
-            self._notify = 0
+        for n, motor in enumerate(self.motors):
+            motor.live(t)
+            if self._notify >> n & 1 and motor.positioning and motor.reached(t):
+                self._notices.append((t, 1 << n))
+                self._notify &= ~(1 << n)
         self.program.live(t)
 
 
+OUTPUT = Parameter("level of an output", range(2))
 STARTERS = frozenset({Axis.TARGET_POSITION, Axis.TARGET_VELOCITY})
+
+
+def storable(number: int, row: Parameter) -> bool:
+    """Whether EEPROM holds an axis parameter."""
+    return row.writable and number > Axis.TARGET_VELOCITY
 
 
 def _number_of(version: str) -> int:
@@ -353,84 +430,3 @@ def _number_of(version: str) -> int:
 def _in_range(row: Parameter, value: int) -> None:
     if value not in row.limits:
         raise Refused(Status.INVALID_VALUE)
-
-
-LENGTH = 9
-PAUSE = 0.5
-"""Seconds of silence after which an unfinished message is dropped."""
-REQUEST = Struct(">BBBBi")
-REPLY = Struct(">BBBBi")
-
-
-class TmclPort(Port):
-    """The serial port of one module. `any_baud`: the wire has no baud rate that the module can be set to."""
-
-    def __init__(self, device: TmclModule, *, any_baud: bool = True) -> None:
-        self._device = device
-        self._any_baud = any_baud
-        self._message = bytearray()
-        self._heard_at = 0.0
-        self._out: list[Transmission] = []
-
-    @property
-    def baud(self) -> int:
-        return 0 if self._any_baud else BAUDS.get(self._device[Global.BAUD], 0)
-
-    @property
-    def deadline(self) -> float | None:
-        times = (self._device.deadline, *(each.at for each in self._out))
-        return min((at for at in times if at is not None), default=None)
-
-    def receive(self, data: bytes, now: float) -> None:
-        if not self._device.powered:
-            self._message.clear()
-            return
-        if now - self._heard_at > PAUSE:
-            self._message.clear()
-        self._heard_at = now
-        for byte in data:
-            self._message.append(byte)
-            if len(self._message) == LENGTH:
-                message = bytes(self._message)
-                self._message.clear()
-                self._take(message, now)
-
-    def sent(self, now: float) -> list[Transmission]:
-        self._device.advance(now)
-        for at, motors in self._device.notices():
-            self._say(at, self._frame(Status.TARGET_REACHED, Command.NOTIFY, motors))
-        due = [each for each in self._out if each.at <= now]
-        self._out = [each for each in self._out if each.at > now]
-        return due
-
-    def _take(self, message: bytes, now: float) -> None:
-        address, command, kind, motor, value = REQUEST.unpack(message[:-1])
-        if address != self._device[Global.ADDRESS]:
-            return
-        self._device.advance(now)
-        host = self._device[Global.HOST_ADDRESS]
-        if sum(message[:-1]) % 256 != message[-1]:
-            self._say(now, self._frame(Status.WRONG_CHECKSUM, command, 0))
-            return
-        answer = self._device.execute(Call(command, kind, motor, value), now)
-        if answer is None:
-            return
-        if answer.text:
-            self._say(now, bytes([host]) + answer.text.encode("ascii"))
-        elif answer.line is not None:
-            line = answer.line
-            self._say(now, self._frame(line.type, line.motor, line.value, line.command, host))
-        else:
-            self._say(now, self._frame(answer.status, command, answer.value, address, host))
-
-    def _frame(
-        self, status: int, command: int, value: int, address: int | None = None, host: int | None = None
-    ) -> bytes:
-        """One reply; it names the address that the request was for, also where that has just been changed."""
-        host = self._device[Global.HOST_ADDRESS] if host is None else host
-        address = self._device[Global.ADDRESS] if address is None else address
-        body = REPLY.pack(host, address, status, command, value)
-        return body + bytes([sum(body) % 256])
-
-    def _say(self, at: float, data: bytes) -> None:
-        self._out.append(Transmission(at + self._device[Global.PAUSE] / 1000, data))

@@ -2,39 +2,45 @@
 
 Rulings where the manuals are silent: a limit switch stops the motor at once and lets it run away from it; MVP REL
 counts from the last target, with parameter 127 at 1 or 2 from the actual position; a position beyond 32 bits wraps
-around, and a move takes the shorter way.
+around, and a move takes the shorter way; an acceleration of 0 acts as 1.
 
-The reference search (RFS) is a machine of phases. Modes (axis parameter 193): 1 the left switch; 2 the right one, then
-the left one; 3 the right one, then the home switch. Ruling: the motor turns to a switch at the search velocity, stops
-at once where it closes, and leaves it at the switch velocity; where it opens is position 0. Mode 2 keeps the distance
-between the two switches in parameter 196.
+The reference search (RFS) is a sequence of steps by the mode in axis parameter 193. Ruling: the motor turns to a switch
+at the search velocity, stops at once where it closes, and leaves it at the switch velocity; where it opens is position
+0. "From both sides" adds a turn back at the switch velocity: position 0 is then where the switch closes again. Modes 2
+and 3 keep the distance of the end switches in parameter 196; 197 keeps the position that became 0.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from enum import Enum
-from itertools import pairwise
 from math import inf
+from typing import NamedTuple
 
-from multidrop.dialects.tmcl.manual.commands import AXIS, Axis
+from multidrop.dialects.tmcl.manual.commands import Axis
+from multidrop.dialects.tmcl.manual.modules import INVERTED, MIRRORED, Module
 from multidrop.simulator.kinematics import halt, move, slew
 from multidrop.simulator.world import Shaft, World
 
 FULL = 256
 """Microsteps of a full step, which is one motor step of the world."""
-STORED = tuple(number for number, row in AXIS.items() if row.writable and number > Axis.TARGET_VELOCITY)
-"""Parameters that EEPROM holds."""
+CLOCK = 16e6
+"""The clock of a TMC428 or TMC429, Hz."""
 FROM_TARGET = 0
 """The value of parameter 127 with which MVP REL counts from the last target."""
+VELOCITIES = frozenset({Axis.MAXIMUM_VELOCITY, Axis.MAXIMUM_ACCELERATION, Axis.RAMP_DIVISOR, Axis.PULSE_DIVISOR})
+"""Parameters that change a ramp while it runs."""
 
 
 class Motor:
     """One motor. Times are seconds, positions microsteps. `positioning`: it aims at a position, else at a velocity."""
 
-    def __init__(self, world: World) -> None:
+    def __init__(self, world: World, module: Module) -> None:
         self.shaft = Shaft(world)
-        self.parameters = {number: row.fresh for number, row in AXIS.items()}
+        self.parameters = {number: row.fresh for number, row in module.axis.items()}
+        self.search: ReferenceSearch | None = None
+        self.passes_limits = False
+        """No limit switch holds it, for a search of the home switch alone."""
+        self._chip_units = module.chip_units
         self._profile = halt(0.0, 0.0)
         self.positioning = True
         self._target = 0
@@ -44,7 +50,7 @@ class Motor:
         measured = {
             Axis.TARGET_POSITION: self._target,
             Axis.ACTUAL_POSITION: self.position(t),
-            Axis.ACTUAL_VELOCITY: round(self._profile.velocity(t)),
+            Axis.ACTUAL_VELOCITY: round(self._profile.velocity(t) / self._units[0]),
             Axis.POSITION_REACHED: int(self.reached(t)),
             Axis.HOME_SWITCH: int(home),
             Axis.RIGHT_SWITCH: int(right),
@@ -74,9 +80,7 @@ class Motor:
             self.parameters[number] = value
             if number == Axis.MICROSTEPS:
                 self._hand_on(t)
-            elif number in (Axis.MAXIMUM_VELOCITY, Axis.MAXIMUM_ACCELERATION) and (
-                self.moving(t) or (self.positioning and not self.reached(t))
-            ):
+            elif number in VELOCITIES and (self.moving(t) or (self.positioning and not self.reached(t))):
                 self._plan(t)
 
     def go(self, target: int, t: float) -> None:
@@ -85,7 +89,7 @@ class Motor:
 
     def go_by(self, distance: int, t: float) -> None:
         """Move by a distance from the last target, or from here, as parameter 127 says."""
-        here = self.parameters[Axis.RELATIVE_FROM] != FROM_TARGET
+        here = self.parameters.get(Axis.RELATIVE_FROM, FROM_TARGET) != FROM_TARGET
         self.go((self.position(t) if here else self._target) + distance, t)
 
     def rotate(self, velocity: int, t: float) -> None:
@@ -110,6 +114,7 @@ class Motor:
     def power(self, on: bool, t: float) -> None:
         """Switch the driver; it wakes up standing at position 0."""
         self.shaft.powered = on
+        self.end_search()
         self.stand_at(0, t)
         self.parameters[Axis.TARGET_VELOCITY] = 0
 
@@ -118,12 +123,31 @@ class Motor:
         if self.moving(after) and self._profile.end < inf:
             yield self._profile.end
 
+    def seek(self, t: float) -> None:
+        """Begin a reference search."""
+        self.search = ReferenceSearch(self, self.parameters[Axis.SEARCH_MODE], t)
+
+    def end_search(self) -> None:
+        self.search, self.passes_limits = None, False
+
     def live(self, t: float) -> None:
         self.shaft.settle(t)
+        if self.search is not None and self.search.over(t):
+            self.end_search()
         if self.moving(t) and self._blocked(self._profile.direction(t), t):
             self.freeze(t)
 
+    @property
+    def _units(self) -> tuple[float, float]:
+        """A unit of velocity in microsteps/s, and one of acceleration in microsteps/s2."""
+        if not self._chip_units:
+            return 1.0, 1.0
+        pulse, ramp = self.parameters[Axis.PULSE_DIVISOR], self.parameters[Axis.RAMP_DIVISOR]
+        return CLOCK / (2**pulse * 2048 * 32), CLOCK**2 / 2 ** (pulse + ramp + 29)
+
     def _blocked(self, way: float, t: float) -> bool:
+        if self.passes_limits:
+            return False
         _, right, left = self.shaft.switches(t)
         if way > 0:
             return right and not self.parameters[Axis.RIGHT_LIMIT_OFF]
@@ -133,10 +157,12 @@ class Motor:
         self._follow_from(self._profile.position(t), self._profile.velocity(t), t)
 
     def _follow_from(self, position: float, velocity: float, t: float) -> None:
-        rate, speed = float(self.parameters[Axis.MAXIMUM_ACCELERATION]), float(self.parameters[Axis.MAXIMUM_VELOCITY])
+        of_velocity, of_rate = self._units
+        rate = max(1, self.parameters[Axis.MAXIMUM_ACCELERATION]) * of_rate
+        speed = self.parameters[Axis.MAXIMUM_VELOCITY] * of_velocity
         if not self.positioning or not speed:
             wanted = 0 if self.positioning else self.parameters[Axis.TARGET_VELOCITY]
-            self._profile = slew(t, position, velocity, float(wanted), vi=0.0, a=rate, d=rate)
+            self._profile = slew(t, position, velocity, wanted * of_velocity, vi=0.0, a=rate, d=rate)
         else:
             here = round(position)
             place = float(here + wrapped(self._target - here))
@@ -160,60 +186,90 @@ HOME, RIGHT, LEFT = 0, 1, 2
 """Places in what `Shaft.switches` gives."""
 
 
-class Phase(Enum):
-    """What a search does now."""
+class Step(NamedTuple):
+    """Turn, to the right with 1 and to the left with -1, until a switch is closed or open."""
 
-    TO_RIGHT = "turn right until the right switch closes"
-    TO_LEFT = "turn left until the left switch closes"
-    TO_HOME = "turn left until the home switch closes"
-    OFF_LEFT = "turn right until the left switch opens"
-    OFF_HOME = "turn right until the home switch opens"
-    DONE = "stand at position 0"
+    way: int
+    switch: int
+    closed: bool = True
+    speed: Axis = Axis.SEARCH_SPEED
 
 
-ROUTES: dict[int, tuple[Phase, ...]] = {
-    1: (Phase.TO_LEFT, Phase.OFF_LEFT, Phase.DONE),
-    2: (Phase.TO_RIGHT, Phase.TO_LEFT, Phase.OFF_LEFT, Phase.DONE),
-    3: (Phase.TO_RIGHT, Phase.TO_HOME, Phase.OFF_HOME, Phase.DONE),
+TO_RIGHT, TO_LEFT = Step(1, RIGHT), Step(-1, LEFT)
+OFF_LEFT, INTO_LEFT = Step(1, LEFT, False, Axis.SWITCH_SPEED), Step(-1, LEFT, True, Axis.SWITCH_SPEED)
+
+
+def _home(way: int) -> tuple[Step, ...]:
+    return Step(way, HOME), Step(-way, HOME, False, Axis.SWITCH_SPEED)
+
+
+ROUTES: dict[int, tuple[Step, ...]] = {
+    1: (TO_LEFT, OFF_LEFT),
+    2: (TO_RIGHT, TO_LEFT, OFF_LEFT),
+    3: (TO_RIGHT, TO_LEFT, OFF_LEFT, INTO_LEFT),
+    4: (TO_LEFT, OFF_LEFT, INTO_LEFT),
+    5: _home(-1),
+    6: _home(1),
+    7: _home(1),
+    8: _home(-1),
 }
-"""The phases of each mode."""
-STEPS: dict[Phase, tuple[int, int, bool, Axis]] = {
-    Phase.TO_RIGHT: (1, RIGHT, True, Axis.SEARCH_SPEED),
-    Phase.TO_LEFT: (-1, LEFT, True, Axis.SEARCH_SPEED),
-    Phase.TO_HOME: (-1, HOME, True, Axis.SEARCH_SPEED),
-    Phase.OFF_LEFT: (1, LEFT, False, Axis.SWITCH_SPEED),
-    Phase.OFF_HOME: (1, HOME, False, Axis.SWITCH_SPEED),
-}
-"""Direction, switch, the state of it that ends the phase, and the parameter that holds the velocity."""
+"""The steps of each mode."""
+TURNS = {5: LEFT, 6: RIGHT}
+"""The end switch at which a search for the home switch turns back: past it, and to it again from its own side."""
+PASSING = (7, 8)
+"""The modes in which no end switch counts."""
 
 
 class ReferenceSearch:
-    """One search of a motor."""
+    """One search of a motor. `number` is that of its step, from 1: what RFS STATUS replies with."""
 
     def __init__(self, motor: Motor, mode: int, t: float) -> None:
         self._motor = motor
-        self._follower = dict(pairwise(ROUTES[mode]))
-        self._right_at = 0
-        self.phase = Phase.DONE
-        self._enter(ROUTES[mode][0], t)
+        self._inverted = bool(mode & INVERTED)
+        base = mode % MIRRORED
+        self._turn = TURNS.get(base)
+        self._steps = list(ROUTES[base])
+        if mode & MIRRORED:
+            self._steps = [each._replace(way=-each.way, switch=RIGHT + LEFT - each.switch) for each in self._steps]
+        self._ends: list[int] = []
+        """Where the end switches were closed."""
+        self.number = 0
+        motor.passes_limits = base in PASSING
+        self._enter(t)
 
-    def live(self, t: float) -> None:
-        while self.phase is not Phase.DONE:
-            _, switch, closed, _ = STEPS[self.phase]
-            if self._motor.shaft.switches(t)[switch] is not closed:
-                return
-            if self.phase is Phase.TO_RIGHT:
-                self._right_at = self._motor.position(t)
-            elif self.phase is Phase.TO_LEFT:
-                distance = wrapped(self._right_at - self._motor.position(t))
-                self._motor.parameters[Axis.SWITCH_DISTANCE] = distance if Phase.TO_RIGHT in self._follower else 0
-            self._motor.freeze(t)
-            self._enter(self._follower[self.phase], t)
+    def over(self, t: float) -> bool:
+        """Take the steps that are due; whether none is left."""
+        while self._steps:
+            step = self._steps[0]
+            if self._turn is not None and self._motor.shaft.switches(t)[self._turn] and self._at(step, t) is False:
+                back = [step._replace(way=-step.way), step._replace(way=-step.way, closed=False)]
+                self._steps, self._turn = [*back, *self._steps], None
+                self._motor.freeze(t)
+            elif self._at(step, t):
+                self._leave(t)
+            else:
+                return False
+            if self._steps:
+                self._enter(t)
+        return True
 
-    def _enter(self, phase: Phase, t: float) -> None:
-        self.phase = phase
-        if phase is Phase.DONE:
-            self._motor.stand_at(0, t)
-            return
-        way, _, _, speed = STEPS[phase]
-        self._motor.rotate(way * self._motor.parameters[speed], t)
+    def _at(self, step: Step, t: float) -> bool:
+        closed = self._motor.shaft.switches(t)[step.switch]
+        return (closed is not self._inverted if step.switch == HOME else closed) is step.closed
+
+    def _leave(self, t: float) -> None:
+        """End a step; after the last one the motor stands at position 0."""
+        motor, step = self._motor, self._steps.pop(0)
+        motor.freeze(t)
+        if step.switch != HOME and step.speed == Axis.SEARCH_SPEED:
+            self._ends.append(motor.position(t))
+        if len(self._ends) > 1:
+            motor.parameters[Axis.SWITCH_DISTANCE] = abs(wrapped(self._ends[0] - self._ends[1]))
+        if not self._steps:
+            motor.parameters[Axis.SEARCH_POSITION] = motor.position(t)
+            motor.stand_at(0, t)
+
+    def _enter(self, t: float) -> None:
+        step = self._steps[0]
+        self.number += 1
+        self._motor.rotate(step.way * self._motor.parameters[step.speed], t)

@@ -36,9 +36,8 @@ from multidrop.simulator.program_run import (
     counted,
     next_look,
 )
-from multidrop.simulator.tmcl.module import TmclModule
+from multidrop.simulator.tmcl.module import TmclModule, worlds_of
 from multidrop.simulator.tmcl.program import ALL_PORTS, USERS
-from multidrop.simulator.world import World
 
 _MOTIONS = frozenset({Command.ROR, Command.ROL, Command.MVP, Word.MVPA, Word.ROLA, Word.RORA})
 _SETS = frozenset({Command.SAP, Word.AAP})
@@ -84,7 +83,7 @@ class ProgramRun:
             valid = ", ".join(TABLE["tmcl"].personalities)
             raise Diagnostic(f"a {spec.personality} does not run TMCL", name, f"valid: {valid}")
         self._name, self._made, self._text = name, made, source
-        self._device = TmclModule(replace(spec, program="", program_name=""), World(spec.world))
+        self._device = TmclModule(replace(spec, program="", program_name=""), worlds_of(spec))
         self._program = self._device.program
         self._program.load({each.at: each.call for each in made.lines})
         self._source = {each.at: each.source for each in made.lines}

@@ -12,6 +12,7 @@ from multidrop.dialects.pmx.host import values as pmx
 from multidrop.dialects.pmx.host.codec import Pmx, PmxState
 from multidrop.dialects.tmcl.host import values as tmcl
 from multidrop.dialects.tmcl.host.codec import Tmcl, TmclState
+from multidrop.dialects.tmcl.manual.modules import module_of
 from multidrop.dialects.values import COMMUNICATION, Permission, Reading, Readings, same
 from multidrop.simulator.pmx.settings import REGISTERS as PMX_REGISTERS
 from tests.dialects.modbus.test_exchange import Far
@@ -76,8 +77,9 @@ def test_every_register_of_a_controller_is_a_setting_with_its_range():
 
 
 def test_a_plan_of_a_module():
-    module = TmclState(Tmcl(), "1", motors=2)
-    now = Readings(tuple(tmcl.reading(name, 0 if name in ("4", "12") else 1) for name in tmcl.setting_names(2)))
+    module, table = TmclState(Tmcl(), "1", motors=2), module_of("")
+    names = tmcl.setting_names(table, 2)
+    now = Readings(tuple(tmcl.reading(name, 0 if name in ("4", "12") else 1, table) for name in names))
     wanted = {"12": 1, "13": 0, "5": 7, "5_1": 8, "4": 9, "G65": 3, "G77": 0, "140": 6}
     made = tmcl.plan(module, now, wanted, Permission())
     assert steps(made) == ["SAP 5, 0, 7", "SAP 13, 0, 0", "SAP 140, 0, 6", "SAP 5, 1, 8", "SGP 77, 0, 0"]

@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 from multidrop.dialects import Diagnostic
 from multidrop.simulator import cells as cell
 from multidrop.simulator.cell.spec import BusSpec, Cell, DriveSpec, Faults, WorldSpec
+from multidrop.simulator.families import BY_PERSONALITY
 from tests.support.cases import for_each
 
 SAMPLE = """
@@ -222,7 +223,7 @@ IS_HINT = 'several lines: IS = ["1,1,0", "2,2,0"]'
         (drive("", "lmdcm"), f'{DRIVE}: personality cannot be "lmdcm"; did you mean "LMDCM"?'),
         (
             drive("", "X"),
-            f'{DRIVE}: personality cannot be "X"; valid: LMDOM, LMDCM, LMDOE, LMDCE, LMM, MDI, MDIE, MDIX, PMX, TMCM',
+            f'{DRIVE}: personality cannot be "X"; valid: {", ".join(BY_PERSONALITY)}',
         ),
         (drive('name = "ab"'), f'{DRIVE}: name cannot be "ab"; valid: one of a-z, A-Z, 0-9 or !'),
         (drive('name = "*"'), f'{DRIVE}: name cannot be "*"; valid: one of a-z, A-Z, 0-9 or !'),

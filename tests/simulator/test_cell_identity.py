@@ -125,7 +125,8 @@ VARIABLES, IDENTITY = f"{WHERE}: [bus.drive.variables]", f"{WHERE}: [bus.drive.i
         (
             "variables = { V1 = 5 }",
             "TMCM",
-            f"{WHERE}: variables is for other drives; leave it out: direct mode has none",
+            f'{WHERE}: [bus.drive.variables]: "V1" is not the name of a variable; '
+            "valid: user variables by number, 0 to 255",
         ),
         ("identity = 5", "LMDCM", f"{WHERE}: identity must be a table, not 5"),
         ("identity = { serail = '1' }", "LMDCM", f'{IDENTITY}: unknown key "serail"; did you mean "serial"?'),

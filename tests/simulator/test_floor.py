@@ -173,7 +173,11 @@ def test_the_axes_of_a_pmx_have_worlds_of_their_own() -> None:
         each.command("/sim input 00 9 0", 3.0)
 
 
-def test_a_module_without_inputs_refuses_an_input() -> None:
-    each = Floor(read('[[bus]]\nname = "axis"\n[[bus.drive]]\npersonality = "TMCM"\nname = "1"\n'))
-    with pytest.raises(Diagnostic, match='/sim input: "1" has no inputs'):
-        each.command("/sim input 1 1 0", 0.0)
+def test_a_module_of_several_motors_has_surroundings_for_each() -> None:
+    each = Floor(read('[[bus]]\nname = "axis"\n[[bus.drive]]\npersonality = "TMCM-3110"\nname = "1"\n'))
+    each.command("/sim push 1.2 100", 0.0)
+    each.command("/sim input 1 8 1", 0.0)
+    with pytest.raises(Diagnostic, match='"1" has no axis "3"; valid: 1.0, 1.1, 1.2'):
+        each.command("/sim push 1.3 100", 0.0)
+    with pytest.raises(Diagnostic, match="valid: 1 to 8"):
+        each.command("/sim input 1 9 1", 0.0)

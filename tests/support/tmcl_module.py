@@ -4,18 +4,29 @@ from __future__ import annotations
 
 from multidrop.dialects.tmcl.host import codec
 from multidrop.dialects.tmcl.manual import commands
+from multidrop.dialects.tmcl.manual.modules import module_of
 from multidrop.simulator.cell.spec import DriveSpec, WorldSpec
-from multidrop.simulator.tmcl.module import TmclModule, TmclPort
+from multidrop.simulator.tmcl.module import TmclModule
+from multidrop.simulator.tmcl.port import TmclPort
 from multidrop.simulator.world import World
 
 
 class Module:
-    """One module with address 1. `now` is the time; commands take no time."""
+    """One module with address 1. `now` is the time; commands take no time. `world` surrounds its first motor."""
 
-    def __init__(self, *, address: int = 1, settings: dict[str, int] | None = None, **world: object) -> None:
+    def __init__(
+        self,
+        *,
+        address: int = 1,
+        settings: dict[str, int] | None = None,
+        product: str = "TMCM",
+        any_address: bool = False,
+        **world: object,
+    ) -> None:
         self.world = World(WorldSpec(**world))  # type: ignore[arg-type]
-        spec = DriveSpec(personality="TMCM", name=str(address), set=settings or {})
-        self.device = TmclModule(spec, self.world)
+        spec = DriveSpec(personality=product, name=str(address), set=settings or {}, any_address=any_address)
+        others = [World(WorldSpec()) for _ in range(module_of(product).motors - 1)]
+        self.device = TmclModule(spec, [self.world, *others])
         self.port = TmclPort(self.device)
         self.now = 0.0
 

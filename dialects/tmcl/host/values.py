@@ -15,16 +15,14 @@ from multidrop.dialects.program_files import Held
 from multidrop.dialects.tmcl.host.codec import TmclState
 from multidrop.dialects.tmcl.host.operations import busy, motors, moving, perform, read, who
 from multidrop.dialects.tmcl.host.programs import read_held
-from multidrop.dialects.tmcl.manual.commands import (
-    AXIS,
+from multidrop.dialects.tmcl.manual.commands import STARTING_PARAMETERS, Axis, Call, Command, Global
+from multidrop.dialects.tmcl.manual.modules import (
     BAUDS,
-    GLOBAL,
+    MODULES,
     RELATIVE_FROM,
-    STARTING_PARAMETERS,
-    Axis,
-    Call,
-    Command,
-    Global,
+    Module,
+    Parameter,
+    module_of,
 )
 from multidrop.dialects.values import (
     BY,
@@ -59,20 +57,27 @@ from multidrop.dialects.values import (
 
 GLOBAL_PREFIX = "G"
 ADDRESS = f"{GLOBAL_PREFIX}{int(Global.ADDRESS)}"
-STATES_OF_THE_MOMENT = frozenset({Axis.TARGET_POSITION, Axis.ACTUAL_POSITION, Axis.TARGET_VELOCITY})
-WIRE = frozenset({Global.BAUD, Global.ADDRESS, Global.PAUSE, Global.HOST_ADDRESS})
+WIRE = frozenset({Global.BAUD, Global.ADDRESS, Global.PAUSE, Global.HOST_ADDRESS, Global.SUPPRESS_REPLY})
+UNITS = (Axis.UNIT_MODE, Axis.PULSE_DIVISOR, Axis.RAMP_DIVISOR)
+"""Parameters that change the meaning of others, and so are written first."""
 NOT_STORED = (3, 6)
 """The statuses of a module that lacks a parameter, or does not store it: wrong type, command not available."""
 _NAME = re.compile(r"(G?)(\d{1,3})(?:_(\d))?", re.ASCII)
 
 
-def setting_names(motors: int) -> tuple[str, ...]:
+def setting_names(module: Module, motors: int) -> tuple[str, ...]:
     """The settings of a module, in the order in which they are written."""
-    axis = [number for number, each in AXIS.items() if each.writable and number not in STATES_OF_THE_MOMENT]
-    own = [f"{int(number)}{f'_{motor}' if motor else ''}" for motor in range(motors) for number in axis]
-    own_globals = [number for number, each in GLOBAL.items() if each.writable]
+    axis = [int(number) for number, each in module.axis.items() if each.writable and not each.live]
+    axis.sort(key=lambda number: number not in UNITS)
+    own = [f"{number}{f'_{motor}' if motor else ''}" for motor in range(motors) for number in axis]
+    own_globals = [int(number) for number, each in module.banks[0].items() if each.writable and not each.live]
     ordered = sorted(own_globals, key=lambda number: (number in WIRE, number == Global.ADDRESS, number == Global.BAUD))
-    return (*own, *(f"{GLOBAL_PREFIX}{int(number)}" for number in ordered))
+    return (*own, *(f"{GLOBAL_PREFIX}{number}" for number in ordered))
+
+
+def _row(module: Module, name: str) -> Parameter:
+    of_module, number, _ = _parts(name)
+    return (module.banks[0] if of_module else module.axis)[number]
 
 
 def _call(name: str, command: Command, value: int = 0) -> Call:
@@ -83,19 +88,21 @@ def _call(name: str, command: Command, value: int = 0) -> Call:
     return Call(command, number, motor, value)
 
 
-def reading(name: str, value: int) -> Reading:
+def reading(name: str, value: int, module: Module) -> Reading:
     of_module, number, _ = _parts(name)
-    row = (GLOBAL if of_module else AXIS)[number]
+    row = _row(module, name)
     unit = ", ".join(each for each in (row.title, row.unit) if each)
-    return Reading(name, value, unit=unit, default=row.fresh, fixed=of_module and number in WIRE)
+    default = row.fresh if row.known else None
+    return Reading(name, value, unit=unit, default=default, fixed=of_module and number in WIRE)
 
 
 def plan(state: TmclState, present: Readings, wanted: Mapping[str, Value], allowed: Permission) -> Plan:
     """Order the steps to the wanted values. Raises Diagnostic for a value that the module refuses."""
-    now, names = present.values, setting_names(state.motors or 1)
+    module = module_of(state.product)
+    now, names = present.values, setting_names(module, state.motors or 1)
     changed = {name.upper(): value for name, value in wanted.items() if not same(value, now.get(name.upper()))}
     withheld = {name: reason for name in changed if (reason := _risk(name, changed[name], now, allowed))}
-    goal = {name: _checked(name, value, names) for name, value in changed.items() if name not in withheld}
+    goal = {name: _checked(name, value, names, module) for name, value in changed.items() if name not in withheld}
     order = [name for name in names if name in goal]
     steps = [Change(name, now.get(name), goal[name], str(_call(name, Command.SAP, goal[name]))) for name in order]
     scale = [name for name in goal if _parts(name)[:2] == (False, Axis.MICROSTEPS)]
@@ -108,14 +115,13 @@ def _parts(name: str) -> tuple[bool, int, int]:
     return (bool(found[1]), int(found[2]), int(found[3] or 0)) if found else (False, -1, 0)
 
 
-def _checked(name: str, value: Value, names: Collection[str]) -> int:
+def _checked(name: str, value: Value, names: Collection[str], module: Module) -> int:
     """Return the value as a whole number. Raises Diagnostic."""
     if name not in names:
         raise Diagnostic(f"{name}: is not a setting of the module")
-    of_module, number, _ = _parts(name)
-    limits = (GLOBAL if of_module else AXIS)[number].limits
-    if isinstance(value, (str, tuple)) or not float(value).is_integer() or int(value) not in limits:
-        raise Diagnostic(f"{name} = {value}: valid: {limits.start} to {limits.stop - 1}")
+    row = _row(module, name)
+    if isinstance(value, (str, tuple)) or not float(value).is_integer() or int(value) not in row.limits:
+        raise Diagnostic(f"{name} = {value}: valid: {row.valid}")
     return int(value)
 
 
@@ -137,12 +143,12 @@ def _risk(name: str, value: Value, now: Mapping[str, Value], allowed: Permission
 
 def read_settings(state: TmclState, progress: Progress) -> Procedure[Readings]:
     """Read every setting; modules differ, so a refused one is listed. Raises NoAnswer."""
-    names = setting_names((yield from motors(state)))
+    names = setting_names(module_of(state.product), (yield from motors(state)))
     return (yield from read_each(names, partial(_read, state), progress))
 
 
 def _read(state: TmclState, name: str) -> Procedure[Reading]:
-    return reading(name, (yield from read(state, _call(name, Command.GAP))))
+    return reading(name, (yield from read(state, _call(name, Command.GAP))), module_of(state.product))
 
 
 def conflict(plan: Plan, others: Collection[str]) -> str:
@@ -156,7 +162,7 @@ def ready(state: TmclState) -> Procedure[str]:
 
 def save(state: TmclState) -> Procedure[None]:
     """Store the axis parameters in EEPROM, one by one; a module may lack some."""
-    for name in setting_names((yield from motors(state))):
+    for name in setting_names(module_of(state.product), (yield from motors(state))):
         if not name.startswith(GLOBAL_PREFIX):
             call = _call(name, Command.GAP)
             try:
@@ -274,10 +280,14 @@ def take(state: TmclState, progress: Progress) -> Procedure[Snapshot]:
     except Refused as refused:
         held = Held()
         remarks.append(f"its program was not read: {refused}")
-    if (count := (yield from motors(state))) > 1:
-        remarks.append(f"it has {count} motors; a simulated module has one")
-    code = readings.values.get(f"G{int(Global.BAUD)}")
+    count = yield from motors(state)
     module, (major, _, minor) = state.product.rpartition("-")[2], state.version.partition(".")
+    if count > (simulated := MODULES[module].motors if module in MODULES else 1):
+        remarks.append(f"it has {count} motors; the simulated module has {simulated}")
+    positions = []
+    for motor in range(count):
+        positions.append((yield from read(state, Call(Command.GAP, Axis.ACTUAL_POSITION, motor))))
+    code = readings.values.get(f"G{int(Global.BAUD)}")
     return Snapshot(
         kind="tmcl",
         product=state.product,
@@ -285,7 +295,7 @@ def take(state: TmclState, progress: Progress) -> Procedure[Snapshot]:
         name=state.address,
         baud=BAUDS.get(code, 0) if isinstance(code, int) else 0,
         readings=readings,
-        counters={"position": ((yield from read(state, Call(Command.GAP, Axis.ACTUAL_POSITION, 0))),)},
+        counters={"position": tuple(positions)},
         program=tuple((line.at, line.text) for line in held.lines),
         active=active or runs,
         remarks=tuple(remarks),

@@ -5,16 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from multidrop.dialects.errors import Diagnostic
-from multidrop.dialects.tmcl.manual.commands import (
-    AXIS,
-    GLOBAL,
-    REFUSALS,
-    RELATIVE_FROM,
-    WORDS,
-    Command,
-    Parameter,
-    Row,
-)
+from multidrop.dialects.tmcl.manual.commands import REFUSALS, WORDS, Command, Row
+from multidrop.dialects.tmcl.manual.modules import RELATIVE_FROM, Parameter, module_of
 
 ON_AXIS = frozenset({Command.SAP, Command.GAP, Command.STAP, Command.RSAP})
 ON_MODULE = frozenset({Command.SGP, Command.GGP, Command.STGP, Command.RSGP})
@@ -40,10 +32,10 @@ def describe(word: str, product: str = "") -> list[str]:
         values = ", ".join(f"{value} {meaning}" for value, meaning in RELATIVE_FROM.items())
         lines.append(f"  REL        axis parameter 127: {values}; not known where a module lacks it")
     setting = row.command in (Command.SAP, Command.SGP)
-    for number, each in _table(row).items():
+    for number, each in _table(row, product).items():
         if each.writable or not setting:
             unit = f", {each.unit}" if each.unit else ""
-            limits = f", {each.limits[0]} to {each.limits[-1]}" if each.writable else ""
+            limits = f", {each.valid}" if each.writable else ""
             lines.append(f"  {number:>3}  {each.title}{unit}{limits}")
     return lines
 
@@ -74,13 +66,13 @@ def hint(text: str, product: str = "") -> str:
     row = WORDS.get(word.upper())
     if row is None:
         return ""
-    table = _table(row)
+    table = _table(row, product)
     number = rest.split(",")[0].strip()
     parameter = table.get(int(number)) if number.isascii() and number.isdigit() else None
     return f"{row.syntax}   {parameter.title if parameter else row.title}"
 
 
-def _table(row: Row) -> Mapping[int, Parameter]:
+def _table(row: Row, product: str) -> Mapping[int, Parameter]:
     if row.command in ON_AXIS:
-        return AXIS
-    return GLOBAL if row.command in ON_MODULE else {}
+        return module_of(product).axis
+    return module_of(product).banks[0] if row.command in ON_MODULE else {}

@@ -11,7 +11,7 @@ from multidrop.dialects.errors import Inexpressible, NoAnswer, Refused, Stopped
 from multidrop.dialects.family import Hints
 from multidrop.dialects.tmcl.family import TMCL
 from multidrop.dialects.tmcl.host.codec import Tmcl
-from multidrop.dialects.tmcl.manual.commands import AXIS, Axis, Call, Command, Status
+from multidrop.dialects.tmcl.manual.commands import Call, Command, Status
 from multidrop.dialects.values import BY
 from multidrop.drives.line import Line
 from multidrop.simulator.cell.spec import Faults
@@ -402,11 +402,8 @@ def test_the_host_says_from_where_a_relative_move_counts(option, counted):
     assert "not known" in TMCL.values.controls(state, "")[BY].about
 
 
-def test_a_module_without_parameter_127_counts_from_a_place_that_is_not_known(monkeypatch, shop):
-    monkeypatch.setattr(
-        "multidrop.simulator.tmcl.module.AXIS", {n: row for n, row in AXIS.items() if n != Axis.RELATIVE_FROM}
-    )
-    (state,) = shop.open()
+def test_a_module_without_parameter_127_counts_from_a_place_that_is_not_known():
+    (state,) = Shop({"personality": "TMCM-1140"}).open()
     assert state.motors == 1
     assert "not known" in TMCL.values.controls(state, "")[BY].about
 

@@ -17,6 +17,8 @@ WORKED = [
     ("01 03 00 00 00 00 00 00 04", "02 01 64 03 00 00 00 00 6A"),
     ("01 04 00 00 00 00 C8 00 CD", "02 01 64 04 00 00 C8 00 33"),
     ("01 06 FA 00 00 00 00 00 01", "02 01 03 06 00 00 00 00 0C"),
+    ("01 09 41 04 00 00 00 07 56", "02 01 04 09 00 00 00 07 17"),
+    ("01 05 8C 00 00 00 00 09 9B", "02 01 04 05 00 00 00 09 15"),
     ("01 0A 42 00 00 00 00 00 4D", "02 01 64 0A 00 00 00 01 72"),
     ("01 0D 02 00 00 00 00 00 10", "02 01 64 0D 00 00 00 00 74"),
 ]
@@ -45,11 +47,18 @@ def test_another_address_gets_no_reply():
     assert Module(address=3).send(codec.frame_of(1, Call(Command.GAP, 1))) == b""
 
 
+@pytest.mark.parametrize("address", [0, 1, 9, 255])
+def test_a_module_with_any_address_replies_to_all_with_its_own(address):
+    module = Module(address=7, any_address=True)
+    reply = codec.parse_reply(module.send(codec.frame_of(address, Call(Command.GGP, Global.ADDRESS))))
+    assert reply is not None and (reply.module, reply.status, reply.value) == (7, 100, 7)
+
+
 def test_a_wrong_checksum_is_refused_and_changes_nothing():
     module = Module()
     frame = codec.frame_of(1, Call(Command.ROR, value=1000))
     reply = codec.parse_reply(module.send(frame[:-1] + b"\x00"))
-    assert reply is not None and (reply.status, reply.command) == (1, Command.ROR)
+    assert reply is not None and (reply.status, reply.command, reply.value) == (1, Command.ROR, 0)
     assert module.ask("GAP 2, 0") == 0
 
 
@@ -134,7 +143,12 @@ CELL = '[[bus]]\nname = "slide"\n[[bus.drive]]\npersonality = "TMCM"\n'
         ('name = "01"', 'name cannot be "01"; valid: the address of a module, 1 to 255'),
         ('name = "256"', 'name cannot be "256"; valid: the address of a module, 1 to 255'),
         ("party = true", "party is for MCode drives"),
-        ("world = { inputs = [] }", 'unknown key "inputs"'),
+        ("world = { inputs = [[0, 3, 1]] }", "inputs"),
+        ("world.1 = { home = 0 }", 'unknown key "1"'),
+        ("set = { 4_1 = 5 }", 'set: "4_1" is not a parameter'),
+        ("set = { 193 = 9 }", 'set: "193" cannot be 9; valid: 1 to 8, 65 to 68, 133 to 136'),
+        ("variables = { 256 = 1 }", '"256" is not the name of a variable'),
+        ("any_address = 1", "any_address must be true or false"),
     ],
 )
 def test_a_wrong_key_is_named(line, message):
@@ -142,3 +156,20 @@ def test_a_wrong_key_is_named(line, message):
         read(CELL + line + "\n", "cell.toml")
     text = str(caught.value)
     assert message in text and text.startswith("cell.toml") and "\n" not in text
+
+
+def test_only_a_module_can_have_any_address():
+    with pytest.raises(Diagnostic, match='unknown key "any_address"'):
+        read('[[bus]]\nname = "p"\n[[bus.drive]]\npersonality = "PMX"\nany_address = true\n', "cell.toml")
+
+
+def test_each_motor_has_surroundings_and_settings_of_its_own():
+    cell = read(
+        CELL.replace("TMCM", "TMCM-3110")
+        + "set = { 4 = 7, 4_2 = 9, G75 = 5 }\nvariables = { 3 = 33 }\nidentity = { position = [1, 2, 3] }\n"
+        + "[bus.drive.world]\nlimit_plus = 5\n[bus.drive.world.2]\nhome = [1, 2]\n",
+        "cell.toml",
+    )
+    (spec,) = cell.buses[0].drives
+    assert (spec.world.limit_plus, spec.further[0].home, spec.further[1].home) == (5, None, (1, 2))
+    assert (spec.set["4_2"], spec.variables["3"], spec.identity.counters["position"]) == (9, 33, (1, 2, 3))
