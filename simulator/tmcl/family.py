@@ -55,6 +55,7 @@ def read_drive(table: Table, folder: Folder) -> DriveSpec:
         raise table.wrong("name", f"cannot be {quoted(name)}", "valid: the address of a module, 1 to 255")
     if table.boolean("party", False):
         raise table.wrong("party", "is for MCode drives", "leave it out: a module always has an address")
+    common["personality"] = _canonical(common["personality"])
     module = module_of(common["personality"])
     world, *further = read_worlds(
         table.table("world", "[bus.drive.world]"), _names(module), WORLD_KEYS, inputs_of(module), COUNTS
@@ -78,6 +79,11 @@ def read_drive(table: Table, folder: Folder) -> DriveSpec:
         further=tuple(further),
         any_address=table.boolean("any_address", False),
     )
+
+
+def _canonical(personality: str) -> str:
+    """One name for the 1241, which has two."""
+    return PREFIX if module_of(personality) is module_of(PREFIX) else personality
 
 
 def _names(module: Module) -> tuple[str, ...]:
@@ -123,7 +129,7 @@ BAUD = f"{GLOBAL_PREFIX}{int(Global.BAUD)}"
 
 
 def describe(snapshot: Snapshot) -> DriveText:
-    personality = snapshot.product if snapshot.product.removeprefix(f"{PREFIX}-") in MODULES else PREFIX
+    personality = _canonical(snapshot.product if snapshot.product.removeprefix(f"{PREFIX}-") in MODULES else PREFIX)
     module = module_of(personality)
     readings = [each for each in snapshot.readings.readings if each.name != ADDRESS]
     held = [each for each in readings if _parameter(module, each.name) is not None]

@@ -84,7 +84,7 @@ async def test_one_false_zero_confirms_no_stop_and_no_rest(family, false, tmp_pa
 async def test_a_module_that_reads_velocity_0_in_motion_is_at_rest_in_one_place_only(tmp_path, monkeypatch):
     async with CellSession(tmp_path, bus("slide", MODULE)) as shop:
         module = shop.session.selected
-        motor = shop.device("slide:1").motor
+        motor = shop.device("slide:1").motors[0]
         read = motor.read
         monkeypatch.setattr(motor, "read", lambda number, t: 0 if number == 3 else read(number, t))
         await shop.session.run("MVP ABS, 0, 200000")

@@ -51,7 +51,7 @@ async def test_a_command_prints_nothing_and_a_value_is_printed(session):
 async def test_wrong_lines_change_nothing(session):
     with pytest.raises(Inexpressible, match="MVP takes 3 fields"):
         await say(session, "@1 MVP 0, 1")
-    with pytest.raises(Refused, match="status 4, invalid value"):
+    with pytest.raises(Refused, match="status 3, wrong type"):
         await say(session, "@1 ROR 3, 100")
     assert await say(session, "@1 GAP 3, 0") == ["0"]
 
@@ -145,7 +145,7 @@ async def test_a_stop_ends_the_program_of_a_module_before_its_motor(session):
     session.stop("Ctrl+X")
     told = await confirmed(session)
     assert not module(session).program.running and any("1: stopped, velocity 0" in text for text in told)
-    now, motor = next(iter(session.cells.values())).now, module(session).motor
+    now, motor = next(iter(session.cells.values())).now, module(session).motors[0]
     place = motor.read(1, now())
     await asyncio.sleep(5.0)
     assert motor.read(1, now()) == place
@@ -166,7 +166,7 @@ async def test_a_module_that_stores_the_stop_gets_the_end_of_its_download_and_th
     module(session).program.download(0)
     before = session.now()
     session.stop("Ctrl+X")
-    while module(session).motor.parameters[2] and session.now() < before + 5:
+    while module(session).motors[0].parameters[2] and session.now() < before + 5:
         await asyncio.sleep(0.01)
     assert session.now() - before < 0.6
     told = await confirmed(session)
@@ -183,7 +183,7 @@ async def test_two_modules_that_store_the_stop_both_get_the_end_of_their_downloa
     session.stop("Ctrl+X")
     told = await confirmed(session)
     assert [name for name in "17" if any(f"{name}: stopped, velocity 0" in text for text in told)] == ["1", "7"], told
-    assert not any(device.program.storing or device.motor.parameters[2] for device in both)
+    assert not any(device.program.storing or device.motors[0].parameters[2] for device in both)
     assert [[call.command for call in device.program.memory] for device in both] == [[3], [3]]
 
 

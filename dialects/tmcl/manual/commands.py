@@ -83,7 +83,7 @@ class Version(IntEnum):
 
 FACTORY_CODE = 1234
 """The value that command 137 needs."""
-TYPE, PORT, MOTOR, BANK, VALUE = "type", "port", "motor", "bank", "value"
+TYPE, MOTOR, BANK, VALUE = "type", "motor", "bank", "value"
 INT32 = range(-(2**31), 2**31)
 MOTORS = range(256)
 
@@ -140,8 +140,13 @@ ROWS = (
         types=SEARCHES,
         moves=True,
     ),
-    Row(Command.SIO, (PORT, BANK, VALUE), "Set an output: bank 2, value 0 or 1"),
-    Row(Command.GIO, (PORT, BANK), "Print an input: bank 0 digital, 1 analog, 2 an output", prints=True),
+    Row(Command.SIO, (TYPE, BANK, VALUE), "Set an output: type is its port, bank 2, value 0 or 1"),
+    Row(
+        Command.GIO,
+        (TYPE, BANK),
+        "Print a port, its number is the type: bank 0 digital, 1 analog, 2 output",
+        prints=True,
+    ),
 )
 WORDS: Mapping[str, Row] = MappingProxyType({row.word: row for row in ROWS})
 
@@ -162,7 +167,6 @@ class Call:
         names = {number: name for name, number in row.types.items()}
         given = {
             TYPE: names.get(self.type, str(self.type)),
-            PORT: str(self.type),
             MOTOR: str(self.motor),
             BANK: str(self.motor),
             VALUE: str(self.value),
@@ -217,7 +221,7 @@ NEVER_MOVE = frozenset(
 
 
 BYTE = range(256)
-RANGES = {TYPE: BYTE, PORT: BYTE, MOTOR: MOTORS, BANK: BYTE, VALUE: INT32}
+RANGES = {TYPE: BYTE, MOTOR: MOTORS, BANK: BYTE, VALUE: INT32}
 NUMBER = re.compile(r"[+-]?\d{1,11}", re.ASCII)
 BY_NUMBER = (TYPE, MOTOR, VALUE)
 """Fields after the number of a command."""
@@ -265,8 +269,7 @@ def _parsed(text: str) -> Call:
         if known is None and name == TYPE and row.types and not NUMBER.fullmatch(given):
             raise LineError(f"{row.word} has no type {given!r}; valid: {', '.join(row.types)}")
         values[name] = _number(name, given) if known is None else known
-    kind, motor = values.get(TYPE, values.get(PORT, 0)), values.get(MOTOR, values.get(BANK, 0))
-    return Call(row.command, kind, motor, values.get(VALUE, 0))
+    return Call(row.command, values.get(TYPE, 0), values.get(MOTOR, values.get(BANK, 0)), values.get(VALUE, 0))
 
 
 def _number(name: str, field: str) -> int:
@@ -299,7 +302,7 @@ REFUSALS: Mapping[int, tuple[str, str]] = MappingProxyType(
     {
         Status.WRONG_CHECKSUM: ("wrong checksum", "the line is disturbed: check wiring and baud"),
         Status.INVALID_COMMAND: ("invalid command", "this module has no such command"),
-        Status.WRONG_TYPE: ("wrong type", "this module has no such parameter or type"),
+        Status.WRONG_TYPE: ("wrong type", "this module has no such parameter, type or motor"),
         Status.INVALID_VALUE: ("invalid value", "check the range of the value, and the motor's number"),
         Status.EEPROM_LOCKED: ("the EEPROM is locked", "unlock it with the vendor's tool"),
         Status.NOT_AVAILABLE: ("command not available", "this module has it not in this state or equipment"),
