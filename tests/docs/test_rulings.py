@@ -11,7 +11,8 @@ from tests.support.paths import ROOT
 
 DOCS = ROOT / "docs"
 CHAPTERS = sorted((DOCS / "rulings").glob("*.md"))
-EVIDENCE = re.compile(r"(manual|client|program|none)( \([^()]+\))?(, (manual|client|program|none)( \([^()]+\))?)*")
+KIND = r"(manual|client|firmware|program|none)( \([^()]+\))?"
+EVIDENCE = re.compile(f"{KIND}(, {KIND})*")
 
 
 def rows(text: str) -> list[list[str]]:
