@@ -251,3 +251,18 @@ def test_no_memory_breaks_the_module(memory: list[Call]) -> None:
     module.wait(2.0)
     module.ask("128 0, 0, 0")
     assert module.ask("GGP 128, 0") == 0
+
+
+def test_user_variables_count_index_and_calculate() -> None:
+    module = executed(
+        *("SGP 5, 2, 3", "Round: CALCV ADD, 6, 10", "DJNZ 5, Round"),
+        *("CALC LOAD, 7", "CALCX LOAD", "SIV 40", "CALCVV SUB, 7, 6", "GIV", "CALCAV MUL, 6", "STOP"),
+    )
+    assert [module.ask(f"GGP {n}, 2") for n in (5, 6, 7)] == [0, 30, 10]
+    assert registers(module) == (300, 7)
+
+
+def test_a_timer_interrupts_again_and_again_and_its_routine_keeps_the_registers() -> None:
+    text = ["VECT 0, Tick", "SGP 0, 3, 100", "EI 0", "EI 255", "CALC LOAD, 5", "WAIT TICKS, 0, 105", "STOP"]
+    module = executed(*text, "Tick: CALCV ADD, 9, 1", "CALC LOAD, 0", "RETI", seconds=2.0)
+    assert (module.ask("GGP 9, 2"), registers(module)[0]) == (10, 5)
