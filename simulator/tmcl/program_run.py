@@ -83,7 +83,10 @@ class ProgramRun:
             valid = ", ".join(TABLE["tmcl"].personalities)
             raise Diagnostic(f"a {spec.personality} does not run TMCL", name, f"valid: {valid}")
         self._name, self._made, self._text = name, made, source
-        self._device = TmclModule(replace(spec, program="", program_name=""), worlds_of(spec))
+        address = (
+            spec.name if spec.name.isdigit() else RUNS.drive.name
+        )  # without a cell it has the name of another drive
+        self._device = TmclModule(replace(spec, name=address, program="", program_name=""), worlds_of(spec))
         self._program = self._device.program
         self._program.load({each.at: each.call for each in made.lines})
         self._source = {each.at: each.source for each in made.lines}

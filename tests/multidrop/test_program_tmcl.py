@@ -111,3 +111,11 @@ def test_a_snapshot_keeps_the_program(multidrop: Command, folder: Path) -> None:
         "WAIT POS, 0, 0",
         "JA 0",
     ]
+
+
+@pytest.mark.usefixtures("folder")
+@pytest.mark.parametrize("personality", ["TMCM", "TMCM-1140", "TMCM-3110"])
+def test_a_personality_without_a_cell_runs_a_file(multidrop: Command, personality: str) -> None:
+    Path("short.tmc").write_text("  MVP ABS, 0, 10\n  WAIT POS, 0, 0\n  STOP\n")
+    done = multidrop("program", "test", "short.tmc", "--personality", personality)
+    assert done.returncode == 0 and "position 10, 1 motion" in done.stdout, done
