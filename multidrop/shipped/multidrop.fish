@@ -120,7 +120,7 @@ complete -c multidrop -n '_shtab_multidrop_using program check; and test $_shtab
 complete -c multidrop -n '_shtab_multidrop_using program; and test $_shtab_multidrop_npos -eq 0' -a test -d 'Run program files on a simulated drive in virtual time: prints, errors, a summary.'
 complete -c multidrop -n '_shtab_multidrop_using program test' -s h -l help -d 'show this help message and exit'
 complete -c multidrop -n '_shtab_multidrop_using program test' -l language -xka "mcode pmx tmcl" -d 'default: pmx for .prg, .asc; tmcl for .tmc; else mcode'
-complete -c multidrop -n '_shtab_multidrop_using program test' -l personality -xka "LMDOM LMDCM LMDOE LMDCE LMM MDI MDIE MDIX PMX TMCM" -d 'LMDOM, LMDCM, LMDOE, LMDCE, LMM, MDI, MDIE, MDIX, PMX, TMCM (default: the cell'"'"'s, or LMDCM)'
+complete -c multidrop -n '_shtab_multidrop_using program test' -l personality -xka "LMDOM LMDCM LMDOE LMDCE LMM MDI MDIE MDIX PMX TMCM TMCM-1140 TMCM-1141 TMCM-1161 TMCM-1240 TMCM-1241 TMCM-1276 TMCM-3110 TMCM-6110" -d 'LMDOM, LMDCM, LMDOE, LMDCE, LMM, MDI, MDIE, MDIX, PMX, TMCM, TMCM-1140, TMCM-1141, TMCM-1161, TMCM-1240, TMCM-1241, TMCM-1276, TMCM-3110, TMCM-6110 (default: the cell'"'"'s, or LMDCM)'
 complete -c multidrop -n '_shtab_multidrop_using program test' -l cell -xka "(__fish_complete_path (commandline -ct))" -d 'a drive of a cell file and its world: CELL, CELL#BUS or CELL#BUS:NAME'
 complete -c multidrop -n '_shtab_multidrop_using program test' -l until -x -d 'virtual seconds at most, for a program without an end'
 complete -c multidrop -n '_shtab_multidrop_using program test' -l run -x -d 'the label or program to execute (default: its own start)'
