@@ -151,6 +151,10 @@ class DriveState:
         """Record that positions of these axes count from wherever the drive was at its restart."""
         self.unreferenced |= frozenset(axes)
 
+    def follows(self, before: DriveState) -> None:
+        """Take over what is known of the same drive from before a lost connection."""
+        self.reference_lost(before.unreferenced)
+
     def referenced(self, *axes: str) -> None:
         """Record that a homing of these axes has ended, or that their position was set; none: of all axes."""
         self.unreferenced = self.unreferenced - frozenset(axes) if axes else frozenset()

@@ -186,7 +186,7 @@ class Roster:
                 drive = Drive(self.conversations, self, state)
             else:
                 _compare(drive.state, state)
-                state.reference_lost(drive.state.unreferenced)
+                state.follows(drive.state)
                 self.restarts.replied_again(drive)
                 drive.state, drive.missing = state, False
             self.drives[state.address] = drive

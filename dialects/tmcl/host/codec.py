@@ -254,6 +254,8 @@ class TmclState(DriveState):
 
     motors: int = 0
     """Number of its motors; 0: not counted."""
+    search_modes_unknown: set[int] = field(default_factory=set)
+    """Motors whose axis parameter 193 was set without success, and neither read nor set since."""
     relative: dict[int, int] = field(default_factory=dict)
     """Axis parameter 127 of each motor: from where MVP REL counts; a motor without an entry: not known."""
 
@@ -284,6 +286,17 @@ class TmclState(DriveState):
 
     def relative_forgotten(self) -> None:
         self.relative.clear()
+
+    def search_mode_sent(self, motor: int) -> None:
+        self.search_modes_unknown.add(motor)
+
+    def search_mode_known(self, motor: int) -> None:
+        self.search_modes_unknown.discard(motor)
+
+    def follows(self, before: DriveState) -> None:
+        super().follows(before)
+        if isinstance(before, TmclState):
+            self.search_modes_unknown |= before.search_modes_unknown
 
     def readdressed(self, address: int) -> None:
         """The module has another address from now on: requests and stops go there."""

@@ -59,13 +59,29 @@ def who(state: TmclState) -> str:
 
 
 def answered(state: TmclState, request: Request) -> Procedure[Reply]:
-    """Send a request once; its reply. Raises Refused or NoAnswer."""
+    """Send a request once; its reply. Raises Refused or NoAnswer.
+
+    After a SAP 193 that was refused or got no reply, no search begins until 193 is read or set.
+    """
+    call = call_of(request.body)[1]
+    begins = (call.command, call.type) == (Command.RFS, Search.START)
+    if begins and call.motor in state.search_modes_unknown:
+        raise Refused(
+            f"{who(state)}: SAP 193 for motor {call.motor} was refused or got no reply: '{request.text}' would search "
+            f"in another mode and was not sent; read it (GAP 193, {call.motor}) or set it"
+        )
     if state.programming:
         raise Refused(f"{who(state)} is in download mode and would store '{request.text}'; {END} ends that")
     yield from synchronised(state, request)
     if state.programming:
         raise Refused(f"{who(state)} is in download mode; '{request.text}' was not sent", int(Status.STORED))
-    return (yield from _EXCHANGE.answered(state, request))
+    sets = (call.command, call.type) == (Command.SAP, Axis.SEARCH_MODE)
+    if sets:
+        state.search_mode_sent(call.motor)
+    reply = yield from _EXCHANGE.answered(state, request)
+    if sets or (call.command, call.type) == (Command.GAP, Axis.SEARCH_MODE):
+        state.search_mode_known(call.motor)
+    return reply
 
 
 def _replied(state: TmclState, request: Request) -> Procedure[Reply]:

@@ -443,3 +443,18 @@ def test_after_any_stops_a_value_is_right_or_not_given(delays, start):
         text, value = asked[(start + number) % 4]
         with contextlib.suppress(NoAnswer):
             assert shop.type(state, text) == (value,)
+
+
+@pytest.mark.parametrize("lost", [True, False])
+@pytest.mark.parametrize("remedy", ["GAP 193, 0", "SAP 193, 0, 1"])
+def test_no_search_begins_after_a_mode_that_was_not_set(remedy, lost, shop, state):
+    shop.delays = [None] if lost else []
+    with pytest.raises(NoAnswer if lost else Refused):
+        shop.type(state, "SAP 193, 0, 2" if lost else "SAP 193, 0, 9")
+    with pytest.raises(Refused, match=r"SAP 193 for motor 0 was refused or got no reply: 'RFS START, 0' would search"):
+        shop.type(state, "RFS START, 0")
+    assert not any(data[1:3] == bytes([Command.RFS, 0]) for data in shop.written)
+    shop.wait(2.0)
+    shop.type(state, remedy)
+    shop.type(state, "RFS START, 0")
+    assert any(data[1:3] == bytes([Command.RFS, 0]) for data in shop.written)
