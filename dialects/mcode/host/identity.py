@@ -23,6 +23,7 @@ from multidrop.dialects.mcode.host.codec import NOBODY, PONG, SLOWEST, MCode, po
 from multidrop.dialects.mcode.host.exchange import answered, as_printed, fresh, refused, take_out
 from multidrop.dialects.mcode.host.framing import NAK, sealed
 from multidrop.dialects.mcode.host.state import MCodeState, Place, who
+from multidrop.dialects.mcode.manual.mnemonic import ETHERNET
 from multidrop.dialects.mcode.manual.program_file import LONGEST
 from multidrop.dialects.mcode.manual.statements import UNNAMED
 
@@ -231,7 +232,6 @@ AT_HEAD = rf"(?m:^){OLDER}"
 NAME, PART, SERIAL = r'(?P<name>"?[!-~]"?)', r'(?P<part>[^">\r\n]*)', r'(?P<serial>[^">\r\n]*)'
 """Part and serial number are for a person and for comparison: odd characters in them hide no drive."""
 SETTINGS, TWICE = r"(?P<settings>(?P<em>[0-3])[0-3][01])", r"(?P=settings)"
-ETHERNET = re.compile(r"LMD.E")
 MDRIVE = "MDI"
 THRICE = 3
 EXPANDED_PART = re.compile(r"<?MDI[34]")

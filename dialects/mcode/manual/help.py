@@ -51,6 +51,7 @@ def describe(word: str, product: str = "") -> list[str]:
     here = ""
     if product in EVERY and product not in row.products:
         here = f"not in an {product}: error 37" if product in row.reserved_on else f"a free name in an {product}"
+        here = f"not in an {product}: it prints 0; error 37 for any value" if product in row.zero_on else here
     facts = (
         ("syntax", row.syntax),
         ("range", _range(row)),
@@ -204,7 +205,8 @@ def _others(statement: Statement, product: str) -> str:
     """The products for which the first word is that this product lacks; empty where it lacks none."""
     for word in words_of(statement):
         row = lookup(word, product)
-        if row is not None and row.products and product not in row.products:
+        printed = row is not None and product in row.zero_on and word != statement.word
+        if row is not None and row.products and product not in row.products and not printed:
             return f"{row.name} is for {', '.join(sorted(row.products))}"
     return ""
 

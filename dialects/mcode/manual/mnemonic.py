@@ -7,6 +7,7 @@ values here, with the rule in `note`.
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 from typing import TypedDict, Unpack
 
@@ -21,6 +22,8 @@ TOP_SPEED = 2560000
 
 LEXIUM = frozenset({"LMDOM", "LMDCM", "LMDOE", "LMDCE", "LMM"})
 """Lexium MDrive, open and closed loop (M serial, E Ethernet), and the Lexium Motion Module."""
+ETHERNET = re.compile(r"LMD.E")
+"""Matches the products with an Ethernet port, unknown ones too."""
 SERIAL = LEXIUM - {"LMDOE", "LMDCE"}
 CLOSED_LOOP = frozenset({"LMDCM", "LMDCE"})
 """The products with hMT."""
@@ -81,6 +84,8 @@ class Mnemonic:
     products: frozenset[str] = LEXIUM
     reserved_on: frozenset[str] = LEXIUM
     """The products that know the word; on others it is a free name. Known but absent is error 37."""
+    zero_on: frozenset[str] = NOWHERE
+    """The products that lack it and print it as 0."""
     note: str = ""
 
     def accepts(self, value: Number, encoder: bool = False) -> bool:

@@ -102,7 +102,7 @@ def locks_resolution(product: str) -> bool:
 
 def fresh(name: str) -> Value | None:
     """The default of a set-up; None for any other word."""
-    special: dict[str, Value] = {"S5": (9, 0), "S7": (33, 0), "S8": (33, 0), "S13": (60, 0), "PF": (10, 6, 0, 0)}
+    special: dict[str, Value] = {"S5": (9, 0), "S7": (33, 0), "S8": (33, 0), "S13": (60, 0, 0), "PF": (10, 6, 0, 0)}
     if name in special:
         return special[name]
     if name in TRIPS:
@@ -122,12 +122,17 @@ def section(name: str) -> str:
 
 def reading_of(name: str, value: Value, row: Mnemonic | None, counts: bool) -> Reading:
     """Put section, unit and default to a value. `counts`: the unit of motion is the encoder count."""
-    default, unit = fresh(name), ""
+    default, unit, value = fresh(name), "", whole_setup(name, value)
     if row is not None:
         unit = (counts and row.unit_encoder) or row.unit
         if default is None:
             default = row.default_encoder if counts and row.default_encoder is not None else row.default
     return Reading(name, value, section(name), unit, default, name in WIRE | UNIT)
+
+
+def whole_setup(name: str, value: Value) -> Value:
+    """The three fields of S13, of which the manual prints two."""
+    return (*value, 0) if name == "S13" and isinstance(value, tuple) and len(value) == 2 else value
 
 
 def _lacking(version: str, part: str) -> frozenset[str]:
@@ -164,7 +169,7 @@ CLOCKS = frozenset({13, 14, 15, 33, 34, 35, 49, 50, 51})
 SHARED = frozenset({0, 16}) | CLOCKS
 """Types that several points may have."""
 FIELDS = {"PF": 4, "PW": 4}
-PAIRED = frozenset({"S5", "S7", "S8", "S13"})
+PAIRED = frozenset({"S5", "S7", "S8"})
 """Points of an MDrivePlus whose set-up has two fields; others have three."""
 PRINT_FORMAT = (16, 16, 1, 1)
 """The highest fields of PF."""
@@ -203,7 +208,7 @@ def _scalar(value: Scalar) -> str:
 
 def checked(name: str, value: Value, product: str, counts: bool, labels: Collection[str]) -> Value:
     """Return the value as the drive takes it. Raises Diagnostic for a value out of range."""
-    row = row_of(name, product)
+    row, value = row_of(name, product), whole_setup(name, value)
     if isinstance(value, float) and value.is_integer() and not (row is not None and isinstance(row.default, float)):
         value = int(value)
     if row is None:

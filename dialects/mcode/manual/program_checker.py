@@ -18,7 +18,7 @@ from multidrop.dialects.mcode.manual.grammar import (
     words,
 )
 from multidrop.dialects.mcode.manual.help import form_of, out_of_range
-from multidrop.dialects.mcode.manual.mnemonic import EVERY
+from multidrop.dialects.mcode.manual.mnemonic import EVERY, Mnemonic
 from multidrop.dialects.mcode.manual.program_file import ProgramLine
 from multidrop.dialects.mcode.manual.program_flow import AT_POWER_UP, Flow
 from multidrop.dialects.mcode.manual.statements import condition_of, condition_reading, is_mixed, names_in, words_of
@@ -32,22 +32,27 @@ Read = Sequence[tuple[ProgramLine, Statement]]
 """The lines of a file that can be parsed, each with its statement."""
 LISTED = 4
 """Words that a message names."""
+CHANGE = frozenset({"IC", "DC", "IV"})
+"""Instructions that write the variable after them."""
 
 
 def check_products(read: Read, names: frozenset[str], product: str) -> Iterator[Problem]:
     """Report that a program is for other products than this one, if it is for any. `names` are the user's."""
-    used = dict[str, ProgramLine]()
+    used, changed = dict[str, ProgramLine](), set[str]()
     for line, statement in read:
         for word in words_of(statement):
             if lookup(word) is not None:
                 used.setdefault(word, line)
+            if word == statement.word or statement.word in CHANGE:
+                changed.add(word)
+
+    def lacks(word: str, row: Mnemonic | None, each: str) -> bool:
+        return row is None or (each not in row.products and (word in changed or each not in row.zero_on))
 
     def unfit(each: str) -> tuple[list[str], list[str]]:
         """Words that a product does not execute, and its own words that are a user's names."""
         rows = {word: lookup(word, each) for word in used}
-        missing = [
-            word for word, row in rows.items() if word not in names and (row is None or each not in row.products)
-        ]
+        missing = [word for word, row in rows.items() if word not in names and lacks(word, row, each)]
         return missing, [word for word, row in rows.items() if word in names - {AT_POWER_UP} and row is not None]
 
     def some(found: Sequence[str]) -> str:

@@ -31,7 +31,7 @@ from multidrop.dialects.mcode.manual.table_system import MATH, PROGRAM, SYSTEM
 # Most are a Lexium's words with another range, default or place; a row has only the differences. Sections are the
 # pages of the MCode reference of 2012 (R062812). Words of the Hybrid's firmware, and words new in the Lexium, are
 # absent. The base unit knows the words of expanded I/O and refuses them (37). So does a unit without an encoder with
-# the nine encoder words.
+# the nine encoder words, of which it prints three as 0.
 
 
 _LEXIUM: Mapping[str, Mnemonic] = {row.name: row for row in (*MOTION, *IO, *SYSTEM, *PROGRAM, *MATH)}
@@ -63,6 +63,11 @@ def _own(row: Mnemonic, products: frozenset[str] = MDRIVE_PLUS) -> Mnemonic:
     return replace(row, products=products, reserved_on=MDRIVE_PLUS)
 
 
+def _read_as_zero(row: Mnemonic) -> Mnemonic:
+    """A word of the encoder that a unit without one prints as 0, and does not take."""
+    return replace(row, zero_on=MDRIVE_PLUS - MDRIVE_ENCODER)
+
+
 def _reserved(name: str, section: str) -> Mnemonic:
     what = "reserved for the maker; no name for a variable or a label (error 24)"
     return _own(Mnemonic(name, "Reserved", what, section, kind="reserved", immediate=False, program=False))
@@ -80,7 +85,7 @@ MOTION_WORDS: tuple[Mnemonic, ...] = (
         for name, page in (("A", "5-1"), ("D", "5-16"))
     ),
     _like("C1", "5-7"),
-    _like("C2", "5-7", products=MDRIVE_ENCODER, note=_ENCODED),
+    _read_as_zero(_like("C2", "5-7", products=MDRIVE_ENCODER, note=_ENCODED)),
     _own(
         flag("CM", "Clock mode", "1 switches the clock on points 7 and 8 on", "5-13", 0, starts=True,
              note=f"{_EXPANDED}; limits do nothing meanwhile, and a jog is error 87"),
@@ -94,9 +99,9 @@ MOTION_WORDS: tuple[Mnemonic, ...] = (
     _like("DB", "5-18", products=MDRIVE_ENCODER, note=_ENCODED),
     replace(_like("DE", "5-19", note="a move with DE=0 is counted and turns nothing"),
         meaning="0 switches the output bridges off"),
-    _like("EE", "5-21", products=MDRIVE_ENCODER,
-        note=f"{_ENCODED}; MS is 256 and locked while it is 1; VI or VM too low for counts is error 90"),
-    _like("EL", "5-22", default=512, products=EXPANDED, note=_EXPANDED),
+    _read_as_zero(_like("EE", "5-21", products=MDRIVE_ENCODER,
+        note=f"{_ENCODED}; MS is 256 and locked while it is 1; VI or VM too low for counts is error 90")),
+    _like("EL", "5-22", low=50, high=6400, default=512, products=EXPANDED, note=_EXPANDED),
     _like("HC", "5-28"),
     _like("HI", "5-29", products=MDRIVE_ENCODER, note=_LEXIUM["HI"].note),
     _like("HM", "5-30", note=_LEXIUM["HM"].note),
@@ -119,7 +124,9 @@ MOTION_WORDS: tuple[Mnemonic, ...] = (
     _like("SF", "5-68", products=MDRIVE_ENCODER, note=_ENCODED),
     _like("SL", "5-68", note="does not heed VM"),
     _like("SM", "5-69", products=MDRIVE_ENCODER, note=_ENCODED),
-    _like("ST", "5-70", access="RW", products=MDRIVE_ENCODER, note=f"{_ENCODED}; reading ER does not clear it"),
+    _read_as_zero(
+        _like("ST", "5-70", access="RW", products=MDRIVE_ENCODER, note=f"{_ENCODED}; reading ER does not clear it"),
+    ),
     _like("V", "5-77"),
     _like("VC", "5-78"),
     _like("VF", "5-79", note="for torque, which it has not: taken, without effect"),
@@ -183,7 +190,8 @@ POINT_WORDS: tuple[Mnemonic, ...] = (
     ),
     _own(
         mode("S13", "Capture and trip setup", "type and active level of the high-speed point 13", "5-67",
-             syntax="S13=<60/61>,<0/1>, PR S13", note=f"{_EXPANDED}; 60 capture input, 61 trip output"),
+             syntax="S13=<60/61>,<0/1>[,<0/1>], PR S13",
+             note=f"{_EXPANDED}; 60 capture input, 61 trip output; a third field as of S1"),
         EXPANDED,
     ),
     _group("IL", "Inputs, low group", "levels of points 1 to 4, point 1 the lowest bit; not filtered", "5-36", 15,

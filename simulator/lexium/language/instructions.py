@@ -100,7 +100,7 @@ class Prints:
             return lambda: constant
         if not isinstance(argument, Name):
             raise Fault(E.NOT_PRINTABLE)
-        word, row = argument.word, self._memory.row(argument.word)
+        word, row = argument.word, self._memory.readable(argument.word)
         if row is not None and row.access in ("-", "WO"):
             raise Fault(E.NOT_PRINTABLE)
         if row is not None and word in self._shapes:
@@ -241,7 +241,7 @@ class Instructions:
 
     def reader(self, word: str) -> Read | None:
         """Return a closure that reads a variable; None for a name that is no variable, now or in the program."""
-        if self._memory.row(word) is None and not self._variables.declared(word):
+        if self._memory.readable(word) is None and not self._variables.declared(word):
             return None
         try:
             return self._variables.reader(word)

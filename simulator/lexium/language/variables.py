@@ -166,9 +166,8 @@ class MotionVariables:
 
     def _check_speeds(self) -> None:
         """Check that VI is a count or more, on a product that has a code for less (5-21, 9). Raises Fault (90)."""
-        values, model = self._values, self._memory.model
-        slowest = values["VI"] * model.encoder_lines * 4
-        if model.per_microstep is None and slowest < self._memory.steps_per_turn:
+        memory = self._memory
+        if memory.model.per_microstep is None and self._values["VI"] < memory.steps_per_count:
             raise Fault(E.VELOCITY_TOO_LOW)
 
     def _write_encoder(self, name: str, value: Value) -> None:
@@ -334,7 +333,9 @@ class Variables:
         }
 
     def reader(self, word: str) -> Read:
-        row = self._memory.row(word)
+        row = self._memory.readable(word)
+        if row is not None and self._memory.product in row.zero_on:
+            return lambda: 0
         if row is not None and word in self._readers:
             return self._readers[word]
         values, key = self._values, word if row else slot(word)

@@ -83,9 +83,9 @@ class Outputs:
         self.driven[n] = value
 
     def write_all(self, value: int, group: Sequence[int]) -> None:
-        """Carry out OT, OL, OH; outputs that follow the drive stay. Raises Fault (9) if all of them do."""
+        """Carry out OT, OL, OH; only points of type 16 change. Raises Fault (9) if a Lexium has none of them."""
         free = [(place, n) for place, n in enumerate(group) if self.types[n][0] == GENERAL]
-        if not free:
+        if not (free or self._points.shared):
             raise Fault(E.NOT_USER_OUTPUT)
         for place, n in free:
             self.driven[n] = value >> place & 1

@@ -9,8 +9,9 @@ With PY=0 a line ends with CR; a LF is part of no line (EM=0 echoes it). With PY
 the addressee: this drive's name, `*` for all, `^` for those with QD=1; anything else makes the drive deaf. A CR before
 the LF has no effect, and between two commands it separates them. Clients of real units send several at once, each with
 its name, and one LF after the last (`1VI 1`, CR, `1MA 4`, LF); they are carried out at that LF. Party mode is inert
-until one LF has come after PY=1 was set, after power-up and after a reset (5.1.105): until then the port is deaf,
-except for ESC, ^E and ^C.
+until one LF has come after PY=1 was set, after power-up and after a reset (5.1.105): until then the port of a Lexium
+is deaf, except for ESC, ^E and ^C. On an MDrivePlus the LF that ends the first line is that one, and the line is
+carried out.
 
 Decisions where the manual is silent (facts that a unit may correct):
 
@@ -424,7 +425,7 @@ class MCodePort:
             self._carry_out(now)
         elif byte == CR:
             return
-        elif not self._active:
+        elif not (self._active or self._memory.model.wakes_by_line):
             self._line = DEAF
         else:
             name = bytes([byte])

@@ -183,6 +183,11 @@ class Memory:
         """The row of a word, None for a free name. Raises Fault (37)."""
         return row_of(word, self.product)
 
+    def readable(self, word: str) -> Mnemonic | None:
+        """The row of a word that is only read: one that the product lacks may print 0. Raises Fault (37)."""
+        row = lookup(word, self.product)
+        return row if row is not None and self.product in row.zero_on else self.row(word)
+
     def checked(self, word: str, value: Value) -> int:
         """A whole number that a word takes. Raises Fault (21, 37)."""
         number, row = whole(value), self.row(word)

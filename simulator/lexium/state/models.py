@@ -96,7 +96,7 @@ EXPANDED_POINTS = MDRIVE_POINTS._replace(
         **dict.fromkeys((7, 8), frozenset({49, 50, 51})),
         13: frozenset({61}),
     },
-    fresh={**MDRIVE_POINTS.fresh, **dict.fromkeys(_EXPANDED, (0, 0, 0)), 7: (33, 0), 8: (33, 0), 13: (60, 0)},
+    fresh={**MDRIVE_POINTS.fresh, **dict.fromkeys(_EXPANDED, (0, 0, 0)), 7: (33, 0), 8: (33, 0), 13: (60, 0, 0)},
     sources=True,
     clocks=(7, 8),
     clock_types={33: STEP_DIRECTION, 34: QUADRATURE, 35: UP_DOWN},
@@ -118,6 +118,7 @@ class Model(NamedTuple):
     `waits_to_print`: a program waits while the transmitter is full, which loses nothing then.
     `prompts_at_start`: a prompt follows the sign-on. `captures_relative`: TR sets PC too, TP does not.
     `flags_by_nak`: with a checksum the drive carries a line out and replies NAK while an error is set.
+    `wakes_by_line`: in party mode the first line is carried out, too; its LF is the one that party mode waits for.
     """
 
     version: str
@@ -148,6 +149,7 @@ class Model(NamedTuple):
     prompts_at_start: bool = False
     captures_relative: bool = False
     flags_by_nak: bool = False
+    wakes_by_line: bool = False
 
 
 def _lexium(name: str, *, ethernet: bool = False) -> Model:
@@ -181,6 +183,7 @@ MDRIVE = Model(
     prompts_at_start=True,
     captures_relative=True,
     flags_by_nak=True,
+    wakes_by_line=True,
 )
 
 MODELS: Mapping[str, Model] = MappingProxyType(

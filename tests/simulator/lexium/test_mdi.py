@@ -97,6 +97,34 @@ def test_other_lines_are_set_on_an_expanded_unit() -> None:
     assert unit.at(2.0, "C2") == ["4000"]
 
 
+def test_an_encoder_has_50_to_6400_lines_of_which_each_is_coarse_enough_for_256_microsteps() -> None:
+    unit = Unit("MDIX")
+    assert unit.say("EL 49", "EL 6401", "EL 50", "El=4096", "PR EL", "EE=1", "PR MS", "EE=0") == [
+        *("?21", "?21", "", "", "4096", "", "256", ""),
+    ]
+    for lines in (50, 200, 4096, 6400):
+        unit = Unit("MDIX", f"EL={lines}", "VI=256", "EE=1", "VM=200000", f"MR {4 * lines}")
+        assert unit.at(20.0, "P", "C1", "C2") == [str(4 * lines), "51200", str(4 * lines)]
+    assert Unit("MDI").say("EL=4096", "PR EL") == ["?37", "?37"]
+
+
+def test_the_lines_of_the_encoder_decide_which_speed_is_less_than_a_count() -> None:
+    unit = Unit("MDIX", "VI=12", "EL=1024")
+    assert unit.say("EE=1", "VI=13", "EE=1") == ["?90", "", ""]
+
+
+def test_a_unit_without_an_encoder_prints_0_for_three_words_of_it_and_takes_no_value() -> None:
+    unit = Unit()
+    assert unit.say("PR EE", "PR ST", "PR C2", "PR EE,ST,C2", "R1=C2+EE", "PR R1,EF") == [
+        *("0", "0", "0", "000", "", "00"),
+    ]
+    assert unit.say("EE=1", "EE=0", "ST=0", "C2=0", "IC C2", "VA EE", "PR DB", "PR I6") == [
+        *("?37", "?37", "?37", "?37", "?37", "?29", "?37", "?37"),
+    ]
+    unit = Unit("MDI", "PG 1", "LB K1", "BR K2,EE=1", 'PR "none ",C2,ST', "E", "LB K2", 'PR "one"', "E", "PG", "EX K1")
+    assert unit.told(0.1).startswith("none 00\r\n") and unit.say("PR ER") == ["0"]
+
+
 def test_a_speed_of_less_than_a_count_is_no_speed_in_counts() -> None:
     unit = Unit("MDIE", "VI=24")
     assert unit.say("EE=1", "PR EE", "VI=25", "EE=1", "MS=128", "MS=256") == ["?90", "0", "", "", "?21", ""]
@@ -146,7 +174,18 @@ def test_groups_write_and_read_their_points_at_once() -> None:
     assert unit.say("OL=16", "OT=255", "PR IL", "OT=256", "S4=0,0,0", "OL=0", "PR IL") == [
         *("?21", "", "15", "?21", "", "", "8"),
     ]
-    assert Unit().say("OL 0", "OT 0", "PR OL", "PR OT") == ["?9", "?9", "?35", "?35"]
+    assert Unit().say("PR OL", "PR OT") == ["?35", "?35"]
+
+
+@pytest.mark.parametrize("personality", ["MDI", "MDIE", "MDIX"])
+def test_a_group_is_written_where_no_point_is_an_output_and_changes_nothing(personality: str) -> None:
+    unit = Unit(personality)
+    assert unit.say("OL 0", "OL 13", "OT 0", "OT 15", "OL=15", "PR IL", "PR EF,ER", "OL 16", "OL -1") == [
+        *("", "", "", "", "", "15", "00", "?21", "?21"),
+    ]
+    assert unit.say("S4=17,0,0", "OL 0", "OT 255", "PR EF") == ["", "", "", "0"], "an output of the drive's own"
+    assert unit.say("S3=16,1,0", "PR IL", "O1=1") == ["", "11", "?9"], "nothing was kept for it"
+    assert personality != "MDIX" or unit.say("OH 0", "OH 15", "PR IH", "OH 16") == ["", "", "15", "?21"]
 
 
 def test_the_groups_of_an_expanded_unit() -> None:
@@ -154,6 +193,17 @@ def test_the_groups_of_an_expanded_unit() -> None:
     assert unit.say("OT=165", "PR IL", "PR IH", "PR IN", "OH=3", "PR IH", "PR IN", "O12=1", "PR IH", "PR I12") == [
         *("", "5", "10", "165", "", "3", "53", "", "11", "1"),
     ]
+
+
+def test_point_13_takes_a_third_field_as_the_others_do() -> None:
+    unit = Unit("MDIX")
+    assert unit.say("S13=60,0,0", "PR S13", "S13 60,0,0", "s13 60,1,1", "PR S13", "S13=61,0", "PR S13") == [
+        *("", "60, 0, 0", "", "", "60, 1, 1", "", "61, 0, 0"),
+    ]
+    assert unit.say("S13=60,0,2", "S13=60,0,0,0", "S13=60", "S13=16,0,0", "S7=33,0,0") == [
+        *("?21", "?24", "?38", "?8", "?24"),
+    ]
+    assert Unit("MDI").say("S13=60,0,0", "S13 60,0,0") == ["?37", "?37"]
 
 
 @pytest.mark.parametrize("kind", [9, 12, 13, 14, 15, 21, 22, 24, 25, 26, 28, 29, 33, 60])

@@ -21,6 +21,8 @@ pytestmark = pytest.mark.slow
 
 TABLE_OF_FACTS = FACTS / "mdi-mnemonics.csv"
 UNITS = ("MDI", "MDIE", "MDIX")
+PRINTS_ZERO = {"EE", "ST", "C2"}
+"""Read as 0 without an encoder: a client for real units polls them, and waits for ever after an error."""
 RULED_HERE = {"FC": UNITS, "VF": UNITS, "WT": UNITS, "IT": (), "S13": ("MDIX",)}
 """Marked for every product, or for another size: where they work here."""
 OPERATORS = re.compile(r"[^A-Z0-9]+")
@@ -47,7 +49,7 @@ RANGES = {
     "R2": (-2147483648, 2147483647),
     "R3": (-2147483648, 2147483647),
     "R4": (-2147483648, 2147483647),
-    "EL": (1, 2000),
+    "EL": (50, 6400),
     "OT": (0, 255),
 }
 """Ranges that are no plain pair in the facts, or are ruled."""
@@ -121,7 +123,8 @@ def test_what_a_word_is_on_a_unit(personality: str) -> None:
         elif row["kind"] == "reserved":
             expected, found = ["?35", "?24", "?24"], [read, written, declared]
         elif not there(row, personality):
-            expected, found = ["?37", "?37", "?29"], [read, written, declared]
+            expected = ["0" if name in PRINTS_ZERO else "?37", "?37", "?29"]
+            found = [read, written, declared]
         else:
             expected, found = ["?29"], [declared]
             if row["rw"] in ("RO", "RW") and row["kind"] in ("variable", "flag"):
@@ -161,7 +164,7 @@ def test_a_value_from_the_factory(personality: str) -> None:
         if row["kind"] == "instruction" and not re.fullmatch(r"S\d+", name):
             continue
         said = Unit(personality).say(f"PR {name}")[0].strip('"').replace(" ", "")
-        assert said == wanted, name
+        assert said == (f"{wanted},0" if name == "S13" else wanted), name
         checked.append(name)
     assert len(checked) > 40
 
@@ -290,7 +293,7 @@ def test_they_are_there_with_expanded_io(line: str) -> None:
 
 @pytest.mark.parametrize(
     "line",
-    ["PR C2", "DB=5", "EE=1", "HI 1", "PR I6", "PM=1", "SF=20", "SM=1", "PR ST", "ST=0", "EE=0", "IC SF", "C2=0"],
+    ["PR DB", "DB=5", "EE=1", "HI 1", "PR I6", "PM=1", "SF=20", "SM=1", "PR SM", "ST=0", "EE=0", "IC SF", "C2=0"],
 )
 def test_encoder_words_need_the_encoder(line: str) -> None:
     assert Unit("MDI").say(line) == ["?37"]

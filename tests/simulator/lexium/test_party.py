@@ -155,6 +155,23 @@ def test_an_ethernet_drive_is_silent_while_it_boots():
     assert drive.deadline is None
 
 
+@pytest.mark.parametrize(
+    ("personality", "heard"),
+    [("LMDCM", b"\r\n0\r\n"), *((unit, b"\r\n\r\n200\r\n") for unit in ("MDI", "MDIE", "MDIX"))],
+)
+@pytest.mark.parametrize("baud", [0, 9600])
+def test_the_first_line_after_power_up_is_carried_out_by_an_mdrive_plus(personality, heard, baud):
+    table = f'[[bus.drive]]\npersonality = "{personality}"\nparty = true\nset = {{ EM = 1 }}\n'
+    drives = "".join(f'{table}name = "{name}"\n' for name in "ab")
+    floor = Floor(read(f'[[bus]]\nname = "line"\nbaud = {baud}\n{drives}', "line.toml"))
+    a, b = (placed.device for placed in floor.drives)
+    assert talk(floor.wires["line"], b"aP=200\naPR P\n", 0.0, 1.0) == heard
+    floor.command("/sim power a off", 1.0)
+    floor.command("/sim power a on", 2.0)
+    talk(floor.wires["line"], b"aMR 300\n", 2.0, 4.0)
+    assert (a.position(4.0), b.position(4.0)) == (0 if personality == "LMDCM" else 300, 0)
+
+
 def party(*names, **settings):
     """A line with drives in party mode, which has been activated."""
     devices = [

@@ -29,7 +29,7 @@ class Drive:
         self.thread = self.bridges = self.power_unit = self.memory = self.model = self.core = self.printer = self
         self.name, self.party, self.checksum, self.echo_mode = "a", False, 0, 0
         self.escape_mode, self.reset_mode, self.quiet_global, self.queued = 1, 1, True, False
-        self.error_flag = self.running = self.stepping = self.flags_by_nak = False
+        self.error_flag = self.running = self.stepping = self.flags_by_nak = self.wakes_by_line = False
         self.programming: int | None = None
         self.did: list[str] = []
         self.said: list[tuple[float, str]] = []
@@ -292,6 +292,34 @@ def test_party_mode_is_deaf_until_one_lf_after_power_up_and_reset() -> None:
     drive.reset(0.0)  # by a hand, an input or a line
     assert ask(port, b"aMR 5\naMR 6\n") == b"Copyright\xa9\r\n\r\n"
     assert drive.did == ["MR 2", "reset", "MR 4", "reset", "MR 6"]
+
+
+@pytest.mark.parametrize(
+    ("em", "answer"), [(0, b"aPR 5\r\n5\r\n>"), (1, b"\r\n5\r\n"), (2, b"5\r\n"), (3, b"PR 5\r\n5\r\n")]
+)
+@pytest.mark.parametrize("ck", [0, 1])
+def test_where_the_first_line_wakes_party_mode_it_is_carried_out(em: int, answer: bytes, ck: int) -> None:
+    sent = sealed(b"aPR 5") if ck else b"aPR 5"
+    if ck:
+        head = {0: sent + ACK, 1: ACK, 2: b"", 3: sent[1:] + ACK}[em]
+        answer = head + sealed(b"5") + b"\r\n" + b">" * (em == 0)
+    for reset in (b"", b"\x03"):
+        for grouped in (True, False):
+            port = MCodePort(Drive(party=True, echo_mode=em, checksum=ck, wakes_by_line=True))
+            assert not reset or ask(port, reset).startswith(b"Copyright")
+            pieces = [sent + b"\n"] if grouped else [bytes([each]) for each in sent + b"\n"]
+            assert b"".join(ask(port, each) for each in pieces) == answer, (reset, grouped)
+
+
+def test_where_the_first_line_wakes_party_mode_it_may_be_several_commands_and_another_drives() -> None:
+    drive = Drive(wakes_by_line=True)
+    port = MCodePort(drive)
+    assert ask(port, b"PY=1\raMR 1\raMR 2\n") == b"PY=1\r\n>aMR 1aMR 2\r\n>\r\n>"
+    assert drive.did == ["PY=1", "MR 1", "MR 2"]
+    other = Drive(party=True, echo_mode=1, wakes_by_line=True)
+    port = MCodePort(other)
+    assert ask(port, b"bMR 1\nMR 2\n*MR 3\naMR 4\n") == b"\r\n"
+    assert other.did == ["MR 3", "MR 4"]
 
 
 def test_a_setting_changes_the_answers_from_the_next_line_on() -> None:
