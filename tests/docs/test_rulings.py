@@ -11,7 +11,7 @@ from tests.support.paths import ROOT
 
 DOCS = ROOT / "docs"
 CHAPTERS = sorted((DOCS / "rulings").glob("*.md"))
-KIND = r"(manual|client|firmware|program|none)( \([^()]+\))?"
+KIND = r"(manual|client|firmware|program|unchecked|none)( \([^()]+\))?"
 EVIDENCE = re.compile(f"{KIND}(, {KIND})*")
 
 
