@@ -23,6 +23,8 @@ if TYPE_CHECKING:
     from multidrop.simulator.family import Family
 
 SCHEMES = ("pty", "tcp", "udp", "modbus")
+LONGEST_GATHER = 0.02
+"""The highest `gather`, s: USB chips hold bytes for up to 16 ms."""
 DRIVE_KEYS = (
     "personality",
     "name",
@@ -72,7 +74,7 @@ class Reader:
         name = table.values.get("name")
         if isinstance(name, str) and name:
             table = Table(table.values, f"{where}: [[bus]] {quoted(name)}")
-        table.only("name", "serve", "baud", "drive", "faults")
+        table.only("name", "serve", "baud", "gather", "drive", "faults")
         name = table.text("name")
         if not name or not name.isprintable() or set(name) & set("#@:/ "):
             raise table.wrong("name", f"cannot be {quoted(name)}", "valid: a word without spaces, #, @, : or /")
@@ -82,6 +84,7 @@ class Reader:
             baud=table.integer("baud", 0, low=0, high=4_000_000),
             drives=tuple(self._drive(each, folder) for each in table.tables("drive", "[[bus.drive]]")),
             faults=_faults(table.table("faults", "[bus.faults]")),
+            gather=table.number("gather", 0.0, 0.0, LONGEST_GATHER) if "gather" in table.values else None,
         )
         self._check_bus(bus, table)
         return bus
@@ -105,10 +108,16 @@ class Reader:
                     f'"{drive.name}" is the name of [[bus.drive]] {names[drive.name]} too', where, "use different names"
                 )
             names[drive.name] = number
-        speaks_modbus = any(self._is_ethernet(each.personality) for each in bus.drives)
-        if any(each.scheme == "modbus" for each in bus.serve) and not speaks_modbus:
-            hint = f"valid: {', '.join(filter(self._is_ethernet, self._families))}"
-            raise table.wrong("serve", "has modbus://, and no drive of the bus serves it", hint)
+        on_ethernet = any(self._is_ethernet(each.personality) for each in bus.drives)
+        if any(each.scheme == "modbus" for each in bus.serve) and not on_ethernet:
+            raise table.wrong("serve", "has modbus://, and no drive of the bus serves it", f"valid: {self._ethernet}")
+        if bus.gather is not None and on_ethernet:
+            raise table.wrong("gather", "is for serial drives", "leave it out: an Ethernet drive sends whole replies")
+
+    @property
+    def _ethernet(self) -> str:
+        """The personalities with an Ethernet port."""
+        return ", ".join(filter(self._is_ethernet, self._families))
 
     def _is_ethernet(self, personality: str) -> bool:
         return personality in self._families[personality].ethernet

@@ -293,6 +293,11 @@ class Wire:
         self._rng = rng or self._rng
 
     @property
+    def following(self) -> float | None:
+        """Time at which the next byte of a drive arrives at the host; None: no drive sends."""
+        return self._merger.deadline
+
+    @property
     def deadline(self) -> float | None:
         """Time of the next event: a byte arrives at the drives or at the host, or a drive does something by itself."""
         if self._outdated:

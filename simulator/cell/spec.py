@@ -109,13 +109,18 @@ class Faults:
 
 
 class BusSpec(NamedTuple):
-    """One wire, the drives on it and the ways in. `baud` 0: bytes take no time, and any baud rate is understood."""
+    """One wire, the drives on it and the ways in. `baud` 0: bytes take no time, and any baud rate is understood.
+
+    `gather`: pty and TCP endpoints of serial drives deliver together the bytes that follow each other within this time,
+    s; None: two character times.
+    """
 
     name: str
     serve: tuple[Endpoint, ...] = ()
     baud: int = 0
     drives: tuple[DriveSpec, ...] = ()
     faults: Faults = Faults()
+    gather: float | None = None
 
 
 class Cell(NamedTuple):

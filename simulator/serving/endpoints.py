@@ -147,6 +147,8 @@ class TcpServer(Listener):
 class TcpClient(asyncio.BufferedProtocol, Client):
     """One client's connection: it receives the whole wire, and is read as fast as the wire carries what it writes."""
 
+    gathers = True
+
     def __init__(self, floor: RunningFloor, bus: str, clients: set[TcpClient]) -> None:
         self._floor, self._bus, self._clients = floor, bus, clients
         self._queue = InputQueue(floor, bus, self)

@@ -155,6 +155,8 @@ SPEEDS = {baud: code for code, baud in BAUDS.items()}
 class PtyServer(Client):
     """Serves one bus on a pseudo-terminal, with a symlink at `link` if one is given. Raises Diagnostic."""
 
+    gathers = True
+
     def __init__(self, floor: RunningFloor, bus: str, link: Path | None) -> None:
         self._floor, self._bus = floor, bus
         self._link = Link(link, f'bus "{bus}"') if link else None

@@ -14,10 +14,12 @@ from __future__ import annotations
 import asyncio
 from collections import deque
 from collections.abc import Callable
+from math import inf
 
+from multidrop.simulator.cell.spec import BusSpec
 from multidrop.simulator.family import Connection, Shadow
 from multidrop.simulator.floor import Floor
-from multidrop.simulator.wire import BITS_A_BYTE
+from multidrop.simulator.wire import BITS_A_BYTE, Wire
 
 HOLD = 4096
 """Bytes of one client that wait in the queue."""
@@ -35,8 +37,43 @@ LATEST = 0.1
 machine that is too slow for a floor still serves its clients at once."""
 
 
+LONGEST_HELD = 0.02
+"""Seconds for which an endpoint holds a byte at most."""
+CHARACTERS = 2
+"""Character times of a pause that ends a piece, unless a cell file says otherwise: as a UART's receive timeout."""
+
+
+class Gathered:
+    """The bytes of a wire in the pieces in which a serial port's hardware delivers them.
+
+    UARTs, USB chips and device servers deliver together what arrives without a pause. `pause`, s; None: two character
+    times. No timer is needed: the wire knows when its next byte arrives, so the last byte of a reply is never late.
+    """
+
+    def __init__(self, wire: Wire, pause: float | None) -> None:
+        self._wire, self._pause = wire, pause
+        self.held = bytearray()
+        self._since = 0.0
+
+    def take(self, data: bytes, now: float) -> bytes:
+        """Take what has arrived up to `now`; return the piece that ends here, empty while more follows."""
+        if not self.held:
+            self._since = now
+        self.held += data
+        pause = CHARACTERS * BITS_A_BYTE / (self._wire.baud or inf) if self._pause is None else self._pause
+        following = self._wire.following
+        if following is not None and following <= min(now + pause, self._since + LONGEST_HELD):
+            return b""
+        piece = bytes(self.held)
+        self.held.clear()
+        return piece
+
+
 class Listener:
     """An endpoint of a bus. It leaves as they are the events that mean nothing to its clients."""
+
+    gathers = False
+    """It is a serial port or a device server, which gathers the bytes of serial drives."""
 
     def receive(self, data: bytes) -> None:
         """Take bytes from the wire."""
@@ -68,12 +105,17 @@ class RunningFloor:
         self._deadline: float | None = None
         """When something happens next, as of the last turn."""
         self._listeners: dict[str, list[Listener]] = {name: [] for name in floor.wires}
+        self._gathered = {bus.name: self._gathering(bus) for bus in floor.cell.buses}
         self._down = {name: wire.hung_up for name, wire in floor.wires.items()}
         self._connectable = {name: floor.connectable(name) for name in floor.ethernet}
         self._wake: asyncio.TimerHandle | None = None
         self._closed = False
         self._sources = 0
         self._turn()
+
+    def _gathering(self, bus: BusSpec) -> Gathered:
+        """The pieces of a bus; an Ethernet drive sends in its own."""
+        return Gathered(self.floor.wires[bus.name], 0.0 if bus.name in self.floor.ethernet else bus.gather)
 
     def now(self) -> float:
         """The floor's time: seconds since the start, times the speed; less where it stood still."""
@@ -157,9 +199,16 @@ class RunningFloor:
 
     def _turn(self) -> None:
         """Bring the floor up to date, call the listeners, and see when to come back."""
-        for bus, data in self.floor.advance(self.now()).items():
+        now = self.now()
+        received = self.floor.advance(now)
+        for bus, gathered in self._gathered.items():
+            data = received.get(bus, b"")
+            if not (data or gathered.held):
+                continue
+            piece = gathered.take(data, now)
             for listener in tuple(self._listeners[bus]):
-                listener.receive(data)
+                if part := piece if listener.gathers else data:
+                    listener.receive(part)
         for bus, wire in self.floor.wires.items():
             if wire.hung_up != self._down[bus]:
                 self._down[bus] = wire.hung_up
