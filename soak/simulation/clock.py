@@ -7,6 +7,7 @@ number that an object of the simulation has; that object says when it can be rea
 from __future__ import annotations
 
 import asyncio
+import heapq
 import socket
 from collections.abc import Callable
 from concurrent.futures import Executor
@@ -23,6 +24,10 @@ MOST_TURNS = 5_000_000
 """Turns of the loop that no seed takes."""
 LATE = 10.0
 """The longest delay of a timer, s."""
+
+
+WORLD = ("soak.", "multidrop.simulator.")
+"""The modules whose timers are not the loop's work: they stand for drives, the kernel, threads and the person."""
 
 
 class Deadlock(AssertionError):
@@ -47,6 +52,7 @@ class SimulatedLoop(asyncio.BaseEventLoop):
         self.descriptors = 1000
         """The number of the last one."""
         self.network: Network
+        self._starved = False
         self._made = 0
         """The number of tasks so far."""
         self.set_exception_handler(self._defect)
@@ -70,8 +76,23 @@ class SimulatedLoop(asyncio.BaseEventLoop):
             raise Deadlock(f"the loop turns for ever, at {self.now:.1f} s")
         self.now += max(0.0, timeout)
         if self.late and self._rng.random() < self.late:
-            self.now += self._rng.random() ** 4 * LATE
+            self.starve(self._rng.random() ** 4 * LATE)
         return []
+
+    def starve(self, seconds: float) -> None:
+        """Let the loop do nothing for so long, while drives, the kernel, threads and the person go on."""
+        until = self.now + seconds
+        self._starved = True
+        while handles := [each for each in self._scheduled if each._when <= until and _of_the_world(each)]:  # type: ignore[attr-defined]
+            handle = min(handles)
+            self._scheduled.remove(handle)  # type: ignore[attr-defined]
+            heapq.heapify(self._scheduled)  # type: ignore[attr-defined]
+            handle._scheduled = False
+            self.now = max(self.now, handle._when)
+            if not handle.cancelled():
+                handle._run()
+        self._starved = False
+        self.now = until
 
     def close(self) -> None:
         """Close the loop."""
@@ -201,12 +222,16 @@ class SimulatedLoop(asyncio.BaseEventLoop):
 
     def readable(self, fd: int) -> None:
         """Call the reader of a descriptor, if there is one."""
-        if (handle := self._readers.get(fd)) is not None:
+        if self._starved:
+            self.call_soon(self.readable, fd)
+        elif (handle := self._readers.get(fd)) is not None:
             handle._run()
 
     def writable(self, fd: int) -> None:
         """Call the writer of a descriptor, if there is one."""
-        if (handle := self._writers.get(fd)) is not None:
+        if self._starved:
+            self.call_soon(self.writable, fd)
+        elif (handle := self._writers.get(fd)) is not None:
             handle._run()
 
     @staticmethod
@@ -215,3 +240,10 @@ class SimulatedLoop(asyncio.BaseEventLoop):
         if handle is not None:
             handle.cancel()
         return handle is not None
+
+
+def _of_the_world(timer: asyncio.TimerHandle) -> bool:
+    """Whether a timer goes on while the loop is starved."""
+    called = timer._callback  # type: ignore[attr-defined]
+    owner = type(called.__self__) if hasattr(called, "__self__") else called
+    return getattr(owner, "__module__", "").startswith(WORLD)

@@ -19,15 +19,15 @@ SOON = 0.05
 def _nothing_before(world: World) -> Iterator[str]:
     """Bytes of a command that was typed before a stop leave after it."""
     for each in world.history.commands.values():
-        stops = [stop.at for stop in world.history.stops if stop.who == each.who]
+        stops = [stop for stop in world.history.stops if stop.who == each.who]
         if each.stops >= len(stops):
             continue
         stop = stops[each.stops]
         text = re.compile(rb"(?<![0-9A-Za-z])" + re.escape(each.text.encode()) + rb"(?![0-9])")
-        for at, line, data in world.history.written:
-            if at > stop and line == each.line + each.who and text.search(data):
+        for at, line, data in world.history.written[stop.written :]:
+            if line == each.line + each.who and text.search(data):
                 where = f"{each.line}:{each.drive} {each.text!r}: {each.outcome.value} ({each.said})"
-                yield f"{where}, typed at {each.typed:.3f}, stop at {stop:.3f}, written at {at:.3f}"
+                yield f"{where}, typed at {each.typed:.3f}, stop at {stop.at:.3f}, written at {at:.3f}"
 
 
 def _first(world: World) -> Iterator[str]:

@@ -7,6 +7,7 @@ holds the stop key calls `stop_ahead` at once, wherever the loop is; what the lo
 from __future__ import annotations
 
 import asyncio
+from collections import deque
 from collections.abc import Callable
 from contextvars import Context
 from random import Random
@@ -17,6 +18,7 @@ from multidrop.shell.prompt.line_queue import History, LineQueue
 from multidrop.shell.prompt.terminal_input import at_keyboard
 from multidrop.shell.session import Session
 from soak.simulation.clock import SimulatedLoop
+from soak.simulation.cut_ins import LATEST, Aim, CutIns
 from soak.simulation.process import Process
 
 PASTE = (b"\x1b[200~", b"\x1b[201~")
@@ -38,6 +40,8 @@ class Person:
         self.lines, self.history = LineQueue(session), History(session.settings.history)
         self._process = process
         self._session, self._loop, self._rng, self._typed = session, loop, rng, typed
+        self._coming: deque[bytes] = deque()
+        """Pieces on their way."""
         self._line = ""
         self._at = 0.0
         session.front.ask = lambda question: at_keyboard(self.keyboard, question)
@@ -56,8 +60,29 @@ class Person:
             size = len(data) if not spread else self._rng.randrange(1, len(data) + 1)
             piece, data = data[:size], data[size:]
             at += 1e-6 + self._rng.random() * spread  # timers of one moment have no order
-            self._loop.call_at(at, self.read, piece, context=self._context())
+            self._coming.append(piece)
+            self._loop.call_at(at, self._arrives, context=self._context())
         self._at = at
+
+    def type_stop(self, cut_ins: CutIns, aim: Aim) -> None:
+        """Type a stop that cuts in at an aim, or comes at a turn of the loop once that was not passed for some time."""
+
+        def arrive() -> None:
+            if any(STOP_KEY in each for each in self._coming):
+                piece = b""
+                while STOP_KEY not in piece:
+                    piece += self._coming.popleft()
+                self.read(piece)
+
+        self._coming.append(STOP_KEY)
+        self._at = max(self._at, self._loop.now) + LATEST
+        self._loop.call_at(self._at, self._arrives, context=self._context())
+        process = self._process
+        cut_ins.begin(aim, arrive if process is None else lambda: process.run(arrive))
+
+    def _arrives(self) -> None:
+        if self._coming:
+            self.read(self._coming.popleft())
 
     def read(self, data: bytes) -> None:
         """One read of the keyboard's thread."""

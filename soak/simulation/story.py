@@ -18,6 +18,7 @@ from soak.simulation.acts.automation import AUTOMATION
 from soak.simulation.acts.files import FILES
 from soak.simulation.acts.hand import HAND
 from soak.simulation.acts_kill import files, kill, power_cut
+from soak.simulation.cut_ins import drawn_aim
 
 if TYPE_CHECKING:
     from soak.simulation.world import World
@@ -42,6 +43,24 @@ def stop(world: World, rng: Random) -> None:
     after = world.command(rng) if rng.random() < 0.5 else b""
     world.person.type(before + STOP + after, rng.choice((0.0, 0.01)))
     world.person.type(b"/resume\r", 0.0)
+
+
+def stop_cuts_in(world: World, rng: Random) -> None:
+    """Type commands, and a stop that comes in the middle of the loop's work."""
+    world.person.type(b"".join(world.command(rng) for _ in range(rng.randrange(1, 4))), rng.choice((0.0, 0.01)))
+    world.stops += 1
+    world.person.type_stop(world.cut_ins, drawn_aim(rng))
+    world.person.type(world.command(rng) * (rng.random() < 0.5) + b"/resume\r", 0.0)
+
+
+def starve(world: World, rng: Random) -> None:
+    """Let the loop do nothing for a while, in which a stop may come."""
+    if rng.random() < 0.7:
+        before = b"".join(world.command(rng) for _ in range(rng.randrange(0, 3)))
+        world.stops += 1
+        world.person.type(before + STOP, rng.choice((0.0, 0.3)))
+        world.person.type(b"/resume\r", 0.0)
+    world.loop.starve(rng.random() ** 2 * 10)
 
 
 def verb(world: World, rng: Random) -> None:
@@ -73,7 +92,9 @@ def clock_jumps(world: World, rng: Random) -> None:
 ACTS = (
     Act("a line", 55, one_line),
     Act("several lines", 20, several_lines),
-    Act("stop", 8, stop),
+    Act("stop", 4, stop),
+    Act("stop cuts in", 5, stop_cuts_in),
+    Act("starve", 1, starve, fault=True),
     Act("verb", 7, verb),
     Act("power off", 4, power_off),
     Act("files", 4, files),

@@ -12,6 +12,7 @@ import logging
 import re
 import shutil
 import tempfile
+import threading
 from collections.abc import Collection, Coroutine, Iterable, Iterator
 from contextlib import AsyncExitStack, ExitStack
 from contextvars import Context, ContextVar
@@ -19,6 +20,7 @@ from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
 from random import Random
+from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any
 
 from multidrop.dialects import Diagnostic, DriveError
@@ -37,7 +39,7 @@ from multidrop.simulator.cell.spec import Faults
 from multidrop.simulator.floor import Floor
 from multidrop.simulator.serving.endpoints import serve_bus
 from multidrop.simulator.serving.running import RunningFloor
-from multidrop.transports import TransportLost, telnet
+from multidrop.transports import TransportLost, pipe, telnet
 from multidrop.transports.relay import Kind, frame
 from soak.judge import Witness, Word, word
 from soak.languages import LANGUAGES, PROGRAM
@@ -45,6 +47,7 @@ from soak.simulation.acts.seams import SEAMS
 from soak.simulation.acts.watching import WatchedPath, wrote
 from soak.simulation.climate import Climate
 from soak.simulation.clock import Deadlock, SimulatedLoop
+from soak.simulation.cut_ins import CutIns
 from soak.simulation.disk import Disk
 from soak.simulation.far import share
 from soak.simulation.files_left import unreadable
@@ -106,6 +109,7 @@ class World:
     wall: Wall
     scheduler: Scheduler
     disk: Disk
+    cut_ins: CutIns
     floor: RunningFloor = field(init=False)
     process: Process = field(init=False)
     session: Session = field(init=False)
@@ -273,6 +277,7 @@ class World:
         self.history.killed(self.loop.now)
         self.stops = sum(not stop.who for stop in self.history.stops)
         self.beside_it.clear()
+        self.cut_ins.end()
         self.kernel.close_all(self.process, power)
         rng = Random(f"{self.seed} life {self.history.lives}")
         if power:
@@ -398,6 +403,7 @@ class World:
         """End the faults, wait until nothing runs, and close; after kills once more, as the next session does."""
         await self.ready.wait()
         self.process.arm(0, "")
+        self.cut_ins.end()
         self.faults(False)
         self.person.type(b"/plot off\r/twin off\r")
         await asyncio.sleep(10.0)
@@ -506,7 +512,8 @@ def lived(seed: int, steps: Iterable[int], keep: bool = False, without: Collecti
         wall, scheduler = Wall(loop), Scheduler(loop, Random(f"{seed} threads"), climate["slow thread"])
         history.folder = str(folder)
         disk = Disk(f"{folder}/", loop, wall, climate, Random(f"{seed} disk"), partial(_noted, history, loop))
-        world = World(seed, loop, history, climate, places, folder, wall, scheduler, disk)
+        cut_ins = CutIns(lambda name: history.count("cut-ins"))
+        world = World(seed, loop, history, climate, places, folder, wall, scheduler, disk, cut_ins)
 
         async def life() -> None:
             await world.begin()
@@ -522,6 +529,9 @@ def lived(seed: int, steps: Iterable[int], keep: bool = False, without: Collecti
             stack.enter_context(contextlib.chdir(folder))
             for seam in ((wire, "harmed", world.harmed), *SEAMS):
                 stack.enter_context(_replaced(*seam))
+            locks = SimpleNamespace(**{**vars(threading), "Lock": cut_ins.lock})
+            stack.enter_context(_replaced(pipe, "threading", locks))
+            stack.callback(cut_ins.end)
             stack.enter_context(_logged(history))
             try:
                 runner.run(life())

@@ -1,0 +1,92 @@
+"""Where the stop's thread cuts in: the list of points, and that a stop arrives there, or as a lock is given back."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from random import Random
+
+import pytest
+
+from multidrop.transports.pipe import DescriptorPipe
+from soak.simulation.cut_ins import Aim, CutIns, points
+from soak.simulation.judge import broken
+from soak.simulation.story import ACTS, stop_cuts_in
+from soak.simulation.world import lived
+from tests.support.paths import ROOT
+
+LIST = ROOT / "tests" / "soak" / "points.txt"
+
+
+def test_the_list_of_points_is_the_one_of_the_source() -> None:
+    """A new lock, queue, write, discard or await of the shared code joins the list, and is cut in at from then on."""
+    assert LIST.read_text().splitlines() == list(points())
+
+
+class Endpoint:
+    """Takes every write."""
+
+    name = "port"
+
+    def __init__(self) -> None:
+        self.taken: list[bytes] = []
+
+    def fileno(self) -> int:
+        return 1
+
+    def write(self, data: bytes | memoryview) -> int:
+        self.taken.append(bytes(data))
+        return len(data)
+
+    def unsent(self) -> int:
+        return 0
+
+    def drop(self) -> int:
+        return 0
+
+    def close(self) -> None:
+        pass
+
+
+@pytest.fixture
+def cut_ins() -> Iterator[CutIns]:
+    made = CutIns(lambda name: None)
+    yield made
+    made.end()
+
+
+@pytest.mark.virtual
+@pytest.mark.parametrize("point", [each for each in points() if each.startswith("pipe DescriptorPipe.write")])
+@pytest.mark.parametrize("further", range(0, 40, 5))
+async def test_a_stop_cuts_in_at_a_point_and_waits_for_the_lock(cut_ins: CutIns, point: str, further: int) -> None:
+    endpoint = Endpoint()
+    pipe = DescriptorPipe(endpoint)  # type: ignore[arg-type]
+    pipe._guard = cut_ins.lock()  # type: ignore[assignment]
+    held: list[int] = []
+
+    def stop() -> None:
+        held.append(cut_ins._held)
+        pipe.preempt(False, lambda dropped: b"\x1b")
+
+    cut_ins.begin(Aim(point, 1, further), stop)
+    pipe.write(b"MR 1\r")
+    pipe.write(b"MR 2\r")
+    assert held == [0], "the stop came once, and held up by no lock"
+    after = endpoint.taken.index(b"\x1b")
+    assert endpoint.taken[after:] == [b"\x1b"], "nothing leaves after it"
+
+
+@pytest.mark.nightly
+def test_every_point_of_the_pipe_is_passed_by_some_seed(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Stories of nothing but lines and stops that cut in; a point that no seed passes is shown."""
+    acts = tuple(each for each in ACTS if each.do is stop_cuts_in or each.name in ("a line", "unplug", "kill"))
+    monkeypatch.setattr("soak.simulation.story.ACTS", acts)
+    passed: set[str] = set()
+    made = CutIns.__init__
+
+    def watched(self: CutIns, count: object) -> None:
+        made(self, passed.add)
+
+    monkeypatch.setattr(CutIns, "__init__", watched)
+    for seed in Random(1).sample(range(100_000), 400):
+        assert broken(lived(seed, range(30))) == []
+    assert not {each for each in points() if each.startswith("pipe")} - passed
