@@ -175,11 +175,12 @@ def test_what_is_wrong_is_told_with_line_and_column(text: str, place: tuple[int,
 
 
 def test_a_files_language_goes_by_its_name() -> None:
-    assert [program_language_of(name) for name in ("a.prg", "b/A.ASC", "c.mxt", "d.txt", "e")] == [
+    assert [program_language_of(name) for name in ("a.prg", "b/A.ASC", "f.TMC", "c.mxt", "d.txt", "e")] == [
         "pmx",
         "pmx",
+        "tmcl",
         "mcode",
         "mcode",
         "mcode",
     ]
-    assert set(program_languages()) == {"mcode", "pmx"}
+    assert set(program_languages()) == {"mcode", "pmx", "tmcl"}
