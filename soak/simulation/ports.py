@@ -81,6 +81,9 @@ class Descriptor:
 class Port(Descriptor):
     """An open tty on the wire of a bus. What has not left can be taken back."""
 
+    gathers = False
+    """It has the kind "late read" in place of that."""
+
     def __init__(
         self,
         loop: SimulatedLoop,
