@@ -98,7 +98,7 @@ class SshProgram:
 
     def write(self, data: bytes | bytearray | memoryview) -> int:
         """Write bytes."""
-        return self._near.send(memoryview(data))
+        return self._near.send(bytes(data))
 
     def unsent(self) -> int:
         """Bytes that ssh has not taken."""

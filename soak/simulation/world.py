@@ -80,6 +80,8 @@ NUMBER = r"\d{7,8}"
 """A unique value."""
 LONGEST = 400.0
 """Virtual seconds in which everything that was begun ends, once the faults are over."""
+FORGETS = ("IP", "FD")
+"""Lines that put values back to the saved ones, as a power-up does."""
 ASKED: ContextVar[tuple[str, float] | None] = ContextVar("asked", default=None)
 """The question that runs in this task, and when it began; None: none that the judge knows."""
 
@@ -130,7 +132,7 @@ class World:
     stops: int = 0
     """The number of stops that were typed, arrived or on their way."""
     cut: dict[tuple[str, str], list[float]] = field(default_factory=dict)
-    """When the power of each drive was switched."""
+    """When the power of each drive was switched, or its values were put back."""
     beside_it: list[asyncio.Task[None]] = field(default_factory=list)
     """What runs beside the prompt."""
 
@@ -190,6 +192,8 @@ class World:
             answer = seen(text, now, **how)
             for each in witness.executed[before:]:
                 self.history.executed.append(Executed(self.loop.now, line, drive, each))
+                if each in FORGETS:
+                    self.cut.setdefault((line, drive), []).append(self.loop.now)
                 self.history.note(self.loop.now, f"! {line}:{drive}", each)
             return answer
 
