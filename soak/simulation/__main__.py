@@ -11,6 +11,7 @@ import argparse
 import sys
 from pathlib import Path
 
+from soak.simulation import mutants
 from soak.simulation.climate import FAULTS
 from soak.simulation.judge import judged
 from soak.simulation.runs import STEPS, Figures, lives, run, verdict
@@ -28,6 +29,7 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--without", type=_kinds, default=(), help="kinds of faults that are left out: flip,late")
     parser.add_argument("--jobs", type=int, default=0, help="processes; one a core unless given")
     parser.add_argument("--resume", type=Path, help="a file of results to take up again")
+    parser.add_argument("--mutant", default="", help="a defect of soak/mutants that is planted first; all: each")
     parser.add_argument("--until-broken", action="store_true", help="end at the first seed that breaks a rule")
     chosen = parser.parse_args(arguments)
     steps = chosen.only if chosen.only is not None else tuple(range(chosen.steps))
@@ -35,7 +37,8 @@ def main(arguments: list[str] | None = None) -> int:
         return _one(Life(chosen.seed, steps, chosen.without), whole=chosen.only is None)
     first, _, last = chosen.seeds.partition("-")
     try:
-        return _range(range(int(first), int(last or first) + 1), chosen)
+        seeds = range(int(first), int(last or first) + 1)
+        return _mutants(seeds, chosen) if chosen.mutant else _range(seeds, chosen)
     except ValueError as problem:
         print(problem, file=sys.stderr)
         return 2
@@ -69,6 +72,20 @@ def _show(life: Life) -> None:
     for rule, text in judged(world).breaches:
         print(f"{rule.name} ({rule.sentence} docs/safety.md, {rule.promise!r}): {text}")
     print(f"again: {life.command}")
+
+
+def _mutants(seeds: range, chosen: argparse.Namespace) -> int:
+    """Plant mutants; print a row for each, and what its seed broke. Return 1 if one was not caught."""
+    tried = []
+    print(mutants.TITLE)
+    for name in mutants.chosen(chosen.mutant):
+        tried.append(each := mutants.caught(name, seeds, chosen.steps, chosen.jobs))
+        print(each.row)
+        if not each.rule or chosen.mutant != mutants.ALL:
+            print(each.said)
+        sys.stdout.flush()
+    print(f"{sum(bool(each.rule) for each in tried)} of {len(tried)} mutants caught")
+    return int(not all(each.rule for each in tried))
 
 
 def _range(seeds: range, chosen: argparse.Namespace) -> int:
