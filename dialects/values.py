@@ -242,9 +242,15 @@ class Conditions:
     more: tuple[tuple[str, str], ...] = ()
     """Names and values of what only this family has."""
     unit: str = "steps"
+    speed: str = ""
+    """The unit of velocities; empty: `unit` a second."""
     pace: Pace | None = None
     modes: str = ""
     """How the drive is set to reply, as short as a person knows it: `EM1 CK1`."""
+
+    @property
+    def speed_unit(self) -> str:
+        return self.speed or f"{self.unit}/s"
 
     @property
     def no_current(self) -> str:

@@ -229,3 +229,12 @@ async def test_a_drive_that_is_selected_is_read_at_once(tmp_path):
         slow.close()
         await asyncio.sleep(1.5)
         assert len(read(cell)) == 2
+
+
+@pytest.mark.parametrize(
+    ("personality", "unit", "paced"), [("TMCM-1241", "microsteps/s", True), ("TMCM-3110", "of 2047", False)]
+)
+async def test_a_module_that_counts_in_units_of_its_chip_says_so(tmp_path, personality, unit, paced):
+    async with Watched(tmp_path, f'personality = "{personality}"', "1") as cell:
+        first = (await last(cell))[0]
+        assert (first.unit, first.speed_unit, first.pace is not None) == ("microsteps", unit, paced)

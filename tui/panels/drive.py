@@ -322,7 +322,8 @@ def axis_rows(glance: Glance, axis: Readout, now: float, width: int) -> list[Row
     unit = unit_of(axis, glance.unit)
     live = role != "dim" and axis.last is not None and axis.last.velocity != 0
     name = f" {axis.axis}" if axis.axis else ""
-    speed: list[Span] = [(velocity, role), (f" {unit}/s ", "dim")]
+    rate = axis.conditions.speed_unit if axis.conditions is not None else f"{unit}/s"
+    speed: list[Span] = [(velocity, role), (f" {rate} ", "dim")]
     rows: list[Row] = [spread(_state(glance, axis, now, width - width_of(speed) - 1), speed, width)]
     rows += [((f"{name} {text}", role_of),) for text, role_of in _troubles(axis, now)]
     if not glance.counts(axis):

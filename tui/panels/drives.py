@@ -98,12 +98,13 @@ def _axis_row(glance: Glance, axis: Readout, now: float, width: int, *, first: b
     """Name, state, place in the travel, position, velocity, and what matters most besides."""
     position, velocity, role = glance.values(now, axis)
     moves = axis.last is not None and axis.last.velocity != 0
+    per = "" if axis.conditions is not None and axis.conditions.speed else "/s"
     row: list[Span] = [
         _name(glance, axis, first=first),
         (short_words(glance, axis, now), _state_role(glance, now)),
         (f"{bar(axis, BAR)} ", "dim" if role == "dim" else "text"),
         (f"{position:>{NUMBER}}", role),
-        (f"{f'{velocity}/s' if moves else '':>{VELOCITY}} ", role),
+        (f"{f'{velocity}{per}' if moves else '':>{VELOCITY}} ", role),
     ]
     room = width - width_of(row)
     text, text_role = _besides(glance, axis, now, room, live=role != "dim")

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
+from multidrop.dialects.values import Conditions
 from multidrop.shell.roles import DIFFERENCE
 from multidrop.tui.curves.chart import Chart, Extent, Look, Window
 from multidrop.tui.curves.raster import CURSOR, EMPTY, TWINS, Ink, Scale, row_of, ticks, with_cursor
@@ -18,8 +19,8 @@ from multidrop.tui.polling import plotted
 from multidrop.tui.text import age, digits, fit, short
 from multidrop.tui.widgets.lines import SERIES, Row, Span, width_of
 
-PLOTTED = {"velocity": "/s", "position": ""}
-"""The quantities of every drive, and the end of their units."""
+PLOTTED = ("velocity", "position")
+"""The quantities of every drive."""
 _MEASURED = {predicted: measured for measured, predicted in PREDICTED.items()}
 
 
@@ -83,7 +84,7 @@ def groups(view: View) -> list[Group]:
             where = ":".join(filter(None, (bus if several or not address else "", address)))
             name = " ".join(filter(None, (where, drive.label, axis)))
             for each in [word] if word else PLOTTED:
-                unit = _unit(view, bus, address, axis) + PLOTTED.get(each, "") if word in ("", DIFFERENCE) else ""
+                unit = _unit(view, bus, address, axis, each) if word in ("", DIFFERENCE) else ""
                 lines = found.setdefault((each, name if view.model.look.apart else ""), [])
                 lines.append(Line(name, Quantity(bus, address, axis, each), unit, number))
                 if not word and _recent(view, predicted := Quantity(bus, address, axis, PREDICTED[each])):
@@ -101,10 +102,11 @@ def _recent(view: View, predicted: Quantity) -> bool:
     return trace is not None and trace.at[-1] >= end - look.span
 
 
-def _unit(view: View, bus: str, address: str, axis: str) -> str:
-    """`steps`, or what the drive counts."""
+def _unit(view: View, bus: str, address: str, axis: str, quantity: str) -> str:
+    """`steps`, or what the drive counts; of a velocity, that a second or a unit of its own."""
     axes = view.model.bus(bus).readout(address).axes
-    return next((each.conditions.unit for each in axes if each.axis == axis and each.conditions is not None), "steps")
+    found = next((each.conditions for each in axes if each.axis == axis and each.conditions is not None), Conditions())
+    return found.speed_unit if quantity == "velocity" else found.unit
 
 
 def role_of(number: int) -> str:

@@ -231,10 +231,11 @@ def fold(state: TmclState, facts: Facts) -> tuple[Conditions, ...]:
 
 
 def _conditions(state: TmclState, facts: Facts, motor: int) -> Conditions:
-    """The conditions of a motor: one ramp up and down, which older modules count in units of their chip."""
+    """The conditions of a motor: one ramp up and down. Older modules count it and velocities in units of their chip."""
     values = {axis: value for axis in KNOWN if isinstance(value := facts.get(_key(axis, motor)), int)}
     run, hold = values.get(Axis.RUN_CURRENT), values.get(Axis.STANDBY_CURRENT)
     speed, ramp = (values.get(axis) for axis in RAMP)
+    chip = module_of(state.product).chip_units
     freewheels = "freewheels: parameter 204" if values.get(Axis.FREEWHEELING) else ""
     return Conditions(
         axis=str(motor) if state.motors > 1 else "",
@@ -244,7 +245,8 @@ def _conditions(state: TmclState, facts: Facts, motor: int) -> Conditions:
         hold_current=None if hold is None else round(hold * 100 / FULL_CURRENT),
         released="parameter 7 is 0" if hold == 0 else freewheels,
         unit="microsteps",
-        pace=Pace(0, speed, ramp, ramp) if speed and ramp else None,
+        speed="of 2047" if chip else "",
+        pace=Pace(0, speed, ramp, ramp) if speed and ramp and not chip else None,
     )
 
 
