@@ -58,7 +58,8 @@ class SimulatedLoop(asyncio.BaseEventLoop):
         self.set_exception_handler(self._defect)
 
     def _defect(self, loop: asyncio.AbstractEventLoop, context: dict[str, Any]) -> None:
-        if not isinstance(context.get("exception"), Killed):
+        process = getattr(context.get("future"), "process", None)
+        if not isinstance(context.get("exception"), Killed) and (process is None or not process.dead):
             self.defects.append(context)
 
     # What asyncio asks of a loop
@@ -175,6 +176,12 @@ class SimulatedLoop(asyncio.BaseEventLoop):
             if process.dead:
                 process.bury(task)
         return task
+
+    def create_future(self) -> asyncio.Future[Any]:
+        """Make a future that knows its process: nobody takes what one of a dead process holds."""
+        future = super().create_future()
+        future.process = PROCESS.get()  # type: ignore[attr-defined]
+        return future
 
     def tasks_of(self, process: Process) -> list[asyncio.Task[Any]]:
         """The tasks of a process that are not done, in the order in which they began."""

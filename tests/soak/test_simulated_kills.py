@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import gc
 import os
 from collections.abc import Awaitable, Callable, Iterator
 from contextlib import ExitStack
@@ -124,6 +125,24 @@ def test_nothing_of_a_dead_process_takes_effect(bench: Bench) -> None:
     assert bench.wire == b"the last" and [each.name for each in bench.folder.iterdir()] == ["before"]
     assert bench.process.dead and not bench.scheduler.running and not bench.loop.defects
     assert not asyncio.all_tasks(bench.loop)
+
+
+def test_a_failure_that_a_dead_process_cannot_take_is_no_defect(bench: Bench) -> None:
+    """One that a live process does not take is a defect; the garbage collection tells of both."""
+
+    async def fails(dies: bool) -> None:
+        asyncio.get_running_loop().create_future().set_exception(ValueError(f"{dies}"))
+        if dies:
+            kept.append(asyncio.get_running_loop().create_future())
+            kept[0].set_exception(ValueError("dead"))
+            bench.process.die()
+
+    kept: list[asyncio.Future[None]] = []
+    for dies in (False, True):
+        bench.live(partial(fails, dies), 1.0)
+    kept.clear()
+    gc.collect()
+    assert [str(each["exception"]) for each in bench.loop.defects] == ["False", "True"]
 
 
 @pytest.mark.parametrize(("moment", "written"), [("before", b""), ("after", b"abcdef")])
