@@ -83,3 +83,10 @@ def program_language_of(path: str | os.PathLike[str]) -> str:
     ending = os.path.splitext(path)[1].lower()
     found = (name for name, files in program_languages().items() if ending in files.endings)
     return next(found, DEFAULT)
+
+
+def spoken(data: bytes, besides: str) -> str:
+    """Name the family, another than `besides`, whose replies these bytes hold, for a message; empty: none."""
+    names = (name for name, family in FAMILIES.items() if name != besides and family.in_frames(data))
+    found = next(names, "")
+    return f"frames came as {found.upper()} drives send them: dialect={found} opens such a line" if found else ""

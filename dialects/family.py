@@ -265,6 +265,8 @@ class Family(Generic[S]):
     """Matches each piece of a stop, however its drives are set; None: several programs cannot share a line of them."""
     message_moves: Callable[[bytes], bool] = lambda messages: False
     """Whether messages that carry their length can start a motion or a program."""
+    in_frames: Callable[[bytes], bool] = lambda data: False
+    """Whether a reply of its drives, with its checksum, is in what an unknown line sent."""
     prepare: Callable[[], object] | None = None
     """Slow work before the first message, safe in any thread; None: there is none."""
 

@@ -6,10 +6,12 @@ It writes what the line says, hands it what is received, and publishes everythin
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 
 from multidrop.dialects import End, Kind, Priority, Request
 from multidrop.drives.events import (
+    BusEvent,
     Changed,
     Ended,
     EventQueue,
@@ -211,6 +213,21 @@ class Link:
             if self._timer is None:  # one that fires too early costs less than many timers
                 self._timer = self._loop.call_at(deadline, self._wake)
         self._news.tell()
+
+    @contextmanager
+    def received(self) -> Iterator[bytearray]:
+        """Gather what is received meanwhile."""
+        heard = bytearray()
+
+        def take(event: BusEvent) -> None:
+            if isinstance(event, Traffic) and not event.outgoing:
+                heard.extend(event.data)
+
+        leave = self.watch(take)
+        try:
+            yield heard
+        finally:
+            leave()
 
     def _wake(self) -> None:
         self._timer = None

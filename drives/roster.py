@@ -16,7 +16,7 @@ from dataclasses import replace
 from typing import Any
 
 from multidrop.dialects import DriveError, DriveState, Family, Hints, NoAnswer
-from multidrop.dialects.families import FAMILIES, family_of
+from multidrop.dialects.families import FAMILIES, family_of, spoken
 from multidrop.dialects.values import Value
 from multidrop.drives.conversations import Conversations
 from multidrop.drives.drive import Drive, still
@@ -256,7 +256,13 @@ class Roster:
         self.family = family = FAMILIES[hints.family or self.family.name]
         self.probing = hints.drives or (*hints.tried, *(each.address for each in hints.remembered))
         unknown = family.new_state(family.codec, "")
-        return await self.conversations.run(family.identify(hints), unknown, searching=True)
+        with self.link.received() as heard:
+            try:
+                return await self.conversations.run(family.identify(hints), unknown, searching=True)
+            except NoAnswer as error:
+                if other := spoken(bytes(heard), family.name):
+                    raise NoAnswer(f"{error}; {other}") from None
+                raise
 
     async def search_again(self, hints: Hints) -> list[DriveState]:
         """Search where the drives were before the loss, then where they were at first. Raises as `search`."""

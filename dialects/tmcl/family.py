@@ -116,4 +116,5 @@ TMCL = Family(
     values_at="multidrop.dialects.tmcl.host.values:VALUES",
     stop_bytes=STOP_BYTES,
     message_moves=codec.moves,
+    in_frames=codec.holds_reply,
 )

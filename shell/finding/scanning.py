@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from multidrop.dialects import Diagnostic, DriveState, Procedure
-from multidrop.dialects.families import DEFAULT, FAMILIES
+from multidrop.dialects.families import DEFAULT, FAMILIES, spoken
 from multidrop.dialects.scanning import WINDOW, Reach, Scan
 from multidrop.shell import stop_report
 from multidrop.shell.channel import Job, running
@@ -392,8 +392,9 @@ class Scanning:
             self._warn(port, state.take_messages()[0])
 
         reach = replace(reach, cut=hints.cut, first_mark=hints.first_mark)
-        outcome = await bus.search(stage.scan.search(reach, found, step))
-        self._warn(f"{port}: {stage.words}", outcome.remarks)
+        with bus.link.received() as heard:
+            outcome = await bus.search(stage.scan.search(reach, found, step))
+        self._warn(f"{port}: {stage.words}", filter(None, (*outcome.remarks, spoken(bytes(heard), stage.family))))
         return bool(outcome.echo)
 
     def _warn(self, where: str, texts: Iterable[str]) -> None:

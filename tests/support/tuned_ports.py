@@ -21,6 +21,8 @@ from multidrop.transports import Transport
 class TunedPipe(Transport):
     """A transport to a bus at a baud rate; `repeats`: the adapter gives back what it sends."""
 
+    gathers = False
+
     def __init__(self, floor: RunningFloor, bus: str, baud: int, repeats: bool) -> None:
         self.name, self._floor, self._bus, self._baud, self._repeats = "port", floor, bus, baud, repeats
         self._received: Any = None

@@ -24,6 +24,7 @@ from multidrop.dialects.tmcl.manual.instructions import spelled
 
 LENGTH = 9
 _FIELDS = Struct(">BBBBi")
+_TEXT = frozenset(b"\r\n\t" + bytes(range(0x20, 0x7F)))
 
 
 class Frame(NamedTuple):
@@ -54,6 +55,17 @@ def line_in(frame: bytes) -> Call:
 def call_of(frame: bytes) -> tuple[int, Call]:
     address, command, kind, motor, value = _FIELDS.unpack(frame[:-1])
     return address, Call(command, kind, motor, value)
+
+
+def holds_reply(data: bytes) -> bool:
+    """Whether a reply is in these bytes, wherever it begins; text without control characters holds none."""
+    for at in range(len(data) - LENGTH + 1):
+        fields = parse_reply(data[at : at + LENGTH])
+        if fields is None or fields.status not in tuple(Status) or all(byte in _TEXT for byte in data[at : at + 8]):
+            continue
+        if fields.module and (fields.command in tuple(Command) or not accepted(fields.status)):
+            return True
+    return False
 
 
 def moves(frames: bytes) -> bool:

@@ -59,7 +59,7 @@ def who(state: TmclState) -> str:
 
 
 def answered(state: TmclState, request: Request) -> Procedure[Reply]:
-    """Send a request once; its reply. Raises Refused or NoAnswer.
+    """Send a request once, a reading one once more where no reply comes; its reply. Raises Refused or NoAnswer.
 
     After a SAP 193 that was refused or got no reply, no search begins until 193 is read or set.
     """
@@ -78,10 +78,29 @@ def answered(state: TmclState, request: Request) -> Procedure[Reply]:
     sets = (call.command, call.type) == (Command.SAP, Axis.SEARCH_MODE)
     if sets:
         state.search_mode_sent(call.motor)
-    reply = yield from _EXCHANGE.answered(state, request)
+    try:
+        reply = yield from _EXCHANGE.answered(state, request)
+    except NoAnswer as lost:
+        if request.kind is not Kind.PRINT or call.changed_by_reading:
+            raise
+        reply = yield from _asked_again(state, request, lost)
     if sets or (call.command, call.type) == (Command.GAP, Axis.SEARCH_MODE):
         state.search_mode_known(call.motor)
     return reply
+
+
+def _asked_again(state: TmclState, request: Request, lost: NoAnswer) -> Procedure[Reply]:
+    """Send a reading request once more, when a mark has shown that all replies to the first one are over."""
+    try:
+        yield from synchronised(state, request)
+    except NoAnswer:
+        raise lost from None
+    if state.programming:  # it would store the request
+        raise lost
+    try:
+        return (yield from _EXCHANGE.answered(state, request))
+    except NoAnswer:
+        raise NoAnswer(f"{who(state)} does not reply: '{request.text}' only reads, and was sent twice") from None
 
 
 def _replied(state: TmclState, request: Request) -> Procedure[Reply]:

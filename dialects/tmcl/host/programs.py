@@ -381,7 +381,10 @@ def watched_call(name: str) -> Call:
         if head == "V":
             return Call(Command.GGP, found, 2)
         if (axis := whole(motor or "0", 0, 5)) is not None:
-            return Call(Command.GAP, found, axis)
+            call = Call(Command.GAP, found, axis)
+            if call.changed_by_reading:
+                raise Diagnostic(f"{name} cannot be watched: reading it clears it", "", f"{call} reads it once")
+            return call
     raise Diagnostic(f"{name} cannot be watched", "", "valid: A, X, V0 to V255, AP and a parameter, as AP1 or AP1/2")
 
 

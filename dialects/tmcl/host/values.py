@@ -259,11 +259,13 @@ def check(state: TmclState, word: str) -> str:
         raise Diagnostic(
             f"{word} cannot be plotted", hint="valid: AP and a parameter, /MOTOR after it; as AP206, AP1/1"
         )
+    if Call(Command.GAP, int(found[1])).changed_by_reading:
+        raise Diagnostic(f"{word} cannot be plotted: reading it clears it", hint=f"GAP {found[1]}, 0 reads it once")
     return word.upper()
 
 
 def again(state: TmclState, word: str, priority: Priority) -> Procedure[float]:
-    """Read a parameter. The manual has none whose reading changes the module."""
+    """Read a parameter, none whose reading changes the module: `check` refuses that."""
     found = _AXIS_WORD.fullmatch(word)
     assert found is not None
     return float((yield from read(state, Call(Command.GAP, int(found[1]), int(found[2] or 0)), priority)))

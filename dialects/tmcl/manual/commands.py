@@ -187,6 +187,11 @@ class Call:
         return self.command in asks or (self.row is not None and self.row.prints)
 
     @property
+    def changed_by_reading(self) -> bool:
+        """Whether it reads the error flags, which that clears: never sent but for a person, and never twice."""
+        return (self.command, self.type) == (Command.GAP, Axis.ERROR_FLAGS)
+
+    @property
     def moves(self) -> bool:
         """Whether it can start motion; a command without a word may."""
         if self.command in NEVER_MOVE:

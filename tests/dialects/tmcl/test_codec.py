@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 
 from multidrop.dialects.codec import End
 from multidrop.dialects.errors import Inexpressible
-from multidrop.dialects.tmcl.host.codec import STOP_BYTES, Tmcl
+from multidrop.dialects.tmcl.host.codec import STOP_BYTES, Tmcl, holds_reply
 from multidrop.dialects.tmcl.manual.commands import parse
 
 FRAMES = [
@@ -157,3 +157,13 @@ def test_any_bytes_give_a_reply_or_wait(data, text):
     late = CODEC.on_timeout(request, data)
     assert late.used == len(data) or (late.reply.end is End.DONE and late.used == 9)
     assert CODEC.parse_unsolicited(data)[1] % 9 == 0
+
+
+@given(st.binary(max_size=12), st.binary(max_size=12))
+def test_a_reply_is_recognised_wherever_it_begins(before, after):
+    assert holds_reply(before + bytes.fromhex("02 01 64 06 00 00 00 05 72") + after)
+
+
+@given(st.lists(st.sampled_from([b"PR VR", b"LMDCM 6.002, Hw: 3.2", b"\r\n", b"?", b">", b"100", b"dd"]), max_size=30))
+def test_text_is_taken_for_no_reply(words):
+    assert not holds_reply(b"".join(words))

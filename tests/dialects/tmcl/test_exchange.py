@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from multidrop.dialects.codec import Priority
-from multidrop.dialects.errors import Inexpressible, NoAnswer, Refused, Stopped
+from multidrop.dialects.errors import Diagnostic, Inexpressible, NoAnswer, Refused, Stopped
 from multidrop.dialects.family import Hints
 from multidrop.dialects.tmcl.family import TMCL
 from multidrop.dialects.tmcl.host.codec import Tmcl
@@ -173,10 +173,10 @@ def test_what_was_lost_is_not_sent_again_and_the_next_value_is_its_own(shop, sta
 @pytest.mark.parametrize("delay", [1.05, 1.2, 1.5, 2.0, 3.0])
 @pytest.mark.parametrize("second", ["GAP 4, 0", "GGP 66, 0", "GAP 3, 0"])
 def test_a_late_reply_is_never_the_next_ones(delay, second, shop, state):
-    right = shop.type(state, second)
+    right, other = shop.type(state, second), shop.type(state, "GAP 6, 0")
     shop.delays = [delay]
-    with pytest.raises(NoAnswer):
-        shop.type(state, "GAP 5, 0")
+    with contextlib.suppress(NoAnswer):
+        assert shop.type(state, "GAP 6, 0") == other
     for _ in range(6):
         try:
             assert shop.type(state, second) == right
@@ -184,6 +184,49 @@ def test_a_late_reply_is_never_the_next_ones(delay, second, shop, state):
             shop.wait(0.3)
     shop.wait(12.0)
     assert shop.type(state, second) == right
+
+
+@pytest.mark.parametrize("text", ["GAP 4, 0", "GGP 76, 0", "RFS STATUS, 0", "136 1, 0, 0", "135 0, 0, 0"])
+@pytest.mark.parametrize("delay", [None, 1.1])
+def test_a_read_whose_reply_was_lost_is_asked_once_more_after_a_mark(delay, text, shop, state):
+    right, sent = shop.type(state, text), len(shop.written)
+    shop.delays = [delay]
+    assert shop.type(state, text) == right
+    first, mark, again = shop.written[sent:]
+    assert first == again and mark[1] != first[1] and not state.reply_pending
+
+
+def test_a_read_is_never_sent_a_third_time(shop, state):
+    sent = len(shop.written)
+    shop.delays = [None, 0.0, None]
+    with pytest.raises(NoAnswer, match="module 1 does not reply: 'GAP 4, 0' only reads, and was sent twice"):
+        shop.type(state, "GAP 4, 0")
+    assert len(shop.written) - sent == 3
+
+
+def test_a_module_that_replies_to_no_mark_is_not_asked_again(shop, state):
+    sent = len(shop.written)
+    shop.delays = [None, None]
+    with pytest.raises(NoAnswer, match="'GAP 4, 0' was executed; it was sent once"):
+        shop.type(state, "GAP 4, 0")
+    assert [data[1] for data in shop.written[sent:]] == [Command.GAP, Command.GGP]
+
+
+@pytest.mark.parametrize("text", ["GAP 207, 0", "GAP 207, 1", "SAP 4, 0, 5", "SIO 0, 2, 1"])
+def test_what_changes_something_is_sent_once(text, shop, state):
+    sent = len(shop.written)
+    shop.delays = [None]
+    with pytest.raises(NoAnswer, match="it was sent once"):
+        shop.type(state, text)
+    assert len(shop.written) - sent == 1
+
+
+def test_a_parameter_that_reading_clears_is_neither_plotted_nor_watched(state):
+    for refuses in (TMCL.values.check, lambda state, word: TMCL.debugging.names(state, [word])):
+        for word in ("AP207", "AP207/1"):
+            with pytest.raises(Diagnostic, match=f"{word} cannot be .*: reading it clears it"):
+                refuses(state, word)
+    assert TMCL.values.check(state, "AP206") == "AP206"
 
 
 def test_after_a_stop_a_late_reply_is_not_taken_for_a_value(shop, state):
@@ -286,7 +329,7 @@ def test_a_late_reply_of_another_module_costs_nothing():
     one, seven = shop.open("1", "7")
     shop.delays = [None]
     with pytest.raises(NoAnswer):
-        shop.type(seven, "GAP 4, 0")
+        shop.type(seven, "GAP 207, 0")
     late = [bytes.fromhex("02 07 64 06 00 00 C8 00 3B")]
 
     def before_the_mark(_):

@@ -4,13 +4,13 @@ import asyncio
 
 import pytest
 
-from multidrop.dialects import Diagnostic, Stopped
+from multidrop.dialects import Diagnostic, NoAnswer, Stopped
 from multidrop.dialects.state import Remembered
 from multidrop.shell.connect.urls import parse
 from multidrop.shell.finding.scanning import NothingFound, Scanning, url_of
 from multidrop.shell.state.port_state import PortState
 from multidrop.transports import TransportLost
-from tests.support.cell_session import CellSession, bus, party, pmx
+from tests.support.cell_session import CellSession, bus, drive, party, pmx
 from tests.support.tuned_ports import Port
 
 pytestmark = [pytest.mark.virtual, pytest.mark.slow]
@@ -306,3 +306,35 @@ async def test_a_rate_at_which_the_port_cannot_be_opened_is_named_and_the_others
     search = Scanning(port.session, failing, parse("/dev/ttyUSB9?dialect=mcode"), lambda drive: None)
     assert await stopped_at(port, search, 2) == [ALL[0], ALL[2], ALL[4], *ALL[:2]]
     assert any("NO STOP SENT with MCode at 38400 baud: busy" in text for text in port.told())
+
+
+TALKATIVE = bus("b", drive("TMCM", "1", "any_address = true"))
+TMCL = "frames came as TMCL drives send them: dialect=tmcl opens such a line"
+
+
+@pytest.mark.parametrize(("family", "title"), [("mcode", "MCode"), ("pmx", "PMX")])
+async def test_frames_of_nine_bytes_that_a_search_hears_are_named(family, title, tmp_path):
+    port = Port(tmp_path, TALKATIVE)
+    _, search = scanning(port, f"/dev/ttyUSB9?dialect={family}")
+    with pytest.raises(NothingFound):
+        await search.run([9600], False)
+    assert any(text.endswith(f"{title} at 9600 baud: {TMCL}") for text in port.told())
+
+
+async def test_the_message_of_a_line_that_is_opened_in_mcode_names_tmcl(tmp_path):
+    port = Port(tmp_path, TALKATIVE)
+    (opened,) = await port.opener(parse("/dev/ttyUSB9"), str)
+    port.session.adopt(opened, 0)
+    with pytest.raises(NoAnswer, match=TMCL):
+        await opened.bus.identify(opened.hints)
+    await port.session.forget(opened.bus)
+
+
+async def test_a_silent_line_is_not_taken_for_tmcl(tmp_path):
+    port = Port(tmp_path, bus("b"))
+    (opened,) = await port.opener(parse("/dev/ttyUSB9"), str)
+    port.session.adopt(opened, 0)
+    with pytest.raises(NoAnswer) as failure:
+        await opened.bus.identify(opened.hints)
+    assert "TMCL" not in str(failure.value)
+    await port.session.forget(opened.bus)
