@@ -83,6 +83,8 @@ class Told:
     raw_written: dict[str, bytearray] = field(default_factory=dict)
     raw_stops: dict[str, dict[bytes, None]] = field(default_factory=dict)
     """The parts of a stop of a line in raw mode."""
+    unexamined: dict[str, Run] = field(default_factory=dict)
+    """Runs that ended early, whose drives were not looked at yet."""
     unstopped: list[str] = field(default_factory=list)
     """Drives that went on after the early end of what had moved them."""
     stopped_too: list[str] = field(default_factory=list)

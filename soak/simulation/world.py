@@ -44,7 +44,7 @@ from multidrop.transports.relay import Kind, frame
 from soak.judge import Witness, Word, word
 from soak.languages import LANGUAGES, PROGRAM
 from soak.simulation.acts.seams import SEAMS
-from soak.simulation.acts.watching import WatchedPath, wrote
+from soak.simulation.acts.watching import WatchedPath, examine_before_a_stop, wrote
 from soak.simulation.climate import Climate
 from soak.simulation.clock import Deadlock, SimulatedLoop
 from soak.simulation.cut_ins import CutIns
@@ -456,6 +456,7 @@ class WatchedSession(Session):
 
     def stop(self, why: str = "stop") -> None:
         """Stop everything, and note it."""
+        examine_before_a_stop(self._world)
         self._world.history.told.halts.append(self.now())
         super().stop(why)
 

@@ -213,6 +213,7 @@ def macro(world: World, rng: Random) -> None:
     folder = world.session.settings.macros
     folder.mkdir(parents=True, exist_ok=True)
     (folder / f"{name}.toml").write_text(text)
+    bystander(world)
     tell(world, run, times)
     world.person.type(f"{run.typed}\r".encode(), rng.choice((0.0, 0.02)))
     end(world, rng)
@@ -238,6 +239,7 @@ def script(world: World, rng: Random) -> None:
     run = Run(f"s{world.step}", f"s{world.step}.txt")
     lines = Lines(world, rng, run)
     (world.folder / run.typed).write_text("\n".join(body(lines)))
+    bystander(world)
     tell(world, run)
 
     async def work() -> None:
@@ -260,6 +262,13 @@ def long_move(world: World, rng: Random) -> None:
     world.person.type(f"{typed}\r".encode())
     if rng.random() < 0.4:
         end(world, rng)
+
+
+def bystander(world: World) -> None:
+    """Perhaps start a drive by hand first: the early end of what follows leaves it alone."""
+    rng = Random(f"{world.seed} bystander {world.step}")
+    if rng.random() < 0.4:
+        long_move(world, rng)
 
 
 AUTOMATION = (

@@ -27,6 +27,9 @@ if TYPE_CHECKING:
 
 SETTLED = 5.0
 """The time, s, after an early end in which its stops are confirmed, or a trouble is said."""
+RAMP = 1.0
+"""The time, s, in which a drive that got its stop stands."""
+MOTIONS = ("SL ", "MR ", "MA ", "X", "MVP ")
 TROUBLE = re.compile(
     r"NOT KNOWN|NOT REACHED|STILL |stop not sent|could not be read|slows down|trying again|not reached"
 )
@@ -94,7 +97,8 @@ async def watched(world: World, run: Run, work: Awaitable[Any]) -> None:
         await work
     except BaseException as failure:
         run.failure = str(failure) or type(failure).__name__
-        world.loop.call_later(SETTLED, examine, world, run, world.loop.now)
+        world.history.told.unexamined[run.typed] = run
+        world.loop.call_later(SETTLED, examine, world, run)
         raise
     finally:
         run.ended = world.loop.now
@@ -114,33 +118,45 @@ def held(world: World, line: str, drive: str) -> tuple[str, ...]:
     return tuple(f"{at} {memory.line(at)}" for at, code in enumerate(memory.code) if code is not None)
 
 
-def examine(world: World, run: Run, ended: float) -> None:
+def examine_before_a_stop(world: World) -> None:
+    """Look at the drives of the early ends so far: afterwards everything stands."""
+    told, now = world.history.told, world.loop.now
+    for run in list(told.unexamined.values()):
+        if run.ended < now - RAMP and not world.climate.wire.harmful:
+            examine(world, run)
+    told.unexamined.clear()
+
+
+def examine(world: World, run: Run) -> None:
     """Look at the drives after an early end: what the run had moved stands, and what others had moved goes on."""
     told, now = world.history.told, world.floor.now()
-    last = {(each.line, each.drive): each for each in world.history.executed}
+    if told.unexamined.pop(run.typed, None) is not run or run.download is not None:
+        return  # a person's own line starts what a download starts
+    last = {(each.line, each.drive): each for each in world.history.executed if each.text.startswith(MOTIONS)}
     for placed in world.floor.floor.drives:
         line, drive = placed.bus, placed.spec.name
         before = last.get((line, drive))
         if before is None or placed.unit.shadow is None:
             continue
         moves = any(each.velocity for each in placed.unit.shadow.motion(now))
-        text = f"{line}:{drive} after {run.typed!r} ({run.failure}) ended at {ended:.3f}"
-        if (line, drive, before.text) in run.moves and run.began <= before.at:
+        text = f"{line}:{drive} after {run.typed!r} ({run.failure}) ended at {run.ended:.3f}"
+        if (line, drive, before.text) in run.moves and run.began <= before.at <= run.ended:
             if moves and not _said(world, line, run.began, TROUBLE):
                 told.unstopped.append(f"{text}: {before.text!r} goes on")
-        elif not moves and before.at < ended and _only_ended_by(world, run, before):
+        elif not moves and before.at < run.ended and _only_ended_by(world, run, before):
             told.stopped_too.append(f"{text}: {before.text!r} was not of it, and was stopped")
 
 
 def _only_ended_by(world: World, run: Run, started: Executed) -> bool:
     """Whether nothing but the end of a run can have ended a motion that goes on for ever."""
     told, place = world.history.told, world.place(started.line)
-    if not PHRASES[place.language].endless or not started.text.startswith("SL "):
+    if not PHRASES[place.language].endless or not re.match("SL [1-9]", started.text):
         return False
     others = (each for each in told.runs.values() if each is not run and each.failure and each.ended >= started.at)
     return not (
         any(each >= started.at for each in told.halts)
         or any(others)
+        or started.line in told.raw_written  # ESC and ^C are typed there
         or world.climate.wire.harmful
         or any(at >= started.at for at in world.cut.get((started.line, started.drive), []))
         or _said(world, started.line, started.at, re.compile("stopped as well|trying again|was lost|restart"))
