@@ -58,6 +58,12 @@ def _made(history: History, command: Command, byte: bytes) -> bool:
     return any(each.after.count(byte) > each.before.count(byte) for each in found)
 
 
+def _took(history: History, command: Command, byte: bytes) -> bool:
+    """Whether noise took a byte away in the time of a command."""
+    found = _damage(history, command.line, command.began, command.ended)
+    return any(each.after.count(byte) < each.before.count(byte) for each in found)
+
+
 def became(world: World, line: str, at: float) -> bool:
     """Whether noise can have made another line of what left: on a line without a checksum."""
     return not world.place(line).checked and bool(_damage(world.history, line, at - AFTER, at))
@@ -69,7 +75,7 @@ def _twice(world: World) -> Iterator[str | Granted]:
             continue
         if any(became(world, command.line, at) for at in times):
             yield Granted(BARE_COMMAND, words)
-        elif _made(world.history, command, NAK):
+        elif _made(world.history, command, NAK) and _took(world.history, command, ACK):
             yield Granted(NOISY_NAK, words)
         elif _doubled(world, command):
             yield Granted(DOUBLED, words)

@@ -10,6 +10,7 @@ import subprocess
 import time
 from collections import Counter
 from collections.abc import Iterator, Sequence
+from contextlib import ExitStack
 from dataclasses import asdict, dataclass, field
 from functools import partial
 from hashlib import sha256
@@ -76,13 +77,17 @@ def run(lives: Sequence[Life], jobs: int = 0, resume: Path | None = None) -> Ite
     yield from known
     left = lives[len(known) :]
     jobs = min(jobs or os.cpu_count() or 1, len(left))
-    with multiprocessing.get_context("fork").Pool(max(1, jobs)) as pool:
-        for each in pool.imap(result, left, chunksize=2) if jobs > 1 else map(result, left):
+    with ExitStack() as stack:
+        if file is not None:
+            stack.enter_context(file)
+        results: Iterator[Result] = map(result, left)
+        if jobs > 1:
+            pool = stack.enter_context(multiprocessing.get_context("fork").Pool(jobs))
+            results = pool.imap(result, left, chunksize=2)
+        for each in results:
             if file is not None:
                 print(json.dumps(asdict(each)), file=file, flush=True)
             yield each
-    if file is not None:
-        file.close()
 
 
 def _taken_up(lives: Sequence[Life], path: Path) -> tuple[list[Result], TextIO]:

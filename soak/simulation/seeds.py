@@ -10,6 +10,7 @@ FIXED = {
     882: "the same, which a wait took for rest",
     2027: "a stop through a shared port, dropped by the purge before it in the same read",
     2177: "the conditions of a drive that nobody wanted any more, which were read as that was said",
+    373: "a view of a relay's bytes, held by the error of a failed send (of the simulation itself)",
 }
 DERIVED = 12
 """The number of seeds that follow from the commit."""
