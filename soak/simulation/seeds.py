@@ -11,6 +11,7 @@ FIXED = {
     2027: "a stop through a shared port, dropped by the purge before it in the same read",
     2177: "the conditions of a drive that nobody wanted any more, which were read as that was said",
     373: "a view of a relay's bytes, held by the error of a failed send (of the simulation itself)",
+    797: "the error of a refused Modbus write, whose flag was read too late, which the next line was blamed for",
 }
 DERIVED = 12
 """The number of seeds that follow from the commit."""

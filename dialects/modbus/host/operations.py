@@ -94,10 +94,11 @@ def refusal(state: ModbusState, asked: Request, reply: Reply, code: int | None) 
 
 def error_number(state: ModbusState) -> Procedure[int | None]:
     """Read the drive's own error, which clears it; None for no error, or where it cannot be read."""
-    flag = yield from _quietly(state, "EF")
-    if not flag:
-        if flag == 0:
-            state.error_flag_read(False)
+    state.error_flag_read(True)  # until it is read: its reply may be lost, and a stop may come in between
+    reply = yield request(state, "PR EF", mapping.read(REGISTERS["EF"]))
+    if reply.end is End.REFUSED or (reply.end is End.DONE and not any(pdu_codec().registers(reply.body))):
+        state.error_flag_read(False)  # a device that refuses to read the flag has none
+    if reply.end is not End.DONE or not state.error:
         return None
     number = yield from _quietly(state, "ER")
     state.error_flag_read(number is None)

@@ -248,6 +248,16 @@ def test_an_error_from_before_is_read_and_told_first():
     assert not drive.error and [data for _, data in far.sent][:2] == ["001f0001", "00210001"]
 
 
+def test_an_error_whose_flag_could_not_be_read_is_told_before_the_next_command_and_not_blamed_on_it():
+    far, drive = Far(), state()
+    far.raises, far.silent = {"SL": (4, 85)}, {"EF"}
+    with pytest.raises(Refused, match="exception 04"):
+        type_("SL 5000", far, drive)
+    far.raises, far.silent = {}, set()
+    assert type_("R2=5", far, drive) == ()
+    assert any("an old error, now cleared: error 85" in note for note in drive.notes)
+
+
 def test_silence_is_told_and_nothing_is_sent_again(far):
     far.silent = {"MR"}
     with pytest.raises(NoAnswer, match="not known whether 'MR 5' was executed; it was sent once"):
