@@ -139,7 +139,8 @@ async def play(
     roles = bind(session, macro, roles)
     name, begun = macro.name, session.now()
     own = macro_claims(session, played, roles)
-    state, ports = session.settings.state, {link.name: session.of(session.buses[link.name]).port for link, _ in own}
+    claimed = sorted({link.name for link, _ in own})  # a set of links has another order in each run
+    state, ports = session.settings.state, {bus: session.of(session.buses[bus]).port for bus in claimed}
     with hearing(session.subscribe) as heard, crash_marks.playing(state, ports.values(), name, session.wall(begun)):
         execution = Execution(session, heard, watcher.executed)
         async with (
