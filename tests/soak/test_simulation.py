@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import random
 import re
 import subprocess
 import sys
@@ -34,6 +35,12 @@ def test_the_rules_hold(seed: int) -> None:
     world = lived(seed, range(30))
     assert broken(world) == []
     assert world.history.commands
+
+
+@pytest.mark.nightly
+def test_the_rules_hold_in_fresh_seeds() -> None:
+    first = random.SystemRandom().randrange(1 << 24)
+    assert [each.breaches for each in run(lives(range(first, first + 400)), jobs=1) if each.breaches] == [], first
 
 
 @pytest.mark.process
