@@ -200,6 +200,16 @@ class Guards(Generic[S]):
 
 
 @dataclass(frozen=True)
+class Protection:
+    """A protection of drives with a network port, which only a person can disable."""
+
+    text: Callable[[str], str]
+    """What may keep a drive of a product silent, or have it refuse every value; no product: not known which."""
+    word: Callable[[str], str]
+    """The word to which a line gives a value; empty: it gives none."""
+
+
+@dataclass(frozen=True)
 class Family(Generic[S]):
     """One family of drives. Every conversation raises Refused, NoAnswer, Stopped or Inexpressible."""
 
@@ -267,6 +277,8 @@ class Family(Generic[S]):
     """Whether messages that carry their length can start a motion or a program."""
     in_frames: Callable[[bytes], bool] = lambda data: False
     """Whether a reply of its drives, with its checksum, is in what an unknown line sent."""
+    protection: Protection | None = None
+    """None: its drives have none."""
     prepare: Callable[[], object] | None = None
     """Slow work before the first message, safe in any thread; None: there is none."""
 

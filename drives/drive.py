@@ -30,6 +30,7 @@ from multidrop.drives.conversations import ASKING, Conversation, Conversations, 
 from multidrop.drives.events import Changed, Outcome, Transaction
 from multidrop.drives.link import Link
 from multidrop.drives.port_journal import GLOBAL
+from multidrop.drives.protected_units import Values, protection, silent
 from multidrop.transports import TransportLost
 
 T = TypeVar("T")
@@ -147,6 +148,7 @@ class Drive:
         self._conversations = conversations
         self._neighbours = neighbours
         self._judged = Judged()
+        self._values = Values()
 
     @property
     def address(self) -> str:
@@ -228,7 +230,14 @@ class Drive:
         if to_all:
             return await self.run(self._to_all(procedure))
         stored = self.state.programming
-        printed = await self.run(procedure)
+        known = protection(self.link, self.family) if not self.state.address else None
+        try:
+            printed = await self.run(procedure)
+        except NoAnswer as error:
+            raise (silent(error, self.link, self.family, self.product) if known is not None else error) from None
+        except Refused as error:
+            raise self._values.refused(known, text, error, self.product) from None
+        self._values.took(known, text)
         found = self.family.referencing(self.state, text) if self.state.unreferenced and not stored else None
         if found is not None and found.homing:
             self._neighbours.homes(self, found.axis)

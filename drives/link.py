@@ -62,6 +62,8 @@ class Link:
         """The loss after which the drives are not found again yet."""
         self.reserved: Reserved | None = None
         """A person writes bytes of his own (`write_raw`), and requests are refused; None: they pass."""
+        self.unheard = True
+        """Nothing was ever received."""
         self.stops = 0
         """Number of stops written so far, of any kind."""
         self.on_unsolicited: Callable[[Sequence[str]], None] = lambda lines: None
@@ -239,7 +241,7 @@ class Link:
             self._timer = None
 
     def _received(self, data: bytes) -> None:
-        now = self.now()
+        now, self.unheard = self.now(), False
         self._news.collect(Traffic(now, False, data))
         self.line.receive(data, now)
         self.advance()

@@ -23,8 +23,11 @@ from multidrop.drives.drive import Drive, still
 from multidrop.drives.events import isolated
 from multidrop.drives.link import Link
 from multidrop.drives.port_journal import GLOBAL, Keeper
+from multidrop.drives.protected_units import protection, silent
 from multidrop.transports import TransportLost
 
+SLOW = 1.0
+"""The time that a slow drive gets to reply before its silence is given a cause, s."""
 PAUSE = 0.25
 """Seconds between two looks at a line that is away, or at a drive that homes."""
 BOOT = 1.0
@@ -262,7 +265,10 @@ class Roster:
             except NoAnswer as error:
                 if other := spoken(bytes(heard), family.name):
                     raise NoAnswer(f"{error}; {other}") from None
-                raise
+                if hints.drives or hints.party or not self.link.unheard or protection(self.link, family) is None:
+                    raise
+                await asyncio.sleep(SLOW)
+                raise silent(error, self.link, family) from None
 
     async def search_again(self, hints: Hints) -> list[DriveState]:
         """Search where the drives were before the loss, then where they were at first. Raises as `search`."""

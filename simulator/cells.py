@@ -34,6 +34,7 @@ DRIVE_KEYS = (
     "program",
     "program_text",
     "instruction_us",
+    "cse",
     "identity",
     "world",
 )
@@ -94,7 +95,10 @@ class Reader:
         own = self._families[name].keys if isinstance(name, str) and name in self._families else ()
         table.only(*DRIVE_KEYS, *own)
         personality = table.choice("personality", tuple(self._families))
-        return self._families[personality].read_drive(table, folder)
+        drive = self._families[personality].read_drive(table, folder)
+        if drive.cse and not self._is_ethernet(personality):
+            raise table.wrong("cse", "is for Ethernet drives", f"valid: {self._ethernet}")
+        return drive
 
     def _check_bus(self, bus: BusSpec, table: Table) -> None:
         """Refuse drives that cannot share a wire, and endpoints that reach no drive."""

@@ -100,6 +100,8 @@ class Transport(ABC):
     """The settings of the port; None: it is not a serial port."""
     limits = ""
     """The promises of others that it cannot keep, for a person who opens it."""
+    network = False
+    """It leads to a network port, which may be a drive's own."""
     round_trip: float | None = None
     """The time to the far side and back, s; None: not measured."""
 

@@ -163,10 +163,13 @@ async def _socket(family: int, kind: socket.SocketKind, protocol: int, address: 
 
 
 def _pipe(name: str, made: socket.socket) -> Transport:
+    pipe: Transport
     if sys.platform == "win32":
-        return ThreadedPipe(SocketDevice(name, made))
+        pipe = ThreadedPipe(SocketDevice(name, made))
     else:
-        return DescriptorPipe(SocketEndpoint(name, made))
+        pipe = DescriptorPipe(SocketEndpoint(name, made))
+    pipe.network = True
+    return pipe
 
 
 class _Socket:

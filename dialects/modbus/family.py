@@ -7,6 +7,7 @@ from functools import partial
 from multidrop.dialects.codec import Procedure
 from multidrop.dialects.family import Family, Guard, Guards, Registers
 from multidrop.dialects.mcode.host.classify import referencing
+from multidrop.dialects.mcode.host.cyber_security import CYBER_SECURITY
 from multidrop.dialects.mcode.manual import guards, help, points
 from multidrop.dialects.modbus.host import operations
 from multidrop.dialects.modbus.host.codec import Modbus, ModbusState, pdu_codec
@@ -56,6 +57,7 @@ MODBUS = Family(
         device=operations.device,
     ),
     guards=Guards(guards.NAMES, guarded, guards.word_of, guards.only_ends),
+    protection=CYBER_SECURITY,
     prepare=pdu_codec,
     values_at="multidrop.dialects.modbus.host.values:VALUES",
 )

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from multidrop.dialects import Diagnostic, DriveState, Procedure
 from multidrop.dialects.families import DEFAULT, FAMILIES, spoken
 from multidrop.dialects.scanning import WINDOW, Reach, Scan
+from multidrop.drives.protected_units import silent
 from multidrop.shell import stop_report
 from multidrop.shell.channel import Job, running
 from multidrop.shell.connect.opening import BAUDED, far_port, port_name
@@ -178,6 +179,8 @@ class Scanning:
         self._read: list[Halt] = []
         """The stops whose drives were read."""
         self._said: set[str] = set()
+        self._first: Bus | None = None
+        """The bus of the first stage."""
 
     async def run(self, bauds: Sequence[int], everything: bool) -> None:
         """Search. `bauds`: only these; `everything`: do not end with the first stage that finds a drive.
@@ -313,6 +316,7 @@ class Scanning:
         """Have a stop reach a bus, and close it in the end."""
         bus = opened.bus
         self._tried[stage] = None
+        self._first = self._first or bus
         bus.roster.probing = stage.scan.names
         self._workspace.adopt(opened, PLACE)
         if opened.limits and opened.limits not in self._said:
@@ -327,10 +331,11 @@ class Scanning:
 
     def nothing(self, stages: Sequence[Stage], advice: str = "") -> NothingFound:
         """Make the failure that names what was tried."""
-        return NothingFound(
+        found = NothingFound(
             f"no drive replies on {self.port} ({listed(stages)}; all names, with and without a checksum); check power, "
             f"wiring (are A and B swapped?) and the adapter{advice}"
         )
+        return silent(found, self._first.link, self._first.roster.family) if self._first is not None else found
 
     def _reach(self, distance: float = 0.0, hasty: bool = False) -> Reach:
         """The manner of the search. `distance`: the time of the network to a drive and back, s."""

@@ -39,6 +39,7 @@ def common_keys(table: Table, folder: Folder) -> dict[str, Any]:
         "program": text or _program(name, table, folder),
         "program_name": PROGRAM_TEXT if text else name,
         "instruction_us": table.number("instruction_us", 200.0, low=0.0, high=1e6),
+        "cse": table.boolean("cse", False),
     }
 
 

@@ -62,7 +62,10 @@ class Identity:
 
 @dataclass(frozen=True)
 class DriveSpec:
-    """One drive. `world` surrounds its first axis, `further` each of the others. `variables` are the user's."""
+    """One drive. `world` surrounds its first axis, `further` each of the others. `variables` are the user's.
+
+    `cse`: the cyber security of an Ethernet drive is on, so it replies to nothing.
+    """
 
     personality: str = "LMDCM"
     name: str = "!"
@@ -77,6 +80,7 @@ class DriveSpec:
     further: tuple[WorldSpec, ...] = ()
     any_address: bool = False
     """A TMCL module that replies to every address."""
+    cse: bool = False
 
     def assignments(self) -> Iterator[tuple[str, str]]:
         """Yield `set` as pairs of name and value, in order; `IS = ["1,1,0", "2,2,0"]` gives two pairs."""

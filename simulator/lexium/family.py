@@ -33,6 +33,7 @@ from multidrop.simulator.lexium.ports.mcode import MCodePort
 from multidrop.simulator.lexium.ports.modbus import ModbusPort
 from multidrop.simulator.lexium.power import BAUDS
 from multidrop.simulator.lexium.state.models import MODELS
+from multidrop.simulator.wire import Transmission
 from multidrop.simulator.world import World
 
 KEY_OF = {"DN": "name", "PY": "party"}
@@ -277,7 +278,8 @@ def build(spec: DriveSpec, place: Place) -> Unit:
     device = MCodeDevice(_at_baud(spec, place.baud), world)
     device.prints()  # no client can be connected at its sign-on
     model, ethernet = device.memory.model, spec.personality in ETHERNET
-    port = MCodePort(device, serial=not ethernet, baud=0 if model.waits_to_print else place.baud)
+    kind, connection = (LockedPort, LockedModbus) if spec.cse else (MCodePort, ModbusPort)
+    port = kind(device, serial=not ethernet, baud=0 if model.waits_to_print else place.baud)
     return Unit(
         device=device,
         port=port,
@@ -286,8 +288,26 @@ def build(spec: DriveSpec, place: Place) -> Unit:
         inputs=model.points.inputs,
         counts=model.points.analog,
         single_supply=model.single_supply,
-        connect=(lambda: ModbusPort(device)) if ethernet else None,
+        connect=(lambda: connection(device)) if ethernet else None,
     )
+
+
+class LockedPort(MCodePort):
+    """The MCode/TCP port of a unit whose cyber security is on: it takes nothing and sends nothing."""
+
+    def receive(self, data: bytes, now: float) -> None:
+        """Drop the bytes; no bytes of the protection are public."""
+
+    def sent(self, now: float) -> list[Transmission]:
+        super().sent(now)
+        return []
+
+
+class LockedModbus(ModbusPort):
+    """The same over Modbus/TCP."""
+
+    def receive(self, data: bytes, now: float) -> bytes:
+        return b""
 
 
 def _shadow(device: MCodeDevice, port: MCodePort) -> Shadow:

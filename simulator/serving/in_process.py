@@ -135,6 +135,7 @@ class SimPipe(Transport, Listener):
     def __init__(self, name: str, floor: RunningFloor, bus: str, closed: Callable[[], None]) -> None:
         self.name, self._floor, self._bus, self._closed = name, floor, bus, closed
         self._source = floor.source()
+        self.network = bus in floor.floor.ethernet
         self._received: Received | None = None
         self._lost: Lost | None = None
         self._received_bytes = bytearray()

@@ -251,6 +251,8 @@ IS_HINT = 'several lines: IS = ["1,1,0", "2,2,0"]'
             f'{DRIVE}: program "no.mxt" does not exist; paths are relative to the cell file',
         ),
         (drive('program = "."'), f'{DRIVE}: program "." does not exist; paths are relative to the cell file'),
+        (drive("cse = true"), f"{DRIVE}: cse is for Ethernet drives; valid: LMDOE, LMDCE"),
+        (drive("cse = 1", "LMDCE"), f"{DRIVE}: cse must be true or false, not 1"),
         (drive("instruction_us = -1"), f"{DRIVE}: instruction_us must be from 0 to 1e+06, not -1"),
         (
             drive("[bus.drive.world]\nhom = 1"),
