@@ -30,7 +30,7 @@ def cell(baud: int, party: bool) -> str:
     drive = '[[bus.drive]]\npersonality = "LMDCM"\n'
     named = f"party = {str(party).lower()}\nset = {{ EM = 1, CK = {int(party)} }}\n"
     return (
-        f'[[bus]]\nname = "w"\nserve = ["pty:w.tty", "tcp://127.0.0.1:0"]\nbaud = {baud}\ngather = 0.0\n'
+        f'[[bus]]\nname = "w"\nserve = ["pty:w.tty", "tcp://127.0.0.1:0"]\nbaud = {baud}\n'
         + f'{drive}name = "{"a" if party else "!"}"\n{named}'
     )
 
