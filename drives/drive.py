@@ -234,7 +234,9 @@ class Drive:
         try:
             printed = await self.run(procedure)
         except NoAnswer as error:
-            raise (silent(error, self.link, self.family, self.product) if known is not None else error) from None
+            if self.state.address:
+                raise
+            raise silent(error, self.link, self.family, self.product) from None
         except Refused as error:
             raise self._values.refused(known, text, error, self.product) from None
         self._values.took(known, text)

@@ -11,12 +11,9 @@ import time
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import Any, TypeVar
 
 from multidrop.macros.atomic import write_atomically
-
-if TYPE_CHECKING:
-    pass
 
 T = TypeVar("T")
 

@@ -61,8 +61,6 @@ class Gathered:
             self._since = now
         self.held += data
         pause = CHARACTERS * BITS_A_BYTE / (self._wire.baud or inf) if self._pause is None else self._pause
-        if self._pause is None and pause > LONGEST_HELD / 2:
-            pause = 0.0  # below 2400 baud a piece would be two or three bytes, with pauses that look like a reply's end
         following = self._wire.following
         if following is not None and following <= min(now + pause, self._since + LONGEST_HELD):
             return b""

@@ -274,8 +274,10 @@ class MCode(Codec):
         if request.kind is Kind.QUIET:
             # The time that ends a collection: none once it holds the expected print and the end that belongs to it.
             found = request.expect and re.search(request.expect.encode("latin-1"), buffer)
-            if found:
-                return 0.0 if _is_whole(request, found, buffer, checksum) else SHORT
+            if found and _is_whole(request, found, buffer, checksum):
+                return 0.0
+            if found:  # a gateway gathers bytes: on a slow line its pieces are further apart than a line and its prompt
+                return SHORT if b"\n" in buffer[found.end() :] else BETWEEN
             if buffer:
                 pinged = request.address and not (request.body or request.text)
                 return (

@@ -2,10 +2,10 @@
 
 import pytest
 
-from multidrop.dialects import Kind
+from multidrop.dialects import Kind, Request
 from multidrop.dialects.mcode.family import MCODE
 from multidrop.dialects.mcode.host import codec as codecs
-from multidrop.dialects.mcode.host.codec import EXECUTED, EXECUTING, LIST_QUIET, PATIENT, SHORT, MCode
+from multidrop.dialects.mcode.host.codec import BETWEEN, EXECUTED, EXECUTING, LIST_QUIET, PATIENT, SHORT, MCode
 from multidrop.dialects.mcode.manual import program_file
 from multidrop.dialects.program_files import Held
 from tests.support.mcode_drives import one_drive
@@ -84,6 +84,15 @@ def test_a_program_that_the_file_starts_saves_the_echo_mode_that_was_there(bench
 def test_the_quiet_time_by_what_has_come(em, check, text, buffer, seconds):
     codec = MCode(em, False, check, 1)
     assert codec.quiet_time(codec.request("", text), buffer) == seconds
+
+
+@pytest.mark.parametrize(
+    ("buffer", "seconds"),
+    [(b"\x06", BETWEEN), (b"\x0642", BETWEEN), (b"\x0642\r", BETWEEN), (b"\x0642\r\n", SHORT)],
+)
+def test_a_print_of_unknown_modes_waits_for_its_line_end_as_long_as_a_slow_gateway_takes(buffer, seconds):
+    request = Request("", "PR Q1", Kind.QUIET, MCode(), expect="42")
+    assert MCode().quiet_time(request, buffer) == seconds
 
 
 def test_a_list_is_parsed_once_however_its_bytes_come(monkeypatch):
