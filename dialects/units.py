@@ -238,7 +238,7 @@ def _loads(own: Sequence[str]) -> tuple[str, ...]:
 class Basis:
     """What the counting of an axis rests on, as read from its drive."""
 
-    settings: tuple[tuple[str, int], ...] = ()
+    settings: tuple[tuple[str, str], ...] = ()
     """Names and values; where one differs later, no quantity is sent."""
     turn: Fraction | None = None
     """Counts of one turn of the motor; None where nothing tells."""

@@ -22,7 +22,7 @@ from multidrop.dialects.units import (
     unit_of,
 )
 
-TURN = Basis((("MS", 256), ("EE", 0)), Fraction(51_200))
+TURN = Basis((("MS", "256"), ("EE", "0")), Fraction(51_200))
 
 
 def measure(text, basis=TURN, own=(), **more):
