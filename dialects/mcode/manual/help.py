@@ -11,8 +11,9 @@ from multidrop.dialects.errors import Diagnostic
 from multidrop.dialects.mcode.manual import errors
 from multidrop.dialects.mcode.manual.errors import ErrorNumber
 from multidrop.dialects.mcode.manual.grammar import LineError, Number, Statement, parse, parsed, tokens
+from multidrop.dialects.mcode.manual.mnemonic import EVERY, LEXIUM, MDRIVE_PLUS, Mnemonic
 from multidrop.dialects.mcode.manual.statements import condition_of, condition_reading, is_mixed, words_of
-from multidrop.dialects.mcode.manual.table import EVERY, LEXIUM, MDRIVE, MDRIVE_PLUS, MNEMONICS, Mnemonic, lookup, words
+from multidrop.dialects.mcode.manual.table import MDRIVE, MNEMONICS, lookup, words
 
 ACCESS = {
     "RW": "read and write",

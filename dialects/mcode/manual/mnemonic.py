@@ -9,34 +9,27 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass
-from typing import TypedDict, Unpack
 
 from multidrop.dialects.mcode.manual.errors import ErrorNumber
 
-READ_ONLY, NOT_STEPPABLE = ErrorNumber.READ_ONLY, ErrorNumber.NOT_STEPPABLE
+READ_ONLY = ErrorNumber.READ_ONLY
 
 INT_LOW, INT_HIGH = -2147483648, 2147483647
 FLOAT_HIGH = 1.7976931348623157e308
-TOP_SPEED = 2560000
-"""MS * 10000 at the finest resolution: the highest possible VM, steps/s."""
 
 LEXIUM = frozenset({"LMDOM", "LMDCM", "LMDOE", "LMDCE", "LMM"})
 """Lexium MDrive, open and closed loop (M serial, E Ethernet), and the Lexium Motion Module."""
 ETHERNET = re.compile(r"LMD.E")
 """Matches the products with an Ethernet port, unknown ones too."""
-SERIAL = LEXIUM - {"LMDOE", "LMDCE"}
 CLOSED_LOOP = frozenset({"LMDCM", "LMDCE"})
 """The products with hMT."""
 ENCODER = CLOSED_LOOP | {"LMM"}
 """The products with an encoder, or an input for one."""
-MODULE = frozenset({"LMM"})
 
 MDRIVE_PLUS = frozenset({"MDI", "MDIE", "MDIX"})
 """MDrivePlus with Motion Control: the base unit, with an encoder, and the Plus2 with expanded I/O."""
 EXPANDED = frozenset({"MDIX"})
 MDRIVE_ENCODER = frozenset({"MDIE", "MDIX"})
-NOWHERE: frozenset[str] = frozenset()
-"""A word that the firmware knows and no listed product executes."""
 
 EVERY = LEXIUM | MDRIVE_PLUS
 
@@ -84,7 +77,7 @@ class Mnemonic:
     products: frozenset[str] = LEXIUM
     reserved_on: frozenset[str] = LEXIUM
     """The products that know the word; on others it is a free name. Known but absent is error 37."""
-    zero_on: frozenset[str] = NOWHERE
+    zero_on: frozenset[str] = frozenset()
     """The products that lack it and print it as 0."""
     note: str = ""
 
@@ -100,60 +93,3 @@ class Mnemonic:
         low = self.low_encoder if encoder and self.low_encoder is not None else self.low
         high = self.high_encoder if encoder and self.high_encoder is not None else self.high
         return low, high
-
-
-class Fields(TypedDict, total=False):
-    """The fields of a Mnemonic that a helper below sets or passes on."""
-
-    syntax: str
-    access: str
-    kind: str
-    immediate: bool
-    program: bool
-    low: Number
-    high: Number
-    unit: str
-    default: Default
-    low_encoder: Number
-    high_encoder: Number
-    unit_encoder: str
-    default_encoder: Number
-    values: tuple[Number, ...]
-    gap: tuple[Number, ...]
-    step: int
-    starts: bool
-    lines: bool
-    products: frozenset[str]
-    reserved_on: frozenset[str]
-    note: str
-
-
-def flag(name: str, title: str, meaning: str, section: str, preset: int, **more: Unpack[Fields]) -> Mnemonic:
-    """A flag that a user sets: 0 or 1."""
-    fields: Fields = {"access": "RW", "kind": "flag", "low": 0, "high": 1, "default": preset, "step": NOT_STEPPABLE}
-    syntax: Fields = {"syntax": f"{name}=<0/1>, PR {name}"}
-    merged: Fields = {**fields, **syntax, **more}
-    return Mnemonic(name, title, meaning, section, **merged)
-
-
-def status(name: str, title: str, meaning: str, section: str, **more: Unpack[Fields]) -> Mnemonic:
-    """A flag that the drive sets and a user only reads."""
-    fields: Fields = {"access": "RO", "kind": "flag", "low": 0, "high": 1, "step": READ_ONLY}
-    syntax: Fields = {"syntax": f"PR {name}, BR <label/address>,{name}=<0/1>"}
-    merged: Fields = {**fields, **syntax, **more}
-    return Mnemonic(name, title, meaning, section, **merged)
-
-
-def number(name: str, title: str, meaning: str, section: str, **more: Unpack[Fields]) -> Mnemonic:
-    """A variable with a number; IC and DC step it unless stated otherwise."""
-    unit = more.get("unit", "").split("/")[0] or "integer"
-    fields: Fields = {"access": "RW", "kind": "variable", "step": 0, "syntax": f"{name}=<{unit}>, PR {name}"}
-    merged: Fields = {**fields, **more}
-    return Mnemonic(name, title, meaning, section, **merged)
-
-
-def mode(name: str, title: str, meaning: str, section: str, **more: Unpack[Fields]) -> Mnemonic:
-    """A variable that selects a mode; IC and DC do not step it."""
-    fields: Fields = {"access": "RW", "kind": "variable", "step": NOT_STEPPABLE, "syntax": f"{name}=<mode>, PR {name}"}
-    merged: Fields = {**fields, **more}
-    return Mnemonic(name, title, meaning, section, **merged)

@@ -27,10 +27,9 @@ from multidrop.dialects.mcode.manual.mnemonic import (
     Mnemonic,
 )
 from multidrop.dialects.mcode.manual.table import lookup, words
-from multidrop.dialects.mcode.manual.table_system import COMMUNICATION_WORDS
 from multidrop.dialects.values import IO, PARAMETERS, VARIABLES, Reading, Scalar, Value, number
 
-WIRE = frozenset(row.name for row in COMMUNICATION_WORDS)
+WIRE = frozenset({"BD", "CE", "CK", "DG", "DN", "EM", "ES", "PY", "QD"})
 """Communication settings."""
 STATES = frozenset({"C1", "C2", "ER", "IF", "P", "ST", "TE"})
 """Words that can be written and are no settings."""

@@ -20,7 +20,6 @@ from multidrop.dialects.files import program_text_of, split_lines, wrong_charact
 from multidrop.dialects.mcode.manual.grammar import LineError, Token, check_groups, parse, tokens
 from multidrop.dialects.mcode.manual.statements import canonical
 from multidrop.dialects.mcode.manual.table import lookup
-from multidrop.dialects.mcode.manual.table_motion import MOTION
 from multidrop.dialects.program_files import Entry, Part, Problem, refuse, respelled
 
 if TYPE_CHECKING:
@@ -207,7 +206,7 @@ def _holds_value(word: str, names: frozenset[str]) -> bool:
 
 
 _DECLARE = ("LB", "VA")
-MOVES = frozenset(row.name for row in MOTION if row.starts and row.kind == "instruction")
+MOVES = frozenset({"CF", "HF", "HI", "HM", "MA", "MR", "SL"})
 
 
 def parts(line: str) -> list[Part]:

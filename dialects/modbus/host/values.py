@@ -17,8 +17,9 @@ from multidrop.dialects.mcode.host.state import who
 from multidrop.dialects.mcode.host.values import SNAPSHOT_WORDS, rows_of_list, snapshot_of
 from multidrop.dialects.mcode.manual import parameter_plan, points
 from multidrop.dialects.mcode.manual import parameters as manual
+from multidrop.dialects.mcode.manual.mnemonic import EVERY
 from multidrop.dialects.mcode.manual.parameters import reading_of
-from multidrop.dialects.mcode.manual.table import EVERY, words
+from multidrop.dialects.mcode.manual.table import words
 from multidrop.dialects.modbus.host import framing, mapping
 from multidrop.dialects.modbus.host.codec import ModbusState, pdu_codec
 from multidrop.dialects.modbus.host.operations import (

@@ -16,7 +16,8 @@ from functools import partial
 
 from multidrop.dialects.mcode.manual.errors import ErrorNumber as E
 from multidrop.dialects.mcode.manual.grammar import Argument, Name, Number, Statement, Text
-from multidrop.dialects.mcode.manual.table import MNEMONICS, Mnemonic
+from multidrop.dialects.mcode.manual.mnemonic import Mnemonic
+from multidrop.dialects.mcode.manual.table import MNEMONICS
 from multidrop.simulator.lexium.event_loop import EventLoop
 from multidrop.simulator.lexium.language.motor_commands import MotorCommands, Setups
 from multidrop.simulator.lexium.language.program_commands import ProgramCommands

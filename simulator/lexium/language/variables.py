@@ -13,7 +13,7 @@ from math import inf
 
 from multidrop.dialects.mcode.manual.errors import ErrorNumber as E
 from multidrop.dialects.mcode.manual.grammar import Argument, Compare, Name, Number, Statement, Text
-from multidrop.dialects.mcode.manual.table import Mnemonic
+from multidrop.dialects.mcode.manual.mnemonic import Mnemonic
 from multidrop.simulator.lexium.event_loop import EventLoop
 from multidrop.simulator.lexium.motion.counters import BITS
 from multidrop.simulator.lexium.motion.motor import Motor

@@ -9,7 +9,8 @@ from typing import NamedTuple
 
 from multidrop.dialects.mcode.manual.errors import ErrorNumber as E
 from multidrop.dialects.mcode.manual.grammar import Argument
-from multidrop.dialects.mcode.manual.table import Mnemonic, lookup, words
+from multidrop.dialects.mcode.manual.mnemonic import Mnemonic
+from multidrop.dialects.mcode.manual.table import lookup, words
 from multidrop.simulator.lexium.state.errors import Fault
 from multidrop.simulator.lexium.state.expressions import Value, whole
 from multidrop.simulator.lexium.state.models import MODELS

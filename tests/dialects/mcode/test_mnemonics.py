@@ -6,17 +6,8 @@ import re
 import pytest
 
 from multidrop.dialects.mcode.manual import errors
-from multidrop.dialects.mcode.manual.table import (
-    LEXIUM,
-    MDRIVE,
-    MDRIVE_PLUS,
-    MNEMONICS,
-    NO_STEP,
-    PRINTS_LINES,
-    Mnemonic,
-    lookup,
-    words,
-)
+from multidrop.dialects.mcode.manual.mnemonic import LEXIUM, MDRIVE_PLUS, Mnemonic
+from multidrop.dialects.mcode.manual.table import MDRIVE, MNEMONICS, NO_STEP, PRINTS_LINES, lookup, words
 from tests.support.cases import for_each
 from tests.support.paths import FACTS
 

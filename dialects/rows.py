@@ -1,0 +1,13 @@
+"""The tables of the manuals: a `.csv` file beside the module that reads it, with a row for each word or number."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Iterator
+from pathlib import Path
+
+
+def rows(module: str, name: str) -> Iterator[dict[str, str]]:
+    """The rows of a table by its head line; `module` is the `__file__` of the reader."""
+    with Path(module).with_name(name).open(encoding="utf-8", newline="") as table:
+        yield from csv.DictReader(table)
