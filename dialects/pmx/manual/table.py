@@ -1,8 +1,8 @@
 """Every ASCII command of the controller: name, values and meaning; its replies in words.
 
-`shape` is the continuation of a name: `bare` nothing, `axis` X or Y, `sign` an axis and a direction, `both` a direction
-for both axes, `1-8` a number, `place` positions. `access` is R, W or RW for a value (`NAME` reads, `NAME=value`
-writes), `-` for an action. (PMX-2ED-SA manual, table 9.0, and the text for J+, J- and CLRS.)
+`commands.csv` has the commands. `shape` is the continuation of a name: `bare` nothing, `axis` X or Y, `sign` an axis and
+a direction, `both` a direction for both axes, `1-8` a number, `place` positions. `access` is R, W or RW for a value
+(`NAME` reads, `NAME=value` writes), `-` for an action. (PMX-2ED-SA manual, table 9.0, and the text for J+, J- and CLRS.)
 """
 
 from __future__ import annotations
@@ -11,11 +11,12 @@ import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
+from multidrop.dialects.rows import rows
+
 AXES = ("X", "Y")
 SIGNS = ("+", "-")
 PROBE, PROBED = "MULTIDROP", "simulator"
 """The request that distinguishes our simulator from a unit, and its reply."""
-INT32 = "-2147483648 to 2147483647"
 
 
 @dataclass(frozen=True)
@@ -53,103 +54,13 @@ class Command:
                 yield from (f"{self.name}{number}" for number in range(int(low), int(high) + 1))
 
 
-SPEED = "1 to 6000000 pulses/s (encoder counts/s with StepNLoop)"
-TIME = "ms; what it may be depends on the speeds (appendix A)"
-
-ROWS: tuple[Command, ...] = (
-    # Motion
-    Command("X", "place", "-", "move X to a position, or by a distance after INC; X1000Y2000 moves both in a line",
-            f"X1000: {INT32} pulses (encoder counts with StepNLoop)", "7.8", starts=True),
-    Command("Y", "place", "-", "move Y to a position, or by a distance after INC", f"Y1000: {INT32} pulses", "7.8",
-            starts=True),
-    Command("I", "place", "-", "move both axes in a straight line", "I1000:-1000, X and Y in pulses", "7.8.2",
-            starts=True),
-    Command("T", "axis", "-", "change the target of a move that is under way", "TX1000: pulses", "7.9", starts=True),
-    Command("ABS", "bare", "-", "targets of moves are positions", "", "7.8"),
-    Command("INC", "bare", "-", "targets of moves are distances", "", "7.8"),
-    Command("MM", "bare", "R", "how targets are meant", "0 positions (ABS), 1 distances (INC)", "7.8"),
-    Command("J", "sign both", "-", "run on in a direction until it is stopped; J+ and J- run both axes", "", "7.6",
-            starts=True),
-    Command("STOP", "bare axis", "-", "slow down and stop: all axes, or one", "", "7.7"),
-    Command("ABORT", "bare axis", "-", "stop at once, without slowing down: all axes, or one", "", "7.7"),
-    Command("H", "sign", "-", "home at high speed on the home input", "", "7.10.1", starts=True),
-    Command("L", "sign", "-", "home on a limit input, then go back by LCA", "", "7.10.2", starts=True),
-    Command("ZH", "sign", "-", "home on the home input, then on the encoder's index", "", "7.10.3", starts=True),
-    Command("Z", "sign", "-", "home on the encoder's index, at low speed", "", "7.10.4", starts=True),
-    Command("HL", "sign", "-", "home on the home input at high speed, then again at low speed", "", "7.10.5",
-            starts=True),
-    Command("HCA", "bare axis", "RW", "how far homing (HL) goes past the home switch before it comes back slowly",
-            "pulses", "7.10.5"),
-    Command("LCA", "bare axis", "RW", "how far homing (L) goes back from the limit", "pulses", "7.10.2"),
-    Command("RZ", "bare", "RW", "whether homing ends with a move to 0", "0, 1", "7.10"),
-    # Speeds
-    Command("HSPD", "bare axis", "RW", "high speed: what a move runs at; an axis's own counts unless it is 0", SPEED,
-            "7.1"),
-    Command("LSPD", "bare axis", "RW", "low speed: what a move begins and ends at; an axis's own counts unless it is 0",
-            SPEED, "7.1"),
-    Command("ACC", "bare axis", "RW", "time from low to high speed; an axis's own counts unless it is 0", TIME, "7.1"),
-    Command("DEC", "bare axis", "RW", "time from high to low speed, where EDEC is 1", TIME, "7.1"),
-    Command("EDEC", "bare", "RW", "whether DEC is used for slowing down, or ACC for both", "0, 1", "7.1"),
-    Command("SCV", "axis", "RW", "S-curves in place of straight ramps", "0, 1", "7.1"),
-    Command("PS", "bare axis", "R", "speed now", "pulses/s (encoder counts/s with StepNLoop)", "7.2"),
-    Command("SSPDM", "axis", "RW", "window of speeds within which SSPD may change the speed; set at rest",
-            "0 to 9 (appendix A); 0: none", "7.3"),
-    Command("SSPD", "axis", "W", "change the speed of a move that is under way", "pulses/s within SSPDM", "7.3"),
-    # Position
-    Command("P", "axis", "RW", "position; with StepNLoop the position that it should have now", f"{INT32} pulses",
-            "7.4", starts=True),
-    Command("E", "axis", "RW", "encoder's position", f"{INT32} counts", "7.4", starts=True),
-    Command("POL", "axis", "RW", "polarities and the encoder's decoding, a bit each", "see table 7.7", "7.16"),
-    Command("MST", "bare axis", "R", "motor status, a bit each; /status has it in words", "see table 7.2", "7.12"),
-    Command("CLR", "axis", "-", "clear limit and StepNLoop errors of an axis", "", "7.11", starts=True),
-    Command("CLRS", "axis", "-", "clear StepNLoop errors of an axis", "", "7.17", starts=True),
-    Command("IERR", "bare", "RW", "whether a limit stops the motor without an error that must be cleared", "0, 1",
-            "7.11"),
-    # StepNLoop
-    Command("SL", "axis", "RW", "StepNLoop: positions are watched and put right by the encoder", "0, 1", "7.17",
-            starts=True),
-    Command("SLR", "axis", "RW", "StepNLoop: pulses for an encoder count", "0.001 to 999.999", "7.17", starts=True),
-    Command("SLT", "axis", "RW", "StepNLoop: error that counts as in position", "encoder counts", "7.17", starts=True),
-    Command("SLE", "axis", "RW", "StepNLoop: error that stops the motor", "encoder counts", "7.17", starts=True),
-    Command("SLA", "axis", "RW", "StepNLoop: corrections tried before it gives up", "times", "7.17", starts=True),
-    Command("SLS", "axis", "R", "StepNLoop: what it does; /status has it in words", "0 to 13", "7.17"),
-    Command("DX", "axis", "R", "StepNLoop: target less actual position", "encoder counts", "7.17",
-            "spelt DX and an axis, as DXX, in the manual's table"),
-    # Inputs and outputs
-    Command("EO", "bare 1-2", "RW", "current of the motors: EO1 X, EO2 Y, or both as bits", "0 to 3; EO1, EO2: 0, 1",
-            "7.5", starts=True),
-    Command("EOBOOT", "bare", "RW", "EO after power-up", "0 to 3", "7.5"),
-    Command("DI", "bare 1-8", "R", "digital inputs, all as bits or one", "0 to 255; DI1 to DI8: 0, 1", "7.13.1"),
-    Command("DO", "bare 1-8", "RW", "digital outputs, all as bits or one", "0 to 255; DO1 to DO8: 0, 1", "7.13.2"),
-    Command("DOBOOT", "bare", "RW", "DO after power-up", "0 to 255", "7.13.2"),
-    Command("AI", "1-2", "R", "analog inputs", "0 to 5000 mV", "7.14"),
-    # Joystick
-    Command("JO", "bare", "-", "joystick on", "", "7.15", starts=True),
-    Command("JF", "bare", "-", "joystick off", "", "7.15"),
-    Command("JV", "1-6", "RW", "joystick: 1, 2 highest speeds of X and Y; 3, 4 change of speed; 5, 6 dead zones",
-            "pulses/s; dead zones in mV", "7.15"),
-    Command("JL", "1-8", "RW", "joystick: outer and inner limits, minus before plus; 1 to 4 of X, 5 to 8 of Y",
-            "pulses", "7.15"),
-    # Programs
-    Command("SR", "0-1", "W", "control a program", "0 stop, 1 start, 2 pause, 3 go on", "7.19.2", starts=True),
-    Command("SASTAT", "bare 0-1", "R", "state of a program", "0 idle, 1 running, 2 paused, 4 error", "7.19.3"),
-    Command("SPC", "0-1", "R", "line that a program is at", "0 to 1274", "7.19.3"),
-    Command("GS", "0-31", "-", "run a stored subroutine", "", "7.19.4", starts=True),
-    Command("V", "0-63", "RW", "variables of the programs; V32 to V63 are kept by STORE", INT32, "7.19.6"),
-    Command("SA", "0-1274", "RW", "a line of the stored programs, compiled", "", "7.19"),
-    Command("SLOAD", "bare", "RW", "programs that run after power-up, a bit each", "0 to 3", "7.19.7"),
-    # The controller
-    Command("STORE", "bare", "-", "keep the settings that can be kept (table 7.15); speeds cannot", "", "7.20"),
-    Command("TOC", "bare", "RW", "watchdog: time without a command after which bit 11 of the motor status is set",
-            "ms; 0: off", "7.18", "every command counts, those of a display that polls too"),
-    Command("DN", "bare", "RW", "device name; its last two digits are the address", "2ED00 to 2ED99", "6.3",
-            "acts after STORE and a power cycle"),
-    Command("DB", "bare", "RW", "baud rate", "1 9600, 2 19200, 3 38400, 4 57600, 5 115200", "6.2.2",
-            "acts after STORE and a power cycle"),
-    Command("ID", "bare", "R", "what the controller is", "", "9.1"),
-    Command("VER", "bare", "R", "firmware version", "", "9.1"),
-)  # fmt: skip
-
+ROWS: tuple[Command, ...] = tuple(
+    Command(
+        *(row[field] for field in ("name", "shape", "access", "meaning", "takes", "section", "note")),
+        bool(row["starts"]),
+    )
+    for row in rows(__file__, "commands.csv")
+)
 COMMANDS: Mapping[str, Command] = {row.name: row for row in ROWS}
 WORDS: Mapping[str, Command] = {word: row for row in ROWS for word in row.words()}
 """Every word, with its axis, direction or number."""
