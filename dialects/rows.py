@@ -1,4 +1,7 @@
-"""The tables of the manuals: a `.csv` file beside the module that reads it, with a row for each word or number."""
+"""The tables of the manuals: a `.csv` file beside the module that reads it, with a row for each word or number.
+
+A row may leave out empty cells at its end.
+"""
 
 from __future__ import annotations
 
@@ -10,4 +13,4 @@ from pathlib import Path
 def rows(module: str, name: str) -> Iterator[dict[str, str]]:
     """The rows of a table by its head line; `module` is the `__file__` of the reader."""
     with Path(module).with_name(name).open(encoding="utf-8", newline="") as table:
-        yield from csv.DictReader(table)
+        yield from csv.DictReader(table, restval="")

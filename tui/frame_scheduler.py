@@ -29,10 +29,7 @@ class Frames:
     """
 
     def __init__(
-        self,
-        paint: Callable[[bool], bool],
-        later: Callable[[Callable[[], None]], bool],
-        behind: Callable[[], bool],
+        self, paint: Callable[[bool], bool], later: Callable[[Callable[[], None]], bool], behind: Callable[[], bool]
     ) -> None:
         self._paint, self._later, self._behind = paint, later, behind
         self._beat = 0

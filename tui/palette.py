@@ -63,11 +63,7 @@ class Recent:
 
 
 def all_commands(
-    session: Session,
-    macros: FunctionKeys,
-    verbs: Iterable[tuple[str, str, str]],
-    keys: Keymap,
-    switches: Switches,
+    session: Session, macros: FunctionKeys, verbs: Iterable[tuple[str, str, str]], keys: Keymap, switches: Switches
 ) -> Iterator[Command]:
     """Each function, the most urgent first."""
     yield Command("Stop all", "every drive, macro and script, now", "app.stop_all", "^X", urgent=True)

@@ -150,11 +150,7 @@ def apply(chosen: argparse.Namespace) -> int:
     if chosen.source and is_several(chosen.drive):
         raise Diagnostic(f"--from {chosen.source} is for one drive", "snapshot apply", "--drive names one")
     cell = cells.load(chosen.file, configuration.load().allowed)
-    wanted = Options(
-        named=_named(chosen),
-        dry_run=chosen.dry_run,
-        other_product=chosen.other_product,
-    )
+    wanted = Options(named=_named(chosen), dry_run=chosen.dry_run, other_product=chosen.other_product)
 
     async def work(session: Session) -> None:
         drives = [drive for each in session.buses.values() for drive in each.drives.values()]

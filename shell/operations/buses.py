@@ -74,31 +74,21 @@ TUI = Operation(
     meaning="show the screen, with a tab for each bus",
     run="lines.tui",
     examples=["tui sim:", "tui press eth"],
-    arguments={
-        **SHOWN,
-    },
+    arguments={**SHOWN},
 )
 SHELL = Operation(
     command="shell",
     meaning="show the prompt; read lines from standard input if that is not a terminal",
     run="lines.shell",
     examples=["shell sim:", "shell /dev/ttyUSB0?drives=a,b", "shell sim: < lines.txt", "shell --raw /dev/ttyUSB0"],
-    arguments={
-        **SHOWN,
-        "--yes": YES,
-    },
+    arguments={**SHOWN, "--yes": YES},
 )
 SEND = Operation(
     command="send",
     meaning="run lines, print the replies, exit",
     run="lines.send",
     examples=['send sim:#press "@a MR 51200" "/wait stopped" "@a PR P"', 'send press "PR AL"'],
-    arguments={
-        "URL": WHAT,
-        "LINE ...": "text for a drive, @ADDR TEXT, or a /verb",
-        "--json": SUMMED,
-        "--yes": YES,
-    },
+    arguments={"URL": WHAT, "LINE ...": "text for a drive, @ADDR TEXT, or a /verb", "--json": SUMMED, "--yes": YES},
 )
 RUN = Operation(
     command="run",
@@ -130,11 +120,7 @@ OPEN = Operation(
     work="buses:open_",
     rows="multidrop.shell.connect.url_forms:table",
 )
-CLOSE = Operation(
-    usage="/close BUS",
-    help="Close a bus; moves nothing and stops nothing.",
-    work="buses:close",
-)
+CLOSE = Operation(usage="/close BUS", help="Close a bus; moves nothing and stops nothing.", work="buses:close")
 USE = Operation(
     usage="/use ADDR|BUS[:ADDR]",
     help="""Select the drive or the bus for lines without an address.
@@ -264,10 +250,7 @@ TAB = Operation(
     usage="/tab left|right [BUS]",
     help="Move the tab of a bus, by default of the selected one; no drive moves.",
     work="buses:tab",
-    words={
-        "left": "before its neighbour",
-        "right": "after its neighbour",
-    },
+    words={"left": "before its neighbour", "right": "after its neighbour"},
     immediate=True,
 )
 KEEP = Operation(
@@ -329,7 +312,5 @@ PORTS = Operation(
     meaning="list the serial ports of this machine, with their stable names",
     run="serving.ports",
     examples=["ports", "ports --json"],
-    arguments={
-        "--json": JSON,
-    },
+    arguments={"--json": JSON},
 )

@@ -170,10 +170,7 @@ SNAPSHOT = Operation(
         "snapshot apply machine.toml press --drive b",
         "snapshot apply machine.toml /dev/ttyUSB0 --from b --dry-run",
     ],
-    arguments={
-        "URL ...": WHAT,
-        "-o|--output CELL.toml": typed("the new file; -: standard output", required=True),
-    },
+    arguments={"URL ...": WHAT, "-o|--output CELL.toml": typed("the new file; -: standard output", required=True)},
 )
 SNAPSHOT_APPLY = Operation(
     command="snapshot apply",

@@ -2,15 +2,7 @@
 
 from __future__ import annotations
 
-from multidrop.shell.operations.arguments import (
-    JUNIT,
-    SUMMED,
-    YES,
-    function_key,
-    named_value,
-    role_url,
-    rounds,
-)
+from multidrop.shell.operations.arguments import JUNIT, SUMMED, YES, function_key, named_value, role_url, rounds
 from multidrop.shell.operations.operation import Operation, typed
 
 MACROS = Operation(
@@ -56,9 +48,7 @@ MACRO_SHOW = Operation(
     meaning="print a macro's file",
     run="macros.show",
     examples=["macro show shuttle"],
-    arguments={
-        "NAME": None,
-    },
+    arguments={"NAME": None},
 )
 PLAY = Operation(
     usage="/play MACRO [NAME=VALUE ...] [--times N|forever] [--fast] | stop [MACRO]",
@@ -103,50 +93,35 @@ MACRO_EDIT = Operation(
     meaning="open a macro's file in the editor of VISUAL or EDITOR; it changes only once the whole text is right",
     run="macros.change",
     examples=["macro edit shuttle"],
-    arguments={
-        "NAME": None,
-    },
+    arguments={"NAME": None},
 )
 MACRO_DESCRIBE = Operation(
     command="macro describe",
     meaning="change a macro's note",
     run="macros.change",
     examples=['macro describe shuttle "ten turns and back"'],
-    arguments={
-        "NAME": None,
-        "text=TEXT ...": "the note",
-    },
+    arguments={"NAME": None, "text=TEXT ...": "the note"},
 )
 MACRO_RENAME = Operation(
     command="macro rename",
     meaning="give a macro another name",
     run="macros.change",
     examples=["macro rename shuttle ten-turns"],
-    arguments={
-        "NAME": None,
-        "NEW": "the other name",
-    },
+    arguments={"NAME": None, "NEW": "the other name"},
 )
 MACRO_COPY = Operation(
     command="macro copy",
     meaning="copy a macro; --project: into the folder macros of the current folder",
     run="macros.change",
     examples=["macro copy shuttle shuttle --project"],
-    arguments={
-        "NAME": None,
-        "NEW": "the other name",
-        "--project": "into the folder macros of the current folder",
-    },
+    arguments={"NAME": None, "NEW": "the other name", "--project": "into the folder macros of the current folder"},
 )
 MACRO_DELETE = Operation(
     command="macro delete",
     meaning="delete a macro; asks first",
     run="macros.change",
     examples=["macro delete shuttle"],
-    arguments={
-        "NAME": None,
-        "--yes": YES,
-    },
+    arguments={"NAME": None, "--yes": YES},
 )
 KEY = Operation(
     usage="/key F2..F12 MACRO|off [--page PAGE]",
@@ -155,10 +130,7 @@ KEY = Operation(
     Keys are in pages, each a number or a word; the default is 1. Only key and page in the macro's file change.
     """,
     work="macros:key",
-    words={
-        "off": "free the key",
-        "--page": "on another page of keys",
-    },
+    words={"off": "free the key", "--page": "on another page of keys"},
     immediate=True,
     command="macro key",
     meaning="put a macro on a function key, or free the key",
@@ -185,10 +157,7 @@ MACRO_EXPORT = Operation(
     meaning="write macros to a new file of a vendor's function-key strings",
     run="macros.change",
     examples=["macro export keys.txt", "macro export keys.txt f2 shuttle"],
-    arguments={
-        "FILE": "the new file (-: standard output)",
-        "[NAME ...]": "a macro (default: those on keys)",
-    },
+    arguments={"FILE": "the new file (-: standard output)", "[NAME ...]": "a macro (default: those on keys)"},
 )
 RECORD = Operation(
     usage="/record [MACRO [--replace] | stop [--waits]]",

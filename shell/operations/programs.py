@@ -114,10 +114,7 @@ LIST = Operation(
     meaning="print the program in a drive",
     run="drives.list_",
     examples=["program list sim:#pmx"],
-    arguments={
-        "URL": WHAT,
-        "--drive ADDR": drives("the drive (default: the first), or all"),
-    },
+    arguments={"URL": WHAT, "--drive ADDR": drives("the drive (default: the first), or all")},
 )
 UPLOAD = Operation(
     usage="/upload FILE [ADDR]",
@@ -201,19 +198,14 @@ BREAK = Operation(
     A drive has one break point. Without arguments, show it.
     """,
     work="programs:break_",
-    words={
-        "off": "remove the break point",
-        "now": "break the running program where it is",
-    },
+    words={"off": "remove the break point", "now": "break the running program where it is"},
     recorded="programs:debugger_recorded",
 )
 WATCH = Operation(
     usage="/watch [ADDR] off | /watch [ADDR] NAME ...",
     help="Show variables now, and whenever a step, a break or the end of a program has changed them.",
     work="programs:watch",
-    words={
-        "off": "watch nothing",
-    },
+    words={"off": "watch nothing"},
     recorded="programs:debugger_recorded",
 )
 LSP = Operation(
@@ -229,8 +221,4 @@ LSP = Operation(
         },
     },
 )
-PROGRAM = Operation(
-    command="program",
-    meaning="check, test and sweep program files; transfer programs",
-    urls=True,
-)
+PROGRAM = Operation(command="program", meaning="check, test and sweep program files; transfer programs", urls=True)

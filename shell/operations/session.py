@@ -67,10 +67,7 @@ STOP = Operation(
     immediate=True,
 )
 RESUME = Operation(
-    usage="/resume",
-    help="Let macros and scripts run again after a stop.",
-    work="session:resume",
-    immediate=True,
+    usage="/resume", help="Let macros and scripts run again after a stop.", work="session:resume", immediate=True
 )
 LOG = Operation(
     usage="/log [FILE|on|off]",
@@ -79,10 +76,7 @@ LOG = Operation(
     Without a word it shows the file. `multidrop log show` shows what is in it.
     """,
     work="session:log",
-    words={
-        "on": "a new file in the state folder",
-        "off": "end the log",
-    },
+    words={"on": "a new file in the state folder", "off": "end the log"},
     immediate=True,
 )
 LOG_SHOW = Operation(
@@ -90,18 +84,14 @@ LOG_SHOW = Operation(
     meaning="print a session log: typed lines, bytes both ways, replies, notices, failures",
     run="log.show",
     examples=["log show", "log show day.jsonl --drive b", "log show --json"],
-    arguments={
-        **ENTRIES,
-    },
+    arguments={**ENTRIES},
 )
 LOG_FOLLOW = Operation(
     command="log follow",
     meaning="print the end of a session log, and what is added to it, until interrupted",
     run="log.follow",
     examples=["log follow"],
-    arguments={
-        **ENTRIES,
-    },
+    arguments={**ENTRIES},
 )
 LOG_GREP = Operation(
     command="log grep",
@@ -121,10 +111,7 @@ LOG_REPLAY = Operation(
     examples=["log replay day.jsonl --against machine.toml --fast", "log replay day.jsonl --to sim:"],
     arguments={
         "FILE": "a session log; its last session is replayed",
-        "--to | --against": {
-            "--to URL": WHAT,
-            "--against CELL": "a cell file (TOML), in virtual time",
-        },
+        "--to | --against": {"--to URL": WHAT, "--against CELL": "a cell file (TOML), in virtual time"},
         "--fast": "leave out the pauses between lines",
         "--json": "print one JSON object a difference, and a summary",
         "--yes": YES,
@@ -187,11 +174,7 @@ UNSENT = Operation(
     fits=has_transcript,
 )
 SLEEP = Operation(
-    usage="/sleep SECONDS",
-    help="Wait for a time.",
-    work="session:sleep",
-    recorded="typed",
-    checked="session:duration",
+    usage="/sleep SECONDS", help="Wait for a time.", work="session:sleep", recorded="typed", checked="session:duration"
 )
 WAIT = Operation(
     usage='/wait stopped|idle [SECONDS] | [@ADDR] WORD=VALUE [SECONDS] | "TEXT" [SECONDS]',
@@ -202,10 +185,7 @@ WAIT = Operation(
     !=, <, <=, > or >=. A text counts since the last line to a drive.
     """,
     work="session:wait",
-    words={
-        "stopped": "until all drives stand",
-        "idle": "until all drives stand and no program runs",
-    },
+    words={"stopped": "until all drives stand", "idle": "until all drives stand and no program runs"},
     recorded="session:with_drive",
     checked="session:wanted_wait",
 )
@@ -232,19 +212,14 @@ REPORT = Operation(
     meaning="show what a bug report needs, and write it to a file",
     run="machine.report",
     examples=["report", "report -o report.txt"],
-    arguments={
-        "-o|--output FILE": "a new file (default: asks in a terminal)",
-        "--yes": "write it without a question",
-    },
+    arguments={"-o|--output FILE": "a new file (default: asks in a terminal)", "--yes": "write it without a question"},
 )
 COMPLETION = Operation(
     command="completion",
     meaning="print the completion of this command line for a shell",
     run="serving.completion",
     examples=["completion bash > ~/.local/share/bash-completion/completions/multidrop", "completion fish | source"],
-    arguments={
-        "shell": typed(None, choices=("bash", "zsh", "fish")),
-    },
+    arguments={"shell": typed(None, choices=("bash", "zsh", "fish"))},
 )
 LOG_GROUP = Operation(command="log", meaning="show, follow, search and replay session logs, which /log begins")
 CONFIG = Operation(command="config", meaning="show and check the configuration: saved connections, keys, colours")

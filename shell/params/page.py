@@ -11,16 +11,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from multidrop.dialects import Diagnostic
-from multidrop.dialects.values import (
-    ORDINARY,
-    Parameters,
-    Permission,
-    Reading,
-    Readings,
-    Scalar,
-    Value,
-    same,
-)
+from multidrop.dialects.values import ORDINARY, Parameters, Permission, Reading, Readings, Scalar, Value, same
 from multidrop.shell.params.file import shown
 
 if TYPE_CHECKING:

@@ -78,12 +78,7 @@ async def checked(
 
 
 async def download(
-    session: Session,
-    drive: Drive,
-    file: str,
-    wanted: Wanted = Wanted(),
-    text: str | None = None,
-    by: By = By.OPERATOR,
+    session: Session, drive: Drive, file: str, wanted: Wanted = Wanted(), text: str | None = None, by: By = By.OPERATOR
 ) -> None:
     """Send a program file to a drive. `text`: what a file of that name would hold.
 

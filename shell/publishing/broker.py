@@ -166,11 +166,7 @@ class Connection:
     def _begin(self) -> None:
         """Open the socket, and begin the thread. Blocks."""
         paho = load()
-        client = paho.Client(
-            paho.CallbackAPIVersion.VERSION2,
-            client_id=self._name,
-            reconnect_on_failure=False,
-        )
+        client = paho.Client(paho.CallbackAPIVersion.VERSION2, client_id=self._name, reconnect_on_failure=False)
         _log_in(client, self._target, self._settings)
         client.will_set(self._will.topic, self._will.text, 1, retain=True)
         client.max_inflight_messages_set(WINDOW)

@@ -84,11 +84,7 @@ class Place:
 
 
 async def known(
-    session: Session,
-    tree: Expression,
-    values: Mapping[str, str],
-    by: By,
-    place: Place | None = None,
+    session: Session, tree: Expression, values: Mapping[str, str], by: By, place: Place | None = None
 ) -> dict[Name | Word, Value]:
     """Find the value of each name and word of an expression; each word is read once.
 

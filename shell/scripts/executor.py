@@ -88,10 +88,7 @@ class _Nobody:
 
 
 async def run_script(
-    session: Session,
-    script: Script,
-    executed: Executed = lambda result: None,
-    by: By = By.SCRIPT,
+    session: Session, script: Script, executed: Executed = lambda result: None, by: By = By.SCRIPT
 ) -> None:
     """Execute a script. `executed` gets the result of each line. Raises the first failure."""
     own = script_claims(session, script)

@@ -44,13 +44,7 @@ class EventLoop:
         self._before: tuple[bool, bool, int] | None = None
         self._next: Event = inf, nothing
         jogs = dict.fromkeys(JOGS, motor.update_jog)
-        self._risen = {
-            GO: self._go,
-            SOFT_STOP: self._soft_stop,
-            PAUSE: self._pause,
-            RESET: self._reset,
-            **jogs,
-        }
+        self._risen = {GO: self._go, SOFT_STOP: self._soft_stop, PAUSE: self._pause, RESET: self._reset, **jogs}
         self._fallen = {PAUSE: self._resume, **jogs}
 
     def proceed(self, now: float) -> float | None:

@@ -333,10 +333,4 @@ def _at_baud(spec: DriveSpec, baud: int) -> DriveSpec:
     return replace(spec, set={"BD": code, **spec.set})
 
 
-MCODE = Family(
-    name="mcode",
-    read_drive=read_drive,
-    build=build,
-    snapshots=SNAPSHOTS,
-    ethernet=ETHERNET,
-)
+MCODE = Family(name="mcode", read_drive=read_drive, build=build, snapshots=SNAPSHOTS, ethernet=ETHERNET)

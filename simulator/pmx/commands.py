@@ -138,8 +138,7 @@ AXIS_WORDS: dict[str, Word] = {
     ),
     "MST": Word(get=PmxController.status),
     "P": Word(
-        get=lambda pmx, axis, t: axis.position(t),
-        set=lambda pmx, axis, text, t: axis.set_position(number(text), t),
+        get=lambda pmx, axis, t: axis.position(t), set=lambda pmx, axis, text, t: axis.set_position(number(text), t)
     ),
     "PS": Word(get=_speed),
     "SLS": Word(get=lambda pmx, axis, t: axis.loop.status),

@@ -165,9 +165,5 @@ def _shadow(device: PmxDevice) -> Shadow:
 
 
 PMX = Family(
-    name="pmx",
-    read_drive=read_drive,
-    build=build,
-    snapshots=Snapshots(describe, wanted, program),
-    addressed=True,
+    name="pmx", read_drive=read_drive, build=build, snapshots=Snapshots(describe, wanted, program), addressed=True
 )

@@ -31,13 +31,7 @@ SIGNALS = (signal.SIGINT, signal.SIGTERM, getattr(signal, "SIGHUP", signal.SIGTE
 
 
 async def serve(
-    cell_path: str | None,
-    *,
-    json: bool,
-    speed: float,
-    stdin: TextIO | None,
-    stdout: TextIO,
-    allow: Sequence[Path] = (),
+    cell_path: str | None, *, json: bool, speed: float, stdin: TextIO | None, stdout: TextIO, allow: Sequence[Path] = ()
 ) -> None:
     """Serve a cell (None: the demo cell) until SIGINT, SIGTERM or SIGHUP; `allow`: its paths may lead there, too.
 

@@ -13,14 +13,7 @@ from multidrop.dialects.codec import End, Kind, Procedure, Request
 from multidrop.dialects.errors import Inexpressible, NoAnswer
 from multidrop.dialects.mcode.host import classify
 from multidrop.dialects.mcode.host.codec import MCode
-from multidrop.dialects.mcode.host.exchange import (
-    printed_value,
-    question,
-    read_error,
-    refused,
-    synchronise,
-    value,
-)
+from multidrop.dialects.mcode.host.exchange import printed_value, question, read_error, refused, synchronise, value
 from multidrop.dialects.mcode.host.framing import NAK
 from multidrop.dialects.mcode.host.identity import activate_party, asked, find, find_in_text, look_in, pinged
 from multidrop.dialects.mcode.host.state import MCodeState, Place, described, unknown, who

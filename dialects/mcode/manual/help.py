@@ -15,13 +15,7 @@ from multidrop.dialects.mcode.manual.mnemonic import EVERY, LEXIUM, MDRIVE_PLUS,
 from multidrop.dialects.mcode.manual.statements import condition_of, condition_reading, is_mixed, words_of
 from multidrop.dialects.mcode.manual.table import MDRIVE, MNEMONICS, lookup, words
 
-ACCESS = {
-    "RW": "read and write",
-    "RO": "read only",
-    "WO": "write only",
-    "RC": "read, and cleared",
-    "-": "not a value",
-}
+ACCESS = {"RW": "read and write", "RO": "read only", "WO": "write only", "RC": "read, and cleared", "-": "not a value"}
 _WORD = re.compile(r"[A-Za-z]_|[A-Za-z][A-Za-z0-9]*", re.ASCII)
 _LAST = re.compile(r"[A-Za-z][A-Za-z0-9]*$", re.ASCII)
 _QUOTED = re.compile(r'"[^"]*"?')

@@ -7,16 +7,7 @@ from functools import reduce
 from operator import or_
 
 from multidrop.dialects.mcode.manual import guards, program_file, program_flow
-from multidrop.dialects.mcode.manual.grammar import (
-    NAME_FORM,
-    LineError,
-    Name,
-    Number,
-    Statement,
-    is_name,
-    parse,
-    words,
-)
+from multidrop.dialects.mcode.manual.grammar import NAME_FORM, LineError, Name, Number, Statement, is_name, parse, words
 from multidrop.dialects.mcode.manual.help import form_of, out_of_range
 from multidrop.dialects.mcode.manual.mnemonic import EVERY, Mnemonic
 from multidrop.dialects.mcode.manual.program_file import ProgramLine

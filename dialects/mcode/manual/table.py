@@ -6,7 +6,9 @@ MCode reference of 2012 (R062812); words of the Hybrid's firmware are absent. Th
 I/O and refuses them (37). So does a unit without an encoder with the nine encoder words, of which it prints three as 0.
 
 A row has the fields of a `Mnemonic`. Marks: `starts` and `lines`; `stored` is a word of programs only, `typed` one of
-typed lines only. Empty: all products of the table, and for a step error 25; `-` is no product.
+typed lines only. Empty: all products of the table, and for a step error 25; `-` is none. A row of an MDrivePlus gives
+what differs from the Lexium's row of that word, and always its own section, products and note; one that is marked `own`
+takes nothing from it.
 """
 
 from __future__ import annotations
@@ -14,15 +16,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from types import MappingProxyType
 
-from multidrop.dialects.mcode.manual.mnemonic import (
-    EVERY,
-    LEXIUM,
-    MDRIVE_PLUS,
-    READ_ONLY,
-    Default,
-    Mnemonic,
-    Number,
-)
+from multidrop.dialects.mcode.manual.mnemonic import EVERY, LEXIUM, MDRIVE_PLUS, READ_ONLY, Default, Mnemonic, Number
 from multidrop.dialects.rows import rows
 
 
@@ -73,13 +67,19 @@ def _mnemonic(row: Mapping[str, str], products: frozenset[str]) -> Mnemonic:
     )
 
 
-def _table(name: str, products: frozenset[str]) -> Mapping[str, Mnemonic]:
-    return MappingProxyType({row["name"]: _mnemonic(row, products) for row in rows(__file__, name)})
+def _like(row: Mapping[str, str]) -> Mapping[str, str]:
+    """A row of an MDrivePlus, with what it does not give taken from the Lexium's row of the word."""
+    base = {} if "own" in row["marks"].split() else _ROWS.get(row["name"], {})
+    return {field: text or (base.get(field, "") if field in _SHARED else "") for field, text in row.items()}
 
 
-MNEMONICS = _table("lexium.csv", LEXIUM)
+_ROWS = {row["name"]: row for row in rows(__file__, "lexium.csv")}
+_SHARED = frozenset(next(iter(_ROWS.values()))) - {"section", "note", "products", "reserved_on", "zero_on"}
+MNEMONICS = MappingProxyType({name: _mnemonic(row, LEXIUM) for name, row in _ROWS.items()})
 """The Lexium's words by name, in capitals; each indexed word has its own row (`D1`, `O3`, `F8`)."""
-MDRIVE = _table("mdrive_plus.csv", MDRIVE_PLUS)
+MDRIVE = MappingProxyType(
+    {row["name"]: _mnemonic(_like(row), MDRIVE_PLUS) for row in rows(__file__, "mdrive_plus.csv")}
+)
 """The MDrivePlus's words by name."""
 
 PRINTS_LINES = frozenset(name for name, row in MNEMONICS.items() if row.lines)

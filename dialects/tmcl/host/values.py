@@ -16,14 +16,7 @@ from multidrop.dialects.tmcl.host.codec import TmclState
 from multidrop.dialects.tmcl.host.operations import busy, motors, moving, perform, read, who
 from multidrop.dialects.tmcl.host.programs import read_held
 from multidrop.dialects.tmcl.manual.commands import STARTING_PARAMETERS, Axis, Call, Command, Global
-from multidrop.dialects.tmcl.manual.modules import (
-    BAUDS,
-    MODULES,
-    RELATIVE_FROM,
-    Module,
-    Parameter,
-    module_of,
-)
+from multidrop.dialects.tmcl.manual.modules import BAUDS, MODULES, RELATIVE_FROM, Module, Parameter, module_of
 from multidrop.dialects.values import (
     BY,
     COMMUNICATION,

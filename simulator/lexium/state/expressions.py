@@ -73,12 +73,7 @@ _COMPARE: Mapping[str, Callable[[Value, Value], bool]] = {
 }
 _ANGLE_IN: Mapping[str, Callable[[float], float]] = {"CS": math.cos, "SI": math.sin, "TG": math.tan}
 _ANGLE_OUT: Mapping[str, Callable[[float], float]] = {"C_": math.acos, "S_": math.asin, "T_": math.atan}
-_PLAIN: Mapping[str, Callable[[float], float]] = {
-    "AB": abs,
-    "LO": math.log2,
-    "L_": math.log10,
-    "SQ": math.sqrt,
-}
+_PLAIN: Mapping[str, Callable[[float], float]] = {"AB": abs, "LO": math.log2, "L_": math.log10, "SQ": math.sqrt}
 
 
 def is_floating(expression: Expression) -> bool:
