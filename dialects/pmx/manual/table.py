@@ -57,7 +57,13 @@ class Command:
 
 ROWS: tuple[Command, ...] = tuple(
     Command(
-        *(row[field] for field in ("name", "shape", "access", "meaning", "takes", "section", "note")),
+        row["name"],
+        row["shape"],
+        row["access"],
+        row["meaning"],
+        row["takes"],
+        row["section"],
+        row["note"],
         bool(row["starts"]),
     )
     for row in rows(__file__, "commands.csv")
