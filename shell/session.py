@@ -48,6 +48,7 @@ if TYPE_CHECKING:
 
 _published: ContextVar[list[BaseException] | None] = ContextVar("published", default=None)
 """The failures published in this task's outermost `run`."""
+BARE_WORDS = {"exit": "/quit", "quit": "/quit", "help": "/help", "?": "/help"}
 CALL = "multidrop.shell.verbs.call:Call"
 """One use of a verb; it knows this class, so this module has only its name."""
 
@@ -148,6 +149,8 @@ class Session(Workspace):
                     raise Stopped(f"a stop came after '{typed.strip()}' was typed; it was not sent")
                 parsed = _raw_line(self, line) or (parse(line) if isinstance(line, str) else line)
                 if isinstance(parsed, DriveLine):
+                    parsed = self.path.meant(parsed, by)
+                if isinstance(parsed, DriveLine):
                     target = parsed
                     await self.path.text(parsed, by)
                 elif parsed is not None:
@@ -212,6 +215,20 @@ class LinePath:
 
     def __init__(self, session: Session) -> None:
         self._session = session
+
+    def meant(self, parsed: DriveLine, by: By) -> TypedLine:
+        """The verb that a bare word of a person means (`exit`, `help`): a drive would take it for a wrong command.
+
+        Program mode and raw mode take the word as it is. Raises Diagnostic where nobody types: in a script, a pipe.
+        """
+        session, word = self._session, parsed.typed.strip().lower()
+        bus = session.buses.get(session.selected_bus)
+        storing = session.selected is not None and session.selected.programming
+        if word not in BARE_WORDS or storing or (bus is not None and session.of(bus).raw is not None):
+            return parsed
+        if by is By.OPERATOR and session.front.before_quit is not None:
+            return VerbLine(BARE_WORDS[word], "", parsed.typed)
+        raise Diagnostic(f"'{word}' is no command of a drive, nothing was sent", hint=f"{BARE_WORDS[word]} is the verb")
 
     async def verb(self, parsed: VerbLine, by: By) -> None:
         """Run a verb, as a task that a stop ends."""

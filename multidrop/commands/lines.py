@@ -1,10 +1,12 @@
-"""`multidrop`, `demo`, `tui`, `shell`, `send` and `run`: the screen, the prompt, lines and scripts."""
+"""`multidrop`, `demo`, `tui`, `shell`, `send`, `run` and `help`: the screen, the prompt, lines, scripts, words."""
 
 from __future__ import annotations
 
 import argparse
+import contextlib
 import sys
 from functools import partial
+from shlex import quote
 from typing import TYPE_CHECKING
 
 from multidrop.commands import refused
@@ -12,6 +14,7 @@ from multidrop.dialects import Diagnostic
 from multidrop.dialects.on_demand import importing
 
 if TYPE_CHECKING:
+    from multidrop.dialects.family import Language
     from multidrop.shell.session import Session
 
 
@@ -107,3 +110,37 @@ def _screen(urls: list[str], reconnect: bool = True, raw: bool = False, twin: bo
         from multidrop.tui.launch import run
 
     return run(urls, reconnect, raw, twin)
+
+
+def help_(chosen: argparse.Namespace) -> int:
+    """Explain a word in the language that is named, or in the first that has it; name the others."""
+    from multidrop.dialects.families import DEFAULT, FAMILIES, languages
+    from multidrop.shell.streams.stdout import write
+    from multidrop.shell.verbs.session import explained, overview
+
+    word, lines = chosen.word, []
+    if chosen.dialect:
+        language = FAMILIES[chosen.dialect].language
+        lines = language.describe_error(int(word[:9])) if _is_number(word) else language.describe(word)
+    elif word:
+        having = [each for each in languages() if _has(each, word)]
+        lines = explained(word, having[0] if having else FAMILIES[DEFAULT].language)
+        for each in having[1:]:
+            name = next(name for name, family in FAMILIES.items() if family.language is each)
+            lines.append(f"also: multidrop help {quote(word)} --dialect {name}")
+    for line in lines or overview():
+        write(sys.stdout, line)
+    return 0
+
+
+def _is_number(word: str) -> bool:
+    return word.isdecimal() and word.isascii()
+
+
+def _has(language: Language, word: str) -> bool:
+    """Whether a language has a word, or an error with that number."""
+    if not _is_number(word):
+        return language.knows(word)
+    with contextlib.suppress(Diagnostic):
+        return bool(language.describe_error(int(word[:9])))
+    return False

@@ -65,7 +65,7 @@ function _shtab_multidrop_using
   test "$_shtab_multidrop_cmdpath" = "$argv"
 end
 
-set -g _shtab_multidrop_commands demo tui shell send run sim program 'program check' 'program test' 'program sweep' 'program list' 'program upload' 'program download' params 'params backup' 'params diff' 'params restore' macro 'macro list' 'macro show' 'macro play' 'macro edit' 'macro describe' 'macro rename' 'macro copy' 'macro delete' 'macro key' 'macro import' 'macro export' plot publish share snapshot ports relay scan rescue log 'log show' 'log follow' 'log grep' 'log replay' config 'config path' 'config show' 'config check' lsp report completion
+set -g _shtab_multidrop_commands demo tui shell send run sim program 'program check' 'program test' 'program sweep' 'program list' 'program upload' 'program download' params 'params backup' 'params diff' 'params restore' macro 'macro list' 'macro show' 'macro play' 'macro edit' 'macro describe' 'macro rename' 'macro copy' 'macro delete' 'macro key' 'macro import' 'macro export' plot publish share snapshot ports relay scan rescue log 'log show' 'log follow' 'log grep' 'log replay' config 'config path' 'config show' 'config check' help lsp report completion
 set -g _shtab_multidrop_opts_with_value --against --allow --baud --break --cell --cluster --dialect --drive --expect --jobs --junit --language --on --other --output --page --personality --random --rate --rfc2217 --role --run --save --seed --serve --set --speed --tcp --times --to --until --vary --watch --with -o
 
 complete -c multidrop -e
@@ -313,6 +313,9 @@ complete -c multidrop -n '_shtab_multidrop_using config; and test $_shtab_multid
 complete -c multidrop -n '_shtab_multidrop_using config show' -s h -l help -d 'show this help message and exit'
 complete -c multidrop -n '_shtab_multidrop_using config; and test $_shtab_multidrop_npos -eq 0' -a check -d 'Report what is wrong in the configuration, by line.'
 complete -c multidrop -n '_shtab_multidrop_using config check' -s h -l help -d 'show this help message and exit'
+complete -c multidrop -n '_shtab_multidrop_using; and test $_shtab_multidrop_npos -eq 0' -a help -d 'Explain a command of the drives, an error number or a verb; without a connection.'
+complete -c multidrop -n '_shtab_multidrop_using help' -s h -l help -d 'show this help message and exit'
+complete -c multidrop -n '_shtab_multidrop_using help' -l dialect -xka "mcode modbus pmx tmcl" -d 'in this language (default: the first that has the word)'
 complete -c multidrop -n '_shtab_multidrop_using; and test $_shtab_multidrop_npos -eq 0' -a lsp -d 'Serve an editor: check, help, completion and renaming in program files (Language Server Protocol).'
 complete -c multidrop -n '_shtab_multidrop_using lsp' -s h -l help -d 'show this help message and exit'
 complete -c multidrop -n '_shtab_multidrop_using lsp' -l personality -xka "LMDOM LMDCM LMDOE LMDCE LMM MDI MDIE MDIX" -d 'the drive that programs are for, unless the editor names one (default: LMDCM)'

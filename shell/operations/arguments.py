@@ -190,6 +190,12 @@ def tested_personality() -> Mapping[str, Any]:
     return typed(about, type=str.upper, choices=tested)
 
 
+def spoken() -> Mapping[str, Any]:
+    from multidrop.dialects.families import FAMILIES
+
+    return typed("in this language (default: the first that has the word)", choices=list(FAMILIES), default=None)
+
+
 def dialect() -> Mapping[str, Any]:
     from multidrop.dialects.families import FAMILIES
 

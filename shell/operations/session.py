@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from multidrop.shell import roles
-from multidrop.shell.operations.arguments import WHAT, YES, drives
+from multidrop.shell.operations.arguments import WHAT, YES, drives, spoken
 from multidrop.shell.operations.operation import Arguments, Operation, typed
 
 if TYPE_CHECKING:
@@ -36,6 +36,14 @@ HELP = Operation(
     """,
     work="session:help_",
     immediate=True,
+    command="help",
+    meaning="explain a command of the drives, an error number or a verb; without a connection",
+    run="lines.help_",
+    examples=["help 86", "help VM", "help EX --dialect pmx"],
+    arguments={
+        "[WORD|NUMBER]": "a command, an error number, or a verb (default: the list of all verbs)",
+        "--dialect D": spoken,
+    },
 )
 PAGE = Operation(
     usage="/page NAME",

@@ -18,7 +18,7 @@ VERB_ORDER = """
     /unsent /twin /sleep /wait
 """
 COMMAND_ORDER = """demo tui shell send run sim program params macro plot publish share snapshot ports relay scan rescue
-    log config lsp report completion"""
+    log config help lsp report completion"""
 SCRIPT_WORDS = {
     "/set": "/set NAME EXPR",
     "/if": "/if EXPR",

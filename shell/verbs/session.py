@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 import difflib
 import re
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 from multidrop.dialects import Diagnostic, Stopped
 from multidrop.dialects.families import DEFAULT, FAMILIES, languages
@@ -20,9 +20,6 @@ from multidrop.shell.operations.table import VERBS
 from multidrop.shell.operations.usage import split
 from multidrop.shell.roles import EVERYTHING, TIMES, Filter, Transcripts
 from multidrop.shell.verbs.call import Call, words
-
-if TYPE_CHECKING:
-    pass
 
 
 async def stop(call: Call) -> None:
@@ -222,14 +219,17 @@ WIDTH = 28
 
 
 async def help_(call: Call) -> None:
-    words, selected = call.words(), call.session.selected
+    word, selected = call.word(), call.session.selected
     language, product = (selected.family.language, selected.product) if selected else (FAMILIES[DEFAULT].language, "")
-    if words and words[0].isdecimal() and words[0].isascii():
-        lines = language.describe_error(int(words[0][:9]), product)
-    else:
-        lines = described(words[0], language, product) if words else overview()
-    for line in lines:
+    for line in explained(word, language, product) if word else overview():
         call.session.output(line, columns=True)
+
+
+def explained(word: str, language: Language, product: str = "") -> list[str]:
+    """The help on a verb, a command or an error number. Raises Diagnostic for what is none."""
+    if word.isdecimal() and word.isascii():
+        return language.describe_error(int(word[:9]), product)
+    return described(word, language, product)
 
 
 def overview() -> list[str]:

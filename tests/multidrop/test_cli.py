@@ -141,3 +141,28 @@ def test_the_version_says_which_extras_are_installed(monkeypatch):
     assert cli.version() == f"multidrop {multidrop.__version__}, Python {python}, extras: here"
     monkeypatch.setattr(cli, "EXTRAS", {})
     assert cli.version().endswith("extras: none")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "begins", "ends"),
+    [
+        (["86"], "error 86: stall", ""),
+        (["VM"], "VM: Maximum velocity", ""),
+        (["EX"], "EX: Execute", "also: multidrop help EX --dialect pmx"),
+        (["EX", "--dialect", "pmx"], "E: encoder's position", ""),
+        (["5"], "status 5: the EEPROM is locked", ""),
+        (["/plot"], "/plot ", ""),
+        ([], "/open URL [NAME]", ""),
+    ],
+)
+def test_words_and_numbers_are_explained_without_a_connection(multidrop, arguments, begins, ends):
+    done = multidrop("help", *arguments)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert done.stdout.startswith(begins)
+    assert not ends or done.stdout.splitlines()[-1] == ends
+
+
+@pytest.mark.parametrize("arguments", [["VMM"], ["999"], ["VM", "--dialect", "pmx"], ["86", "--dialect", "pmx"]])
+def test_a_word_that_no_language_has_is_one_line_and_exit_2(multidrop, arguments):
+    done = multidrop("help", *arguments)
+    assert (done.returncode, done.stdout, done.stderr.count("\n")) == (2, "", 1)

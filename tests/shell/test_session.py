@@ -8,7 +8,8 @@ import pytest
 from multidrop.dialects import Diagnostic, DriveError, NoAnswer, Refused, Stopped
 from multidrop.drives.events import Notice, Sent, Unsolicited
 from multidrop.macros import Macro, Step
-from multidrop.shell.events import By, Entered, Failed, Notified, OnBus, Printed, StateChanged
+from multidrop.shell.channel import Front
+from multidrop.shell.events import By, Entered, Failed, Notified, OnBus, Output, Printed, StateChanged
 from multidrop.shell.streams.stdout import report
 from multidrop.transports import TransportLost
 from tests.support.cell_session import ETHERNET, CellSession, bus, party
@@ -366,3 +367,35 @@ async def test_a_key_plays_one_macro(press):
 async def test_quit_is_for_the_front_end_to_see(press):
     await press.run("/quit")
     assert press.session.quitting and press.heard(StateChanged)
+
+
+@pytest.mark.parametrize("word", ["exit", "quit", "help", "?", " Help "])
+async def test_a_bare_word_that_a_person_types_is_the_verb_and_goes_to_no_drive(press, word):
+    press.session.front = Front(before_quit=agreed)
+    await press.run(word)
+    assert press.done == []
+    assert press.session.quitting is (word in ("exit", "quit"))
+    assert any("/open" in each.text for each in press.heard(Output)) is not press.session.quitting
+
+
+async def agreed():
+    return True
+
+
+@pytest.mark.parametrize("by", [By.OPERATOR, By.MACRO])
+@pytest.mark.parametrize("word", ["exit", "quit", "help", "?"])
+async def test_a_bare_word_of_a_script_or_a_pipe_is_refused_and_goes_to_no_drive(press, word, by):
+    with pytest.raises(Diagnostic, match="is no command of a drive, nothing was sent"):
+        await press.session.run(word, by)
+    assert (press.done, press.heard(Sent)) == ([], [])
+
+
+async def test_program_mode_and_an_address_take_a_bare_word_as_it_is(press):
+    press.session.front = Front(before_quit=agreed)
+    await press.run("PG 100")
+    with pytest.raises(Refused, match="in program mode"):
+        await press.run("help")
+    await press.run("PG")
+    with pytest.raises(Refused):
+        await press.run("@a exit")
+    assert not press.session.quitting
