@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 from random import Random
+from struct import pack
 from typing import Any, Protocol
 
+from multidrop.dialects.modbus.manual.registers import REGISTERS
 from multidrop.dialects.tmcl.manual.commands import Call, Status
 
 VALUES = (60_000_000, 100_000_000)
@@ -44,6 +47,12 @@ class Language(Protocol):
     def say(self, rng: Random, serial: int, witness: Any, now: float) -> Said:
         """A random command."""
 
+    stop: bytes
+    """What a stop begins with, as a regular expression; what makes a half-sent line harmless may be before it."""
+
+    def sent(self, text: str) -> bytes:
+        """What leaves of a command, as a regular expression."""
+
     def print_on(self, witness: Any, now: float) -> None:
         """Let the program run that prints."""
 
@@ -54,6 +63,11 @@ class MCodeLanguage:
     url = "dialect=mcode"
     alone = "!"
     checked = True
+    stop = rb"\x1b"
+
+    def sent(self, text: str) -> bytes:
+        """What leaves of a command, as a regular expression."""
+        return rb"(?<![0-9A-Za-z])" + re.escape(text.encode()) + rb"(?![0-9])"
 
     @staticmethod
     def refused(answer: Any) -> bool:
@@ -109,6 +123,8 @@ class PmxLanguage:
     url = "dialect=pmx"
     alone = "00"
     checked = False
+    stop = rb"(~+\r)?(@\d\d)?ABORT\r"
+    sent = MCodeLanguage.sent
 
     @staticmethod
     def refused(answer: Any) -> bool:
@@ -144,6 +160,13 @@ class TmclLanguage:
     url = "dialect=tmcl"
     alone = "1"
     checked = True
+    stop = rb"(?s:.)\x03"
+
+    @staticmethod
+    def sent(text: str) -> bytes:
+        """What leaves of a command, as a regular expression."""
+        word, value = text.split()[0], int(text.split()[-1])
+        return re.escape((b"\x05\xc2\0" if word == "SAP" else b"\x04\0\0") + value.to_bytes(4))
 
     @staticmethod
     def refused(answer: Any) -> bool:
@@ -175,6 +198,14 @@ class TmclLanguage:
 
 class ModbusLanguage(MCodeLanguage):
     """Lexium drives with Modbus/TCP: no echo mode, one value a print, and no checksum but TCP's."""
+
+    stop = rb"(?s:....)\0\x06.A *E"
+
+    def sent(self, text: str) -> bytes:
+        """What leaves of a command, as a regular expression: function 16 with its two registers."""
+        name, value = re.split("[= ]", text)
+        words = int(value) & 0xFFFF, int(value) >> 16
+        return re.escape(pack(">BHHBHH", 16, REGISTERS[name].address, 2, 4, *words))
 
     @staticmethod
     def asks(line: str) -> bool:

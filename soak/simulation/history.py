@@ -30,6 +30,8 @@ class Stop:
     """Whose stop it was; empty: this person's."""
     written: int = 0
     """The number of writes before it."""
+    lost: tuple[str, ...] = ()
+    """The lines that were lost, and being tried again."""
 
 
 class Outcome(Enum):
@@ -116,8 +118,8 @@ class History:
     """Drives that were said to stand, and moved."""
     written: list[tuple[float, str, bytes]] = field(default_factory=list)
     """Time, port and bytes of each write that the kernel took."""
-    opened: list[tuple[float, str]] = field(default_factory=list)
-    """Time and line of each descriptor that was opened."""
+    opened: list[tuple[float, str, int]] = field(default_factory=list)
+    """Time and line of each descriptor that was opened, and the number of writes before it."""
     received: dict[str, list[tuple[float, bytes]]] = field(default_factory=dict)
     """Time and bytes of each read, by line."""
     damage: dict[str, list[Damage]] = field(default_factory=dict)

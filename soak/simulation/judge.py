@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import re
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 
+from soak.simulation.departures import DEPARTURES
 from soak.simulation.outcomes import OUTCOMES
 from soak.simulation.promises import PROMISES
 from soak.simulation.rule import Rule
@@ -14,20 +14,6 @@ from soak.simulation.world import World
 
 SOON = 0.05
 """The time, s, in which the kernel takes a stop: a line that takes nothing meanwhile is lost, or flooded."""
-
-
-def _nothing_before(world: World) -> Iterator[str]:
-    """Bytes of a command that was typed before a stop leave after it."""
-    for each in world.history.commands.values():
-        stops = [stop for stop in world.history.stops if stop.who == each.who]
-        if each.stops >= len(stops):
-            continue
-        stop = stops[each.stops]
-        text = re.compile(rb"(?<![0-9A-Za-z])" + re.escape(each.text.encode()) + rb"(?![0-9])")
-        for at, line, data in world.history.written[stop.written :]:
-            if line == each.line + each.who and text.search(data):
-                where = f"{each.line}:{each.drive} {each.text!r}: {each.outcome.value} ({each.said})"
-                yield f"{where}, typed at {each.typed:.3f}, stop at {stop.at:.3f}, written at {at:.3f}"
 
 
 def _first(world: World) -> Iterator[str]:
@@ -59,9 +45,7 @@ def _ends(world: World) -> Iterator[str]:
 RULES = (
     *OUTCOMES,
     *PROMISES,
-    Rule(
-        "after a stop", "Nothing that was typed before a stop leaves after it.", "What a stop promises", _nothing_before
-    ),
+    *DEPARTURES,
     Rule("first", "What leaves next on a line that can be written is its stop.", "What a stop promises", _first),
     Rule("stopped", "A drive that is said to be stopped does not move.", "What a stop promises", _true),
     Rule("ends", "Every wait ends; no task, thread, file, lock or defect is left.", "What a report means", _ends),

@@ -19,6 +19,7 @@ from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any
 
 from multidrop.shell.connect import reconnect
+from multidrop.simulator.lexium import power
 from multidrop.simulator.serving.running import Listener, RunningFloor
 from multidrop.transports import relay, serial_port, serial_ports, sockets, ssh_session
 from soak.simulation.far import SshProgram
@@ -36,6 +37,8 @@ WHO: ContextVar[str] = ContextVar("who", default="")
 OTHER = "picocom (pid 4711)"
 """Another program, which has a port open at times."""
 NODES = 8
+BOOT = 2.0
+"""The time that an Ethernet drive takes to boot, s: a real one takes longer than a whole story."""
 
 
 class Adapter(Listener):
@@ -237,6 +240,7 @@ class Kernel:
             (ssh_session, "SshSession", self.ssh),
             (relay, "os", system),
             (relay, "_now", self.loop.time),
+            (power, "ETHERNET_BOOT", BOOT),
         )
         before = [(module, name, getattr(module, name)) for module, name, _ in seams]
         for module, name, made in seams:

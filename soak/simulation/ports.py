@@ -14,6 +14,8 @@ from multidrop.simulator.serving.running import RunningFloor
 from soak.simulation.climate import Climate
 from soak.simulation.clock import SimulatedLoop
 
+FEW = 3
+"""Bytes that an empty buffer of a socket takes whole."""
 ROOM = 4095
 """Bytes that a tty takes before a write has to wait."""
 
@@ -57,7 +59,7 @@ class Descriptor:
             self.loop.call_later(0.001 + self.rng.random() * 0.01, self.loop.writable, self._descriptor)
             raise BlockingIOError(errno.EAGAIN, "no room")
         size = min(len(data), room)
-        if size > 1 and self.rng.random() < self.climate["part"]:
+        if size > (1 if busy else FEW) and self.rng.random() < self.climate["part"]:
             size = self.rng.randrange(1, size)
         if size < len(data):
             self.loop.call_later(0.001 + self.rng.random() * 0.01, self.loop.writable, self._descriptor)

@@ -151,7 +151,7 @@ class World:
         if who == "far":
             return lambda way, data: self.history.note(self.loop.now, f"{way} {line} far", data.hex())
         name = f"{line}{who}"
-        self.history.opened.append((self.loop.now, name))
+        self.history.opened.append((self.loop.now, name, len(self.history.written)))
 
         def trace(way: str, data: bytes) -> None:
             self.history.note(self.loop.now, f"{way} {name}", data.hex())
@@ -353,7 +353,9 @@ class World:
             buses = {name: bus for name, bus in session.buses.items() if not bus.link.lost}
             forms = {f"{name}{who}": self._forms(bus) for name, bus in buses.items()}
             rests = {f"{name}{who}": self.kernel.rest(f"{name}{who}") for name in buses}
-            self.history.stops.append(Stop(self.loop.now, forms, rests, who, len(self.history.written)))
+            trying = session.reconnections.trying
+            lost = tuple(name + who for name, bus in session.buses.items() if bus.link.lost and name in trying)
+            self.history.stops.append(Stop(self.loop.now, forms, rests, who, len(self.history.written), lost))
 
     def _forms(self, bus: Bus) -> tuple[bytes, ...]:
         """What a stop of a line may begin with."""

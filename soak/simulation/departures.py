@@ -1,0 +1,105 @@
+"""Rules of what leaves, on which connection: after a stop, after a loss, and once a lost line is back."""
+
+from __future__ import annotations
+
+import re
+from bisect import bisect_right
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from multidrop.transports import telnet
+from multidrop.transports.relay import Frames, Kind
+from soak.languages import LANGUAGES
+from soak.simulation.history import Command
+from soak.simulation.rule import Rule
+from soak.simulation.world import World
+
+WHOLE = 20
+"""Bytes of a connection that are enough to see what it began with."""
+
+
+@dataclass(frozen=True)
+class Connection:
+    """One opening of a line, and what left on it for the drives."""
+
+    at: float
+    line: str
+    begins: int
+    """The number of writes before it."""
+    data: bytes
+
+
+def _connections(world: World) -> Iterator[Connection]:
+    """Every connection of every line, in their order."""
+    history = world.history
+    places = {each.name: each for each in world.places}
+    for number, (at, line, begins) in enumerate(history.opened):
+        ends = next((index for _, other, index in history.opened[number + 1 :] if other == line), None)
+        left = b"".join(data for _, port, data in history.written[begins:ends] if port == line)
+        yield Connection(at, line, begins, _for_drives(places[line[:2]].kind, left))
+
+
+def _for_drives(kind: str, left: bytes) -> bytes:
+    """Those bytes of a connection that are for the drives."""
+    if kind == "rfc2217":
+        return b"".join(each.data for each in telnet.Decoder().receive(left) if isinstance(each, telnet.Data))
+    if kind == "ssh":
+        return b"".join(payload for each, payload in Frames().take(left) if each is Kind.DATA)
+    return left
+
+
+def _words(command: Command) -> str:
+    where = f"{command.line}:{command.drive} {command.text!r}: {command.outcome.value} ({command.said})"
+    return f"{where}, typed at {command.typed:.3f}"
+
+
+def _pattern(world: World, command: Command) -> re.Pattern[bytes]:
+    return re.compile(LANGUAGES[world.place(command.line).language].sent(command.text))
+
+
+def _nothing_before(world: World) -> Iterator[str]:
+    """Bytes of a command that was typed before a stop leave after it."""
+    history, after = world.history, dict[tuple[int, str], bytes]()
+    for each in history.commands.values():
+        stops = [stop for stop in history.stops if stop.who == each.who]
+        if each.stops >= len(stops):
+            continue
+        stop, line = stops[each.stops], each.line + each.who
+        key = stop.written, line
+        if key not in after:
+            left = b"".join(data for _, port, data in history.written[stop.written :] if port == line)
+            after[key] = left.replace(b"\xff\xff", b"\xff") if world.place(each.line).kind == "rfc2217" else left
+        if _pattern(world, each).search(after[key]):
+            yield f"{_words(each)}, stop at {stop.at:.3f}, written after it"
+
+
+def _never_again(world: World) -> Iterator[str]:
+    """The bytes of a command leave on two connections."""
+    connections = [*_connections(world)]
+    for each in world.history.commands.values():
+        pattern, line = _pattern(world, each), each.line + each.who
+        times = [known.at for known in connections if known.line == line and pattern.search(known.data)]
+        if len(times) > 1:
+            yield f"{_words(each)}, left on the connections of {', '.join(f'{at:.3f}' for at in times)}"
+
+
+def _owed(world: World) -> Iterator[str]:
+    """A line that was lost at a stop is back, and something else leaves first. A killed session owes nothing."""
+    history, connections = world.history, [*_connections(world)]
+    for stop in history.stops:
+        death = bisect_right(history.deaths, stop.at)
+        until = history.deaths[death] if death < len(history.deaths) and not stop.who else float("inf")
+        for line in stop.lost:
+            back = [each for each in connections if each.line == line and stop.at < each.at <= until]
+            first = next((each for each in back if each.data and each.begins >= stop.written), None)
+            form = re.compile(LANGUAGES[world.place(line[:2]).language].stop)
+            if first is not None and len(first.data) >= WHOLE and not form.match(first.data):
+                yield f"{line}: stop at {stop.at:.3f}, back at {first.at:.3f} with {first.data[:WHOLE]!r}"
+
+
+PROMISE = "What a stop promises"
+DEPARTURES = (
+    Rule("after a stop", "Nothing that was typed before a stop leaves after it.", PROMISE, _nothing_before),
+    Rule("sent again", "No command leaves again on another connection.", "What is never done twice", _never_again),
+    Rule("owed", "What leaves first on a line that was lost at a stop is the stop.", PROMISE, _owed),
+)
