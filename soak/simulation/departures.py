@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from bisect import bisect_right
+from bisect import bisect_left
 from collections.abc import Iterator
 from dataclasses import dataclass
 
@@ -87,7 +87,7 @@ def _owed(world: World) -> Iterator[str]:
     """A line that was lost at a stop is back, and something else leaves first. A killed session owes nothing."""
     history, connections = world.history, [*_connections(world)]
     for stop in history.stops:
-        death = bisect_right(history.deaths, stop.at)
+        death = bisect_left(history.deaths, stop.at)
         until = history.deaths[death] if death < len(history.deaths) and not stop.who else float("inf")
         for line in stop.lost:
             back = [each for each in connections if each.line == line and stop.at < each.at <= until]

@@ -120,6 +120,8 @@ class History:
     """Time, port and bytes of each write that the kernel took."""
     opened: list[tuple[float, str, int]] = field(default_factory=list)
     """Time and line of each descriptor that was opened, and the number of writes before it."""
+    passed: list[tuple[float, str]] = field(default_factory=list)
+    """Time and line of each stop, or piece of one, that a computer which lends the line has passed on."""
     received: dict[str, list[tuple[float, bytes]]] = field(default_factory=dict)
     """Time and bytes of each read, by line."""
     damage: dict[str, list[Damage]] = field(default_factory=dict)

@@ -16,6 +16,8 @@ from soak.simulation.rule import Grant, Granted, Rule
 from soak.simulation.world import NUMBER, World
 
 ACK, NAK = b"\x06", b"\x15"
+REPEATED = 2.0
+"""The time, s, in which all pieces of a stop are written."""
 AFTER = 2.0
 """The longest time, s, between a damaged byte of a line and the end of that line: late bytes, and a slow wire."""
 
@@ -23,6 +25,7 @@ SEVEN_BITS = Grant("a checksum of seven or eight bits", "The checksum of CK has 
 NOISY_ACK = Grant("an ACK of noise", "An ACK without its command")
 NOISY_NAK = Grant("a NAK of noise", "A NAK of noise together with a lost ACK")
 DOUBLED = Grant("a datagram that arrives twice", "A datagram that arrives twice")
+OTHERS_REPLY = Grant("a reply to another client's stop", "The reply to another client's stop")
 BARE_REFUSAL = Grant("a refusal of noise, without a checksum", "A refusal without a checksum")
 BARE_COMMAND = Grant("a damaged command without a checksum", "Noise on the line")
 BARE_VALUE = Grant("a damaged value without a checksum", "Noise on the line")
@@ -109,13 +112,24 @@ def _lost(world: World) -> Iterator[str | Granted]:
             continue
         if not world.place(command.line).checked:
             noise = _damage(world.history, command.line, command.began - AFTER, command.ended)
-            yield Granted(BARE_COMMAND, words) if noise else words
+            grant = BARE_COMMAND if noise else OTHERS_REPLY if _stopped_by_another(world, command) else None
+            yield Granted(grant, words) if grant else words
         elif _made(world.history, command, ACK):
             yield Granted(NOISY_ACK, words)
         elif _executed_as_another(world, command):
             yield Granted(SEVEN_BITS, words)
         else:
             yield words
+
+
+def _stopped_by_another(world: World, command: Command) -> bool:
+    """Whether a PMX replied, about the time of a command, to a stop that is not of its own client."""
+    history = world.history
+    own = [stop.at for stop in history.stops if stop.who == command.who]
+    since = command.began - AFTER
+    passed = [at for at, line in history.passed if line == command.line and since <= at <= command.ended]
+    others = any(not any(at - REPEATED <= each <= at for each in own) for at in passed)
+    return others and world.place(command.line).language == "pmx"
 
 
 def _executed_as_another(world: World, command: Command) -> bool:
@@ -199,7 +213,7 @@ OUTCOMES = (
         "What was said to be done was executed.",
         NOISE,
         _lost,
-        (BARE_COMMAND, NOISY_ACK, SEVEN_BITS),
+        (BARE_COMMAND, NOISY_ACK, SEVEN_BITS, OTHERS_REPLY),
     ),
     Rule(
         "credited",

@@ -222,18 +222,26 @@ class World:
         token = WHO.set("far")
         url = f"serial:{place.link}?baud={place.baud}&dialect={place.language}"
         try:
-            self.shares[place.name] = await share(url, place.language, place.host, 2217, self._lent)
+            self.shares[place.name] = await share(url, place.language, place.host, 2217, partial(self._lent, place))
         finally:
             WHO.reset(token)
 
-    def _lent(self, said: Say) -> None:
+    def _lent(self, place: Place, said: Say) -> None:
+        if said.event == "stop":
+            self.history.passed.append((self.loop.now, place.name))
         self.history.note(self.loop.now, "share", f"{said.client} {said.event} {said.detail}")
 
     def settings(self, folder: Path) -> Settings:
         """The settings of a person, who has the connections of all lines."""
-        text = "".join(f'[connections.{each.name}]\nurl = "{each.url}"\n' for each in self.places)
+        text = "".join(f'[connections.{each.name}]\nurl = "{self._url(each)}"\n' for each in self.places)
         text += "[log]\nalways = true\nmegabytes = 0.02\nfiles = 3\n" * (Random(f"{self.seed} log").random() < 0.2)
         return replace(parse(text, "world"), folder=folder / "config", state=folder / "state")
+
+    def _url(self, place: Place) -> str:
+        """How a person names a line: a serial port by the link that follows it, or by the node that it has now."""
+        node = self.kernel.realpath(place.link)
+        by_node = place.kind == "serial" and Random(f"{self.seed} {place.name} by node").random() < 0.5
+        return place.url.replace(place.link, node) if by_node else place.url
 
     def another(self, place: Place, who: str) -> Session:
         """A session of another person, which opens a line that is shared."""
