@@ -207,10 +207,10 @@ class Stopping:
 
         link.transport.preempt(forms.framed, stop)
 
-    def halt(self, only: Iterable[Drive] | None = None) -> Halt:
+    def halt(self, only: Iterable[Drive] | None = None, follows: bool = True) -> Halt:
         """Write a stop of all drives or some, and nothing else: no watcher hears of it before `halted`.
 
-        Failures go to `Halt.trouble`.
+        `follows`: it may be the one that follows a call of `ahead`. Failures go to `Halt.trouble`.
         """
         drives = tuple(self._roster.all_drives if only is None else only)
         halt = Halt(self._link, self._link.now(), self._link.stops, only is None, drives)
@@ -218,10 +218,10 @@ class Stopping:
             self.last = halt
             self._unconfirmed.clear()
         self._unconfirmed.append(halt)
-        self._write(halt)
+        self._write(halt, follows)
         return halt
 
-    def _write(self, halt: Halt) -> None:
+    def _write(self, halt: Halt, follows: bool = False) -> None:
         """Write the bytes first; then tell the line."""
         link, conversations = self._link, self._roster.conversations
         link.stops += 1
@@ -233,9 +233,8 @@ class Stopping:
             return
         with isolated(f"the stop of {link.name}", halt.trouble):
             at, ahead = link.now(), self._ahead
-            if halt.whole:  # only a stop of the whole link takes over what another thread has written
+            if halt.whole and follows and link.transport.yielded():  # else another thread's stop has not been followed
                 self._ahead = None
-                link.transport.yielded()
             forms, halt.data, whole = ahead or self._write_now(halt)
             halt.missed.update(forms.missed)
             only = None
@@ -295,7 +294,7 @@ class Stopping:
             return None
         whole = whole or bool(self._link.cut)
         self._roster.settings_may_have_changed(self._roster.all_drives if whole else drives)
-        halt = self.halt(None if whole else drives)
+        halt = self.halt(None if whole else drives, follows=False)
         self._publish(halt)
         return halt
 

@@ -8,6 +8,9 @@ import os
 import sys
 from pathlib import Path
 
+UNABLE = (errno.EINVAL, errno.ENOTSUP, errno.ENOSYS, errno.EACCES, errno.EPERM)
+"""What a disk says that has no sync of a folder, and a folder that may be written and not read."""
+
 
 def write_atomically(path: Path, data: bytes, mode: int = 0o666, *, synced: bool = True) -> None:
     """Replace a file's content, or create the file with `mode` less the umask. On OSError the old file is unchanged.
@@ -36,7 +39,10 @@ def write_atomically(path: Path, data: bytes, mode: int = 0o666, *, synced: bool
 
 
 def create_atomically(path: Path, data: bytes) -> None:
-    """Create a file; it has its name only once all of it is on the disk. Raises FileExistsError where one is there."""
+    """Create a file; it has its name only once all of it is on the disk. Raises FileExistsError where one is there.
+
+    On any other OSError, of the name's own sync too, there is no file.
+    """
     beside = path.with_name(f".{path.name}.{os.urandom(4).hex()}.tmp")
     try:
         with open(beside, "xb") as file:
@@ -57,17 +63,25 @@ def create_atomically(path: Path, data: bytes) -> None:
     finally:
         with contextlib.suppress(OSError):
             beside.unlink()
-    with contextlib.suppress(OSError):
+    try:
         sync_folder(path.parent)
+    except OSError:
+        path.unlink()
+        raise
 
 
 def make_folder(folder: Path, *, synced: bool = True) -> None:
-    """Make a folder and those above it. `synced`: their names survive a power cut."""
+    """Make a folder and those above it. `synced`: their names survive a power cut. On OSError none of them is made."""
     made = [each for each in (folder, *folder.parents) if not each.exists()]
     folder.mkdir(parents=True, exist_ok=True)
-    for each in made if synced else ():
-        with contextlib.suppress(OSError):
+    try:
+        for each in made if synced else ():
             sync_folder(each.parent)
+    except OSError:
+        for each in made:
+            with contextlib.suppress(OSError):  # another process uses it
+                each.rmdir()
+        raise
 
 
 def _take_over(old: Path, new: int) -> None:
@@ -85,10 +99,15 @@ def _take_over(old: Path, new: int) -> None:
 
 
 def sync_folder(folder: Path) -> None:
-    """Make new names survive a power cut. Raises OSError where a folder cannot be synced; Windows has no such call."""
-    if sys.platform != "win32":
+    """Make new names survive a power cut. Raises OSError where the disk fails; some disks have no such call."""
+    if sys.platform == "win32":
+        return
+    try:
         descriptor = os.open(folder, os.O_RDONLY)
         try:
             os.fsync(descriptor)
         finally:
             os.close(descriptor)
+    except OSError as problem:
+        if problem.errno not in UNABLE:
+            raise

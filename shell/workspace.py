@@ -294,13 +294,16 @@ class Workspace(Channel):
             with isolated(f"the stop of {name}"):
                 bus.stop_ahead()
 
-    def stop(self, why: str = "stop") -> None:
-        """Stop every drive and everything that runs, and latch. Synchronous; at any time, any number of times."""
+    def stop(self, why: str = "stop", follows: bool = True) -> None:
+        """Stop every drive and everything that runs, and latch. Synchronous; at any time, any number of times.
+
+        `follows`: it may be the one that follows a call of `stop_ahead`.
+        """
         self.stops, self.stopped_at = self.stops + 1, self.now()
         halts: list[Halt] = []
         for bus in list(self.buses.values()):  # each wire by itself
             with isolated(f"the stop of {bus.name}"):
-                halts.append(bus.halt())
+                halts.append(bus.halt(follows=follows))
         self.latched = True
         self.tasks.stop()
         self.questions.open.stop()

@@ -131,14 +131,14 @@ class Transport(ABC):
     def preempt(self, whole: bool, make: Callable[[int], bytes]) -> bool:
         """Drop what is unsent and write `make(bytes dropped)` at once, from any thread.
 
-        `write` drops everything until `yielded` is called. `make` must not call the pipe. The result is False, and
+        `write` drops everything until `yielded` is called as often. `make` must not call the pipe. The result is False, and
         `make` is not called, where the pipe is broken or cannot do this.
         """
         return False
 
-    def yielded(self) -> None:
-        """Let the loop write again, once it has taken note of what preempted it."""
-        return
+    def yielded(self) -> bool:
+        """Take note of one `preempt`; return whether it was the last, so that the loop writes again."""
+        return True
 
     @abstractmethod
     async def close(self) -> None:

@@ -154,7 +154,9 @@ class DescriptorPipe(Pipe):
         super().__init__(endpoint.name, control)
         self._endpoint = endpoint
         self._pending: deque[memoryview] = deque()
-        self._reading = self._writing = self._preempted = False
+        self._reading = self._writing = False
+        self._preempted = 0
+        """The number of writes of other threads that the loop has not taken note of."""
         self._guard = threading.Lock()
         """Held for `_pending`, `_preempted` and each write to the endpoint; never during a callback."""
 
@@ -197,15 +199,16 @@ class DescriptorPipe(Pipe):
         with self._guard:
             if not self._usable:
                 return False
-            self._preempted = True
+            self._preempted += 1
             self._pending.append(memoryview(make(self._drop(whole))))
             problem = self._push()
         self._loop.call_soon_threadsafe(self._after_push, problem)
         return True
 
-    def yielded(self) -> None:
+    def yielded(self) -> bool:
         with self._guard:
-            self._preempted = False
+            self._preempted = max(0, self._preempted - 1)
+            return not self._preempted
 
     def _begin(self) -> None:
         self._reading = True

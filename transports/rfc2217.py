@@ -233,8 +233,8 @@ class Rfc2217Pipe(Transport):
         purge = b"" if whole else _PURGE
         return self._inner.preempt(True, lambda dropped: purge + telnet.escaped(make(dropped)))
 
-    def yielded(self) -> None:
-        self._inner.yielded()
+    def yielded(self) -> bool:
+        return self._inner.yielded()
 
     async def close(self) -> None:
         self._lost = self._received = None

@@ -37,6 +37,8 @@ KEPT = 5000
 """The number of lines read back; a file of twice as many is cut to that number."""
 PRIVATE = 0o600
 TRIES = 3
+TORN = "\0"
+"""The last character of a line of which only a part was written: it is not offered again."""
 
 
 class History:
@@ -51,7 +53,7 @@ class History:
             found = self.path.read_text(encoding="utf-8", errors="replace").split("\n")
         except OSError:
             return []
-        lines = [line for line in found if line.strip()]
+        lines = [line for line in found[:-1] if _whole(line)]
         if len(lines) > 2 * KEPT:
             self._cut()
         return lines[-KEPT:]
@@ -71,7 +73,7 @@ class History:
             if not locked:
                 return
             with open(descriptor, "rb", closefd=False) as old:
-                lines = [line for line in old.read().split(b"\n") if line.strip()]
+                lines = [line for line in old.read().split(b"\n")[:-1] if _whole(line.decode("utf-8", "replace"))]
                 write_atomically(self.path, b"".join(line + b"\n" for line in lines[-KEPT:]), PRIVATE)
                 late = old.read()  # from a process that had the file open, and no lock
             with open(self.path, "ab") as new:
@@ -110,13 +112,18 @@ def _is_at(descriptor: int, path: Path) -> bool:
     return False
 
 
+def _whole(line: str) -> bool:
+    """Whether a line of the file was typed as it is there."""
+    return bool(line.strip()) and not line.endswith(TORN)
+
+
 def _gap(descriptor: int) -> str:
-    """A line end if the last line has none, as after a full disk."""
+    """The mark of a torn line and its end if the last line has none, as after a full disk."""
     size = os.fstat(descriptor).st_size
     if not size:
         return ""
     os.lseek(descriptor, size - 1, os.SEEK_SET)
-    return "" if os.read(descriptor, 1) == b"\n" else "\n"
+    return "" if os.read(descriptor, 1) == b"\n" else f"{TORN}\n"
 
 
 BURST = 0.5

@@ -272,7 +272,7 @@ class Prompt:
         self._empty(dropped)
 
     def _stop(self, why: str) -> None:
-        self._session.stop(why)
+        self._session.stop(why, follows=False)
         self._empty()
 
     def _empty(self, typed_ahead: str = "") -> None:

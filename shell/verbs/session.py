@@ -24,7 +24,7 @@ from multidrop.shell.verbs.call import Call, words
 
 async def stop(call: Call) -> None:
     call.words()
-    call.session.stop("/stop")
+    call.session.stop("/stop", follows=False)
 
 
 async def resume(call: Call) -> None:

@@ -122,7 +122,7 @@ class Person:
 
     def _stop(self, dropped: str, why: str = "Ctrl+X") -> None:
         lines, self._line = (self._line + dropped).splitlines(), ""
-        self._session.stop(why)
+        self._session.stop(why, follows=why == "Ctrl+X")
         self.lines.show_unsent("a stop came", lines)
 
     def _noticed(self, event: object) -> None:

@@ -464,11 +464,11 @@ class WatchedSession(Session):
     def _dead(self) -> bool:
         return self._process is not None and self._process.dead
 
-    def stop(self, why: str = "stop") -> None:
+    def stop(self, why: str = "stop", follows: bool = True) -> None:
         """Stop everything, and note it."""
         examine_before_a_stop(self._world)
         self._world.history.told.halts.append(self.now())
-        super().stop(why)
+        super().stop(why, follows)
 
     async def run(self, line: str | TypedLine, *arguments: Any, **named: Any) -> None:
         """Run a line, and note its outcome."""

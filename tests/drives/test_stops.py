@@ -42,15 +42,16 @@ async def refused_by_stop(work) -> None:
 class Preempted(SimPipe):
     """A pipe that a thread can take from the loop, without the thread."""
 
-    held = False
+    held = 0
 
     def preempt(self, whole, make):
         super().write(make(self.discard(whole)))
-        self.held = True
+        self.held += 1
         return True
 
     def yielded(self):
-        self.held = False
+        self.held -= 1
+        return not self.held
 
     def write(self, data):
         return not self.held and super().write(data)
@@ -70,6 +71,23 @@ async def test_a_stop_that_a_thread_has_written_is_not_written_again_and_nothing
     assert not shop.transport.held
     await shop.bus.stopped()
     assert not shop.moving("a")
+    await shop.send("a", "SL 70000")
+    assert shop.moving("a")
+
+
+async def test_nothing_goes_out_between_two_stop_keys_that_the_loop_sees_after_both():
+    shop = await SimulatedBus(party("a"), pipe=Preempted).open("a")
+    for _ in range(2):
+        shop.bus.stop_ahead()
+    before = len(shop.sent)
+    shop.bus.halt()  # of the first key
+    shop.bus.halt(follows=False)  # of a /stop between them
+    late = asyncio.ensure_future(shop.send("a", "SL 60000"))
+    await asyncio.sleep(1.0)
+    assert not shop.sent[before:]
+    shop.bus.stop()
+    await refused_by_stop(late)
+    await shop.bus.stopped()
     await shop.send("a", "SL 70000")
     assert shop.moving("a")
 

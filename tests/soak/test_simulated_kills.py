@@ -245,24 +245,35 @@ def test_a_new_file_in_a_new_folder_survives_a_power_cut(bench: Bench) -> None:
 
 
 def test_a_new_file_whose_name_cannot_be_made_durable_is_not_there(make: Callable[..., Bench]) -> None:
-    refused = 0
+    refused: list[int] = []
 
-    async def work(bench: Bench) -> None:
-        nonlocal refused
+    async def work(bench: Bench, seed: int) -> None:
         try:
             create_atomically(bench.folder / "file", b"whole")
         except OSError:
-            refused += 1
+            refused.append(seed)
             assert not [*bench.folder.iterdir()]
         bench.process.die()
 
     for seed in range(20):
         bench = make(Climate(1, {"fsync refused": 0.5}))
         bench.disk.rng = Random(seed)
-        bench.live(partial(work, bench))
+        bench.live(partial(work, bench, seed))
         bench.disk.cut_power(Random(seed))
-        assert (bench.folder / "file").exists() or refused
-    assert 0 < refused < 20 and not bench.loop.defects
+        assert (bench.folder / "file").exists() or seed in refused
+    assert 0 < len(refused) < 20 and not bench.loop.defects
+
+
+def test_a_new_folder_whose_name_cannot_be_made_durable_is_not_there(make: Callable[..., Bench]) -> None:
+    async def work(bench: Bench) -> None:
+        with pytest.raises(OSError):
+            make_folder(bench.folder / "new" / "in")
+        assert not [*bench.folder.iterdir()]
+        bench.process.die()
+
+    bench = make(Climate(1, {"fsync refused": 1.0}))
+    bench.live(partial(work, bench))
+    assert not bench.loop.defects
 
 
 @pytest.mark.parametrize("kind", ["disk full", "fsync refused"])

@@ -243,7 +243,7 @@ class FakeSession:
     def stop_ahead(self) -> None:
         self.ahead += 1
 
-    def stop(self, why: str = "stop") -> None:
+    def stop(self, why: str = "stop", follows: bool = True) -> None:
         self.stops += 1
         self.latched = True
         self.busy = False

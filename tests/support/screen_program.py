@@ -18,7 +18,7 @@ class Witness(FakeSession):
 
     told: Path
 
-    def stop(self, why: str = "stop") -> None:
+    def stop(self, why: str = "stop", follows: bool = True) -> None:
         """Record it."""
         super().stop(why)
         self._note(why)

@@ -162,16 +162,19 @@ async def test_a_thread_writes_its_stop_while_the_loop_is_held_up_and_nothing_fo
         arrived: list[bytes] = []
 
         def stop() -> None:
-            assert each.transport.preempt(False, lambda dropped: b"stop")
-            select.select([each.far.descriptor], [], [], PATIENCE)
-            arrived.append(os.read(each.far.descriptor, 100))
+            for word in (b"stop", b"again"):
+                assert each.transport.preempt(False, lambda dropped, word=word: word)
+                select.select([each.far.descriptor], [], [], PATIENCE)
+                arrived.append(os.read(each.far.descriptor, 100))
 
         thread = threading.Thread(target=stop)
         thread.start()
         thread.join(PATIENCE)  # the loop does nothing meanwhile
-        assert arrived == [b"stop"]
+        assert arrived == [b"stop", b"again"]
         assert not each.transport.write(b"1200\r")
-        each.transport.yielded()
+        assert not each.transport.yielded()
+        assert not each.transport.write(b"1200\r")
+        assert each.transport.yielded()
         assert each.transport.write(b"after")
         assert await each.far.receive(5) == b"after"
 

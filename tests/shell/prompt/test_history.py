@@ -116,8 +116,18 @@ def test_a_full_disk_costs_one_line_and_not_the_next(tmp_path):
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
         signal.signal(signal.SIGXFSZ, before)
+    assert kept.lines() == ["MR 1"], "a part of a line is no line: MR 5 of MR 51200"
     kept.append("MR 2")
-    assert kept.lines()[0] == "MR 1" and kept.lines()[-1] == "MR 2"
+    assert kept.lines() == ["MR 1", "MR 2"]
+
+
+def test_a_part_of_a_line_is_gone_once_the_file_is_cut(tmp_path, three_kept):
+    kept = filled(tmp_path / "history")
+    with kept.path.open("a") as file:
+        file.write("MR 5")
+    kept.append("MR 7")
+    kept.lines()
+    assert kept.path.read_text() == "MR 5\nMR 6\nMR 7\n"
 
 
 def test_a_full_disk_leaves_a_long_history_as_it_was(tmp_path, monkeypatch, three_kept):
