@@ -52,6 +52,8 @@ class Client:
         """Replies to its negotiation that are to be sent to it."""
         self.waiting: deque[Input] = deque()
         """What has been received from it and is not worked off."""
+        self.begun = b""
+        """The beginning of a line or message that came while another client wrote."""
         self.setting = False
         """A setting of its is being changed: what follows waits for that."""
         self._text = text

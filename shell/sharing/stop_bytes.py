@@ -103,6 +103,12 @@ class StopBytes:
             return data, b"", b""
         return data[: matches[0].start()], b"".join(each[0] for each in matches), data[matches[-1].end() :]
 
+    def whole(self, data: bytes) -> tuple[bytes, bytes]:
+        """Divide bytes: whole lines, messages and stops, and what the next read may make one of."""
+        size = len(self.own[0].data)
+        at = len(data) // size * size if self.framed else max(data.rfind(b"\r"), data.rfind(b"\n")) + 1
+        return (data, b"") if len(data) - at > LONGEST or self.found(data[at:])[1] else (data[:at], data[at:])
+
     def binary(self, data: bytes) -> bool:
         """Whether a read holds a byte that no language of text has: then no byte of the writer's is a stop."""
         return not self.framed and bool(self.pattern.sub(b"", data).translate(None, _TEXT))

@@ -223,11 +223,15 @@ class Exchange:
 
     def _without_stops(self, client: int, data: bytes, now: float) -> list[Input]:
         """Take the stops out of bytes, and write them at once; return what is left for the client's turn."""
+        known, others = self.clients[client], self.writer is not None and client != self.writer
+        data = known.begun + data  # a stop may come in two reads
+        data, known.begun = self._stops.whole(data) if others or self._away else (data, b"")
         before, stop, rest = self._stops.found(data)
-        others = self.writer is not None and client != self.writer
+        if not data:
+            return []
         if not stop or (not others and not self._away and self._stops.binary(data)):
             return [data]
-        self.owed.note(self.clients[client].name, stop, now)
+        self.owed.note(known.name, stop, now)
         if self._away:
             self._say(client, NOT_REACHED, f"the port is lost; {OWED}")
             return []

@@ -153,8 +153,40 @@ def test_in_frames_only_a_whole_stop_is_one() -> None:
     port.send(ADA, bytes([3, 0x1B, 5]))
     port.send(BOB, MST * 2)
     assert port.written == ROR + bytes([3, 0x1B, 5]) + MST * 2
-    port.send(BOB, b"\x1b")
+    port.send(BOB, ROR)
     assert port.closed == [BOB]
+
+
+@pytest.mark.parametrize(
+    ("family", "line", "stop"),
+    [
+        ("", b"MR 51200\r", b"ABORT\r"),
+        ("", b"MR 51200\r", b"~" * 65 + b"\r"),
+        ("pmx", b"@00X1000\r", b"@00ABORT\r"),
+        ("tmcl", ROR, MST),
+        ("tmcl", ROR, MST * 2),
+    ],
+)
+def test_a_stop_passes_in_any_pieces(family: str, line: bytes, stop: bytes) -> None:
+    for at in range(1, len(stop)):
+        port = Port(family)
+        port.send(ADA, line)
+        port.send(BOB, stop[:at])
+        port.send(BOB, stop[at:])
+        assert port.written == line + stop, at
+        assert not port.closed and port.exchange.writer == ADA
+
+
+def test_a_line_that_comes_while_another_one_writes_is_refused_at_its_end_and_sent_whole_after_that(port: Port) -> None:
+    port.send(ADA, b"PR P\r")
+    port.send(BOB, b"MR 5")
+    assert port.closed == [] and port.written == b"PR P\r"
+    port.send(EVE, b"MR 5")
+    port.send(EVE, b"1200\r")
+    assert port.closed == [EVE]
+    port.do(port.exchange.advance(11.0))
+    port.send(BOB, b"1200\r", 11.0)
+    assert port.written == b"PR P\rMR 51200\r"
 
 
 @pytest.mark.parametrize(
