@@ -131,8 +131,8 @@ class Transport(ABC):
     def preempt(self, whole: bool, make: Callable[[int], bytes]) -> bool:
         """Drop what is unsent and write `make(bytes dropped)` at once, from any thread.
 
-        `write` drops everything until `yielded` is called as often. `make` must not call the pipe. The result is False, and
-        `make` is not called, where the pipe is broken or cannot do this.
+        `write` drops everything until `yielded` is called as often. `make` must not call the pipe. The result is False,
+        and `make` is not called, where the pipe is broken or cannot do this.
         """
         return False
 

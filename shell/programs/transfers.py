@@ -92,7 +92,8 @@ async def download(
     try:
         made = _Download(session, drive, file, wanted)
         await made.agree(lines, by)
-        await made.run(text, lines)
+        async with session.automations.run(f"the download of {file}"):
+            await made.run(text, lines)
     finally:
         _under_way.discard(drive)
 
