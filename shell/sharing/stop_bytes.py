@@ -75,8 +75,7 @@ GAP = 0.1
 _FORMS = 16
 """The forms of a stop that are kept."""
 _ADDRESS_OR_CHECKSUM = re.compile(r"^@\d\d|[\x80-\xff]+$")
-_ENDS = b"\r\n"
-_TEXT = bytes(range(0x20, 0x7F)) + b"\t" + _ENDS
+_TEXT = bytes(range(0x20, 0x7F)) + b"\t" + ENDS
 
 
 @dataclass(frozen=True)
@@ -103,11 +102,15 @@ class StopBytes:
             return data, b"", b""
         return data[: matches[0].start()], b"".join(each[0] for each in matches), data[matches[-1].end() :]
 
+    def keyed(self, data: bytes) -> bool:
+        """Whether bytes hold a stop that is a key, which ends no line."""
+        return not self.framed and _keys(self.found(data)[1])
+
     def whole(self, data: bytes) -> tuple[bytes, bytes]:
-        """Divide bytes: whole lines, messages and stops, and what the next read may make one of."""
+        """Divide bytes: whole lines or messages, and what the next read may make one of."""
         size = len(self.own[0].data)
         at = len(data) // size * size if self.framed else max(data.rfind(b"\r"), data.rfind(b"\n")) + 1
-        return (data, b"") if len(data) - at > LONGEST or self.found(data[at:])[1] else (data[:at], data[at:])
+        return (data, b"") if len(data) - at > LONGEST else (data[:at], data[at:])
 
     def binary(self, data: bytes) -> bool:
         """Whether a read holds a byte that no language of text has: then no byte of the writer's is a stop."""
@@ -117,8 +120,11 @@ class StopBytes:
         """The stop after a line was cut in two: no byte of it may end that line before it is harmless."""
         if not self.invalidate:
             return stop
-        keys = any(byte < 0x20 and byte not in _ENDS for byte in stop)
-        return (stop.translate(None, _ENDS) if keys else b"") + self.invalidate + stop
+        return (stop.translate(None, ENDS) if _keys(stop) else b"") + self.invalidate + stop
+
+
+def _keys(stop: bytes) -> bool:
+    return any(byte < 0x20 and byte not in ENDS for byte in stop)
 
 
 class OwedStop:

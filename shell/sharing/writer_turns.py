@@ -224,9 +224,13 @@ class Exchange:
     def _without_stops(self, client: int, data: bytes, now: float) -> list[Input]:
         """Take the stops out of bytes, and write them at once; return what is left for the client's turn."""
         known, others = self.clients[client], self.writer is not None and client != self.writer
-        data = known.begun + data  # a stop may come in two reads
-        data, known.begun = self._stops.whole(data) if others or self._away else (data, b"")
+        begun, known.begun = known.begun, b""
+        if not self._stops.keyed(data):  # it may end a stop; a letter before a key that stops all names no drive
+            begun, data = b"", begun + data
+            if others or self._away:
+                data, known.begun = self._stops.whole(data)
         before, stop, rest = self._stops.found(data)
+        before = begun + before
         if not data:
             return []
         if not stop or (not others and not self._away and self._stops.binary(data)):

@@ -24,19 +24,17 @@ class Connection:
 
     at: float
     line: str
-    begins: int
-    """The number of writes before it."""
     data: bytes
 
 
-def _connections(world: World) -> Iterator[Connection]:
-    """Every connection of every line, in their order."""
+def _connections(world: World, since: int = 0) -> Iterator[Connection]:
+    """Every connection of every line, in their order, with what left from a write on."""
     history = world.history
     places = {each.name: each for each in world.places}
     for number, (at, line, begins) in enumerate(history.opened):
         ends = next((index for _, other, index in history.opened[number + 1 :] if other == line), None)
-        left = b"".join(data for _, port, data in history.written[begins:ends] if port == line)
-        yield Connection(at, line, begins, _for_drives(places[line[:2]].kind, left))
+        left = b"".join(data for _, port, data in history.written[max(begins, since) : ends] if port == line)
+        yield Connection(at, line, _for_drives(places[line[:2]].kind, left))
 
 
 def _for_drives(kind: str, left: bytes) -> bytes:
@@ -85,13 +83,13 @@ def _never_again(world: World) -> Iterator[str]:
 
 def _owed(world: World) -> Iterator[str]:
     """A line that was lost at a stop is back, and something else leaves first. A killed session owes nothing."""
-    history, connections = world.history, [*_connections(world)]
+    history = world.history
     for stop in history.stops:
         death = bisect_left(history.deaths, stop.at)
         until = history.deaths[death] if death < len(history.deaths) and not stop.who else float("inf")
         for line in stop.lost:
-            back = [each for each in connections if each.line == line and stop.at < each.at <= until]
-            first = next((each for each in back if each.data and each.begins >= stop.written), None)
+            since = _connections(world, stop.written)  # one that was just being made may carry it
+            first = next((each for each in since if each.line == line and each.at <= until and each.data), None)
             form = re.compile(LANGUAGES[world.place(line[:2]).language].stop)
             if first is not None and len(first.data) >= WHOLE and not form.match(first.data):
                 yield f"{line}: stop at {stop.at:.3f}, back at {first.at:.3f} with {first.data[:WHOLE]!r}"

@@ -12,6 +12,7 @@ FIXED = {
     2177: "the conditions of a drive that nobody wanted any more, which were read as that was said",
     373: "a view of a relay's bytes, held by the error of a failed send (of the simulation itself)",
     797: "the error of a refused Modbus write, whose flag was read too late, which the next line was blamed for",
+    116: "the error of a Modbus write that was refused after its time-out, which the next line was blamed for",
     12175655: "the K of another client's OK, which was shown as a value",
 }
 DERIVED = 12

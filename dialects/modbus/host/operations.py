@@ -118,6 +118,7 @@ def carried_out(state: ModbusState, text: str, pdu: bytes) -> Procedure[bytes]:
     """
     if state.error and (code := (yield from error_number(state))):
         state.note(f"{who(state)}: an old error, now cleared: {described(code, state)}")
+    state.error_flag_read(True)  # until it is read: a command that is not answered in time may still be refused
     answer = yield from answered(state, request(state, text, pdu))
     if code := (yield from error_number(state)):
         raise Refused(f"{who(state)} refused '{text}': {described(code, state)}", code)

@@ -258,6 +258,16 @@ def test_an_error_whose_flag_could_not_be_read_is_told_before_the_next_command_a
     assert any("an old error, now cleared: error 85" in note for note in drive.notes)
 
 
+def test_the_error_of_a_command_that_was_not_answered_in_time_is_not_blamed_on_the_next():
+    far, drive = Far(), state()
+    far.silent = {"MR"}
+    with pytest.raises(NoAnswer):
+        type_("MR 5", far, drive)
+    far.put("EF", 1), far.put("ER", 85)
+    assert type_("R2=5", far, drive) == ()
+    assert any("an old error, now cleared: error 85" in note for note in drive.notes)
+
+
 def test_silence_is_told_and_nothing_is_sent_again(far):
     far.silent = {"MR"}
     with pytest.raises(NoAnswer, match="not known whether 'MR 5' was executed; it was sent once"):

@@ -25,7 +25,7 @@ def test_the_first_to_write_is_the_writer_and_bytes_of_another_are_refused(port:
 
 def test_every_client_hears_what_the_drives_send_but_one_that_was_refused(port: Port) -> None:
     port.send(ADA, b"PR P\r")
-    port.send(EVE, b"x")
+    port.send(EVE, b"x\r")
     port.sent[EVE] = b""
     port.do(port.exchange.printed(b"51200\r\n\xff", 0.0))
     assert port.sent == {ADA: b"51200\r\n\xff", BOB: b"51200\r\n\xff", EVE: b""}
@@ -255,13 +255,14 @@ def test_only_the_writer_writes_and_every_stop_passes(steps: list[tuple[int, byt
         exchange.connect(client, f"pc:{client}")
     for client, data, pause in steps:
         now += pause
+        begun = exchange.clients[client].begun
         actions = exchange.receive(client, data, now)
         for each in actions:
             match each:
                 case Write(by, written):
                     assert by == client and by not in closed
                     assert by == writer or writer < 0 or writer in closed or now >= last + SILENT
-                    assert written.startswith(b"~") or _left_of(written, data)
+                    assert written.startswith(b"~") or _left_of(written, begun + data)
                     writer, last = by, now
                 case Close(by):
                     assert by == client
