@@ -6,11 +6,11 @@ A row may leave out empty cells at its end.
 from __future__ import annotations
 
 import csv
+import os
 from collections.abc import Iterator
-from pathlib import Path
 
 
 def rows(module: str, name: str) -> Iterator[dict[str, str]]:
     """The rows of a table by its head line; `module` is the `__file__` of the reader."""
-    with Path(module).with_name(name).open(encoding="utf-8", newline="") as table:
+    with open(os.path.join(os.path.dirname(module), name), encoding="utf-8", newline="") as table:
         yield from csv.DictReader(table, restval="")

@@ -13,19 +13,16 @@ import contextlib
 from collections.abc import AsyncIterator, Callable, Collection, Iterable, Iterator
 from contextvars import ContextVar
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
 
 from multidrop.dialects import Diagnostic
+from multidrop.drives.bus import Bus
+from multidrop.drives.drive import Drive
 from multidrop.drives.events import isolated
+from multidrop.drives.link import Link
 from multidrop.drives.port_journal import GLOBAL
 from multidrop.drives.stopping import Halt
 from multidrop.shell import stop_report
-
-if TYPE_CHECKING:
-    from multidrop.drives.bus import Bus
-    from multidrop.drives.drive import Drive
-    from multidrop.drives.link import Link
-    from multidrop.shell.workspace import Workspace
+from multidrop.shell.workspace import Workspace
 
 LINGER = 3.0
 """The longest wait for a stop to be sent and confirmed, s."""

@@ -11,16 +11,13 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from datetime import datetime, timedelta
 from functools import partial
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import Any, TypeVar
 
 from multidrop.dialects import Diagnostic, Procedure, Stopped
+from multidrop.drives.drive import Drive
 from multidrop.drives.events import Publisher
 from multidrop.shell.events import By, Notified, Output, Progressed, SessionEvent, StateChanged
-
-if TYPE_CHECKING:
-    from multidrop.drives.drive import Drive
-    from multidrop.shell.roles import Transcripts
-
+from multidrop.shell.roles import Transcripts
 
 T = TypeVar("T")
 

@@ -7,23 +7,19 @@ import contextlib
 from collections.abc import Callable, Coroutine, Iterator, Sequence
 from dataclasses import replace
 from itertools import count
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import Any, TypeVar
 
 from multidrop.dialects import Diagnostic, DriveError
-from multidrop.shell.connect.opening import port_name
+from multidrop.drives.bus import Bus
+from multidrop.drives.drive import Drive
+from multidrop.drives.stopping import Halt
+from multidrop.shell.connect.opening import Opened, Opener, port_name
 from multidrop.shell.connect.urls import Connection, parse
 from multidrop.shell.line_syntax import EVERYONE, split_target
 from multidrop.shell.raw import RawLine
 from multidrop.shell.state import crash_marks
-from multidrop.shell.workspace import BeingOpened
+from multidrop.shell.workspace import BeingOpened, Workspace
 from multidrop.transports import TransportLost
-
-if TYPE_CHECKING:
-    from multidrop.drives.bus import Bus
-    from multidrop.drives.drive import Drive
-    from multidrop.drives.stopping import Halt
-    from multidrop.shell.connect.opening import Opened, Opener
-    from multidrop.shell.workspace import Workspace
 
 
 def model(drive: Drive) -> str:

@@ -5,21 +5,19 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from multidrop.dialects import Diagnostic, SourceLine
 from multidrop.dialects.debugging import Row
 from multidrop.dialects.family import Programs
 from multidrop.dialects.program_files import Held, Stored
+from multidrop.drives.drive import Drive
 from multidrop.shell import new_file
 from multidrop.shell.channel import Channel, running, transferring
 from multidrop.shell.events import Phase, ProgramRead, ProgramSeen
 from multidrop.shell.line_syntax import EVERYONE
 from multidrop.shell.state.backups import Copy, Sources
-
-if TYPE_CHECKING:
-    from multidrop.drives.drive import Drive
-    from multidrop.shell.workspace import Workspace
+from multidrop.shell.workspace import Workspace
 
 AROUND = 3
 """Lines that are shown before and after the current one."""

@@ -7,21 +7,18 @@ import contextlib
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 from contextvars import ContextVar
-from typing import TYPE_CHECKING
 from weakref import WeakKeyDictionary
 
 from multidrop.dialects import DriveError, Priority
 from multidrop.dialects.codec import at_priority
+from multidrop.dialects.program_files import Held
+from multidrop.drives.bus import Bus
+from multidrop.drives.drive import Drive
 from multidrop.drives.events import Conditioned, Sample, Unsolicited
 from multidrop.macros import Recorder
 from multidrop.shell.events import OnBus, Printed, SessionEvent
 from multidrop.shell.line_syntax import join_target
 from multidrop.transports import TransportLost
-
-if TYPE_CHECKING:
-    from multidrop.dialects.program_files import Held
-    from multidrop.drives.bus import Bus
-    from multidrop.drives.drive import Drive
 
 
 class KnownNames:

@@ -13,14 +13,16 @@ import contextlib
 from collections.abc import Iterator, Sequence
 from contextvars import ContextVar
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from multidrop.dialects import Diagnostic, DriveError, Refused, Stopped
 from multidrop.dialects.on_demand import imported
+from multidrop.drives.bus import Bus
+from multidrop.drives.drive import Drive
 from multidrop.drives.events import BusEvent, Changed
 from multidrop.shell.automation import ENDING, Automations, only_ends
 from multidrop.shell.configuration import Settings
-from multidrop.shell.connect.opening import open_buses
+from multidrop.shell.connect.opening import Opener, open_buses
 from multidrop.shell.events import FAILURES, By, Entered, Failed, Printed
 from multidrop.shell.line_syntax import (
     EVERYONE,
@@ -32,19 +34,14 @@ from multidrop.shell.line_syntax import (
     parse,
     split_target,
 )
+from multidrop.shell.openings import Failed as OpeningFailed
 from multidrop.shell.openings import Openings
 from multidrop.shell.operations.table import find
 from multidrop.shell.playing import played_by
+from multidrop.shell.raw import RawLine
 from multidrop.shell.twins.twins import Twins
 from multidrop.shell.waits import in_motion
 from multidrop.shell.workspace import LATCHED, Workspace
-
-if TYPE_CHECKING:
-    from multidrop.drives.bus import Bus
-    from multidrop.drives.drive import Drive
-    from multidrop.shell.connect.opening import Opener
-    from multidrop.shell.openings import Failed as OpeningFailed
-    from multidrop.shell.raw import RawLine
 
 _published: ContextVar[list[BaseException] | None] = ContextVar("published", default=None)
 """The failures published in this task's outermost `run`."""

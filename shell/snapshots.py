@@ -3,22 +3,19 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 from multidrop.dialects import Diagnostic, DriveError, Stopped
 from multidrop.dialects.program_files import Held, Stored
+from multidrop.dialects.values import Snapshot
+from multidrop.drives.bus import Bus
+from multidrop.drives.drive import Drive
 from multidrop.shell import new_file, program_listing
 from multidrop.shell.channel import running, transferring
+from multidrop.shell.workspace import Workspace
 from multidrop.simulator import cells
 from multidrop.simulator.cell.writer import BusText, DriveText, write
 from multidrop.simulator.families import FAMILIES, snapshots_of
 from multidrop.simulator.floor import Floor
-
-if TYPE_CHECKING:
-    from multidrop.dialects.values import Snapshot
-    from multidrop.drives.bus import Bus
-    from multidrop.drives.drive import Drive
-    from multidrop.shell.workspace import Workspace
 
 FORBIDDEN = "#@:/ "
 """Characters that the name of a bus in a cell file lacks."""

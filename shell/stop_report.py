@@ -9,13 +9,10 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from datetime import datetime
-from typing import TYPE_CHECKING
 
+from multidrop.drives.bus import Bus
+from multidrop.drives.drive import Drive
 from multidrop.drives.stopping import Fate, Halt
-
-if TYPE_CHECKING:
-    from multidrop.drives.bus import Bus
-    from multidrop.drives.drive import Drive
 
 E_STOP = " - use the E-stop"
 NOT_OPEN = "still being opened"

@@ -11,20 +11,14 @@ import operator
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
-from multidrop.dialects import Diagnostic, DriveError
-from multidrop.drives.drive import REST, confirmed_motion
+from multidrop.dialects import Diagnostic, DriveError, Motion
+from multidrop.drives.bus import Bus
+from multidrop.drives.drive import REST, Drive, Running, confirmed_motion
 from multidrop.shell.line_syntax import EVERYONE
 from multidrop.shell.stop_report import UNCONFIRMED, last_seen
+from multidrop.shell.workspace import Workspace
 from multidrop.transports import TransportLost
-
-if TYPE_CHECKING:
-    from multidrop.dialects import Motion
-    from multidrop.drives.bus import Bus
-    from multidrop.drives.drive import Drive, Running
-    from multidrop.shell.workspace import Workspace
-
 
 LIMIT = 60.0
 """The default time limit, s."""

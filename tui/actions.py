@@ -8,28 +8,24 @@ from __future__ import annotations
 import asyncio
 from dataclasses import dataclass, field
 from functools import partial
-from typing import TYPE_CHECKING
 
 from textual.app import App
 from textual.widgets import Input, TextArea
 
+from multidrop.tui.assist import Assist
+from multidrop.tui.keymap import Keymap
 from multidrop.tui.palette import PADDING, PALETTE, Command, Recent, Switches, all_commands, commands_like, entries
 from multidrop.tui.palette import found as help_on
 from multidrop.tui.panels.view import glances_of
+from multidrop.tui.polling import Polling
 from multidrop.tui.screens.dialogs import Search
+from multidrop.tui.screens.main_screen import MainScreen
 from multidrop.tui.screens.page import Framed, Host, Page, page_entry
+from multidrop.tui.screens.questions import Questions
+from multidrop.tui.screens.start import Opener
+from multidrop.tui.tour import Tour
+from multidrop.tui.typist import Selection
 from multidrop.tui.widgets.theme import SignFilter, Signs, ink_of
-
-if TYPE_CHECKING:
-    from multidrop.tui.assist import Assist
-    from multidrop.tui.keymap import Keymap
-    from multidrop.tui.polling import Polling
-    from multidrop.tui.screens.main_screen import MainScreen
-    from multidrop.tui.screens.questions import Questions
-    from multidrop.tui.screens.start import Opener
-    from multidrop.tui.tour import Tour
-    from multidrop.tui.typist import Selection
-
 
 CTRL_C = "Ctrl+Q quits, Ctrl+X stops all drives"
 

@@ -14,7 +14,7 @@ from __future__ import annotations
 import asyncio
 import os
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import Any, ClassVar
 
 from rich.console import RenderableType
 from textual import events
@@ -30,6 +30,7 @@ from textual.screen import Screen
 from multidrop.drives.events import Unsolicited
 from multidrop.shell.configuration import DEFAULT_LOOK, Look
 from multidrop.shell.events import Failed, OnBus, Printed, SessionEvent, StateChanged
+from multidrop.shell.session import Session
 from multidrop.tui.actions import Actions, Parts
 from multidrop.tui.assist import Assist
 from multidrop.tui.frame_scheduler import AGEING, Frames
@@ -51,9 +52,6 @@ from multidrop.tui.typist import Selection, Typist, Unsent
 from multidrop.tui.widgets.bars import Banner, Footer
 from multidrop.tui.widgets.entry import Entry
 from multidrop.tui.widgets.theme import DEFAULTS, SignFilter, Signs, dress, ink_of, signs_for, wrong_theme
-
-if TYPE_CHECKING:
-    from multidrop.shell.session import Session
 
 INTERRUPTED = 130
 """The exit code after a signal."""

@@ -12,18 +12,15 @@ import math
 import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
 
 from textual.binding import Binding, BindingType
 from textual.keys import Keys
 
 from multidrop.dialects import Diagnostic
 from multidrop.dialects.text import visible
+from multidrop.macros import Macro, MacroStore
 from multidrop.macros.model import FIRST_PAGE, KEYS, describe_clash, page_order
 from multidrop.tui.text import key_words
-
-if TYPE_CHECKING:
-    from multidrop.macros import Macro, MacroStore
 
 FIXED = {"escape", "enter", "tab", "space", "up", "down", "left", "right", "backspace", "delete"}
 FIXED |= {"ctrl+h", "ctrl+i", "ctrl+j", "ctrl+m", "ctrl+z"}

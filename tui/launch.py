@@ -8,19 +8,16 @@ import signal
 import sys
 from collections.abc import Sequence
 from functools import partial
-from typing import TYPE_CHECKING
 
 from textual.driver import Driver
 
 from multidrop.dialects import Diagnostic
 from multidrop.dialects.on_demand import importing
+from multidrop.shell.configuration import Settings
+from multidrop.shell.session import Session
 from multidrop.shell.signals import SIGNALS, early_ends
 from multidrop.tui.app import MultidropApp
 from multidrop.tui.assist import Assist
-
-if TYPE_CHECKING:
-    from multidrop.shell.configuration import Settings
-    from multidrop.shell.session import Session
 
 
 def run(urls: Sequence[str], reconnect: bool = True, raw: bool = False, twin: bool = False) -> int:

@@ -16,14 +16,11 @@ import asyncio
 from collections import deque
 from collections.abc import Callable, Coroutine, Sequence
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from multidrop.shell.line_syntax import Place, pinned
 from multidrop.shell.prompt.line_queue import BURST, Line
-
-if TYPE_CHECKING:
-    from multidrop.shell.session import Session
-
+from multidrop.shell.session import Session
 
 NAMED = 4
 """Number of lines that a report of unsent lines quotes."""

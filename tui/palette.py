@@ -3,19 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 from rich.text import Text
 from textual.fuzzy import Matcher
 
+from multidrop.shell.session import Session
 from multidrop.tui.keymap import FunctionKeys, Keymap
 from multidrop.tui.panels.table import PANELS
 from multidrop.tui.screens.dialogs import Match
 from multidrop.tui.screens.page import PAGES, Framed, Page
 from multidrop.tui.text import at_words, fit, visible
-
-if TYPE_CHECKING:
-    from multidrop.shell.session import Session
 
 PALETTE, PADDING = 90, 7
 """Greatest width of the palette in cells, and what border, padding and scroll bar take of it."""

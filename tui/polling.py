@@ -9,16 +9,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Container, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import Any, TypeVar
 
-from multidrop.drives.telemetry import Value
+from multidrop.drives.bus import Bus
+from multidrop.drives.telemetry import Subscription, Telemetry, Value
 from multidrop.shell.roles import Series
+from multidrop.shell.session import Session
 from multidrop.tui.screen_model import ScreenModel
-
-if TYPE_CHECKING:
-    from multidrop.drives.bus import Bus
-    from multidrop.drives.telemetry import Subscription, Telemetry
-    from multidrop.shell.session import Session
 
 PLOT = 0.02
 """Seconds between the samples of a plotted drive; a slow wire gives fewer."""

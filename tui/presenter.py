@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
+from multidrop.drives.bus import Bus
+from multidrop.shell.session import Session
 from multidrop.tui.keymap import FunctionKeys, Keymap
 from multidrop.tui.panels.drive import trouble_of
 from multidrop.tui.panels.drives import narrow_rows
@@ -17,10 +18,6 @@ from multidrop.tui.screens.main_screen import MainScreen
 from multidrop.tui.screens.page import Framed, Page
 from multidrop.tui.widgets.bars import Tab, banner_row, footer_row, top_row
 from multidrop.tui.widgets.lines import Row
-
-if TYPE_CHECKING:
-    from multidrop.drives.bus import Bus
-    from multidrop.shell.session import Session
 
 FLOOD = 3
 """The number of lines in one frame that are too many to read."""

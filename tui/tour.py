@@ -7,15 +7,13 @@ time with Escape.
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 from multidrop.shell.events import By, Entered, SessionEvent
+from multidrop.shell.session import Session
 from multidrop.tui.keymap import Keymap
 from multidrop.tui.text import at_words
 from multidrop.tui.widgets.lines import Row
-
-if TYPE_CHECKING:
-    from multidrop.shell.session import Session
 
 LINE = "press"
 """The line of the demo cell that it is on."""

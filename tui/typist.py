@@ -11,11 +11,11 @@ from __future__ import annotations
 import asyncio
 import re
 from collections.abc import Callable
-from typing import TYPE_CHECKING
 
 from multidrop.dialects.files import split_lines
 from multidrop.shell.events import FAILURES
 from multidrop.shell.line_syntax import Place
+from multidrop.shell.session import Session
 from multidrop.tui.assist import Assist
 from multidrop.tui.outbox import Outbox, not_sent
 from multidrop.tui.screen_model import Record, ScreenModel
@@ -24,9 +24,6 @@ from multidrop.tui.screens.questions import Questions
 from multidrop.tui.terminal.keyboard import Keyboard
 from multidrop.tui.widgets.entry import LONGEST
 from multidrop.tui.widgets.lines import Row
-
-if TYPE_CHECKING:
-    from multidrop.shell.session import Session
 
 
 class Selection:

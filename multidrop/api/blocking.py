@@ -9,7 +9,7 @@ import contextlib
 from collections.abc import Callable, Coroutine, Iterator
 from functools import update_wrapper
 from types import TracebackType
-from typing import TYPE_CHECKING, Any, Concatenate, ParamSpec, TypeVar
+from typing import Any, Concatenate, ParamSpec, TypeVar
 
 from multidrop.api import endings
 from multidrop.api.calls import CLOSED, StopReport
@@ -17,10 +17,7 @@ from multidrop.api.drives import AsyncDrive, AsyncParameters, AsyncPrograms, Dri
 from multidrop.api.sessions import AsyncSession, Notice, log
 from multidrop.api.telemetry import RATE, AsyncTelemetry, Sample
 from multidrop.api.threads import LoopThread, Notices
-from multidrop.dialects import Diagnostic
-
-if TYPE_CHECKING:
-    from multidrop.dialects import Motion
+from multidrop.dialects import Diagnostic, Motion
 
 P = ParamSpec("P")
 T = TypeVar("T")

@@ -11,18 +11,16 @@ import contextlib
 from collections.abc import Callable, Coroutine, Generator, Sequence
 from contextvars import Context, ContextVar, copy_context
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import Any, TypeVar
 from weakref import WeakKeyDictionary, WeakSet
 
 from multidrop.api.telemetry import AsyncTelemetry
 from multidrop.dialects import Diagnostic, Stopped
+from multidrop.drives.drive import Drive
 from multidrop.shell import stop_report
 from multidrop.shell.automation import ENDING, outcome, settled
 from multidrop.shell.events import Output, Printed, SessionEvent
-
-if TYPE_CHECKING:
-    from multidrop.drives.drive import Drive
-    from multidrop.shell.session import Session
+from multidrop.shell.session import Session
 
 T = TypeVar("T")
 CLOSED = ("the session is closed", "session", "connect(URL) opens one")

@@ -4,10 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from html import escape
-from typing import TYPE_CHECKING
 
-if TYPE_CHECKING:
-    from multidrop.shell.session import Session as Shell
+from multidrop.shell.session import Session as Shell
 
 ROWS = 200
 """The largest number of rows of a table."""

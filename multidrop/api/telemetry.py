@@ -8,20 +8,16 @@ from array import array
 from collections import deque
 from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple, overload
+from typing import Any, NamedTuple, SupportsIndex, overload
 
 from multidrop.api.pictures import Curve, plot
 from multidrop.dialects import Diagnostic
 from multidrop.dialects.files import why
+from multidrop.drives.drive import Drive
 from multidrop.drives.events import Lost
 from multidrop.drives.events import Sample as Read
 from multidrop.shell.events import OnBus, SessionEvent
-
-if TYPE_CHECKING:
-    from typing import SupportsIndex
-
-    from multidrop.drives.drive import Drive
-    from multidrop.shell.session import Session
+from multidrop.shell.session import Session
 
 
 class Sample(NamedTuple):

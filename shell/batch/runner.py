@@ -11,7 +11,6 @@ import sys
 from collections.abc import Awaitable, Callable, Sequence
 from contextlib import nullcontext
 from functools import partial
-from typing import TYPE_CHECKING
 
 from multidrop.shell import configuration, stop_report
 from multidrop.shell.automation import outcome, settled
@@ -25,9 +24,7 @@ from multidrop.shell.session import Session
 from multidrop.shell.signals import early_ends
 from multidrop.shell.streams.event_printer import Printer
 from multidrop.shell.streams.stdout import finish, nonblocking, report, why_interrupted, work_done, write
-
-if TYPE_CHECKING:
-    from multidrop.shell.workspace import Workspace
+from multidrop.shell.workspace import Workspace
 
 Body = Callable[[Session], Awaitable[None]]
 

@@ -9,19 +9,16 @@ import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import PurePath
-from typing import TYPE_CHECKING, Any
+from typing import Any
 from urllib.parse import unquote
 
 from multidrop.dialects import Diagnostic, Hints
 from multidrop.dialects.families import TABLE
 from multidrop.dialects.text import whole
+from multidrop.shell.configuration import SavedConnection
 from multidrop.shell.connect.url_forms import URL_FORMS, sentence
 from multidrop.shell.secrets import holds_password, url_without_secrets, without_secrets
 from multidrop.transports.ssh import WAYS, wrong_path
-
-if TYPE_CHECKING:
-    from multidrop.shell.configuration import SavedConnection
-
 
 DEFAULT_PORTS = {scheme: form.port or None for scheme, form in URL_FORMS.items() if form.port is not None}
 SCHEMES = tuple(URL_FORMS)

@@ -8,16 +8,12 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 from multidrop.dialects import Diagnostic, Procedure
 from multidrop.dialects.families import FAMILIES, family_of
-from multidrop.drives.events import Traffic
+from multidrop.drives.events import BusEvent, Traffic
 from multidrop.shell.finding.scanning import HAZARD, SO_FAR, FoundDrive, Scanning, Stage, listed
-
-if TYPE_CHECKING:
-    from multidrop.drives.events import BusEvent
-    from multidrop.shell.workspace import Workspace
+from multidrop.shell.workspace import Workspace
 
 LISTENS = 20.0
 """The time to listen for a sign-on after a question, s: the user walks to a switch."""

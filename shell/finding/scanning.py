@@ -11,24 +11,21 @@ import asyncio
 from collections.abc import AsyncIterator, Callable, Iterable, Iterator, Sequence
 from contextlib import AsyncExitStack, asynccontextmanager, suppress
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 from multidrop.dialects import Diagnostic, DriveState, Procedure
 from multidrop.dialects.families import DEFAULT, FAMILIES, spoken
 from multidrop.dialects.scanning import WINDOW, Reach, Scan
+from multidrop.drives.bus import Bus
 from multidrop.drives.protected_units import silent
+from multidrop.drives.stopping import Halt
 from multidrop.shell import stop_report
 from multidrop.shell.channel import Job, running
-from multidrop.shell.connect.opening import BAUDED, far_port, port_name
+from multidrop.shell.connect.opening import BAUDED, Opened, Opener, far_port, port_name
 from multidrop.shell.connect.urls import Connection
 from multidrop.shell.state.port_state import memory_of
+from multidrop.shell.workspace import Workspace
 from multidrop.transports import TransportLost
-
-if TYPE_CHECKING:
-    from multidrop.drives.bus import Bus
-    from multidrop.drives.stopping import Halt
-    from multidrop.shell.connect.opening import Opened, Opener
-    from multidrop.shell.workspace import Workspace
 
 SLOWEST = 0.2
 """The longest time for which a network's reply is waited, s; `timeout=` in the URL replaces it."""

@@ -16,15 +16,12 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 from multidrop.dialects import Diagnostic
 from multidrop.dialects.files import opened, why
+from multidrop.shell.configuration import Settings
 from multidrop.shell.secrets import without_secrets
-
-if TYPE_CHECKING:
-    from multidrop.shell.configuration import Settings
-
 
 FORMAT = 1
 """The version of the format, in the first entry of each file."""

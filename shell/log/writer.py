@@ -8,11 +8,11 @@ import stat
 from collections import deque
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING
 
-from multidrop.dialects import Diagnostic, Priority
+from multidrop.dialects import Diagnostic, Priority, Request
 from multidrop.dialects.files import why
 from multidrop.dialects.text import visible
+from multidrop.drives.bus import Bus
 from multidrop.drives.events import BusEvent, Ended, Sent, Traffic, Unsolicited
 from multidrop.shell.events import (
     Entered,
@@ -29,11 +29,7 @@ from multidrop.shell.log import files
 from multidrop.shell.log.files import BEGIN, KINDS, TRAFFIC, Entry, line_of
 from multidrop.shell.openings import model
 from multidrop.shell.threads import BoundedWriter
-
-if TYPE_CHECKING:
-    from multidrop.dialects import Request
-    from multidrop.drives.bus import Bus
-    from multidrop.shell.workspace import Workspace
+from multidrop.shell.workspace import Workspace
 
 LAST = 50
 """Entries that are kept for a screen."""

@@ -8,18 +8,15 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from multidrop.dialects import Diagnostic
+from multidrop.dialects import Diagnostic, DriveState
 from multidrop.dialects.files import escaped_toml, text_of, toml_of
 from multidrop.dialects.values import SECTIONS, VARIABLES, Readings, Value
+from multidrop.drives.drive import Drive
 from multidrop.shell.channel import running, transferring
 from multidrop.shell.events import SettingsRead
-
-if TYPE_CHECKING:
-    from multidrop.dialects import DriveState
-    from multidrop.drives.drive import Drive
-    from multidrop.shell.workspace import Workspace
+from multidrop.shell.workspace import Workspace
 
 DRIVE, UNREAD = "drive", "unread"
 HEAD = (

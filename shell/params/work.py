@@ -13,7 +13,6 @@ from collections.abc import Awaitable, Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from multidrop.dialects import Diagnostic, DriveError, NoAnswer, Refused, Stopped
 from multidrop.dialects.values import (
@@ -28,16 +27,14 @@ from multidrop.dialects.values import (
     Value,
     same,
 )
+from multidrop.drives.drive import Drive
 from multidrop.shell import new_file
 from multidrop.shell.channel import running, transferring
 from multidrop.shell.line_syntax import split_target
 from multidrop.shell.params import file as files
+from multidrop.shell.session import Session
+from multidrop.shell.workspace import Workspace
 from multidrop.transports import TransportLost
-
-if TYPE_CHECKING:
-    from multidrop.drives.drive import Drive
-    from multidrop.shell.session import Session
-    from multidrop.shell.workspace import Workspace
 
 ALL = ("all", "*")
 Work = Callable[["Drive"], Awaitable[None]]

@@ -5,17 +5,14 @@ from __future__ import annotations
 import asyncio
 import sys
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 from multidrop.dialects import Diagnostic, DriveError
 from multidrop.shell.batch import runner
 from multidrop.shell.plots.plot import begin
 from multidrop.shell.plots.request import PlotTarget, parse_rate, parse_series, parse_target, read_first
+from multidrop.shell.session import Session
 from multidrop.shell.streams.stdout import report, write
-
-if TYPE_CHECKING:
-    from multidrop.shell.session import Session
-    from multidrop.transports import TransportLost
+from multidrop.transports import TransportLost
 
 
 def run(

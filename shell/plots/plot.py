@@ -12,7 +12,6 @@ import contextlib
 from collections.abc import Callable, Iterator, Sequence
 from datetime import datetime
 from functools import partial
-from typing import TYPE_CHECKING
 
 from multidrop.dialects import Diagnostic
 from multidrop.dialects.values import UNREAD, Conditions
@@ -35,11 +34,8 @@ from multidrop.shell.plots.request import PlotTarget, shown
 from multidrop.shell.plots.rerun_calls import AGREES, COLOURS, DIFFERS, RUNS, TWIN, Batch, Curve, Sink, State
 from multidrop.shell.roles import DIFFERENCE, RunningPlot, Series
 from multidrop.shell.threads import in_thread
+from multidrop.shell.workspace import Workspace
 from multidrop.transports.sockets import exposed
-
-if TYPE_CHECKING:
-    from multidrop.shell.workspace import Workspace
-
 
 FILE_PERIOD, LIVE_PERIOD = 0.4, 0.1
 """The time between batches, s: longer makes a smaller file, shorter a smoother view."""

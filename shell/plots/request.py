@@ -13,19 +13,16 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from ipaddress import ip_address
 from pathlib import Path
-from typing import TYPE_CHECKING
 from urllib.parse import urlsplit
 
 from multidrop.dialects import Diagnostic
+from multidrop.drives.drive import Drive
 from multidrop.drives.telemetry import FASTEST, MODEST
 from multidrop.shell.connect.urls import listening
 from multidrop.shell.line_syntax import EVERYONE, split_target
 from multidrop.shell.roles import DIFFERENCE, Series
 from multidrop.shell.secrets import url_without_secrets
-
-if TYPE_CHECKING:
-    from multidrop.drives.drive import Drive
-    from multidrop.shell.session import Session
+from multidrop.shell.session import Session
 
 
 @dataclass(frozen=True)

@@ -9,18 +9,16 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Callable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from multidrop.dialects import Diagnostic, DriveError, Inexpressible, Procedure, Refused
 from multidrop.dialects.debugging import Debugging, Look, Neighbours, Row
+from multidrop.drives.drive import Drive
 from multidrop.drives.events import Lost
 from multidrop.shell.events import OnBus, Phase, SessionEvent
 from multidrop.shell.program_listing import Listing, Sight
+from multidrop.shell.session import Session
 from multidrop.transports import TransportLost
-
-if TYPE_CHECKING:
-    from multidrop.drives.drive import Drive
-    from multidrop.shell.session import Session
 
 PERIOD = 0.1
 """The time between two looks at a running program, s."""

@@ -11,7 +11,6 @@ import asyncio
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
 from weakref import WeakSet
 
 from multidrop.dialects import Diagnostic, DriveError, Refused, SourceLine
@@ -19,17 +18,14 @@ from multidrop.dialects.errors import Differs
 from multidrop.dialects.families import program_languages
 from multidrop.dialects.files import program_text_of
 from multidrop.dialects.program_files import LOCKED, Held, errors, refuse
-from multidrop.drives.drive import still
+from multidrop.drives.drive import Drive, still
 from multidrop.shell.channel import running, transferring
 from multidrop.shell.events import By, Printed
 from multidrop.shell.program_listing import check_one, read
+from multidrop.shell.session import Session
 from multidrop.shell.state.backups import Copy, Sources, write_backup
 from multidrop.shell.state.crash_marks import marked
-
-if TYPE_CHECKING:
-    from multidrop.drives.drive import Drive
-    from multidrop.shell.session import Session
-    from multidrop.shell.workspace import Workspace
+from multidrop.shell.workspace import Workspace
 
 LIMIT = 10.0
 """The longest wait for a running program and its motion to end, s."""

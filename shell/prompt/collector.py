@@ -13,10 +13,8 @@ import asyncio
 import contextlib
 import gc
 from collections.abc import Callable, Iterator
-from typing import TYPE_CHECKING
 
-if TYPE_CHECKING:
-    from multidrop.shell.workspace import Workspace
+from multidrop.shell.workspace import Workspace
 
 FREEZE = 1.0
 """The time between two freezes, s."""

@@ -4,17 +4,14 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 from multidrop.dialects import Diagnostic
+from multidrop.drives.drive import Drive
 from multidrop.shell.line_syntax import EVERYONE, DriveLine, VerbLine, parse
 from multidrop.shell.operations.offers import PLACEHOLDERS, Found, meant, offered, spoken, targets, verbs
 from multidrop.shell.operations.table import VERBS
 from multidrop.shell.operations.usage import following, narrowed
-
-if TYPE_CHECKING:
-    from multidrop.drives.drive import Drive
-    from multidrop.shell.workspace import Workspace
+from multidrop.shell.workspace import Workspace
 
 MOST = 200
 """The largest number of completions."""

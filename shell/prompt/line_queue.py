@@ -18,7 +18,6 @@ import sys
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from multidrop.dialects import Diagnostic
 from multidrop.dialects.files import lines_of
@@ -30,8 +29,7 @@ from multidrop.shell.line_syntax import NOWHERE, DriveLine, Place, TypedLine, Ve
 if sys.platform != "win32":
     import fcntl
 
-if TYPE_CHECKING:
-    from multidrop.shell.session import Session
+from multidrop.shell.session import Session
 
 KEPT = 5000
 """The number of lines read back; a file of twice as many is cut to that number."""

@@ -11,7 +11,6 @@ import sys
 import threading
 from collections.abc import AsyncIterator, Awaitable, Callable, Iterable, Sequence
 from functools import partial
-from typing import TYPE_CHECKING
 
 from multidrop.dialects import Diagnostic
 from multidrop.dialects.files import LARGEST, check_line, split_lines
@@ -19,11 +18,8 @@ from multidrop.dialects.text import visible
 from multidrop.shell.channel import Ask, Field
 from multidrop.shell.line_syntax import uncommented
 from multidrop.shell.prompt.keyboard import Keyboard, on_stop_key
+from multidrop.shell.session import Session
 from multidrop.shell.streams.stdout import write
-
-if TYPE_CHECKING:
-    from multidrop.shell.session import Session
-
 
 QUIET = 0.5
 """The quiet time that ends the input of a line in raw mode, s."""

@@ -6,9 +6,9 @@ import asyncio
 import sys
 from collections.abc import Callable, Sequence
 from ipaddress import ip_address
-from typing import TYPE_CHECKING
 
 from multidrop.dialects import Diagnostic
+from multidrop.drives.bus import Bus
 from multidrop.shell.batch import runner
 from multidrop.shell.events import FAILURES
 from multidrop.shell.publishing import broker
@@ -16,13 +16,10 @@ from multidrop.shell.publishing.broker import Message, Target, parse_target
 from multidrop.shell.publishing.feed import BYE, LOST, ONLINE, Feed, Topics, parse_rate
 from multidrop.shell.publishing.publisher import Publisher
 from multidrop.shell.secrets import url_without_secrets
+from multidrop.shell.session import Session
 from multidrop.shell.streams.stdout import report, write
-
-if TYPE_CHECKING:
-    from multidrop.drives.bus import Bus
-    from multidrop.shell.session import Session
-    from multidrop.shell.workspace import Workspace
-    from multidrop.transports import TransportLost
+from multidrop.shell.workspace import Workspace
+from multidrop.transports import TransportLost
 
 AGAIN = 30.0
 """The time between two attempts to open a line that was not there, s."""

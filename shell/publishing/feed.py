@@ -9,22 +9,19 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from datetime import datetime
 from functools import partial
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 from multidrop.dialects import Diagnostic
 from multidrop.dialects.text import visible
 from multidrop.dialects.values import UNREAD, Conditions
+from multidrop.drives.bus import Bus
 from multidrop.drives.events import Changed, Conditioned, Lost, Sample, Silent, Unsolicited
 from multidrop.shell.events import Entered, Failed, Notified, OnBus, Printed, SessionEvent
 from multidrop.shell.log.files import Entry, line_of
 from multidrop.shell.publishing.broker import Message
 from multidrop.shell.publishing.publisher import Publisher
 from multidrop.shell.streams.stdout import shortened
-
-if TYPE_CHECKING:
-    from multidrop.drives.bus import Bus
-    from multidrop.shell.workspace import Workspace
-
+from multidrop.shell.workspace import Workspace
 
 RESERVED = "+#/%"
 """The wildcards and the separator of MQTT, and the sign of an escape."""

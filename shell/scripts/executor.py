@@ -11,7 +11,6 @@ import contextlib
 from collections.abc import AsyncIterator, Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import replace
 from itertools import islice
-from typing import TYPE_CHECKING
 
 from multidrop.dialects import Diagnostic, NoAnswer, Stopped
 from multidrop.drives.drive import Drive
@@ -25,14 +24,11 @@ from multidrop.shell.scripts.execution import CUT, Execution, Frame, Unfinished
 from multidrop.shell.scripts.model import Ending, Executed, Result, Script, ScriptLine, Watcher
 from multidrop.shell.scripts.planning import bind, macro_claims, script_claims
 from multidrop.shell.scripts.reading import read_macro
+from multidrop.shell.session import Session
 from multidrop.shell.state import crash_marks
 from multidrop.shell.waits import Standing, standings
 from multidrop.shell.workspace import LATCHED
 from multidrop.transports import TransportLost
-
-if TYPE_CHECKING:
-    from multidrop.shell.session import Session
-
 
 # A connection that is lost while no line uses it: that ends a script or macro too, and not only its next line.
 

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from typing import TYPE_CHECKING
+from collections.abc import Iterator, Mapping, Sequence
 
 from multidrop.dialects import Diagnostic, Inexpressible, NoAnswer
+from multidrop.drives.drive import Drive
 from multidrop.macros import Macro, fill, value_names
 from multidrop.shell.automation import Claim, only_ends
 from multidrop.shell.line_syntax import DriveLine, parse
@@ -15,11 +15,6 @@ from multidrop.shell.scripts.model import CallFile, CallMacro, If, MacroScript, 
 from multidrop.shell.scripts.reading import UNKNOWN
 from multidrop.shell.scripts.words import macro_call
 from multidrop.shell.workspace import Workspace
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from multidrop.drives.drive import Drive
 
 OPENING = ("/open", "/close")
 SELECTING = (*OPENING, "/use")

@@ -5,16 +5,14 @@ from __future__ import annotations
 import contextlib
 from datetime import datetime
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 from urllib.parse import quote
 
 from multidrop.dialects import Diagnostic
 from multidrop.dialects.files import why
+from multidrop.dialects.program_files import Held
 from multidrop.macros.atomic import create_atomically, make_folder
 from multidrop.shell.state.store import Store, digest
-
-if TYPE_CHECKING:
-    from multidrop.dialects.program_files import Held
 
 
 class Copy(NamedTuple):

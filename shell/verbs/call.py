@@ -5,17 +5,15 @@ from __future__ import annotations
 from collections.abc import Coroutine, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from multidrop.dialects import Diagnostic
+from multidrop.drives.drive import Drive
 from multidrop.shell.events import By
 from multidrop.shell.line_syntax import split_target
 from multidrop.shell.operations.operation import Operation
 from multidrop.shell.operations.usage import limits, split
-
-if TYPE_CHECKING:
-    from multidrop.drives.drive import Drive
-    from multidrop.shell.session import Session
+from multidrop.shell.session import Session
 
 
 def words(verb: Operation, rest: str) -> list[str]:

@@ -4,16 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
+from multidrop.drives.bus import Bus
+from multidrop.shell.session import Session
 from multidrop.tui.readout import READ, Readout, State
 from multidrop.tui.screen_model import ScreenModel
 from multidrop.tui.text import digits, fit
 from multidrop.tui.widgets.lines import Span
-
-if TYPE_CHECKING:
-    from multidrop.drives.bus import Bus
-    from multidrop.shell.session import Session
 
 STATE = 17
 """Width of a sign and its words: `■ stood 0.9 s ago`."""

@@ -5,21 +5,19 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Sequence
 from string import ascii_letters, digits
-from typing import TYPE_CHECKING, ClassVar, NamedTuple
+from typing import ClassVar, NamedTuple
 
 from textual.binding import Binding, BindingType
 
 from multidrop.dialects import Diagnostic
+from multidrop.macros import Macro, MacroStore
+from multidrop.shell.playing import Playing
 from multidrop.tui.panels.view import View
 from multidrop.tui.screens.dialogs import Ask, Confirm
 from multidrop.tui.screens.page import Host, Page
 from multidrop.tui.screens.program_rows import news_rows, rule
 from multidrop.tui.text import fit, visible
 from multidrop.tui.widgets.lines import Row, in_view, spread
-
-if TYPE_CHECKING:
-    from multidrop.macros import Macro, MacroStore
-    from multidrop.shell.playing import Playing
 
 NAME, KEY = 20, 8
 NEWS = 3

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, ClassVar, NamedTuple
+from typing import ClassVar, NamedTuple
 
 from textual.app import ComposeResult
 from textual.binding import Binding, BindingType
@@ -18,6 +18,7 @@ from textual.screen import Screen
 from multidrop.dialects import Diagnostic
 from multidrop.dialects.on_demand import imported
 from multidrop.shell.line_syntax import Place
+from multidrop.shell.session import Session
 from multidrop.tui.frame_scheduler import Frames
 from multidrop.tui.keymap import FunctionKeys, named_key
 from multidrop.tui.outbox import Outbox
@@ -29,9 +30,6 @@ from multidrop.tui.terminal.keyboard import Keyboard
 from multidrop.tui.texts import Texts
 from multidrop.tui.widgets.bars import Banner, Footer, TopLine
 from multidrop.tui.widgets.lines import Lines, Span
-
-if TYPE_CHECKING:
-    from multidrop.shell.session import Session
 
 
 class Framed(Screen[None]):

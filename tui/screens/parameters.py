@@ -7,12 +7,13 @@ sends the lines that are shown. They go out as if they were typed, and then ever
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar
 
 from textual.binding import Binding, BindingType
 
 from multidrop.dialects import Diagnostic
 from multidrop.dialects.values import VARIABLES, Readings, Value
+from multidrop.drives.drive import Drive
 from multidrop.shell.params import file as files
 from multidrop.shell.params.page import Edit, edit, found_in, meanings_of, parsed, rows
 from multidrop.shell.params.page import Row as Setting
@@ -20,9 +21,6 @@ from multidrop.tui.panels.view import Glance, View, name_of
 from multidrop.tui.screens.page import AskingPage, Begun, Host
 from multidrop.tui.text import age, fit
 from multidrop.tui.widgets.lines import Row, Span, in_view, spread
-
-if TYPE_CHECKING:
-    from multidrop.drives.drive import Drive
 
 NAME, VALUE, UNIT = 8, 16, 10
 TOLD = ("range", "value", "values", "note")

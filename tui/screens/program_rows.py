@@ -7,7 +7,7 @@ import shlex
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import datetime
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 from rich.text import Text
 
@@ -15,6 +15,7 @@ from multidrop.dialects.families import program_languages
 from multidrop.dialects.program_files import Entry, Part, Problem, errors
 from multidrop.shell.line_syntax import join_target
 from multidrop.shell.programs.edited_file import real_text
+from multidrop.shell.session import Session
 from multidrop.tui.editor import Grammar, MacroGrammar, Mark
 from multidrop.tui.panels.view import Glance, name_of
 from multidrop.tui.readout import ProgramFacts
@@ -24,9 +25,6 @@ from multidrop.tui.text import fit, visible
 from multidrop.tui.texts import OpenText
 from multidrop.tui.widgets.lines import Row, Span, spread, width_of
 from multidrop.tui.widgets.transcript import MARKS
-
-if TYPE_CHECKING:
-    from multidrop.shell.session import Session
 
 MOST_PROBLEMS = 4
 """Problems that are shown below the editor."""

@@ -5,20 +5,18 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Awaitable, Callable, Sequence
 from functools import partial
-from typing import TYPE_CHECKING, TypeVar
+from typing import TypeVar
 
 from rich.text import Text
 from textual.app import App
 
+from multidrop.drives.bus import Bus
 from multidrop.shell.channel import Field
+from multidrop.shell.session import Session
 from multidrop.tui.panels.view import Glance
 from multidrop.tui.screens.dialogs import Ask, Choose, Confirm, Dialog, Form, GoOn, Match, Offer, Search, TooSmall
 from multidrop.tui.text import visible
 from multidrop.tui.widgets.theme import THEMES, Signs
-
-if TYPE_CHECKING:
-    from multidrop.drives.bus import Bus
-    from multidrop.shell.session import Session
 
 T = TypeVar("T")
 Answers = list[tuple[str, str]]

@@ -7,7 +7,7 @@ top narrows the list, and takes a URL. Enter opens what is highlighted.
 from __future__ import annotations
 
 from collections.abc import Awaitable, Callable, Sequence
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar
 
 from rich.text import Text
 from textual.app import App, ComposeResult
@@ -18,14 +18,12 @@ from textual.widgets.option_list import Option
 
 from multidrop.dialects.text import visible
 from multidrop.shell.events import FAILURES
+from multidrop.shell.session import Session
 from multidrop.tui.assist import Assist, StartEntry
 from multidrop.tui.keymap import named_key
 from multidrop.tui.screens.dialogs import Field, Options, Over
 from multidrop.tui.terminal.keyboard import Keyboard
 from multidrop.tui.widgets.bars import Banner
-
-if TYPE_CHECKING:
-    from multidrop.shell.session import Session
 
 DEMO = StartEntry("demo", "the demo cell", "sim:", "simulated drives, no hardware needed")
 TOUR = StartEntry("demo", "the tour", "tour", "two minutes through it, on the demo cell")
