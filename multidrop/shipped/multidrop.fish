@@ -234,7 +234,7 @@ complete -c multidrop -n '_shtab_multidrop_using; and test $_shtab_multidrop_npo
 complete -c multidrop -n '_shtab_multidrop_using plot' -s h -l help -d 'show this help message and exit'
 complete -c multidrop -n '_shtab_multidrop_using plot' -l drive -x -d 'a drive, or ADDR.WORD for a value that it prints (default: all drives)'
 complete -c multidrop -n '_shtab_multidrop_using plot' -l rate -x -d 'samples a second of each drive, at most (default: 50); max: as fast as the line allows'
-complete -c multidrop -n '_shtab_multidrop_using plot' -l to -xka "(__fish_complete_path (commandline -ct))" -d 'a file (an existing one is added to), or a viewer elsewhere'
+complete -c multidrop -n '_shtab_multidrop_using plot' -l to -x -d 'a file for rerun or a table (an existing one is added to), or a viewer elsewhere'
 complete -c multidrop -n '_shtab_multidrop_using plot' -l serve -x -d 'serve a viewer'"'"'s data here'
 complete -c multidrop -n '_shtab_multidrop_using plot' -l no-reconnect -d 'give up a lost connection, and do not try again'
 complete -c multidrop -n '_shtab_multidrop_using plot; and test $_shtab_multidrop_npos -eq 0' -ka "(_multidrop_url)" -d 'what to open'

@@ -94,16 +94,16 @@ PARAMS_RESTORE = Operation(
 )
 PLOT = Operation(
     usage=(
-        "/plot [[ADDR ...] --to FILE.rrd|rerun+http://HOST:PORT/proxy [--rate N|max] | [ADDR ...] "
-        "--serve [HOST:]PORT [--rate N|max] | ADDR ... | off]"
+        "/plot [[ADDR ...] --to FILE.rrd|FILE.csv|FILE.parquet|rerun+http://HOST:PORT/proxy [--rate N|max] | "
+        "[ADDR ...] --serve [HOST:]PORT [--rate N|max] | ADDR ... | off]"
     ),
-    help="""Plot drives and values on the screen, or to rerun with commands and replies, until /plot off or the end.
+    help="""Plot drives and values on the screen, to rerun or into a table, with commands and replies, until /plot off.
 
     ADDR is a drive (position and velocity): `b`, `press:b`, `press:*`; or a value that a drive prints: `VM`, `b.I1`.
     `/plot b.I1` shows it on the screen. With --to or --serve, and without ADDR, it plots all drives of all open buses.
     It reads only while a plot runs or is shown, each drive 50 times a second unless `--rate` says otherwise; `--rate
     max` reads as fast as the line allows. `/plot FILE.rrd` is short for `/plot --to FILE.rrd`; `/plot` alone lists the
-    running plots.
+    running plots. A table (CSV, Parquet) has a row for each value, state and line.
     """,
     work="drives:plot",
     words={
@@ -119,6 +119,7 @@ PLOT = Operation(
     examples=[
         "plot sim:#press --to run.rrd",
         "plot press --drive b --serve 9876",
+        "plot press --to night.csv --rate 1",
         "plot press --to rerun+http://pc:9876/proxy",
     ],
     arguments={
@@ -128,8 +129,8 @@ PLOT = Operation(
             "samples a second of each drive, at most (default: 50); max: as fast as the line allows", default="50"
         ),
         "--to | --serve": {
-            "--to FILE.rrd|rerun+http://HOST:PORT/proxy": typed(
-                "a file (an existing one is added to), or a viewer elsewhere", default=None
+            "--to FILE.rrd|FILE.csv|FILE.parquet|rerun+http://HOST:PORT/proxy": typed(
+                "a file for rerun or a table (an existing one is added to), or a viewer elsewhere", default=None
             ),
             "--serve [HOST:]PORT": typed("serve a viewer's data here", default=None),
         },

@@ -57,8 +57,9 @@ def verbs(workspace: Workspace) -> Found:
     return ((verb.name, verb.lines[0]) for verb in VERBS.values() if verb.fits is None or verb.fits(workspace))
 
 
+PLOTS = ("FILE.rrd", "FILE.csv", "FILE.parquet")
 PLACEHOLDERS = (
-    *("ADDR", "@ADDR", "BUS", "BUS[:ADDR]", "DRIVE", "F2..F12", "FILE", "FILE.rrd", "MACRO", "PAGE"),
+    *("ADDR", "@ADDR", "BUS", "BUS[:ADDR]", "DRIVE", "F2..F12", "FILE", *PLOTS, "MACRO", "PAGE"),
     *("PERSONALITY", "URL", "WORD"),
 )
 """The words of a usage for which values are known; only a person knows the value of any other placeholder."""
@@ -94,7 +95,7 @@ def offered(workspace: Workspace, placeholder: str, word: str) -> Found:
             yield from language.complete("", product)
     if placeholder in ("BUS", "BUS[:ADDR]"):
         yield from ((bus.name, ", ".join(bus.drives)) for bus in workspace.buses.values())
-    if placeholder in ("FILE", "FILE.rrd", "URL"):
+    if placeholder in ("FILE", *PLOTS, "URL"):
         yield from _files(word)
 
 

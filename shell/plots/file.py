@@ -49,7 +49,7 @@ class RecordingFile:
         """The entities in the file."""
         self._good = 0
         self._made = not os.path.exists(path)  # Path's own method raises for a name that is too long
-        self._lock = self._take_lock()
+        self._lock = take_lock(path)
         try:
             self._look()
         except Diagnostic:
@@ -63,21 +63,6 @@ class RecordingFile:
     @property
     def writes(self) -> Path:
         return self.part if self.adds else self.path
-
-    def _take_lock(self) -> int:
-        try:
-            lock = os.open(self.path, os.O_RDWR | os.O_CREAT, 0o666)
-        except OSError as error:
-            raise Diagnostic(f"cannot write {self.path} ({error.strerror})") from None
-        if sys.platform != "win32":
-            try:
-                fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            except BlockingIOError:
-                os.close(lock)
-                raise Diagnostic(f"another plot writes {self.path}", hint="use another file") from None
-            except OSError:
-                pass  # the file system has no locks
-        return lock
 
     def _look(self) -> None:
         if self.path.stat().st_size:
@@ -116,7 +101,7 @@ class RecordingFile:
             if self.adds:
                 self._join(blueprint)
             else:
-                _sync(self.path)
+                synced(self.path)
         except OSError as error:
             raise SinkBroken(self.why(error)) from None
         finally:
@@ -128,7 +113,7 @@ class RecordingFile:
         beside = target.with_name(f".{target.stem}.{secrets.token_hex(4)}.tmp.rrd")
         try:
             _copy(self._rr, (self.path, self.part), beside, self.identity, blueprint)
-            _sync(beside)
+            synced(beside)
             os.replace(beside, target)
             self.part.unlink()
         except (RuntimeError, OSError) as error:
@@ -139,7 +124,7 @@ class RecordingFile:
     def why(self, error: Exception) -> str:
         """The error in words, and where the samples are."""
         reason = str(error)
-        if _disk_full(self.path.parent):
+        if disk_full(self.path.parent):
             reason = "the disk is full"
         kept = f"{self.part} has what was added to {self.path}" if self.adds else "what came before is in it"
         return f"cannot write {self.writes}: {reason}; {kept}"
@@ -153,6 +138,23 @@ class RecordingFile:
                 self.path.unlink()
         os.close(self._lock)
         self._lock = -1
+
+
+def take_lock(path: Path) -> int:
+    """Open and lock the file of a plot, which is made if there is none. Raises Diagnostic."""
+    try:
+        lock = os.open(path, os.O_RDWR | os.O_CREAT, 0o666)
+    except OSError as error:
+        raise Diagnostic(f"cannot write {path} ({error.strerror})") from None
+    if sys.platform != "win32":
+        try:
+            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            os.close(lock)
+            raise Diagnostic(f"another plot writes {path}", hint="use another file") from None
+        except OSError:
+            pass  # the file system has no locks
+    return lock
 
 
 def _identity(path: Path) -> str:
@@ -179,7 +181,7 @@ def _chunks(path: Path) -> Iterator[Any]:
         yield from reader.stream()
 
 
-def _disk_full(folder: Path) -> bool:
+def disk_full(folder: Path) -> bool:
     if sys.platform != "win32":
         with contextlib.suppress(OSError):
             room = os.statvfs(folder)
@@ -209,7 +211,7 @@ def _copy(rr: Any, sources: tuple[Path, ...], target: Path, identity: str, bluep
         recording.disconnect()
 
 
-def _sync(path: Path) -> None:
+def synced(path: Path) -> None:
     descriptor = os.open(path, os.O_RDWR)
     try:
         os.fsync(descriptor)

@@ -1,4 +1,4 @@
-"""A plot to rerun, and its feed: samples, values, states and twins of drives; typed and printed lines as a text log.
+"""A plot to rerun or into a table, and its feed: samples, values, states and twins; typed and printed lines as a log.
 
 Theory of operation. A plot takes samples and texts at almost no cost. A thread passes them on in batches. A killed
 process loses at most half a second, and a frozen viewer delays nothing. There are two timelines: `elapsed` (s since the
@@ -30,8 +30,9 @@ from multidrop.shell.events import (
     TwinEvent,
 )
 from multidrop.shell.plots.file import SinkBroken
-from multidrop.shell.plots.request import PlotTarget, shown
+from multidrop.shell.plots.request import TABLES, PlotTarget, shown
 from multidrop.shell.plots.rerun_calls import AGREES, COLOURS, DIFFERS, RUNS, TWIN, Batch, Curve, Sink, State
+from multidrop.shell.plots.table import TableSink
 from multidrop.shell.roles import DIFFERENCE, RunningPlot, Series
 from multidrop.shell.threads import in_thread
 from multidrop.shell.workspace import Workspace
@@ -53,7 +54,7 @@ class Plot:
     What takes samples, values, states and texts never blocks.
     """
 
-    def __init__(self, sink: Sink, clock: Callable[[], float], wall: Callable[[float], datetime]) -> None:
+    def __init__(self, sink: Sink | TableSink, clock: Callable[[], float], wall: Callable[[float], datetime]) -> None:
         """Use `open`."""
         self._sink, self._wall = sink, wall
         self._clock = clock
@@ -84,7 +85,7 @@ class Plot:
         writable, or the port is in use. Raises Unreachable where no viewer listens. The target is unchanged then.
         """
         try:
-            sink = await in_thread(lambda: Sink(target), _timeout(target))
+            sink = await in_thread(lambda: _sink(target), _timeout(target))
         except TimeoutError:
             raise Diagnostic(f"cannot plot to {target.text}: it does not respond") from None
         return cls(sink, clock, wall)
@@ -208,6 +209,10 @@ class Plot:
         with contextlib.suppress(TimeoutError):
             await in_thread(self._sink.abandon, ABANDON_TIMEOUT)
         self._sink.let_go()
+
+
+def _sink(target: PlotTarget) -> Sink | TableSink:
+    return TableSink(target) if target.file is not None and target.file.suffix in TABLES else Sink(target)
 
 
 def _timeout(target: PlotTarget) -> float:

@@ -25,6 +25,11 @@ from multidrop.shell.secrets import url_without_secrets
 from multidrop.shell.session import Session
 
 
+TABLES = (".csv", ".parquet")
+ENDINGS = ".rrd, .csv or .parquet"
+FILES = "FILE.rrd|.csv|.parquet"
+
+
 @dataclass(frozen=True)
 class PlotTarget:
     """A file, a server of our own at host and port (0: a free one), or a viewer elsewhere."""
@@ -62,13 +67,13 @@ def bracketed(host: str) -> str:
 
 
 def parse_target(to: str | None, serve: str | None) -> PlotTarget:
-    """Parse `--to FILE.rrd`, `--to rerun+http://HOST:PORT/proxy` or `--serve [HOST:]PORT`.
+    """Parse `--to FILE.rrd|.csv|.parquet`, `--to rerun+http://HOST:PORT/proxy` or `--serve [HOST:]PORT`.
 
     Raises Diagnostic for a wrong target, for two targets and for none.
     """
     if (to is None) == (serve is None):
         what = "no target for the plot" if to is None else "two targets for one plot"
-        raise Diagnostic(what, hint="valid: --to FILE.rrd, --to rerun+http://HOST:PORT/proxy or --serve [HOST:]PORT")
+        raise Diagnostic(what, hint=f"valid: --to {FILES}, --to rerun+http://HOST:PORT/proxy or --serve [HOST:]PORT")
     if serve is not None:
         host, port = listening(serve)
         return PlotTarget(host=host, port=port)
@@ -81,8 +86,8 @@ def _file(text: str) -> PlotTarget:
         path = Path(text).expanduser()
     except RuntimeError:  # a ~ and no home
         path = Path(text)
-    if path.suffix != ".rrd":
-        raise Diagnostic(f"no plot file {text!r}", hint="valid: a name that ends in .rrd")
+    if path.suffix not in (".rrd", *TABLES):
+        raise Diagnostic(f"no plot file {text!r}", hint=f"valid: a name that ends in {ENDINGS}")
     if not os.path.isdir(path.parent):  # Path's own methods raise for a name that is too long
         raise Diagnostic(f"no folder {path.parent}", hint="make it first")
     if os.path.exists(path) and not os.path.isfile(path):

@@ -16,7 +16,7 @@ from multidrop.shell.operations.buses import simulated_cell
 from multidrop.shell.params import work
 from multidrop.shell.params.work import Options
 from multidrop.shell.plots.plot import begin
-from multidrop.shell.plots.request import DEFAULT, parse_rate, parse_series, parse_target, read_first
+from multidrop.shell.plots.request import DEFAULT, FILES, TABLES, parse_rate, parse_series, parse_target, read_first
 from multidrop.shell.verbs.call import Call
 
 FLAGS = ("--dry-run", "--save", "--communication", "--other-product", "--defaults")
@@ -114,7 +114,7 @@ async def _plot_on_screen(call: Call, texts: list[str]) -> None:
     workspace = call.session
     screen = workspace.front.screen
     if screen is None:
-        raise Diagnostic("no screen to plot on", "/plot", "valid here: --to FILE.rrd or --serve [HOST:]PORT")
+        raise Diagnostic("no screen to plot on", "/plot", f"valid here: --to {FILES} or --serve [HOST:]PORT")
     series = parse_series(workspace, texts)
     await read_first(workspace, series)
     workspace.plotted = series
@@ -132,7 +132,7 @@ def _plotted(call: Call, words: list[str]) -> tuple[dict[str, str], list[str]]:
         option = word
         if word in ("--to", "--serve", "--rate", "--drive"):
             value = next(left, "")
-        elif word.endswith(".rrd") or "://" in word:
+        elif word.endswith((".rrd", *TABLES)) or "://" in word:
             option, value = "--to", word
         else:
             option, value = "--drive", word

@@ -52,7 +52,7 @@ def test_a_target_is_what_was_typed(to: str | None, serve: str | None, text: str
     [
         (None, None, "no target for the plot"),
         ("a.rrd", "9876", "two targets for one plot"),
-        ("a.csv", None, "valid: a name that ends in .rrd"),
+        ("a.txt", None, "valid: a name that ends in .rrd, .csv or .parquet"),
         ("no/such/folder/a.rrd", None, "no folder no/such/folder"),
         (None, "here", "valid: PORT or HOST:PORT"),
         (None, "", "valid: PORT or HOST:PORT"),
