@@ -54,7 +54,7 @@ async def test_each_value_state_and_line_is_a_row(ending: str, tmp_path: Path) -
     ]
     assert [float(row["value"]) for row in found[1:4]] == [1.5, 7, -2]
     assert [row["unit"] for row in found] == ["", "", "steps", "steps/s", ""]
-    assert [found[0]["text"], found[4]["text"]] == ["G1", r'a: PR "x",\nP']
+    assert [found[0]["text"], found[4]["text"]] == ["G1", r'a: PR "x",\x0aP']
     assert str(found[1]["time"]).replace(" ", "T").startswith("2027-01-15T08:00:00.5")
 
 
