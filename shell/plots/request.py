@@ -24,7 +24,6 @@ from multidrop.shell.roles import DIFFERENCE, Series
 from multidrop.shell.secrets import url_without_secrets
 from multidrop.shell.session import Session
 
-
 TABLES = (".csv", ".parquet")
 ENDINGS = ".rrd, .csv or .parquet"
 FILES = "FILE.rrd|.csv|.parquet"
