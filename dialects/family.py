@@ -275,8 +275,8 @@ class Family(Generic[S]):
     """Matches each piece of a stop, however its drives are set; None: several programs cannot share a line of them."""
     message_moves: Callable[[bytes], bool] = lambda messages: False
     """Whether messages that carry their length can start a motion or a program."""
-    in_frames: Callable[[bytes], bool] = lambda data: False
-    """Whether a reply of its drives, with its checksum, is in what an unknown line sent."""
+    in_frames: Callable[[bytes], Sequence[str]] = lambda data: ()
+    """The addresses of its drives whose replies, with their checksums, are in what an unknown line sent."""
     protection: Protection | None = None
     """None: its drives have none."""
     prepare: Callable[[], object] | None = None

@@ -239,6 +239,11 @@ class Line:
         self._state = Recovering(now)
         return flight
 
+    @property
+    def stopping(self) -> bool:
+        """Whether pieces of a stop are still to be written."""
+        return bool(self._repeats)
+
     def take_repeats(self) -> bytes:
         """Remove and return the stop that is still to be repeated, for a caller that cannot wait for quiet."""
         repeats, self._repeats = b"".join(each.data for each in self._repeats), []

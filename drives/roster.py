@@ -15,7 +15,7 @@ from collections.abc import Callable, Coroutine, Iterable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
-from multidrop.dialects import DriveError, DriveState, Family, Hints, NoAnswer
+from multidrop.dialects import DriveError, DriveState, Family, Hints, NoAnswer, StopPiece
 from multidrop.dialects.families import FAMILIES, family_of, spoken
 from multidrop.dialects.values import Value
 from multidrop.drives.conversations import Conversations
@@ -154,6 +154,8 @@ class Roster:
         """Drives that were addressed and are not among those found: a stop must reach them, too."""
         self.probing: tuple[str, ...] = ()
         """Addresses of the drives that are being looked for."""
+        self.sweep: tuple[StopPiece, ...] = ()
+        """A stop of the whole link ends with it: of addresses that a search has asked, and that have not replied."""
         self.restarts = Restarts(self.link)
         self.homes = self.restarts.homes
         self.stated: tuple[str, ...] = ()

@@ -163,6 +163,7 @@ def stop_forms(roster: Roster, only: Iterable[Drive] | None = None) -> StopForms
                 invalidate.append(harmless)
         if failed:
             missed += drives
+    repeats += roster.sweep if only is None else ()
     joined = b"".join
     return StopForms(joined(immediate), joined(unterminated), tuple(repeats), joined(invalidate), framed, tuple(missed))
 

@@ -1,8 +1,9 @@
 """The record of the TMCL family: Trinamic modules in direct mode, on RS-485, USB or through a TCP converter.
 
-It has no URL scheme: its frames contain bytes that other drives obey, so nothing tries it on an unknown line. A guarded
-line wears the EEPROM out, forgets what is stored, starts programs later, or changes how the module is reached. A stop
-is never guarded. Values have numbers, not words: SAP and SGP set them, so no line assigns one.
+It has no URL scheme: its frames contain bytes that other drives obey, so nothing tries it on an unknown line before a
+person has agreed. A guarded line wears the EEPROM out, forgets what is stored, starts programs later, or changes how
+the module is reached. A stop is never guarded. Values have numbers, not words: SAP and SGP set them, so no line assigns
+one.
 """
 
 from __future__ import annotations
@@ -116,5 +117,6 @@ TMCL = Family(
     values_at="multidrop.dialects.tmcl.host.values:VALUES",
     stop_bytes=STOP_BYTES,
     message_moves=codec.moves,
-    in_frames=codec.holds_reply,
+    in_frames=codec.replies_in,
+    scan_at="multidrop.dialects.tmcl.host.scan:SCAN",
 )

@@ -39,6 +39,9 @@ class Rescue:
         Raises NothingFound, Diagnostic where a person does not agree, and the failures of a port.
         """
         stages = self._scanning.stages(bauds)
+        if stages[0].scan.clear is None:
+            why = f"a {stages[0].scan.title} drive that does not reply is freed by a pause; rescue has no step for it"
+            raise Diagnostic(why, self._scanning.port, f"multidrop scan --dialect {stages[0].family} searches for it")
         async with self._scanning.stopping_all():
             for step in (self._search, self._clear, self._widen, self._power_cycles):
                 await step(stages)
@@ -93,6 +96,7 @@ class Rescue:
                 await self._cleared(each)
 
     async def _cleared(self, stage: Stage) -> None:
+        assert stage.scan.clear is not None
         await self._scanning.converse(self._scanning.connection(stage), stage.scan.clear)
         self._say(f"cleared with {stage.words}; programs that ran are stopped until they are started again")
         await self._scanning.search([stage], False)

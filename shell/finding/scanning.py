@@ -2,7 +2,7 @@
 
 It begins with the given baud rate and MCode, and ends with the first of these at which a drive replies, unless all are
 asked for. Anything else may be an error to a drive that is set to another baud rate or speaks another language, so a
-person is asked before it is tried.
+person is asked before it is tried. A language with a hazard of its own is searched only by its name, after a question.
 """
 
 from __future__ import annotations
@@ -34,8 +34,6 @@ TURNS = {"tcp": 1.0, "ssh": 0.25}
 SPREAD, JITTER = 2.0, 0.02
 """Over a network, a reply may take this many times as long as the measured one, and this time, s, more."""
 PLACE = 0
-BYTES = 20
-"""The mean size of the questions to one address, bytes; for the estimate."""
 REPEATED = 0.2
 """The time in which a stop is repeated once the line is quiet, s."""
 UNLISTED = "It was not confirmed for drives that have not replied"
@@ -158,7 +156,8 @@ class Scanning:
         """Search nothing yet. Raises Diagnostic for a port that needs no search."""
         if connection.hints.family and FAMILIES[connection.hints.family].scan is None:
             titles = [scan.title for family in FAMILIES.values() if (scan := family.scan) is not None]
-            raise Diagnostic(f"scan searches for {' and '.join(titles)} drives", connection.text, "open it instead")
+            searched = f"{', '.join(titles[:-1])} and {titles[-1]}"
+            raise Diagnostic(f"scan searches for {searched} drives", connection.text, "open it instead")
         self.found: list[FoundDrive] = []
         self.port = port_of(connection, "")
         """The port for a person."""
@@ -175,6 +174,9 @@ class Scanning:
         """The stages at which a stop was sent."""
         self._read: list[Halt] = []
         """The stops whose drives were read."""
+        self._asked: dict[Stage, dict[str, None]] = {}
+        """The addresses that a stage has asked, where a stop must name each."""
+        self._everything = False
         self._said: set[str] = set()
         self._first: Bus | None = None
         """The bus of the first stage."""
@@ -184,15 +186,21 @@ class Scanning:
 
         Raises NothingFound, Diagnostic where a person does not agree, and the failures of a port.
         """
+        self._everything = everything
         first, *others = self.stages(bauds)
+        reach = self._reach()
+
+        def about(stages: Iterable[Stage]) -> str:
+            return f"about {round(sum(each.scan.seconds(reach, each.baud) for each in stages))} s"
+
+        if first.scan.hazard:
+            asks = f"the search with {listed([first])} asks {first.scan.asked(reach)}, {about([first])}"
+            await self._workspace.questions.confirm(f"{asks}; {first.scan.hazard}", self.port)
         async with self.stopping_all():
             await self.search([first], False)
             if others and (everything or not self.found):
                 so_far = f"{len(self.found)} found" if self.found else "no drive replies"
-                reach, seconds = self._reach(), 0.0
-                for each in others:
-                    seconds += each.scan.places(reach) * (reach.window + BYTES * 10 / (each.baud or 1_000_000))
-                on = f"the search goes on with {listed(others)} (about {round(seconds)} s)"
+                on = f"the search goes on with {listed(others)} ({about(others)})"
                 try:
                     what = f"{so_far} with {listed([first])}; {on}; {HAZARD}"
                     await self._workspace.questions.confirm(what, self.port, SO_FAR)
@@ -202,12 +210,13 @@ class Scanning:
                     return  # a no ends the search where a drive was found
                 await self.search(others, everything)
         if not self.found:
-            raise self.nothing([first, *others], "; multidrop rescue PORT frees a drive that is stuck")
+            advice = "; multidrop rescue PORT frees a drive that is stuck" if first.scan.clear is not None else ""
+            raise self.nothing([first, *others], advice)
 
     def stages(self, bauds: Sequence[int]) -> list[Stage]:
         """The stages in their order: the given language and baud rate first."""
         given = self._connection
-        searched = [name for name, family in FAMILIES.items() if family.scan is not None]
+        searched = [name for name, family in FAMILIES.items() if (scan := family.scan) is not None and not scan.hazard]
         stages = [Stage(family, None) for family in ([given.hints.family] if given.hints.family else searched)]
         if given.scheme not in BAUDED:
             if bauds:
@@ -273,7 +282,10 @@ class Scanning:
             self._warn(self.port, [f"the stop was sent with {listed(self._stopped)}{why}{read}. {UNLISTED}"])
 
     async def _stop_at(self, stage: Stage, confirm: bool) -> None:
-        """Send a stop at a stage, to the drives that replied there by name; `confirm`: read them."""
+        """Send a stop at a stage, to the drives that replied there by name; `confirm`: read them, else ask no others.
+
+        An address that was asked and has not replied gets a short stop. Where that is answered, the whole one follows.
+        """
         try:
             opened = await self._opener(self.connection(stage), str)
         except TransportLost as loss:
@@ -284,12 +296,29 @@ class Scanning:
                 for found in self.found:
                     if _stage_of(found.connection) == stage:
                         each.bus.roster.found(found.state)
-                halt = each.bus.halt()
-                each.bus.halted(halt, confirm=confirm and bool(each.bus.drives))
-                await each.bus.stopped()
-                await asyncio.sleep(REPEATED + 2 * len(halt.data) * 10 / (stage.baud or 1_000_000))
-                if confirm and each.bus.drives:
-                    self._read.append(halt)
+                asked = [name for name in self._asked.get(stage, ()) if name not in each.bus.drives]
+                each.bus.roster.sweep = () if confirm else tuple(stage.scan.stop(asked))
+                with each.bus.link.received() as heard:
+                    await self._halted(each.bus, stage, confirm)
+                family, replied = each.bus.roster.family, False
+                for name in family.in_frames(bytes(heard)) if each.bus.roster.sweep else ():
+                    if name not in each.bus.drives:
+                        each.bus.roster.found(family.new_state(family.codec, name))
+                        replied = True
+                each.bus.roster.sweep = ()
+                if replied:
+                    await self._halted(each.bus, stage, True)
+
+    async def _halted(self, bus: Bus, stage: Stage, confirm: bool) -> None:
+        """Stop a bus, and wait until the whole stop has left; `confirm`: read the drives that are listed."""
+        halt = bus.halt()
+        bus.halted(halt, confirm=confirm and bool(bus.drives))
+        await bus.stopped()
+        while bus.line.stopping:
+            await asyncio.sleep(REPEATED)
+        await asyncio.sleep(REPEATED + 2 * len(halt.data) * 10 / (stage.baud or 1_000_000))
+        if confirm and bus.drives:
+            self._read.append(halt)
 
     def connection(self, stage: Stage) -> Connection:
         return next(self._forms(stage))
@@ -324,12 +353,14 @@ class Scanning:
         finally:
             if bus.last_stop is not None and bus.last_stop.data:
                 self._stopped[stage] = None
+            if stage in self._asked and bus.line.take_repeats():
+                self._stopped.pop(stage, None)  # frames without the time for replies reach no module: it is sent again
             await self._workspace.forget(bus)
 
     def nothing(self, stages: Sequence[Stage], advice: str = "") -> NothingFound:
         """Make the failure that names what was tried."""
         found = NothingFound(
-            f"no drive replies on {self.port} ({listed(stages)}; all names, with and without a checksum); check power, "
+            f"no drive replies on {self.port} ({listed(stages)}; {stages[0].scan.asked(self._reach())}); check power, "
             f"wiring (are A and B swapped?) and the adapter{advice}"
         )
         return silent(found, self._first.link, self._first.roster.family) if self._first is not None else found
@@ -339,7 +370,7 @@ class Scanning:
         scheme, window = self._connection.scheme, self._connection.timeout or WINDOW
         if self._connection.timeout is None:
             window += distance
-        return Reach(window=window, alone=scheme == "udp", hasty=hasty)
+        return Reach(window=window, alone=scheme == "udp", hasty=hasty, everything=self._everything)
 
     # One stage
 
@@ -393,7 +424,10 @@ class Scanning:
             self._report(each)
             self._warn(port, state.take_messages()[0])
 
-        reach = replace(reach, cut=hints.cut, first_mark=hints.first_mark)
+        def asks(address: str) -> None:
+            self._asked.setdefault(stage, {})[address] = None
+
+        reach = replace(reach, asks=asks, cut=hints.cut, first_mark=hints.first_mark)
         with bus.link.received() as heard:
             outcome = await bus.search(stage.scan.search(reach, found, step))
         self._warn(f"{port}: {stage.words}", filter(None, (*outcome.remarks, spoken(bytes(heard), stage.family))))
@@ -411,7 +445,7 @@ def _stage_of(connection: Connection) -> Stage:
 async def extend(workspace: Workspace, bus: Bus) -> list[str]:
     """Search an open bus for drives that are not listed, and list them; return their addresses. Raises Diagnostic."""
     scan = bus.roster.family.scan
-    if scan is None:
+    if scan is None or scan.hazard:
         raise Diagnostic(f"{bus.name}: its drives cannot be searched for", hint="/open URL names them in drives=")
     if "" in bus.drives:
         raise Diagnostic(f"{bus.name}: its drive takes no address", hint="no other drive can share its line")

@@ -201,3 +201,12 @@ def dialect() -> Mapping[str, Any]:
 
     languages = [name for name, family in FAMILIES.items() if family.scan is not None]
     return typed("this language only", choices=languages)
+
+
+def freed_dialect() -> Mapping[str, Any]:
+    """Declare the language of a drive that `rescue` can free."""
+    from multidrop.dialects.families import FAMILIES
+
+    scans = {name: family.scan for name, family in FAMILIES.items()}
+    languages = [name for name, scan in scans.items() if scan is not None and scan.clear is not None]
+    return typed("this language only", choices=languages)

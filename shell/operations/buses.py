@@ -15,6 +15,7 @@ from multidrop.shell.operations.arguments import (
     any_baud,
     baud,
     dialect,
+    freed_dialect,
     named_value,
     role_url,
     speed,
@@ -150,10 +151,11 @@ SCAN = Operation(
         "scan /dev/ttyUSB0",
         "scan /dev/ttyUSB0 --baud 9600 --dialect mcode --json",
         "scan COM3 --all --save press",
+        "scan /dev/ttyUSB0 --dialect tmcl --all",
     ],
     arguments={
         **SEARCHED,
-        "--all": "go on after the first drives that reply",
+        "--all": "go on after the first drives that reply; with --dialect tmcl, ask every address and not only 1",
         "--yes": YES,
         "--save NAME": "save what was found as a connection of this name",
     },
@@ -165,6 +167,7 @@ RESCUE = Operation(
     examples=["rescue /dev/ttyUSB0", "rescue /dev/ttyUSB0 --plain", "rescue COM3 --baud 9600 --dialect mcode"],
     arguments={
         **SEARCHED,
+        "--dialect": freed_dialect,
         "--all": "take every step, although other drives reply",
         "--plain": "then set EM=0, CK=0 and PY=0 in the drive, after a question",
         "--erase": "go as far as FD, which erases; it is asked about as well",

@@ -326,4 +326,12 @@ def _clear() -> Procedure[None]:
 
 
 CLEARS = "ends half a command in a controller with a word that no controller knows. It moves and erases nothing"
-SCAN = Scan("PMX", (9600, 19200, 38400, 57600, 115200), lambda reach: len(_numbers(reach)), search, _clear, CLEARS)
+SCAN = Scan(
+    "PMX",
+    (9600, 19200, 38400, 57600, 115200),
+    lambda reach: len(_numbers(reach)),
+    search,
+    _clear,
+    CLEARS,
+    asked=lambda reach: "numbers 00 to 99",
+)

@@ -57,15 +57,16 @@ def call_of(frame: bytes) -> tuple[int, Call]:
     return address, Call(command, kind, motor, value)
 
 
-def holds_reply(data: bytes) -> bool:
-    """Whether a reply is in these bytes, wherever it begins; text without control characters holds none."""
+def replies_in(data: bytes) -> tuple[str, ...]:
+    """The addresses of modules whose replies are in these bytes, wherever one begins; plain text holds none."""
+    found = {}
     for at in range(len(data) - LENGTH + 1):
         fields = parse_reply(data[at : at + LENGTH])
         if fields is None or fields.status not in tuple(Status) or all(byte in _TEXT for byte in data[at : at + 8]):
             continue
         if fields.module and (fields.command in tuple(Command) or not accepted(fields.status)):
-            return True
-    return False
+            found[str(fields.module)] = True
+    return tuple(found)
 
 
 def moves(frames: bytes) -> bool:
@@ -163,7 +164,7 @@ class Tmcl(Codec):
 
     def quiet_time(self, request: Request, buffer: bytes) -> float:
         """Seconds of quiet that end a request without a reply; others are given that long at least."""
-        return QUIET if request.kind is Kind.QUIET else RESYNC
+        return (request.settle or QUIET) if request.kind is Kind.QUIET else RESYNC
 
     def parse_unsolicited(self, buffer: bytes) -> tuple[tuple[str, ...], int]:
         """Late replies and reached targets, a line each; replies to a stop give none."""

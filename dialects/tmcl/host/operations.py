@@ -375,19 +375,24 @@ def identify(hints: Hints) -> Procedure[list[TmclState]]:
         state.named(name)
         if any(each.name == name for each in hints.owed):
             yield from _end_download(state, "the last session left it in download mode")
-        if not (yield from _found(state)):
+        if not (yield from find(state)):
             state.note(f"{who(state)} does not reply")
         found.append(state)
-    codec = Tmcl(tuple((state.address, state.motors) for state in found if state.motors))
-    for state in found:
-        state.line_counted(codec)
+    count_line(found)
     if not any(state.product for state in found):
         tried = ", ".join(state.address for state in found)
         raise NoAnswer(f"no module replies at {tried}; check power, baud and addresses (drives=1,2,...)")
     return found
 
 
-def _found(state: TmclState) -> Procedure[bool]:
+def count_line(states: list[TmclState]) -> None:
+    """Give the modules of a line the codec that they share: a stop of one motor each is shorter than one of six."""
+    codec = Tmcl(tuple((state.address, state.motors) for state in states if state.motors))
+    for state in states:
+        state.line_counted(codec)
+
+
+def find(state: TmclState) -> Procedure[bool]:
     """Ask one module for its version and count its motors; whether it replied."""
     for _ in range(TRIES):
         reply = yield state.codec.request(state.address, "136 1, 0, 0", IDENTITY)
