@@ -43,6 +43,8 @@ GUARDS: Mapping[str, str] = MappingProxyType(
         "AUTOSTART": "has the module start its program at each power-up",
         "BAUD": "changes the baud rate from the next message on",
         "ADDRESS": "changes the address of the module from the next message on",
+        "TEXTMODE": "may have the module reply in text mode, which multidrop does not read",
+        "REPLIES": "may have the module send no more replies: nothing can be read, and no stop confirmed",
         EVERYONE: "can start every drive of the line",
     }
 )
@@ -56,8 +58,18 @@ _COMMANDS: Mapping[int, str] = MappingProxyType(
         BOOTLOADER: "BOOTLOADER",
     }
 )
-_PARAMETERS: Mapping[int, str] = MappingProxyType({Global.BAUD: "BAUD", Global.ADDRESS: "ADDRESS"})
-"""Guards on setting a global parameter, or restoring it from EEPROM."""
+_PARAMETERS: Mapping[int, str] = MappingProxyType(
+    {
+        Global.BAUD: "BAUD",
+        Global.ADDRESS: "ADDRESS",
+        Global.TEXT_MODE: "TEXTMODE",
+        Global.AUTOSTART: "AUTOSTART",
+        Global.SUPPRESS_REPLY: "REPLIES",
+    }
+)
+"""Guards on setting a global parameter of bank 0, or restoring it from EEPROM."""
+_SWITCHES = frozenset({Global.TEXT_MODE, Global.AUTOSTART, Global.SUPPRESS_REPLY})
+"""Those that a 0 switches off, which needs no agreement."""
 
 
 def guarded(text: str, address: str) -> Guard | None:
@@ -68,9 +80,8 @@ def guarded(text: str, address: str) -> Guard | None:
     except commands.LineError:
         return None
     name = _COMMANDS.get(call.command, "")
-    if call.command == Command.SGP and call.type == Global.AUTOSTART and call.value:
-        name = "AUTOSTART"
-    elif call.command in (Command.SGP, Command.RSGP):
+    off = call.command == Command.SGP and call.type in _SWITCHES and not call.value
+    if call.command in (Command.SGP, Command.RSGP) and call.motor == 0 and not off:
         name = _PARAMETERS.get(call.type, "")
     if name:
         return Guard(name, f"'{line}' {GUARDS[name]}")

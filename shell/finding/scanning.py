@@ -176,6 +176,8 @@ class Scanning:
         """The stops whose drives were read."""
         self._asked: dict[Stage, dict[str, None]] = {}
         """The addresses that a stage has asked, where a stop must name each."""
+        self._woken: dict[Stage, dict[str, None]] = {}
+        """The addresses that replied to a stop only."""
         self._everything = False
         self._said: set[str] = set()
         self._first: Bus | None = None
@@ -272,7 +274,7 @@ class Scanning:
         others = [each for each in self._agreed_to if each not in likely]
         for stage in [*(each for each in likely if each not in self._stopped), *others]:
             await self._stop_at(stage, confirm=False)
-        for stage in likely if others else dict.fromkeys(replied):
+        for stage in likely if others else dict.fromkeys([*replied, *self._woken]):
             await self._stop_at(stage, confirm=True)
         if self._stopped:
             left_out = [each for each in self.stages(()) if each not in {**self._stopped, **self._agreed_to}]
@@ -296,18 +298,20 @@ class Scanning:
                 for found in self.found:
                     if _stage_of(found.connection) == stage:
                         each.bus.roster.found(found.state)
-                asked = [name for name in self._asked.get(stage, ()) if name not in each.bus.drives]
-                each.bus.roster.sweep = () if confirm else tuple(stage.scan.stop(asked))
+                roster, woken = each.bus.roster, self._woken.get(stage, {})
+                for name in woken:
+                    roster.found(roster.family.new_state(roster.family.codec, name))
+                asked = [name for name in self._asked.get(stage, ()) if name not in roster.drives]
+                roster.sweep = () if confirm else tuple(stage.scan.stop(asked))
                 with each.bus.link.received() as heard:
                     await self._halted(each.bus, stage, confirm)
-                family, replied = each.bus.roster.family, False
-                for name in family.in_frames(bytes(heard)) if each.bus.roster.sweep else ():
-                    if name not in each.bus.drives:
-                        each.bus.roster.found(family.new_state(family.codec, name))
-                        replied = True
-                each.bus.roster.sweep = ()
-                if replied:
-                    await self._halted(each.bus, stage, True)
+                replied = roster.family.in_frames(bytes(heard)) if roster.sweep else ()
+                if new := [name for name in replied if name not in roster.drives]:
+                    self._woken[stage] = woken | dict.fromkeys(new)
+                    roster.sweep = ()
+                    for name in new:
+                        roster.found(roster.family.new_state(roster.family.codec, name))
+                    await self._halted(each.bus, stage, False)
 
     async def _halted(self, bus: Bus, stage: Stage, confirm: bool) -> None:
         """Stop a bus, and wait until the whole stop has left; `confirm`: read the drives that are listed."""

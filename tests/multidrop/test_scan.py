@@ -1,11 +1,17 @@
 """The front door of scan and rescue: what goes where, and how it ends."""
 
 import json
+import re
 import shlex
+import time
 
 import pytest
 
+from multidrop.shell.prompt.terminal_input import PAUSE
+from tests.support.front_door import read_to_end
+
 CELL = '[[bus]]\nname = "press"\n[[bus.drive]]\npersonality = "LMDCM"\n'
+MODULES = {"1": "TMCM-1140", "30": "TMCM-6110", "40": "TMCM-1241", "200": "TMCM-1276"}
 CONTRACT = {"port", "baud", "address", "product", "version", "serial", "party", "checksum", "em"}
 
 
@@ -41,7 +47,7 @@ def test_a_rescue_names_its_steps_and_ends_once_a_drive_replies(multidrop):
     ("arguments", "code", "why"),
     [
         (["sim:#eth", "--baud", "9600"], 2, "the port has no baud rate"),
-        (["modbus://127.0.0.1"], 2, "scan searches for MCode and PMX drives"),
+        (["modbus://127.0.0.1"], 2, "scan searches for MCode, PMX and TMCL drives"),
         (["/dev/no-such-port"], 3, "no port /dev/no-such-port"),
         (["/dev/ttyUSB0", "--baud", "12"], 2, "12 is not a number from 300"),
         (["elsewhere"], 2, "neither a URL nor a saved connection"),
@@ -51,3 +57,53 @@ def test_a_rescue_names_its_steps_and_ends_once_a_drive_replies(multidrop):
 def test_what_cannot_be_searched_is_one_line(multidrop, command, arguments, code, why):
     done = multidrop(command, *arguments)
     assert done.returncode == code and why in done.stderr.splitlines()[-1] and done.stdout == ""
+
+
+TMCL = "".join(
+    [
+        '[[bus]]\nname = "slide"\nserve = ["pty:slide.tty", "tcp://127.0.0.1:0"]\nbaud = 115200\n',
+        *(f'[[bus.drive]]\npersonality = "{product}"\nname = "{name}"\n' for name, product in MODULES.items()),
+    ]
+)
+
+
+def test_tmcl_is_searched_only_by_name_and_agreement(multidrop, tmp_path):
+    (tmp_path / "cell.toml").write_text(TMCL)
+    done = multidrop("scan", "sim:cell.toml", "--dialect", "tmcl")
+    assert (done.returncode, done.stdout) == (2, "") and done.stderr.count("\n") == 1
+    assert "are ^C, LF, CR and ESC to them; nothing was sent; --yes agrees to it" in done.stderr
+    done = multidrop("scan", "sim:cell.toml", "--dialect", "tmcl", "--yes", "--json")
+    [fact] = map(json.loads, done.stdout.splitlines())
+    assert (fact["dialect"], fact["address"], fact["party"]) == ("tmcl", "1", None)
+    done = multidrop("rescue", "sim:cell.toml", "--dialect", "tmcl")
+    assert done.returncode == 2 and "'tmcl'" in done.stderr
+
+
+@pytest.mark.process
+@pytest.mark.slow
+def test_modules_of_a_served_line_are_found_at_their_addresses_and_opened_by_the_url(home):
+    home.serve(TMCL)
+    done = home.run("scan", str(home.folder / "slide.tty"), "--baud", "115200", "--dialect", "tmcl", "--all", "--yes")
+    assert done.returncode == 0
+    assert re.findall(r"115200 baud  (\d+)  (TMCM-\d+)", done.stdout) == [*MODULES.items()]
+    [*_, url] = shlex.split(done.stderr.partition("open with: ")[2])
+    asked = home.run("send", url, *(f"@{name} SAP 193, 0, 4" for name in MODULES), "@30 GAP 193, 0")
+    assert (asked.returncode, asked.stdout) == (0, "4\n")
+
+
+@pytest.mark.process
+@pytest.mark.slow
+def test_the_stop_key_in_a_search_stops_the_modules_that_were_asked(home):
+    home.serve(TMCL)
+    url = f"{home.endpoints['slide']['tcp']}?dialect=tmcl&drives={','.join(MODULES)}"
+    assert home.run("send", url, "@1 ROR 0, 500", "@30 ROR 2, 500", "@40 ROR 0, 500", "@200 ROR 0, 500").returncode == 0
+    child = home.terminal("scan", home.endpoints["slide"]["tcp"], "--dialect", "tmcl", "--all", columns=200)
+    child.expect(r"LF, CR and ESC to them. Go on\? \[y/N\]")
+    time.sleep(2 * PAUSE)  # the pause itself: from here on a key counts
+    child.send("y")
+    child.expect("40  TMCM-1241")
+    child.send("\x18")
+    child.expect("the stop was sent with TMCL")
+    assert read_to_end(child) == 4
+    motors = ("1", "GAP 3, 0"), ("30", "GAP 3, 2"), ("40", "GAP 3, 0"), ("200", "GAP 3, 0")
+    assert home.run("send", url, *(f"@{name} {text}" for name, text in motors)).stdout.split() == ["0", "0", "0", "500"]

@@ -123,6 +123,11 @@ async def test_a_module_is_followed_to_its_new_address_and_stopped_there(session
     assert {forms.immediate[0], *(piece.data[0] for piece in forms.repeats)} == {5, 7}
 
 
+async def test_a_user_variable_with_the_number_of_the_address_changes_no_address(session):
+    assert await say(session, "@slide:1 SGP 66, 2, 5", "@slide:1 GGP 66, 2", "@1 GGP 66, 0") == ["5", "1"]
+    assert session.buses["slide"].drives["1"].address == "1"
+
+
 SHUTTLE = ("132 0, 0, 0", "MVP ABS, 0, 20000", "27 1, 0, 0", "MVP ABS, 0, 0", "27 1, 0, 0", "22 0, 0, 0", "133 0, 0, 0")
 
 

@@ -346,9 +346,10 @@ def _remark(state: TmclState, call: Call) -> None:
         state.relative_read(call.motor, call.value)
     if call.command == Command.FACTORY:
         state.remark(f"{who(state)}: factory settings; it may now have address 1 and 9600 baud: open the line again")
-    if call.command == Command.SGP and call.type == Global.BAUD:
+    of_module = call.command == Command.SGP and call.motor == 0  # in bank 2 the same numbers are user variables
+    if of_module and call.type == Global.BAUD:
         state.remark(f"{who(state)}: its baud code is {call.value} from now on: open the line again with it")
-    if call.command == Command.SGP and call.type == Global.ADDRESS:
+    if of_module and call.type == Global.ADDRESS:
         state.remark(f"{who(state)}: its address is {call.value} from now on: type @{call.value}")
         state.readdressed(call.value)
 

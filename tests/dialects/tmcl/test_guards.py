@@ -25,6 +25,10 @@ ONE, EVERY = TmclState(Tmcl(), "1"), TmclState(Tmcl(), "*")
         ("242 0, 0, 0", "bootloader"),
         ("132 0, 0, 0", "stores every command until 133"),
         ("SGP 77, 0, 1", "at each power-up"),
+        ("RSGP 77, 0", "at each power-up"),
+        ("SGP 67, 0, 1", "text mode"),
+        ("9 255, 0, 1", "no more replies"),
+        ("RSGP 255, 0", "no more replies"),
     ],
 )
 def test_a_guarded_line_has_a_reason(text, part):
@@ -32,7 +36,9 @@ def test_a_guarded_line_has_a_reason(text, part):
 
 
 @pytest.mark.parametrize(
-    "text", ["GAP 1, 0", "ROR 0, 1000", "SGP 75, 0, 5", "GGP 66, 0", "SGP 66", "SGP 77, 0, 0", "", "MR 5", "/x"]
+    "text",
+    ["GAP 1, 0", "ROR 0, 1000", "SGP 75, 0, 5", "GGP 66, 0", "SGP 66", "SGP 77, 0, 0", "", "MR 5", "/x"]
+    + ["SGP 65, 2, 7", "RSGP 66, 2", "SGP 255, 2, 1", "SGP 67, 0, 0", "SGP 255, 0, 0"],
 )
 def test_other_lines_have_none(text):
     assert FAMILY.guards.find(ONE, text) is None
