@@ -97,11 +97,12 @@ class Notice(NamedTuple):
 
 
 class Traffic(NamedTuple):
-    """Raw bytes, `outgoing` or incoming."""
+    """Raw bytes, `outgoing` or incoming. `stop`: they are those of a stop."""
 
     at: float
     outgoing: bool
     data: bytes
+    stop: bool = False
 
 
 class Sample(NamedTuple):

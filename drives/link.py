@@ -253,7 +253,7 @@ class Link:
             return
         if request is None:
             self.debris.stop_written(b"", self.line.transmitted)
-            self.publish(Traffic(now, True, data))
+            self.publish(Traffic(now, True, data, stop=True))
             return
         # A program's lines are stored and do nothing; a part of a setting or of a question moves nothing.
         if request.kind is Kind.COMMAND or request.address in GLOBAL:

@@ -311,7 +311,7 @@ class Stopping:
 
     def _publish(self, halt: Halt) -> None:
         if halt.data:
-            self._link.publish(Traffic(self._link.now(), True, halt.data))
+            self._link.publish(Traffic(self._link.now(), True, halt.data, stop=True))
         self._link.advance()
 
     def _repeat(self, halt: Halt) -> None:

@@ -1,4 +1,4 @@
-r"""`multidrop log show|follow|grep|replay`: session logs as text, searched, followed, and taken again.
+r"""`multidrop log show|follow|grep|judge|replay`: session logs as text, searched, followed, judged, and taken again.
 
 2026-11-22 12:41:06.020 >  press:b PR P
 2026-11-22 12:41:06.020 >> press:b bPR P\n
@@ -7,6 +7,7 @@ r"""`multidrop log show|follow|grep|replay`: session logs as text, searched, fol
 from __future__ import annotations
 
 import argparse
+import json
 import os
 import re
 import sys
@@ -22,6 +23,7 @@ from multidrop.shell import configuration
 from multidrop.shell.line_syntax import join_target
 from multidrop.shell.log import files, steps
 from multidrop.shell.log.files import KINDS, TRAFFIC, Entry, Line
+from multidrop.shell.log.judge import RULES, judged
 from multidrop.shell.raw import text_of
 from multidrop.shell.streams.stdout import lose, write
 
@@ -29,6 +31,9 @@ if TYPE_CHECKING:
     from multidrop.shell.session import Session
 
 NOTHING_FOUND = 1
+BROKEN = 1
+STAMP = 23
+"""The length of a time in a shown entry."""
 PERIOD = 0.1
 """The time between two looks at a log that is followed, s."""
 LONGEST = 200
@@ -79,6 +84,29 @@ def follow(chosen: argparse.Namespace) -> int:
         return _reported(work)
     except KeyboardInterrupt:
         return 0
+
+
+def judge(chosen: argparse.Namespace) -> int:
+    """Print each breach of a rule; the exit code says whether there is any. Raises Diagnostic for a wrong file."""
+    path = Path(chosen.file)
+    found = judged(files.whole(path))
+    if found.sessions == found.unmarked:
+        why = "marks no commands and stops, as older versions did" if found.unmarked else "is not a session log"
+        raise Diagnostic(why, str(path), "a log of this version is one JSON object a line")
+
+    def work() -> None:
+        for rule, line, entry, said in found.breaches:
+            if chosen.json:
+                fields = {"rule": rule, "time": entry.time.isoformat(), "where": line.where, "text": said}
+                write(sys.stdout, json.dumps(fields))
+            else:
+                write(sys.stdout, f"{line.where}: {text(entry)[:STAMP]} {rule}: {said}")
+
+    code = _reported(work)
+    counts = f"{found.commands} commands, {found.stops} stops" + ", older sessions left out" * bool(found.unmarked)
+    broken = f"{len(found.breaches)} breaches" if found.breaches else f"all {len(RULES)} rules held"
+    write(sys.stderr, f"{path}: {broken} ({counts})")
+    return code or (BROKEN if found.breaches else 0)
 
 
 def replay(chosen: argparse.Namespace) -> int:

@@ -65,7 +65,7 @@ function _shtab_multidrop_using
   test "$_shtab_multidrop_cmdpath" = "$argv"
 end
 
-set -g _shtab_multidrop_commands demo tui shell send run sim program 'program check' 'program test' 'program sweep' 'program list' 'program upload' 'program download' params 'params backup' 'params diff' 'params restore' macro 'macro list' 'macro show' 'macro play' 'macro edit' 'macro describe' 'macro rename' 'macro copy' 'macro delete' 'macro key' 'macro import' 'macro export' plot publish share snapshot ports relay scan rescue log 'log show' 'log follow' 'log grep' 'log replay' config 'config path' 'config show' 'config check' help lsp report completion
+set -g _shtab_multidrop_commands demo tui shell send run sim program 'program check' 'program test' 'program sweep' 'program list' 'program upload' 'program download' params 'params backup' 'params diff' 'params restore' macro 'macro list' 'macro show' 'macro play' 'macro edit' 'macro describe' 'macro rename' 'macro copy' 'macro delete' 'macro key' 'macro import' 'macro export' plot publish share snapshot ports relay scan rescue log 'log show' 'log follow' 'log grep' 'log judge' 'log replay' config 'config path' 'config show' 'config check' help lsp report completion
 set -g _shtab_multidrop_opts_with_value --against --allow --baud --break --cell --cluster --dialect --drive --expect --jobs --junit --language --on --other --output --page --personality --random --rate --rfc2217 --role --run --save --seed --serve --set --speed --tcp --times --to --until --vary --watch --with -o
 
 complete -c multidrop -e
@@ -276,7 +276,7 @@ complete -c multidrop -n '_shtab_multidrop_using rescue' -l all -d 'take every s
 complete -c multidrop -n '_shtab_multidrop_using rescue' -l plain -d 'then set EM=0, CK=0 and PY=0 in the drive, after a question'
 complete -c multidrop -n '_shtab_multidrop_using rescue' -l erase -d 'go as far as FD, which erases; it is asked about as well'
 complete -c multidrop -n '_shtab_multidrop_using rescue' -l yes -d 'answer every question with yes beforehand'
-complete -c multidrop -n '_shtab_multidrop_using; and test $_shtab_multidrop_npos -eq 0' -a log -d 'Show, follow, search and replay session logs, which /log begins.'
+complete -c multidrop -n '_shtab_multidrop_using; and test $_shtab_multidrop_npos -eq 0' -a log -d 'Show, follow, search, judge and replay session logs, which /log begins.'
 complete -c multidrop -n '_shtab_multidrop_using log' -s h -l help -d 'show this help message and exit'
 complete -c multidrop -n '_shtab_multidrop_using log; and test $_shtab_multidrop_npos -eq 0' -a show -d 'Print a session log: typed lines, bytes both ways, replies, notices, failures.'
 complete -c multidrop -n '_shtab_multidrop_using log show' -s h -l help -d 'show this help message and exit'
@@ -297,6 +297,10 @@ complete -c multidrop -n '_shtab_multidrop_using log grep' -l all -d 'show the b
 complete -c multidrop -n '_shtab_multidrop_using log grep' -l json -d 'print the entries as they are in the file'
 complete -c multidrop -n '_shtab_multidrop_using log grep' -s i -l ignore-case -d 'a and A are the same'
 complete -c multidrop -n '_shtab_multidrop_using log grep; and test $_shtab_multidrop_npos -eq 1' -ka "(__fish_complete_path (commandline -ct))" -d 'a session log (default: the newest)'
+complete -c multidrop -n '_shtab_multidrop_using log; and test $_shtab_multidrop_npos -eq 0' -a judge -d 'Check a session log by the rules of a session; exit code 0: all held, 1: one broke.'
+complete -c multidrop -n '_shtab_multidrop_using log judge' -s h -l help -d 'show this help message and exit'
+complete -c multidrop -n '_shtab_multidrop_using log judge' -l json -d 'print one JSON object a breach'
+complete -c multidrop -n '_shtab_multidrop_using log judge; and test $_shtab_multidrop_npos -eq 0' -ka "(__fish_complete_path (commandline -ct))" -d 'a session log; its older parts belong to it'
 complete -c multidrop -n '_shtab_multidrop_using log; and test $_shtab_multidrop_npos -eq 0' -a replay -d 'Send the lines of a session log to other drives and print where the answers differ; asks first.'
 complete -c multidrop -n '_shtab_multidrop_using log replay' -s h -l help -d 'show this help message and exit'
 complete -c multidrop -n '_shtab_multidrop_using log replay' -l to -xka "(_multidrop_url)" -d 'what to open'

@@ -44,7 +44,7 @@ KINDS = {
     "received": "<<",
 }
 """The kinds of entries, and the sign of each."""
-_MARKS = ("poll", "warning", "raw")
+_MARKS = ("poll", "warning", "raw", "stop", "marks")
 
 
 @dataclass(frozen=True)
@@ -63,6 +63,12 @@ class Entry:
     warning: bool = False
     raw: bool = False
     """The text was typed for a bus in raw mode."""
+    command: str = ""
+    """The command that the bytes carry; empty for a question, a line to be stored, and bytes of another kind."""
+    stop: bool = False
+    """The bytes are those of a stop."""
+    marks: bool = False
+    """The entries after this one have `command` and `stop`, which older versions did not write."""
 
 
 def line_of(entry: Entry) -> bytes:
@@ -74,6 +80,8 @@ def line_of(entry: Entry) -> bytes:
     fields["bytes" if entry.kind in TRAFFIC else "text"] = without_secrets(entry.text)
     if entry.by:
         fields["by"] = entry.by
+    if entry.command:
+        fields["command"] = without_secrets(entry.command)
     fields |= {name: True for name in _MARKS if getattr(entry, name)}
     if entry.kind == "log":
         fields["format"] = FORMAT
@@ -87,14 +95,15 @@ def entry_of(line: bytes) -> Entry | None:
         kind = fields.get("kind") if isinstance(fields, dict) else None
         if not isinstance(kind, str) or kind not in KINDS or fields.get("format", FORMAT) != FORMAT:
             return None
-        names = ("time", "bytes" if kind in TRAFFIC else "text", "bus", "drive", "by")
-        time, text, bus, drive, by = (fields.get(name, "") for name in names)
-        if not all(isinstance(each, str) for each in (time, text, bus, drive, by)):
+        names = ("time", "bytes" if kind in TRAFFIC else "text", "bus", "drive", "by", "command")
+        time, text, bus, drive, by, command = (fields.get(name, "") for name in names)
+        if not all(isinstance(each, str) for each in (time, text, bus, drive, by, command)):
             return None
         at = datetime.fromisoformat(time)
         if at.tzinfo is None or (kind in TRAFFIC and any(ord(each) > 0xFF for each in text)):
             return None
-        return Entry(at, kind, text, bus, drive, by, **{name: fields.get(name) is True for name in _MARKS})
+        marks = {name: fields.get(name) is True for name in _MARKS}
+        return Entry(at, kind, text, bus, drive, by, command=command, **marks)
     except (ValueError, RecursionError):
         return None
 

@@ -9,7 +9,7 @@ from collections import deque
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
-from multidrop.dialects import Diagnostic, Priority, Request
+from multidrop.dialects import Diagnostic, Kind, Priority, Request
 from multidrop.dialects.files import why
 from multidrop.dialects.text import visible
 from multidrop.drives.bus import Bus
@@ -25,6 +25,7 @@ from multidrop.shell.events import (
     StateChanged,
     TwinEvent,
 )
+from multidrop.shell.line_syntax import EVERYONE
 from multidrop.shell.log import files
 from multidrop.shell.log.files import BEGIN, KINDS, TRAFFIC, Entry, line_of
 from multidrop.shell.openings import model
@@ -33,6 +34,7 @@ from multidrop.shell.workspace import Workspace
 
 LAST = 50
 """Entries that are kept for a screen."""
+COMMANDS = (Kind.COMMAND, Kind.SETTING)
 _KINDS = {Printed: "printed", Output: "output", Notified: "notice", Failed: "failed"}
 
 
@@ -86,7 +88,7 @@ class SessionLog:
     def _head(self) -> bytes:
         text = f"{'part' if self._begun else BEGIN} of process {files.PROCESS}"
         self._begun = True
-        return line_of(self._entry(self._workspace.now(), "log", text))
+        return line_of(self._entry(self._workspace.now(), "log", text, marks=True))
 
     def _missing(self, number: int) -> bytes:
         text = f"{number} entries are missing here: the disk did not take them"
@@ -110,6 +112,9 @@ class SessionLog:
         return Entry(self._workspace.wall(at), kind, text, bus, drive, **more)  # type: ignore[arg-type]
 
     def _entries(self, event: SessionEvent) -> Iterator[Entry]:
+        if self._stops != self._workspace.stops:  # a stop came since the last entry
+            self._stops = self._workspace.stops
+            yield self._entry(self._workspace.stopped_at, "stop", "stop of every drive")
         if isinstance(event, OnBus):
             yield from self._on_bus(event.bus, event.event)
         elif isinstance(event, StateChanged):
@@ -128,9 +133,6 @@ class SessionLog:
             assert isinstance(event, Printed | Output | Notified | Failed)
             bus, drive = getattr(event, "bus", ""), getattr(event, "address", "")
             warning = isinstance(event, Notified) and event.warning
-            if self._stops != self._workspace.stops:  # a stop came since the last entry
-                self._stops = self._workspace.stops
-                yield self._entry(event.at, "stop", "stop of every drive")
             yield self._entry(event.at, kind, event.text, bus, drive, warning=warning)
 
     def _changes(self, at: float) -> Iterator[Entry]:
@@ -160,8 +162,11 @@ class SessionLog:
         request = self._departing.pop(bus, None) if event.outgoing else self._in_flight.get(bus)
         drive = request.address if request is not None else ""
         poll = request is not None and request.priority is Priority.POLL
-        kind = "sent" if event.outgoing else "received"
-        return self._entry(event.at, kind, event.data.decode("latin-1"), bus, drive, poll=poll)
+        kind, command = "sent" if event.outgoing else "received", ""
+        if request is not None and event.outgoing and not poll and (request.kind in COMMANDS or drive in EVERYONE):
+            command = request.text
+        text = event.data.decode("latin-1")
+        return self._entry(event.at, kind, text, bus, drive, poll=poll, command=command, stop=event.stop)
 
 
 def _described(bus: Bus) -> str:

@@ -112,6 +112,16 @@ LOG_GREP = Operation(
         "-i|--ignore-case": "a and A are the same",
     },
 )
+LOG_JUDGE = Operation(
+    command="log judge",
+    meaning="check a session log by the rules of a session; exit code 0: all held, 1: one broke",
+    run="log.judge",
+    examples=["log judge day.jsonl", "log judge day.jsonl --json"],
+    arguments={
+        "FILE": "a session log; its older parts belong to it",
+        "--json": "print one JSON object a breach",
+    },
+)
 LOG_REPLAY = Operation(
     command="log replay",
     meaning="send the lines of a session log to other drives and print where the answers differ; asks first",
@@ -229,5 +239,5 @@ COMPLETION = Operation(
     examples=["completion bash > ~/.local/share/bash-completion/completions/multidrop", "completion fish | source"],
     arguments={"shell": typed(None, choices=("bash", "zsh", "fish"))},
 )
-LOG_GROUP = Operation(command="log", meaning="show, follow, search and replay session logs, which /log begins")
+LOG_GROUP = Operation(command="log", meaning="show, follow, search, judge and replay session logs, which /log begins")
 CONFIG = Operation(command="config", meaning="show and check the configuration: saved connections, keys, colours")

@@ -8,7 +8,8 @@ from pathlib import Path
 
 from multidrop.dialects import Diagnostic
 from multidrop.macros import MacroStore
-from multidrop.shell.log.files import ENDING, entry_of
+from multidrop.shell.log.files import ENDING, entry_of, whole
+from multidrop.shell.log.judge import judged
 from soak.simulation.history import History
 
 
@@ -35,6 +36,15 @@ def _state(state: Path, history: History) -> Iterator[str]:
         if ENDING in path.name:
             lines = path.read_bytes().split(b"\n")[:-1]
             yield from (f"{name}: {line!r}" for line in lines if entry_of(line + b"\n") is None)
+
+
+def breaches_in_logs(folder: Path) -> Iterator[str]:
+    """What `log judge` finds in the logs of all lives."""
+    for path in (*sorted((folder / "state" / "logs").glob(f"*{ENDING}")), folder / "session.log"):
+        if path.exists():
+            yield from (
+                f"{path.name}:{each.line.number}: {each.rule}: {each.text}" for each in judged(whole(path)).breaches
+            )
 
 
 def _is_json(path: Path) -> bool:

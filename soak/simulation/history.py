@@ -143,6 +143,8 @@ class History:
     """The kill that is armed is a power cut."""
     unreadable: list[str] = field(default_factory=list)
     """Files that a session could not read at its start."""
+    logged: list[str] = field(default_factory=list)
+    """Breaches that the session logs show."""
     told: Told = field(default_factory=Told)
     """What was told to run by itself."""
     defects: list[str] = field(default_factory=list)

@@ -38,6 +38,10 @@ def _readable(world: World) -> Iterator[str]:
     yield from world.history.unreadable
 
 
+def _logged(world: World) -> Iterator[str]:
+    yield from world.history.logged
+
+
 def _ends(world: World) -> Iterator[str]:
     yield from world.history.defects
 
@@ -55,6 +59,7 @@ RULES = (
         "What a report means",
         _readable,
     ),
+    Rule("log", "A session log breaks no rule of `log judge`.", "What a report means", _logged),
 )
 
 

@@ -1,0 +1,270 @@
+"""The judge of a session log: rules that its entries alone can decide.
+
+A line of a log has what multidrop typed, sent, received and said, and nothing of what a drive did. So a rule compares
+these with each other. What an entry does not show breaks no rule. A gap in the log, and each new session, begins anew.
+"""
+
+from __future__ import annotations
+
+import re
+from collections import Counter, deque
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, field
+from datetime import datetime
+from typing import NamedTuple
+
+from multidrop.dialects import Diagnostic
+from multidrop.shell.line_syntax import EVERYONE, DriveLine, parse
+from multidrop.shell.log.files import BEGIN, Entry, Line
+
+RULES = {
+    "twice": "A typed command is sent once; again only after a NAK and a question, three times at most.",
+    "not sent": "A command that is said to be not sent is not sent.",
+    "after a stop": "A command that was typed before a stop is not sent after it.",
+    "first": "What is sent first on a line after a stop is its stop.",
+    "stopped": "A drive is said to have stopped after two replies since the stop, or since one before it.",
+    "credited": "A printed line was received after its drive was asked, and from a drive of no other name.",
+    "silence": "A typed command to which nothing was received is reported.",
+}
+KEPT = 20
+"""The exchanges of a drive in which a printed line is looked for."""
+REPEATS = 3
+"""How often a command that was rejected as damaged is sent again."""
+READINGS = 2
+NAK = "\x15"
+MBAP, FRAME = 7, 9
+"""The bytes of the head of a Modbus/TCP message, and those of a TMCL frame."""
+UNSENT = re.compile(
+    r"'(.+?)'(?: was typed; it| was stopped; it)? was not sent|^not sent, as (?:'.*?' failed|.*?): (.*)$"
+)
+STOPPED = re.compile(r"(?:.*: )?stopped, velocity 0 at ")
+Place = tuple[str, str]
+"""A bus, and a drive on it."""
+
+
+class Breach(NamedTuple):
+    """A broken rule, and the line that shows it."""
+
+    rule: str
+    line: Line
+    entry: Entry
+    text: str
+
+
+@dataclass(eq=False)
+class Typed:
+    """A line for a drive that was typed, and what was sent and received for its drive since."""
+
+    text: str
+    stops: int
+    """The stops before it."""
+    sent: int = 0
+    """How often it was sent."""
+    asked: int = 0
+    """The questions that were sent since it was sent last."""
+    heard: str = ""
+    """What was received since it was sent last."""
+    reported: bool = False
+
+
+class _Session:
+    """The entries of one session, as far as the rules need them."""
+
+    def __init__(self, marked: bool = False) -> None:
+        self.marked = marked
+        self._stops = 0
+        self._stop: datetime | None = None
+        self._due: set[str] = set()
+        """Buses on which the stop is sent next."""
+        self._buses: set[str] = set()
+        self._typed: dict[tuple[str, str, str], Typed] = {}
+        """By bus, drive and text: the last of each."""
+        self._last: dict[tuple[str, str, str], Typed] = {}
+        """The last line for a drive of each origin; a person and a macro may have one at a time."""
+        self._exchanges: dict[Place, deque[list[str]]] = {}
+        """What was sent to a drive, and what was received on its bus until it was sent more."""
+        self._unsent: set[tuple[str, str, str]] = set()
+        """Commands that are said to be not sent, and not typed since."""
+        self._asked: dict[str, str] = {}
+        """By bus, the drive that was asked last and has not replied."""
+        self._replies: Counter[Place] = Counter()
+        """Replies of drives since a stop after which they got no command."""
+        self._commanded: set[Place] = set()
+
+    def take(self, entry: Entry) -> Iterator[tuple[str, str]]:
+        """Take an entry, where commands and stops are marked; yield each rule that it breaks, and how."""
+        if entry.kind == "log":
+            self.marked = entry.marks
+        elif not self.marked:
+            return
+        elif entry.kind == "bus":
+            self._bus(entry)
+        elif entry.kind == "typed":
+            yield from self._line_typed(entry)
+        elif entry.kind == "stop":
+            self._stops, self._stop, self._due = self._stops + 1, entry.time, set(self._buses)
+            for bus, drive in [*self._replies]:
+                if self._stops == 1 or self._commanded & {(bus, drive), *((bus, each) for each in EVERYONE)}:
+                    del self._replies[bus, drive]
+            self._commanded.clear()
+            self._report("")
+        elif entry.kind == "sent":
+            yield from self._sent(entry)
+        elif entry.kind == "received":
+            self._received(entry)
+        elif entry.kind == "printed":
+            yield from self._printed(entry)
+        elif entry.kind in ("notice", "failed"):
+            yield from self._said(entry)
+
+    def _bus(self, entry: Entry) -> None:
+        self._report(entry.bus)
+        self._buses.add(entry.bus)
+        if entry.text == "closed":
+            self._buses.discard(entry.bus)
+            self._due.discard(entry.bus)
+
+    def _report(self, bus: str) -> None:
+        """Something was said of a bus; empty: of all."""
+        for (each, *_), typed in self._last.items():
+            typed.reported = typed.reported or bus in ("", each)
+
+    def _line_typed(self, entry: Entry) -> Iterator[tuple[str, str]]:
+        if not entry.bus:  # a verb may send the same texts by itself
+            self._last.clear()
+            self._typed.clear()
+        if entry.raw or not entry.bus:
+            return
+        origin = entry.bus, entry.drive, entry.by
+        before = self._last.get(origin)
+        if before is not None and before.sent and not (before.heard or before.reported or entry.drive in EVERYONE):
+            yield "silence", f"{before.text!r} was sent, nothing was received, and nothing was said of it"
+        text = _text(entry.text)
+        self._last[origin] = self._typed[entry.bus, entry.drive, text] = Typed(text, self._stops)
+        self._unsent.discard((entry.bus, entry.drive, text))
+
+    def _sent(self, entry: Entry) -> Iterator[tuple[str, str]]:
+        place, earlier = (entry.bus, entry.drive), self._stop is not None and entry.time < self._stop
+        if entry.bus in self._due and not earlier:
+            self._due.discard(entry.bus)
+            if not entry.stop:
+                yield "first", f"{entry.text!r} was sent before the stop"
+        if entry.stop or entry.poll:
+            self._asked[entry.bus] = "" if entry.stop else entry.drive
+            return
+        self._asked[entry.bus] = entry.drive
+        self._exchanges.setdefault(place, deque(maxlen=KEPT)).append([entry.text, ""])
+        last = [each for key, each in self._last.items() if key[:2] == place]
+        for each in last:
+            each.asked += not entry.command
+        if not entry.command:
+            return
+        self._commanded.add(place)
+        key = (*place, entry.command)
+        if key in self._unsent:
+            yield "not sent", f"{entry.command!r} was said to be not sent, and not typed since"
+        typed = self._typed.get(key)
+        if typed is not None and typed.stops != self._stops and not earlier:
+            yield "after a stop", f"{entry.command!r} was typed before the stop"
+        if typed not in last or typed is None:
+            return
+        again = NAK in typed.heard and typed.asked and typed.sent <= REPEATS
+        if typed.sent and not again:
+            yield "twice", f"{entry.command!r} was sent {typed.sent + 1} times"
+        typed.sent, typed.asked, typed.heard = typed.sent + 1, 0, ""
+
+    def _received(self, entry: Entry) -> None:
+        if entry.drive and self._asked.get(entry.bus) == entry.drive or (not entry.drive and entry.bus in self._asked):
+            self._replies[entry.bus, entry.drive] += 1
+            del self._asked[entry.bus]
+        for (bus, *_), typed in self._last.items():
+            typed.heard += entry.text * (bus == entry.bus)
+        for (bus, _), exchanges in self._exchanges.items():
+            exchanges[-1][1] += entry.text * (bus == entry.bus)
+
+    def _printed(self, entry: Entry) -> Iterator[tuple[str, str]]:
+        exchanges = self._exchanges.get((entry.bus, entry.drive))
+        if exchanges is None:  # they were sent before this part of the log
+            return
+        found = [_named(sent, received, entry.text) for sent, received in exchanges]
+        names = {name for each in found if each is not None for name in each}
+        if all(each is None for each in found):
+            yield "credited", f"{entry.text!r} was printed and not received"
+        elif names and entry.drive not in names:
+            yield "credited", f"{entry.text!r} came from {', '.join(sorted(names))}"
+
+    def _said(self, entry: Entry) -> Iterator[tuple[str, str]]:
+        self._report(entry.bus)
+        for found in UNSENT.finditer(entry.text):
+            bus, drive, text = _target(found[1] or found[2], entry)
+            typed = self._typed.get((bus, drive, text))
+            if entry.kind == "failed" and typed is not None and typed.sent:
+                yield "not sent", f"{text!r} was sent"
+            self._unsent.add((bus, drive, text))
+        if entry.kind == "notice" and self._stops and STOPPED.match(entry.text):
+            drive = entry.text.removeprefix(f"{entry.bus}: ").rpartition("stopped, ")[0].removesuffix(": ")
+            if self._replies[entry.bus, drive] < READINGS:
+                yield "stopped", f"{entry.text!r}, after {self._replies[entry.bus, drive]} replies"
+
+
+def _text(typed: str) -> str:
+    """The text of a typed line, without its address."""
+    try:
+        parsed = parse(typed)
+    except Diagnostic:
+        return typed
+    return str(parsed.text) if isinstance(parsed, DriveLine) else typed
+
+
+def _target(typed: str, entry: Entry) -> tuple[str, str, str]:
+    """The bus, the drive and the text of a line that an entry names."""
+    try:
+        parsed = parse(typed)
+    except Diagnostic:
+        parsed = None
+    if not isinstance(parsed, DriveLine) or parsed.address is None and not entry.bus:
+        return "", "", typed
+    drive = entry.drive if parsed.address is None else parsed.address
+    return parsed.bus or entry.bus, drive, str(parsed.text)
+
+
+def _named(sent: str, received: str, printed: str) -> set[str] | None:
+    """The drives that a reply names beside a printed line; empty: it names none. None: there is no such reply."""
+    if len(sent) > MBAP and sent[2:4] == "\0\0" and (ord(sent[4]) << 8) + ord(sent[5]) == len(sent) - MBAP + 1:
+        return set() if sent[:4] in received else None
+    if len(sent) == FRAME and sum(map(ord, sent[:-1])) & 0xFF == ord(sent[-1]):
+        frames = (received[at : at + FRAME] for at in range(len(received) - FRAME + 1))
+        own = any(frame[1] == sent[0] and frame[3] == sent[1] for frame in frames)
+        return set() if own or printed in received else None
+    if printed not in received:
+        return None
+    return set(re.findall(re.escape(printed) + r'"(.)"', received))
+
+
+@dataclass
+class Judgement:
+    """What was judged, and what broke a rule."""
+
+    sessions: int = 0
+    """Sessions and parts of sessions."""
+    commands: int = 0
+    stops: int = 0
+    unmarked: int = 0
+    """Sessions of a version whose logs cannot be judged."""
+    breaches: list[Breach] = field(default_factory=list)
+
+
+def judged(lines: Iterable[Line]) -> Judgement:
+    """Judge the lines of a log."""
+    found, session = Judgement(), _Session()
+    for line in lines:
+        entry = line.entry
+        if entry is None or entry.kind == "missing" or (entry.kind == "log" and entry.text.startswith(BEGIN)):
+            session = _Session(session.marked)
+        if entry is not None:
+            found.commands += bool(entry.command)
+            found.stops += entry.kind == "stop"
+            found.sessions += entry.kind == "log"
+            found.unmarked += entry.kind == "log" and not entry.marks
+            found.breaches += (Breach(rule, line, entry, text) for rule, text in session.take(entry))
+    return found
