@@ -38,10 +38,11 @@ def _state(state: Path, history: History) -> Iterator[str]:
             yield from (f"{name}: {line!r}" for line in lines if entry_of(line + b"\n") is None)
 
 
-def breaches_in_logs(folder: Path) -> Iterator[str]:
+def breaches_in_logs(folder: Path, history: History) -> Iterator[str]:
     """What `log judge` finds in the logs of all lives."""
     for path in (*sorted((folder / "state" / "logs").glob(f"*{ENDING}")), folder / "session.log"):
         if path.exists():
+            history.count("logs judged")
             yield from (
                 f"{path.name}:{each.line.number}: {each.rule}: {each.text}" for each in judged(whole(path)).breaches
             )

@@ -94,6 +94,8 @@ class WireRandom(Random):
         self.line = line
 
 
+LOGGED = 0.2
+"""The probability of a session log of every life."""
 AWAY = 20.0
 """The longest time until a killed session is started again, s; a PC without power takes at least as long."""
 
@@ -234,7 +236,7 @@ class World:
     def settings(self, folder: Path) -> Settings:
         """The settings of a person, who has the connections of all lines."""
         text = "".join(f'[connections.{each.name}]\nurl = "{self._url(each)}"\n' for each in self.places)
-        text += "[log]\nalways = true\nmegabytes = 0.02\nfiles = 3\n" * (Random(f"{self.seed} log").random() < 0.2)
+        text += "[log]\nalways = true\nmegabytes = 0.02\nfiles = 3\n" * (Random(f"{self.seed} log").random() < LOGGED)
         return replace(parse(text, "world"), folder=folder / "config", state=folder / "state")
 
     def _url(self, place: Place) -> str:
@@ -433,7 +435,7 @@ class World:
             await self._live()
             await self._close()
         self.history.unreadable += unreadable(self.folder, "the end", self.history)
-        self.history.logged += breaches_in_logs(self.folder)
+        self.history.logged += breaches_in_logs(self.folder, self.history)
         for other in self.others:
             await other.leave()
         for shared in self.shares.values():

@@ -1,5 +1,6 @@
 """`multidrop log`, and what a killed process leaves in a log."""
 
+import json
 import os
 import signal
 import subprocess
@@ -195,3 +196,46 @@ def test_a_kill_loses_nothing_that_was_put(tmp_path):
         put += [line for line in child.stdout.readlines() if line.endswith(b"\n")]
     written = (tmp_path / "log").read_bytes().splitlines()
     assert written[: int(put[-1]) + 1] == [b"%d" % number for number in range(int(put[-1]) + 1)]
+
+
+def judgeable(*entries):
+    return (entry("log", "session of process 7", "", "", marks=True), entry("bus", "p: b", drive=""), *entries)
+
+
+GOOD = judgeable(entry("stop", "stop", "", ""), entry("sent", "\x1b", drive="", stop=True), entry("sent", "bPR P\n"))
+BAD = judgeable(entry("stop", "stop", "", ""), entry("sent", "bPR P\n"))
+
+
+def test_judge_says_what_held_on_standard_error(log, done):
+    log.write_bytes(b"".join(map(line_of, GOOD)))
+    assert done("judge", log) == (0, [], [f"{log}: all 7 rules held (0 commands, 1 stops)"])
+
+
+def test_judge_prints_a_line_a_breach_also_as_json(log, done):
+    log.write_bytes(b"".join(map(line_of, BAD)))
+    said = r"'bPR P\n' was sent before the stop"
+    code, lines, err = done("judge", log)
+    assert (code, lines) == (1, [f"{log}:4: 2026-11-22 12:41:06.020 first: {said}"])
+    assert err == [f"{log}: 1 breaches (0 commands, 1 stops)"]
+    code, [line], _ = done("judge", log, "--json")
+    assert json.loads(line) == {"rule": "first", "time": AT.isoformat(), "where": f"{log}:4", "text": said}
+    assert code == 1
+
+
+@pytest.mark.parametrize(
+    ("content", "why"),
+    [
+        (b"".join(map(line_of, ENTRIES)), "marks no commands and stops, as older versions did"),
+        (b"", "is not a session log"),
+        (b"\x00\xff", "is not a session log"),
+        (None, "cannot be read"),
+    ],
+    ids=["older", "empty", "no log", "absent"],
+)
+def test_judge_refuses_what_it_cannot_judge(content, why, log, done):
+    log.unlink()
+    if content is not None:
+        log.write_bytes(content)
+    code, lines, [err] = done("judge", log)
+    assert (code, lines) == (2, [])
+    assert err.startswith(f"{log}: {why}")

@@ -12,7 +12,7 @@ from typing import Any
 
 import pytest
 
-from soak.simulation import shrinking
+from soak.simulation import shrinking, world
 from soak.simulation.__main__ import main
 from soak.simulation.climate import FAULTS
 from soak.simulation.history import Command, Damage, Executed, Held, History, Outcome, Shown
@@ -41,6 +41,16 @@ def test_the_rules_hold(seed: int) -> None:
 def test_the_rules_hold_in_fresh_seeds() -> None:
     first = random.SystemRandom().randrange(1 << 24)
     assert [each.breaches for each in run(lives(range(first, first + 400)), jobs=1) if each.breaches] == [], first
+
+
+@pytest.mark.parametrize(("first", "logs"), [(1, 8), pytest.param(1000, 50, marks=pytest.mark.nightly)])
+def test_the_logs_of_simulated_sessions_break_no_rule(first: int, logs: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(world, "LOGGED", 1.0)
+    judged, seed = 0, first
+    while judged < logs:
+        history = lived(seed, range(30)).history
+        assert history.logged == [], seed
+        judged, seed = judged + history.counts["logs judged"], seed + 1
 
 
 @pytest.mark.process

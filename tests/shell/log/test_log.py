@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from multidrop.dialects import Diagnostic, Priority
+from multidrop.dialects import Diagnostic, Kind, Priority
 from multidrop.drives.events import Ended, Sent, Traffic, Unsolicited
 from multidrop.shell.configuration import LogSettings, Settings, parse
 from multidrop.shell.events import By, Entered, Failed, Notified, OnBus, Output, Printed, StateChanged
@@ -23,7 +23,7 @@ from multidrop.shell.threads import BoundedWriter
 class FakeSession:
     def __init__(self, folder, **limits):
         self.callbacks, self.told, self.log = [], [], None
-        self.stops, self.buses, self.raw = 0, {}, {}
+        self.stops, self.stopped_at, self.buses, self.raw = 0, 1.0, {}, {}
         self.settings = Settings({}, folder / "config", folder / "state", log=LogSettings(**limits))
 
     def subscribe(self, callback):
@@ -61,8 +61,8 @@ def without_time(path):
     return [{key: value for key, value in each.items() if key != "time"} for each in read(path)]
 
 
-def request(text, priority=Priority.OPERATOR):
-    return SimpleNamespace(address="b", text=text, priority=priority)
+def request(text, priority=Priority.OPERATOR, kind=Kind.PRINT, address="b"):
+    return SimpleNamespace(address=address, text=text, priority=priority, kind=kind)
 
 
 def test_everything_typed_printed_told_and_failed_is_a_line_at_once(session, tmp_path):
@@ -125,6 +125,29 @@ def test_bytes_have_their_bus_and_the_drive_of_their_request_and_polls_are_marke
     ]
 
 
+def test_commands_and_stops_are_marked_and_a_stop_is_before_its_bytes(session, tmp_path):
+    SessionLog(session, tmp_path / "day.log")
+    for each in (
+        request("MR 5", kind=Kind.COMMAND),
+        request("EM=1", kind=Kind.SETTING),
+        request("SL 0", kind=Kind.QUIET, address="*"),
+        request("PR P"),
+        request("MR 6", kind=Kind.PROGRAM),
+        request("AR", Priority.POLL, kind=Kind.COMMAND),
+    ):
+        session.publish(OnBus("l", Sent(1.0, each)), OnBus("l", Traffic(1.0, True, b"x")))
+    session.publish(OnBus("l", Traffic(1.0, False, b"y")))
+    session.stops, session.stopped_at = 1, 1.5
+    session.publish(OnBus("l", Traffic(2.0, True, b"\x1b", stop=True)))
+    head, *found = read(tmp_path / "day.log")
+    assert head["marks"] is True
+    assert [each.get("command") for each in found] == ["MR 5", "EM=1", "SL 0", *[None] * 6]
+    assert [each["kind"] for each in found[-2:]] == ["stop", "sent"]
+    assert [each.get("stop") for each in found] == [*[None] * 8, True]
+    assert found[-2]["time"].endswith(":01.500000+00:00")
+    assert entry_of(json.dumps(found[0]).encode()).command == "MR 5"
+
+
 def test_a_stop_and_buses_that_come_and_go_are_entries(session, tmp_path):
     SessionLog(session, tmp_path / "day.log")
     bus = SimpleNamespace(link=SimpleNamespace(transport=SimpleNamespace(name="/dev/ttyS0")), drives={})
@@ -138,8 +161,8 @@ def test_a_stop_and_buses_that_come_and_go_are_entries(session, tmp_path):
     found = [(each["kind"], each["text"]) for each in read(tmp_path / "day.log")[1:]]
     assert found == [
         ("bus", "/dev/ttyS0: no drive yet"),
-        ("bus", "/dev/ttyS0: a LMDCM 6.002"),
         ("stop", "stop of every drive"),
+        ("bus", "/dev/ttyS0: a LMDCM 6.002"),
         ("notice", "Ctrl+X: stop sent"),
         ("notice", "more"),
         ("bus", "closed"),
