@@ -24,7 +24,7 @@ from multidrop.drives.events import Sample, Traffic, isolated
 from multidrop.drives.link import Link
 from multidrop.drives.port_journal import GLOBAL
 from multidrop.drives.roster import Roster
-from multidrop.transports import TransportLost
+from multidrop.transports import TransportLost, Undelivered
 
 TRIES = 3
 BETWEEN = 0.1
@@ -98,7 +98,7 @@ class Halt:
         runs = drive.running.runs if drive.running is not None and drive.running.at > since else None
         if seen is not None and seen.at_rest(since) and runs is False:
             return Fate.STANDING
-        if not self.data or drive in self.missed:
+        if not self.data or drive in self.missed or isinstance(self.link.lost, Undelivered):
             return Fate.NOT_REACHED
         if (seen is not None and seen.velocity) or runs:
             return Fate.MOVING if seen is not None and seen.velocity else Fate.RUNNING

@@ -22,7 +22,7 @@ from multidrop.simulator.families import BY_PERSONALITY
 if TYPE_CHECKING:
     from multidrop.simulator.family import Family
 
-SCHEMES = ("pty", "tcp", "udp", "modbus")
+SCHEMES = ("pty", "tcp", "udp", "modbus", "usbip")
 LONGEST_GATHER = 0.02
 """The highest `gather`, s: USB chips hold bytes for up to 16 ms."""
 DRIVE_KEYS = (
@@ -66,12 +66,12 @@ class Reader:
         here = Folder(Path.cwd() if folder is None else folder, tuple(allow))
         cell = Cell(
             seed=table.integer("seed", 0),
-            buses=tuple(self._bus(each, where, here) for each in table.tables("bus", "[[bus]]")),
+            buses=tuple(self._bus(each, where, here, text) for each in table.tables("bus", "[[bus]]")),
         )
         _check_cell(cell, where)
         return cell
 
-    def _bus(self, table: Table, where: str, folder: Folder) -> BusSpec:
+    def _bus(self, table: Table, where: str, folder: Folder, text: str) -> BusSpec:
         name = table.values.get("name")
         if isinstance(name, str) and name:
             table = Table(table.values, f"{where}: [[bus]] {quoted(name)}")
@@ -88,6 +88,7 @@ class Reader:
             gather=table.number("gather", 0.0, 0.0, LONGEST_GATHER) if "gather" in table.values else None,
         )
         self._check_bus(bus, table)
+        self._check_usb(bus, where, text)
         return bus
 
     def _drive(self, table: Table, folder: Folder) -> DriveSpec:
@@ -118,6 +119,15 @@ class Reader:
         if bus.gather is not None and on_ethernet:
             raise table.wrong("gather", "is for serial drives", "leave it out: an Ethernet drive sends whole replies")
 
+    def _check_usb(self, bus: BusSpec, where: str, text: str) -> None:
+        """Refuse usbip:// for other drives than controllers with USB, with the line that has it."""
+        others = [each.personality for each in bus.drives if not self._families[each.personality].usb]
+        if any(each.scheme == "usbip" for each in bus.serve) and (others or not bus.drives):
+            found = f"{others[0]} has no USB" if others else "the bus has no drive"
+            line = text.count("\n", 0, text.find("usbip:", text.find(f'"{bus.name}"'))) + 1
+            what = f"serve of [[bus]] {quoted(bus.name)} has usbip://, and {found}"
+            raise Diagnostic(what, f"{where}:{line}", "valid: a bus of PMX only")
+
     @property
     def _ethernet(self) -> str:
         """The personalities with an Ethernet port."""
@@ -139,7 +149,7 @@ def _endpoint(text: str, table: Table, folder: Folder) -> Endpoint:
     scheme, colon, rest = text.partition(":")
     if not colon or scheme not in SCHEMES:
         raise table.wrong(
-            "serve", f"cannot be {quoted(text)}", "valid: pty:, tcp://, udp:// or modbus:// at the beginning"
+            "serve", f"cannot be {quoted(text)}", "valid: pty:, tcp://, udp://, modbus:// or usbip:// at the beginning"
         )
     if scheme == "pty":
         if not rest.isprintable():

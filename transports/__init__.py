@@ -59,6 +59,10 @@ class Unreachable(TransportLost):
     """The pipe could not be opened: no such port, in use, refused, no such host."""
 
 
+class Undelivered(TransportLost):
+    """The pipe broke because the far end did not take a stop."""
+
+
 Received = Callable[[bytes], None]
 Lost = Callable[[TransportLost], None]
 

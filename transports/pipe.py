@@ -71,11 +71,11 @@ class Pipe(Transport):
         if self._received is not None and self._closing is None and not self._told:
             self._received(data)
 
-    def _break(self, error: OSError | None) -> None:
+    def _break(self, error: OSError | None, kind: type[TransportLost] = TransportLost) -> None:
         """Mark the pipe as broken by `error`, or (None) as closed by the other end. May be called repeatedly."""
         self._halt()
         if self._broken is None:
-            self._broken = TransportLost(f"{self.name} was lost: {self._explain(error)}")
+            self._broken = kind(f"{self.name} was lost: {self._explain(error)}")
             self._loop.call_soon(self._tell)
 
     def _tell(self) -> None:

@@ -64,13 +64,13 @@ _WHY = {
 async def open_tcp(host: str, port: int, scheme: str = "tcp", within: float | None = None) -> Transport:
     """Connect within a time, s, by default within 5; its name begins with `scheme`. Raises Unreachable."""
     name = f"{scheme}://{host_port(host, port)}"
-    return _pipe(name, await _connected(name, host, port, socket.SOCK_STREAM, within))
+    return _pipe(name, await connected(name, host, port, given=within))
 
 
 async def open_udp(host: str, port: int) -> Transport:
     """Make a UDP socket to one other end: one `write` is one datagram. Sends nothing. Raises Unreachable."""
     name = f"udp://{host_port(host, port)}"
-    return _pipe(name, await _connected(name, host, port, socket.SOCK_DGRAM))
+    return _pipe(name, await connected(name, host, port, socket.SOCK_DGRAM))
 
 
 def host_port(host: str, port: int) -> str:
@@ -105,9 +105,14 @@ def explain(error: OSError | None) -> str:
     return _WHY.get(error.errno or 0) or (os.strerror(error.errno) if error.errno else str(error))
 
 
-async def _connected(
-    name: str, host: str, port: int, kind: socket.SocketKind, given: float | None = None
+async def connected(
+    name: str,
+    host: str,
+    port: int,
+    kind: socket.SocketKind = socket.SOCK_STREAM,
+    given: float | None = None,
 ) -> socket.socket:
+    """Connect within a time, s. Raises Unreachable, which begins with `name`."""
     within = given or CONNECT
     check(name, host, port)
     try:

@@ -125,10 +125,11 @@ class Assist:
 
 def _ports(state: Path) -> list[StartEntry]:
     from multidrop.shell.state.port_state import memory_of
-    from multidrop.transports.serial_ports import holder, list_ports
+    from multidrop.transports.libusb import all_ports
+    from multidrop.transports.serial_ports import holder
 
     entries = []
-    for port in list_ports():
+    for port in all_ports():
         memory, at = memory_of(state, port.stable_name or port.device)
         names = " ".join(filter(None, (each.address for each in memory.drives))) or "a drive"
         answered = f"{names} answered {ago(time.time() - at)}" if memory.drives else ""

@@ -224,9 +224,9 @@ def _macros() -> Iterator[str]:
 
 
 def _ports() -> Iterator[str]:
-    from multidrop.transports.serial_ports import list_ports
+    from multidrop.transports.libusb import all_ports
 
-    found = list_ports()
+    found = all_ports()
     for port in found:
         yield "  ".join(part for part in (port.device, port.stable_name, port.description) if part)
     if not found:

@@ -16,6 +16,7 @@ from multidrop.shell.connect.urls import parse
 from multidrop.shell.finding.rescuing import Rescue
 from multidrop.shell.finding.scanning import FoundDrive, Scanning, url_of
 from multidrop.shell.session import Session
+from multidrop.transports import TransportLost
 
 
 def run(chosen: argparse.Namespace) -> int:
@@ -25,14 +26,33 @@ def run(chosen: argparse.Namespace) -> int:
 
 
 async def _scan(chosen: argparse.Namespace, session: Session) -> None:
-    scanning = _made(chosen, session)
-    await scanning.run([chosen.baud] if chosen.baud else [], chosen.all)
-    _conclude(chosen.json, session, scanning.found, chosen.save)
+    searches = [_made(chosen, session, url) for url in _places(chosen.url)]
+    failed: TransportLost | None = None
+    for scanning in searches:
+        try:
+            await scanning.run([chosen.baud] if chosen.baud else [], chosen.all)
+        except TransportLost as loss:
+            failed = loss
+            if len(searches) > 1:
+                session.notify(str(loss), warning=True)
+    found = [drive for scanning in searches for drive in scanning.found]
+    if failed is not None and not found:
+        raise failed
+    _conclude(chosen.json, session, found, chosen.save)
 
 
-def _made(chosen: argparse.Namespace, session: Session) -> Scanning:
+def _places(url: str) -> list[str]:
+    """The URLs to search: each controller on USB for `usb:`."""
+    if url != "usb:":
+        return [url]
+    from multidrop.transports.libusb import list_controllers
+
+    return [each.url for each in list_controllers()] or [url]
+
+
+def _made(chosen: argparse.Namespace, session: Session, url: str) -> Scanning:
     """Make the search that the arguments ask for; it prints each drive that it finds. Raises Diagnostic."""
-    connection = parse(chosen.url, session.settings.connections)
+    connection = parse(url, session.settings.connections)
     if chosen.dialect:
         connection = replace(connection, hints=replace(connection.hints, family=chosen.dialect))
 
@@ -65,7 +85,7 @@ def rescue(chosen: argparse.Namespace) -> int:
 
 
 async def _rescue(chosen: argparse.Namespace, session: Session) -> None:
-    scanning = _made(chosen, session)
+    scanning = _made(chosen, session, chosen.url)
     rescue = Rescue(session, scanning)
     await rescue.run([chosen.baud] if chosen.baud else [], everything=chosen.all, erase=chosen.erase)
     if chosen.plain:

@@ -121,9 +121,9 @@ def lsp(chosen: argparse.Namespace) -> int:
 
 
 def ports(chosen: argparse.Namespace) -> int:
-    from multidrop.transports.serial_ports import list_ports
+    from multidrop.transports.libusb import all_ports
 
-    found = list_ports()
+    found = all_ports()
     for port in found:
         if chosen.json:
             import json

@@ -16,7 +16,7 @@ from multidrop.dialects.families import DEFAULT, FAMILIES
 from multidrop.drives.bus import Bus
 from multidrop.drives.line import DEFAULT_TIMEOUT
 from multidrop.shell import configuration
-from multidrop.shell.connect.reconnect import LoginAgain, Reopen, SerialAgain, host_again, simulated
+from multidrop.shell.connect.reconnect import LoginAgain, Reopen, SerialAgain, host_again, simulated, usb_again
 from multidrop.shell.connect.urls import Connection
 from multidrop.shell.state.port_state import PortState
 from multidrop.transports import Unreachable
@@ -121,8 +121,10 @@ def port_name(connection: Connection) -> str:
         return ""
     if connection.scheme == "ssh":
         return replace(far_port(connection), user="", host=connection.host.lower()).name
+    if connection.scheme == "usb":
+        return f"usb:{connection.target}"
     if connection.scheme != "serial":
-        return f"{connection.host.lower()}:{connection.port}"
+        return f"{connection.host.lower()}:{connection.port}" + (f"/{connection.target}" if connection.target else "")
     from multidrop.transports.serial_ports import stable_name
 
     return stable_name(connection.target)
@@ -172,6 +174,15 @@ async def _transport(
             from multidrop.transports.ssh_session import open_ssh
 
             return await open_ssh(far, baud, within, connection.relay)
+    if connection.scheme == "usb":
+        from multidrop.transports.libusb import open_libusb
+
+        return await open_libusb(port or connection.target)
+    if connection.scheme == "usbip":
+        from multidrop.transports.usb import open_usb
+        from multidrop.transports.usbip import imported
+
+        return await open_usb(await imported(connection.host, connection.port, connection.target, within))
     from multidrop.transports.sockets import open_tcp, open_udp
 
     if connection.scheme == "udp":
@@ -186,6 +197,8 @@ async def _connected(connection: Connection) -> tuple[Transport, Reopen | None]:
     transport, took = await _transport(connection), clock() - begun
     if connection.scheme == "ssh":
         return transport, LoginAgain(lambda within, baud: _transport(connection, within=within, baud=baud), took)
+    if connection.scheme == "usb":
+        return transport, usb_again(partial(_transport, connection))
     if connection.scheme != "serial":
         return transport, host_again(lambda within: _transport(connection, within=within), took)
     again = SerialAgain(connection.target, partial(_transport, connection))

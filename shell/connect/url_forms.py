@@ -24,6 +24,8 @@ URL_FORMS: Mapping[str, UrlForm] = {
     "modbus": UrlForm("modbus://", "modbus://HOST:502", "an Ethernet drive's registers", 502),
     "rfc2217": UrlForm("rfc2217://", "rfc2217://HOST:PORT", "a serial port of a terminal server", 0),
     "ssh": UrlForm("ssh://", "ssh://HOST/dev/ttyUSB0", "a serial port of another machine, through ssh"),
+    "usb": UrlForm("usb:", "usb:2ED01", "a PMX controller on USB, by its device number; usb: alone is the only one"),
+    "usbip": UrlForm("usbip://", "usbip://HOST:3240/BUSID", "a PMX controller on the USB of another machine", 3240),
     "sim": UrlForm("sim:", "sim:CELL.toml#BUS", "simulated drives; sim: alone is the demo cell"),
 }
 """By scheme."""

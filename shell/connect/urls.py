@@ -26,6 +26,12 @@ DIALECTS = tuple(name for name, row in TABLE.items() if not row.scheme)
 """The families that `dialect=` names."""
 IMPLIED = {row.scheme: name for name, row in TABLE.items() if row.scheme}
 """The families that a scheme implies."""
+DIRECT = {scheme: name for name, row in TABLE.items() for scheme in row.direct}
+"""The families of schemes that lead to one drive, without an address."""
+OF_A_LINE = ("family", "drives", "baud", "party", "checksum", "em", "local_echo", "addressed")
+"""What is not to be given of such a connection."""
+USB = r"(?:[!-?A-~]+(?:@\d+-\d+(?:\.\d+)*)?)?"
+"""A controller on USB: its device number with the socket that it is plugged into, or its place in the list."""
 
 
 _WORD = r"[A-Za-z0-9_.][A-Za-z0-9_.-]*"
@@ -64,7 +70,7 @@ class Connection:
     @property
     def short(self) -> str:
         """The default name of its bus: the saved name, the port's name, the host."""
-        if self.scheme == "ssh" and not self.name:
+        if self.scheme in ("ssh", "usbip") and not self.name:
             return f"{self.host}-{PurePath(self.target).name}"
         return self.name or (PurePath(self.target).name if self.target else self.host) or self.scheme
 
@@ -103,6 +109,16 @@ def _parsed(text: str) -> Connection:
         if not body:
             raise Diagnostic("serial: without a port", text, "as in serial:/dev/ttyUSB0?baud=9600")
         base = replace(base, target=body)
+    elif scheme == "usb":
+        if not re.fullmatch(USB, body):
+            raise Diagnostic(f"no controller on USB {body}", text, "as in usb:2ED01, usb:2ED01@1-1.4 or usb:0")
+        base = replace(base, target=body)
+    elif scheme == "usbip":
+        where, slash, bus_id = body.removeprefix("//").rpartition("/")
+        if not slash or not re.fullmatch(r"\d+-\d+(\.\d+)*", bus_id):
+            raise Diagnostic("usbip: needs //HOST[:PORT]/BUSID", text, "as in usbip://10.0.0.5/1-1")
+        host, port = _host(f"//{where}", scheme, text)
+        base = replace(base, host=host, port=port, target=bus_id)
     elif scheme == "ssh":
         base = _ssh(base, body)
     else:
@@ -213,6 +229,11 @@ def _with_query(connection: Connection, query: str) -> Connection:
         if "family" in values:
             raise Diagnostic(f"dialect= is not valid with {connection.scheme}://", connection.text, "drop dialect=")
         values["family"] = own
+    if own := DIRECT.get(connection.scheme):
+        keys = [key for key, (name, *_) in KEYS.items() if name in values and name in OF_A_LINE]
+        if keys:
+            raise Diagnostic(f"{keys[0]}= is not valid on USB", connection.text, f"drop {keys[0]}=")
+        values |= {"family": own, "addressed": False}
     hints = {name: values.pop(name) for name in list(values) if name in HINTED}
     return replace(connection, hints=Hints(**hints), **values)
 

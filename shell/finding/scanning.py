@@ -22,7 +22,7 @@ from multidrop.drives.stopping import Halt
 from multidrop.shell import stop_report
 from multidrop.shell.channel import Job, running
 from multidrop.shell.connect.opening import BAUDED, Opened, Opener, far_port, port_name
-from multidrop.shell.connect.urls import Connection
+from multidrop.shell.connect.urls import DIRECT, Connection
 from multidrop.shell.state.port_state import memory_of
 from multidrop.shell.workspace import Workspace
 from multidrop.transports import TransportLost
@@ -91,6 +91,8 @@ class FoundDrive:
 def url_of(found: Sequence[FoundDrive]) -> str:
     """The URL that opens drives of one language and baud rate on one port."""
     connection, codec = found[0].connection, found[0].state.codec
+    if connection.scheme in DIRECT:
+        return found[0].port
     keys = []
     if connection.baud:
         keys.append(f"baud={connection.baud}")
@@ -120,8 +122,11 @@ def port_of(connection: Connection, bus: str) -> str:
         return f"sim:{connection.target}" + (f"#{connection.bus or bus}" if connection.bus or bus else "")
     if connection.scheme == "ssh":
         return far_port(connection).name
+    if connection.scheme == "usb":
+        return f"usb:{connection.target}"
     host = f"[{connection.host}]" if ":" in connection.host else connection.host
-    return f"{connection.scheme}://{host}:{connection.port}"
+    device = f"/{connection.target}" if connection.scheme == "usbip" else ""
+    return f"{connection.scheme}://{host}:{connection.port}{device}"
 
 
 class NothingFound(TransportLost):
@@ -374,7 +379,7 @@ class Scanning:
         scheme, window = self._connection.scheme, self._connection.timeout or WINDOW
         if self._connection.timeout is None:
             window += distance
-        return Reach(window=window, alone=scheme == "udp", hasty=hasty, everything=self._everything)
+        return Reach(window=window, alone=scheme == "udp" or scheme in DIRECT, hasty=hasty, everything=self._everything)
 
     # One stage
 

@@ -31,6 +31,7 @@ from multidrop.simulator.pmx.commands import MODEL
 from multidrop.simulator.pmx.controller import BAUDS
 from multidrop.simulator.pmx.device import PROGRAMS, PmxDevice, PmxPort
 from multidrop.simulator.pmx.settings import AXES, VARIABLES
+from multidrop.simulator.pmx.usb import UsbController
 
 NAMES_OF_AXES = "xy"
 INPUTS, COUNTS = range(1, 9), 5000
@@ -139,6 +140,7 @@ def build(spec: DriveSpec, place: Place) -> Unit:
         port=PmxPort(device, alone=place.alone, any_baud=place.baud not in BAUDS.values()),
         worlds=dict(zip(NAMES_OF_AXES, device.worlds, strict=True)),
         shadow=_shadow(device),
+        usb=UsbController(device),
         inputs=INPUTS,
         counts=COUNTS,
     )
@@ -165,5 +167,10 @@ def _shadow(device: PmxDevice) -> Shadow:
 
 
 PMX = Family(
-    name="pmx", read_drive=read_drive, build=build, snapshots=Snapshots(describe, wanted, program), addressed=True
+    name="pmx",
+    read_drive=read_drive,
+    build=build,
+    snapshots=Snapshots(describe, wanted, program),
+    addressed=True,
+    usb=True,
 )

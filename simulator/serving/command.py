@@ -23,6 +23,7 @@ from multidrop.simulator.floor import Floor
 from multidrop.simulator.serving.endpoints import Served, serve_bus
 from multidrop.simulator.serving.running import RunningFloor
 from multidrop.transports.sockets import exposed
+from multidrop.transports.usbip import PORT
 
 INPUT = "standard input"
 LONGEST = 64 * 1024
@@ -52,6 +53,8 @@ async def serve(
         for bus in cell.buses:
             for served in await serve_bus(floor, bus, stack):
                 _print_endpoint(served, json, stdout)
+                if served.endpoint.startswith("usbip:"):
+                    _narrate(attaching(served.endpoint))
                 open_to_all += [f"{served.bus} {served.endpoint}"] if reachable(served.endpoint) else []
         if open_to_all:
             _warn(f"{', '.join(open_to_all)}: open to the network, not only to this computer; serve 127.0.0.1 for that")
@@ -61,6 +64,14 @@ async def serve(
         await over.wait()
 
 
+def attaching(endpoint: str) -> str:
+    """The command that plugs in an endpoint of USB/IP."""
+    place = urlsplit(endpoint)
+    port = f"--tcp-port {place.port} " if place.port != PORT else ""
+    command = f"usbip {port}attach -r {place.hostname} -b {place.path[1:]}"
+    return f"{command}   (as root, on Linux; on Windows with usbip-win2) plugs it in"
+
+
 def reachable(endpoint: str) -> bool:
     """Whether other computers can reach an endpoint; a pseudo-terminal has no host."""
     host = urlsplit(endpoint).hostname
@@ -68,8 +79,12 @@ def reachable(endpoint: str) -> bool:
 
 
 def _warn(text: str) -> None:
+    _narrate(f"multidrop: {text}")
+
+
+def _narrate(text: str) -> None:
     with contextlib.suppress(OSError):
-        print(f"multidrop: {visible(text)}", file=sys.stderr, flush=True)
+        print(visible(text), file=sys.stderr, flush=True)
 
 
 def _print_endpoint(served: Served | None, json: bool, stdout: TextIO) -> None:

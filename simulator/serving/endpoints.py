@@ -50,7 +50,7 @@ async def serve_bus(floor: RunningFloor, bus: BusSpec, stack: AsyncExitStack) ->
         except OSError as error:
             reason = error.strerror or str(error)
             raise Diagnostic(f"cannot serve {endpoint.text} ({reason})", where) from None
-        served.append(Served(bus.name, url))
+        served += [Served(bus.name, each) for each in ([url] if isinstance(url, str) else url)]
     return served
 
 
@@ -81,7 +81,16 @@ async def _serve_udp(floor: RunningFloor, bus: str, endpoint: Endpoint, stack: A
     return f"udp://{_bracketed(endpoint.host)}:{transport.get_extra_info('sockname')[1]}"
 
 
-_OPENERS = {"pty": _serve_pty, "tcp": _serve_tcp, "udp": _serve_udp, "modbus": _serve_tcp}
+async def _serve_usbip(floor: RunningFloor, bus: str, endpoint: Endpoint, stack: AsyncExitStack) -> list[str]:
+    from multidrop.simulator.serving.usbip import UsbipServer
+
+    server = UsbipServer(floor, bus)
+    stack.push_async_callback(server.close)
+    port = await server.open(endpoint.host, endpoint.port)
+    return [f"usbip://{_bracketed(endpoint.host)}:{port}/{bus_id}" for bus_id in server.devices]
+
+
+_OPENERS = {"pty": _serve_pty, "tcp": _serve_tcp, "udp": _serve_udp, "modbus": _serve_tcp, "usbip": _serve_usbip}
 
 
 def _bracketed(host: str) -> str:

@@ -90,6 +90,9 @@ class Listener:
     def connectable(self) -> None:
         """The Ethernet drive has booted."""
 
+    def commanded(self) -> None:
+        """A line of `/sim` was carried out."""
+
 
 class RunningFloor:
     """Runs a floor `speed` times as fast as the clock. Needs a running loop; `close` ends it."""
@@ -183,6 +186,8 @@ class RunningFloor:
             return self.floor.command(text, self.now())
         finally:
             self._turn()
+            for listener in [each for listeners in self._listeners.values() for each in listeners]:
+                listener.commanded()
 
     def shadow(self, bus: str, name: str) -> Shadow | None:
         """The reading of a drive without its wire, up to date; None where the cell has no such drive."""
