@@ -29,7 +29,7 @@ EPILOG = (
     "Without a command: the screen, with saved connections, serial ports and the demo cell. "
     "multidrop COMMAND --help shows its arguments."
 )
-EXTRAS = {"cluster": "distributed", "lsp": "pygls", "mqtt": "paho", "pytest": "pytest", "rerun": "rerun"}
+EXTRAS = {"cluster": "distributed", "lsp": "pygls", "mqtt": "paho", "pytest": "pytest", "rerun": "rerun", "usb": "usb1"}
 """The modules of the extras in pyproject.toml, by extra."""
 
 

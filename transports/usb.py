@@ -103,8 +103,10 @@ class UsbPipe(Pipe):
         """When the last command began to leave; long ago after a stop."""
         self._requests: dict[int, asyncio.Future[int]] = {}
         """Requests that `open` waits for."""
-        self._preempted = self._urgent = False
-        """A stop has gone first; a stop is written next."""
+        self._preempted = 0
+        """Stops that have gone first, of which the loop has not taken note."""
+        self._urgent = False
+        """A stop is written next."""
         self._stale = True
         """What comes belongs to an earlier session."""
         self._problem: OSError | None = None
@@ -172,16 +174,17 @@ class UsbPipe(Pipe):
         with self._guard:
             if not self._usable:
                 return False
-            self._preempted = True
+            self._preempted += 1
             self._drop()
             commands = make(0).split(b"\r")
             numbers = self._send(commands)
         self._loop.call_soon_threadsafe(self._watch, commands, numbers)
         return True
 
-    def yielded(self) -> None:
+    def yielded(self) -> bool:
         with self._guard:
-            self._preempted = False
+            self._preempted = max(0, self._preempted - 1)
+            return not self._preempted
 
     def _drop(self) -> None:
         self._queue.clear()

@@ -224,7 +224,7 @@ def _macros() -> Iterator[str]:
 
 
 def _ports() -> Iterator[str]:
-    from multidrop.transports.libusb import all_ports
+    from multidrop.transports.controllers import all_ports
 
     found = all_ports()
     for port in found:

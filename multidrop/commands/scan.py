@@ -45,7 +45,7 @@ def _places(url: str) -> list[str]:
     """The URLs to search: each controller on USB for `usb:`."""
     if url != "usb:":
         return [url]
-    from multidrop.transports.libusb import list_controllers
+    from multidrop.transports.controllers import list_controllers
 
     return [each.url for each in list_controllers()] or [url]
 

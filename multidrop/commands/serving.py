@@ -121,7 +121,7 @@ def lsp(chosen: argparse.Namespace) -> int:
 
 
 def ports(chosen: argparse.Namespace) -> int:
-    from multidrop.transports.libusb import all_ports
+    from multidrop.transports.controllers import all_ports
 
     found = all_ports()
     for port in found:

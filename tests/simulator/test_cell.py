@@ -185,7 +185,7 @@ IS_HINT = 'several lines: IS = ["1,1,0", "2,2,0"]'
         (
             '[[bus]]\nname = "b"\nserve = ["http://x:1"]',
             'cell.toml: [[bus]] "b": serve cannot be "http://x:1"; '
-            "valid: pty:, tcp://, udp:// or modbus:// at the beginning",
+            "valid: pty:, tcp://, udp://, modbus:// or usbip:// at the beginning",
         ),
         (
             '[[bus]]\nname = "b"\nserve = ["tcp://127.0.0.1"]',

@@ -9,8 +9,9 @@ from typing import Any
 
 import pytest
 
-from multidrop.transports import Unreachable, libusb
-from multidrop.transports.libusb import RULE, UNREAD, Found, all_ports, chosen, controllers, refusal
+from multidrop.transports import Unreachable
+from multidrop.transports import controllers as here
+from multidrop.transports.controllers import RULE, UNREAD, Found, all_ports, chosen, controllers, refusal
 from multidrop.transports.performax import IN, OUT, PRODUCT, VENDOR, Control
 from tests.support.cases import for_each
 
@@ -61,7 +62,7 @@ def test_a_number_that_cannot_be_read_names_the_remedy() -> None:
 )
 def test_a_refusal_says_what_is_needed(platform: str, code: int, why: str) -> None:
     with pytest.MonkeyPatch.context() as patched:
-        patched.setattr(libusb, "sys", SimpleNamespace(platform=platform))
+        patched.setattr(here, "sys", SimpleNamespace(platform=platform))
         assert refusal(code, SEVERAL[0]).startswith(why)
 
 
@@ -71,13 +72,13 @@ def test_the_rule_of_udev_is_beside_the_program() -> None:
 
 @pytest.mark.skipif(sys.platform != "linux", reason="looks at /proc")
 def test_the_holder_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(libusb, "holder", lambda path: f"minicom ({path})")
+    monkeypatch.setattr(here, "holder", lambda path: f"minicom ({path})")
     assert refusal(-6, Found("2ED00", "1-1", "/dev/bus/usb/001/002")) == "minicom (/dev/bus/usb/001/002) has it"
 
 
 def test_ports_are_listed_with_their_numbers(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(libusb, "list_ports", list)
-    monkeypatch.setattr(libusb, "list_controllers", lambda: [SEVERAL[2], Found(UNREAD, "1-1")])
+    monkeypatch.setattr(here, "list_ports", list)
+    monkeypatch.setattr(here, "list_controllers", lambda: [SEVERAL[2], Found(UNREAD, "1-1")])
     assert [(each.device, each.description[:20]) for each in all_ports()] == [
         ("usb:2ED07@2-3", "Performax controller"),
         ("usb:unread@1-1", f"copy {RULE}"[:20]),
@@ -86,7 +87,7 @@ def test_ports_are_listed_with_their_numbers(monkeypatch: pytest.MonkeyPatch) ->
     def missing() -> list[Found]:
         raise Unreachable("usb: needs libusb")
 
-    monkeypatch.setattr(libusb, "list_controllers", missing)
+    monkeypatch.setattr(here, "list_controllers", missing)
     assert all_ports() == []
 
 

@@ -1,0 +1,167 @@
+"""The Performax controllers on the USB of this machine, found through libusb (the extra `usb`).
+
+A controller is known by its device number and by the socket that it is plugged into: after it was unplugged, another
+one in its place is not taken for it.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import ctypes
+import re
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+from multidrop.transports import Unreachable
+from multidrop.transports.performax import (
+    GONE,
+    IN,
+    OUT,
+    PACKET,
+    PRODUCT,
+    REQUEST,
+    REQUEST_TYPE,
+    STALLED,
+    TIMEOUT,
+    VENDOR,
+    Control,
+)
+from multidrop.transports.serial_ports import PortInfo, holder, list_ports, natural
+
+RULE = Path(__file__).with_name("60-multidrop-usb.rules")
+"""The rule of udev that gives the users of this machine access."""
+UNREAD = "unread"
+"""In place of a device number that cannot be read."""
+_ACCESS, _NO_DEVICE, _BUSY, _TIMED_OUT, _STALL = -3, -4, -6, -7, -9
+"""libusb's errors."""
+STATUS = {_NO_DEVICE: GONE, _TIMED_OUT: TIMEOUT, _STALL: STALLED}
+OTHER = -5
+"""The status of any other error."""
+ASKING = 100
+"""Milliseconds in which a controller takes or sends a packet while it is looked for."""
+
+
+@dataclass(frozen=True)
+class Found:
+    """A controller on this machine. `place`: the bus and the sockets from its root on, as `1-1.4`."""
+
+    number: str
+    """The device number, as `2ED01`, or `UNREAD`."""
+    place: str
+    path: str = ""
+    """The device's file on Linux."""
+    device: Any = None
+
+    @property
+    def url(self) -> str:
+        """The URL of this one."""
+        return f"usb:{self.number}@{self.place}"
+
+
+def library() -> ModuleType:
+    """The library. Raises Unreachable where it is not installed."""
+    try:
+        import usb1
+
+        with contextlib.suppress(ImportError, OSError):  # else the system's library
+            from libusb_package import get_library_path
+
+            usb1.loadLibrary(ctypes.CDLL(str(get_library_path())))
+        usb1.loadLibrary()
+    except (ImportError, OSError, AttributeError):
+        raise Unreachable("usb: needs libusb: pip install 'multidrop[usb]'") from None
+    return sys.modules["usb1"]
+
+
+def controllers(usb1: ModuleType, context: Any) -> list[Found]:
+    """The controllers in the order of their places."""
+    found = []
+    for device in context.getDeviceIterator(skip_on_error=True):
+        if (device.getVendorID(), device.getProductID()) == (VENDOR, PRODUCT):
+            bus, ports = device.getBusNumber(), ".".join(map(str, device.getPortNumberList())) or "0"
+            path = f"/dev/bus/usb/{bus:03}/{device.getDeviceAddress():03}"
+            try:
+                number = device.getSerialNumber() or _asked(usb1, device)
+            except usb1.USBError:
+                number = UNREAD
+            found.append(Found(number, f"{bus}-{ports}", path, device))
+    return sorted(found, key=lambda each: natural(each.place))
+
+
+def _asked(usb1: ModuleType, device: Any) -> str:
+    """Ask a controller whose descriptor has no number for it. Raises USBError where a program has it."""
+    handle = device.open()
+    try:
+        handle.claimInterface(0)
+        for value in (Control.OPEN, Control.FLUSH):
+            handle.controlWrite(REQUEST_TYPE, REQUEST, value, 0, b"", ASKING)
+        with contextlib.suppress(usb1.USBErrorTimeout):
+            handle.bulkRead(IN, PACKET, ASKING)  # what an earlier session has left
+        handle.bulkWrite(OUT, b"DN\0", ASKING)
+        reply = bytes(handle.bulkRead(IN, PACKET, ASKING)).partition(b"\0")[0].decode("latin-1")
+        handle.controlWrite(REQUEST_TYPE, REQUEST, Control.CLOSE, 0, b"", ASKING)
+        return reply if re.fullmatch(r"\w+", reply, re.ASCII) else UNREAD
+    finally:
+        handle.close()
+
+
+def list_controllers() -> list[Found]:
+    """The controllers of this machine. Raises Unreachable where the library is not installed."""
+    usb1 = library()
+    try:
+        with usb1.USBContext() as context:
+            return [Found(each.number, each.place, each.path) for each in controllers(usb1, context)]
+    except usb1.USBError:
+        return []  # a machine without USB
+
+
+def all_ports() -> list[PortInfo]:
+    """The serial ports of this machine, and its controllers on USB where the library is installed."""
+    try:
+        found = list_controllers()
+    except Unreachable:
+        found = []
+    usb = [
+        PortInfo(each.url, description=permission() if each.number == UNREAD else "Performax controller")
+        for each in found
+    ]
+    return list_ports() + usb
+
+
+def chosen(found: list[Found], target: str) -> Found:
+    """The controller that a URL names by its target. Raises Unreachable."""
+    number, _, place = target.partition("@")
+    listed = ", ".join(each.url for each in found) or "none"
+    if any(each.number == UNREAD for each in found):
+        listed += f"; where a number cannot be read: {permission()}"
+    if re.fullmatch(r"\d{1,3}", target):
+        matching = found[int(target) :][:1]
+    else:
+        matching = [each for each in found if number in ("", each.number) and place in ("", each.place)]
+    if not matching:
+        raise Unreachable(f"usb:{target}: not there; controllers on USB: {listed}")
+    if len(matching) > 1:
+        raise Unreachable(f"usb:{target}: {len(matching)} controllers; name one of {listed}")
+    return matching[0]
+
+
+def permission() -> str:
+    """The remedy where this machine's user may not use a device."""
+    if sys.platform == "win32":
+        return "the maker's driver holds it; multidrop reaches it with the WinUSB driver in place of that only"
+    if sys.platform == "darwin":
+        return "another program or driver holds it; end that program"
+    return f"copy {RULE} to /etc/udev/rules.d and plug it in again"
+
+
+def refusal(code: int, found: Found) -> str:
+    """The reason why a controller could not be opened, from libusb's error."""
+    if code == _BUSY:
+        return f"{holder(found.path) or 'another connection'} has it"
+    if code == _NO_DEVICE:
+        return "unplugged, or without power"
+    what = "no permission" if code == _ACCESS else f"no access (libusb error {code})"
+    return f"{what}; {permission()}"
