@@ -11,6 +11,7 @@ import ctypes
 import re
 import sys
 from dataclasses import dataclass
+from importlib.util import find_spec
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -66,10 +67,11 @@ def library() -> ModuleType:
     try:
         import usb1
 
-        with contextlib.suppress(ImportError, OSError):  # else the system's library
-            from libusb_package import get_library_path
-
-            usb1.loadLibrary(ctypes.CDLL(str(get_library_path())))
+        carried = find_spec("libusb_package")  # not imported: its own search takes longer than the rest
+        if carried is not None and carried.origin is not None:
+            ending = {"win32": "dll", "darwin": "dylib"}.get(sys.platform, "so")
+            with contextlib.suppress(OSError):  # else the system's library
+                usb1.loadLibrary(ctypes.CDLL(str(Path(carried.origin).with_name(f"libusb-1.0.{ending}"))))
         usb1.loadLibrary()
     except (ImportError, OSError, AttributeError):
         raise Unreachable("usb: needs libusb: pip install 'multidrop[usb]'") from None

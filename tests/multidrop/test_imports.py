@@ -66,7 +66,8 @@ TABLE = {
     | {"socket", "ssl", "asyncio", "serial", "multidrop.dialects.pmx", "multidrop.simulator.pmx"}
     | {"concurrent.futures", "distributed", "dask"}
     | HOSTS,
-    ("ports",): NO_LINE - {"serial", "subprocess"} | {"json", "platformdirs", "multidrop.dialects.mcode"},
+    # libusb1 imports subprocess and json
+    ("ports",): NO_LINE - {"serial", "subprocess"} | {"platformdirs", "multidrop.dialects.mcode"},
     ("completion", "bash"): NO_LINE | {"platformdirs", "multidrop.dialects.mcode"},
     ("macro", "list"): HEAVY | LOOP | HOSTS | SIMULATORS | {"serial"},
     ("send", "tcp://127.0.0.1:1", "PR P"): HEAVY | OTHERS | SIMULATORS | VERBS | {"serial"},
