@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from enum import Enum
 from functools import lru_cache
+from typing import Any
 
 from rich.cells import cell_len
 from rich.segment import Segment
@@ -22,85 +23,46 @@ from multidrop.dialects.text import visible
 from multidrop.shell.configuration import Look
 from multidrop.tui.curves.raster import INKS, Ink
 
-DARK = Theme(
-    name="multidrop-dark",
-    primary="#5fafd7",
-    accent="#5fafd7",
-    warning="#e0af5f",
-    error="#e05f5f",
-    success="#c6c6c6",
-    foreground="#d0d0d0",
-    background="#121212",
-    surface="#1c1c1c",
-    panel="#1c1c1c",
-    dark=True,
-    variables={
-        "muted": "#8a8a8a",
-        "faint": "#444444",
-        "stop-text": "#ffffff",
-        "stop-ground": "#af0000",
-        "ground": "#121212",
-        "series-2": "#87af5f",
-        "series-3": "#af87d7",
-        "series-4": "#d0d0d0",
-        "series-5": "#5fafaf",
-        "series-6": "#d787af",
-    },
+COLOURS = (
+    ("primary", "#5fafd7", "#005f87", "ansi_cyan"),
+    ("accent", "#5fafd7", "#005f87", "ansi_cyan"),
+    ("warning", "#e0af5f", "#875f00", "ansi_yellow"),
+    ("error", "#e05f5f", "#af0000", "ansi_red"),
+    ("success", "#c6c6c6", "#303030", "ansi_default"),
+    ("foreground", "#d0d0d0", "#1c1c1c", "ansi_default"),
+    ("background", "#121212", "#eeeeee", "ansi_default"),
+    ("surface", "#1c1c1c", "#e4e4e4", "ansi_default"),
+    ("panel", "#1c1c1c", "#e4e4e4", "ansi_default"),
+    ("muted", "#8a8a8a", "#626262", "ansi_default"),
+    ("faint", "#444444", "#b2b2b2", "ansi_default"),
+    ("stop-text", "#ffffff", "#ffffff", "ansi_bright_white"),
+    ("stop-ground", "#af0000", "#af0000", "ansi_red"),
+    ("ground", "#121212", "#eeeeee", "ansi_black"),
+    ("series-2", "#87af5f", "#4f6f00", "ansi_green"),
+    ("series-3", "#af87d7", "#5f3f9f", "ansi_magenta"),
+    ("series-4", "#d0d0d0", "#303030", "ansi_default"),
+    ("series-5", "#5fafaf", "#006f6f", "ansi_blue"),
+    ("series-6", "#d787af", "#9f3f6f", "ansi_bright_cyan"),
 )
-LIGHT = Theme(
-    name="multidrop-light",
-    primary="#005f87",
-    accent="#005f87",
-    warning="#875f00",
-    error="#af0000",
-    success="#303030",
-    foreground="#1c1c1c",
-    background="#eeeeee",
-    surface="#e4e4e4",
-    panel="#e4e4e4",
-    dark=False,
-    variables={
-        "muted": "#626262",
-        "faint": "#b2b2b2",
-        "stop-text": "#ffffff",
-        "stop-ground": "#af0000",
-        "ground": "#eeeeee",
-        "series-2": "#4f6f00",
-        "series-3": "#5f3f9f",
-        "series-4": "#303030",
-        "series-5": "#006f6f",
-        "series-6": "#9f3f6f",
-    },
+"""Each colour in the dark theme, in the light one, and among the terminal's own sixteen."""
+OF_TEXTUAL = frozenset(
+    {"primary", "accent", "warning", "error", "success", "foreground", "background", "surface", "panel"}
 )
-ANSI = Theme(
-    name="multidrop-ansi",
-    ansi=True,
-    primary="ansi_cyan",
-    secondary="ansi_cyan",
-    accent="ansi_cyan",
-    warning="ansi_yellow",
-    error="ansi_red",
-    success="ansi_default",
-    foreground="ansi_default",
-    background="ansi_default",
-    surface="ansi_default",
-    panel="ansi_default",
-    boost="ansi_default",
-    dark=True,
-    variables={
-        **BUILTIN_THEMES["ansi-dark"].variables,
-        "muted": "ansi_default",
-        "faint": "ansi_default",
-        "stop-text": "ansi_bright_white",
-        "stop-ground": "ansi_red",
-        "ground": "ansi_black",
-        "series-2": "ansi_green",
-        "series-3": "ansi_magenta",
-        "series-4": "ansi_default",
-        "series-5": "ansi_blue",
-        "series-6": "ansi_bright_cyan",
-    },
-)
+"""Those that Textual knows; the others are variables of ours."""
+
+
+def _theme(name: str, column: int, **more: Any) -> Theme:
+    colours = {row[0]: row[column] for row in COLOURS}
+    variables = {**more.pop("variables", {}), **{key: colours.pop(key) for key in colours.keys() - OF_TEXTUAL}}
+    return Theme(name=f"multidrop-{name}", variables=variables, **colours, **more)
+
+
+DARK = _theme("dark", 1, dark=True)
+LIGHT = _theme("light", 2, dark=False)
+ANSI = _theme(
+    "ansi", 3, dark=True, ansi=True, secondary="ansi_cyan", boost="ansi_default",
+    variables=BUILTIN_THEMES["ansi-dark"].variables,
+)  # fmt: skip
 THEMES = (DARK, LIGHT, ANSI)
 DEFAULTS = dict(DARK.variables)
 """Values of our variables, for themes that are not ours."""
