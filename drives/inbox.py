@@ -99,7 +99,11 @@ class Doubt:
         if reply.surplus or (doubtful and not reply.lines):
             others = [replace(late, taken=late.nak) for late in others]
             self._late = own + others
-        if _proves_itself(request, reply, doubtful):
+        # Whether the reply is certainly that of this drive: it printed what only this request can print.
+        expected = request.expect is not None and reply.end is End.DONE
+        distinct = request.gather or not doubtful
+        executed = reply.acknowledged or request.kind is not Kind.QUIET
+        if expected and distinct and executed:
             self._late = others
             return Weight(doubtful or any(late.taken for late in own), request.gather and bool(own))
         if _outstanding(request, reply, doubtful):
@@ -125,14 +129,6 @@ def _may_answer(late: Request, request: Request, reply: Reply) -> bool:
     if request.signed:
         return False
     return late.expect is None or any(re.fullmatch(late.expect, line) for line in reply.lines)
-
-
-def _proves_itself(request: Request, reply: Reply, doubtful: bool) -> bool:
-    """Whether the reply is certainly that of this drive: it printed what only this request can print."""
-    expected = request.expect is not None and reply.end is End.DONE
-    distinct = request.gather or not doubtful
-    executed = reply.acknowledged or request.kind is not Kind.QUIET
-    return expected and distinct and executed
 
 
 def _outstanding(request: Request, reply: Reply, doubtful: bool) -> bool:

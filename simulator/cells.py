@@ -107,7 +107,12 @@ class Reader:
         for number, drive in enumerate(bus.drives, 1):
             where = f"{table.where}: [[bus.drive]] {number}"
             if len(bus.drives) > 1:
-                self._check_shared(drive, where)
+                # Refuse a drive that must have its bus to itself.
+                if self._is_ethernet(drive.personality):
+                    raise Diagnostic(f"an {drive.personality} cannot share its bus", where, "give it a bus of its own")
+                if not (drive.party or self._families[drive.personality].addressed):
+                    what = "without party mode it replies to every line of the bus"
+                    raise Diagnostic(what, where, "add party = true")
             if drive.name in names:
                 raise Diagnostic(
                     f'"{drive.name}" is the name of [[bus.drive]] {names[drive.name]} too', where, "use different names"
@@ -135,14 +140,6 @@ class Reader:
 
     def _is_ethernet(self, personality: str) -> bool:
         return personality in self._families[personality].ethernet
-
-    def _check_shared(self, drive: DriveSpec, where: str) -> None:
-        """Refuse a drive that must have its bus to itself."""
-        if self._is_ethernet(drive.personality):
-            raise Diagnostic(f"an {drive.personality} cannot share its bus", where, "give it a bus of its own")
-        if not (drive.party or self._families[drive.personality].addressed):
-            what = "without party mode it replies to every line of the bus"
-            raise Diagnostic(what, where, "add party = true")
 
 
 def _endpoint(text: str, table: Table, folder: Folder) -> Endpoint:

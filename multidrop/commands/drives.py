@@ -51,20 +51,16 @@ def upload(chosen: argparse.Namespace) -> int:
 
 def download(chosen: argparse.Namespace) -> int:
     """Send a file to the drive; report a wrong file before anything is opened."""
-    _check(chosen.file)
+    # Raise Diagnostic for a file that is correct in no language: the error in the language of its name.
+    own, text = program_languages()[program_language_of(chosen.file)], program_text_of(chosen.file)
+    if all(errors(source.language.check(text)) for source in program_languages().values() if source is not own):
+        own.language.load(chosen.file)
     wanted = transfers.Wanted(not chosen.no_verify, chosen.save, chosen.only_changed, chosen.run)
 
     async def put(session: Session, drive: Drive) -> None:
         await transfers.download(session, drive, chosen.file, wanted)
 
     return _with_drive(chosen, put, agreed=chosen.yes)
-
-
-def _check(file: str) -> None:
-    """Raise Diagnostic for a file that is correct in no language: the error in the language of its name."""
-    own, text = program_languages()[program_language_of(file)], program_text_of(file)
-    if all(errors(source.language.check(text)) for source in program_languages().values() if source is not own):
-        own.language.load(file)
 
 
 def _with_drive(

@@ -241,7 +241,11 @@ class Sink:
         if self._file:
             return self._rr.FileSink(str(self._file.writes), write_footer=False)
         if self.target.url:
-            _probe(self.target)
+            # Check that a viewer listens: rerun's client would wait for seconds, and again on close.
+            try:
+                socket.create_connection((self.target.host, self.target.port), timeout=3.0).close()
+            except (OSError, UnicodeError) as error:
+                raise Unreachable(f"no viewer at {self.target.url} ({why(error)}); start `rerun` there first") from None
             return self._rr.GrpcSink(self.target.url)
         self.target = _free(self.target)
         return self._rr.GrpcServerSink(self.target.host, self.target.port, server_memory_limit="64MiB")
@@ -400,11 +404,3 @@ def _unserved(target: PlotTarget, error: OSError | UnicodeError) -> Diagnostic:
     return Diagnostic(
         f"cannot serve at {where} ({error.strerror})", hint="use another port, or end the program that uses it"
     )
-
-
-def _probe(target: PlotTarget) -> None:
-    """Check that a viewer listens: rerun's client would wait for seconds, and again on close."""
-    try:
-        socket.create_connection((target.host, target.port), timeout=3.0).close()
-    except (OSError, UnicodeError) as error:
-        raise Unreachable(f"no viewer at {target.url} ({why(error)}); start `rerun` there first") from None

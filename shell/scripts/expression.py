@@ -322,7 +322,10 @@ class _Parser:
 
     def _value(self, token: _Token) -> Expression:
         if token.kind == "number":
-            return _constant(token.text)
+            value = value_of(token.text)
+            if isinstance(value, str) or value > LARGEST:
+                raise Diagnostic(f"{token.text} has too many digits", hint=f"valid: up to {LARGEST:.0e}, 16 places")
+            return Constant(value)
         if token.kind == "text":
             return Constant(token.text[1:-1])
         if token.kind == "address":
@@ -333,13 +336,6 @@ class _Parser:
         if token.kind == "word":
             return Name(token.text) if token.text in self._names else Word(token.text, self._target)
         raise Diagnostic(f"a value is missing at the end of {self._text}" if self._text else "a value is missing")
-
-
-def _constant(text: str) -> Constant:
-    value = value_of(text)
-    if isinstance(value, str) or value > LARGEST:
-        raise Diagnostic(f"{text} has too many digits", hint=f"valid: up to {LARGEST:.0e}, 16 places")
-    return Constant(value)
 
 
 def _target(text: str) -> str:

@@ -293,12 +293,9 @@ class UdpServer(asyncio.DatagramProtocol, Listener):
         if self._floor.floor.wires[self._bus].queued(self._source) < UDP_WAITING:
             self._floor.write(self._bus, data, self._source)
         else:
-            self._drop(data)
-
-    def _drop(self, data: bytes) -> None:
-        if not self.dropped:
-            self._floor.notify(f"{self._bus}: datagrams come faster than the wire carries them; some are dropped")
-        self.dropped += 1
+            if not self.dropped:
+                self._floor.notify(f"{self._bus}: datagrams come faster than the wire carries them; some are dropped")
+            self.dropped += 1
 
     def receive(self, data: bytes) -> None:
         if self._transport is None or cast(asyncio.Transport, self._transport).get_write_buffer_size() > BACKLOG:

@@ -53,11 +53,8 @@ class Trace:
         self.at.append(at)
         self.values.append(value)
         if len(self.at) > MOST or (len(self.at) % _SLACK == 0 and at - self.at[_SLACK - 1] > KEPT):
-            self._drop(_SLACK)
-
-    def _drop(self, count: int) -> None:
-        del self.at[:count], self.values[:count]
-        self.dropped += count
+            del self.at[:_SLACK], self.values[:_SLACK]
+            self.dropped += _SLACK
 
     @property
     def count(self) -> int:

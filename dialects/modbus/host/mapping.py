@@ -69,7 +69,12 @@ def _value(word: str, arguments: Sequence[Argument | None]) -> int:
     if word in TRIGGERS and not arguments:
         return 1
     if word in STEPS:
-        return _variable(word, arguments).address
+        name = arguments[0] if len(arguments) == 1 else None
+        if not isinstance(name, Name):
+            raise Inexpressible(f"{word} needs a variable, as in {word} R1")
+        if name.word not in REGISTERS:
+            raise unavailable(name.word)
+        return REGISTERS[name.word].address
     return _number(word, arguments)
 
 
@@ -84,15 +89,6 @@ def _number(word: str, arguments: Sequence[Argument | None]) -> int:
     if not isinstance(value.value, int):
         raise Inexpressible(f"{value.value} is not a whole number, which a register needs; {ALTERNATIVE} may take it")
     return value.value
-
-
-def _variable(word: str, arguments: Sequence[Argument | None]) -> Register:
-    name = arguments[0] if len(arguments) == 1 else None
-    if not isinstance(name, Name):
-        raise Inexpressible(f"{word} needs a variable, as in {word} R1")
-    if name.word not in REGISTERS:
-        raise unavailable(name.word)
-    return REGISTERS[name.word]
 
 
 def _none(word: str, arguments: Sequence[Argument | None]) -> None:

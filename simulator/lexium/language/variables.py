@@ -160,15 +160,12 @@ class MotionVariables:
         number, t = self._memory.checked("EE", value), self._timeline.now
         if number and not self._values["EE"]:
             self._check_ratio({})
-            self._check_speeds()
+            # Check that VI is a count or more, on a product that has a code for less (5-21, 9). Raises Fault (90).
+            memory = self._memory
+            if memory.model.per_microstep is None and self._values["VI"] < memory.steps_per_count:
+                raise Fault(E.VELOCITY_TOO_LOW)
         self._motor.limit_stop.relocate(lambda: self._motor.axis.switch_unit("EE", number, t), t)
         self._timeline.replan()
-
-    def _check_speeds(self) -> None:
-        """Check that VI is a count or more, on a product that has a code for less (5-21, 9). Raises Fault (90)."""
-        memory = self._memory
-        if memory.model.per_microstep is None and self._values["VI"] < memory.steps_per_count:
-            raise Fault(E.VELOCITY_TOO_LOW)
 
     def _write_encoder(self, name: str, value: Value) -> None:
         """DB, PM, SF: a rotor that is out of place already is brought back, or stalls."""
