@@ -52,7 +52,7 @@ OF_TEXTUAL = frozenset(
 
 
 def _theme(name: str, column: int, **more: Any) -> Theme:
-    colours = {row[0]: row[column] for row in COLOURS}
+    colours: dict[str, Any] = {row[0]: row[column] for row in COLOURS}
     variables = {**more.pop("variables", {}), **{key: colours.pop(key) for key in colours.keys() - OF_TEXTUAL}}
     return Theme(name=f"multidrop-{name}", variables=variables, **colours, **more)
 
