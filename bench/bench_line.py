@@ -22,9 +22,12 @@ sys.path.insert(0, str(Path(__file__).parent.parent))
 import serial
 from report import Row, compared, main
 
+from multidrop.dialects.codec import Request
 from multidrop.dialects.mcode.host.codec import MCode
 from multidrop.drives.bus import Bus
-from multidrop.transports import Transport
+from multidrop.drives.line import Transaction
+from multidrop.drives.link import Link
+from multidrop.transports import Transport, TransportLost
 from multidrop.transports.serial_port import open_serial
 from multidrop.transports.sockets import open_tcp
 
@@ -62,6 +65,17 @@ while True:
         if held:
             peer.sendall(ANSWER)
 """
+
+
+async def transact(link: Link, request: Request) -> Transaction:
+    """Send one request and return the whole transaction. Raises TransportLost."""
+    answer: asyncio.Future[Transaction | TransportLost] = asyncio.get_running_loop().create_future()
+    link.submit(request, answer.set_result)
+    link.advance()
+    found = await answer
+    if isinstance(found, TransportLost):
+        raise found
+    return found
 
 
 def rows(full: bool) -> Iterator[Row]:
@@ -133,10 +147,10 @@ async def through_bus(where: str, trips: int) -> tuple[float, float]:
     bus.start()
     try:
         for _ in range(100):
-            await bus.link.transact(REQUEST)
+            await transact(bus.link, REQUEST)
         begin, busy = time.perf_counter(), time.process_time()
         for _ in range(trips):
-            reply = await bus.link.transact(REQUEST)
+            reply = await transact(bus.link, REQUEST)
             assert reply.reply.text == "51200", reply
         return time.perf_counter() - begin, time.process_time() - busy
     finally:

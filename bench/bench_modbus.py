@@ -20,6 +20,7 @@ from typing import Any
 
 sys.path.insert(0, str(Path(__file__).parent.parent))
 
+from bench_line import transact
 from report import Row, absent, compared, main
 
 from multidrop.dialects.modbus.host import mapping
@@ -61,7 +62,7 @@ def through_bus(port: int, trips: int) -> Measured:
         reading = mapping.reading("P")
 
         async def once() -> None:
-            assert reading.shown((await bus.link.transact(asked)).reply.body) == str(VALUE)
+            assert reading.shown((await transact(bus.link, asked)).reply.body) == str(VALUE)
 
         try:
             return await timed(once, trips)

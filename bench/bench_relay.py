@@ -22,7 +22,7 @@ from shutil import which
 
 sys.path.insert(0, str(Path(__file__).parent.parent))
 
-from bench_line import ANSWER, FRAME, PEER, REQUEST, timed
+from bench_line import ANSWER, FRAME, PEER, REQUEST, timed, transact
 from report import Row, alone, compared, main
 
 from multidrop.drives.bus import Bus
@@ -80,10 +80,10 @@ async def through_bus(far: FarPort, count: int, way: str) -> tuple[float, float,
     relay = int(lock_owner(far.path).rpartition("pid ")[2].rstrip(")"))
     try:
         for _ in range(100):
-            await bus.link.transact(REQUEST)
+            await transact(bus.link, REQUEST)
         begin, busy, there = time.perf_counter(), time.process_time(), spent(relay)
         for _ in range(count):
-            reply = await bus.link.transact(REQUEST)
+            reply = await transact(bus.link, REQUEST)
             assert reply.reply.text == "51200", reply
         return time.perf_counter() - begin, time.process_time() - busy, spent(relay) - there
     finally:

@@ -121,25 +121,6 @@ class Link:
 
     # Requests
 
-    async def transact(self, request: Request) -> Transaction:
-        """Send one request and return the whole transaction. Raises TransportLost."""
-        future: asyncio.Future[Transaction] = self._loop.create_future()
-
-        def settle(answer: Transaction | TransportLost) -> None:
-            if future.done():
-                return
-            if isinstance(answer, TransportLost):
-                future.set_exception(answer)
-            else:
-                future.set_result(answer)
-
-        ticket = self.submit(request, settle)
-        self.advance()
-        try:
-            return await future
-        finally:
-            self.withdraw(ticket)
-
     def submit(self, request: Request, on_answer: OnAnswer, searching: bool = False) -> int:
         """Queue a request; return its ticket. `advance` must follow. Raises TransportLost.
 
