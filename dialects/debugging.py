@@ -39,6 +39,11 @@ class Look(NamedTuple):
     address: int | None = None
 
 
+def _never_broken(*_: object) -> Procedure[int | None]:
+    return None
+    yield  # a procedure
+
+
 @dataclass(frozen=True)
 class Debugging(Generic[S]):
     """Observation of a program. Every conversation raises Refused, NoAnswer, Stopped or Inexpressible.
@@ -62,8 +67,6 @@ class Debugging(Generic[S]):
     """Start a program that waits for `step` before each line; a break point is removed before."""
     waits: Callable[[S, str, Row | None], Procedure[None]]
     """Raise Refused unless it is known that a program waits, after this last line, for a step or to go on."""
-    forget: Callable[[S], None]
-    """Forget what proves that a program waits: a stop came."""
     step: Callable[[S, Sequence[Row]], Procedure[Stepped]]
     """Execute one line of this program. Call it after `waits`, with no other conversation in between."""
     go_on: Callable[[S, str], Procedure[None]]
@@ -76,15 +79,17 @@ class Debugging(Generic[S]):
     """Remove the break point."""
     break_now: Callable[[S, str], Procedure[None]]
     """Break a running program where it is."""
-    broken: Callable[[S, Sequence[Row], Row, str], Procedure[int | None]]
-    """Whether the drive waits at the break point after this last line of a quiet trace; its address, or None."""
-    hold: Callable[[str], float | None]
-    """Seconds for which a line holds its program, 0 for none and for motion; None: they are not known."""
     names: Callable[[S, Sequence[str]], None]
     """Check names to watch, without a request. Raises Diagnostic."""
     values: Callable[[S, Sequence[str]], Procedure[Mapping[str, str]]]
     """Read variables; one that the drive does not have now is left out. Clears nothing."""
-    traced: Callable[[str], Row | None]
+    forget: Callable[[S], None] = lambda state: None
+    """Forget what proves that a program waits: a stop came."""
+    broken: Callable[[S, Sequence[Row], Row, str], Procedure[int | None]] = _never_broken
+    """Whether the drive waits at the break point after this last line of a quiet trace; its address, or None."""
+    hold: Callable[[str], float | None] = lambda text: 0.0
+    """Seconds for which a line holds its program, 0 for none and for motion; None: they are not known."""
+    traced: Callable[[str], Row | None] = lambda line: None
     """The executed line that a printed line shows; None for any other line."""
     no_step: str = ""
     """The reason why its drives have no single step; empty: they have."""

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Generic, NamedTuple, Protocol, TypeVar
 
 from multidrop.dialects.codec import Codec, Priority, Procedure
-from multidrop.dialects.files import SourceLine
+from multidrop.dialects.files import SourceLine, lines_of_text
 from multidrop.dialects.on_demand import imported, imported_if
 from multidrop.dialects.state import DriveState, Owed, Remembered
 
@@ -131,8 +131,6 @@ class Programs(Generic[S]):
     """Read what the drive holds, at least where these lines would go."""
     file: Callable[[S, Held, bool], Sequence[str]]
     """Return the lines of a file that reproduces what a drive holds; True: in its stored form."""
-    executed: Callable[[Sequence[SourceLine]], Sequence[SourceLine]]
-    """Return the lines of a file that the drive executes as they come, and does not store."""
     size: Callable[[Sequence[SourceLine]], int]
     """Count the lines of a file that the drive stores."""
     end: Callable[[S], Procedure[bool]]
@@ -149,10 +147,12 @@ class Programs(Generic[S]):
     """Return why a file must be sent; empty where the drive holds all of it."""
     start: Callable[[Sequence[SourceLine], str], str]
     """Return the line that executes a program of a file, by its label. Raises Diagnostic for an unknown one."""
-    refreshed: Callable[[str, Held], Sequence[str]]
-    """Return the lines of a file with the present values of variables."""
     annotated: Callable[[str, Held], Sequence[str]]
     """List what the drive holds with the remarks and the layout of its file; empty where `readable` is better."""
+    refreshed: Callable[[str, Held], Sequence[str]] = lines_of_text
+    """Return the lines of a file with the present values of variables."""
+    executed: Callable[[Sequence[SourceLine]], Sequence[SourceLine]] = lambda lines: ()
+    """Return the lines of a file that the drive executes as they come, and does not store."""
     acts: Callable[[str], bool] = lambda line: False
     """Whether one of those lines starts motion or a program; a setting does not."""
     save: str = ""

@@ -136,6 +136,11 @@ def split_lines(text: str) -> list[str]:
     return re.split(r"\r?\n", body) if "\n" in body else body.split("\r")
 
 
+def lines_of_text(text: str, _: object = None) -> tuple[str, ...]:
+    """The lines of a file that a person edits, without the end of file of an old editor."""
+    return tuple(split_lines(text.removesuffix("\x1a").removesuffix("\n")))
+
+
 def wrong_characters(lines: Iterable[str]) -> Iterator[tuple[int, int, str]]:
     """Name the first character of each line that no line may have: line and column from 1, and its name."""
     for number, line in enumerate(lines, 1):

@@ -97,6 +97,13 @@ class Difference(NamedTuple):
     there: str
 
 
+def first_difference(found: Sequence[Difference], drive: str = "drive") -> str:
+    """Say why a file must be sent by the first of its differences; empty where there is none."""
+    if not found:
+        return ""
+    return f"line {found[0].number} differs" if found[0].number else f"the {drive} holds more lines"
+
+
 class Part(NamedTuple):
     """A part of a line, by columns from 0. `kind`: word, starts, label, text, remark or wrong.
 

@@ -31,7 +31,7 @@ from multidrop.dialects.mcode.manual import guards
 from multidrop.dialects.mcode.manual.grammar import Argument, Compare, LineError, Name, Number, Statement, Unary, parse
 from multidrop.dialects.mcode.manual.statements import canonical
 from multidrop.dialects.mcode.manual.table import lookup
-from multidrop.dialects.program_files import Difference, Held, Stored
+from multidrop.dialects.program_files import Difference, Held, Stored, first_difference
 
 # A program file and what a drive holds, compared line by line in canonical spelling.
 
@@ -113,18 +113,14 @@ def _compared(here: Sequence[SourceLine], there: Sequence[Stored], names: set[st
 
 def to_send(state: MCodeState, lines: Sequence[SourceLine], held: Held) -> Procedure[str]:
     """Return why a file must be sent; empty where the drive holds its programs, variables and settings already."""
-    if differing := differences(state, lines, held):
-        return _place(differing[0].number)
+    if why := first_difference(differences(state, lines, held)):
+        return why
     if clears_itself(lines) and size_of_file(lines) != len(held.lines):
         return "the drive holds other programs, which the file clears"
     for line in immediate_lines(lines):
         if why := (yield from _unlike(state, line, held)):
             return why
     return ""
-
-
-def _place(number: int) -> str:
-    return f"line {number} differs" if number else "the drive holds more lines"
 
 
 def _unlike(state: MCodeState, line: SourceLine, held: Held) -> Procedure[str]:
@@ -143,12 +139,12 @@ def _unlike(state: MCodeState, line: SourceLine, held: Held) -> Procedure[str]:
     if name in names:
         present = [_as_number(names[name].value)]
     elif named is not None or (row := lookup(name, state.product)) is None:
-        return _place(line.number)
+        return f"line {line.number} differs"
     else:
         present = (yield from _read_setting(state, name, values)) if row.kind in HOLDING and values else []
     if None in values or not present:
         return f"line {line.number}: '{line.text}' cannot be compared"
-    return "" if present == values else _place(line.number)
+    return "" if present == values else f"line {line.number} differs"
 
 
 def _values(state: MCodeState, statement: Statement) -> Procedure[list[float | None]]:

@@ -15,7 +15,7 @@ from multidrop.dialects.codec import End, Procedure
 from multidrop.dialects.debugging import Debugging, Look, Neighbours, Row
 from multidrop.dialects.errors import Diagnostic, DriveError, Inexpressible, NoAnswer, Refused, Stopped
 from multidrop.dialects.family import Programs, Progress
-from multidrop.dialects.files import SourceLine, split_lines
+from multidrop.dialects.files import SourceLine, lines_of_text
 from multidrop.dialects.pmx.host.codec import PmxState
 from multidrop.dialects.pmx.host.operations import OK, PROGRAMS, answered, moving, number, perform, who
 from multidrop.dialects.pmx.manual import program_file, script_checker
@@ -23,7 +23,7 @@ from multidrop.dialects.pmx.manual.program_file import RAW, Undecodable
 from multidrop.dialects.pmx.manual.script_compiler import EMPTY, ERASED, LINES
 from multidrop.dialects.pmx.manual.script_parser import VARIABLES
 from multidrop.dialects.pmx.manual.table import PROBE, PROBED, lookup
-from multidrop.dialects.program_files import Difference, Held, Stored
+from multidrop.dialects.program_files import Difference, Held, Stored, first_difference
 from multidrop.dialects.text import whole
 
 RUNS = (1, 2)
@@ -194,10 +194,7 @@ def differences(
 def to_send(state: PmxState, lines: Sequence[SourceLine], held: Held) -> Procedure[str]:
     """Return why a file must be sent; empty where the controller holds its lines."""
     yield from ()
-    found = differences(state, lines, held)
-    if not found:
-        return ""
-    return f"line {found[0].number} differs" if found[0].number else "the controller holds more lines"
+    return first_difference(differences(state, lines, held), "controller")
 
 
 def start(lines: Sequence[SourceLine], label: str) -> str:
@@ -211,12 +208,7 @@ def start(lines: Sequence[SourceLine], label: str) -> str:
 
 def annotated(text: str, held: Held) -> tuple[str, ...]:
     """Return the lines of a script: it shows no numbers of lines. Compiled lines are better read as a script."""
-    made = refreshed(text, held)
-    return () if program_file.is_raw(program_file.read(text, "program")) else made
-
-
-def refreshed(text: str, _: Held) -> tuple[str, ...]:
-    return tuple(split_lines(text.removesuffix("\x1a").removesuffix("\n")))
+    return () if program_file.is_raw(program_file.read(text, "program")) else lines_of_text(text)
 
 
 def readable(held: Held) -> tuple[str, ...]:
@@ -246,14 +238,12 @@ PROGRAM_FILES: Programs[PmxState] = Programs(
     upload=upload,
     read=read,
     file=file_of,
-    executed=lambda lines: (),
     size=lambda lines: len(program_file.compiled(lines)),
     end=end,
     download=download,
     differences=differences,
     to_send=to_send,
     start=start,
-    refreshed=refreshed,
     annotated=annotated,
 )
 
@@ -341,11 +331,6 @@ def _lacks(state: PmxState, what: str) -> Inexpressible:
     return Inexpressible(f"{who(state)}: {what}; nothing was sent")
 
 
-def never_broken(*_: object) -> Procedure[int | None]:
-    return None
-    yield  # a procedure
-
-
 def check_names(state: PmxState, names: Sequence[str]) -> None:
     for name in names:
         row = lookup(name)
@@ -370,17 +355,13 @@ DEBUGGING = Debugging(
     trace=trace,
     begin=no_step,
     waits=waits,
-    forget=lambda state: None,
     step=no_step,
     go_on=go_on,
     look=look,
     break_at=no_break,
     break_off=no_break,
     break_now=break_now,
-    broken=never_broken,
-    hold=lambda text: 0.0,
     names=check_names,
     values=watched,
-    traced=lambda line: None,
     no_step=NO_STEP,
 )

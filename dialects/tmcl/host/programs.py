@@ -17,8 +17,8 @@ from multidrop.dialects.codec import Procedure
 from multidrop.dialects.debugging import Debugging, Look, Neighbours, Row, Stepped
 from multidrop.dialects.errors import Diagnostic, DriveError, Inexpressible, Refused, Stopped
 from multidrop.dialects.family import Programs, Progress
-from multidrop.dialects.files import SourceLine, split_lines
-from multidrop.dialects.program_files import Difference, Held, Stored
+from multidrop.dialects.files import SourceLine, lines_of_text
+from multidrop.dialects.program_files import Difference, Held, Stored, first_difference
 from multidrop.dialects.text import whole
 from multidrop.dialects.tmcl.host.codec import TmclState, call_of, line_in, parse_reply
 from multidrop.dialects.tmcl.host.operations import LACKS, answered, busy, moving, perform, read, store, who
@@ -218,10 +218,7 @@ def differences(
 
 def to_send(state: TmclState, lines: Sequence[SourceLine], held: Held) -> Procedure[str]:
     yield from ()
-    found = differences(state, lines, held)
-    if not found:
-        return ""
-    return f"line {found[0].number} differs" if found[0].number else "the module holds more lines"
+    return first_difference(differences(state, lines, held), "module")
 
 
 def start(lines: Sequence[SourceLine], label: str) -> str:
@@ -235,13 +232,9 @@ def start(lines: Sequence[SourceLine], label: str) -> str:
     return program_file.run_at(address)
 
 
-def refreshed(text: str, _: Held) -> tuple[str, ...]:
-    return tuple(split_lines(text.removesuffix("\x1a").removesuffix("\n")))
-
-
 def annotated(text: str, held: Held) -> tuple[str, ...]:
     """The lines of a file, each with its address where it gives a line of the memory."""
-    lines = refreshed(text, held)
+    lines = lines_of_text(text)
     made = program_file.assembled([program_file.ProgramLine(number, line) for number, line in enumerate(lines, 1)])
     places = {each.source: each.at for each in made.lines}
     width = len(str(len(made.lines)))
@@ -254,14 +247,12 @@ PROGRAM_FILES: Programs[TmclState] = Programs(
     upload=upload,
     read=read_held,
     file=file_of,
-    executed=lambda lines: (),
     size=lambda lines: len(program_file.compiled(lines)),
     end=end,
     download=download,
     differences=differences,
     to_send=to_send,
     start=start,
-    refreshed=refreshed,
     annotated=annotated,
     remark="//",
 )
@@ -360,11 +351,6 @@ def no_break(state: TmclState, *_: object) -> Procedure[None]:
     yield  # a procedure
 
 
-def never_broken(*_: object) -> Procedure[int | None]:
-    return None
-    yield  # a procedure
-
-
 def check_names(state: TmclState, names: Sequence[str]) -> None:  # noqa: ARG001
     for name in names:
         watched_call(name)
@@ -415,9 +401,6 @@ DEBUGGING = Debugging(
     break_at=no_break,
     break_off=no_break,
     break_now=break_now,
-    broken=never_broken,
-    hold=lambda text: 0.0,
     names=check_names,
     values=watched,
-    traced=lambda line: None,
 )
