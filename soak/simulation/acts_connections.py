@@ -28,7 +28,7 @@ class Other:
         self.place, self._world = place, world
         self.stops = 0
         self.session = world.another(place, SECOND)
-        self.person = Person(self.session, world.loop, Random(f"{world.seed} other"), self._typed)
+        self.person = Person(self.session, world.loop, Random(f"{world.seed} other"), self._typed, world.cut_ins)
         self._opening = world.loop.create_task(self.session.open_all([place.name], lambda number, failure: None))
 
     def _typed(self, data: bytes) -> None:

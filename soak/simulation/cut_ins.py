@@ -2,8 +2,8 @@
 
 Nothing is added to that code: while a cut-in is ahead, Python's tracing counts the instructions of the loop's thread.
 A cut-in is aimed at a named point (a lock, a queue, a write, a discard, an await: `points` finds them in the source),
-or at the n-th line from now. There the work of the stop's thread is done whole, as if the loop's thread had lost its
-turn. Where the loop's side holds a lock, it is done as the lock is given back: the thread would wait for that.
+or at the n-th line from now. There the stop's thread takes its turn, and may be held up at any instruction of its own
+while the loop's thread goes on. Who finds a lock taken waits until the other gives it back.
 """
 
 from __future__ import annotations
@@ -11,12 +11,16 @@ from __future__ import annotations
 import ast
 import sys
 from collections.abc import Callable, Collection, Iterator
+from contextvars import Context
 from dataclasses import dataclass
 from functools import cache
 from importlib import import_module
 from random import Random
 from types import FrameType
 from typing import Any
+
+from soak.simulation.beside import Beside, Lock
+from soak.simulation.clock import SimulatedLoop
 
 SHARED = {
     "multidrop.transports.pipe": ("Pipe", "DescriptorPipe"),
@@ -39,6 +43,11 @@ STATES = {"_ahead", "_preempted", "_partial_until", "lost", "transport", "buses"
 WRITES = {"write", "discard", "drop", "unsent", "preempt", "yielded", "take_repeats"}
 WRITING = ("pipe DescriptorPipe.write", "pipe DescriptorPipe._push", "link Link._write", "line Line._launch")
 """The points on the way of a line to the wire."""
+HELD = 0.02
+"""The longest time, s, for which the stop's thread is held up while the loop waits."""
+OWN_WORK = 1500
+"""The instructions of the stop's thread on a machine of two lines, about."""
+UP = "the stop's thread is held up"
 LATEST = 0.3
 """The time, s, after which a stop comes although its point was not passed."""
 
@@ -91,40 +100,52 @@ def points() -> dict[str, tuple[str, int]]:
 
 @dataclass(frozen=True)
 class Aim:
-    """Where a stop cuts in: at the n-th pass of a point (empty: at the n-th line), so many instructions further on."""
+    """Where a stop cuts in: at the n-th pass of a point (empty: at the n-th line), so many instructions further on.
+
+    `own`, `others`: after so many instructions of its own it is held up for so many of the loop's; 0: it is not.
+    """
 
     point: str
     passes: int
     further: int
+    own: int = 0
+    others: int = 0
 
 
 def drawn_aim(rng: Random) -> Aim:
     """Draw an aim."""
     further = int(rng.random() ** 2 * 16)
+    held = (1 + int(rng.random() ** 2 * OWN_WORK), 1 + int(rng.random() ** 2 * 3000)) if rng.random() < 0.5 else (0, 0)
     if (choice := rng.random()) < 0.7:
         names = [each for each in points() if choice > 0.5 or each.startswith(WRITING)]
-        return Aim(rng.choice(names), 1 + int(rng.random() ** 3 * 6), further)
-    return Aim("", 1 + int(rng.random() ** 2 * 3000), further)
+        return Aim(rng.choice(names), 1 + int(rng.random() ** 3 * 6), further, *held)
+    return Aim("", 1 + int(rng.random() ** 2 * 3000), further, *held)
 
 
 class CutIns:
     """The cut-ins of one world, one after the other. `passed` is called with the name of each point that is hit."""
 
-    def __init__(self, passed: Callable[[str], None]) -> None:
-        self._passed = passed
+    def __init__(self, passed: Callable[[str], None], loop: SimulatedLoop | None = None) -> None:
+        self.thread: Beside | None = None
+        """The stop's thread, once it has cut in."""
+        self._passed, self._loop = passed, loop
         self._files = {file for file, _ in points().values()}
         self._names = {place: name for name, place in points().items()}
         self._aim = Aim("", 0, 0)
         self._run: Callable[[], None] | None = None
-        self._waiting: Callable[[], None] | None = None
-        """The work of the stop's thread, which waits for a lock."""
-        self._held = 0
-        """Locks that the loop's side holds."""
-        self._passes = self._further = 0
+        self._passes = self._further = self._own = 0
         self._before: Any = None
 
-    def begin(self, aim: Aim, run: Callable[[], None]) -> None:
-        """Call `run` at the aim, in place of what was to be called at the last one."""
+    def lock(self) -> Lock:
+        """A lock of the code that is shared."""
+        return Lock(lambda: self.thread)
+
+    def begin(self, aim: Aim, work: Callable[[], None]) -> None:
+        """Let the stop's thread do work at the aim, in place of what it was to do at the last one."""
+        self.hurry()
+        self._trace(aim, lambda: self._cut_in(aim, work))
+
+    def _trace(self, aim: Aim, run: Callable[[], None]) -> None:
         self.end()
         self._aim, self._run, self._passes, self._further = aim, run, aim.passes, -1
         self._before = sys.gettrace()
@@ -136,20 +157,17 @@ class CutIns:
             self._run = None
             sys.settrace(self._before)
 
-    # Locks
+    def hurry(self) -> None:
+        """Let the stop's thread do the rest of its work, unless it waits for a lock."""
+        if (thread := self.thread) is not None and not (thread.over or thread.runs or thread.waits):
+            self.end()
+            thread.go()
 
-    def lock(self) -> CutIns:
-        """A lock of the code that is shared."""
-        return self
-
-    def __enter__(self) -> None:
-        self._held += 1
-
-    def __exit__(self, *_: object) -> None:
-        self._held -= 1
-        if not self._held and self._waiting is not None:
-            run, self._waiting = self._waiting, None
-            run()
+    def kill(self) -> None:
+        """End with the process: the stop's thread does nothing more."""
+        self.end()
+        if self.thread is not None:
+            self.thread.kill()
 
     # The loop's thread
 
@@ -174,8 +192,37 @@ class CutIns:
             if self._further < 0:
                 run = self._run
                 self.end()
-                if self._held:
-                    self._waiting = run
-                else:
-                    run()
+                run()
         return self._traced
+
+    def _cut_in(self, aim: Aim, work: Callable[[], None]) -> None:
+        self.thread = thread = Beside(lambda: self._beside(work))
+        self._own = aim.own
+        thread.go()
+        if not thread.over and thread.waits is None and self._run is None:  # held up
+            self._trace(Aim("", 1, aim.others), self.hurry)
+
+    # The stop's thread
+
+    def _beside(self, work: Callable[[], None]) -> None:
+        sys.settrace(self._called_beside)
+        try:
+            work()
+        finally:
+            sys.settrace(None)
+
+    def _called_beside(self, frame: FrameType, event: str, argument: Any) -> Any:
+        if not self._own or frame.f_code.co_filename not in self._files:
+            return None
+        frame.f_trace_opcodes = True
+        return self._traced_beside
+
+    def _traced_beside(self, frame: FrameType, event: str, argument: Any) -> Any:
+        if event == "opcode" and self._own:
+            self._own -= 1
+            if not self._own and self.thread is not None:
+                self._passed(UP)
+                if self._loop is not None:
+                    self._loop.call_later(HELD, self.hurry, context=Context())
+                self.thread.rest()
+        return self._traced_beside

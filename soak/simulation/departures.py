@@ -63,9 +63,9 @@ def _nothing_before(world: World) -> Iterator[str]:
         if each.stops >= len(stops):
             continue
         stop, line = stops[each.stops], each.line + each.who
-        key = stop.written, line
+        key = stop.own[line][0] if line in stop.own else stop.done, line
         if key not in after:
-            left = b"".join(data for _, port, data in history.written[stop.written :] if port == line)
+            left = b"".join(data for _, port, data in history.written[key[0] :] if port == line)
             after[key] = left.replace(b"\xff\xff", b"\xff") if world.place(each.line).kind == "rfc2217" else left
         if _pattern(world, each).search(after[key]):
             yield f"{_words(each)}, stop at {stop.at:.3f}, written after it"

@@ -18,18 +18,21 @@ KILLED = "killed before it was said"
 UNSENT = re.compile(r"^not sent, as (?:'.*?' failed|.*?): (.*)$")
 
 
-@dataclass(frozen=True)
+@dataclass
 class Stop:
     """A read that held the stop key. `forms`: by line that could be written, the bytes of which one had to go first."""
 
     at: float
     forms: dict[str, tuple[bytes, ...]]
-    rests: dict[str, int] = field(default_factory=dict)
-    """By line, the bytes of a message that had begun to leave, which leave before it."""
     who: str = ""
     """Whose stop it was; empty: this person's."""
     written: int = 0
     """The number of writes before it."""
+    done: int = 0
+    """The number of writes once its thread had done its work."""
+    own: dict[str, tuple[int, int]] = field(default_factory=dict)
+    """By line, the number of writes before its thread's first one, and the bytes of a message that had begun to leave,
+    which leave before it."""
     lost: tuple[str, ...] = ()
     """The lines that were lost, and being tried again."""
 

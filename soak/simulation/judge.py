@@ -20,11 +20,11 @@ def _first(world: World) -> Iterator[str]:
     """What leaves next on a line that can be written is its stop, after the rest of a message that must leave whole."""
     for stop in world.history.stops:
         for line, forms in stop.forms.items():
-            after = [(at, data) for at, port, data in world.history.written[stop.written :] if port == line]
+            first, rest = stop.own[line]  # the rest of a message that leaves whole; other rests are dropped
+            after = [(at, data) for at, port, data in world.history.written[first:] if port == line]
             killed = any(stop.at <= at <= stop.at + SOON for at in world.history.deaths)
             if after and after[0][0] <= stop.at + SOON and not (killed and not stop.who):
                 begun = b"".join(data for at, data in after if at <= stop.at + SOON)
-                rest = stop.rests[line]  # of a message that leaves whole; other rests are dropped
                 left = [begun, *filter(None, [begun[rest:]])]
                 if not any(form.startswith(each) or each.startswith(form) for form in forms for each in left):
                     yield f"{line}: stop at {stop.at:.6f}, {begun!r} left at {after[0][0]:.6f}"

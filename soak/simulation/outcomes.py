@@ -156,7 +156,7 @@ def _credited(world: World) -> Iterator[str | Granted]:
         words = f"{shown.line}:{shown.drive} printed {shown.text!r}, asked at {shown.began:.3f}"
         if origin := _origin(shown, numbers):
             yield f"{words}: {origin}"
-        elif own and own[-1].restarts == shown.restarts:
+        elif own and all(each.restarts == shown.restarts for each in own if each.until > shown.began):
             yield _never_held(world, shown, f"{words}: it never held that")
 
 

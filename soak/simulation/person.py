@@ -33,10 +33,12 @@ class Person:
         loop: SimulatedLoop,
         rng: Random,
         typed: Callable[[bytes], None],
+        cut_ins: CutIns,
         process: Process | None = None,
     ) -> None:
         self.keyboard = Keyboard(-1, signals=False)
         self.keyboard.stop_ahead, self.keyboard.stop = session.stop_ahead, self._stop
+        self._cut_ins = cut_ins
         self.lines, self.history = LineQueue(session), History(session.settings.history)
         self._process = process
         self._session, self._loop, self._rng, self._typed = session, loop, rng, typed
@@ -64,7 +66,7 @@ class Person:
             self._loop.call_at(at, self._arrives, context=self._context())
         self._at = at
 
-    def type_stop(self, cut_ins: CutIns, aim: Aim) -> None:
+    def type_stop(self, aim: Aim) -> None:
         """Type a stop that cuts in at an aim, or comes at a turn of the loop once that was not passed for some time."""
 
         def arrive() -> None:
@@ -78,9 +80,10 @@ class Person:
         self._at = max(self._at, self._loop.now) + LATEST
         self._loop.call_at(self._at, self._arrives, context=self._context())
         process = self._process
-        cut_ins.begin(aim, arrive if process is None else lambda: process.run(arrive))
+        self._cut_ins.begin(aim, arrive if process is None else lambda: process.run(arrive))
 
     def _arrives(self) -> None:
+        self._cut_ins.hurry()  # the thread that reads the keys
         if self._coming:
             self.read(self._coming.popleft())
 

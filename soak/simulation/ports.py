@@ -63,8 +63,8 @@ class Descriptor:
             size = self.rng.randrange(1, size)
         if size < len(data):
             self.loop.call_later(0.001 + self.rng.random() * 0.01, self.loop.writable, self._descriptor)
-        self.rest = len(data) - size
         self.trace(">", bytes(data[:size]))
+        self.rest = len(data) - size
         return size
 
     def wake(self) -> None:

@@ -47,7 +47,7 @@ from soak.simulation.acts.seams import SEAMS
 from soak.simulation.acts.watching import WatchedPath, examine_before_a_stop, wrote
 from soak.simulation.climate import Climate
 from soak.simulation.clock import Deadlock, SimulatedLoop
-from soak.simulation.cut_ins import CutIns
+from soak.simulation.cut_ins import UP, CutIns
 from soak.simulation.disk import Disk
 from soak.simulation.far import share
 from soak.simulation.files_left import breaches_in_logs, unreadable
@@ -123,6 +123,8 @@ class World:
     witnesses: dict[tuple[str, str], Witness] = field(default_factory=dict)
     network: Network = field(init=False)
     kernel: Kernel = field(init=False)
+    stopping: dict[int, Stop] = field(default_factory=dict)
+    """The stops that threads write now, by thread."""
     others: list[Other] = field(default_factory=list)
     """Other people, who share lines."""
     shares: dict[str, SharedPort] = field(default_factory=dict)
@@ -158,6 +160,8 @@ class World:
         def trace(way: str, data: bytes) -> None:
             self.history.note(self.loop.now, f"{way} {name}", data.hex())
             if way == ">":
+                if (stop := self.stopping.get(threading.get_ident())) is not None:
+                    stop.own.setdefault(name, (len(self.history.written), self.kernel.rest(name)))
                 self.history.written.append((self.loop.now, name, data))
                 if not who:
                     wrote(self, line, data)
@@ -275,7 +279,7 @@ class World:
         self.session.subscribe(self.heard)
         writer.begin(self.session)
         rng = Random(f"{self.seed} person {self.history.lives}")
-        self.person = Person(self.session, self.loop, rng, self._typed, process)
+        self.person = Person(self.session, self.loop, rng, self._typed, self.cut_ins, process)
 
     def kill(self, operations: int, moment: str, power: bool = False) -> None:
         """Kill the session at an operation from now; `power`: the PC loses its power there."""
@@ -291,7 +295,7 @@ class World:
         self.history.killed(self.loop.now)
         self.stops = sum(not stop.who for stop in self.history.stops)
         self.beside_it.clear()
-        self.cut_ins.end()
+        self.cut_ins.kill()
         self.kernel.close_all(self.process, power)
         rng = Random(f"{self.seed} life {self.history.lives}")
         if power:
@@ -362,10 +366,22 @@ class World:
         if STOP in data:
             buses = {name: bus for name, bus in session.buses.items() if not bus.link.lost}
             forms = {f"{name}{who}": self._forms(bus) for name, bus in buses.items()}
-            rests = {f"{name}{who}": self.kernel.rest(f"{name}{who}") for name in buses}
             trying = session.reconnections.trying
             lost = tuple(name + who for name, bus in session.buses.items() if bus.link.lost and name in trying)
-            self.history.stops.append(Stop(self.loop.now, forms, rests, who, len(self.history.written), lost))
+            self.history.stops.append(Stop(self.loop.now, forms, who, len(self.history.written), lost))
+
+    @contextlib.contextmanager
+    def ahead(self) -> Iterator[None]:
+        """Note what the stop's thread writes meanwhile: the one that runs this."""
+        stop, me = self.history.stops[-1], threading.get_ident()
+        self.stopping[me] = stop
+        try:
+            yield
+        finally:
+            del self.stopping[me]
+            stop.done = len(self.history.written)
+            for name in stop.forms:
+                stop.own.setdefault(name, (stop.done, self.kernel.rest(name)))
 
     def _forms(self, bus: Bus) -> tuple[bytes, ...]:
         """What a stop of a line may begin with."""
@@ -419,6 +435,7 @@ class World:
         """End the faults, wait until nothing runs, and close; after kills once more, as the next session does."""
         await self.ready.wait()
         self.process.arm(0, "")
+        self.cut_ins.hurry()
         self.cut_ins.end()
         self.faults(False)
         self.person.type(b"/plot off\r/twin off\r")
@@ -466,6 +483,11 @@ class WatchedSession(Session):
     @property
     def _dead(self) -> bool:
         return self._process is not None and self._process.dead
+
+    def stop_ahead(self) -> None:
+        """Write the stop, and note it."""
+        with self._world.ahead():
+            super().stop_ahead()
 
     def stop(self, why: str = "stop", follows: bool = True) -> None:
         """Stop everything, and note it."""
@@ -530,7 +552,7 @@ def lived(seed: int, steps: Iterable[int], keep: bool = False, without: Collecti
         wall, scheduler = Wall(loop), Scheduler(loop, Random(f"{seed} threads"), climate["slow thread"])
         history.folder = str(folder)
         disk = Disk(f"{folder}/", loop, wall, climate, Random(f"{seed} disk"), partial(_noted, history, loop))
-        cut_ins = CutIns(lambda name: history.count("cut-ins"))
+        cut_ins = CutIns(lambda name: history.count("stops held up" if name == UP else "cut-ins"), loop)
         world = World(seed, loop, history, climate, places, folder, wall, scheduler, disk, cut_ins)
 
         async def life() -> None:
@@ -549,7 +571,7 @@ def lived(seed: int, steps: Iterable[int], keep: bool = False, without: Collecti
                 stack.enter_context(_replaced(*seam))
             locks = SimpleNamespace(**{**vars(threading), "Lock": cut_ins.lock})
             stack.enter_context(_replaced(pipe, "threading", locks))
-            stack.callback(cut_ins.end)
+            stack.callback(cut_ins.kill)
             stack.enter_context(_logged(history))
             try:
                 runner.run(life())

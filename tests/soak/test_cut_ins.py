@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import partial
 from random import Random
 
 import pytest
 
 from multidrop.transports.pipe import DescriptorPipe
-from soak.simulation.cut_ins import Aim, CutIns, points
+from soak.simulation.cut_ins import UP, Aim, CutIns, points
 from soak.simulation.judge import broken
 from soak.simulation.story import ACTS, stop_cuts_in
 from soak.simulation.world import lived
@@ -51,7 +52,7 @@ class Endpoint:
 def cut_ins() -> Iterator[CutIns]:
     made = CutIns(lambda name: None)
     yield made
-    made.end()
+    made.kill()
 
 
 @pytest.mark.virtual
@@ -61,18 +62,30 @@ async def test_a_stop_cuts_in_at_a_point_and_waits_for_the_lock(cut_ins: CutIns,
     endpoint = Endpoint()
     pipe = DescriptorPipe(endpoint)  # type: ignore[arg-type]
     pipe._guard = cut_ins.lock()  # type: ignore[assignment]
-    held: list[int] = []
-
-    def stop() -> None:
-        held.append(cut_ins._held)
-        pipe.preempt(False, lambda dropped: b"\x1b")
-
-    cut_ins.begin(Aim(point, 1, further), stop)
+    cut_ins.begin(Aim(point, 1, further), partial(pipe.preempt, False, lambda dropped: b"\x1b"))
     pipe.write(b"MR 1\r")
     pipe.write(b"MR 2\r")
-    assert held == [0], "the stop came once, and held up by no lock"
-    after = endpoint.taken.index(b"\x1b")
-    assert endpoint.taken[after:] == [b"\x1b"], "nothing leaves after it"
+    assert endpoint.taken.count(b"\x1b") == 1
+    assert endpoint.taken[-1] == b"\x1b", "nothing leaves after it"
+
+
+@pytest.mark.virtual
+@pytest.mark.parametrize("own", range(1, 80, 3))
+async def test_the_thread_of_a_stop_is_held_up_anywhere_and_nothing_leaves_after_it(cut_ins: CutIns, own: int) -> None:
+    endpoint, held = Endpoint(), list[str]()
+    pipe = DescriptorPipe(endpoint)  # type: ignore[arg-type]
+    pipe._guard = cut_ins.lock()  # type: ignore[assignment]
+    cut_ins._passed = held.append
+    point = next(each for each in points() if each.startswith("pipe DescriptorPipe.write"))
+    cut_ins.begin(Aim(point, 1, 0, own, 10_000), partial(pipe.preempt, False, lambda dropped: b"\x1b"))
+    for number in range(3):
+        pipe.write(b"MR %d\r" % number)
+    cut_ins.hurry()
+    assert UP in held or own > 60
+    assert endpoint.taken.count(b"\x1b") == 1
+    assert endpoint.taken[-1] == b"\x1b"
+    pipe.yielded()
+    assert pipe.write(b"MR 4\r")
 
 
 @pytest.mark.nightly

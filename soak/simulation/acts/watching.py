@@ -16,6 +16,7 @@ from multidrop.dialects import Diagnostic, DriveError
 from multidrop.drives.stopping import stop_forms
 from multidrop.shell.events import By
 from multidrop.shell.line_syntax import DriveLine, VerbLine
+from multidrop.shell.programs import transfers
 from multidrop.shell.session import LinePath
 from soak.simulation.acts.phrases import PHRASES
 from soak.simulation.told import Put, Run
@@ -71,7 +72,8 @@ class WatchedPath(LinePath):
                 history.told.raw.append(put)
                 return put
             drive = session.drive(bus.name, parsed.address)
-            if drive.programming and (command := history.commands.pop(typed, None)) is not None:
+            typed_in = drive.programming and drive not in transfers._under_way  # else it waits, and is sent after that
+            if typed_in and (command := history.commands.pop(typed, None)) is not None:
                 put = Put(session.now(), command.line, command.drive, command.text)
                 history.told.stored.append(put)
                 return put
