@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from multidrop.dialects.debugging import Debugging
     from multidrop.dialects.program_files import Difference, Held
     from multidrop.dialects.scanning import Scan
+    from multidrop.dialects.units import Units
     from multidrop.dialects.values import Values
 
 
@@ -244,14 +245,16 @@ class Family(Generic[S]):
     """At rest the position, too, is the same in both readings: in motion the velocity may read 0."""
     question: Callable[[str], str | None]
     """The line that prints the value of a word; None: the word has no value to read."""
-    move: Callable[[str, int], tuple[str, ...]]
-    """The lines that move an axis by a distance. An axis is as in `Motion.axis`; empty: the first."""
-    move_to: Callable[[str, int], tuple[str, ...]]
+    move: Callable[[str, int | str], tuple[str, ...]]
+    """The lines that move an axis by a distance, a quantity too. An axis is as in `Motion.axis`; empty: the first."""
+    move_to: Callable[[str, int | str], tuple[str, ...]]
     """The lines that move an axis to a position."""
     assign: Callable[[str, str], str | None]
     """The line that gives a word a value; None: its values are not assigned by a word."""
     values_at: str
     """The place of its `Values`, as of the programs below; few commands need these."""
+    units_at: str
+    """The place of its `Units`."""
     status: Callable[[S], Printed] | None = None
     """The drive's state in words, one line for each part; None: its drives do not report it."""
     programs_at: str = ""
@@ -290,6 +293,11 @@ class Family(Generic[S]):
     @property
     def values(self) -> Values[S]:
         found: Values[S] = imported(self.values_at)
+        return found
+
+    @property
+    def units(self) -> Units[S]:
+        found: Units[S] = imported(self.units_at)
         return found
 
     @property

@@ -11,14 +11,16 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from enum import Enum
 from fractions import Fraction
 from functools import cached_property
-from typing import Any
+from typing import Any, Generic, NamedTuple, TypeVar
 
+from multidrop.dialects.codec import Procedure
 from multidrop.dialects.errors import Diagnostic
+from multidrop.dialects.state import DriveState
 
 LENGTH, ANGLE, MOTOR = "length", "angle", "motor"
 """The kinds of units; each own word is a kind of its own."""
@@ -63,6 +65,8 @@ class Takes(Enum):
     VELOCITY = "a velocity"
     SPEED = "a velocity without sign"
     ACCELERATION = "an acceleration without sign"
+    TARGET = "a position or a distance"
+    """As a mode of the drive says, which is read."""
 
     @property
     def per(self) -> int:
@@ -242,9 +246,9 @@ class Basis:
     """Names and values; where one differs later, no quantity is sent."""
     turn: Fraction | None = None
     """Counts of one turn of the motor; None where nothing tells."""
-    speed: Fraction = Fraction(1)
-    """The drive's unit of velocity for 1 count/s."""
-    acceleration: Fraction = Fraction(1)
+    speed: Fraction | None = Fraction(1)
+    """The drive's unit of velocity for 1 count/s; None: not known."""
+    acceleration: Fraction | None = Fraction(1)
     """The same of acceleration, for 1 count/s2."""
     assumed: str = ""
     """What no reading shows, for a person."""
@@ -275,15 +279,7 @@ class Measure:
 
     def native(self, given: Quantity, takes: Takes) -> int:
         """The drive's number for a quantity. Raises Diagnostic where it cannot be that, or rounding spoils it."""
-        if given.unit.per != takes.per:
-            other = ("a distance", "a velocity", "an acceleration")[given.unit.per]
-            raise Diagnostic(f"{given} is {other}, not {takes.value}", "", f"as in {EXAMPLES[takes.per]}")
-        if takes.unsigned and given.value < 0:
-            raise Diagnostic(f"{given}: it takes {takes.value}", "", "the direction is that of the move")
-        count, zero = self._count_of(given, takes), self.scale.zero if takes is Takes.PLACE else Fraction(0)
-        if takes.unsigned:
-            count = abs(count)
-        count /= self._rate(takes.per)
+        count, zero = self._factors(given, takes)
         number = round((given.base - zero) / count)
         back = number * count + zero
         if given.value and abs(back - given.base) > SPOILT * abs(given.base):
@@ -291,6 +287,27 @@ class Measure:
             one = f"{decimal(abs(count) / given.unit.factor, 9)} {given.unit.name}"
             raise Diagnostic(f"{given} would be {near} after rounding", "", f"one step of the drive is {one}")
         return number
+
+    def number(self, given: Quantity, takes: Takes) -> float:
+        """The same without rounding, to be compared with a number of the drive. Raises Diagnostic."""
+        count, zero = self._factors(given, takes)
+        return float((given.base - zero) / count)
+
+    def base(self, number: float, takes: Takes, one: Quantity) -> Fraction:
+        """A number of the drive in a unit, of which `one` is 1. Raises Diagnostic for one of another kind."""
+        count, zero = self._factors(one, takes)
+        return (Fraction(number) * count + zero) / one.base
+
+    def _factors(self, given: Quantity, takes: Takes) -> tuple[Fraction, Fraction]:
+        """The drive's unit, and its zero, in the base unit of a quantity's kind. Raises Diagnostic."""
+        if given.unit.per != takes.per:
+            other = ("a distance", "a velocity", "an acceleration")[given.unit.per]
+            raise Diagnostic(f"{given} is {other}, not {takes.value}", "", f"as in {EXAMPLES[takes.per]}")
+        if takes.unsigned and given.value < 0:
+            raise Diagnostic(f"{given}: it takes {takes.value}", "", "the direction is that of the move")
+        count = self._count_of(given, takes) / self._rate(takes.per)
+        zero = self.scale.zero if takes is Takes.PLACE and given.unit.kind == self.scale.kind else Fraction(0)
+        return (abs(count) if takes.unsigned else count), zero
 
     def _count_of(self, given: Quantity, takes: Takes) -> Fraction:
         """One count in the base unit of a quantity's kind."""
@@ -307,7 +324,14 @@ class Measure:
         return 1 / self.basis.turn
 
     def _rate(self, per: int) -> Fraction:
-        return (Fraction(1), self.basis.speed, self.basis.acceleration)[per]
+        rate = (Fraction(1), self.basis.speed, self.basis.acceleration)[per]
+        if rate is None:
+            raise Diagnostic(f"the drive counts velocities in units of its own ({self.basis})", "", "use its numbers")
+        return rate
+
+    def counts(self, takes: Takes) -> bool:
+        """Whether numbers of this sort can be converted."""
+        return (True, self.basis.speed is not None, self.basis.acceleration is not None)[takes.per]
 
     # The drive's own numbers, shown
 
@@ -326,6 +350,7 @@ class Measure:
         return {
             each: (float(self._signed(each) / units), float(self.scale.zero / units) if each is Takes.PLACE else 0.0)
             for each in Takes
+            if self.counts(each)
         }
 
     def _signed(self, takes: Takes) -> Fraction:
@@ -365,3 +390,48 @@ def quantities(text: str) -> Iterator[re.Match[str]]:
     for match in QUANTITY.finditer(text):
         if not any(low < match.start() < high for low, high in quoted):
             yield match
+
+
+def with_numbers(text: str) -> str:
+    """The line with a number in place of each quantity, to be read by its grammar before it is converted."""
+    for match in reversed(list(quantities(text))):
+        text = f"{text[: match.start()]}1{text[match.end() :]}"
+    return text
+
+
+# What the lines of a family take.
+
+
+S = TypeVar("S", bound=DriveState)
+VALUE = r"(\{[^{}]*\}|[+-]?\d+)"
+"""A quantity or a whole number, in the pattern of a line that takes either."""
+
+
+class Field(NamedTuple):
+    """A place in a line that takes a quantity. `moves`: the axis goes there, or that far."""
+
+    axis: str
+    takes: Takes
+    start: int
+    stop: int
+    moves: bool = False
+
+
+@dataclass(frozen=True)
+class Units(Generic[S]):
+    """The quantities in the lines of a family, and what the counting of its axes rests on."""
+
+    axes: Callable[[S], Sequence[str]]
+    """The axes of a drive, as in `Motion.axis`."""
+    fields: Callable[[S, str], Sequence[Field]]
+    """The places of a line that take a quantity; a whole number in them is found, too."""
+    words: str
+    """The words that take one, for a person."""
+    basis: Callable[[S, str, int | None], Procedure[Basis]]
+    """Read what the counting of an axis rests on; the last: its full steps a turn, where a person gave them."""
+    disturbs: Callable[[S, str], Collection[str]]
+    """The axes whose positions may count from elsewhere, or otherwise, after a line."""
+    reads: Callable[[S, str], tuple[str, Takes] | None]
+    """What a question prints: its axis, and how that counts; None: no quantity."""
+    target: Callable[[S], Procedure[Takes]] | None = None
+    """Read what a field of `Takes.TARGET` means now."""

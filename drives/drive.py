@@ -22,6 +22,7 @@ from multidrop.dialects import (
     SourceLine,
     Stopped,
 )
+from multidrop.dialects.errors import Differs
 from multidrop.dialects.families import FAMILIES, program_languages
 from multidrop.dialects.family import Programs
 from multidrop.dialects.program_files import Held, ProgramFiles
@@ -117,6 +118,10 @@ class Running:
     """Whether one runs, which can move the drive again."""
 
 
+Check = Callable[["Drive"], Procedure[None]]
+"""A conversation before a line for a drive. Raises Differs where the drive is not as the line takes it to be."""
+
+
 class Drive:
     """A drive to talk to. Its methods raise Refused, NoAnswer, Stopped, Inexpressible or TransportLost."""
 
@@ -133,6 +138,8 @@ class Drive:
         """No program was known to run at that time."""
         self.settings: dict[str, tuple[Mapping[str, Value], int]] = {}
         """Settings as last read, by the part of the conditions, and the number of `commands` then."""
+        self.anchored: frozenset[str] = frozenset()
+        """The axes whose positions are places of the machine: setting a position gives them no reference."""
         self.missing = False
         """It did not reply to the last request; replies since then are not compared yet."""
         self.started_at = float("-inf")
@@ -193,23 +200,31 @@ class Drive:
         return self.address or self.link.name
 
     @property
+    def stops(self) -> int:
+        """The number of stops of it so far; a line from before one must not be sent after it."""
+        return self._conversations.stops(self.state)
+
+    @property
     def engaged(self) -> bool:
         return self._conversations.engaged(self.state)
 
     # What is sent
 
-    async def send(self, text: str) -> tuple[str, ...]:
-        """Send a line in the drive's own language (a `Command` if it was parsed before); return what it printed."""
+    async def send(self, text: str, check: Check | None = None) -> tuple[str, ...]:
+        """Send a line in the drive's own language (a `Command` if it was parsed before); return what it printed.
+
+        `check`: runs in the same conversation right before the line, which is not sent if that raises.
+        """
         text = text if isinstance(text, Command) else Command(text)
         if not self.starts(text):
-            return await self._send(text)
+            return await self._send(text, check)
         before = {each: each.commanded_at for each in self._meant}
         self.starts_now()
         noted = self.commanded_at
         self.starting += 1
         try:
-            return await self._send(text)
-        except (Refused, Inexpressible):
+            return await self._send(text, check)
+        except (Refused, Inexpressible, Differs):
             if self.commanded_at == noted:
                 self.commanded_at = before[self]
             raise
@@ -220,32 +235,46 @@ class Drive:
         finally:
             self.starting -= 1
 
-    async def _send(self, text: str) -> tuple[str, ...]:
+    async def _send(self, text: str, check: Check | None) -> tuple[str, ...]:
         to_all = self.state.address in GLOBAL
         if to_all and not self.codec.broadcasts:
             drives = self._neighbours.all_drives
             _refuse_while_stored(drives, "end that mode first")
-            return await _to_each(drives, text)
+            return await _to_each(drives, text, check)
         procedure = self.family.perform(self.state, text)
+        if check is not None:
+            procedure = _checked(check(self), procedure)
         if to_all:
-            return await self.run(self._to_all(procedure))
+            return await self.run(self._to_all(procedure, text))
         stored = self.state.programming
         known = protection(self.link, self.family) if not self.state.address else None
+        refused = False
         try:
             printed = await self.run(procedure)
         except NoAnswer as error:
             if self.state.address:
                 raise
             raise silent(error, self.link, self.family, self.product) from None
-        except Refused as error:
-            raise self._values.refused(known, text, error, self.product) from None
+        except (Refused, Inexpressible, Differs) as error:
+            refused = True
+            if isinstance(error, Refused):
+                raise self._values.refused(known, text, error, self.product) from None
+            raise
+        finally:
+            if not (refused or stored):
+                self._disturbed(text)
         self._values.took(known, text)
         found = self.family.referencing(self.state, text) if self.state.unreferenced and not stored else None
         if found is not None and found.homing:
             self._neighbours.homes(self, found.axis)
-        elif found is not None:
+        elif found is not None and found.axis not in self.anchored:
             self.state.referenced(found.axis)
         return printed
+
+    def _disturbed(self, text: str) -> None:
+        """Note the places of the machine that a line, which may have been executed, has left without a reference."""
+        if self.anchored:
+            self.state.reference_lost(self.anchored.intersection(self.family.units.disturbs(self.state, text)))
 
     def starts(self, text: str) -> bool:
         """Whether a line can start motion or a program in it; in program mode the line is stored."""
@@ -262,12 +291,13 @@ class Drive:
     def _meant(self) -> list[Drive]:
         return [self, *self._neighbours.all_drives] if self.state.address in GLOBAL else [self]
 
-    def _to_all(self, procedure: Procedure[T]) -> Procedure[T]:
+    def _to_all(self, procedure: Procedure[T], text: str) -> Procedure[T]:
         """Run a command to all; refuse it if a drive stores a program when it goes out, not when it is typed."""
         others = self._neighbours.all_drives
         _refuse_while_stored(others, "leave it with PG first")
         result = yield from procedure
         for drive in others:
+            drive._disturbed(text)
             drive.calm = False  # what was read of it before says nothing of what is read next
             drive.settings.clear()
             if self.state.settings_unknown:
@@ -368,13 +398,18 @@ def _refuse_while_stored(drives: Sequence[Drive], remedy: str) -> None:
         raise Refused(f"{', '.join(names)}: in program mode a command to all would be stored; {remedy}")
 
 
-async def _to_each(drives: Sequence[Drive], text: str) -> tuple[str, ...]:
+def _checked(check: Procedure[None], procedure: Procedure[T]) -> Procedure[T]:
+    yield from check
+    return (yield from procedure)
+
+
+async def _to_each(drives: Sequence[Drive], text: str, check: Check | None) -> tuple[str, ...]:
     """Send to each of these drives in turn; raise the first failure once all have been tried."""
     printed: list[str] = []
     failures: list[DriveError] = []
     for drive in drives:
         try:
-            printed += await drive.send(text)
+            printed += await drive.send(text, check)
         except Stopped:
             raise
         except DriveError as failure:

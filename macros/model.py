@@ -2,7 +2,8 @@
 
 Braces in a line: `{NAME}` takes a value; `{{` and `}}` are literal braces. `{NAME:TYPE=DEFAULT,LOW..HIGH}` also says
 what is valid. TYPE is `int`, `float`, `text` or `choice(A|B)`. Default and limits may be left out; without a default a
-value must be given. A plain `{NAME}` takes the type that another line gives it, else it is a text.
+value must be given. A plain `{NAME}` takes the type that another line gives it, else it is a text. `{12.5 mm}` is a
+quantity and stays; a value that is one is in braces, too, but in a text.
 """
 
 from __future__ import annotations
@@ -15,12 +16,20 @@ from dataclasses import dataclass
 from multidrop.dialects.errors import Diagnostic
 from multidrop.dialects.text import visible
 
-_BRACES = re.compile(r"\{\{|\}\}|\{(?P<name>[A-Za-z0-9_-]+)\}|[{}]")
+_UNIT = r"(?:(?:[mcu]?m|in|deg|rad|m?turn)(?:/s2?|/min)?|m?rpm)"
+_QUANTITY = r"\{[+-]?(?:\d{1,16}(?:\.\d{0,16})?|\.\d{1,16}) [A-Za-z][A-Za-z0-9_/]*\}"
+"""A quantity, which is no name of a value: it has a space."""
+_BRACES = re.compile(rf"(?P<quantity>{_QUANTITY})|\{{\{{|\}}\}}|\{{(?P<name>[A-Za-z0-9_-]+)\}}|[{{}}]", re.ASCII)
+_VALUE = re.compile(rf"[+-]?(?:\d{{1,16}}(?:\.\d{{0,16}})?|\.\d{{1,16}}) {_UNIT}", re.ASCII)
+"""A value that is a quantity."""
+_TEXTS = ("/print", "/expect")
+"""Verbs that take text: a value that is a quantity is text there, too."""
 
 
 def escape(line: str) -> str:
-    """Double the braces of a line, so that `fill` returns it unchanged."""
-    return line.replace("{", "{{").replace("}", "}}")
+    """Double the braces of a line but those of quantities, so that `fill` returns it unchanged."""
+    doubled = line.replace("{", "{{").replace("}", "}}")
+    return re.sub(rf"\{{({_QUANTITY})\}}", r"\1", doubled, flags=re.ASCII)
 
 
 def value_names(line: str) -> set[str]:
@@ -29,9 +38,12 @@ def value_names(line: str) -> set[str]:
 
 def fill(line: str, values: Mapping[str, str], where: str = "") -> str:
     """Replace each `{NAME}` by its value. Raises Diagnostic for a missing value or a lone brace."""
+    texts = line.split(maxsplit=1)[:1] in ([verb] for verb in _TEXTS)
 
     def one(match: re.Match[str]) -> str:
         name = match["name"]
+        if match["quantity"]:
+            return match[0]
         if name is None and len(match[0]) == 2:
             return match[0][0]
         if name is None:
@@ -39,7 +51,9 @@ def fill(line: str, values: Mapping[str, str], where: str = "") -> str:
             raise Diagnostic(what, where, f"write {match[0] * 2} for a brace")
         if name not in values:
             raise Diagnostic(f"no value for {{{name}}}", where, f"set {name}=VALUE, or write {{{{ for a brace")
-        return values[name]
+        value = values[name]
+        quoted = texts or line.count('"', 0, match.start()) % 2
+        return f"{{{value}}}" if not quoted and _VALUE.fullmatch(value) else value
 
     return _BRACES.sub(one, line)
 

@@ -150,6 +150,8 @@ class Front:
     """Asks its person for values."""
     way: str = "--yes"
     """The way to agree to every question beforehand."""
+    beyond: str = "--beyond"
+    """The way to agree to moves that leave their travel."""
     beforehand: str = ""
     """The way to agree to the questions of this front end beforehand, for the message after a no."""
     ready: Callable[[], Awaitable[None]] | None = None
@@ -172,25 +174,35 @@ class Questions:
     def __init__(self, channel: Channel) -> None:
         self._channel = channel
         self.agreed = False
-        """Every question is answered with yes beforehand (`--yes`)."""
+        """Every question is answered with yes beforehand (`--yes`), but not those on moves that leave their travel."""
+        self.beyond = False
+        """Those are answered with yes, too (`--beyond`)."""
         self.open = Tasks(channel.changed)
         """The open questions. A stop ends them."""
         self._turn = asyncio.Lock()
 
-    async def confirm(self, what: str, where: str = "", so_far: str = "nothing was sent", by: By = By.OPERATOR) -> None:
+    async def confirm(
+        self,
+        what: str,
+        where: str = "",
+        so_far: str = "nothing was sent",
+        by: By = By.OPERATOR,
+        beyond: bool = False,
+    ) -> None:
         """Return once a person has agreed to `what`, one line that says what will happen. A script cannot ask.
 
         Raises Diagnostic after any other answer and without a person to ask, Stopped after a stop. `so_far`: what a
-        caller that has sent something says instead.
+        caller that has sent something says instead. `beyond`: it is a move that leaves its travel.
         """
-        if self.agreed:
+        if self.beyond if beyond else self.agreed:
             return
         front = self._channel.front
+        way = front.beyond if beyond else front.way
         if by is not By.OPERATOR:
-            hint = f"{front.way} agrees beforehand, or type the line"
+            hint = f"{way} agrees beforehand, or type the line"
             raise Diagnostic(f"{what}; a {by.value} cannot ask, {so_far}", where, hint)
         if front.ask is None:
-            raise Diagnostic(f"{what}; {so_far}", where, f"{front.way} agrees to it")
+            raise Diagnostic(f"{what}; {so_far}", where, f"{way} agrees to it")
         question = f"{where}: {what}" if where else what
         try:
             agreed = await self.open.run(self._in_turn(partial(front.ask, question)))

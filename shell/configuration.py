@@ -3,6 +3,7 @@
 [connections.press]
 url = "serial:/dev/ttyUSB0?drives=a,b"
 names = { a = "gantry", b = "clamp" }
+units = { a = "5 mm/turn", b = { scale = "0.4 um/step", zero = "120 mm", travel = "0..300 mm", full_steps = 200 } }
 
 [guards]
 off = ["BD", "*"]           # guards that ask no more; "*": what can start every drive of a line
@@ -29,6 +30,7 @@ ca = "plant-ca.pem"                 # the authority of the broker's certificate,
 cert = "shop-7.pem"                 # our certificate, where the broker requires one
 key = "shop-7.key"
 
+`own_units = ["pallet"]`, above all tables, names further units. An axis of a controller is `"00.x"` in `units`.
 A relative path begins at the folder of the configuration file. `MULTIDROP_CONFIG_DIR` moves the configuration and the
 macros; `MULTIDROP_STATE_DIR` moves the history.
 """
@@ -50,21 +52,25 @@ from multidrop.shell.roles import TIMES
 
 if TYPE_CHECKING:
     from multidrop.dialects import DriveState, Family
+    from multidrop.dialects.units import Scale
 
 MEGABYTE = 1_000_000
 CHOICES = {"signs": ("auto", "full", "boxes", "ascii"), "times": tuple(TIMES)}
 """The settings that have one of a few words."""
 MQTT_FILES = ("password_file", "ca", "cert", "key")
-TABLES = ("connections", "guards", "keys", "log", "mqtt", "screen", "simulator", "sweep")
+TABLES = ("connections", "guards", "keys", "log", "mqtt", "own_units", "screen", "simulator", "sweep")
+TRAVEL = "TRAVEL"
+"""The guard on moves that leave the travel of their axis, which no family knows."""
 
 
 @dataclass(frozen=True)
 class SavedConnection:
-    """A named URL, and names for its drives by address."""
+    """A named URL; names for its drives by address, and scales by address or `ADDRESS.AXIS`."""
 
     name: str
     url: str
     names: Mapping[str, str] = field(default_factory=dict)
+    units: Mapping[str, Scale] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -153,6 +159,8 @@ class Settings:
     """Further folders to which paths of cell files may lead, in `simulator.allow`."""
     clusters: tuple[str, ...] = ()
     """The addresses of the schedulers that may run code here, in `sweep.clusters`."""
+    own_units: tuple[str, ...] = ()
+    """Units beside those that every session knows."""
 
     @property
     def macros(self) -> Path:
@@ -225,9 +233,9 @@ def placed(message: str, text: str, where: str, hint: str = "") -> Diagnostic:
 
 
 def line_of(text: str, key: Sequence[str]) -> int:
-    """The number of the line with a key, given with its tables (`screen`, `theme`), or with its table; 0: not found."""
+    """The number of the line with a key, given with its tables (`screen`, `theme`), or the nearest table's; 0: none."""
     table: tuple[str, ...] = ()
-    best = 0
+    best = depth = 0
     for number, line in enumerate(split_lines(text), 1):
         if header := re.match(r"\s*\[\[?([^\]]+)\]", line):
             table = _parts(header[1])
@@ -238,8 +246,8 @@ def line_of(text: str, key: Sequence[str]) -> int:
             continue
         if found == tuple(key):
             return number
-        if not best and found and found == tuple(key[: len(found)]):
-            best = number
+        if len(found) > depth and found == tuple(key[: len(found)]):
+            best, depth = number, len(found)
     return best
 
 
@@ -252,7 +260,8 @@ def _read(document: Mapping[str, Any], where: str) -> Settings:
     tables = document.get("connections", {})
     if not isinstance(tables, dict):
         raise Diagnostic("connections is not a table", where, "write [connections.NAME]")
-    connections = {name: _connection(name, table, where) for name, table in tables.items()}
+    own = _own_units(document.get("own_units", []), where)
+    connections = {name: _connection(name, table, where, own) for name, table in tables.items()}
     guards, log = _guards(document.get("guards", {}), where), _log(document.get("log", {}), where)
     look = _look(document.get("screen", {}), document.get("keys", {}), where)
     mqtt = _mqtt(document.get("mqtt", {}), where)
@@ -264,7 +273,14 @@ def _read(document: Mapping[str, Any], where: str) -> Settings:
             raise Diagnostic(f"{name}.{key} is not a list of texts", where, f'as in {key} = ["..."]')
     allowed = tuple(Path(where).parent / os.path.expanduser(each) for each in lists["allow"])
     return Settings(
-        connections, guards=guards, log=log, look=look, mqtt=mqtt, allowed=allowed, clusters=tuple(lists["clusters"])
+        connections,
+        guards=guards,
+        log=log,
+        look=look,
+        mqtt=mqtt,
+        allowed=allowed,
+        clusters=tuple(lists["clusters"]),
+        own_units=own,
     )
 
 
@@ -278,11 +294,40 @@ def _table(found: Any, name: str, keys: Sequence[str], where: str, hint: str) ->
     return found
 
 
-def _connection(name: str, found: Any, where: str) -> SavedConnection:
+def _own_units(found: Any, where: str) -> tuple[str, ...]:
+    if not isinstance(found, list) or not all(isinstance(word, str) for word in found):
+        raise Diagnostic("own_units is not a list of words", where, 'as in own_units = ["pallet"]')
+    if found:
+        from multidrop.dialects.units import check_own
+
+        try:
+            check_own(found)
+        except Diagnostic as problem:
+            raise Diagnostic(f"own_units: {problem.message}", where, problem.hint) from None
+    return tuple(found)
+
+
+def _units(key: str, found: Any, where: str, own: Sequence[str]) -> dict[str, Scale]:
+    if not isinstance(found, dict):
+        raise Diagnostic(f"{key} is not a table of scales", where, 'as in { a = "5 mm/turn" }')
+    if not found:
+        return {}
+    from multidrop.dialects.units import scale
+
+    scales = {}
+    for axis, given in found.items():
+        try:
+            scales[axis] = scale(given, own)
+        except Diagnostic as problem:
+            raise Diagnostic(f"{key}.{axis}: {problem.message}", where, problem.hint) from None
+    return scales
+
+
+def _connection(name: str, found: Any, where: str, own: Sequence[str]) -> SavedConnection:
     key = f"connections.{name}"
     if not re.fullmatch(r"[A-Za-z0-9_-]+", name):
         raise Diagnostic(f"{key}: not a name", where, "valid: letters, digits, - and _")
-    table = _table(found, key, ("names", "url"), where, f"write [{key}] with url = ...")
+    table = _table(found, key, ("names", "units", "url"), where, f"write [{key}] with url = ...")
     url = table.get("url")
     if not isinstance(url, str) or not url:
         raise Diagnostic(f"{key}.url is missing or not text", where)
@@ -293,7 +338,7 @@ def _connection(name: str, found: Any, where: str) -> SavedConnection:
         if not re.fullmatch(r"[^\s:@/]+", label) or visible(label) != label:
             hint = "invalid: spaces, control characters, :, @ and /"
             raise Diagnostic(f"{key}.names: {label!r} is not a name", where, hint)
-    return SavedConnection(name, url, names)
+    return SavedConnection(name, url, names, _units(f"{key}.units", table.get("units", {}), where, own))
 
 
 def _guards(found: Any, where: str) -> Guarding:
@@ -308,7 +353,8 @@ def _guards(found: Any, where: str) -> Guarding:
             continue  # only a configuration with guards imports all families
         from multidrop.dialects.families import FAMILIES
 
-        known = sorted({name for family in FAMILIES.values() if family.guards for name in family.guards.names})
+        named = {name for family in FAMILIES.values() if family.guards for name in family.guards.names}
+        known = sorted(named | {TRAVEL})
         for word in sorted(words[key]):
             if key == "off" and word not in known:
                 raise Diagnostic(f"guards.off: no guard {word}", where, f"valid: {', '.join(known)}")

@@ -10,12 +10,13 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import re
 from collections.abc import Iterator, Sequence
 from contextvars import ContextVar
-from functools import partial
-from typing import Any
+from functools import cached_property, partial
+from typing import TYPE_CHECKING, Any
 
-from multidrop.dialects import Diagnostic, DriveError, Refused, Stopped
+from multidrop.dialects import Command, Diagnostic, DriveError, Refused, Stopped
 from multidrop.dialects.on_demand import imported
 from multidrop.drives.bus import Bus
 from multidrop.drives.drive import Drive
@@ -43,6 +44,11 @@ from multidrop.shell.twins.twins import Twins
 from multidrop.shell.waits import in_motion
 from multidrop.shell.workspace import LATCHED, Workspace
 
+if TYPE_CHECKING:
+    from multidrop.shell.units import Units
+
+_MAYBE_QUANTITY = re.compile(r"\{|\d ?[A-Za-z]\w*(?:/\w+)?(?![\w/])")
+"""Matches each line that may hold a number with a unit, and few others: most lines go without `units`."""
 _published: ContextVar[list[BaseException] | None] = ContextVar("published", default=None)
 """The failures published in this task's outermost `run`."""
 BARE_WORDS = {"exit": "/quit", "quit": "/quit", "help": "/help", "?": "/help"}
@@ -50,8 +56,16 @@ CALL = "multidrop.shell.verbs.call:Call"
 """One use of a verb; it knows this class, so this module has only its name."""
 
 
+def _units(session: Session) -> Units:
+    made: Units = imported("multidrop.shell.units:Units")(session)
+    return made
+
+
 class Session(Workspace):
     """Everything that is open, and the path of a command. Needs a running event loop, and belongs to its thread."""
+
+    units = cached_property(_units)
+    """The scales of axes, and quantities in lines. Few sessions need it."""
 
     def __init__(
         self,
@@ -74,8 +88,15 @@ class Session(Workspace):
         self.path = LinePath(self)
         self.openings = Openings(self, opener or partial(open_buses, state=self.settings.state), lazy, raw, tried)
         self._background: set[asyncio.Task[Any]] = set()
+        if self.scaled:
+            self.on_opened.append(self.units.opened)
 
     # Buses
+
+    def identified(self, bus: Bus) -> None:
+        """Note that the drives of a bus are found: its first one is selected there, and twins begin if wanted."""
+        super().identified(bus)
+        self.twins.identified(bus)
 
     async def open(self, url: str, name: str | None = None, *, raw: bool = False) -> list[Bus]:
         """Open a URL or saved connection and find its drives; `sim:` may open several buses. Moves nothing.
@@ -117,11 +138,6 @@ class Session(Workspace):
         """Close a bus and drop everything known of it, its twins too."""
         self.twins.stop(bus)
         await super().forget(bus)
-
-    def identified(self, bus: Bus) -> None:
-        """Note that the drives of a bus are found: its first one is selected there, and twins begin if wanted."""
-        super().identified(bus)
-        self.twins.identified(bus)
 
     def _on_bus(self, bus: Bus, event: BusEvent) -> None:
         super()._on_bus(bus, event)
@@ -248,8 +264,14 @@ class LinePath:
         drive = session.drive(bus.name, parsed.address)
         session.publish(Entered(session.now(), parsed.typed.strip(), by, bus.name, drive.address))
         self._allow(by)
-        await self.guard(drive, parsed.text, by)
-        recorded, starts = None, drive.starts(parsed.text)
+        text, check, values, stops = parsed.text, None, "", drive.stops
+        if session.scaled or _MAYBE_QUANTITY.search(text):
+            line = await session.units.line(drive, text, by)
+            text, check, values = Command(line.text), line.check, line.values
+        await self.guard(drive, text, by)
+        if drive.stops != stops:
+            raise Stopped(f"a stop came before '{text.strip()}' was sent")
+        recorded, starts = None, drive.starts(text)
         if by is not By.MACRO:
             target = session.qualified_address(drive)
             typed = f"@{target} {parsed.text}" if target else parsed.text
@@ -260,8 +282,8 @@ class LinePath:
         session.lately.begin()
         before, started = drive.commands, False
         try:
-            started = starts and session.automations.starts(drive, only_ends(drive, parsed.text))
-            printed = await drive.send(parsed.text)
+            started = starts and session.automations.starts(drive, only_ends(drive, text))
+            printed = await drive.send(text, check)
         except FAILURES as failure:
             unsent = started and drive.commands == before and drive.address not in EVERYONE
             if unsent and isinstance(failure, DriveError):
@@ -269,13 +291,16 @@ class LinePath:
             if recorded is not None:
                 recorded.came_back([f"failed: {failure}"])
             raise
+        finally:
+            if values and drive.commands != before:
+                session.notify(f"{text.strip()}   {values}", bus=bus.name)
         if recorded is not None:
             recorded.came_back(printed)
         if drive.address not in (*EVERYONE, *bus.drives):
             bus.drives[drive.address] = drive  # it replied, so it exists: a stop and a wait must know it
             session.changed()
-        for text in printed:
-            session.publish(Printed(session.now(), bus.name, drive.address, text, by))
+        for each in printed:
+            session.publish(Printed(session.now(), bus.name, drive.address, each, by))
 
     async def _raw_text(self, raw: RawLine, parsed: DriveLine, by: By) -> None:
         session, name, typed = self._session, raw.bus.name, parsed.typed.strip()

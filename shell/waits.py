@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 from multidrop.dialects import Diagnostic, DriveError, Motion
 from multidrop.drives.bus import Bus
-from multidrop.drives.drive import REST, Drive, Running, confirmed_motion
+from multidrop.drives.drive import REST, Check, Drive, Running, confirmed_motion
 from multidrop.shell.line_syntax import EVERYONE
 from multidrop.shell.stop_report import UNCONFIRMED, last_seen
 from multidrop.shell.workspace import Workspace
@@ -26,7 +26,7 @@ APART = REST
 """The time between the two readings of a drive at rest, and between those of a value, s."""
 SHOWN = 3
 """The number of lines that a wait for a text shows when it runs out."""
-SIGNS: Mapping[str, Callable[[int, int], bool]] = {
+SIGNS: Mapping[str, Callable[[float, float], bool]] = {
     "=": operator.eq,
     "==": operator.eq,
     "!=": operator.ne,
@@ -36,7 +36,7 @@ SIGNS: Mapping[str, Callable[[int, int], bool]] = {
     ">=": operator.ge,
 }
 _CONDITION = re.compile(
-    r"(?:@(?P<target>\S+)\s+)?(?P<word>[A-Za-z][A-Za-z0-9_]*)\s*(?P<sign>[=!<>]=|[=<>])\s*(?P<value>[+-]?\d{1,15})",
+    r"(?:@(?P<target>\S+)\s+)?(?P<word>[A-Za-z][A-Za-z0-9_]*)\s*(?P<sign>[=!<>]=|[=<>])\s*(?:(?P<value>[+-]?\d{1,15})|(?P<quantity>\{[^{}]+\}))",
     re.ASCII,
 )
 
@@ -48,12 +48,14 @@ class Condition:
     target: str
     word: str
     sign: str
-    value: int
+    value: float
+    quantity: str = ""
+    """In place of a number, `{100 mm}`; the value is what it is to the drive."""
 
     @property
     def text(self) -> str:
         """The condition without the drive."""
-        return f"{self.word}{self.sign}{self.value}"
+        return f"{self.word}{self.sign}{self.quantity or self.value}"
 
     def holds(self, seen: int) -> bool:
         """True if a value that was read fits."""
@@ -63,7 +65,10 @@ class Condition:
 def condition(text: str) -> Condition | None:
     """Parse a condition; None for another text."""
     match = _CONDITION.fullmatch(text.strip())
-    return Condition(match["target"] or "", match["word"], match["sign"], int(match["value"])) if match else None
+    if match is None:
+        return None
+    target, quantity = match["target"] or "", match["quantity"] or ""
+    return Condition(target, match["word"], match["sign"], int(match["value"] or 0), quantity)
 
 
 def seconds(text: str, wrong: Callable[[str], Diagnostic]) -> float:
@@ -113,17 +118,23 @@ async def _moving(workspace: Workspace, drives: Sequence[Drive], idle: bool) -> 
     return None
 
 
-async def wait_value(workspace: Workspace, drive: Drive, wanted: Condition, limit: float) -> None:
-    """Wait until a drive reports a value. Raises DriveError after `limit` seconds, Diagnostic for no such value."""
-    line, name = _question(workspace, drive, wanted), workspace.display_name(drive)
+async def wait_value(
+    workspace: Workspace, drive: Drive, wanted: Condition, limit: float, check: Check | None = None
+) -> None:
+    """Wait until a drive reports a value. Raises DriveError after `limit` seconds, Diagnostic for no such value.
+
+    `check`: see `Drive.send`.
+    """
+    line, name = question(workspace, drive, wanted), workspace.display_name(drive)
     deadline = workspace.now() + limit
-    while not wanted.holds(seen := await _value(workspace, drive, line)):
+    while not wanted.holds(seen := await _value(workspace, drive, line, check)):
         if workspace.now() >= deadline:
             raise DriveError(f"/wait {wanted.text}: {name} still reports {seen} after {limit:g} s")
         await sleep(APART)
 
 
-def _question(workspace: Workspace, drive: Drive, wanted: Condition) -> str:
+def question(workspace: Workspace, drive: Drive, wanted: Condition) -> str:
+    """The line that asks for the value. Raises Diagnostic."""
     name = workspace.display_name(drive)
     if drive.link.name in workspace.raw:
         raise Diagnostic("is in raw mode, where no drive is asked", drive.link.name, "/raw off ends it")
@@ -133,12 +144,12 @@ def _question(workspace: Workspace, drive: Drive, wanted: Condition) -> str:
     return line
 
 
-async def _value(workspace: Workspace, drive: Drive, line: str) -> int:
+async def _value(workspace: Workspace, drive: Drive, line: str, check: Check | None) -> int:
     """Ask a drive for a value."""
     name = workspace.display_name(drive)
     if drive.programming:
         raise DriveError(f"{name} is in program mode and would store the question; PG ends it")
-    printed = await drive.send(line)
+    printed = await drive.send(line, check)
     if len(printed) != 1 or not re.fullmatch(r"\s*[+-]?\d{1,15}\s*", printed[0], re.ASCII):
         raise DriveError(f"{name}: {line} printed {', '.join(printed) or 'nothing'}; a wait needs a whole number")
     return int(printed[0])

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import asyncio
 import re
-from collections.abc import Callable
+from collections.abc import Awaitable, Callable
 from dataclasses import dataclass, field
 from functools import partial
 from typing import TYPE_CHECKING
@@ -109,6 +109,10 @@ class Workspace(Channel):
         self.names = KnownNames()
         """The labels and variables that were read, for completion."""
         self.log: OpenLog | None = None
+        self.scaled = any(each.units for each in settings.connections.values())
+        """An axis may have a scale."""
+        self.on_opened: list[Callable[[Bus], Awaitable[None]]] = []
+        """Awaited with each bus whose drives were found."""
         self.plots: list[RunningPlot] = []
         self.plotted: tuple[Series, ...] = ()
         """The series that the screen plots; empty: the selected drive."""

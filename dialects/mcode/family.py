@@ -51,5 +51,6 @@ MCODE = Family(
     remember=remember,
     scan_at="multidrop.dialects.mcode.host.scan:SCAN",
     values_at="multidrop.dialects.mcode.host.values:VALUES",
+    units_at="multidrop.dialects.mcode.host.units:UNITS",
     stop_bytes=STOP_BYTES,
 )

@@ -60,4 +60,5 @@ MODBUS = Family(
     protection=CYBER_SECURITY,
     prepare=pdu_codec,
     values_at="multidrop.dialects.modbus.host.values:VALUES",
+    units_at="multidrop.dialects.modbus.host.units:UNITS",
 )

@@ -21,11 +21,11 @@ FIRST = "X"
 """The first axis."""
 
 
-def move(axis: str, steps: int) -> tuple[str, ...]:
+def move(axis: str, steps: int | str) -> tuple[str, ...]:
     return "INC", f"{axis.upper() or FIRST}{steps}"
 
 
-def move_to(axis: str, position: int) -> tuple[str, ...]:
+def move_to(axis: str, position: int | str) -> tuple[str, ...]:
     return "ABS", f"{axis.upper() or FIRST}{position}"
 
 
@@ -91,5 +91,6 @@ PMX = Family(
     scan_at="multidrop.dialects.pmx.host.operations:SCAN",
     debugging_at="multidrop.dialects.pmx.host.programs:DEBUGGING",
     values_at="multidrop.dialects.pmx.host.values:VALUES",
+    units_at="multidrop.dialects.pmx.host.units:UNITS",
     stop_bytes=STOP_BYTES,
 )

@@ -22,11 +22,11 @@ FIRST = "0"
 """The first motor."""
 
 
-def move(axis: str, steps: int) -> tuple[str, ...]:
+def move(axis: str, steps: int | str) -> tuple[str, ...]:
     return (f"MVP REL, {axis or FIRST}, {steps}",)
 
 
-def move_to(axis: str, position: int) -> tuple[str, ...]:
+def move_to(axis: str, position: int | str) -> tuple[str, ...]:
     return (f"MVP ABS, {axis or FIRST}, {position}",)
 
 
@@ -126,6 +126,7 @@ TMCL = Family(
     debugging_at="multidrop.dialects.tmcl.host.programs:DEBUGGING",
     repairs=True,
     values_at="multidrop.dialects.tmcl.host.values:VALUES",
+    units_at="multidrop.dialects.tmcl.host.units:UNITS",
     stop_bytes=STOP_BYTES,
     message_moves=codec.moves,
     in_frames=codec.replies_in,

@@ -40,10 +40,10 @@ class Session:
     call, and the end of the process while it is open.
     """
 
-    def __init__(self, *urls: str, yes: bool = False, notice: Notice = log) -> None:
+    def __init__(self, *urls: str, yes: bool = False, beyond: bool = False, notice: Notice = log) -> None:
         """Open the connections; see `connect`."""
         self._notices = Notices(notice)
-        self.awaited = AsyncSession(urls, yes=yes, notice=self._notices)
+        self.awaited = AsyncSession(urls, yes=yes, beyond=beyond, notice=self._notices)
         self.thread = LoopThread()
         self.leaving = contextlib.ExitStack()
         """The contexts that end after everything is closed, and before the thread does."""
@@ -178,6 +178,8 @@ class Drive(DriveFacts):
     move = blocking(AsyncDrive.move)
     move_to = blocking(AsyncDrive.move_to)
     wait = blocking(AsyncDrive.wait)
+    position_in = blocking(AsyncDrive.position_in)
+    velocity_in = blocking(AsyncDrive.velocity_in)
 
     @property
     def position(self) -> int:
@@ -274,10 +276,11 @@ class Telemetry:
     samples = blocking(AsyncTelemetry.samples)
 
 
-def connect(*urls: str, yes: bool = False) -> Session:
+def connect(*urls: str, yes: bool = False, beyond: bool = False) -> Session:
     """Open connections as on the command line: ports, URLs, saved connections, `sim:`. Moves nothing.
 
-    `yes`: questions, such as that of a restore, are answered with yes beforehand. Raises Diagnostic for a wrong URL,
-    Unreachable where there is no connection, NoAnswer where no drive replies.
+    `yes`: questions, such as that of a restore, are answered with yes beforehand. `beyond`: moves may leave the travel
+    of their axis, which `yes` does not include. Raises Diagnostic for a wrong URL, Unreachable where there is no
+    connection, NoAnswer where no drive replies.
     """
-    return Session(*urls, yes=yes)
+    return Session(*urls, yes=yes, beyond=beyond)

@@ -10,7 +10,9 @@ from typing import TYPE_CHECKING
 from multidrop.api.calls import Calls, Stopping
 from multidrop.api.pictures import table
 from multidrop.dialects import Diagnostic, Motion, Refused
+from multidrop.dialects.units import QUANTITY
 from multidrop.drives.drive import still
+from multidrop.macros import model
 from multidrop.shell import new_file, program_listing, stop_report, waits
 from multidrop.shell.events import By
 from multidrop.shell.line_syntax import join_target
@@ -20,6 +22,7 @@ from multidrop.shell.programs import transfers
 from multidrop.shell.programs.transfers import Wanted
 from multidrop.shell.scripts.execution import ask
 from multidrop.shell.scripts.expression import Value, Word, written
+from multidrop.shell.units import BEYOND
 
 if TYPE_CHECKING:
     from multidrop.api.telemetry import AsyncTelemetry
@@ -119,6 +122,16 @@ class AsyncParameters:
         return printed
 
 
+def _amount(number: float, unit: str) -> int | str:
+    """Whole steps, or a quantity as a line has it. Raises Diagnostic for another number, TypeError for such steps."""
+    if not unit:
+        return operator.index(number)  # type: ignore[arg-type]
+    text = f"{{{model.written(number)} {unit}}}"
+    if QUANTITY.fullmatch(text) is None:
+        raise Diagnostic(f"{number} {unit} is no quantity", "", 'valid: as in move(12.5, "mm")')
+    return text
+
+
 _WORD = re.compile(r"[A-Za-z]\w*", re.ASCII)
 
 
@@ -191,8 +204,10 @@ class AsyncDrive(DriveFacts):
         await self.calls.run(lambda: self._send(line), printed)
         return printed
 
-    async def _send(self, *lines: str) -> None:
+    async def _send(self, *lines: str, beyond: bool = False) -> None:
         shell = self.calls.shell
+        if beyond:
+            BEYOND.set(True)  # in the context of this call
         for line in lines:
             await shell.run(f"@{self.target} {line}", By.SCRIPT)
 
@@ -215,20 +230,24 @@ class AsyncDrive(DriveFacts):
 
     # Motion
 
-    async def move(self, steps: int) -> None:
-        """Begin to move by a distance. Raises Refused."""
-        await self._move(self.drive.family.move(self.axis, operator.index(steps)))
+    async def move(self, steps: float, unit: str = "", *, beyond: bool = False) -> None:
+        """Begin to move by a distance: whole steps, or a number of a unit, as in `move(12.5, "mm")`.
 
-    async def move_to(self, position: int) -> None:
-        """Begin to move to a position. Raises Refused."""
-        await self._move(self.drive.family.move_to(self.axis, operator.index(position)))
+        `beyond`: it may leave the travel of its axis. Raises Refused; Diagnostic for a unit that its scale has not;
+        TypeError for a fraction of a step.
+        """
+        await self._move(self.drive.family.move(self.axis, _amount(steps, unit)), beyond)
 
-    async def _move(self, lines: tuple[str, ...]) -> None:
+    async def move_to(self, position: float, unit: str = "", *, beyond: bool = False) -> None:
+        """Begin to move to a position: whole steps, or a number of a unit. As `move` in all else."""
+        await self._move(self.drive.family.move_to(self.axis, _amount(position, unit)), beyond)
+
+    async def _move(self, lines: tuple[str, ...], beyond: bool) -> None:
         self._check_executes()
         if not self._axis_known:
             await self.motion()
         async with self.calls.moves(self.drive):  # a mode and its move belong together
-            await self.calls.run(lambda: self._send(*lines))
+            await self.calls.run(lambda: self._send(*lines, beyond=beyond))
 
     async def wait(self, timeout: float = waits.LIMIT, *, idle: bool = False) -> None:
         """Wait until two readings show it at rest; with `idle` also until no program runs.
@@ -245,6 +264,19 @@ class AsyncDrive(DriveFacts):
     async def velocity(self) -> int:
         """Read the velocity, signed, per second."""
         return (await self.motion()).velocity
+
+    async def position_in(self, unit: str) -> float:
+        """Read the position in a unit of its scale, such as `mm`. Raises Diagnostic where it has none."""
+        return await self._in("position", unit)
+
+    async def velocity_in(self, unit: str) -> float:
+        """Read the velocity in a unit of its scale, such as `mm/s`, signed. Raises as `position_in`."""
+        return await self._in("velocity", unit)
+
+    async def _in(self, what: str, unit: str) -> float:
+        self._check_executes()
+        units, axis = self.calls.shell.units, self.axis.lower()
+        return await self.calls.run(lambda: units.reading(self.drive, axis, what, unit))
 
     async def moving(self) -> bool:
         """Read whether it moves; at rest, two readings say so."""

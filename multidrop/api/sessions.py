@@ -66,9 +66,9 @@ class AsyncSession:
     Leaving it by an exception stops every drive that it has set in motion.
     """
 
-    def __init__(self, urls: Sequence[str], *, yes: bool = False, notice: Notice) -> None:
+    def __init__(self, urls: Sequence[str], *, yes: bool = False, beyond: bool = False, notice: Notice) -> None:
         self._urls = urls
-        self._yes = yes
+        self._yes, self._beyond = yes, beyond
         self._notice = notice
         self._calls = Calls()
 
@@ -102,7 +102,8 @@ class AsyncSession:
         from multidrop.shell.log.writer import begin as begin_log
 
         shell = Shell(load())
-        shell.questions.agreed, shell.front = self._yes, Front(way="connect(URL, yes=True)")
+        shell.questions.agreed, shell.questions.beyond = self._yes, self._beyond
+        shell.front = Front(way="connect(URL, yes=True)", beyond="beyond=True")
         shell.subscribe(self._take)
         self._calls.open(shell)
         begin_log(shell)
@@ -224,6 +225,6 @@ class AsyncSession:
         return drives_table(self.shell) if self._calls.opened else "<p>multidrop: a closed session</p>"
 
 
-def connect_async(*urls: str, yes: bool = False) -> AsyncSession:
+def connect_async(*urls: str, yes: bool = False, beyond: bool = False) -> AsyncSession:
     """Make a session for `async with`, in the running event loop. Arguments as for `connect`."""
-    return AsyncSession(urls, yes=yes, notice=log)
+    return AsyncSession(urls, yes=yes, beyond=beyond, notice=log)

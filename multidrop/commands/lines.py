@@ -22,7 +22,14 @@ def shell(chosen: argparse.Namespace) -> int:
     if sys.stdin.isatty():
         with importing():
             from multidrop.shell.prompt.prompt import run
-        return run(chosen.urls, reconnect=not chosen.no_reconnect, agreed=chosen.yes, raw=chosen.raw, twin=chosen.twin)
+        return run(
+            chosen.urls,
+            reconnect=not chosen.no_reconnect,
+            agreed=chosen.yes,
+            beyond=chosen.beyond,
+            raw=chosen.raw,
+            twin=chosen.twin,
+        )
     from multidrop.shell.batch import runner
     from multidrop.shell.prompt.terminal_input import run_stream
 
@@ -32,7 +39,9 @@ def shell(chosen: argparse.Namespace) -> int:
                 await session.twins.start(bus)
         await run_stream(session, descriptor=sys.stdin.fileno())
 
-    return runner.run(chosen.urls, lines, watch_keys=False, agreed=chosen.yes, asks=False, raw=chosen.raw)
+    return runner.run(
+        chosen.urls, lines, watch_keys=False, agreed=chosen.yes, beyond=chosen.beyond, asks=False, raw=chosen.raw
+    )
 
 
 def send(chosen: argparse.Namespace) -> int:
@@ -44,7 +53,9 @@ def send(chosen: argparse.Namespace) -> int:
     lazy, tried = each_names_one_drive(chosen.lines), targets(chosen.lines)
     if not chosen.json:
         lines = partial(run_lines, lines=chosen.lines)
-        return runner.run([chosen.url], lines, lazy=lazy, agreed=chosen.yes, asks=False, tried=tried)
+        return runner.run(
+            [chosen.url], lines, lazy=lazy, agreed=chosen.yes, beyond=chosen.beyond, asks=False, tried=tried
+        )
     from multidrop.shell.batch.report import Report
     from multidrop.shell.scripts.executor import run_typed
 
@@ -53,7 +64,9 @@ def send(chosen: argparse.Namespace) -> int:
     async def body(session: Session) -> None:
         await run_typed(session, chosen.lines, report.executed)
 
-    code = runner.run([chosen.url], body, lazy=lazy, agreed=chosen.yes, asks=False, replies=False, tried=tried)
+    code = runner.run(
+        [chosen.url], body, lazy=lazy, agreed=chosen.yes, beyond=chosen.beyond, asks=False, replies=False, tried=tried
+    )
     return report.finish(code)
 
 
@@ -88,7 +101,9 @@ def run(chosen: argparse.Namespace) -> int:
             await run_script(session, script, report.executed)
 
     tried = targets(each.text for each in lines_of(script.body))
-    return report.finish(runner.run([], body, agreed=chosen.yes, asks=False, replies=not chosen.json, tried=tried))
+    return report.finish(
+        runner.run([], body, agreed=chosen.yes, beyond=chosen.beyond, asks=False, replies=not chosen.json, tried=tried)
+    )
 
 
 def start(chosen: argparse.Namespace) -> int:

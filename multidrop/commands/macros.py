@@ -69,7 +69,8 @@ def play(chosen: argparse.Namespace) -> int:
         with report.noting():
             await play_macro(session, macro, values, times=chosen.times, fast=chosen.fast, watcher=report)
 
-    return report.finish(runner.run([], body, agreed=chosen.yes, asks=False, replies=not chosen.json))
+    code = runner.run([], body, agreed=chosen.yes, beyond=chosen.beyond, asks=False, replies=not chosen.json)
+    return report.finish(code)
 
 
 def _asked(macro: Macro, values: Mapping[str, str]) -> dict[str, str]:

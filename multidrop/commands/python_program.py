@@ -49,7 +49,7 @@ def result_of(end: BaseException, file: str, number: int) -> Result:
 class ReportedSession(Session):
     """A session that reports what each call of a program sends and prints."""
 
-    def __init__(self, file: str, report: Report | None, *, yes: bool, notice: Notice) -> None:
+    def __init__(self, file: str, report: Report | None, *, yes: bool, beyond: bool, notice: Notice) -> None:
         self._file = file
         self._report = report
         self._out = sys.stdout
@@ -58,7 +58,7 @@ class ReportedSession(Session):
         self._printed: list[str] = []
         self._failed: tuple[BaseException, Result] | None = None
         """The last call, if it failed, and its result: the program may end with it, or go on."""
-        super().__init__(yes=yes, notice=notice)
+        super().__init__(yes=yes, beyond=beyond, notice=notice)
         self.awaited.shell.subscribe(self._take)
 
     def _take(self, event: SessionEvent) -> None:
@@ -231,7 +231,7 @@ class _Execution:
     def _session(self) -> Iterator[Session]:
         chosen = self._chosen
         report = self._report if chosen.json else None
-        opened = ReportedSession(self._file, report, yes=chosen.yes, notice=_say)
+        opened = ReportedSession(self._file, report, yes=chosen.yes, beyond=chosen.beyond, notice=_say)
         with opened:
             self._watch_keys(opened)
             opened.add(*chosen.on, **dict(chosen.role))

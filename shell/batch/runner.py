@@ -38,6 +38,7 @@ def run(
     lazy: bool = False,
     reconnect: bool = False,
     agreed: bool = False,
+    beyond: bool = False,
     asks: bool = True,
     unsolicited: bool = True,
     replies: bool = True,
@@ -48,11 +49,11 @@ def run(
     """Open the URLs, await the body, close, and return the exit code (`interrupted` after a signal).
 
     `lazy`: each line of the body names one drive. `reconnect`: a lost bus is tried again; otherwise the body fails
-    with it. `agreed`: every question is answered with yes. `asks`: a question is put to the terminal; otherwise, and
-    where there is none, what needs an answer is refused. `unsolicited`: what drives send by themselves is printed.
-    `replies`: standard output shows replies; otherwise the body writes there itself. `raw`: the URLs are opened
-    in raw mode. `tried`: see `Session`. `loop` makes the event loop, where it is not the usual one. A failure is one
-    line on standard error.
+    with it. `agreed`: every question is answered with yes; `beyond`: also those on travel. `asks`: a question is put to
+    the terminal; otherwise, and where there is none, what needs an answer is refused. `unsolicited`: what drives send
+    by themselves is printed. `replies`: standard output shows replies; otherwise the body writes there itself. `raw`:
+    the URLs are opened in raw mode. `tried`: see `Session`. `loop` makes the event loop, where it is not the usual one.
+    A failure is one line on standard error.
     """
     try:
         found = configuration.load()
@@ -60,7 +61,8 @@ def run(
         write(sys.stderr, report(failure))
         return exit_code(failure)
     try:
-        make = partial(_session, partial(Session, found, lazy=lazy, reconnect=reconnect, raw=raw, tried=tried), agreed)
+        create = partial(Session, found, lazy=lazy, reconnect=reconnect, raw=raw, tried=tried)
+        make = partial(_session, create, agreed, beyond)
         printer = Printer(unsolicited=unsolicited, replies=replies)
         with early_ends(), asyncio.Runner(loop_factory=loop) as runner:  # before the log has its thread
             return runner.run(_run(make, printer, urls, body, watch_keys, interrupted, asks))
@@ -68,9 +70,9 @@ def run(
         return interrupted
 
 
-def _session(make: Callable[[], Session], agreed: bool) -> Session:
+def _session(make: Callable[[], Session], agreed: bool, beyond: bool) -> Session:
     made = make()
-    made.questions.agreed = agreed
+    made.questions.agreed, made.questions.beyond = agreed, beyond
     return made
 
 

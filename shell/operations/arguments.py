@@ -12,6 +12,7 @@ HOST = "127.0.0.1"
 KEYS = [f"F{number}" for number in range(2, 13)]
 WHAT = "what to open"
 YES = "answer every question with yes beforehand"
+BEYOND = "let moves leave the travel of their axis, which --yes does not"
 JSON = "print one JSON object a line"
 SUMMED = "print one JSON object a line, and a summary"
 JUNIT = "write the checks to a JUnit XML file"

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from multidrop.shell.operations.arguments import (
+    BEYOND,
     JSON,
     JUNIT,
     NO_RECONNECT,
@@ -82,14 +83,24 @@ SHELL = Operation(
     meaning="show the prompt; read lines from standard input if that is not a terminal",
     run="lines.shell",
     examples=["shell sim:", "shell /dev/ttyUSB0?drives=a,b", "shell sim: < lines.txt", "shell --raw /dev/ttyUSB0"],
-    arguments={**SHOWN, "--yes": YES},
+    arguments={
+        **SHOWN,
+        "--yes": YES,
+        "--beyond": BEYOND,
+    },
 )
 SEND = Operation(
     command="send",
     meaning="run lines, print the replies, exit",
     run="lines.send",
     examples=['send sim:#press "@a MR 51200" "/wait stopped" "@a PR P"', 'send press "PR AL"'],
-    arguments={"URL": WHAT, "LINE ...": "text for a drive, @ADDR TEXT, or a /verb", "--json": SUMMED, "--yes": YES},
+    arguments={
+        "URL": WHAT,
+        "LINE ...": "text for a drive, @ADDR TEXT, or a /verb",
+        "--json": SUMMED,
+        "--yes": YES,
+        "--beyond": BEYOND,
+    },
 )
 RUN = Operation(
     command="run",
@@ -110,6 +121,7 @@ RUN = Operation(
         "--json": SUMMED,
         "--junit FILE": JUNIT,
         "--yes": YES,
+        "--beyond": BEYOND,
     },
 )
 OPEN = Operation(
@@ -182,6 +194,21 @@ REFERENCED = Operation(
     """,
     work="buses:referenced",
     immediate=True,
+)
+UNITS = Operation(
+    usage="/units [on|off | here [ADDR] NUMBER UNIT | ADDR [NUMBER UNIT/turn|UNIT/step]]",
+    help="""Give an axis a scale, or list the scales; on and off: show positions in units, or in the drive's numbers.
+
+    /units a 5 mm/turn: the motor's turn; /units 00.x 0.4 um/step: the drive's count. A line then takes {12.5 mm},
+    {50 mm/s}, {2 m/s2}. /units a takes the scale with the settings as they are now. /units here a 0 mm: the position
+    at rest is 0 mm in this session.
+    """,
+    work="units:units",
+    words={
+        "on": "show positions in units",
+        "off": "show the drive's own numbers",
+        "here": "the position at rest is this place from now on",
+    },
 )
 STATUS = Operation(
     usage="/status [ADDR]",

@@ -2,7 +2,16 @@
 
 from __future__ import annotations
 
-from multidrop.shell.operations.arguments import JUNIT, SUMMED, YES, function_key, named_value, role_url, rounds
+from multidrop.shell.operations.arguments import (
+    BEYOND,
+    JUNIT,
+    SUMMED,
+    YES,
+    function_key,
+    named_value,
+    role_url,
+    rounds,
+)
 from multidrop.shell.operations.operation import Operation, typed
 
 MACROS = Operation(
@@ -86,6 +95,7 @@ PLAY = Operation(
         "--json": SUMMED,
         "--junit FILE": JUNIT,
         "--yes": YES,
+        "--beyond": BEYOND,
     },
 )
 MACRO_EDIT = Operation(

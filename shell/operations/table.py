@@ -12,7 +12,7 @@ from multidrop.shell.operations import buses, drives, macros, programs, session
 from multidrop.shell.operations.operation import Operation
 
 VERB_ORDER = """
-    /open /close /use /drives /scan /referenced /status /check /trace /step /continue /break /watch /help
+    /open /close /use /drives /scan /referenced /units /status /check /trace /step /continue /break /watch /help
     /macros /macro /key /play /params /plot /list /upload /download /raw /hex /bytes /record /register /coil
     /device /page /tour /stop /resume /log /quit /sim /snapshot /rename /tab /keep /times /filter /save
     /unsent /twin /sleep /wait

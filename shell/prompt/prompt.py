@@ -50,12 +50,17 @@ FIRST_FRAME = 0.05
 
 
 def run(
-    urls: Sequence[str], reconnect: bool = True, agreed: bool = False, raw: bool = False, twin: bool = False
+    urls: Sequence[str],
+    reconnect: bool = True,
+    agreed: bool = False,
+    beyond: bool = False,
+    raw: bool = False,
+    twin: bool = False,
 ) -> int:
     """Open the URLs and prompt until the end; return the exit code.
 
-    `reconnect`: lost buses are tried again. `agreed`: every question is answered with yes. `raw`: the URLs
-    are opened in raw mode. `twin`: each drive gets a twin.
+    `reconnect`: lost buses are tried again. `agreed`: every question is answered with yes; `beyond`: those on travel,
+    too. `raw`: the URLs are opened in raw mode. `twin`: each drive gets a twin.
     """
     try:
         found = configuration.load()
@@ -64,15 +69,15 @@ def run(
         return exit_code(failure)
     try:
         with early_ends():  # before the log has its thread
-            return asyncio.run(_run(partial(Session, found, reconnect=reconnect, raw=raw), urls, agreed, twin))
+            return asyncio.run(_run(partial(Session, found, reconnect=reconnect, raw=raw), urls, agreed, beyond, twin))
     except KeyboardInterrupt:
         return INTERRUPTED
 
 
-async def _run(make: Callable[[], Session], urls: Sequence[str], agreed: bool, twin: bool) -> int:
+async def _run(make: Callable[[], Session], urls: Sequence[str], agreed: bool, beyond: bool, twin: bool) -> int:
     with nonblocking() as streams, ExitStack() as stack:
         session = make()
-        session.questions.agreed, session.twins.wanted = agreed, twin
+        session.questions.agreed, session.questions.beyond, session.twins.wanted = agreed, beyond, twin
         session.subscribe(Printer(talkative=True).show)
         begin_log(session)
         stack.enter_context(collected_at_rest(partial(at_rest, session)))

@@ -10,10 +10,11 @@ import contextlib
 from collections import deque
 from collections.abc import Awaitable, Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from types import MappingProxyType
 from typing import TypeVar
 
 from multidrop.dialects import Diagnostic, DriveError, Stopped
-from multidrop.drives.drive import Drive
+from multidrop.drives.drive import Check, Drive
 from multidrop.macros import checked_values, fill
 from multidrop.shell import waits
 from multidrop.shell.events import FAILURES, By, Failed
@@ -22,8 +23,13 @@ from multidrop.shell.playing import Playing, StepProgress, cast, played_by
 from multidrop.shell.scripts import words
 from multidrop.shell.scripts.captured_prints import Hearing
 from multidrop.shell.scripts.expression import (
+    Binary,
+    Comparison,
+    Constant,
     Expression,
+    Measured,
     Name,
+    Unary,
     Value,
     Word,
     evaluate,
@@ -83,8 +89,40 @@ class Place:
             self._at = self._workspace.place
 
 
+Checks = dict[Word, Check]
+"""What runs right before a question, because a quantity is compared with its value."""
+
+
+async def converted(session: Session, tree: Expression, place: Place | None = None) -> tuple[Expression, Checks]:
+    """The expression with numbers of the drive in place of quantities. Raises Diagnostic."""
+    if isinstance(tree, Unary):
+        operand, checks = await converted(session, tree.operand, place)
+        return replace(tree, operand=operand), checks
+    if isinstance(tree, Binary):
+        left, checks = await converted(session, tree.left, place)
+        right, more = await converted(session, tree.right, place)
+        return replace(tree, left=left, right=right), checks | more
+    if not isinstance(tree, Comparison):
+        return tree, {}
+    word = next((each for each in (tree.left, tree.right) if isinstance(each, Word)), None)
+    found, checks = tree, Checks()
+    for part in ("left", "right", "within"):
+        each = getattr(tree, part)
+        if isinstance(each, Measured) and word is not None:
+            drive = drive_of(session, word, place)
+            question, within = _question(session, drive, word), part == "within"
+            value, checks[word] = await session.units.condition(drive, question, each.text, within)
+            found = replace(found, **{part: Constant(value)})  # type: ignore[arg-type]
+    return found, checks
+
+
 async def known(
-    session: Session, tree: Expression, values: Mapping[str, str], by: By, place: Place | None = None
+    session: Session,
+    tree: Expression,
+    values: Mapping[str, str],
+    by: By,
+    place: Place | None = None,
+    checks: Mapping[Word, Check] = MappingProxyType({}),
 ) -> dict[Name | Word, Value]:
     """Find the value of each name and word of an expression; each word is read once.
 
@@ -93,7 +131,10 @@ async def known(
     found: dict[Name | Word, Value] = {}
     for each in unknowns(tree):
         if each not in found:
-            found[each] = value_of(values[each.name]) if isinstance(each, Name) else await ask(session, each, by, place)
+            if isinstance(each, Name):
+                found[each] = value_of(values[each.name])
+            else:
+                found[each] = await ask(session, each, by, place, checks.get(each))
     return found
 
 
@@ -103,12 +144,12 @@ def drive_of(workspace: Workspace, word: Word, place: Place | None = None) -> Dr
     return workspace.drive(bus, address or None)
 
 
-async def ask(session: Session, word: Word, by: By, place: Place | None = None) -> Value:
+async def ask(session: Session, word: Word, by: By, place: Place | None = None, check: Check | None = None) -> Value:
     """Read the value of a word. Raises Diagnostic, DriveError or TransportLost."""
     drive = drive_of(session, word, place)
     line = _question(session, drive, word)
     await session.path.guard(drive, line, by)
-    printed = await drive.send(line)
+    printed = await drive.send(line, check)
     if len(printed) != 1:
         raise DriveError(f"{session.display_name(drive)}: {line} printed {len(printed)} lines; a value is one")
     return value_of(printed[0])
@@ -414,7 +455,9 @@ class Execution:
         for word in (each for each in unknowns(tree) if isinstance(each, Word)):
             drive = drive_of(self.session, word, frame.place)
             self._heard.target = self._heard.target or (drive.link.name, drive.address)
-        found = await self._known(tree, frame)
+        measured, checks = await converted(self.session, tree, frame.place)
+        assert isinstance(measured, Comparison)
+        tree, found = measured, await self._known(measured, frame, checks)
         if evaluate(tree, found):
             return
         within = evaluate(tree.within, found)
@@ -428,10 +471,11 @@ class Execution:
             raise CheckFailed(f'{text}: wanted "{wanted}" within {seconds:g} s, seen {seen}')
 
     async def _value(self, tree: Expression, frame: Frame) -> Value:
-        return evaluate(tree, await self._known(tree, frame))
+        tree, checks = await converted(self.session, tree, frame.place)
+        return evaluate(tree, await self._known(tree, frame, checks))
 
-    async def _known(self, tree: Expression, frame: Frame) -> Mapping[Name | Word, Value]:
-        return await known(self.session, tree, frame.names, frame.by, frame.place)
+    async def _known(self, tree: Expression, frame: Frame, checks: Checks) -> Mapping[Name | Word, Value]:
+        return await known(self.session, tree, frame.names, frame.by, frame.place, checks)
 
 
 @contextlib.contextmanager

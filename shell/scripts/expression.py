@@ -129,6 +129,13 @@ class Word:
 
 
 @dataclass(frozen=True)
+class Measured:
+    """A quantity, `{10 mm}`: it is compared with one word of a drive, whose scale makes a number of it."""
+
+    text: str
+
+
+@dataclass(frozen=True)
 class Unary:
     """`-X` or `not X`."""
 
@@ -155,7 +162,7 @@ class Comparison:
     within: Expression = field(default_factory=lambda: Constant(0))
 
 
-Expression = Constant | Name | Word | Unary | Binary | Comparison
+Expression = Constant | Name | Word | Measured | Unary | Binary | Comparison
 Known = Mapping[Name | Word, Value]
 """The values of an expression's names and words."""
 
@@ -180,6 +187,9 @@ def evaluate(tree: Expression, known: Known) -> Value:
         return tree.value
     if isinstance(tree, Name | Word):
         return known[tree]
+    if isinstance(tree, Measured):
+        hint = "as in P > {10 mm}, or P == {10 mm} +- {0.1 mm}"
+        raise Diagnostic(f"{tree.text} is not compared with one word of a drive", "", hint)
     if isinstance(tree, Unary):
         operand = number(evaluate(tree.operand, known))
         return -operand if tree.sign == "-" else int(not operand)
@@ -213,6 +223,7 @@ class _Token(NamedTuple):
 _TOKEN = re.compile(
     r"""\s*(?:(?P<number>\d+(?:\.\d*)?|\.\d+)
     |(?P<text>"[^"]*")
+    |(?P<quantity>\{[^{}\s]+[ ][^{}\s]+\})
     |(?P<line>\[(?:"[^"]*"|[^\]"])*\])
     |(?P<address>@\S*)
     |(?P<word>[A-Za-z_][A-Za-z0-9_]*)
@@ -331,6 +342,8 @@ class _Parser:
         if token.kind == "address":
             self._target = _target(token.text)
             return self._operand()
+        if token.kind == "quantity":
+            return Measured(token.text)
         if token.kind == "line":
             return Word(token.text[1:-1].strip() if self._lists else _line(token.text), self._target, line=True)
         if token.kind == "word":

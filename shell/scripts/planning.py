@@ -127,12 +127,17 @@ class _Planning:
             raise Diagnostic(problem.message, line.where, problem.hint) from None
         if drive.link.name in self._workspace.raw:
             return None
+        text = parsed.text
+        if "{" in text:
+            from multidrop.dialects.units import with_numbers
+
+            text = with_numbers(text)
         if value_names(line.text) <= dict.keys(values):
             try:
-                drive.family.check(drive.state, parsed.text)
+                drive.family.check(drive.state, text)
             except Inexpressible as problem:
                 raise Diagnostic(str(problem), line.where) from None
-        return drive if drive.starts(parsed.text) else None
+        return drive if drive.starts(text) else None
 
 
 def _text_of(line: ScriptLine, values: Values) -> str:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import difflib
 import re
+from dataclasses import replace
 from typing import NamedTuple
 
 from multidrop.dialects import Diagnostic, Stopped
@@ -68,7 +69,7 @@ async def quit_(call: Call) -> None:
 
 
 _TEXT = re.compile(r"""(?P<quote>["'])(?P<text>.+?)(?P=quote)(?:\s+(?P<seconds>\S+))?""")
-_VALUE = re.compile(r"(?P<condition>(?:@\S+\s+)?[^\s=!<>]+\s*[=!<>]=?\s*\S+)(?:\s+(?P<seconds>\S+))?")
+_VALUE = re.compile(r"(?P<condition>(?:@\S+\s+)?[^\s=!<>]+\s*[=!<>]=?\s*(?:\{[^{}]*\}|\S+))(?:\s+(?P<seconds>\S+))?")
 
 
 class Wait(NamedTuple):
@@ -124,7 +125,12 @@ async def wait(call: Call) -> None:
     if wanted.text:
         await waits.wait_text(call.session, wanted.text, wanted.limit)
     elif wanted.value is not None:
-        await waits.wait_value(call.session, call.drive(wanted.value.target), wanted.value, wanted.limit)
+        drive, condition, check = call.drive(wanted.value.target), wanted.value, None
+        if condition.quantity:
+            line = waits.question(call.session, drive, condition)
+            number, check = await call.session.units.condition(drive, line, condition.quantity)
+            condition = replace(condition, value=number)
+        await waits.wait_value(call.session, drive, condition, wanted.limit, check)
     else:
         await waits.wait(call.session, wanted.limit, idle=wanted.idle)
 

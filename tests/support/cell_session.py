@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import json
-from collections.abc import AsyncIterator, Sequence
+from collections.abc import AsyncIterator, Mapping, Sequence
 from contextlib import asynccontextmanager
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
+from multidrop.dialects.units import scale
 from multidrop.drives.events import Traffic
-from multidrop.shell.configuration import Settings
+from multidrop.shell.configuration import Guarding, SavedConnection, Settings
 from multidrop.shell.events import Failed, Notified, OnBus, Output, Printed
 from multidrop.shell.session import Session
 
@@ -73,13 +75,27 @@ async def session_on(folder: Path, cell: str, *, opened: bool = True, agreed: bo
 class CellSession:
     """`async with`: the session of a cell, open, and what it told. `bus:name` names a drive of the cell.
 
-    It agrees to every question.
+    It agrees to every question. `units`: the scales of a saved connection; `guards`: those that are off.
     """
 
-    def __init__(self, folder: Path, *buses: str, reconnect: bool = False) -> None:
+    def __init__(
+        self,
+        folder: Path,
+        *buses: str,
+        reconnect: bool = False,
+        units: Mapping[str, Any] = MappingProxyType({}),
+        own: tuple[str, ...] = (),
+        guards: Sequence[str] = (),
+    ) -> None:
         (folder / "cell.toml").write_text("".join(buses))
         self.url = f"sim:{folder / 'cell.toml'}"
-        self.session = Session(Settings({}, folder / "config", folder / "state"), reconnect=reconnect)
+        saved: dict[str, SavedConnection] = {}
+        if units:
+            scales = {axis: scale(found, own) for axis, found in units.items()}
+            saved, self.url = {"saved": SavedConnection("saved", self.url, {}, scales)}, "saved"
+        off = Guarding(off=frozenset(guards))
+        settings = Settings(saved, folder / "config", folder / "state", off, own_units=own)
+        self.session = Session(settings, reconnect=reconnect)
         self.session.questions.agreed = True
         self.events: list[Any] = []
         self.session.subscribe(self.events.append)

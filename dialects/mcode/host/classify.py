@@ -143,7 +143,16 @@ def starts_motion(text: str) -> bool:
 
 def may_displace(text: str) -> bool:
     """Whether a line may change where the drive goes, or what its positions count."""
-    return starts_motion(text) or word_of(text)[0] in SCALE
+    return starts_motion(text) or written_word(text) in SCALE
+
+
+def written_word(text: str) -> str:
+    """Return the variable to which a line gives a value, also by IC and DC; empty: it gives none."""
+    statement = parsed(text)
+    if statement is None or not statement.arguments or statement.word == "PR":
+        return ""
+    first = statement.arguments[0]
+    return first.word if statement.word in STEPS and isinstance(first, Name) else statement.word
 
 
 def target_of(text: str, rest: int | None) -> int | None:

@@ -139,11 +139,11 @@ def _outputs(facts: Facts) -> Iterator[Lamp]:
 # Lines that the product writes by itself. The drive has one axis.
 
 
-def move(axis: str, steps: int) -> tuple[str, ...]:
+def move(axis: str, steps: int | str) -> tuple[str, ...]:
     return (f"MR {steps}",)
 
 
-def move_to(axis: str, position: int) -> tuple[str, ...]:
+def move_to(axis: str, position: int | str) -> tuple[str, ...]:
     return (f"MA {position}",)
 
 

@@ -1,0 +1,457 @@
+"""Engineering units at work: the scales of open drives, quantities in lines, the travel of moves.
+
+Theory of operation. A line with a quantity becomes a line in the drive's own language before anything else asks about
+it: guards, recorders of motion and the drive never see a quantity. What the scale rests on was read before, at the
+opening or by `/units`. It is read again in the same conversation right before the line, and where it differs nothing is
+sent (`Drive.send`, `check`). The line is not converted with the new values: a person has to look first. A move that
+leaves the travel of its axis is asked about. For that, the position is read before the line.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Sequence
+from contextvars import ContextVar
+from dataclasses import dataclass, replace
+from fractions import Fraction
+from typing import TYPE_CHECKING
+from weakref import WeakKeyDictionary
+
+from multidrop.dialects import Diagnostic, DriveError, Procedure, Refused
+from multidrop.dialects.errors import Differs
+from multidrop.dialects.units import (
+    PLACES,
+    QUANTITY,
+    SHORT,
+    Basis,
+    Field,
+    Measure,
+    Scale,
+    Takes,
+    quantities,
+    quantity,
+)
+from multidrop.drives.drive import confirmed_motion
+from multidrop.shell.configuration import TRAVEL
+from multidrop.shell.events import By
+from multidrop.shell.line_syntax import EVERYONE
+
+if TYPE_CHECKING:
+    from multidrop.drives.bus import Bus
+    from multidrop.drives.drive import Check, Drive
+    from multidrop.shell.workspace import Workspace
+
+BEYOND: ContextVar[bool] = ContextVar("beyond", default=False)
+"""The moves of this task may leave their travel."""
+_BRACES = re.compile(r"\{\s*[+-]?[.,]?\d[^{}\"]*\s[^{}\"]*\}")
+"""Braces that hold a number and more: a quantity, or one that is written wrongly."""
+_BARE = re.compile(r"([+-]?(?:\d+[.,]?\d*|[.,]\d+)) ?([A-Za-z]\w*?(?:/(?:s2|s|min))?)(?![a-z0-9_/])", re.ASCII)
+_UNQUOTED = re.compile(r'"[^"]*(?:"|$)')
+
+
+@dataclass(eq=False)
+class Axis:
+    """The scale of one axis, with what it rests on as last read and accepted."""
+
+    scale: Scale
+    basis: Basis | None = None
+    measure: Measure | None = None
+    """None: there is no basis yet, or the scale cannot be used (`problem`)."""
+    problem: str = "what it rests on has not been read"
+    sure: bool = False
+    """Nothing that could change what it rests on has run since it was read."""
+    told: bool = False
+    """It was said that moves are not checked."""
+
+    def accept(self, basis: Basis) -> None:
+        """Take what was read as what the scale rests on."""
+        self.basis, self.sure, self.measure, self.problem = basis, True, None, ""
+        try:
+            self.measure = Measure(self.scale, basis)
+        except Diagnostic as problem:
+            self.problem = str(problem)
+
+
+@dataclass(frozen=True)
+class Line:
+    """A line as it is sent: its text, what runs right before it, and its quantities as shown."""
+
+    text: str
+    check: Check | None = None
+    values: str = ""
+
+
+class Units:
+    """The units of one session."""
+
+    def __init__(self, workspace: Workspace) -> None:
+        self._workspace = workspace
+        self.shown = True
+        """Positions are shown in units where an axis has a scale."""
+        self._axes: WeakKeyDictionary[Drive, dict[str, Axis]] = WeakKeyDictionary()
+
+    # Scales
+
+    @property
+    def own(self) -> tuple[str, ...]:
+        return self._workspace.settings.own_units
+
+    def axes(self, drive: Drive) -> dict[str, Axis]:
+        """The scales of a drive by axis, as in `Motion.axis`."""
+        found = self._axes.get(drive)
+        if found is None:
+            found = self._axes[drive] = {}
+            for key, scale in self._configured(drive).items():
+                if drive.address in EVERYONE:
+                    break
+                address, _, axis = key.partition(".")
+                if address in _names(drive):
+                    axes = [axis.lower()] if axis else drive.family.units.axes(drive.state)
+                    found |= {each: Axis(scale) for each in axes}
+            _anchor(drive, found)
+        return found
+
+    def _configured(self, drive: Drive) -> dict[str, Scale]:
+        bus = self._workspace.buses.get(drive.link.name)
+        connection = self._workspace.of(bus).connection if bus is not None and bus.link is drive.link else None
+        saved = self._workspace.settings.connections.get(connection.name) if connection is not None else None
+        return dict(saved.units) if saved is not None else {}
+
+    def of(self, drive: Drive, axis: str = "") -> Axis | None:
+        """The scale of an axis; None: it has none."""
+        found = self.axes(drive).get(axis)
+        if found is not None and found.sure and _runs(drive):
+            found.sure = False
+        return found
+
+    def referenced(self, drive: Drive, axis: str) -> bool:
+        """Whether places of the machine count."""
+        return not drive.state.unreferenced & {axis, ""}
+
+    def set(self, drive: Drive, axis: str, scale: Scale) -> Axis:
+        """Give an axis a scale."""
+        axes = self.axes(drive)
+        axes[axis] = Axis(scale)
+        _anchor(drive, axes)
+        self._workspace.scaled = True
+        return axes[axis]
+
+    async def confirm(self, drive: Drive) -> None:
+        """Read what the scales of a drive rest on, and take it as it is. Raises DriveError or TransportLost."""
+        for name, axis in self.axes(drive).items():
+            axis.accept(await self._read(drive, name, axis.scale))
+            if _runs(drive):
+                axis.sure = False
+        self._workspace.changed()
+
+    async def opened(self, bus: Bus) -> None:
+        """Read what the scales of a bus rest on; say which of them are for no drive, or cannot be read."""
+        workspace = self._workspace
+        for drive in bus.drives.values():
+            try:
+                await self.confirm(drive)
+            except DriveError as failure:
+                workspace.notify(f"{bus.name}: the scale of {drive.shown} is not confirmed: {failure}", warning=True)
+            for axis in self.axes(drive).values():
+                if axis.problem:
+                    workspace.notify(f"{bus.name}: {drive.shown}: {axis.problem}", bus=bus.name, warning=True)
+        known = {name for drive in bus.drives.values() for name in _names(drive)}
+        axes = {axis for drive in bus.drives.values() for axis in (*drive.family.units.axes(drive.state), "")}
+        for drive in list(bus.drives.values())[:1]:
+            for key in self._configured(drive):
+                address, _, name = key.partition(".")
+                if address not in known or name.lower() not in axes:
+                    workspace.notify(f"{bus.name}: units has {key}, which no drive there is", warning=True)
+
+    async def _read(self, drive: Drive, axis: str, scale: Scale) -> Basis:
+        return await drive.run(drive.family.units.basis(drive.state, axis, scale.full_steps))
+
+    async def measure(self, drive: Drive, axis: str) -> Measure:
+        """The measure of an axis; what it rests on is read where it was not. Raises Diagnostic where there is none."""
+        found, name = self.of(drive, axis), self._name(drive, axis)
+        if found is None:
+            raise Diagnostic(f"{name} has no scale", "", f"/units {name} 5 mm/turn gives it one")
+        if found.basis is None:
+            await self.confirm(drive)
+        if found.measure is None:
+            raise Diagnostic(f"{name}: {found.problem}")
+        return found.measure
+
+    def _name(self, drive: Drive, axis: str) -> str:
+        shown = self._workspace.display_name(drive) or drive.shown
+        return f"{shown}.{axis}" if axis else shown
+
+    # Quantities in lines
+
+    async def line(self, drive: Drive, text: str, by: By) -> Line:
+        """Convert the quantities of a line for a drive, and ask before a move that leaves its travel.
+
+        Raises Diagnostic for a quantity that the line or the axis cannot take, Refused in program mode.
+        """
+        found = self._quantities(drive, text)
+        line = await self._converted(drive, text, found) if found else Line(text)
+        if not drive.programming:
+            await self._travel(drive, line.text, by)
+        return line
+
+    def _quantities(self, drive: Drive, text: str) -> list[re.Match[str]]:
+        """The quantities of a line. Raises Diagnostic for one that is written wrongly."""
+        bare = _UNQUOTED.sub(lambda match: " " * len(match[0]), text)
+        found = list(quantities(text))
+        for match in _BRACES.finditer(bare):
+            if QUANTITY.fullmatch(match[0]) is None:
+                quantity(match[0][1:-1], self.own)
+                raise Diagnostic(f"{match[0]} is no quantity", "", "valid: {NUMBER SPACE UNIT}, as in {12.5 mm}")
+        for unit in _BARE.finditer(bare):
+            if unit[2].partition("/")[0] in (*PLACES, *SHORT, *self.own):
+                written = f"{{{unit[1].replace(',', '.')} {unit[2]}}}"
+                meant = text[: unit.start()] + written + text[unit.end() :]
+                if any(field.start == unit.start() for field in drive.family.units.fields(drive.state, meant)):
+                    raise Diagnostic(f"{unit[0]} has a unit; nothing was sent", text.strip(), f"write {meant.strip()}")
+        return found
+
+    async def _converted(self, drive: Drive, text: str, found: Sequence[re.Match[str]]) -> Line:
+        name = self._workspace.display_name(drive) or drive.shown
+        if drive.programming:
+            raise Refused(f"{name} is in program mode, which takes no quantity; nothing was sent")
+        drives = self._meant(drive)
+        fields = {field.start: field for field in drive.family.units.fields(drives[0].state, text)}
+        for match in found:
+            if match.start() not in fields:
+                valid = f"valid: {drive.family.units.words}, each with one"
+                raise Diagnostic(f"{match[0]}: no quantity is taken here; nothing was sent", text.strip(), valid)
+        target = await self._target(drives, fields.values())
+        pieces, values, at, wanted = [], [], 0, set[str]()
+        for match in found:
+            field = fields[match.start()]
+            takes = target if field.takes is Takes.TARGET and target is not None else field.takes
+            given, measure = quantity(match[0][1:-1], self.own), await self._common(drives, field.axis)
+            if takes is Takes.PLACE:
+                self._check_referenced(drives, field.axis)
+            try:
+                number = measure.native(given, takes)
+            except Diagnostic as problem:
+                raise Diagnostic(f"{problem.message}; nothing was sent", text.strip(), problem.hint) from None
+            pieces += [text[at : match.start()], str(number)]
+            values.append(measure.shown(number, takes))
+            at = match.end()
+            wanted.add(field.axis)
+        sent = "".join(pieces) + text[at:]
+        return Line(sent, await self._check(drive, sorted(wanted), target, sent), ", ".join(values))
+
+    def _meant(self, drive: Drive) -> list[Drive]:
+        """The drives that a line goes to."""
+        if drive.address not in EVERYONE:
+            return [drive]
+        found = self._workspace.bus(drive.link.name).all_drives
+        if not found:
+            raise Diagnostic(f"{drive.link.name}: no drive has replied, so no scale is known; nothing was sent")
+        return found
+
+    async def _target(self, drives: Sequence[Drive], fields: Iterable[Field]) -> Takes | None:
+        """Read what a target means to each of these drives. Raises Diagnostic where they differ."""
+        if not any(field.takes is Takes.TARGET for field in fields):
+            return None
+        found = {await each.run(each.family.units.target(each.state)) for each in drives if each.family.units.target}
+        if len(found) != 1:
+            raise Diagnostic("targets are positions for some drives and distances for others; nothing was sent")
+        return found.pop()
+
+    async def _common(self, drives: Sequence[Drive], axis: str) -> Measure:
+        """The measure that these drives have in common. Raises Diagnostic where they have several."""
+        found = [await self.measure(each, axis) for each in drives]
+        for each, other in zip(drives, found, strict=True):
+            if (other.count, other.scale.zero, other.basis) != (found[0].count, found[0].scale.zero, found[0].basis):
+                names = f"{self._name(drives[0], axis)} and {self._name(each, axis)}"
+                raise Diagnostic(f"{names} have different scales; nothing was sent", "", "name one drive")
+        return found[0]
+
+    def _check_referenced(self, drives: Sequence[Drive], axis: str) -> None:
+        for each in drives:
+            if not self.referenced(each, axis):
+                name = self._name(each, axis)
+                hint = f"home it, or /units here {name} 0 {axis_unit(self.of(each, axis))} where it is"
+                raise Diagnostic(f"the position of {name} is not referenced; nothing was sent", "", hint)
+
+    async def _check(self, drive: Drive, axes: Sequence[str], target: Takes | None, text: str) -> Check:
+        """What runs right before a line: what its quantities rest on is read again, of every drive that takes it."""
+        drives = self._meant(drive)
+        rests = {each: [(axis, self.axes(each)[axis]) for axis in axes] for each in drives}
+
+        def check(each: Drive) -> Procedure[None]:
+            for name, axis in rests[each]:
+                yield from self._same(each, name, axis, text)
+            units = each.family.units
+            if target is not None and units.target is not None and (yield from units.target(each.state)) is not target:
+                raise Differs(f"{each.shown}: ABS or INC was set meanwhile; '{text}' was not sent")
+
+        if drive.address not in EVERYONE or not drive.codec.broadcasts:
+            return check
+        for each in drives:  # no drive replies to a line for all, so each is asked in a conversation of its own
+            await each.run(check(each))
+        before = [each.commands for each in drives]
+
+        def still(_: Drive) -> Procedure[None]:
+            yield from ()
+            if [each.commands for each in drives] != before:
+                raise Differs(f"{drive.shown}: another line was sent meanwhile; '{text}' was not sent")
+
+        return still
+
+    def _same(self, drive: Drive, name: str, axis: Axis, text: str) -> Procedure[None]:
+        """Read what a scale rests on. Raises Differs where it is not what was accepted."""
+        found = yield from drive.family.units.basis(drive.state, name, axis.scale.full_steps)
+        if axis.basis is None or found.settings != axis.basis.settings:
+            self._lost(drive, name, axis)
+            before = dict(axis.basis.settings) if axis.basis is not None else {}
+            was = [
+                f"{key} was {before.get(key)} and is {now} now" for key, now in found.settings if before.get(key) != now
+            ]
+            hint = f"/units {self._name(drive, name)} takes it as it is now"
+            raise Differs(f"{drive.shown}: {', '.join(was)}: its scale rests on that, so '{text}' was not sent; {hint}")
+        axis.sure = not _runs(drive)
+
+    def _lost(self, drive: Drive, name: str, axis: Axis) -> None:
+        axis.sure = False
+        if axis.scale.anchored:
+            drive.state.reference_lost([name])
+
+    # Quantities in conditions
+
+    async def condition(self, drive: Drive, question: str, text: str, within: bool = False) -> tuple[float, Check]:
+        """Convert a quantity that is compared with the value of a question; `within`: it is a tolerance.
+
+        Returns the drive's own number, not rounded, and what runs right before the question.
+        """
+        found = drive.family.units.reads(drive.state, question)
+        if found is None:
+            raise Diagnostic(
+                f"{text}: '{question}' prints no quantity", self._name(drive, ""), "compare it with a number"
+            )
+        axis, takes = found
+        if drive.programming:
+            raise Refused(f"{self._name(drive, '')} is in program mode, which takes no quantity")
+        measure, given = await self.measure(drive, axis), quantity(text.strip("{}"), self.own)
+        if within:
+            takes = {Takes.PLACE: Takes.DISTANCE, Takes.VELOCITY: Takes.SPEED}.get(takes, takes)
+        elif takes is Takes.PLACE:
+            self._check_referenced([drive], axis)
+        number = measure.number(given, takes)
+        check = await self._check(drive, [axis], None, question)
+        return (abs(number) if within else number), check
+
+    async def reading(self, drive: Drive, axis: str, what: str, unit: str) -> float:
+        """Read the position or the velocity of an axis in a unit; what its scale rests on comes first.
+
+        An empty axis is the first one. Raises Diagnostic, Differs where the scale must be confirmed again.
+        """
+        axis = axis or drive.family.units.axes(drive.state)[0]
+        measure, takes = await self.measure(drive, axis), Takes.PLACE if what == "position" else Takes.VELOCITY
+        wanted = quantity(f"1 {unit}", self.own)
+        measure.number(wanted, takes)  # of the same kind
+        if takes is Takes.PLACE:
+            self._check_referenced([drive], axis)
+        await drive.run(self._same(drive, axis, self.axes(drive)[axis], f"{what} in {unit}"))
+        motion = next(each for each in await drive.motion() if each.axis == axis)
+        number = motion.position if takes is Takes.PLACE else motion.velocity
+        return float(measure.base(number, takes, wanted))
+
+    # Travel
+
+    async def _travel(self, drive: Drive, text: str, by: By) -> None:
+        """Ask before a move that leaves the travel of its axis; say once where the end is not known."""
+        if drive.address in EVERYONE and not self._workspace.bus(drive.link.name).all_drives:
+            return
+        for each in self._meant(drive):
+            limited = {name: axis for name, axis in self.axes(each).items() if axis.scale.travel is not None}
+            if not limited or not each.starts(text):
+                continue
+            fields = [field for field in each.family.units.fields(each.state, text) if field.moves]
+            ends = each.family.guards is not None and each.family.guards.only_ends(text)
+            if not fields and not ends and each.family.referencing(each.state, text) is None:
+                for name, axis in limited.items():
+                    self._unchecked(each, name, axis, f"the end of '{text}' is not known")
+            for field in fields:
+                if field.axis in limited:
+                    await self._leaves(each, field, limited[field.axis], text, by)
+
+    def _unchecked(self, drive: Drive, name: str, axis: Axis, why: str) -> None:
+        if not axis.told:
+            axis.told = True
+            self._workspace.notify(f"{self._name(drive, name)}: travel not checked: {why}", bus=drive.link.name)
+
+    async def _leaves(self, drive: Drive, field: Field, axis: Axis, text: str, by: By) -> None:
+        name, travel = self._name(drive, field.axis), axis.scale.travel
+        assert travel is not None
+        takes = await self._target([drive], [field]) or field.takes
+        measure = await self.measure(drive, field.axis)
+        now = await self._read(drive, field.axis, axis.scale)
+        if axis.basis is None or now.settings != axis.basis.settings:
+            self._lost(drive, field.axis, axis)
+        if not self.referenced(drive, field.axis):
+            why = "its position is not referenced"
+            if takes is Takes.PLACE:
+                return await self._confirm(f"'{text}' may leave the travel: {why}", name, by)
+            return self._unchecked(drive, field.axis, axis, why)
+        motion = next((each for each in await confirmed_motion(drive) if each.axis == field.axis), None)
+        at_rest = motion is not None and not motion.velocity
+        if motion is None or not (at_rest or takes is Takes.PLACE):
+            return self._unchecked(drive, field.axis, axis, "it moves")
+        number = int(text[field.start : field.stop])
+        end = number if takes is Takes.PLACE else motion.position + number
+        begin = motion.position if at_rest else end
+        axis.told = False
+        if _leaves(measure.exact(begin), measure.exact(end), travel):
+            low, high = (axis.scale.shown(each) for each in travel)
+            await self._confirm(f"'{text}' ends at {measure.shown(end)}, and the travel is {low} to {high}", name, by)
+
+    async def _confirm(self, what: str, name: str, by: By) -> None:
+        if not (BEYOND.get() or TRAVEL in self._workspace.settings.guards.off):
+            await self._workspace.questions.confirm(what, name, by=by, beyond=True)
+
+    # Here
+
+    async def here(self, drive: Drive, axis: str, text: str) -> Axis:
+        """Have the position at rest be a place from now on. Raises Diagnostic while it moves."""
+        measure, given = await self.measure(drive, axis), quantity(text, self.own)
+        await self.confirm(drive)
+        motion = next((each for each in await confirmed_motion(drive) if each.axis == axis), None)
+        if motion is None or motion.velocity:
+            raise Diagnostic(f"{self._name(drive, axis)} moves", "/units here", "wait until it is at rest")
+        found = self.axes(drive)[axis]
+        if given.unit.kind != measure.scale.kind or given.unit.per:
+            raise Diagnostic(f"{given}: the scale is {measure.scale}", "/units here", f"use {measure.unit}")
+        scale = found.scale.with_zero(Fraction(0))
+        zero = given.base - Measure(scale, found.basis or Basis()).exact(motion.position)
+        basis = found.basis
+        found = self.set(drive, axis, replace(scale, zero=zero))
+        if basis is not None:
+            found.accept(basis)
+        drive.state.referenced(axis)
+        self._workspace.changed()
+        return found
+
+
+def axis_unit(axis: Axis | None) -> str:
+    return axis.scale.unit.name if axis is not None else "mm"
+
+
+def _leaves(begin: Fraction, end: Fraction, travel: tuple[Fraction, Fraction]) -> bool:
+    """Whether a move ends outside; not where it only comes back towards the travel."""
+    low, high = travel
+    if low <= end <= high:
+        return False
+    return not (end < begin and end > high) and not (begin < end < low)
+
+
+def _names(drive: Drive) -> set[str]:
+    """What a configuration may call a drive; one without an address also `!`."""
+    return {drive.address or "!", *filter(None, (drive.label, drive.state.name if not drive.address else ""))}
+
+
+def _anchor(drive: Drive, axes: dict[str, Axis]) -> None:
+    drive.anchored = frozenset(name for name, axis in axes.items() if axis.scale.anchored)
+
+
+def _runs(drive: Drive) -> bool:
+    return drive.state.running or (drive.running is not None and drive.running.runs)

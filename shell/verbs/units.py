@@ -1,0 +1,110 @@
+"""The work of `/units`: scales given, confirmed and listed; the display in units."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+from multidrop.dialects import Diagnostic
+from multidrop.dialects.units import Takes, scale
+from multidrop.shell.verbs.call import Call
+
+if TYPE_CHECKING:
+    from multidrop.drives.drive import Drive
+
+
+async def units(call: Call) -> None:
+    session = call.session
+    match call.split():
+        case []:
+            found = [
+                (drive, axis)
+                for bus in session.buses.values()
+                for drive in bus.drives.values()
+                for axis in _axes(call, drive)
+            ]
+            for drive, axis in found:
+                session.output(_described(call, drive, axis))
+            if not found:
+                session.notify("no axis has a scale: /units ADDR 5 mm/turn gives it one", outcome=True)
+        case [("on" | "off") as word]:
+            session.units.shown = word == "on"
+            session.changed()
+        case ["here", *rest] if len(rest) in (2, 3):
+            drive, axis = _meant(call, "".join(rest[:-2]))
+            await session.units.here(drive, axis, " ".join(rest[-2:]))
+            session.output(_described(call, drive, axis))
+        case [target]:
+            drive, axis = _meant(call, target)
+            if axis not in _axes(call, drive):
+                raise Diagnostic(f"{target} has no scale", "/units", f"/units {target} 5 mm/turn gives it one")
+            await session.units.confirm(drive)
+            session.output(_described(call, drive, axis))
+        case [*target, _, unit] if len(target) < 2 and "/" in unit:
+            drive, axis = _meant(call, "".join(target))
+            await _give(call, drive, axis, " ".join(call.split()[-2:]))
+            session.output(_described(call, drive, axis))
+        case _:
+            raise call.wrong()
+
+
+async def _give(call: Call, drive: Drive, axis: str, text: str) -> None:
+    """Give an axis a scale; zero and travel of one of the same kind stay, but its places then need a reference."""
+    units = call.session.units
+    given, before = scale(text, units.own), units.of(drive, axis)
+    if before is not None and before.scale.kind == given.kind:
+        given = replace(
+            given, **{key: getattr(before.scale, key) for key in ("zero", "travel", "full_steps", "anchored")}
+        )
+        if given.anchored and given != before.scale:
+            drive.state.reference_lost([axis])
+    units.set(drive, axis, given)
+    await units.confirm(drive)
+    found = units.of(drive, axis)
+    if found is not None and found.measure is None:
+        raise Diagnostic(found.problem, "/units")
+
+
+def _axes(call: Call, drive: Drive) -> list[str]:
+    return sorted(call.session.units.axes(drive))
+
+
+def _meant(call: Call, target: str) -> tuple[Drive, str]:
+    """The drive and the axis of `ADDR`, `ADDR.AXIS`, or of nothing: the selected drive. Raises Diagnostic."""
+    session, (address, _, axis) = call.session, target.rpartition(".")
+    known = {
+        name for bus in session.buses.values() for each in bus.drives.values() for name in (each.address, each.label)
+    }
+    if not address or target.rpartition(":")[2] in known:
+        address, axis = target, ""
+    drive = call.drive(address)
+    if drive not in session.bus(drive.link.name).drives.values():
+        raise Diagnostic(f"no drive {target}", "/units", "/drives lists them")
+    axes = drive.family.units.axes(drive.state)
+    if axis.lower() not in axes:
+        names = ", ".join(f"{drive.address}.{each}" for each in axes if each)
+        raise Diagnostic(f"no axis {target}", "/units", f"valid: {names or drive.address}")
+    return drive, axis.lower()
+
+
+def _described(call: Call, drive: Drive, name: str) -> str:
+    """A scale in one line: `a: 5 mm/turn, 51200 a turn (MS=256, EE=0), travel 0 mm to 300 mm`."""
+    session = call.session
+    axis = session.units.axes(drive)[name]
+    shown = session.display_name(drive) or drive.shown
+    parts = [f"{shown}.{name}" if name else shown, str(axis.scale)]
+    if axis.measure is not None:
+        basis = axis.measure.basis
+        turn = f"{float(basis.turn):g} steps a turn" if basis.turn else ""
+        parts += [turn, f"one step is {axis.measure.shown(1, Takes.DISTANCE)}", str(basis), basis.assumed]
+    else:
+        parts.append(axis.problem)
+    if axis.scale.anchored:
+        parts.append(f"zero {axis.scale.shown(axis.scale.zero)}")
+    if axis.scale.travel is not None:
+        parts.append("travel {} to {}".format(*map(axis.scale.shown, axis.scale.travel)))
+    if not session.units.referenced(drive, name):
+        parts.append("not referenced")
+    if axis.measure is not None and not axis.sure:
+        parts.append("not confirmed since a program ran, or a setting changed")
+    return f"{parts[0]}: {', '.join(filter(None, parts[1:]))}"
