@@ -115,6 +115,8 @@ class Openings:
         if bus.lost is not None:
             raise bus.lost
         await bus.reserve()
+        for drive in bus.drives.values():  # bytes may do anything
+            drive.state.reference_lost(drive.anchored)
         begin_raw(self._workspace, bus)
 
     async def raw_off(self, bus: Bus) -> None:
