@@ -10,7 +10,7 @@ import errno
 from collections.abc import Callable
 from random import Random
 
-from multidrop.simulator.serving.running import RunningFloor
+from multidrop.simulator.serving.running import Listener, RunningFloor
 from soak.simulation.climate import Climate
 from soak.simulation.clock import SimulatedLoop
 
@@ -80,11 +80,8 @@ class Descriptor:
         self.loop.readable(self._descriptor)
 
 
-class Port(Descriptor):
+class Port(Descriptor, Listener):
     """An open tty on the wire of a bus. What has not left can be taken back."""
-
-    gathers = False
-    """It has the kind "late read" in place of that."""
 
     def __init__(
         self,
@@ -163,12 +160,6 @@ class Port(Descriptor):
         self._gone = True
         self.wake()
 
-    def plugged(self) -> None:
-        """Do nothing: a descriptor of a pulled adapter stays dead."""
-
     def disconnected(self) -> None:
         """The other end has gone."""
         self.unplugged()
-
-    def connectable(self) -> None:
-        """Do nothing: somebody has to connect anew."""
