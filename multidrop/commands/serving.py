@@ -1,6 +1,6 @@
 """Commands that serve until interrupted, and small ones: each imports what it needs when it runs.
 
-`multidrop sim`, `share`, `relay`, `plot`, `publish`, `lsp`, `ports`, `completion`.
+`multidrop sim`, `share`, `relay`, `plot`, `poll`, `publish`, `lsp`, `ports`, `completion`.
 """
 
 from __future__ import annotations
@@ -59,6 +59,13 @@ def plot(chosen: argparse.Namespace) -> int:
         rate=chosen.rate,
         reconnect=not chosen.no_reconnect,
     )
+
+
+def poll(chosen: argparse.Namespace) -> int:
+    from multidrop.shell.batch import poll
+
+    asked = poll.Polling(chosen.names, chosen.drive or "all", chosen.every, chosen.rows, chosen.json)
+    return poll.run(chosen.url, asked, reconnect=not chosen.no_reconnect)
 
 
 def publish(chosen: argparse.Namespace) -> int:

@@ -65,8 +65,8 @@ function _shtab_multidrop_using
   test "$_shtab_multidrop_cmdpath" = "$argv"
 end
 
-set -g _shtab_multidrop_commands demo tui shell send run sim program 'program check' 'program test' 'program sweep' 'program list' 'program upload' 'program download' params 'params backup' 'params diff' 'params restore' macro 'macro list' 'macro show' 'macro play' 'macro edit' 'macro describe' 'macro rename' 'macro copy' 'macro delete' 'macro key' 'macro import' 'macro export' plot publish share snapshot ports relay scan rescue log 'log show' 'log follow' 'log grep' 'log judge' 'log replay' config 'config path' 'config show' 'config check' help lsp report completion
-set -g _shtab_multidrop_opts_with_value --against --allow --baud --break --cell --cluster --dialect --drive --expect --jobs --junit --language --on --other --output --page --personality --random --rate --rfc2217 --role --run --save --seed --serve --set --speed --tcp --times --to --until --vary --watch --with -o
+set -g _shtab_multidrop_commands demo tui shell send run sim program 'program check' 'program test' 'program sweep' 'program list' 'program upload' 'program download' params 'params backup' 'params diff' 'params restore' macro 'macro list' 'macro show' 'macro play' 'macro edit' 'macro describe' 'macro rename' 'macro copy' 'macro delete' 'macro key' 'macro import' 'macro export' plot poll publish share snapshot ports relay scan rescue log 'log show' 'log follow' 'log grep' 'log judge' 'log replay' config 'config path' 'config show' 'config check' help lsp report completion
+set -g _shtab_multidrop_opts_with_value --against --allow --baud --break --cell --cluster --dialect --drive --every --expect --jobs --junit --language --on --other --output --page --personality --random --rate --rfc2217 --role --rows --run --save --seed --serve --set --speed --tcp --times --to --until --vary --watch --with -o
 
 complete -c multidrop -e
 complete -c multidrop -f
@@ -238,6 +238,14 @@ complete -c multidrop -n '_shtab_multidrop_using plot' -l to -x -d 'a file for r
 complete -c multidrop -n '_shtab_multidrop_using plot' -l serve -x -d 'serve a viewer'"'"'s data here'
 complete -c multidrop -n '_shtab_multidrop_using plot' -l no-reconnect -d 'give up a lost connection, and do not try again'
 complete -c multidrop -n '_shtab_multidrop_using plot; and test $_shtab_multidrop_npos -eq 0' -ka "(_multidrop_url)" -d 'what to open'
+complete -c multidrop -n '_shtab_multidrop_using; and test $_shtab_multidrop_npos -eq 0' -a poll -d 'Print values of drives in a row every so many seconds, until interrupted.'
+complete -c multidrop -n '_shtab_multidrop_using poll' -s h -l help -d 'show this help message and exit'
+complete -c multidrop -n '_shtab_multidrop_using poll' -l every -x -d 'the time from one row to the next'
+complete -c multidrop -n '_shtab_multidrop_using poll' -l drive -x -d 'the drives of names without an address (default: all); may be repeated'
+complete -c multidrop -n '_shtab_multidrop_using poll' -l rows -x -d 'end after this number of rows'
+complete -c multidrop -n '_shtab_multidrop_using poll' -l json -d 'print one JSON object a value: time (UTC), bus, drive, name, value (null: not known)'
+complete -c multidrop -n '_shtab_multidrop_using poll' -l no-reconnect -d 'give up a lost connection, and do not try again'
+complete -c multidrop -n '_shtab_multidrop_using poll; and test $_shtab_multidrop_npos -eq 0' -ka "(_multidrop_url)" -d 'what to open'
 complete -c multidrop -n '_shtab_multidrop_using; and test $_shtab_multidrop_npos -eq 0' -a publish -d 'Publish samples, states, errors and transcripts of all drives to an MQTT broker until interrupted.'
 complete -c multidrop -n '_shtab_multidrop_using publish' -s h -l help -d 'show this help message and exit'
 complete -c multidrop -n '_shtab_multidrop_using publish' -l to -x -d 'the broker, and the topic above all others; mqtts:// is encrypted'

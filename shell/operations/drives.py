@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from multidrop.shell.operations.arguments import JSON, NO_RECONNECT, WHAT, YES, drives
+from multidrop.shell.operations.arguments import JSON, NO_RECONNECT, WHAT, YES, count, drives, duration
 from multidrop.shell.operations.operation import Operation, typed
 
 if TYPE_CHECKING:
@@ -134,6 +134,25 @@ PLOT = Operation(
             ),
             "--serve [HOST:]PORT": typed("serve a viewer's data here", default=None),
         },
+        "--no-reconnect": NO_RECONNECT,
+    },
+)
+POLL = Operation(
+    command="poll",
+    meaning="print values of drives in a row every so many seconds, until interrupted",
+    run="serving.poll",
+    examples=[
+        "poll press P V --every 1",
+        "poll press IT b.VM --drive a --every 60 --json",
+        "poll sim:#pmx PX --every 0.5 --rows 10",
+    ],
+    arguments={
+        "URL": WHAT,
+        "NAME ...": "a value of the drives of --drive, as P or VM; or of one drive, as b.VM, press:b.I1",
+        "--every SECONDS": typed("the time from one row to the next", required=True, type=duration),
+        "--drive ADDR": drives("the drives of names without an address (default: all)"),
+        "--rows N": typed("end after this number of rows", type=count),
+        "--json": "print one JSON object a value: time (UTC), bus, drive, name, value (null: not known)",
         "--no-reconnect": NO_RECONNECT,
     },
 )

@@ -17,8 +17,8 @@ VERB_ORDER = """
     /device /page /tour /stop /resume /log /quit /sim /snapshot /rename /tab /keep /times /filter /save
     /unsent /twin /sleep /wait
 """
-COMMAND_ORDER = """demo tui shell send run sim program params macro plot publish share snapshot ports relay scan rescue
-    log config help lsp report completion"""
+COMMAND_ORDER = """demo tui shell send run sim program params macro plot poll publish share snapshot ports relay scan
+    rescue log config help lsp report completion"""
 SCRIPT_WORDS = {
     "/set": "/set NAME EXPR",
     "/if": "/if EXPR",

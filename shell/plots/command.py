@@ -37,19 +37,19 @@ async def _until_ended(workspace: Session, target: PlotTarget, drives: Sequence[
     if running.desk:
         write(sys.stderr, f"at your desk: {running.desk}, then rerun {running.where}")
     try:
-        lost = runner.until(workspace, lambda: _lost(workspace))
-        waits: list[asyncio.Task[object]] = [asyncio.create_task(plot.ended.wait()), asyncio.create_task(lost)]
+        losing = runner.until(workspace, lambda: lost(workspace))
+        waits: list[asyncio.Task[object]] = [asyncio.create_task(plot.ended.wait()), asyncio.create_task(losing)]
         try:
             await asyncio.wait(waits, return_when=asyncio.FIRST_COMPLETED)
         finally:
             for each in waits:
                 each.cancel()
-        raise _lost(workspace) or DriveError(plot.failure)
+        raise lost(workspace) or DriveError(plot.failure)
     finally:
         write(sys.stderr, await running.end())
 
 
-def _lost(workspace: Session) -> TransportLost | None:
+def lost(workspace: Session) -> TransportLost | None:
     """The loss of a bus that is not tried again."""
     trying = workspace.reconnections.trying
     return next((bus.lost for bus in workspace.buses.values() if bus.lost and bus.name not in trying), None)

@@ -362,7 +362,7 @@ def check(state: MCodeState, word: str) -> str:
     try:
         debugging.check_names(state, [word])
     except Diagnostic as wrong:
-        raise Diagnostic(wrong.message.replace("be watched", "be plotted"), wrong.where, wrong.hint) from None
+        raise Diagnostic(wrong.message.replace("be watched", "be polled"), wrong.where, wrong.hint) from None
     return word.upper()
 
 

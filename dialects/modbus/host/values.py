@@ -180,10 +180,10 @@ def check(state: ModbusState, word: str) -> str:
     try:
         mapping.reading(name)
     except (Inexpressible, Refused) as reason:
-        raise Diagnostic(f"{word} cannot be plotted: {reason}") from None
+        raise Diagnostic(f"{word} cannot be polled: {reason}") from None
     if name == "ER" or name in _NO_NUMBER:
         why = "reading it clears it" if name == "ER" else "it is not a number"
-        raise Diagnostic(f"{word} cannot be plotted: {why}")
+        raise Diagnostic(f"{word} cannot be polled: {why}")
     return name
 
 

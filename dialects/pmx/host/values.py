@@ -341,7 +341,7 @@ def _pace(axis: str, facts: Mapping[str, int]) -> Pace | None:
 def check(state: PmxState, word: str) -> str:
     row = lookup(word)
     if row is None or "R" not in row.access:
-        raise Diagnostic(f"{word} cannot be plotted: it reads no value", hint="valid: V0 to V63, DI, SSPD and others")
+        raise Diagnostic(f"{word} cannot be polled: it reads no value", hint="valid: V0 to V63, DI, SSPD and others")
     return word.upper()
 
 

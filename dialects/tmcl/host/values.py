@@ -249,11 +249,9 @@ _AXIS_WORD = re.compile(r"AP(\d{1,3})(?:/(\d))?", re.IGNORECASE | re.ASCII)
 def check(state: TmclState, word: str) -> str:
     found = _AXIS_WORD.fullmatch(word)
     if found is None or int(found[1]) > 255:
-        raise Diagnostic(
-            f"{word} cannot be plotted", hint="valid: AP and a parameter, /MOTOR after it; as AP206, AP1/1"
-        )
+        raise Diagnostic(f"{word} cannot be polled", hint="valid: AP and a parameter, /MOTOR after it; as AP206, AP1/1")
     if Call(Command.GAP, int(found[1])).changed_by_reading:
-        raise Diagnostic(f"{word} cannot be plotted: reading it clears it", hint=f"GAP {found[1]}, 0 reads it once")
+        raise Diagnostic(f"{word} cannot be polled: reading it clears it", hint=f"GAP {found[1]}, 0 reads it once")
     return word.upper()
 
 

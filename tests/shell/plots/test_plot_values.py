@@ -63,10 +63,10 @@ async def test_words_name_drives_and_values(tmp_path: Path) -> None:
     [
         ("x.VM", "no drive x; valid on press: a, b"),
         ("nobus:a", "no drive nobus:a; open: press, eth"),
-        ("a.ER", "ER cannot be plotted: reading it clears it"),
-        ("a.MA", "MA cannot be plotted: it prints no value"),
+        ("a.ER", "ER cannot be polled: reading it clears it"),
+        ("a.MA", "MA cannot be polled: it prints no value"),
         ("a.", "no value in 'a.'"),
-        ("PR VM", "cannot be plotted"),
+        ("PR VM", "cannot be polled"),
         ("QQ", "no drive and no value QQ; valid on press: a, b; .QQ is a user's variable"),
         ("", "no value"),
     ],
