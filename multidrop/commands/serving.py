@@ -62,7 +62,7 @@ def plot(chosen: argparse.Namespace) -> int:
 
 
 def poll(chosen: argparse.Namespace) -> int:
-    from multidrop.shell.batch import poll
+    from multidrop.shell.plots import poll
 
     asked = poll.Polling(chosen.names, chosen.drive or "all", chosen.every, chosen.rows, chosen.json)
     return poll.run(chosen.url, asked, reconnect=not chosen.no_reconnect)
