@@ -2,7 +2,9 @@
 
 Rulings where the manuals are silent: a limit switch stops the motor at once and lets it run away from it; MVP REL
 counts from the last target, with parameter 127 at 1 or 2 from the actual position; a position beyond 32 bits wraps
-around, and a move takes the shorter way; an acceleration of 0 acts as 1.
+around, and a move takes the shorter way; an acceleration of 0 acts as 1. Parameter 206 is FREE while the motor turns
+without load, less by the world's load, and 0 at rest or in a stall; a stall at the velocity of parameter 181 or above
+stops the motor at once.
 
 The reference search (RFS) is a sequence of steps by the mode in axis parameter 193. Ruling: the motor turns to a switch
 at the search velocity, stops at once where it closes, and leaves it at the switch velocity; where it opens is position
@@ -25,6 +27,8 @@ FULL = 256
 """Microsteps of a full step, which is one motor step of the world."""
 CLOCK = 16e6
 """The clock of a TMC428 or TMC429, Hz."""
+FREE = 1023
+"""The load value (parameter 206) of a motor that turns without load."""
 FROM_TARGET = 0
 """The value of parameter 127 with which MVP REL counts from the last target."""
 VELOCITIES = frozenset({Axis.MAXIMUM_VELOCITY, Axis.MAXIMUM_ACCELERATION, Axis.RAMP_DIVISOR, Axis.PULSE_DIVISOR})
@@ -55,6 +59,7 @@ class Motor:
             Axis.HOME_SWITCH: int(home),
             Axis.RIGHT_SWITCH: int(right),
             Axis.LEFT_SWITCH: int(left),
+            Axis.LOAD: round(FREE * (1 - self.shaft.world.load)) if self.moving(t) and self.shaft.factor else 0,
         }
         return measured[Axis(number)] if number in measured else self.parameters[number]
 
@@ -122,6 +127,10 @@ class Motor:
         yield from self.shaft.events(after)
         if self.moving(after) and self._profile.end < inf:
             yield self._profile.end
+        if self._stall_speed and not self.shaft.factor:  # when it becomes that fast
+            for each in self._profile.segments:
+                if each.acceleration:
+                    yield each.start + (self._stall_speed * each.direction - each.velocity) / each.acceleration
 
     def seek(self, t: float) -> None:
         """Begin a reference search."""
@@ -134,8 +143,15 @@ class Motor:
         self.shaft.settle(t)
         if self.search is not None and self.search.over(t):
             self.end_search()
-        if self.moving(t) and self._blocked(self._profile.direction(t), t):
+        fast = abs(self._profile.velocity(t)) >= self._stall_speed * (1 - 1e-9)
+        stalled = self._stall_speed and not self.shaft.factor and fast
+        if self.moving(t) and (stalled or self._blocked(self._profile.direction(t), t)):
             self.freeze(t)
+
+    @property
+    def _stall_speed(self) -> float:
+        """From this velocity on a stall stops it, microsteps/s; 0: never."""
+        return self.parameters.get(Axis.STALL_VELOCITY, 0) * self._units[0]
 
     @property
     def _units(self) -> tuple[float, float]:

@@ -127,7 +127,7 @@ VOLTAGE, TEMPERATURE = 8, 9
 
 def _module(row: Mapping[str, str]) -> Module:
     chip_units = row["units"] == "chip"
-    axis = {**_AXIS, **_CHIP} if chip_units else _AXIS
+    axis = {**_AXIS, **(_CHIP if chip_units else {}), **_parameters(row["module"])}
     return Module(
         row["version"],
         {number: axis[number] for number in _numbers(row["axis"])},

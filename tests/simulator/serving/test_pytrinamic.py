@@ -53,3 +53,50 @@ def test_the_makers_client_works_on_a_pseudo_terminal_and_over_tcp(tmp_path: Pat
         assert json.loads(done.stdout.splitlines()[-1]) == FACTS
     running.process.terminate()
     assert running.end() == 0
+
+
+SPEED = 20
+EXAMPLES = {
+    "TMCM1140/TMCL/rotate_demo.py": "",
+    "TMCM1140/TMCL/StallGuard2_demo.py": "stall_at = 3000000",
+    "TMCM1140/TMCL/CoolStep_demo.py": "stall_at = 3000000",
+    "TMCM1161/TMCL/rotate_demo.py": "",
+    "TMCM1240/TMCL/rotate_demo.py": "",
+    "TMCM1240/TMCL/StallGuard2_demo.py": "stall_at = 1000000",
+    "TMCM1241/TMCL/rotate_demo.py": "",
+    "TMCM1241/TMCL/StallGuard2_demo.py": "stall_at = 1000000",
+    "TMCM1276/TMCL/rotate_demo.py": "",
+    "TMCM1276/TMCL/six_point_ramp_demo.py": "",
+    "TMCM1276/TMCL/stop_switch_demo.py": "limit_plus = 200000",
+    "TMCM3110/TMCL/rotate_demo.py": "",
+    "TMCM6110/TMCL/rotate_demo.py": "",
+}
+"""Every example of the library for a module that the simulator has, but for CAN, and what surrounds its motor."""
+ENDS = {
+    "rotate_demo.py": ("Reached position 0", "Reached Position 0"),
+    "StallGuard2_demo.py": ("stopped by StallGuard2",),
+}
+
+
+@pytest.mark.slow
+def test_every_example_of_the_maker_for_a_simulated_module_runs_to_its_end(tmp_path: Path) -> None:
+    python = foreign_python(*PACKAGES, *NEEDED)
+    buses = []
+    for number, (example, world) in enumerate(EXAMPLES.items()):
+        product = example.partition("/")[0].replace("TMCM", "TMCM-")
+        served = f'name = "b{number}"\nserve = ["tcp://127.0.0.1:0"]\nbaud = 115200\n'
+        buses.append(f'[[bus]]\n{served}[[bus.drive]]\npersonality = "{product}"\n[bus.drive.world]\n{world}\n')
+    (tmp_path / "cell.toml").write_text("".join(buses))
+    running = Running("sim", "cell.toml", "--json", "--speed", str(SPEED), folder=tmp_path)
+    said = running.until('{"ready": true}')
+    places = [json.loads(line)["endpoint"].removeprefix("tcp://") for line in said if "endpoint" in line]
+    runner = str(SUPPORT / "example_pytrinamic.py")
+    for example, place in zip(EXAMPLES, places, strict=True):
+        script = [str(python), runner, example, place, str(SPEED)]
+        done = subprocess.run(script, capture_output=True, text=True, timeout=PATIENCE)
+        assert done.returncode == 0, (example, done.stdout[-500:], done.stderr)
+        ends = ENDS.get(example.rpartition("/")[2], ("",))
+        assert any(each in done.stdout for each in ends), (example, done.stdout)
+        assert done.stdout.endswith("the example has ended\n")
+    running.process.terminate()
+    assert running.end() == 0

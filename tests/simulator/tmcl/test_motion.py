@@ -195,3 +195,29 @@ def test_after_a_stop_parameter_127_says_from_where_a_relative_move_counts(optio
     module.rest()
     assert (module.ask("GAP 1, 0"), module.ask("GAP 0, 0")) == (12_800, 100_000)
     assert module.ask("MVP REL, 0, 1000") == target
+
+
+@pytest.mark.parametrize(("product", "speed"), [("TMCM", 10_000), ("TMCM-1140", 1000)])
+def test_a_stall_at_the_velocity_of_181_stops_the_motor_and_a_slower_one_does_not(product, speed):
+    module = Module(product=product, stall_at=20_000, load=0.25)
+    assert module.ask("GAP 206, 0") == 0
+    module.ask(f"SAP 181, 0, {speed + 1}")
+    module.ask(f"ROR 0, {speed}")
+    module.wait(0.01)
+    assert module.ask("GAP 206, 0") == round(1023 * 0.75)
+    module.wait(60.0)
+    assert (module.ask("GAP 3, 0"), module.ask("GAP 206, 0")) == (speed, 0)
+    module.ask(f"SAP 181, 0, {speed}")
+    assert module.ask("GAP 3, 0") == 0
+
+
+def test_a_stalled_motor_stops_when_it_becomes_that_fast_whenever_it_is_asked():
+    places = set()
+    for asked in (0.01, 0.3, 5.0):
+        module = Module(stall_at=1, settings={"5": 10_000, "181": 4_000})
+        module.ask("ROR 0, 10000")
+        for _ in range(int(5.0 / asked)):
+            module.wait(asked)
+            module.ask("GAP 3, 0")
+        places.add(module.ask("GAP 1, 0"))
+    assert places == {800}  # v^2 / 2a
