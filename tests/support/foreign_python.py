@@ -13,6 +13,8 @@ import pytest
 
 from tests.support.paths import ROOT
 
+TABLES_ONLY = ("pytrinamic==0.2.26", "typing_extensions", "pyserial==3.5")
+"""What the tables of the maker's TMCL library need."""
 QUICK = ("--quiet", "--retries=0", "--timeout=15", "--disable-pip-version-check", "--no-compile")
 
 

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import re
+
 import pytest
 
 from multidrop.dialects import Diagnostic
 from multidrop.simulator.cells import read
 from multidrop.simulator.floor import Floor
 from tests.support.mdrive_unit import Unit
+from tests.support.sample_files import FOLDER
+from tests.support.sample_programs import begin, load, printed, say
 
 # Motion.
 
@@ -401,3 +405,18 @@ def test_all_parameters_are_its_own() -> None:
     for personality, there, absent in (("MDI", "S4", "EE"), ("MDIE", "EE", "S9"), ("MDIX", "CR", "IT")):
         listed = {line.split(" = ")[0] for line in Unit(personality).say("PR AL")[0].split("|")}
         assert there in listed and absent not in listed and not listed & {"AO", "RD", "IS", "OS", "VT", "TM", "AS"}
+
+
+def test_an_index_table_as_people_write_it_counts_and_prints_words_of_an_encoder_that_it_lacks() -> None:
+    text = (FOLDER / "mdi_indexer.mxt").read_text()
+    device = load(text, "MDI", home=0, inputs=((1.0, 1, 1), (2.0, 1, 0), (4.0, 1, 1)))
+    begin(device)
+    assert printed(device, 6.0) == [f"INDEX {n} AT {n * 51200} ENC 0 STALL 0" for n in (1, 2)]
+
+
+def test_a_capture_on_point_13_as_people_write_it() -> None:
+    device = load((FOLDER / "mdix_print_mark.mxt").read_text(), "MDIX", inputs=((1.0, 13, 1), (1.1, 13, 0)))
+    say(device, "EX AA")
+    first, second = printed(device, 5.0)
+    assert re.fullmatch(r"M=[1-9]\d+", first) and re.fullmatch(r"RUNOUT [1-9]\d*", second)
+    assert say(device, "PR MV", "PR ER") == ["0", "0"]

@@ -7,7 +7,7 @@ import pytest
 
 from multidrop.dialects.tmcl.host import codec
 from multidrop.dialects.tmcl.manual.modules import MODULES, Axis, module_of
-from tests.support.foreign_python import foreign_python
+from tests.support.foreign_python import TABLES_ONLY, foreign_python
 from tests.support.tmcl_module import Module
 
 EXTREMES = (-(2**31), 2**31 - 1)
@@ -26,7 +26,7 @@ print(json.dumps(found))
 
 @pytest.mark.process
 def test_the_tables_have_the_numbers_of_the_makers_library():
-    python = foreign_python("pytrinamic==0.2.26", "typing_extensions", "pyserial==3.5")
+    python = foreign_python(*TABLES_ONLY)
     script = [str(python), "-c", TABLES % (list(MODULES),)]
     done = subprocess.run(script, capture_output=True, text=True, timeout=60)
     assert done.returncode == 0, done.stderr
