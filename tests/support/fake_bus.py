@@ -22,7 +22,7 @@ class FakeDrive:
     state: object = field(default_factory=lambda: MCodeState(MCode()))
 
     seen = running = None
-    commands = starting = 0
+    commands = starting = stops = 0
     started_at = commanded_at = float("-inf")
 
     @property
@@ -32,7 +32,7 @@ class FakeDrive:
     def starts(self, text):
         return not text.startswith("PR")
 
-    async def send(self, text):
+    async def send(self, text, check=None):
         return ()
 
     async def motion(self):

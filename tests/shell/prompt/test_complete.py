@@ -171,6 +171,9 @@ def test_every_placeholder_of_a_usage_is_completed_or_known_to_a_person_only():
         "BYTE",
         "MS",
         "NAMES",
+        "UNIT",
+        "UNIT/turn",
+        "UNIT/step",
     }
     known_to_a_person |= {"TEXT", "WORD=VALUE", '"TEXT"', "[HOST:]PORT", "rerun+http://HOST:PORT/proxy"}
     words = {word for verb in VERBS.values() for form in forms(verb.usage) for place in form for word in place.words}
