@@ -12,17 +12,19 @@ from functools import partial
 from pathlib import Path
 
 from soak.judge import Ledger
-from soak.noisy_line import Setup, in_memory, served
+from soak.noisy_line import Setup, in_memory, on_usb, served
 from tests.support.virtual import VirtualLoop
 
 CHUNK = 250
 """Commands of one line; the next one has another seed."""
 LEVELS = (1e-4, 3e-4, 1e-3)
+IN_MEMORY = {"": in_memory, "usb": on_usb}
+"""Places in memory, in virtual time."""
 
 
 @dataclass(frozen=True)
 class Job:
-    """A line to be judged, how it is reached, and how many commands are sent. `place` is empty in memory."""
+    """A line to be judged, how it is reached, and how many commands are sent. `place` is empty in memory, on a wire."""
 
     setup: Setup
     commands: int
@@ -38,13 +40,14 @@ class Job:
 def judge(job: Job) -> Ledger:
     """Run one job in a loop of its own."""
     with tempfile.TemporaryDirectory() as folder:
-        factory = None if job.place else VirtualLoop
+        factory = None if job.place not in IN_MEMORY else VirtualLoop
         with asyncio.Runner(loop_factory=factory) as runner:
             return runner.run(_judge(job, Path(folder)))
 
 
 async def _judge(job: Job, folder: Path) -> Ledger:
-    opened = served(job.setup, folder, job.place) if job.place else in_memory(job.setup, folder)
+    make = IN_MEMORY.get(job.place)
+    opened = make(job.setup, folder) if make else served(job.setup, folder, job.place)
     async with opened as line:
         return await line.run(job.commands)
 
@@ -68,6 +71,9 @@ def jobs(commands: int, on_ports: int) -> list[Job]:
     found += _chunks([pmx], commands // 10, "no checksum")
     tmcl = [Setup(language="tmcl", names=("1", "3"), printing=False, level=level) for level in LEVELS]
     found += _chunks(tmcl, commands // 10, "TMCL")
+    for hangups in (False, True):
+        usb = Setup(language="pmx", names=(), printing=False, level=0.03, hangups=hangups)
+        found += [replace(each, place="usb") for each in _chunks([usb], commands // 10, "USB")]
     modbus = Setup(language="modbus", names=(), printing=False, latest=0.45)
     found += [Job(replace(modbus, hangups=hangups), on_ports, "modbus", "Modbus/TCP") for hangups in (False, True)]
     return found

@@ -44,6 +44,17 @@ def test_nor_by_a_tmcl_module_whose_frames_have_a_checksum():
     assert ledger.misdeeds == ledger.undetected == [] and ledger.executed > 20
 
 
+@pytest.mark.parametrize("commands", [300, pytest.param(10_000, marks=pytest.mark.nightly)])
+def test_nor_over_usb_with_stale_and_late_replies_flushes_and_unplugging(commands):
+    ledger = Ledger()
+    for seed in range(max(2, commands // 500)):
+        setup = Setup(language="pmx", names=(), printing=False, level=0.05, hangups=seed % 2 == 0, seed=seed)
+        ledger.add(judge(Job(setup, min(commands // 2, 500), "usb")))
+    assert ledger.misdeeds == ledger.undetected == []
+    assert ledger.commands == commands and ledger.hangups > commands / 100
+    assert ledger.words["unknown"] > commands / 100 and ledger.words["done"] > commands / 2
+
+
 @pytest.mark.process
 def test_nor_over_modbus_whose_replies_come_too_late():
     ledger = judge(Job(Setup(language="modbus", names=(), printing=False, latest=0.6), 12, "modbus"))

@@ -1,0 +1,221 @@
+"""A carrier in memory between the product's USB pipe and simulated controllers, with the faults of a USB connection.
+
+No transfer ends in the call that begins it. A packet that the controller has taken is executed once. Its reply can
+become readable late: a flush in between does not take it away, as with a controller that still works at its reply.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import errno
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass
+from random import Random
+
+from multidrop.simulator.pmx.usb import UsbController
+from multidrop.simulator.serving.running import Listener, RunningFloor
+from multidrop.transports import Unreachable
+from multidrop.transports.libusb import Found, chosen
+from multidrop.transports.usb import PACKET, Broken, Control, Done
+from multidrop.transports.usbip import setup
+
+
+@dataclass(frozen=True)
+class UsbFaults:
+    """The probability of each fault of a packet, and the longest delays, s."""
+
+    late: float = 0.0
+    """A reply becomes readable late."""
+    latest: float = 1.5
+    missing: float = 0.0
+    """A reply never comes: something has flushed the buffers meanwhile."""
+    held: float = 0.0
+    """The controller takes a packet late, unless that is cancelled before."""
+    longest_held: float = 0.4
+    stalled: float = 0.0
+    """A packet is refused, and is not executed."""
+    empty: float = 0.0
+    """A packet of no bytes comes before a reply."""
+
+
+@dataclass(eq=False)
+class Plugged(Listener):
+    """A controller of a floor in a socket of this machine, as `1-1`."""
+
+    floor: RunningFloor
+    bus: str
+    controller: UsbController
+    place: str
+    stand_in: StandIn | None = None
+    """The carrier that has it open."""
+    faults: UsbFaults = UsbFaults()
+    reply_time: float = 0.0
+    """Seconds that the controller takes for a reply."""
+
+    def __post_init__(self) -> None:
+        self.floor.attach(self.bus, self)
+
+    def unplugged(self) -> None:
+        if self.stand_in is not None:
+            self.stand_in.unplug()
+
+    def commanded(self) -> None:
+        if not self.present:
+            self.unplugged()
+
+    @property
+    def present(self) -> bool:
+        """Whether it has power and its cable is plugged in."""
+        return self.controller.present and not self.floor.floor.wires[self.bus].hung_up
+
+    @property
+    def found(self) -> Found:
+        """The entry of the list of controllers."""
+        return Found(f"2ED{self.controller.device.controller.settings.number}", self.place, "", self)
+
+
+class Sockets:
+    """The USB sockets of a machine, in place of libusb's search."""
+
+    def __init__(self, *plugged: Plugged, rng: Random | None = None) -> None:
+        self.plugged = list(plugged)
+        self.rng = rng or Random(0)
+
+    def find(self, target: str) -> StandIn:
+        """Open the controller that a target names, as `LibusbCarrier.find` does. Raises Unreachable."""
+        found = chosen([each.found for each in self.plugged if each.present], target)
+        plugged: Plugged = found.device
+        if plugged.stand_in is not None:
+            raise Unreachable(f"{found.url}: another program has it")
+        plugged.stand_in = StandIn(found.url, plugged, self.rng)
+        return plugged.stand_in
+
+
+class StandIn:
+    """The transfers of one controller. `trace` is called with each packet that is taken (">") or delivered ("<")."""
+
+    def __init__(self, name: str, plugged: Plugged, rng: Random) -> None:
+        self.name = name
+        self.trace: Callable[[str, bytes], None] = lambda way, data: None
+        self._plugged, self._rng = plugged, rng
+        self._timers: dict[int, asyncio.TimerHandle] = {}
+        """Packets and requests that were not taken yet."""
+        self._reading: deque[int] = deque()
+        """Transfers that wait for a reply."""
+        self._last = 0
+        self._ends_at = {"out": 0.0, "control": 0.0, "in": 0.0}
+        """When the last transfer of each endpoint ends: they end in their order."""
+        self._gone = False
+
+    def attach(self) -> None:
+        """Report to the loop that runs."""
+        self._loop = asyncio.get_running_loop()
+
+    def start(self, done: Done, broken: Broken) -> None:
+        self._done, self._broken = done, broken
+
+    def explain(self, error: OSError | None) -> str:
+        """Reason of a break."""
+        return "unplugged, or without power" if error is None or error.errno == errno.ENODEV else str(error.strerror)
+
+    # Transfers
+
+    def control(self, value: Control) -> int:
+        def carry_out() -> None:
+            status, _ = self._plugged.controller.request(setup(value))
+            self._end(number, status)
+
+        number = self._begin("control", 0.0, carry_out)
+        return number
+
+    def send(self, data: bytes) -> int:
+        faults = self._plugged.faults
+        held = self._rng.random() * faults.longest_held if self._drawn(faults.held) else 0.0
+        number = self._begin("out", held, lambda: self._take(number, data))
+        return number
+
+    def receive(self) -> int:
+        self._reading.append(self._number())
+        self._loop.call_soon(self._deliver)
+        return self._last
+
+    def cancel(self, number: int) -> None:
+        if (timer := self._timers.pop(number, None)) is not None:
+            timer.cancel()
+        elif number in self._reading:
+            self._reading.remove(number)
+        else:
+            return
+        self._loop.call_soon(self._end, number, -errno.ECONNRESET)
+
+    async def close(self) -> None:
+        self._gone = True
+        self._plugged.stand_in = None
+        for timer in self._timers.values():
+            timer.cancel()
+
+    # What the controller does
+
+    def unplug(self) -> None:
+        """End every transfer: the controller is gone for this carrier."""
+        for number in (*self._timers, *self._reading):
+            self._loop.call_soon(self._end, number, -errno.ENODEV)
+        for timer in self._timers.values():
+            timer.cancel()
+        self._timers.clear()
+        self._reading.clear()
+        self._gone = True
+
+    def _drawn(self, probability: float) -> bool:
+        return probability > 0 and self._rng.random() < probability
+
+    def _number(self) -> int:
+        if self._gone or not self._plugged.present:
+            raise OSError(errno.ENODEV, "No such device")
+        self._last += 1
+        return self._last
+
+    def _begin(self, endpoint: str, after: float, work: Callable[[], None]) -> int:
+        number = self._number()
+        self._timers[number] = self._loop.call_at(self._end_of(endpoint, after), work)
+        return number
+
+    def _end_of(self, endpoint: str, after: float) -> float:
+        self._ends_at[endpoint] = max(self._ends_at[endpoint] + 1e-6, self._loop.time() + after)
+        return self._ends_at[endpoint]
+
+    def _end(self, number: int, status: int, data: bytes = b"") -> None:
+        self._timers.pop(number, None)
+        if self._plugged.stand_in is self:
+            self._done(number, status, data)
+
+    def _take(self, number: int, data: bytes) -> None:
+        faults, controller, loop = self._plugged.faults, self._plugged.controller, self._loop
+        if not self._plugged.present:
+            return self._end(number, -errno.ENODEV)
+        if self._drawn(faults.stalled):
+            return self._end(number, -errno.EPIPE)
+        self.trace(">", data)
+        before = [*controller.replies]
+        controller.replies.clear()
+        self._plugged.floor.exchange(self._plugged.bus, controller, data)
+        replies, controller.replies = controller.replies, deque(before, controller.replies.maxlen)
+        self._end(number, 0)
+        for reply in replies:
+            late = self._rng.random() * faults.latest if self._drawn(faults.late) else self._plugged.reply_time
+            if not self._drawn(faults.missing):
+                loop.call_at(self._end_of("in", late), self._reply, reply)
+
+    def _reply(self, reply: bytes) -> None:
+        if self._plugged.present:
+            self._plugged.controller.replies += [b""] * self._drawn(self._plugged.faults.empty) + [reply]
+            if self._plugged.stand_in is not None:
+                self._plugged.stand_in._deliver()
+
+    def _deliver(self) -> None:
+        replies = self._plugged.controller.replies
+        while self._reading and replies and self._plugged.present:
+            data = replies.popleft()[:PACKET]
+            self.trace("<", data)
+            self._end(self._reading.popleft(), 0, data)
