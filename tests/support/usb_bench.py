@@ -5,7 +5,7 @@
 umockdev answers the system calls of programs that it is preloaded to; here its answers come from, as the kernel's
 driver `usbfs` gives them. Each device is plugged in to a socket with the name of its bus id. A line on standard input
 makes a fault: `hold SOCKET ENDPOINT`, `free SOCKET ENDPOINT`, `stall SOCKET ENDPOINT`, `empty SOCKET`, `unplug SOCKET`,
-`plug SOCKET`, `forbid SOCKET`. Each is confirmed by a line.
+`plug SOCKET`, `forbid SOCKET`, `reply SOCKET FORM` with a form of `FORMS`. Each is confirmed by a line.
 """
 
 from __future__ import annotations
@@ -45,6 +45,14 @@ CLEAR_HALT, SET_CONFIGURATION, GET_DRIVER, GET_SPEED = 0x80045515, 0x80045505, 0
 FULL_SPEED = 2
 PAUSE = 2
 """Milliseconds before "none has ended": a file of umockdev is always ready, and libusb would ask without end."""
+FORMS = {
+    "full": lambda data: data,
+    "short": lambda data: data[: data.index(0) + 1],
+    "bare": lambda data: data[: data.index(0)],
+    "dirty": lambda data: data[: data.index(0) + 1].ljust(64, b"#"),
+    "long": lambda data: None,
+}
+"""Replies in blocks as they come, only up to their NUL, without NUL, with anything behind it, and of too many bytes."""
 
 
 def say(**facts: object) -> None:
@@ -85,7 +93,7 @@ class Device:
         self.ended: deque[Urb] = deque()
         self.held: dict[int, list[Urb]] = {}
         self.stalled: set[int] = set()
-        self.empty = 0
+        self.empty, self.form = 0, "full"
         self.last = 0
         self.messages = Transfers(answers=True)
         self.wire = socket.create_connection(self.server, timeout=10)
@@ -187,7 +195,11 @@ class Device:
         for each in self.messages.feed(data):
             if each.kind == RET_SUBMIT:
                 if (urb := self.flying.pop(each.number, None)) is not None:
-                    self.end(urb, each.status, each.data, each.length)
+                    formed = FORMS[self.form](each.data) if urb.request.endpoint == 0x82 and each.data else each.data
+                    if formed is None:
+                        self.end(urb, -errno.EOVERFLOW)
+                    else:
+                        self.end(urb, each.status, formed, each.length)
             elif discarded and (urb := self.flying.pop(discarded, None)) is not None:
                 self.messages.wanted.discard(discarded)
                 self.end(urb, -errno.ENOENT)
@@ -302,7 +314,8 @@ class Bench:
         return True
 
     def carry_out(self, word: str, place: str, endpoint: str = "0") -> None:
-        device, number = self.devices[place], int(endpoint, 16)
+        device = self.devices[place]
+        number = int(endpoint, 16) if endpoint not in FORMS else 0
         match word:
             case "hold":
                 device.held[number] = []
@@ -315,6 +328,8 @@ class Bench:
                     device.discard(urb.address)
                     device.ended.pop()
                     device.end(urb, -errno.EPIPE)
+            case "reply":
+                device.form = endpoint
             case "empty":
                 device.empty += 1
             case "unplug":
