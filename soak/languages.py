@@ -133,8 +133,8 @@ class PmxLanguage:
 
     @staticmethod
     def asks(line: str) -> bool:
-        """Whether a line only prints: it has no value."""
-        return "=" not in line and line[:1] not in "XY"
+        """Whether a line only prints: it has no value. Or it is a stop, which is owed after a lost line."""
+        return line in ("SR0=0", "SR1=0") or ("=" not in line and line[:1] not in "XY")
 
     @staticmethod
     def drive(name: str, em: int, checksum: int, party: bool) -> str:

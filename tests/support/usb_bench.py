@@ -79,7 +79,7 @@ class Device:
         self.bed, self.server, self.bus_id, self.number = bed, server, bus_id, number
         self.node = f"/dev/bus/usb/001/{number:03}"
         self.path = f"/sys/devices/pci0000:00/0000:00:14.0/usb1/{bus_id}"
-        self.handler = UMockdev.IoctlBase()
+        self.handler = UMockdev.IoctlBase.new()
         self.handler.connect("handle-ioctl", self.system_call)
         self.handler.connect("client-vanished", self.vanished)
         self.plug()
@@ -105,7 +105,7 @@ class Device:
         configuration = self.ask(struct.pack("<BBHHH", 0x80, 6, 0x0200, 0, 255))
         self.present = True
         self.watch = GLib.io_add_watch(self.wire.fileno(), GLib.IO_IN | GLib.IO_HUP, self.arrived)
-        descriptors = (device + configuration).hex()
+        descriptors = (device + configuration).hex().upper()
         self.bed.add_from_string(
             f"P: {self.path.removeprefix('/sys')}\n"
             f"N: {self.node.removeprefix('/dev/')}={descriptors}\n"
@@ -288,7 +288,7 @@ class Bench:
     """All devices, and the faults that are asked for."""
 
     def __init__(self, server: tuple[str, int], bus_ids: list[str]) -> None:
-        self.bed = UMockdev.Testbed()
+        self.bed = UMockdev.Testbed.new()
         self.bed.add_from_string(
             "P: /devices/pci0000:00/0000:00:14.0/usb1\nN: bus/usb/001/001\n"
             "E: DEVNAME=/dev/bus/usb/001/001\nE: DEVTYPE=usb_device\nE: SUBSYSTEM=usb\nE: DRIVER=usb\n"

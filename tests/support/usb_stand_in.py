@@ -10,7 +10,7 @@ import asyncio
 import errno
 from collections import deque
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from random import Random
 
 from multidrop.simulator.pmx.usb import UsbController
@@ -52,6 +52,8 @@ class Plugged(Listener):
     faults: UsbFaults = UsbFaults()
     reply_time: float = 0.0
     """Seconds that the controller takes for a reply."""
+    ends_at: dict[str, float] = field(default_factory=lambda: {"out": 0.0, "control": 0.0, "in": 0.0})
+    """When the last transfer of each endpoint ends: they end in their order, also those of a host that has gone."""
 
     def __post_init__(self) -> None:
         self.floor.attach(self.bus, self)
@@ -104,8 +106,7 @@ class StandIn:
         self._reading: deque[int] = deque()
         """Transfers that wait for a reply."""
         self._last = 0
-        self._ends_at = {"out": 0.0, "control": 0.0, "in": 0.0}
-        """When the last transfer of each endpoint ends: they end in their order."""
+        self._ends_at = plugged.ends_at
         self._gone = False
 
     def attach(self) -> None:

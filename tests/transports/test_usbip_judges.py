@@ -5,8 +5,9 @@ from __future__ import annotations
 import asyncio
 import re
 import subprocess
-from collections.abc import AsyncIterator
-from contextlib import asynccontextmanager
+from collections.abc import AsyncIterator, Iterator
+from contextlib import asynccontextmanager, contextmanager
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -157,8 +158,8 @@ class Performax(usbip.Interface):  # type: ignore[misc, name-defined]
             self.bulk_in.write(self.controller.replies.popleft())
 
 
-@asynccontextmanager
-async def plugged(vendor: int = 0x1589) -> AsyncIterator[tuple[Performax, int]]:
+@contextmanager
+def plugged(vendor: int = 0x1589) -> Iterator[tuple[Performax, int]]:
     """A device of the library, and the port where it is served."""
     floor = Floor(read(bus("w", pmx("07")), "cell"))
     device = usbip.USBDevice(vendor, 0xA101, product="Performax USB", serial="2ED07")
@@ -176,7 +177,7 @@ async def opened(port: int) -> tuple[UsbPipe, bytearray, list[TransportLost]]:
 
 
 async def test_the_pipe_speaks_to_the_librarys_device_as_the_driver_does() -> None:
-    async with plugged() as (device, port):
+    with plugged() as (device, port):
         pipe, heard, lost = await opened(port)
         assert device.requests[:2] == [OPEN, FLUSH]
         for text, reply in ((b"DN\r", b"2ED07\r"), (b"V1=5\r", b"OK\r"), (b"V1\r", b"5\r")):
@@ -191,7 +192,7 @@ async def test_the_pipe_speaks_to_the_librarys_device_as_the_driver_does() -> No
 
 
 async def test_after_a_missing_reply_the_next_command_waits_for_a_flush() -> None:
-    async with plugged() as (device, port):
+    with plugged() as (device, port):
         pipe, heard, _ = await opened(port)
         device.silent = True
         pipe.write(b"V1\r")
@@ -205,7 +206,7 @@ async def test_after_a_missing_reply_the_next_command_waits_for_a_flush() -> Non
 
 
 async def test_the_stop_leaves_at_once_while_a_reply_is_awaited() -> None:
-    async with plugged() as (device, port):
+    with plugged() as (device, port):
         pipe, _, _ = await opened(port)
         device.silent = True
         pipe.write(b"V1\r")
@@ -218,7 +219,7 @@ async def test_the_stop_leaves_at_once_while_a_reply_is_awaited() -> None:
 
 
 async def test_a_device_that_is_unplugged_there_is_lost_here() -> None:
-    async with plugged() as (device, port):
+    with plugged() as (device, port):
         pipe, _, lost = await opened(port)
         device.dev.unplug()
         device.bulk_in.stall()  # what waits for a reply ends with an error
@@ -228,14 +229,14 @@ async def test_a_device_that_is_unplugged_there_is_lost_here() -> None:
 
 
 async def test_a_device_of_another_make_is_refused() -> None:
-    async with plugged(vendor=0x1209) as (_, port):
+    with plugged(vendor=0x1209) as (_, port):
         with pytest.raises(Unreachable, match="1209:a101"):
             await imported(HOST, port, "1-1")
         with pytest.raises(Unreachable, match=f"^usbip://{HOST}:{port}/1-9: "):
             await imported(HOST, port, "1-9")
 
 
-async def test_a_command_line_asks_the_librarys_device(tmp_path: Any) -> None:
-    async with plugged() as (_, port):
-        done = await asyncio.to_thread(command, tmp_path, "send", f"usbip://{HOST}:{port}/1-1", "V1=77", "V1")
+def test_a_command_line_asks_the_librarys_device(tmp_path: Path) -> None:
+    with plugged() as (_, port):
+        done = command(tmp_path, "send", f"usbip://{HOST}:{port}/1-1", "V1=77", "V1")
         assert (done.returncode, done.stdout) == (0, "77\n"), done.stderr
