@@ -16,10 +16,12 @@ import os
 import socket
 import struct
 import sys
+import warnings
 from collections import deque
 from dataclasses import dataclass
 
-from gi.repository import GLib, UMockdev
+with warnings.catch_warnings(action="ignore"):  # there is one version
+    from gi.repository import GLib, UMockdev
 
 from multidrop.transports.usbip import (
     BUS_ID,
@@ -179,19 +181,22 @@ class Device:
                 self.last += 1
                 self.wire.sendall(Transfer(UNLINK, self.last, unlinked=number).pack(2))
                 while number in self.flying:  # as the kernel waits
-                    self.take(self.wire.recv(4096), discarded=number)
+                    self.take(self.wire.recv(4096), number, self.last)
                 return 0
         return errno.EINVAL
 
     def arrived(self, *_: object) -> bool:
-        data = self.wire.recv(4096)
+        try:
+            data = self.wire.recv(4096, socket.MSG_DONTWAIT)
+        except BlockingIOError:
+            return True  # `discard` has read it
         if not data:
             self.unplug()
             return False
         self.take(data)
         return True
 
-    def take(self, data: bytes, discarded: int = 0) -> None:
+    def take(self, data: bytes, discarded: int = 0, unlink: int = 0) -> None:
         for each in self.messages.feed(data):
             if each.kind == RET_SUBMIT:
                 if (urb := self.flying.pop(each.number, None)) is not None:
@@ -200,7 +205,7 @@ class Device:
                         self.end(urb, -errno.EOVERFLOW)
                     else:
                         self.end(urb, each.status, formed, each.length)
-            elif discarded and (urb := self.flying.pop(discarded, None)) is not None:
+            elif each.number == unlink and (urb := self.flying.pop(discarded, None)) is not None:
                 self.messages.wanted.discard(discarded)
                 self.end(urb, -errno.ENOENT)
 

@@ -7,7 +7,6 @@ become readable late: a flush in between does not take it away, as with a contro
 from __future__ import annotations
 
 import asyncio
-import errno
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -17,7 +16,7 @@ from multidrop.simulator.pmx.usb import UsbController
 from multidrop.simulator.serving.running import Listener, RunningFloor
 from multidrop.transports import Unreachable
 from multidrop.transports.libusb import Found, chosen
-from multidrop.transports.usb import PACKET, Broken, Control, Done
+from multidrop.transports.usb import CANCELLED, GONE, PACKET, STALLED, Broken, Control, Done, TransferFailed
 from multidrop.transports.usbip import setup
 
 
@@ -84,8 +83,8 @@ class Sockets:
         self.plugged = list(plugged)
         self.rng = rng or Random(0)
 
-    def find(self, target: str) -> StandIn:
-        """Open the controller that a target names, as `LibusbCarrier.find` does. Raises Unreachable."""
+    def __call__(self, target: str) -> StandIn:
+        """Open the controller that a target names, in place of `LibusbCarrier`. Raises Unreachable."""
         found = chosen([each.found for each in self.plugged if each.present], target)
         plugged: Plugged = found.device
         if plugged.stand_in is not None:
@@ -93,9 +92,19 @@ class Sockets:
         plugged.stand_in = StandIn(found.url, plugged, self.rng)
         return plugged.stand_in
 
+    @staticmethod
+    def close(late: StandIn) -> None:
+        """Close one that nobody waits for any more."""
+        late.close()
+
 
 class StandIn:
-    """The transfers of one controller. `trace` is called with each packet that is taken (">") or delivered ("<")."""
+    """The transfers of one controller: a `Carrier`.
+
+    `trace` is called with each packet that is taken (">") or delivered ("<").
+    """
+
+    delay = 0.0
 
     def __init__(self, name: str, plugged: Plugged, rng: Random) -> None:
         self.name = name
@@ -107,18 +116,11 @@ class StandIn:
         """Transfers that wait for a reply."""
         self._last = 0
         self._ends_at = plugged.ends_at
-        self._gone = False
-
-    def attach(self) -> None:
-        """Report to the loop that runs."""
-        self._loop = asyncio.get_running_loop()
+        self._gone = self._halted = False
 
     def start(self, done: Done, broken: Broken) -> None:
+        self._loop = asyncio.get_running_loop()
         self._done, self._broken = done, broken
-
-    def explain(self, error: OSError | None) -> str:
-        """Reason of a break."""
-        return "unplugged, or without power" if error is None or error.errno == errno.ENODEV else str(error.strerror)
 
     # Transfers
 
@@ -148,10 +150,13 @@ class StandIn:
             self._reading.remove(number)
         else:
             return
-        self._loop.call_soon(self._end, number, -errno.ECONNRESET)
+        self._loop.call_soon(self._end, number, CANCELLED)
 
-    async def close(self) -> None:
-        self._gone = True
+    def halt(self) -> None:
+        self._halted = self._gone = True
+
+    def close(self) -> None:
+        self.halt()
         self._plugged.stand_in = None
         for timer in self._timers.values():
             timer.cancel()
@@ -161,7 +166,7 @@ class StandIn:
     def unplug(self) -> None:
         """End every transfer: the controller is gone for this carrier."""
         for number in (*self._timers, *self._reading):
-            self._loop.call_soon(self._end, number, -errno.ENODEV)
+            self._loop.call_soon(self._end, number, GONE)
         for timer in self._timers.values():
             timer.cancel()
         self._timers.clear()
@@ -173,7 +178,7 @@ class StandIn:
 
     def _number(self) -> int:
         if self._gone or not self._plugged.present:
-            raise OSError(errno.ENODEV, "No such device")
+            raise TransferFailed(GONE)
         self._last += 1
         return self._last
 
@@ -188,15 +193,15 @@ class StandIn:
 
     def _end(self, number: int, status: int, data: bytes = b"") -> None:
         self._timers.pop(number, None)
-        if self._plugged.stand_in is self:
+        if not self._halted:
             self._done(number, status, data)
 
     def _take(self, number: int, data: bytes) -> None:
         faults, controller, loop = self._plugged.faults, self._plugged.controller, self._loop
         if not self._plugged.present:
-            return self._end(number, -errno.ENODEV)
+            return self._end(number, GONE)
         if self._drawn(faults.stalled):
-            return self._end(number, -errno.EPIPE)
+            return self._end(number, STALLED)
         self.trace(">", data)
         before = [*controller.replies]
         controller.replies.clear()
