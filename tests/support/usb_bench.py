@@ -16,6 +16,7 @@ import os
 import socket
 import struct
 import sys
+import threading
 import warnings
 from collections import deque
 from dataclasses import dataclass
@@ -47,6 +48,8 @@ CLEAR_HALT, SET_CONFIGURATION, GET_DRIVER, GET_SPEED = 0x80045515, 0x80045505, 0
 FULL_SPEED = 2
 PAUSE = 2
 """Milliseconds before "none has ended": a file of umockdev is always ready, and libusb would ask without end."""
+GUARD = threading.RLock()
+"""Held by whatever changes something: system calls come in a thread of umockdev."""
 FORMS = {
     "full": lambda data: data,
     "short": lambda data: data[: data.index(0) + 1],
@@ -83,7 +86,6 @@ class Device:
         self.path = f"/sys/devices/pci0000:00/0000:00:14.0/usb1/{bus_id}"
         self.handler = UMockdev.IoctlBase.new()
         self.handler.connect("handle-ioctl", self.system_call)
-        self.handler.connect("client-vanished", self.vanished)
         self.plug()
 
     # Plugging
@@ -105,6 +107,7 @@ class Device:
         about = Exported.read(self.exactly(RECORD))
         device = self.ask(struct.pack("<BBHHH", 0x80, 6, 0x0100, 0, 18))
         configuration = self.ask(struct.pack("<BBHHH", 0x80, 6, 0x0200, 0, 255))
+        self.wire.settimeout(None)
         self.present = True
         self.watch = GLib.io_add_watch(self.wire.fileno(), GLib.IO_IN | GLib.IO_HUP, self.arrived)
         descriptors = (device + configuration).hex().upper()
@@ -186,15 +189,16 @@ class Device:
         return errno.EINVAL
 
     def arrived(self, *_: object) -> bool:
-        try:
-            data = self.wire.recv(4096, socket.MSG_DONTWAIT)
-        except BlockingIOError:
-            return True  # `discard` has read it
-        if not data:
-            self.unplug()
-            return False
-        self.take(data)
-        return True
+        with GUARD:
+            try:
+                data = self.wire.recv(4096, socket.MSG_DONTWAIT)
+            except BlockingIOError:
+                return True  # `discard` has read it
+            if not data:
+                self.unplug()
+                return False
+            self.take(data)
+            return True
 
     def take(self, data: bytes, discarded: int = 0, unlink: int = 0) -> None:
         for each in self.messages.feed(data):
@@ -218,20 +222,17 @@ class Device:
 
     # System calls
 
-    def vanished(self, _: object, client: UMockdev.IoctlClient) -> None:
-        if self.claimed is client:
-            self.claimed = None
-
     def system_call(self, _: object, client: UMockdev.IoctlClient) -> bool:
-        """Answer a call of `ioctl`."""
+        """Answer a call of `ioctl`, in umockdev's thread."""
         request, memory = client.get_request(), client.get_arg()
-        if request in (REAP, REAP_NO_DELAY):
-            if not self.reap(client, memory):
-                GLib.timeout_add(PAUSE, self.reap_late, client, memory)
+        with GUARD:
+            if request in (REAP, REAP_NO_DELAY):
+                if not self.reap(client, memory):
+                    GLib.timeout_add(PAUSE, self.reap_late, client, memory)
+                return True
+            result = self.carry_out(request, client, memory) if self.present else -errno.ENODEV
+            client.complete(max(result, -1), max(0, -result))
             return True
-        result = self.carry_out(request, client, memory) if self.present else -errno.ENODEV
-        client.complete(max(result, -1), max(0, -result))
-        return True
 
     def carry_out(self, request: int, client: UMockdev.IoctlClient, memory: UMockdev.IoctlData) -> int:
         if request == SUBMIT_URB:
@@ -239,7 +240,7 @@ class Device:
         if request == DISCARD:
             return -self.discard(int.from_bytes(bytes(memory.retrieve()), sys.byteorder))
         if request in (CLAIM, DISCONNECT_CLAIM):
-            if self.claimed not in (None, client):
+            if self.claimed not in (None, client) and self.claimed.get_connected():
                 return -errno.EBUSY
             self.claimed = client
         elif request == RELEASE:
@@ -284,8 +285,9 @@ class Device:
         return False
 
     def reap_late(self, client: UMockdev.IoctlClient, memory: UMockdev.IoctlData) -> bool:
-        if not self.reap(client, memory):
-            client.complete(-1, errno.EAGAIN if self.present else errno.ENODEV)
+        with GUARD:
+            if not self.reap(client, memory):
+                client.complete(-1, errno.EAGAIN if self.present else errno.ENODEV)
         return False
 
 
@@ -315,7 +317,8 @@ class Bench:
             return False
         *lines, self.line = (self.line + data).split(b"\n")
         for line in lines:
-            self.carry_out(*line.decode().split())
+            with GUARD:
+                self.carry_out(*line.decode().split())
         return True
 
     def carry_out(self, word: str, place: str, endpoint: str = "0") -> None:
