@@ -1,6 +1,6 @@
 """Run by Debian's Python with umockdev: USB devices for libusb, whose URBs go to a server of USB/IP. Prints JSON lines.
 
-    /usr/bin/python3 usb_bench.py HOST:PORT BUSID ...
+    LD_PRELOAD=libumockdev-preload.so.0 /usr/bin/python3 usb_bench.py HOST:PORT BUSID ...
 
 umockdev answers the system calls of programs that it is preloaded to; here its answers come from, as the kernel's
 driver `usbfs` gives them. Each device is plugged in to a socket with the name of its bus id. A line on standard input
@@ -11,6 +11,7 @@ makes a fault: `hold SOCKET ENDPOINT`, `free SOCKET ENDPOINT`, `stall SOCKET END
 from __future__ import annotations
 
 import errno
+import itertools
 import json
 import os
 import socket
@@ -78,7 +79,7 @@ class Urb:
 
 
 class Device:
-    """A device in a socket: the URBs on their way, those that have ended, and who has claimed it."""
+    """A device while it is in a socket: the URBs on their way, those that have ended, and who has claimed it."""
 
     def __init__(self, bed: UMockdev.Testbed, server: tuple[str, int], bus_id: str, number: int) -> None:
         self.bed, self.server, self.bus_id, self.number = bed, server, bus_id, number
@@ -86,12 +87,6 @@ class Device:
         self.path = f"/sys/devices/pci0000:00/0000:00:14.0/usb1/{bus_id}"
         self.handler = UMockdev.IoctlBase.new()
         self.handler.connect("handle-ioctl", self.system_call)
-        self.plug()
-
-    # Plugging
-
-    def plug(self) -> None:
-        """Import the device; let udev and libusb see it."""
         self.claimed: UMockdev.IoctlClient | None = None
         self.flying: dict[int, Urb] = {}
         self.ended: deque[Urb] = deque()
@@ -133,7 +128,6 @@ class Device:
         self.flying.clear()
         self.held.clear()
         self.bed.uevent(self.path, "remove")
-        self.bed.detach_ioctl(self.node)
         self.bed.remove_device(self.path)
 
     def exactly(self, size: int) -> bytes:
@@ -295,7 +289,7 @@ class Bench:
     """All devices, and the faults that are asked for."""
 
     def __init__(self, server: tuple[str, int], bus_ids: list[str]) -> None:
-        self.bed = UMockdev.Testbed.new()
+        self.bed, self.server, self.numbers = UMockdev.Testbed.new(), server, itertools.count(2)
         self.bed.add_from_string(
             "P: /devices/pci0000:00/0000:00:14.0/usb1\nN: bus/usb/001/001\n"
             "E: DEVNAME=/dev/bus/usb/001/001\nE: DEVTYPE=usb_device\nE: SUBSYSTEM=usb\nE: DRIVER=usb\n"
@@ -304,11 +298,15 @@ class Bench:
             "A: idVendor=1d6b\\n\nA: idProduct=0002\\n\n"
             "H: descriptors=12010002090001406b1d020006060302010109021900010100e0000904000001090000000705810304000c\n\n"
         )
-        self.devices = {each: Device(self.bed, server, each, number) for number, each in enumerate(bus_ids, 2)}
+        self.devices = {each: self.plugged(each) for each in bus_ids}
         os.chmod(self.bed.get_root_dir(), 0o755)
         self.line = b""
         GLib.io_add_watch(0, GLib.IO_IN | GLib.IO_HUP, self.read)
         say(root=self.bed.get_root_dir())
+
+    def plugged(self, place: str) -> Device:
+        """Plug a device in: it has a number that none had before."""
+        return Device(self.bed, self.server, place, next(self.numbers))
 
     def read(self, *_: object) -> bool:
         data = os.read(0, 4096)
@@ -343,7 +341,7 @@ class Bench:
             case "unplug":
                 device.unplug()
             case "plug":
-                device.plug()
+                self.devices[place] = device = self.plugged(place)
                 self.bed.uevent(device.path, "add")
             case "forbid":
                 os.chmod(f"{self.bed.get_root_dir()}{device.node}", 0)

@@ -1,6 +1,6 @@
 /* A host for Performax controllers on libusb-1.0: claim, vendor requests, a read before each write, blocks of 64 bytes.
 
-   performax TIMEOUT_MS COMMAND ... prints a line for each reply. A command that begins with = is sent without padding.
+   performax SERIAL TIMEOUT_MS COMMAND ... prints a line for each reply. A command that begins with = is sent without padding.
    Exit 1: an error, named with the call that met it. */
 #include <libusb.h>
 #include <stdio.h>
@@ -24,27 +24,46 @@ static void request(libusb_device_handle *device, int value)
     check(libusb_control_transfer(device, 0x40, 0x02, value, 0, NULL, 0, 1000), "request");
 }
 
+static libusb_device_handle *opened(libusb_context *context, const char *wanted)
+{
+    libusb_device **devices;
+    libusb_device_handle *device = NULL;
+    struct libusb_device_descriptor about;
+    unsigned char serial[BLOCK];
+    ssize_t count = libusb_get_device_list(context, &devices);
+
+    for (ssize_t i = 0; i < count && device == NULL; i++) {
+        check(libusb_get_device_descriptor(devices[i], &about), "descriptor");
+        if (about.idVendor != VENDOR || about.idProduct != PRODUCT)
+            continue;
+        check(libusb_open(devices[i], &device), "open");
+        check(libusb_get_string_descriptor_ascii(device, about.iSerialNumber, serial, sizeof serial), "serial");
+        if (strcmp((char *)serial, wanted) != 0) {
+            libusb_close(device);
+            device = NULL;
+        }
+    }
+    libusb_free_device_list(devices, 1);
+    return device;
+}
+
 int main(int count, char **arguments)
 {
-    unsigned char block[BLOCK], serial[BLOCK];
-    int timeout = atoi(arguments[1]), size, result;
+    unsigned char block[BLOCK];
+    int timeout = atoi(arguments[2]), size, result;
     libusb_context *context;
     libusb_device_handle *device;
-    struct libusb_device_descriptor about;
 
     check(libusb_init(&context), "init");
-    device = libusb_open_device_with_vid_pid(context, VENDOR, PRODUCT);
+    device = opened(context, arguments[1]);
     if (device == NULL) {
         fprintf(stderr, "open: no controller\n");
         return 1;
     }
-    check(libusb_get_device_descriptor(libusb_get_device(device), &about), "descriptor");
-    check(libusb_get_string_descriptor_ascii(device, about.iSerialNumber, serial, sizeof serial), "serial");
     check(libusb_claim_interface(device, 0), "claim");
     request(device, OPEN);
     request(device, FLUSH);
-    printf("serial %s\n", serial);
-    for (int i = 2; i < count; i++) {
+    for (int i = 3; i < count; i++) {
         const char *text = arguments[i];
         int length = BLOCK;
         result = libusb_bulk_transfer(device, IN, block, BLOCK, &size, 20);

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import contextlib
-import functools
+import ctypes
 import json
 import os
 import re
@@ -19,6 +19,7 @@ import pytest
 from tests.support.cell_session import TCP, bus, pmx
 from tests.support.front_door import Done, Home
 from tests.support.paths import ROOT
+from tests.support.processes import environment
 from tests.support.tools import absent, tool
 from tests.support.until import PATIENCE
 
@@ -26,39 +27,29 @@ pytestmark = [pytest.mark.process, pytest.mark.skipif(sys.platform != "linux", r
 DEBIANS = "/usr/bin/python3"
 """The Python that has the bindings of Debian's umockdev."""
 PRELOADED = "libumockdev-preload.so.0"
-NOBODY = 65534
-
-
-@functools.cache
-def umockdev() -> None:
-    """Skip without umockdev and its bindings."""
-    pytest.importorskip("usb1", reason="libusb1 is not installed: the extra usb")
-    tool("umockdev-run")
-    check = [DEBIANS, "-c", "import gi; gi.require_version('UMockdev', '1.0'); from gi.repository import UMockdev"]
-    if not Path(DEBIANS).exists() or subprocess.run(check, capture_output=True).returncode:
-        absent("gir1.2-umockdev-1.0 with python3-gi is not installed")
+FIRST, SECOND = "1-1", "1-2"
+"""The sockets of controllers 00 and 07."""
 
 
 class Machine(Home):
-    """A machine with controllers in its USB sockets; they are served over TCP, as their RS-485 line, too."""
+    """A machine with two controllers in its USB sockets. Their RS-485 line is served over TCP."""
 
-    def __init__(self, folder: Path, *numbers: str) -> None:
+    def __init__(self, folder: Path) -> None:
         super().__init__(folder)
-        self.serve(bus("w", *map(pmx, numbers), baud=0, serve=["usbip://127.0.0.1:0", *TCP]))
+        self.serve(bus("w", pmx("00"), pmx("07"), baud=0, serve=["usbip://127.0.0.1:0", *TCP]))
         server = self.endpoints["w"]["usbip"].split("/")[2]
-        places = [f"1-{number}" for number in range(1, len(numbers) + 1)]
         self.bench = subprocess.Popen(
-            [DEBIANS, str(ROOT / "tests" / "support" / "usb_bench.py"), server, *places],
+            [DEBIANS, str(ROOT / "tests" / "support" / "usb_bench.py"), server, FIRST, SECOND],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             text=True,
-            env={"PYTHONPATH": str(ROOT), "PATH": os.environ["PATH"]},
+            env={"PYTHONPATH": str(ROOT), "PATH": os.environ["PATH"], "LD_PRELOAD": PRELOADED},
         )
-        self.started.append(self.bench)
-        self.root = self.said()["root"]
+        self.unplugged: set[str] = set()
+        self.mocked = environment(folder) | {"LD_PRELOAD": PRELOADED, "UMOCKDEV_DIR": self._said()["root"]}
+        """The environment of a program that sees them."""
 
-    def said(self) -> dict[str, str]:
-        """The next line of the bench."""
+    def _said(self) -> dict[str, str]:
         assert self.bench.stdout is not None
         return dict(json.loads(self.bench.stdout.readline()))
 
@@ -67,192 +58,192 @@ class Machine(Home):
         assert self.bench.stdin is not None
         self.bench.stdin.write(text + "\n")
         self.bench.stdin.flush()
-        assert "done" in self.said(), text
+        assert "done" in self._said(), text
+        word, place, *_ = text.split()
+        if word in ("plug", "unplug"):
+            (self.unplugged.discard if word == "plug" else self.unplugged.add)(place)
 
     def start(self, *arguments: str, stdin: Any = subprocess.PIPE, **more: Any) -> subprocess.Popen[str]:
-        given = more.pop("env", None) or self.mocked
-        return super().start(*arguments, stdin=stdin, env=given, **more)
+        return super().start(*arguments, stdin=stdin, env=self.mocked, **more)
 
-    @property
-    def mocked(self) -> dict[str, str]:
-        """An environment whose programs see the mocked devices."""
-        from tests.support.processes import environment
-
-        return environment(self.folder) | {"LD_PRELOAD": PRELOADED, "UMOCKDEV_DIR": self.root}
-
-    def send(self, *lines: str, url: str = "usb:", **more: Any) -> Done:
+    def send(self, *lines: str, url: str = "usb:2ED00", **more: Any) -> Done:
         return self.process("send", url, *lines, **more)
 
-    def on_the_wire(self, *lines: str, number: str = "00") -> list[str]:
-        """Replies over RS-485 at the same time."""
-        url = f"{self.endpoints['w']['tcp']}?dialect=pmx&drives={number}"
-        return self.run("send", url, *lines).stdout.split()
+    def on_the_line(self, *lines: str) -> list[str]:
+        """The replies of controller 00 over RS-485, at the same time."""
+        done = self.run("send", f"{self.endpoints['w']['tcp']}?dialect=pmx&drives=00", "--yes", *lines)
+        assert done.returncode == 0, done
+        return done.stdout.split()
+
+    def again(self) -> None:
+        """End what a test has started, and plug both in anew: without any fault, at rest, with 0 in V1."""
+        self.end_all()
+        for place in (FIRST, SECOND):
+            if place not in self.unplugged:
+                self.fault(f"unplug {place}")
+            self.fault(f"plug {place}")
+        self.on_the_line("ABORT", "V1=0")
 
     def close(self) -> None:
-        """End what runs."""
-        self.end_all()
+        self.started.append(self.bench)
+        super().close()
 
 
-Plugged = Callable[..., Machine]
+@pytest.fixture(scope="module")
+def machine(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Machine]:
+    pytest.importorskip("usb1", reason="libusb1 is not installed: the extra usb")
+    tool("umockdev-run")
+    bindings = [DEBIANS, "-W", "ignore", "-c", "from gi.repository import UMockdev"]
+    if not Path(DEBIANS).exists() or subprocess.run(bindings, capture_output=True).returncode:
+        absent("gir1.2-umockdev-1.0 with python3-gi is not installed")
+    with contextlib.closing(Machine(tmp_path_factory.mktemp("machine"))) as made:
+        yield made
 
 
 @pytest.fixture
-def machine(tmp_path: Path) -> Iterator[Plugged]:
-    umockdev()
-    with contextlib.ExitStack() as stack:
-
-        def make(*numbers: str) -> Machine:
-            made = Machine(tmp_path, *(numbers or ("00",)))
-            stack.callback(made.close)
-            return made
-
-        yield make
+def here(machine: Machine) -> Iterator[Machine]:
+    """The machine for one test."""
+    yield machine
+    machine.again()
 
 
 def one_line(done: Done, code: int) -> str:
     """The one line on standard error of a command that ended so."""
-    assert done.returncode == code, done
-    [line] = [each for each in done.stderr.splitlines() if each.startswith("multidrop: ")]
+    assert (done.returncode, done.stdout) == (code, ""), done
+    [line] = done.stderr.splitlines()
     return line
+
+
+class Shell:
+    """`multidrop shell` on pipes, at one controller."""
+
+    def __init__(self, here: Machine, url: str) -> None:
+        self.process = here.start("shell", url)
+
+    def ask(self, *lines: str) -> str:
+        """Type lines; the first that is printed."""
+        assert self.process.stdin is not None and self.process.stdout is not None
+        self.process.stdin.write("\n".join(lines) + "\n")
+        self.process.stdin.flush()
+        return self.process.stdout.readline()
+
+    def told(self, word: str) -> str:
+        """The next notice that has a word in it."""
+        assert self.process.stderr is not None
+        while word not in (line := self.process.stderr.readline()):
+            assert line, f"{word} did not come"
+        return line
 
 
 # The whole way
 
 
-def test_the_only_controller_is_asked_and_is_one_device_with_its_line(machine: Plugged) -> None:
-    here = machine()
+def test_a_controller_is_asked_and_is_one_device_with_its_line(here: Machine) -> None:
     assert here.send("V1=77", "V1", "DN", "ID").stdout.split() == ["77", "2ED00", "Performax-2ED-SA"]
-    assert here.on_the_wire("V1", "V1=78") == ["77"]
+    assert here.on_the_line("V1", "V1=78") == ["77"]
     assert here.send("V1").stdout == "78\n"
 
 
-def test_two_controllers_are_told_apart_by_number_place_and_index(machine: Plugged) -> None:
-    here = machine("00", "07")
-    refused = one_line(here.send("V1"), 3)
-    assert "usb:2ED00@1-1" in refused and "usb:2ED07@1-2" in refused
+def test_two_controllers_are_told_apart_by_number_place_and_index(here: Machine) -> None:
+    refused = one_line(here.send("V1", url="usb:"), 3)
+    assert refused == "usb:: 2 controllers; name one of usb:2ED00@1-1, usb:2ED07@1-2"
     for url, number in (("usb:2ED07", "2ED07"), ("usb:2ED00@1-1", "2ED00"), ("usb:1", "2ED07")):
         assert here.send("DN", url=url).stdout == f"{number}\n", url
-    assert "usb:2ED07@1-1" in one_line(here.send("DN", url="usb:2ED07@1-1"), 3)
+    elsewhere = one_line(here.send("DN", url="usb:2ED07@1-1"), 3)
+    assert elsewhere == "usb:2ED07@1-1: not there; controllers on USB: usb:2ED00@1-1, usb:2ED07@1-2"
     listed = here.process("ports").stdout
-    assert "usb:2ED00@1-1" in listed and "usb:2ED07@1-2" in listed
+    assert re.findall(r"^usb:\S+", listed, re.M) == ["usb:2ED00@1-1", "usb:2ED07@1-2"]
 
 
 @pytest.mark.parametrize("form", ["short", "bare", "dirty"])
-def test_a_reply_ends_at_its_nul_or_with_its_packet(machine: Plugged, form: str) -> None:
-    here = machine()
-    here.fault(f"reply 1-1 {form}")
+def test_a_reply_ends_at_its_nul_or_with_its_packet(here: Machine, form: str) -> None:
+    here.fault(f"reply {FIRST} {form}")
     assert here.send("V1=12345678", "V1", "DN").stdout.split() == ["12345678", "2ED00"]
 
 
-def test_packets_of_no_bytes_before_a_reply_mean_nothing(machine: Plugged) -> None:
-    here = machine()
+def test_packets_of_no_bytes_before_a_reply_mean_nothing(here: Machine) -> None:
     for _ in range(3):
-        here.fault("empty 1-1")
+        here.fault(f"empty {FIRST}")
     assert here.send("V1=5", "V1").stdout == "5\n"
 
 
 # Failures, each with one clear line
 
 
-def test_a_packet_of_too_many_bytes_loses_the_connection(machine: Plugged) -> None:
-    here = machine()
-    here.fault("reply 1-1 long")
-    assert "usb:2ED00@1-1" in one_line(here.send("V1"), 3)
+def test_a_packet_of_too_many_bytes_loses_the_connection(here: Machine) -> None:
+    here.fault(f"reply {FIRST} long")
+    assert one_line(here.send("V1"), 3).startswith("usb:2ED00@1-1 was lost: a transfer failed")
 
 
-def test_a_command_that_is_not_taken_ends_in_time_and_is_not_executed_later(machine: Plugged) -> None:
-    here = machine()
-    here.fault("hold 1-1 02")
-    assert "usb:2ED00@1-1" in one_line(here.send("V1=9"), 3)
-    here.fault("free 1-1 02")
+def test_a_command_that_is_not_taken_ends_in_time_and_is_not_executed_later(here: Machine) -> None:
+    shell = Shell(here, "usb:2ED00")
+    assert shell.ask("V1") == "0\n"
+    here.fault(f"hold {FIRST} 02")
+    out, err = shell.process.communicate("V1=9\n", timeout=PATIENCE)
+    assert (out, shell.process.returncode) == ("", 3), err
+    assert "usb:2ED00@1-1 was lost: the controller takes nothing" in err
+    here.fault(f"free {FIRST} 02")
     assert here.send("V1").stdout == "0\n"
 
 
-def test_a_stall_ends_the_connection_with_its_reason(machine: Plugged) -> None:
-    here = machine()
-    here.fault("stall 1-1 82")
-    assert "refused a transfer" in one_line(here.send("V1"), 3)
+def test_a_stall_ends_the_connection_with_its_reason(here: Machine) -> None:
+    here.fault(f"stall {FIRST} 82")
+    assert one_line(here.send("V1"), 3) == "usb:2ED00@1-1 was lost: the controller refused a transfer"
 
 
-def test_without_permission_the_error_names_the_rule(machine: Plugged) -> None:
-    here = machine()
-    here.fault("forbid 1-1")
-    options = {"user": NOBODY, "group": NOBODY} if os.getuid() == 0 else {}
-    if options:
-        for each in (here.folder, *here.folder.parents):
-            if each != Path("/") and each.stat().st_uid == 0:
-                each.chmod(0o777)
-    refused = one_line(here.send("V1", **options), 3)
-    assert "permission" in refused and "60-multidrop-usb.rules" in refused and "/etc/udev/rules.d" in refused
+def test_without_permission_the_error_names_the_rule(here: Machine) -> None:
+    def without_roots_rights() -> None:
+        for capability in (1, 2):  # to override and to search any file's permissions
+            ctypes.CDLL(None).prctl(24, capability)  # PR_CAPBSET_DROP
+
+    here.fault(f"forbid {FIRST}")
+    refused = one_line(here.send("V1", url="usb:0", preexec_fn=without_roots_rights), 3)
+    assert re.fullmatch(
+        r"usb:unread@1-1: no permission; copy \S+/60-multidrop-usb\.rules to /etc/udev/rules\.d and plug it in again",
+        refused,
+    )
 
 
-def test_a_second_process_is_told_that_another_one_has_it(machine: Plugged) -> None:
-    here = machine()
-    first = here.start("shell", "usb:")
-    assert first.stdin is not None and first.stdout is not None
-    first.stdin.write("V1=4\nV1\n")
-    first.stdin.flush()
-    assert first.stdout.readline() == "4\n"
-    assert re.search(r"usb:2ED00@1-1: .* has it", one_line(here.send("V1"), 3))
-    first.stdin.close()
-    assert first.wait(PATIENCE) == 0
+def test_a_second_process_is_told_that_another_one_has_it(here: Machine) -> None:
+    shell = Shell(here, "usb:2ED00")
+    assert shell.ask("V1=4", "V1") == "4\n"
+    assert re.fullmatch(r"usb:2ED00@1-1: .* has it", one_line(here.send("V1"), 3))
+    shell.process.communicate(timeout=PATIENCE)
+    assert shell.process.returncode == 0
     assert here.send("V1").stdout == "4\n"
 
 
-def test_unplugged_in_mid_transfer_is_said_once(machine: Plugged) -> None:
-    here = machine()
-    here.fault("hold 1-1 82")
-    asked = here.start("send", "usb:2ED00?timeout=60", "V1")
-    assert here.on_the_wire("V1") == ["0"]
-    here.fault("unplug 1-1")
-    out, err = asked.communicate(timeout=PATIENCE)
-    assert "unplugged" in one_line(Done(asked.returncode, out, err), 3)
-    assert "usb:: not there" in one_line(here.send("V1"), 3)
-    here.fault("plug 1-1")
-    assert here.send("V1").stdout == "0\n"
-
-
-def test_plugged_in_again_it_is_the_same_connection_and_nothing_is_sent_twice(machine: Plugged) -> None:
-    here = machine("00", "07")
-    shell = here.start("shell", "usb:2ED07")
-    assert shell.stdin is not None and shell.stdout is not None and shell.stderr is not None
-
-    def ask(line: str) -> str:
-        shell.stdin.write(line + "\n")  # type: ignore[union-attr]
-        shell.stdin.flush()  # type: ignore[union-attr]
-        return str(shell.stdout.readline())  # type: ignore[union-attr]
-
-    assert ask("V1=3\nV1") == "3\n"
-    here.fault("unplug 1-2")
-    while "was lost" not in shell.stderr.readline():
+def test_unplugged_while_a_reply_is_awaited_it_is_lost_and_another_is_not_taken_for_it(here: Machine) -> None:
+    shell = Shell(here, "usb:2ED00")
+    assert shell.ask("V1") == "0\n"
+    here.fault(f"hold {FIRST} 82")
+    assert shell.process.stdin is not None
+    shell.process.stdin.write("V1=5\n")
+    shell.process.stdin.flush()
+    while here.on_the_line("V1") != ["5"]:
         pass
-    here.fault("plug 1-2")
-    while "again" not in shell.stderr.readline():
-        pass
-    assert ask("V1") == "3\n"
-    shell.stdin.close()
-    assert shell.wait(PATIENCE) == 0
+    here.fault(f"unplug {FIRST}")
+    assert "usb:2ED00@1-1 was lost: unplugged" in shell.told("was lost")
+    assert one_line(here.send("V1"), 3) == "usb:2ED00: not there; controllers on USB: usb:2ED07@1-2"
+    here.fault(f"plug {FIRST}")
+    assert here.send("V1").stdout == "5\n"
 
 
-def test_an_interrupt_stops_it_while_the_reply_is_awaited(machine: Plugged) -> None:
-    here = machine()
-    assert here.on_the_wire("HSX=1000", "X=0", "EO=3") is not None
-    shell = here.start("send", "usb:?timeout=60", "--yes", "J+X", "V1", "/sleep 60")
-    moving = False
-    while not moving:
-        assert shell.poll() is None, shell.communicate()
-        moving = here.on_the_wire("MSTX") != ["0"]
-    shell.send_signal(signal.SIGINT)
-    out, err = shell.communicate(timeout=PATIENCE)
-    assert shell.returncode == 130, (out, err)
-    assert here.on_the_wire("SLX" if False else "PSX") is not None
-    assert here.on_the_wire("MSTX") == ["0"]
+def test_an_interrupt_stops_it_while_the_reply_is_awaited(here: Machine) -> None:
+    jogging = here.start("send", "usb:2ED00?timeout=60", "--yes", "EO=3", "HSPD=1000", "JX+", "/sleep 60")
+    while here.on_the_line("PSX") == ["0"]:
+        assert jogging.poll() is None, jogging.communicate()
+    here.fault(f"hold {FIRST} 82")
+    jogging.send_signal(signal.SIGINT)
+    out, err = jogging.communicate(timeout=PATIENCE)
+    assert (jogging.returncode, out) == (130, ""), err
+    assert here.on_the_line("PSX") == ["0"]
 
 
 # A host in C
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="module")
 def host(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The host in C, compiled."""
     compiler, config = tool("gcc"), tool("pkg-config")
@@ -266,12 +257,12 @@ def host(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture
-def ask(machine: Plugged, host: Path) -> Callable[..., Any]:
-    """Run the host in C on a machine: its lines, or its error."""
+def ask(here: Machine, host: Path) -> Callable[..., list[str]]:
+    """Run the host in C on controller 00, with a time in ms: its lines, or its error."""
 
-    def run(here: Machine, *arguments: str) -> list[str]:
+    def run(*arguments: str) -> list[str]:
         done = subprocess.run(
-            [host, *arguments], env=here.mocked, capture_output=True, text=True, timeout=PATIENCE, cwd=here.folder
+            [host, "2ED00", *arguments], env=here.mocked, capture_output=True, text=True, timeout=PATIENCE
         )
         assert (done.returncode == 0) == (done.stderr == "")
         return (done.stdout + done.stderr).splitlines()
@@ -279,38 +270,34 @@ def ask(machine: Plugged, host: Path) -> Callable[..., Any]:
     return run
 
 
-@pytest.mark.needs("gcc", "pkg-config")
-def test_the_host_in_c_speaks_to_the_simulated_controller(machine: Plugged, ask: Callable[..., Any]) -> None:
-    here = machine()
-    said = ask(here, "500", "ID", "DN", "V1=31", "=V1", "=V2=1", "V1=", "EX")
-    assert said == ["serial 2ED00", "Performax-2ED-SA", "2ED00", "OK", "31", "OK", "?V1=", said[-1]]
+def test_the_host_in_c_speaks_to_the_simulated_controller(here: Machine, ask: Callable[..., list[str]]) -> None:
+    said = ask("500", "ID", "DN", "V1=31", "=V1", "=V2=1", "HELLO")
+    assert said == ["Performax-2ED-SA", "2ED00", "OK", "31", "OK", "?HELLO"]
     assert here.send("V1").stdout == "31\n"
 
 
-@pytest.mark.needs("gcc", "pkg-config")
-def test_the_host_in_c_meets_each_error(machine: Plugged, ask: Callable[..., Any]) -> None:
-    here = machine()
+def test_the_host_in_c_meets_each_error(here: Machine, ask: Callable[..., list[str]]) -> None:
     for fault, expected in (
-        ("hold 1-1 02", "write: LIBUSB_ERROR_TIMEOUT"),
-        ("free 1-1 02", "0"),
-        ("stall 1-1 82", "read before: LIBUSB_ERROR_PIPE"),
+        (f"hold {FIRST} 02", "write: LIBUSB_ERROR_TIMEOUT"),
+        (f"free {FIRST} 02", "0"),
+        (f"reply {FIRST} long", "read: LIBUSB_ERROR_OVERFLOW"),
+        (f"reply {FIRST} full", "0"),
+        (f"stall {FIRST} 82", "read before: LIBUSB_ERROR_PIPE"),
     ):
         here.fault(fault)
-        assert ask(here, "200", "V1")[-1] == expected, fault
-    here.fault("unplug 1-1")
-    here.fault("plug 1-1")
-    here.fault("reply 1-1 long")
-    assert ask(here, "200", "V1")[-1] == "read: LIBUSB_ERROR_OVERFLOW"
-    here.fault("unplug 1-1")
-    assert ask(here, "200", "V1") == ["open: no controller"]
+        assert ask("200", "V1")[-1] == expected, fault
+    here.fault(f"unplug {FIRST}")
+    here.fault(f"unplug {SECOND}")
+    assert ask("200", "V1") == ["open: no controller"]
 
 
-@pytest.mark.needs("gcc", "pkg-config")
-def test_the_host_in_c_finds_it_busy_while_multidrop_has_it(machine: Plugged, ask: Callable[..., Any]) -> None:
-    here = machine()
-    shell = here.start("shell", "usb:")
-    assert shell.stdin is not None and shell.stdout is not None
-    shell.stdin.write("V1\n")
-    shell.stdin.flush()
-    assert shell.stdout.readline() == "0\n"
-    assert ask(here, "200", "V1") == ["claim: LIBUSB_ERROR_BUSY"]
+def test_the_host_in_c_finds_it_busy_while_multidrop_has_it(here: Machine, ask: Callable[..., list[str]]) -> None:
+    assert Shell(here, "usb:2ED00").ask("V1") == "0\n"
+    assert ask("200", "V1") == ["claim: LIBUSB_ERROR_BUSY"]
+
+
+def test_a_reply_that_the_host_in_c_left_is_not_multidrops(here: Machine, ask: Callable[..., list[str]]) -> None:
+    here.fault(f"hold {FIRST} 82")
+    assert ask("200", "V1")[-1] == "read: LIBUSB_ERROR_TIMEOUT"
+    here.fault(f"free {FIRST} 82")
+    assert here.send("DN").stdout == "2ED00\n"
