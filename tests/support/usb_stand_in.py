@@ -15,8 +15,9 @@ from random import Random
 from multidrop.simulator.pmx.usb import UsbController
 from multidrop.simulator.serving.running import Listener, RunningFloor
 from multidrop.transports import Unreachable
-from multidrop.transports.libusb import Found, chosen
-from multidrop.transports.usb import CANCELLED, GONE, PACKET, STALLED, Broken, Control, Done, TransferFailed
+from multidrop.transports.controllers import Found, chosen
+from multidrop.transports.performax import CANCELLED, GONE, PACKET, STALLED, Control
+from multidrop.transports.usb import Broken, Done, TransferFailed
 from multidrop.transports.usbip import setup
 
 
@@ -91,11 +92,6 @@ class Sockets:
             raise Unreachable(f"{found.url}: another program has it")
         plugged.stand_in = StandIn(found.url, plugged, self.rng)
         return plugged.stand_in
-
-    @staticmethod
-    def close(late: StandIn) -> None:
-        """Close one that nobody waits for any more."""
-        late.close()
 
 
 class StandIn:

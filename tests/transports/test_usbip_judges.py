@@ -185,7 +185,7 @@ async def test_the_pipe_speaks_to_the_librarys_device_as_the_driver_does() -> No
             assert pipe.write(text)
             await until(lambda reply=reply: bytes(heard) == reply)
         await pipe.close()
-        assert device.requests[-1] == CLOSE
+        await until(lambda: device.requests[-1] == CLOSE)
         assert [each.rstrip(b"\0") for each in device.heard] == [b"DN", b"V1=5", b"V1"]
         assert all(each.endswith(b"\0") and len(each) <= 64 for each in device.heard)
         assert lost == []
