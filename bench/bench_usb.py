@@ -13,6 +13,7 @@ import sys
 import time
 from collections.abc import Awaitable, Callable, Iterator
 from pathlib import Path
+from random import Random
 
 sys.path.insert(0, str(Path(__file__).parent.parent))
 
@@ -51,7 +52,7 @@ def rows(full: bool) -> Iterator[Row]:
 def plugged(reply_time: float) -> tuple[RunningFloor, Sockets]:
     """A controller in a socket of this machine."""
     floor = RunningFloor(Floor(read(CELL, "cell")))
-    return floor, Sockets(Plugged(floor, "w", floor.floor.usb("w")[0], "1-1", reply_time=reply_time))
+    return floor, Sockets(Plugged(floor, "w", floor.floor.usb("w")[0], "1-1", Random(0), reply_time=reply_time))
 
 
 async def timed(once: Callable[[], Awaitable[str]], trips: int) -> tuple[float, float]:

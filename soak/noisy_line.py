@@ -251,10 +251,10 @@ class UsbLine(NoisyLine):
 async def on_usb(setup: Setup, folder: Path) -> AsyncIterator[NoisyLine]:
     """A controller on the USB of a machine in memory, for a loop with virtual time."""
     floor = RunningFloor(Floor(cells.load(str(setup.write(folder)))))
-    plugged = Plugged(floor, BUS, floor.floor.usb(BUS)[0], "1-1")
+    plugged = Plugged(floor, BUS, floor.floor.usb(BUS)[0], "1-1", Random(setup.seed))
     with (
         contextlib.closing(floor),
-        mock.patch.object(libusb, "LibusbCarrier", Sockets(plugged, rng=Random(setup.seed))),
+        mock.patch.object(libusb, "LibusbCarrier", Sockets(plugged)),
     ):
         yield UsbLine(setup, floor, plugged, folder)
 

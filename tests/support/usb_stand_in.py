@@ -9,6 +9,7 @@ from __future__ import annotations
 import asyncio
 from collections import deque
 from collections.abc import Callable
+from contextvars import Context, copy_context
 from dataclasses import dataclass, field
 from random import Random
 
@@ -47,6 +48,7 @@ class Plugged(Listener):
     bus: str
     controller: UsbController
     place: str
+    rng: Random
     stand_in: StandIn | None = None
     """The carrier that has it open."""
     faults: UsbFaults = UsbFaults()
@@ -54,6 +56,8 @@ class Plugged(Listener):
     """Seconds that the controller takes for a reply."""
     ends_at: dict[str, float] = field(default_factory=lambda: {"out": 0.0, "control": 0.0, "in": 0.0})
     """When the last transfer of each endpoint ends: they end in their order, also those of a host that has gone."""
+    context: Context = field(default_factory=copy_context)
+    """Where the controller works: whoever talks to it."""
 
     def __post_init__(self) -> None:
         self.floor.attach(self.bus, self)
@@ -65,6 +69,17 @@ class Plugged(Listener):
     def commanded(self) -> None:
         if not self.present:
             self.unplugged()
+
+    def drawn(self, probability: float) -> bool:
+        """Whether a fault happens now."""
+        return probability > 0 and self.rng.random() < probability
+
+    def reply(self, reply: bytes) -> None:
+        """Let a reply become readable."""
+        if self.present:
+            self.controller.replies += [b""] * self.drawn(self.faults.empty) + [reply]
+            if self.stand_in is not None:
+                self.stand_in.deliver()
 
     @property
     def present(self) -> bool:
@@ -80,9 +95,8 @@ class Plugged(Listener):
 class Sockets:
     """The USB sockets of a machine, in place of libusb's search."""
 
-    def __init__(self, *plugged: Plugged, rng: Random | None = None) -> None:
+    def __init__(self, *plugged: Plugged) -> None:
         self.plugged = list(plugged)
-        self.rng = rng or Random(0)
 
     def __call__(self, target: str) -> StandIn:
         """Open the controller that a target names, in place of `LibusbCarrier`. Raises Unreachable."""
@@ -90,22 +104,18 @@ class Sockets:
         plugged: Plugged = found.device
         if plugged.stand_in is not None:
             raise Unreachable(f"{found.url}: another program has it")
-        plugged.stand_in = StandIn(found.url, plugged, self.rng)
+        plugged.stand_in = StandIn(found.url, plugged)
         return plugged.stand_in
 
 
 class StandIn:
-    """The transfers of one controller: a `Carrier`.
-
-    `trace` is called with each packet that is taken (">") or delivered ("<").
-    """
+    """The transfers of one controller: a `Carrier`."""
 
     delay = 0.0
 
-    def __init__(self, name: str, plugged: Plugged, rng: Random) -> None:
+    def __init__(self, name: str, plugged: Plugged) -> None:
         self.name = name
-        self.trace: Callable[[str, bytes], None] = lambda way, data: None
-        self._plugged, self._rng = plugged, rng
+        self._plugged = plugged
         self._timers: dict[int, asyncio.TimerHandle] = {}
         """Packets and requests that were not taken yet."""
         self._reading: deque[int] = deque()
@@ -115,8 +125,8 @@ class StandIn:
         self._gone = self._halted = False
 
     def start(self, done: Done, broken: Broken) -> None:
-        self._loop = asyncio.get_running_loop()
-        self._done, self._broken = done, broken
+        self._loop, self._context = asyncio.get_running_loop(), copy_context()
+        self._done = done
 
     # Transfers
 
@@ -129,24 +139,22 @@ class StandIn:
         return number
 
     def send(self, data: bytes) -> int:
-        faults = self._plugged.faults
-        held = self._rng.random() * faults.longest_held if self._drawn(faults.held) else 0.0
+        plugged, faults = self._plugged, self._plugged.faults
+        held = plugged.rng.random() * faults.longest_held if plugged.drawn(faults.held) else 0.0
         number = self._begin("out", held, lambda: self._take(number, data))
         return number
 
     def receive(self) -> int:
         self._reading.append(self._number())
-        self._loop.call_soon(self._deliver)
+        self._loop.call_soon(self.deliver, context=self._plugged.context)
         return self._last
 
     def cancel(self, number: int) -> None:
-        if (timer := self._timers.pop(number, None)) is not None:
-            timer.cancel()
-        elif number in self._reading:
+        if number in self._reading:
             self._reading.remove(number)
-        else:
+        elif number not in self._timers:
             return
-        self._loop.call_soon(self._end, number, CANCELLED)
+        self._end(number, CANCELLED)
 
     def halt(self) -> None:
         self._halted = self._gone = True
@@ -162,15 +170,9 @@ class StandIn:
     def unplug(self) -> None:
         """End every transfer: the controller is gone for this carrier."""
         for number in (*self._timers, *self._reading):
-            self._loop.call_soon(self._end, number, GONE)
-        for timer in self._timers.values():
-            timer.cancel()
-        self._timers.clear()
+            self._end(number, GONE)
         self._reading.clear()
         self._gone = True
-
-    def _drawn(self, probability: float) -> bool:
-        return probability > 0 and self._rng.random() < probability
 
     def _number(self) -> int:
         if self._gone or not self._plugged.present:
@@ -180,7 +182,7 @@ class StandIn:
 
     def _begin(self, endpoint: str, after: float, work: Callable[[], None]) -> int:
         number = self._number()
-        self._timers[number] = self._loop.call_at(self._end_of(endpoint, after), work)
+        self._timers[number] = self._loop.call_at(self._end_of(endpoint, after), work, context=self._plugged.context)
         return number
 
     def _end_of(self, endpoint: str, after: float) -> float:
@@ -188,36 +190,29 @@ class StandIn:
         return self._ends_at[endpoint]
 
     def _end(self, number: int, status: int, data: bytes = b"") -> None:
-        self._timers.pop(number, None)
+        if (timer := self._timers.pop(number, None)) is not None:
+            timer.cancel()
         if not self._halted:
-            self._done(number, status, data)
+            self._loop.call_soon(self._done, number, status, data, context=self._context)
 
     def _take(self, number: int, data: bytes) -> None:
-        faults, controller, loop = self._plugged.faults, self._plugged.controller, self._loop
-        if not self._plugged.present:
+        plugged, faults, controller = self._plugged, self._plugged.faults, self._plugged.controller
+        if not plugged.present:
             return self._end(number, GONE)
-        if self._drawn(faults.stalled):
+        if plugged.drawn(faults.stalled):
             return self._end(number, STALLED)
-        self.trace(">", data)
         before = [*controller.replies]
         controller.replies.clear()
-        self._plugged.floor.exchange(self._plugged.bus, controller, data)
+        plugged.floor.exchange(plugged.bus, controller, data)
         replies, controller.replies = controller.replies, deque(before, controller.replies.maxlen)
         self._end(number, 0)
         for reply in replies:
-            late = self._rng.random() * faults.latest if self._drawn(faults.late) else self._plugged.reply_time
-            if not self._drawn(faults.missing):
-                loop.call_at(self._end_of("in", late), self._reply, reply)
+            late = plugged.rng.random() * faults.latest if plugged.drawn(faults.late) else plugged.reply_time
+            if not plugged.drawn(faults.missing):
+                self._loop.call_at(self._end_of("in", late), plugged.reply, reply, context=plugged.context)
 
-    def _reply(self, reply: bytes) -> None:
-        if self._plugged.present:
-            self._plugged.controller.replies += [b""] * self._drawn(self._plugged.faults.empty) + [reply]
-            if self._plugged.stand_in is not None:
-                self._plugged.stand_in._deliver()
-
-    def _deliver(self) -> None:
+    def deliver(self) -> None:
+        """Give the packets that wait to the transfers that wait for one."""
         replies = self._plugged.controller.replies
         while self._reading and replies and self._plugged.present:
-            data = replies.popleft()[:PACKET]
-            self.trace("<", data)
-            self._end(self._reading.popleft(), 0, data)
+            self._end(self._reading.popleft(), 0, replies.popleft()[:PACKET])
