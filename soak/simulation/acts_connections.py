@@ -13,6 +13,7 @@ from soak.simulation.person import Person
 
 if TYPE_CHECKING:
     from soak.simulation.places import Place
+    from soak.simulation.usb import Socket
     from soak.simulation.world import World
 
 LONG = 12.0
@@ -43,7 +44,7 @@ class Other:
 
 def _host(world: World, rng: Random) -> str:
     """A line that a network leads to, as its host; empty if there is none."""
-    hosts = [place.host for place in world.places if place.kind != "serial"]
+    hosts = [place.host for place in world.places if place.networked]
     return rng.choice(hosts) if hosts else ""
 
 
@@ -65,25 +66,52 @@ def restart(world: World, rng: Random) -> None:
 
 
 def replug(world: World, rng: Random) -> None:
-    """Pull adapters and plug them in again in another order: each may get the number of another."""
+    """Pull adapters and plug them in again in another order: each may get the number of another.
+
+    Controllers on USB go to each other's sockets, and come back: none may be taken for another.
+    """
     for adapter in world.kernel.adapters:
         world.floor.command(f"/sim unplug {adapter.line}")
     for adapter in rng.sample(world.kernel.adapters, len(world.kernel.adapters)):
         world.loop.call_later(rng.random() * 2, world.floor.command, f"/sim plug {adapter.line}")
+    sockets = world.kernel.usb
+    if len(sockets.plugged) > 1:
+        _pull(world)
+        sockets.exchange()
+        world.loop.call_later(rng.random(), _plug, world)
+        world.loop.call_later(1 + rng.random() * 4, _bring_back, world)
+
+
+def _pull(world: World) -> None:
+    for each in world.kernel.usb.plugged:
+        world.floor.command(f"/sim unplug {each.bus}")
+
+
+def _plug(world: World) -> None:
+    for each in world.kernel.usb.plugged:
+        world.floor.command(f"/sim plug {each.bus}")
+
+
+def _bring_back(world: World) -> None:
+    _pull(world)
+    for each in world.kernel.usb.plugged:
+        each.place = f"1-{world.place(each.bus).place}"
+    _plug(world)
 
 
 def busy(world: World, rng: Random) -> None:
     """Pull an adapter; another program opens its port before it is back, and closes it after a while."""
-    if not world.kernel.adapters:
+    adapters = [*world.kernel.adapters, *world.kernel.usb.plugged]
+    if not adapters:
         return
-    adapter = rng.choice(world.kernel.adapters)
+    adapter = rng.choice(adapters)
     world.floor.command(f"/sim unplug {adapter.line}")
     adapter.held = True
     world.loop.call_later(rng.random(), world.floor.command, f"/sim plug {adapter.line}")
     world.loop.call_later(rng.random() * 8, _release, adapter)
 
 
-def _release(adapter: Adapter) -> None:
+def _release(adapter: Adapter | Socket) -> None:
     adapter.held = False
 
 
@@ -92,7 +120,7 @@ def stop_while_away(world: World, rng: Random) -> None:
     place = rng.choice(world.places)
     world.person.type(world.command(rng, place), 0.0)
     away = 0.05 + rng.random() ** 2 * 6
-    if place.kind == "serial":
+    if not place.networked:
         world.loop.call_later(0.03, world.floor.command, f"/sim unplug {place.name}")
         world.loop.call_later(0.03 + away, world.floor.command, f"/sim plug {place.name}")
     else:

@@ -21,11 +21,12 @@ from typing import TYPE_CHECKING, Any
 from multidrop.shell.connect import reconnect
 from multidrop.simulator.lexium import power
 from multidrop.simulator.serving.running import Listener, RunningFloor
-from multidrop.transports import relay, serial_port, serial_ports, sockets, ssh_session
+from multidrop.transports import libusb, relay, serial_port, serial_ports, sockets, ssh_session
 from soak.simulation.far import SshProgram
 from soak.simulation.network import Network, Socket
 from soak.simulation.ports import Descriptor, Port, Trace
 from soak.simulation.process import PROCESS, Process, operate, outside
+from soak.simulation.usb import OTHER, Carrier, UsbSockets
 
 if TYPE_CHECKING:
     from multidrop.transports.ssh import FarPort
@@ -34,8 +35,6 @@ if TYPE_CHECKING:
 
 WHO: ContextVar[str] = ContextVar("who", default="")
 """Whose code runs."""
-OTHER = "picocom (pid 4711)"
-"""Another program, which has a port open at times."""
 NODES = 8
 BOOT = 2.0
 """The time that an Ethernet drive takes to boot, s: a real one takes longer than a whole story."""
@@ -86,7 +85,8 @@ class Kernel:
         self.latest: dict[str, Descriptor] = {}
         """The last one of each line and person."""
         self._trace = trace
-        self._seed = seed
+        self.seed = seed
+        self.usb = UsbSockets(self)
 
     def adapter(self, floor: RunningFloor, line: str, link: str) -> Adapter:
         """Plug an adapter in to a line."""
@@ -101,6 +101,7 @@ class Kernel:
         self.climate = self.network.climate = climate
         for each in self.descriptors.values():
             each.climate = climate
+        self.usb.quiet(climate)
 
     def rest(self, name: str) -> int:
         """The bytes that are left of a write which has begun."""
@@ -135,7 +136,7 @@ class Kernel:
                 outside(each.close)
 
     def _rng(self) -> Random:
-        return Random(f"{self._seed} descriptor {self.loop.descriptors}")
+        return Random(f"{self.seed} descriptor {self.loop.descriptors}")
 
     def serial(self, port: str, baud: int, **settings: Any) -> Any:
         """Open a port, as `serial.Serial` does."""
@@ -163,6 +164,11 @@ class Kernel:
 
         made.traced = traced
         return made
+
+    def keep(self, made: Carrier, line: str) -> None:
+        """Keep an open controller, whose host is the process that runs now."""
+        made.owner, made.climate, made.trace = PROCESS.get(), self.climate, self._trace(WHO.get(), line)
+        self.descriptors[self.loop.descriptor()] = made
 
     def ssh(self, far: FarPort, baud: int, way: str) -> SshProgram:
         """Start the program `ssh`."""
@@ -235,6 +241,7 @@ class Kernel:
             (serial_port, "fcntl", SimpleNamespace(ioctl=lambda *given: 0)),
             (serial_port, "output_queue", self.unsent),
             (serial_port, "holder", self.holder),
+            (libusb, "LibusbCarrier", self.usb),
             (sockets, "socket", _like(socket, socket=self.socket)),
             (sockets, "output_queue", self.unsent),
             (ssh_session, "SshSession", self.ssh),

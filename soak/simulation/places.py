@@ -19,6 +19,8 @@ KINDS = {
 """How often each kind of connection is drawn: `tcp` is a device server, `mcode` the port of an Ethernet drive."""
 ETHERNET = ("mcode", "udp", "modbus")
 """The kinds that reach an Ethernet drive: it is alone, and no wire is behind it."""
+USB = 0.1
+"""How often a line is a controller on USB in place of what was drawn."""
 SERIAL = ("serial", "rfc2217", "ssh")
 """The kinds with a serial port somewhere."""
 PERSONALITIES = ("LMDCM", "LMDCM", "LMDOM", "MDI", "MDIE", "MDIX")
@@ -37,11 +39,13 @@ class Place:
     kind: str = "serial"
     """One of `KINDS`."""
     personality: str = ""
+    number: str = ""
+    """The number of a controller on USB, which is the only drive of its line."""
 
     @property
     def names(self) -> tuple[str, ...]:
         """The names of its drives, also of one that has the line for itself."""
-        return self.drives or (LANGUAGES[self.language].alone,)
+        return self.drives or (self.number or LANGUAGES[self.language].alone,)
 
     @property
     def checked(self) -> bool:
@@ -51,7 +55,17 @@ class Place:
     @property
     def noisy(self) -> bool:
         """Whether there is a wire whose bytes can be damaged."""
-        return self.kind not in ETHERNET
+        return self.kind not in (*ETHERNET, "usb")
+
+    @property
+    def place(self) -> int:
+        """The USB socket that it is plugged into."""
+        return int(self.number)
+
+    @property
+    def networked(self) -> bool:
+        """Whether a network leads to it."""
+        return self.kind not in ("serial", "usb")
 
     @property
     def host(self) -> str:
@@ -66,14 +80,16 @@ class Place:
     @property
     def url(self) -> str:
         """The URL that opens it."""
-        keys = [f"dialect={self.language}"] * (self.kind != "modbus") + ["timeout=0.4"]
+        keys = [f"dialect={self.language}"] * (self.kind not in ("modbus", "usb")) + ["timeout=0.4"]
         keys += [f"drives={','.join(self.drives)}"] * bool(self.drives) + [f"baud={self.baud}"] * (self.kind in SERIAL)
         return f"{TARGETS[self.kind].format(self)}?{'&'.join(keys)}"
 
     def cell(self) -> str:
         """Its part of the cell file."""
         language = LANGUAGES[self.language]
-        served = f'serve = ["{TARGETS[self.kind].format(self)}"]\n' if self.kind not in SERIAL else ""
+        served = (
+            f'serve = ["{TARGETS[self.kind].format(self)}"]\n' if self.networked and self.kind not in SERIAL else ""
+        )
         head = f'[[bus]]\nname = "{self.name}"\nbaud = {self.baud}\n{served}'
         tables = (language.drive(each, self.em, self.checksum, bool(self.drives)) for each in self.names)
         tables = (each.replace('"LMDCM"', f'"{self.personality}"') for each in tables)
@@ -89,12 +105,13 @@ TARGETS = {
     "mcode": "tcp://{0.host}:503",
     "udp": "udp://{0.host}:503",
     "modbus": "modbus://{0.host}:502",
+    "usb": "usb:2ED{0.number}@1-{0.place}",
 }
 """The URL of each kind, without its keys."""
 
 
-def drawn_places(rng: Random) -> list[Place]:
-    """Draw a machine of one to three lines."""
+def drawn_places(rng: Random, usb: Random) -> list[Place]:
+    """Draw a machine of one to three lines. `usb` draws which of them are controllers on USB."""
     places = []
     for number in range(rng.choice((1, 1, 1, 2, 2, 3))):
         [kind] = rng.choices(list(KINDS), list(KINDS.values()))
@@ -108,5 +125,8 @@ def drawn_places(rng: Random) -> list[Place]:
         if kind in ETHERNET:
             language, drives, baud = "modbus" if kind == "modbus" else "mcode", (), 0
             personality = rng.choice(("LMDCE", "LMDOE"))
+        if usb.random() < (0.5 if places and places[-1].kind == "usb" else USB):
+            places.append(Place(f"l{number}", "pmx", (), em, checksum, 0, "usb", number=f"{number + 1:02}"))
+            continue
         places.append(Place(f"l{number}", language, drives, em, checksum, baud, kind, personality))
     return places

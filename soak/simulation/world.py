@@ -39,7 +39,7 @@ from multidrop.simulator.cell.spec import Faults
 from multidrop.simulator.floor import Floor
 from multidrop.simulator.serving.endpoints import serve_bus
 from multidrop.simulator.serving.running import RunningFloor
-from multidrop.transports import TransportLost, pipe, telnet
+from multidrop.transports import TransportLost, pipe, telnet, usb
 from multidrop.transports.relay import Kind, frame
 from soak.judge import Witness, Word, word
 from soak.languages import LANGUAGES, PROGRAM
@@ -183,6 +183,8 @@ class World:
                 self.kernel.adapter(self.floor, place.name, place.link)
             if place.kind == "rfc2217":
                 await self.lend(place)
+            if place.kind == "usb":
+                self.kernel.usb.add(self.floor, place.name, f"1-{place.place}")
         for bus in self.floor.floor.cell.buses:
             await serve_bus(self.floor, bus, self.stack)
         await self._live()
@@ -316,8 +318,8 @@ class World:
         self.kernel.quiet(self.climate if on else Climate(self.seed))
         if not on:
             self.network.heal()
-            for adapter in self.kernel.adapters:
-                adapter.held = False
+            for held in (*self.kernel.adapters, *self.kernel.usb.plugged):
+                held.held = False
 
     # What happens
 
@@ -538,7 +540,7 @@ def place_of_state() -> Iterator[Path]:
 
 def lived(seed: int, steps: Iterable[int], keep: bool = False, without: Collection[str] = ()) -> World:
     """Live one seed: these steps of its story, `without` these kinds of faults."""
-    climate, places = Climate.drawn(seed, without), drawn_places(Random(f"{seed} places"))
+    climate, places = Climate.drawn(seed, without), drawn_places(Random(f"{seed} places"), Random(f"{seed} usb"))
     history = History(keep=keep)
     loops: list[SimulatedLoop] = []
 
@@ -570,7 +572,8 @@ def lived(seed: int, steps: Iterable[int], keep: bool = False, without: Collecti
             for seam in ((wire, "harmed", world.harmed), *SEAMS):
                 stack.enter_context(_replaced(*seam))
             locks = SimpleNamespace(**{**vars(threading), "Lock": cut_ins.lock})
-            stack.enter_context(_replaced(pipe, "threading", locks))
+            for shared in (pipe, usb):
+                stack.enter_context(_replaced(shared, "threading", locks))
             stack.callback(cut_ins.kill)
             stack.enter_context(_logged(history))
             try:

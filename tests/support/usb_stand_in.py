@@ -104,8 +104,12 @@ class Sockets:
         plugged: Plugged = found.device
         if plugged.stand_in is not None:
             raise Unreachable(f"{found.url}: another program has it")
-        plugged.stand_in = StandIn(found.url, plugged)
+        plugged.stand_in = self.opened(found.url, plugged)
         return plugged.stand_in
+
+    def opened(self, name: str, plugged: Plugged) -> StandIn:
+        """Open a controller that nobody has."""
+        return StandIn(name, plugged)
 
 
 class StandIn:
