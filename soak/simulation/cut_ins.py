@@ -24,6 +24,7 @@ from soak.simulation.clock import SimulatedLoop
 
 SHARED = {
     "multidrop.transports.pipe": ("Pipe", "DescriptorPipe"),
+    "multidrop.transports.usb": ("UsbPipe",),
     "multidrop.drives.stopping": ("Stopping", "_read"),
     "multidrop.drives.link": ("Link",),
     "multidrop.drives.line": ("Line",),
@@ -34,14 +35,21 @@ SHARED = {
     "multidrop.shell.prompt.line_queue": ("LineQueue",),
 }
 """The modules that both threads run, and what of them they run: the other pipe is for Windows."""
-OWN = {"DescriptorPipe.preempt", "Stopping.ahead", "Keyboard._run"}
+OWN = {"DescriptorPipe.preempt", "UsbPipe.preempt", "Stopping.ahead", "Keyboard._run"}
 """What the keyboard's thread runs alone."""
 LOCKS = {"_guard"}
 QUEUES = {"_pending", "_queue", "_waiting", "_repeats", "_typed", "_background"}
 STATES = {"_ahead", "_preempted", "_partial_until", "lost", "transport", "buses"}
 """Attributes that one thread sets and the other reads."""
 WRITES = {"write", "discard", "drop", "unsent", "preempt", "yielded", "take_repeats"}
-WRITING = ("pipe DescriptorPipe.write", "pipe DescriptorPipe._push", "link Link._write", "line Line._launch")
+WRITING = (
+    "pipe DescriptorPipe.write",
+    "pipe DescriptorPipe._push",
+    "usb UsbPipe.write",
+    "usb UsbPipe._next",
+    "link Link._write",
+    "line Line._launch",
+)
 """The points on the way of a line to the wire."""
 HELD = 0.02
 """The longest time, s, for which the stop's thread is held up while the loop waits."""
@@ -112,12 +120,13 @@ class Aim:
     others: int = 0
 
 
-def drawn_aim(rng: Random) -> Aim:
-    """Draw an aim."""
+def drawn_aim(rng: Random, usb: bool = False) -> Aim:
+    """Draw an aim. `usb`: there is a controller on USB."""
     further = int(rng.random() ** 2 * 16)
     held = (1 + int(rng.random() ** 2 * OWN_WORK), 1 + int(rng.random() ** 2 * 3000)) if rng.random() < 0.5 else (0, 0)
     if (choice := rng.random()) < 0.7:
         names = [each for each in points() if choice > 0.5 or each.startswith(WRITING)]
+        names = [each for each in names if usb or not each.startswith("usb ")]
         return Aim(rng.choice(names), 1 + int(rng.random() ** 3 * 6), further, *held)
     return Aim("", 1 + int(rng.random() ** 2 * 3000), further, *held)
 

@@ -49,7 +49,7 @@ def stop_cuts_in(world: World, rng: Random) -> None:
     """Type commands, and a stop that comes in the middle of the loop's work."""
     world.person.type(b"".join(world.command(rng) for _ in range(rng.randrange(1, 4))), rng.choice((0.0, 0.01)))
     world.stops += 1
-    world.person.type_stop(drawn_aim(rng))
+    world.person.type_stop(drawn_aim(rng, bool(world.kernel.usb.plugged)))
     world.person.type(world.command(rng) * (rng.random() < 0.5) + b"/resume\r", 0.0)
 
 
