@@ -26,6 +26,7 @@ from soak.simulation.shrinking import Life, shrunk
 from soak.simulation.trace import readable
 from soak.simulation.world import lived
 from tests.support.paths import ROOT
+from tests.support.until import PATIENCE
 
 SAFETY = (ROOT / "docs" / "safety.md").read_text()
 
@@ -188,7 +189,7 @@ def test_a_failure_is_shrunk_to_the_steps_and_faults_that_it_needs(monkeypatch: 
         shrinking, "judged", lambda world: Judgement([(rule, "")] if len(world.history.stops) > 1 else [])
     )
     seed = next(seed for seed in range(1, 50) if len(lived(seed, range(20)).history.stops) > 2)
-    life = shrunk(Life(seed, tuple(range(20))), rule.name)
+    life = shrunk(Life(seed, tuple(range(20))), rule.name, seconds=PATIENCE * 4)
     assert len(life.steps) == 2
     assert not set(lived(seed, ()).climate.chances) - set(life.without)
     assert life.command.startswith(f"make simulate SEED={seed} ONLY={life.steps[0]},{life.steps[1]}")
