@@ -61,6 +61,8 @@ class Command:
     said: str = ""
     who: str = ""
     """Who typed it; empty: this person."""
+    times: int = 1
+    """How often it may be executed: a macro that is being recorded plays it once more."""
     began: float = -1.0
     ended: float = -1.0
 
@@ -139,7 +141,9 @@ class History:
     """Requests that have ended."""
     notices: list[tuple[float, str]] = field(default_factory=list)
     deaths: list[float] = field(default_factory=list)
-    """When a process was killed."""
+    """When a process was killed, or lost its terminal."""
+    unshown: list[str] = field(default_factory=list)
+    """What a terminal has neither shown nor counted."""
     lives: int = 0
     """The number of processes that have run."""
     power: bool = False

@@ -34,6 +34,10 @@ def _true(world: World) -> Iterator[str]:
     yield from world.history.untrue
 
 
+def _shown(world: World) -> Iterator[str]:
+    yield from world.history.unshown
+
+
 def _readable(world: World) -> Iterator[str]:
     yield from world.history.unreadable
 
@@ -59,6 +63,7 @@ RULES = (
         "What a report means",
         _readable,
     ),
+    Rule("shown", "What the terminal does not show is counted there.", "0013", _shown),
     Rule("log", "A session log breaks no rule of `log judge`.", "What a report means", _logged),
 )
 

@@ -21,7 +21,8 @@ from soak.simulation.clock import SimulatedLoop
 from soak.simulation.cut_ins import LATEST, Aim, CutIns
 from soak.simulation.process import Process
 
-PASTE = (b"\x1b[200~", b"\x1b[201~")
+PASTE = ("\x1b[200~", "\x1b[201~")
+"""What a terminal puts around a text that is pasted."""
 
 
 class Person:
@@ -50,6 +51,7 @@ class Person:
         self.keyboard.listen(self._listen)
         self._stops = session.stops
         session.subscribe(self._noticed)
+        self._sequence, self._pasting = "", False
         self.working = loop.create_task(self.lines.run())
 
     def _context(self) -> Context | None:
@@ -84,7 +86,7 @@ class Person:
 
     def _arrives(self) -> None:
         self._cut_ins.hurry()  # the thread that reads the keys
-        if self._coming:
+        if self._coming and not self.keyboard.closed:
             self.read(self._coming.popleft())
 
     def read(self, data: bytes) -> None:
@@ -94,8 +96,14 @@ class Person:
             self.keyboard.stop_ahead()
         self._loop.call_soon(self.keyboard._read, data)
 
-    def hang_up(self) -> None:
-        """The terminal goes away."""
+    def paste(self, text: str, enter: bool = True) -> None:
+        """Paste text in brackets, and type Enter behind it."""
+        self.type(PASTE[0].encode() + text.encode() + PASTE[1].encode() + b"\r" * enter)
+
+    def hang_up(self, gone: Callable[[], None]) -> None:
+        """The terminal goes away; `gone` is called once the loop sees that."""
+        self.keyboard.gone = gone
+        self._coming.clear()
         self._loop.call_soon(self.keyboard._read, b"", context=self._context())
 
     async def leave(self) -> None:
@@ -106,7 +114,16 @@ class Person:
 
     def _listen(self) -> None:
         for char in self.keyboard.take():
-            if char in "\r\n":
+            if self._sequence or char == "\x1b":
+                self._sequence += char
+                if any(each.startswith(self._sequence) for each in PASTE):
+                    if self._sequence in PASTE:
+                        self._pasting, self._sequence = self._sequence == PASTE[0], ""
+                    continue
+                self._sequence = ""
+            if self._pasting:
+                self._line += char
+            elif char in "\r\n":
                 line, self._line = self._line, ""
                 self.history.append(line)
                 self.lines.enter(line)
@@ -125,6 +142,7 @@ class Person:
 
     def _stop(self, dropped: str, why: str = "Ctrl+X") -> None:
         lines, self._line = (self._line + dropped).splitlines(), ""
+        self._sequence, self._pasting = "", False
         self._session.stop(why, follows=why == "Ctrl+X")
         self.lines.show_unsent("a stop came", lines)
 

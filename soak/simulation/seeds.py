@@ -13,6 +13,7 @@ FIXED = {
     373: "a view of a relay's bytes, held by the error of a failed send (of the simulation itself)",
     797: "the error of a refused Modbus write, whose flag was read too late, which the next line was blamed for",
     116: "the error of a Modbus write that was refused after its time-out, which the next line was blamed for",
+    3025: "a script's line that a macro recorded, and played (of the simulation itself)",
     4478: "a line that waited for the end of a download, taken for one of program mode (of the simulation itself)",
     10177: "a value of a drive that was without power, set while the question ran (of the simulation itself)",
     12175655: "the K of another client's OK, which was shown as a value",

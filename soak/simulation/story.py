@@ -39,10 +39,34 @@ def several_lines(world: World, rng: Random) -> None:
 def stop(world: World, rng: Random) -> None:
     """Type the stop key, before and after commands."""
     before = b"".join(world.command(rng) for _ in range(rng.randrange(0, 3)))
+    before += world.command(rng)[: -rng.randrange(1, 4)] * (rng.random() < 0.2)  # Enter was not typed
     world.stops += 1
     after = world.command(rng) if rng.random() < 0.5 else b""
     world.person.type(before + STOP + after, rng.choice((0.0, 0.01)))
     world.person.type(b"/resume\r", 0.0)
+
+
+def paste(world: World, rng: Random) -> None:
+    """Paste several lines in brackets; the stop may come before their Enter, or right behind it."""
+    lines = b"".join(world.command(rng) for _ in range(rng.randrange(1, 5))).decode().replace("\r", rng.choice("\r\n"))
+    stops = rng.random() < 0.2
+    world.stops += stops
+    world.person.paste(lines, enter=rng.random() < 0.8 or not stops)
+    if stops:
+        world.person.type(STOP + b"/resume\r")
+
+
+def unread(world: World, rng: Random) -> None:
+    """Let nobody read the terminal for a while, or read a byte a second, and write much to it."""
+    world.terminal.reader(rng.random() ** 2 * 30, slow=rng.random() < 0.4)
+    world.person.type(b"/help\r/status\r" + b"".join(world.command(rng) for _ in range(rng.randrange(3))))
+
+
+def hang_up(world: World, rng: Random) -> None:
+    """Type some lines, and hang up the terminal in the middle of them."""
+    world.person.type(b"".join(world.command(rng) for _ in range(rng.randrange(3))), rng.choice((0.0, 0.02)))
+    process = world.process
+    world.loop.call_later(rng.random() ** 2 * 0.5, lambda: world.process is process and world.hang_up())
 
 
 def stop_cuts_in(world: World, rng: Random) -> None:
@@ -94,6 +118,9 @@ ACTS = (
     Act("several lines", 20, several_lines),
     Act("stop", 4, stop),
     Act("stop cuts in", 5, stop_cuts_in),
+    Act("paste", 4, paste),
+    Act("terminal unread", 1, unread, fault=True),
+    Act("terminal hangs up", 1, hang_up, fault=True),
     Act("starve", 1, starve, fault=True),
     Act("verb", 7, verb),
     Act("power off", 4, power_off),

@@ -27,6 +27,7 @@ from multidrop.dialects import Diagnostic, DriveError
 from multidrop.drives.bus import Bus
 from multidrop.drives.events import LOG, Ended
 from multidrop.drives.stopping import stop_forms
+from multidrop.shell.automation import settled
 from multidrop.shell.configuration import Settings, parse
 from multidrop.shell.events import Failed, Notified, OnBus, Output, Printed
 from multidrop.shell.line_syntax import TypedLine
@@ -59,6 +60,7 @@ from soak.simulation.places import SERIAL, Place, drawn_places
 from soak.simulation.ports import Trace
 from soak.simulation.process import Process
 from soak.simulation.story import STOP, tell
+from soak.simulation.terminal import Terminal
 from soak.simulation.threads import Scheduler
 from soak.simulation.wall import Wall
 
@@ -118,6 +120,7 @@ class World:
     process: Process = field(init=False)
     session: Session = field(init=False)
     person: Person = field(init=False)
+    terminal: Terminal = field(init=False)
     ready: asyncio.Event = field(default_factory=asyncio.Event)
     """A session is open, and somebody types at it."""
     witnesses: dict[tuple[str, str], Witness] = field(default_factory=dict)
@@ -279,6 +282,8 @@ class World:
         files.PROCESS = process.number
         self.session = WatchedSession(self.settings(self.folder), self, process)
         self.session.subscribe(self.heard)
+        self.terminal = Terminal(self.loop)
+        self.session.subscribe(self.terminal.show)
         writer.begin(self.session)
         rng = Random(f"{self.seed} person {self.history.lives}")
         self.person = Person(self.session, self.loop, rng, self._typed, self.cut_ins, process)
@@ -318,6 +323,7 @@ class World:
         self.kernel.quiet(self.climate if on else Climate(self.seed))
         if not on:
             self.network.heal()
+            self.terminal.reader()
             for held in (*self.kernel.adapters, *self.kernel.usb.plugged):
                 held.held = False
 
@@ -469,9 +475,49 @@ class World:
 
     async def _close(self) -> None:
         """Close the session in an orderly way."""
-        await self.process.start(self.person.leave())
-        await self.process.start(self.session.close())
+        await self.process.start(self._leave())
         self.history.defects += [f"file left: {each.path}" for each in self.disk.open.values()]
+
+    async def _leave(self) -> None:
+        await self.person.leave()
+        await self.session.close()
+        self.history.unshown += await self.terminal.finish()
+
+    # A terminal that hangs up
+
+    def hang_up(self) -> None:
+        """Hang up the terminal: the session ends in an orderly way, and after a while another one begins."""
+        if self.ready.is_set() and not self.process.dead:
+            self.ready.clear()
+            self.cut_ins.hurry()
+            self.cut_ins.end()
+            self.history.deaths.append(self.loop.now)
+            self.history.note(self.loop.now, "hang-up", "")
+            self.person.hang_up(lambda: self.loop.create_task(self._hung_up(), context=Context()) and None)
+
+    async def _hung_up(self) -> None:
+        process, rng = self.process, Random(f"{self.seed} hang-up {self.history.lives}")
+        ending = process.start(self._end_of_prompt())
+        await asyncio.wait((ending, process.death), return_when=asyncio.FIRST_COMPLETED)
+        if process.dead:
+            return  # killed meanwhile, which begins the next life
+        process.arm(0, "")
+        ending.result()
+        self.stops = sum(not stop.who for stop in self.history.stops)
+        self.beside_it.clear()
+        opened = [each for each in self.kernel.descriptors.values() if each.owner is process and not each.closed]
+        self.history.defects += [f"left by a hang-up: {each!r}" for each in (*self.loop.tasks_of(process), *opened)]
+        await self._again(rng.random() ** 2 * AWAY)
+
+    async def _end_of_prompt(self) -> None:
+        """End as the prompt does: what was set in motion is stopped."""
+        for work in self._beside:
+            work.cancel()
+        self.person.lines.drop("the prompt has ended")
+        self.session.interrupt()
+        await self.session.automations.over()
+        await settled(self.session)
+        await self._leave()
 
 
 class WatchedSession(Session):
@@ -506,6 +552,7 @@ class WatchedSession(Session):
         if command is None:
             return await super().run(line, *arguments, **named)
         command.began = self.now()
+        command.times += self.recording.startswith("r")
         try:
             await super().run(line, *arguments, **named)
         except (DriveError, Diagnostic, TransportLost) as failure:
