@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import json
 from collections.abc import Awaitable, Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -25,14 +26,41 @@ if TYPE_CHECKING:
     from multidrop.drives.drive import Drive
     from multidrop.shell.session import Session
 
+DIFFERS = 1
+
 
 def list_(chosen: argparse.Namespace) -> int:
     async def show(session: Session, drive: Drive) -> None:
-        own = f"{session.display_name(drive)}: " if is_several(chosen.drive) else ""
+        name = session.display_name(drive)
+        if chosen.json:
+            held = await program_listing.read(session, drive, "list")
+            held.check_listed(name)
+            for at, text in held.lines:
+                session.output(json.dumps({"drive": name, "at": at, "text": text}))
+            return
+        own = f"{name}: " if is_several(chosen.drive) else ""
         for line in await program_listing.readable(session, drive):
             session.output(f"{own}{line}")
 
-    return _with_drive(chosen, show)
+    return _with_drive(chosen, show, unsolicited=not chosen.json)
+
+
+def program_diff(chosen: argparse.Namespace) -> int:
+    """Print the lines that differ; the exit code says whether any does."""
+    _check(chosen.file)
+    differ = False
+
+    async def compare(session: Session, drive: Drive) -> None:
+        nonlocal differ
+        name, found = session.display_name(drive), await transfers.differences(session, drive, chosen.file)
+        for row in found:
+            facts = {"drive": name, "line": row.number or None, "here": row.here, "at": row.at, "there": row.there}
+            session.output(json.dumps(facts) if chosen.json else transfers.in_words(chosen.file, row, name))
+        differ = differ or bool(found)
+        if not found:
+            session.notify(f"{name} holds {chosen.file}", outcome=True)
+
+    return _with_drive(chosen, compare, unsolicited=False) or (DIFFERS if differ else 0)
 
 
 def upload(chosen: argparse.Namespace) -> int:
@@ -51,16 +79,20 @@ def upload(chosen: argparse.Namespace) -> int:
 
 def download(chosen: argparse.Namespace) -> int:
     """Send a file to the drive; report a wrong file before anything is opened."""
-    # Raise Diagnostic for a file that is correct in no language: the error in the language of its name.
-    own, text = program_languages()[program_language_of(chosen.file)], program_text_of(chosen.file)
-    if all(errors(source.language.check(text)) for source in program_languages().values() if source is not own):
-        own.language.load(chosen.file)
+    _check(chosen.file)
     wanted = transfers.Wanted(not chosen.no_verify, chosen.save, chosen.only_changed, chosen.run)
 
     async def put(session: Session, drive: Drive) -> None:
         await transfers.download(session, drive, chosen.file, wanted)
 
     return _with_drive(chosen, put, agreed=chosen.yes)
+
+
+def _check(file: str) -> None:
+    """Raise Diagnostic for a file that is correct in no language: the error in the language of its name."""
+    own, text = program_languages()[program_language_of(file)], program_text_of(file)
+    if all(errors(source.language.check(text)) for source in program_languages().values() if source is not own):
+        own.language.load(file)
 
 
 def _with_drive(
@@ -75,7 +107,6 @@ def _with_drive(
     return runner.run([chosen.url], work, agreed=agreed, unsolicited=unsolicited, tried=chosen.drive.split(","))
 
 
-DIFFERS = 1
 """The exit code of a comparison where something differs, as where a drive did not reply or refused."""
 
 

@@ -65,7 +65,7 @@ function _shtab_multidrop_using
   test "$_shtab_multidrop_cmdpath" = "$argv"
 end
 
-set -g _shtab_multidrop_commands demo tui shell send run sim program 'program check' 'program test' 'program sweep' 'program list' 'program upload' 'program download' params 'params backup' 'params diff' 'params restore' macro 'macro list' 'macro show' 'macro play' 'macro edit' 'macro describe' 'macro rename' 'macro copy' 'macro delete' 'macro key' 'macro import' 'macro export' plot poll publish share snapshot ports relay scan rescue log 'log show' 'log follow' 'log grep' 'log judge' 'log replay' config 'config path' 'config show' 'config check' help lsp report completion
+set -g _shtab_multidrop_commands demo tui shell send run sim program 'program check' 'program test' 'program sweep' 'program list' 'program diff' 'program upload' 'program download' params 'params backup' 'params diff' 'params restore' macro 'macro list' 'macro show' 'macro play' 'macro edit' 'macro describe' 'macro rename' 'macro copy' 'macro delete' 'macro key' 'macro import' 'macro export' plot poll publish share snapshot ports relay scan rescue log 'log show' 'log follow' 'log grep' 'log judge' 'log replay' config 'config path' 'config show' 'config check' help lsp report completion
 set -g _shtab_multidrop_opts_with_value --against --allow --baud --break --cell --cluster --dialect --drive --every --expect --jobs --junit --language --on --other --output --page --personality --random --rate --rfc2217 --role --rows --run --save --seed --serve --set --speed --tcp --times --to --until --vary --watch --with -o
 
 complete -c multidrop -e
@@ -87,11 +87,13 @@ complete -c multidrop -n '_shtab_multidrop_using shell' -l raw -d 'look for no d
 complete -c multidrop -n '_shtab_multidrop_using shell' -l twin -d 'run a simulated twin beside each drive; warn of differences'
 complete -c multidrop -n '_shtab_multidrop_using shell' -l no-reconnect -d 'give up a lost connection, and do not try again'
 complete -c multidrop -n '_shtab_multidrop_using shell' -l yes -d 'answer every question with yes beforehand'
+complete -c multidrop -n '_shtab_multidrop_using shell' -l beyond -d 'let moves leave the travel of their axis, which --yes does not'
 complete -c multidrop -n '_shtab_multidrop_using shell; and test $_shtab_multidrop_npos -ge 0' -ka "(_multidrop_url)" -d 'what to open'
 complete -c multidrop -n '_shtab_multidrop_using; and test $_shtab_multidrop_npos -eq 0' -a send -d 'Run lines, print the replies, exit.'
 complete -c multidrop -n '_shtab_multidrop_using send' -s h -l help -d 'show this help message and exit'
 complete -c multidrop -n '_shtab_multidrop_using send' -l json -d 'print one JSON object a line, and a summary'
 complete -c multidrop -n '_shtab_multidrop_using send' -l yes -d 'answer every question with yes beforehand'
+complete -c multidrop -n '_shtab_multidrop_using send' -l beyond -d 'let moves leave the travel of their axis, which --yes does not'
 complete -c multidrop -n '_shtab_multidrop_using send; and test $_shtab_multidrop_npos -eq 0' -ka "(_multidrop_url)" -d 'what to open'
 complete -c multidrop -n '_shtab_multidrop_using; and test $_shtab_multidrop_npos -eq 0' -a run -d 'Run a script of lines, with blocks and checks, or a Python program.'
 complete -c multidrop -n '_shtab_multidrop_using run' -s h -l help -d 'show this help message and exit'
@@ -101,6 +103,7 @@ complete -c multidrop -n '_shtab_multidrop_using run' -l role -x -d 'open a URL 
 complete -c multidrop -n '_shtab_multidrop_using run' -l json -d 'print one JSON object a line, and a summary'
 complete -c multidrop -n '_shtab_multidrop_using run' -l junit -xka "(__fish_complete_path (commandline -ct))" -d 'write the checks to a JUnit XML file'
 complete -c multidrop -n '_shtab_multidrop_using run' -l yes -d 'answer every question with yes beforehand'
+complete -c multidrop -n '_shtab_multidrop_using run' -l beyond -d 'let moves leave the travel of their axis, which --yes does not'
 complete -c multidrop -n '_shtab_multidrop_using run; and test $_shtab_multidrop_npos -eq 0' -ka "(__fish_complete_path (commandline -ct))" -d 'a file of lines as typed at the prompt, or a Python program (.py); -: standard input'
 complete -c multidrop -n '_shtab_multidrop_using; and test $_shtab_multidrop_npos -eq 0' -a sim -d 'Serve a simulated cell to other programs; the demo cell without CELL.'
 complete -c multidrop -n '_shtab_multidrop_using sim' -s h -l help -d 'show this help message and exit'
@@ -148,7 +151,14 @@ complete -c multidrop -n '_shtab_multidrop_using program sweep; and test $_shtab
 complete -c multidrop -n '_shtab_multidrop_using program; and test $_shtab_multidrop_npos -eq 0' -a list -d 'Print the program in a drive.'
 complete -c multidrop -n '_shtab_multidrop_using program list' -s h -l help -d 'show this help message and exit'
 complete -c multidrop -n '_shtab_multidrop_using program list' -l drive -x -d 'the drive (default: the first), or all; may be repeated'
+complete -c multidrop -n '_shtab_multidrop_using program list' -l json -d 'print one JSON object a line of the drive: drive, at, text'
 complete -c multidrop -n '_shtab_multidrop_using program list; and test $_shtab_multidrop_npos -eq 0' -ka "(_multidrop_url)" -d 'what to open'
+complete -c multidrop -n '_shtab_multidrop_using program; and test $_shtab_multidrop_npos -eq 0' -a diff -d 'Compare a program file with the program in a drive; exit code 0: the same, 1: lines differ.'
+complete -c multidrop -n '_shtab_multidrop_using program diff' -s h -l help -d 'show this help message and exit'
+complete -c multidrop -n '_shtab_multidrop_using program diff' -l drive -x -d 'the drive (default: the first), or all; may be repeated'
+complete -c multidrop -n '_shtab_multidrop_using program diff' -l json -d 'print one JSON object a difference: drive, line, here, at, there'
+complete -c multidrop -n '_shtab_multidrop_using program diff; and test $_shtab_multidrop_npos -eq 0' -ka "(__fish_complete_path (commandline -ct))" -d 'MCode (.mxt, .txt) or A-SCRIPT (.prg, .asc) or TMCL (.tmc)'
+complete -c multidrop -n '_shtab_multidrop_using program diff; and test $_shtab_multidrop_npos -eq 1' -ka "(_multidrop_url)" -d 'what to open'
 complete -c multidrop -n '_shtab_multidrop_using program; and test $_shtab_multidrop_npos -eq 0' -a upload -d 'Save the program in a drive to a new file.'
 complete -c multidrop -n '_shtab_multidrop_using program upload' -s h -l help -d 'show this help message and exit'
 complete -c multidrop -n '_shtab_multidrop_using program upload' -l drive -x -d 'the drive (default: the first), or all; all or several: FILE is a new folder of files; may be repeated'
@@ -208,6 +218,7 @@ complete -c multidrop -n '_shtab_multidrop_using macro play' -l fast -d 'leave o
 complete -c multidrop -n '_shtab_multidrop_using macro play' -l json -d 'print one JSON object a line, and a summary'
 complete -c multidrop -n '_shtab_multidrop_using macro play' -l junit -xka "(__fish_complete_path (commandline -ct))" -d 'write the checks to a JUnit XML file'
 complete -c multidrop -n '_shtab_multidrop_using macro play' -l yes -d 'answer every question with yes beforehand'
+complete -c multidrop -n '_shtab_multidrop_using macro play' -l beyond -d 'let moves leave the travel of their axis, which --yes does not'
 complete -c multidrop -n '_shtab_multidrop_using macro; and test $_shtab_multidrop_npos -eq 0' -a edit -d 'Open a macro'"'"'s file in the editor of VISUAL or EDITOR; it changes only once the whole text is right.'
 complete -c multidrop -n '_shtab_multidrop_using macro edit' -s h -l help -d 'show this help message and exit'
 complete -c multidrop -n '_shtab_multidrop_using macro; and test $_shtab_multidrop_npos -eq 0' -a describe -d 'Change a macro'"'"'s note.'

@@ -114,7 +114,23 @@ LIST = Operation(
     meaning="print the program in a drive",
     run="drives.list_",
     examples=["program list sim:#pmx"],
-    arguments={"URL": WHAT, "--drive ADDR": drives("the drive (default: the first), or all")},
+    arguments={
+        "URL": WHAT,
+        "--drive ADDR": drives("the drive (default: the first), or all"),
+        "--json": "print one JSON object a line of the drive: drive, at, text",
+    },
+)
+PROGRAM_DIFF = Operation(
+    command="program diff",
+    meaning="compare a program file with the program in a drive; exit code 0: the same, 1: lines differ",
+    run="drives.program_diff",
+    examples=["program diff shuttle.mxt press --drive b"],
+    arguments={
+        "FILE": titles,
+        "URL": WHAT,
+        "--drive ADDR": drives("the drive (default: the first), or all"),
+        "--json": "print one JSON object a difference: drive, line, here, at, there",
+    },
 )
 UPLOAD = Operation(
     usage="/upload FILE [ADDR]",

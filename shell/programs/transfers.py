@@ -17,7 +17,7 @@ from multidrop.dialects import Diagnostic, DriveError, Refused, SourceLine
 from multidrop.dialects.errors import Differs
 from multidrop.dialects.families import program_languages
 from multidrop.dialects.files import program_text_of
-from multidrop.dialects.program_files import LOCKED, Held, errors, refuse
+from multidrop.dialects.program_files import LOCKED, Difference, Held, errors, refuse
 from multidrop.drives.drive import Drive, still
 from multidrop.shell.channel import running, transferring
 from multidrop.shell.events import By, Printed
@@ -68,6 +68,24 @@ async def checked(
         if each.warning:
             workspace.notify(f"{each.where(file)}: warning: {each.what}", warning=True)
     return text, await asyncio.to_thread(own.language.read, text, file)
+
+
+async def differences(session: Session, drive: Drive, file: str) -> Sequence[Difference]:
+    """Read the program lines of a drive, and return where a file differs; programs that it lacks do not count.
+
+    Raises Diagnostic for the file, and Refused where the drive's program is locked.
+    """
+    _, lines = await checked(session, drive, file)
+    held = await read(session, drive, "diff", lines)
+    held.check_listed(session.display_name(drive))
+    return drive.programs.differences(drive.state, lines, held, None)
+
+
+def in_words(file: str, found: Difference, drive: str) -> str:
+    where = f"{file}:{found.number}" if found.number else file
+    here = f"here '{found.here}'" if found.here else "here no line"
+    there = f"'{found.there}' at {found.at}" if found.at is not None else "no line"
+    return f"{where}: {here}, in {drive} {there}"
 
 
 # Download
@@ -243,10 +261,7 @@ class _Download:
             return
         found = self._programs.differences(self._drive.state, sent, held, before)
         for each in found[:MOST]:
-            where = f"{self._file}:{each.number}" if each.number else self._file
-            here = f"here '{each.here}'" if each.here else "here no line"
-            line = f"'{each.there}' at {each.at}" if each.at is not None else "no line"
-            self._session.notify(f"{where}: {here}, in {self._name} {line}", warning=True)
+            self._session.notify(in_words(self._file, each, self._name), warning=True)
         if found:
             count = f"{len(found)} lines differ" if len(found) > 1 else "1 line differs"
             raise Differs(f"{self._name}: {count} from {self._file}; download it again")

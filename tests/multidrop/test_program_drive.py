@@ -1,4 +1,4 @@
-"""`multidrop program check|list|upload|download` from outside, for both languages."""
+"""`multidrop program check|list|diff|upload|download` from outside, for both languages."""
 
 from __future__ import annotations
 
@@ -170,3 +170,35 @@ def test_a_file_that_is_wrong_is_found_before_anything_is_opened(
     (tmp_path / "bad.prg").write_text("FROB\n")
     done = program(arguments[0], "tcp://127.0.0.1:1", arguments[1])
     assert done.returncode == 2 and len(done.stderr.splitlines()) == 1 and arguments[1] in done.stderr
+
+
+@pytest.mark.process
+@pytest.mark.parametrize(
+    ("bus", "file", "changed", "number"),
+    [("line", "a.mxt", ("MR Q1", "MR 8"), 4), ("pmx", "a.prg", ("PRG 0", "PRG 1"), 0)],
+)
+def test_a_file_and_a_drive_are_compared_line_by_line(
+    program: Command, served: dict[str, str], tmp_path: Path, bus: str, file: str, changed: tuple[str, str], number: int
+) -> None:
+    url = served[bus]
+    assert program("download", url, file).returncode == 0
+    same = program("diff", file, url)
+    assert (same.returncode, same.stdout) == (0, "") and f"holds {file}" in same.stderr
+    other = "other" + Path(file).suffix
+    (tmp_path / other).write_text(FILES[file].replace(*changed))
+    done = program("diff", other, url)
+    assert done.returncode == 1 and done.stderr == ""
+    found = [json.loads(line) for line in program("diff", other, url, "--json").stdout.splitlines()]
+    assert len(found) == len(done.stdout.splitlines()) > 0
+    assert [*found[0]] == ["drive", "line", "here", "at", "there"]
+    if number:
+        assert done.stdout == f"{other}:{number}: here 'MR 8', in a 'MR Q1' at {found[0]['at']}\n"
+        assert (found[0]["line"], found[0]["here"], found[0]["there"]) == (number, "MR 8", "MR Q1")
+    listed = [json.loads(line) for line in program("list", url, "--json").stdout.splitlines()]
+    assert listed and all([*each] == ["drive", "at", "text"] for each in listed)
+
+
+def test_a_wrong_file_is_told_before_anything_is_opened(program: Command, tmp_path: Path) -> None:
+    (tmp_path / "c.mxt").write_text("PG 1\nFROB (\nE\nPG\n")
+    done = program("diff", "c.mxt", "tcp://127.0.0.1:1")
+    assert (done.returncode, done.stdout) == (2, "") and done.stderr.startswith("c.mxt:2:1")
