@@ -180,7 +180,7 @@ def test_a_file_that_is_wrong_is_found_before_anything_is_opened(
 def test_a_file_and_a_drive_are_compared_line_by_line(
     program: Command, served: dict[str, str], tmp_path: Path, bus: str, file: str, changed: tuple[str, str], number: int
 ) -> None:
-    url = served[bus]
+    url = f"{served[bus]}?drives=07&dialect=pmx" if bus == "pmx" else served[bus]
     assert program("download", url, file).returncode == 0
     same = program("diff", file, url)
     assert (same.returncode, same.stdout) == (0, "") and f"holds {file}" in same.stderr
@@ -192,13 +192,13 @@ def test_a_file_and_a_drive_are_compared_line_by_line(
     assert len(found) == len(done.stdout.splitlines()) > 0
     assert [*found[0]] == ["drive", "line", "here", "at", "there"]
     if number:
-        assert done.stdout == f"{other}:{number}: here 'MR 8', in a 'MR Q1' at {found[0]['at']}\n"
+        assert done.stdout == f"{other}:{number}: here 'MR 8', in 127.0.0.1 'MR Q1' at {found[0]['at']}\n"
         assert (found[0]["line"], found[0]["here"], found[0]["there"]) == (number, "MR 8", "MR Q1")
     listed = [json.loads(line) for line in program("list", url, "--json").stdout.splitlines()]
     assert listed and all([*each] == ["drive", "at", "text"] for each in listed)
 
 
 def test_a_wrong_file_is_told_before_anything_is_opened(program: Command, tmp_path: Path) -> None:
-    (tmp_path / "c.mxt").write_text("PG 1\nFROB (\nE\nPG\n")
+    (tmp_path / "c.mxt").write_text("PG 1\nMR 100\nE\n")
     done = program("diff", "c.mxt", "tcp://127.0.0.1:1")
-    assert (done.returncode, done.stdout) == (2, "") and done.stderr.startswith("c.mxt:2:1")
+    assert (done.returncode, done.stdout) == (2, "") and done.stderr.startswith("c.mxt:1:1: PG is never ended")
