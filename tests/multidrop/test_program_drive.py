@@ -175,7 +175,7 @@ def test_a_file_that_is_wrong_is_found_before_anything_is_opened(
 @pytest.mark.process
 @pytest.mark.parametrize(
     ("bus", "file", "changed", "number"),
-    [("line", "a.mxt", ("MR Q1", "MR 8"), 4), ("pmx", "a.prg", ("PRG 0", "PRG 1"), 0)],
+    [("line", "a.mxt", ("MR Q1", "MR 8"), 4), ("pmx", "a.prg", ("X1000", "X1001"), 0)],
 )
 def test_a_file_and_a_drive_are_compared_line_by_line(
     program: Command, served: dict[str, str], tmp_path: Path, bus: str, file: str, changed: tuple[str, str], number: int
