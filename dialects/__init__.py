@@ -10,22 +10,29 @@ from typing import TYPE_CHECKING, Any
 from multidrop.dialects.on_demand import imported
 
 if TYPE_CHECKING:
-    from multidrop.dialects.codec import (
-        Codec,
-        Command,
-        Decoded,
-        End,
-        Kind,
-        Priority,
-        Procedure,
-        Reply,
-        Request,
-        StopPiece,
-    )
-    from multidrop.dialects.errors import Diagnostic, DriveError, Inexpressible, NoAnswer, Refused, Stopped
-    from multidrop.dialects.family import Family, Hints, Motion, Progress
-    from multidrop.dialects.files import SourceLine
-    from multidrop.dialects.state import DriveState, Owed
+    from multidrop.dialects.codec import Codec as Codec
+    from multidrop.dialects.codec import Command as Command
+    from multidrop.dialects.codec import Decoded as Decoded
+    from multidrop.dialects.codec import End as End
+    from multidrop.dialects.codec import Kind as Kind
+    from multidrop.dialects.codec import Priority as Priority
+    from multidrop.dialects.codec import Procedure as Procedure
+    from multidrop.dialects.codec import Reply as Reply
+    from multidrop.dialects.codec import Request as Request
+    from multidrop.dialects.codec import StopPiece as StopPiece
+    from multidrop.dialects.errors import Diagnostic as Diagnostic
+    from multidrop.dialects.errors import DriveError as DriveError
+    from multidrop.dialects.errors import Inexpressible as Inexpressible
+    from multidrop.dialects.errors import NoAnswer as NoAnswer
+    from multidrop.dialects.errors import Refused as Refused
+    from multidrop.dialects.errors import Stopped as Stopped
+    from multidrop.dialects.family import Family as Family
+    from multidrop.dialects.family import Hints as Hints
+    from multidrop.dialects.family import Motion as Motion
+    from multidrop.dialects.family import Progress as Progress
+    from multidrop.dialects.files import SourceLine as SourceLine
+    from multidrop.dialects.state import DriveState as DriveState
+    from multidrop.dialects.state import Owed as Owed
 
 _MODULES = {
     "codec": ("Codec", "Command", "Decoded", "End", "Kind", "Priority", "Procedure", "Reply", "Request", "StopPiece"),
@@ -35,31 +42,6 @@ _MODULES = {
     "state": ("DriveState", "Owed"),
 }
 _PLACES = {name: f"multidrop.dialects.{module}:{name}" for module, names in _MODULES.items() for name in names}
-__all__ = [
-    "Codec",
-    "Command",
-    "Decoded",
-    "Diagnostic",
-    "DriveError",
-    "DriveState",
-    "End",
-    "Family",
-    "Hints",
-    "Inexpressible",
-    "Kind",
-    "Motion",
-    "NoAnswer",
-    "Owed",
-    "Priority",
-    "Procedure",
-    "Progress",
-    "Refused",
-    "Reply",
-    "Request",
-    "SourceLine",
-    "StopPiece",
-    "Stopped",
-]
 
 
 def __getattr__(name: str) -> Any:

@@ -66,32 +66,7 @@ _PLACES = {
     "multidrop.transports": ("TransportLost", "Unreachable"),
 }
 _PUBLIC = {name: module for module, names in _PLACES.items() for name in names}
-__all__ = [
-    "AsyncDrive",
-    "AsyncSession",
-    "AsyncTelemetry",
-    "Diagnostic",
-    "Differs",
-    "Drive",
-    "DriveError",
-    "Inexpressible",
-    "NoAnswer",
-    "Refused",
-    "Run",
-    "Sample",
-    "Samples",
-    "Session",
-    "SimulatedCell",
-    "StopReport",
-    "Stopped",
-    "Telemetry",
-    "TransportLost",
-    "Unreachable",
-    "connect",
-    "connect_async",
-    "read_rrd",
-    "simulate",
-]
+__all__ = [*_PUBLIC]
 
 
 def __getattr__(name: str) -> Any:
