@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
-from types import MappingProxyType
 
 from multidrop.dialects.family import ADDRESSES, EVERYONE, Family, Guard, Guards, to_all
 from multidrop.dialects.pmx.host import operations
@@ -29,18 +28,14 @@ def move_to(axis: str, position: int | str) -> tuple[str, ...]:
     return "ABS", f"{axis.upper() or FIRST}{position}"
 
 
-GUARDS: Mapping[str, str] = MappingProxyType(
-    {
-        "STORE": "writes the present settings over the kept ones, device name and baud rate included",
-        "DN": "changes the number by which the controller is addressed, after STORE and a power cycle",
-        "DB": "changes the baud rate, after STORE and a power cycle",
-        EVERYONE: "can start every drive of the line",
-    }
-)
+GUARDS: Mapping[str, str] = {
+    "STORE": "writes the present settings over the kept ones, device name and baud rate included",
+    "DN": "changes the number by which the controller is addressed, after STORE and a power cycle",
+    "DB": "changes the baud rate, after STORE and a power cycle",
+    EVERYONE: "can start every drive of the line",
+}
 """Every guard, and what its commands do."""
-QUIET: Mapping[str, frozenset[str]] = MappingProxyType(
-    {"SR": frozenset({"0", "2"}), "EO": frozenset({"0"}), "SL": frozenset({"0"})}
-)
+QUIET: Mapping[str, frozenset[str]] = {"SR": frozenset({"0", "2"}), "EO": frozenset({"0"}), "SL": frozenset({"0"})}
 """Values that stop a program, a motor or its correction: no address makes them a guarded command."""
 _NUMBER = re.compile(r"\A\s*@\d{2}", re.ASCII)
 

@@ -9,7 +9,6 @@ one.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from types import MappingProxyType
 
 from multidrop.dialects.family import ADDRESSES, EVERYONE, Family, Guard, Guards, to_all
 from multidrop.dialects.tmcl.host import codec, operations
@@ -33,40 +32,34 @@ def move_to(axis: str, position: int | str) -> tuple[str, ...]:
 BOOTLOADER = 242
 """The command that starts the bootloader."""
 _EEPROM = "writes to the EEPROM, which wears out"
-GUARDS: Mapping[str, str] = MappingProxyType(
-    {
-        "STAP": _EEPROM,
-        "STGP": _EEPROM,
-        "FACTORY": "restores the factory settings, and gives no reply",
-        "BOOTLOADER": "starts the bootloader; the module then obeys no command, a stop included",
-        "DOWNLOAD": "erases the program from that line on; the module then stores every command until 133",
-        "AUTOSTART": "has the module start its program at each power-up",
-        "BAUD": "changes the baud rate from the next message on",
-        "ADDRESS": "changes the address of the module from the next message on",
-        "TEXTMODE": "may have the module reply in text mode, which multidrop does not read",
-        "REPLIES": "may have the module send no more replies: nothing can be read, and no stop confirmed",
-        EVERYONE: "can start every drive of the line",
-    }
-)
+GUARDS: Mapping[str, str] = {
+    "STAP": _EEPROM,
+    "STGP": _EEPROM,
+    "FACTORY": "restores the factory settings, and gives no reply",
+    "BOOTLOADER": "starts the bootloader; the module then obeys no command, a stop included",
+    "DOWNLOAD": "erases the program from that line on; the module then stores every command until 133",
+    "AUTOSTART": "has the module start its program at each power-up",
+    "BAUD": "changes the baud rate from the next message on",
+    "ADDRESS": "changes the address of the module from the next message on",
+    "TEXTMODE": "may have the module reply in text mode, which multidrop does not read",
+    "REPLIES": "may have the module send no more replies: nothing can be read, and no stop confirmed",
+    EVERYONE: "can start every drive of the line",
+}
 """Every guard, and what its lines do."""
-_COMMANDS: Mapping[int, str] = MappingProxyType(
-    {
-        Command.STAP: "STAP",
-        Command.STGP: "STGP",
-        Command.DOWNLOAD: "DOWNLOAD",
-        Command.FACTORY: "FACTORY",
-        BOOTLOADER: "BOOTLOADER",
-    }
-)
-_PARAMETERS: Mapping[int, str] = MappingProxyType(
-    {
-        Global.BAUD: "BAUD",
-        Global.ADDRESS: "ADDRESS",
-        Global.TEXT_MODE: "TEXTMODE",
-        Global.AUTOSTART: "AUTOSTART",
-        Global.SUPPRESS_REPLY: "REPLIES",
-    }
-)
+_COMMANDS: Mapping[int, str] = {
+    Command.STAP: "STAP",
+    Command.STGP: "STGP",
+    Command.DOWNLOAD: "DOWNLOAD",
+    Command.FACTORY: "FACTORY",
+    BOOTLOADER: "BOOTLOADER",
+}
+_PARAMETERS: Mapping[int, str] = {
+    Global.BAUD: "BAUD",
+    Global.ADDRESS: "ADDRESS",
+    Global.TEXT_MODE: "TEXTMODE",
+    Global.AUTOSTART: "AUTOSTART",
+    Global.SUPPRESS_REPLY: "REPLIES",
+}
 """Guards on setting a global parameter of bank 0, or restoring it from EEPROM."""
 _SWITCHES = frozenset({Global.TEXT_MODE, Global.AUTOSTART, Global.SUPPRESS_REPLY})
 """Those that a 0 switches off, which needs no agreement."""

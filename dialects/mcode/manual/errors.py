@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from enum import IntEnum
-from types import MappingProxyType
 
 from multidrop.dialects.rows import rows
 
@@ -100,12 +99,10 @@ BY_ITSELF = frozenset(number for number, row in _ROWS.items() if row["by_itself"
 
 def _texts(family: str) -> Mapping[int, str]:
     own = {number: row for number, row in _ROWS.items() if family not in row["lacking"].split()}
-    return MappingProxyType(
-        {number: (row["mdi_meaning"] if family == "MDI" else "") or row["meaning"] for number, row in own.items()}
-    )
+    return {number: (row["mdi_meaning"] if family == "MDI" else "") or row["meaning"] for number, row in own.items()}
 
 
-TEXTS: Mapping[str, Mapping[int, str]] = MappingProxyType({family: _texts(family) for family in ("LMD", "LMM", "MDI")})
+TEXTS: Mapping[str, Mapping[int, str]] = {family: _texts(family) for family in ("LMD", "LMM", "MDI")}
 """Number to text, for the Lexium MDrive (LMD), the Lexium Motion Module (LMM) and MDrivePlus (MDI)."""
 
 UNKNOWN = "unknown error"

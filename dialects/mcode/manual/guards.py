@@ -8,37 +8,30 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Mapping
-from types import MappingProxyType
 
 from multidrop.dialects.family import ADDRESSES, EVERYONE, Guard, to_all
 from multidrop.dialects.mcode.manual.grammar import LineError, Number, Statement, parse
 from multidrop.dialects.mcode.manual.program_file import bare
 from multidrop.dialects.mcode.manual.table import lookup
 
-AT_ONCE: Mapping[str, str] = MappingProxyType(
-    {
-        "FD": "erases all programs, variables and settings, and resets the drive",
-        "CP": "erases the program",
-        "UG": "makes the drive wait for a firmware upgrade, and obey nothing else until that is complete",
-        "IP": "puts every variable and flag back to its saved value; values that were not saved are lost",
-    }
-)
+AT_ONCE: Mapping[str, str] = {
+    "FD": "erases all programs, variables and settings, and resets the drive",
+    "CP": "erases the program",
+    "UG": "makes the drive wait for a firmware upgrade, and obey nothing else until that is complete",
+    "IP": "puts every variable and flag back to its saved value; values that were not saved are lost",
+}
 """Instructions, with or without a value."""
-SETTINGS: Mapping[str, str] = MappingProxyType(
-    {
-        "AS": "starts the motor at once, in torque mode",
-        "BD": "changes the baud rate: after S and a reset the drive replies at that rate only",
-        "DN": "changes the name by which the drive is addressed",
-        "LK": "hides the program: once that is saved, only CP or FD opens it, and both erase",
-        "PY": "takes the drive out of party mode: it then obeys lines that are for other drives",
-    }
-)
+SETTINGS: Mapping[str, str] = {
+    "AS": "starts the motor at once, in torque mode",
+    "BD": "changes the baud rate: after S and a reset the drive replies at that rate only",
+    "DN": "changes the name by which the drive is addressed",
+    "LK": "hides the program: once that is saved, only CP or FD opens it, and both erase",
+    "PY": "takes the drive out of party mode: it then obeys lines that are for other drives",
+}
 """Settings, where a value is written."""
-NAMES: Mapping[str, str] = MappingProxyType({**AT_ONCE, **SETTINGS, EVERYONE: "can start every drive of the line"})
+NAMES: Mapping[str, str] = {**AT_ONCE, **SETTINGS, EVERYONE: "can start every drive of the line"}
 """Every guard, and what its lines do."""
-HARMLESS: Mapping[str, frozenset[int]] = MappingProxyType(
-    {"AS": frozenset({0, 1, 2}), "LK": frozenset({0}), "PY": frozenset({1})}
-)
+HARMLESS: Mapping[str, frozenset[int]] = {"AS": frozenset({0, 1, 2}), "LK": frozenset({0}), "PY": frozenset({1})}
 """The values of a setting that are not guarded; an expression may have any value, so it is."""
 STOPS_AT_0 = frozenset({"SL", "JE", "DE", "AS", "TQ"})
 """Words whose 0 ends motion or torque: no address makes them a guarded line."""

@@ -14,7 +14,6 @@ takes nothing from it.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from types import MappingProxyType
 
 from multidrop.dialects.mcode.manual.mnemonic import EVERY, LEXIUM, MDRIVE_PLUS, READ_ONLY, Default, Mnemonic, Number
 from multidrop.dialects.rows import rows
@@ -75,17 +74,17 @@ def _like(row: Mapping[str, str]) -> Mapping[str, str]:
 
 _ROWS = {row["name"]: row for row in rows(__file__, "lexium.csv")}
 _SHARED = frozenset(next(iter(_ROWS.values()))) - {"section", "note", "products", "reserved_on", "zero_on"}
-MNEMONICS = MappingProxyType({name: _mnemonic(row, LEXIUM) for name, row in _ROWS.items()})
+MNEMONICS: Mapping[str, Mnemonic] = {name: _mnemonic(row, LEXIUM) for name, row in _ROWS.items()}
 """The Lexium's words by name, in capitals; each indexed word has its own row (`D1`, `O3`, `F8`)."""
-MDRIVE = MappingProxyType(
-    {row["name"]: _mnemonic(_like(row), MDRIVE_PLUS) for row in rows(__file__, "mdrive_plus.csv")}
-)
+MDRIVE: Mapping[str, Mnemonic] = {
+    row["name"]: _mnemonic(_like(row), MDRIVE_PLUS) for row in rows(__file__, "mdrive_plus.csv")
+}
 """The MDrivePlus's words by name."""
 
 PRINTS_LINES = frozenset(name for name, row in MNEMONICS.items() if row.lines)
 """The words whose PR prints several lines without an end of their own."""
 
-NO_STEP: Mapping[str, int] = MappingProxyType({name: row.step for name, row in MNEMONICS.items() if row.step})
+NO_STEP: Mapping[str, int] = {name: row.step for name, row in MNEMONICS.items() if row.step}
 """The error of `IC` and `DC` on a word that cannot be stepped: 25 or 26 (section 5.1.29)."""
 
 

@@ -10,7 +10,6 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from types import MappingProxyType
 
 from multidrop.dialects.rows import rows
 
@@ -73,7 +72,7 @@ ROWS: tuple[Register, ...] = tuple(
     )
     for row in rows(__file__, "registers.csv")
 )
-REGISTERS: Mapping[str, Register] = MappingProxyType({row.name: row for row in ROWS})
+REGISTERS: Mapping[str, Register] = {row.name: row for row in ROWS}
 """Registers by name."""
-AT: Mapping[int, Register] = MappingProxyType({address: row for row in ROWS for address in row.addresses})
+AT: Mapping[int, Register] = {address: row for row in ROWS for address in row.addresses}
 """Registers by address; both registers of a value lead to it. A missing address is reserved."""

@@ -110,8 +110,8 @@ class Row:
         return f"{self.word} {', '.join(names)}".strip()
 
 
-MOVES: Mapping[str, int] = MappingProxyType({each.name: each.value for each in Move})
-SEARCHES: Mapping[str, int] = MappingProxyType({each.name: each.value for each in Search})
+MOVES: Mapping[str, int] = {each.name: each.value for each in Move}
+SEARCHES: Mapping[str, int] = {each.name: each.value for each in Search}
 _AXIS, _GLOBAL = (TYPE, MOTOR), (TYPE, BANK)
 
 ROWS = (
@@ -148,7 +148,7 @@ ROWS = (
         prints=True,
     ),
 )
-WORDS: Mapping[str, Row] = MappingProxyType({row.word: row for row in ROWS})
+WORDS: Mapping[str, Row] = {row.word: row for row in ROWS}
 
 
 @dataclass(frozen=True)
@@ -303,21 +303,19 @@ def accepted(status: int) -> bool:
     return status >= Status.DONE and status != Status.STORED
 
 
-REFUSALS: Mapping[int, tuple[str, str]] = MappingProxyType(
-    {
-        Status.WRONG_CHECKSUM: ("wrong checksum", "the line is disturbed: check wiring and baud"),
-        Status.INVALID_COMMAND: ("invalid command", "this module has no such command"),
-        Status.WRONG_TYPE: ("wrong type", "this module has no such parameter, type or motor"),
-        Status.INVALID_VALUE: ("invalid value", "check the range of the value, and the motor's number"),
-        Status.EEPROM_LOCKED: ("the EEPROM is locked", "unlock it with the vendor's tool"),
-        Status.NOT_AVAILABLE: ("command not available", "this module has it not in this state or equipment"),
-        Status.MAXIMUM_EXCEEDED: ("maximum exceeded", "too many of them; check the value"),
-        Status.STORED: (
-            "stored as a program line, not executed",
-            "the module is in download mode; 133 0, 0, 0 or a stop ends that",
-        ),
-    }
-)
+REFUSALS: Mapping[int, tuple[str, str]] = {
+    Status.WRONG_CHECKSUM: ("wrong checksum", "the line is disturbed: check wiring and baud"),
+    Status.INVALID_COMMAND: ("invalid command", "this module has no such command"),
+    Status.WRONG_TYPE: ("wrong type", "this module has no such parameter, type or motor"),
+    Status.INVALID_VALUE: ("invalid value", "check the range of the value, and the motor's number"),
+    Status.EEPROM_LOCKED: ("the EEPROM is locked", "unlock it with the vendor's tool"),
+    Status.NOT_AVAILABLE: ("command not available", "this module has it not in this state or equipment"),
+    Status.MAXIMUM_EXCEEDED: ("maximum exceeded", "too many of them; check the value"),
+    Status.STORED: (
+        "stored as a program line, not executed",
+        "the module is in download mode; 133 0, 0, 0 or a stop ends that",
+    ),
+}
 """Meaning of a refusing status and what to do, for a person."""
 
 

@@ -14,7 +14,6 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import IntEnum
-from types import MappingProxyType
 
 from multidrop.dialects.tmcl.manual import commands
 from multidrop.dialects.tmcl.manual.commands import BYTE, INT32, MOTOR, STARTING_PARAMETERS, TYPE, VALUE, Call, Command
@@ -178,7 +177,7 @@ class Row:
 
 
 def _words(of: type[IntEnum], *without: IntEnum) -> Mapping[str, int]:
-    return MappingProxyType({each.name: each.value for each in of if each not in without})
+    return {each.name: each.value for each in of if each not in without}
 
 
 _NUMBER = re.compile(r"[+-]?(?:\d{1,11}|0[xX][0-9A-Fa-f]{1,8})", re.ASCII)
@@ -250,12 +249,11 @@ def _direct(row: commands.Row) -> Row:
     return Row(int(row.command), tuple(fields), row.title, row.word, row.moves)
 
 
-ROWS: Mapping[int, Row] = MappingProxyType(
-    {int(number): Row(int(number), fields, title, number.name, number in _STARTS) for number, fields, title in _TABLE}
-    | {int(row.command): _direct(row) for row in commands.ROWS}
-)
+ROWS: Mapping[int, Row] = {
+    int(number): Row(int(number), fields, title, number.name, number in _STARTS) for number, fields, title in _TABLE
+} | {int(row.command): _direct(row) for row in commands.ROWS}
 """Every word by its number."""
-WORDS: Mapping[str, Row] = MappingProxyType({row.word: row for row in ROWS.values()})
+WORDS: Mapping[str, Row] = {row.word: row for row in ROWS.values()}
 JUMPS = frozenset(number for number, row in ROWS.items() if any(each.label for each in row.fields))
 """The lines whose value is an address."""
 ENDS = frozenset({EMPTY, Word.JA, Word.RSUB, Word.STOP, Word.RETI, Word.RST})

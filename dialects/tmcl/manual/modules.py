@@ -11,7 +11,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from types import MappingProxyType
 
 from multidrop.dialects.rows import rows
 from multidrop.dialects.tmcl.manual.commands import INT32, Axis, Status
@@ -56,34 +55,32 @@ def _limits(text: str) -> Sequence[int]:
 
 
 def _parameters(group: str) -> Mapping[int, Parameter]:
-    return MappingProxyType(
-        {
-            int(row["number"]): Parameter(
-                row["title"],
-                INT32 if row["valid"] == "?" else _limits(row["valid"]) if row["valid"] else range(0),
-                row["unit"],
-                int(row["fresh"] or 0),
-                bool(row["live"]),
-                row["valid"] != "?",
-            )
-            for row in rows(__file__, "parameters.csv")
-            if row["group"] == group
-        }
-    )
+    return {
+        int(row["number"]): Parameter(
+            row["title"],
+            INT32 if row["valid"] == "?" else _limits(row["valid"]) if row["valid"] else range(0),
+            row["unit"],
+            int(row["fresh"] or 0),
+            bool(row["live"]),
+            row["valid"] != "?",
+        )
+        for row in rows(__file__, "parameters.csv")
+        if row["group"] == group
+    }
 
 
 _AXIS, _CHIP, _GLOBAL = map(_parameters, ("axis", "chip", "global"))
-GLOBAL: Mapping[int, Parameter] = MappingProxyType({number: row for number, row in _GLOBAL.items() if row.known})
-RELATIVE_FROM: Mapping[int, str] = MappingProxyType(
-    {0: "counts from the last target", 1: "counts from here", 2: "counts from the encoder's position"}
-)
+GLOBAL: Mapping[int, Parameter] = {number: row for number, row in _GLOBAL.items() if row.known}
+RELATIVE_FROM: Mapping[int, str] = {
+    0: "counts from the last target",
+    1: "counts from here",
+    2: "counts from the encoder's position",
+}
 """The values of axis parameter 127; only some modules have it (in the maker's tables 1240, 1241 and 1276)."""
 USER = Parameter("user variable; STGP keeps it without power", INT32)
 USERS = range(256)
 """The numbers of the user variables, in bank 2."""
-BAUDS: Mapping[int, int] = MappingProxyType(
-    {0: 9600, 1: 14400, 2: 19200, 3: 28800, 4: 38400, 5: 57600, 6: 76800, 7: 115200}
-)
+BAUDS: Mapping[int, int] = {0: 9600, 1: 14400, 2: 19200, 3: 28800, 4: 38400, 5: 57600, 6: 76800, 7: 115200}
 """Baud rates by the code in global parameter 65. The codes beyond 9600 are common knowledge, read in no manual."""
 
 
@@ -145,7 +142,7 @@ def _module(row: Mapping[str, str]) -> Module:
     )
 
 
-MODULES: Mapping[str, Module] = MappingProxyType({row["module"]: _module(row) for row in rows(__file__, "modules.csv")})
+MODULES: Mapping[str, Module] = {row["module"]: _module(row) for row in rows(__file__, "modules.csv")}
 """By the number in the module's name."""
 COMMON = Module(
     "", {number: row for number, row in _AXIS.items() if row.known and number != Axis.UNIT_MODE}, {0: GLOBAL}

@@ -186,16 +186,14 @@ MDRIVE = Model(
     wakes_by_line=True,
 )
 
-MODELS: Mapping[str, Model] = MappingProxyType(
-    {
-        "LMDOM": _lexium("LMDOM"),
-        "LMDCM": _lexium("LMDCM"),
-        "LMDOE": _lexium("LMDOE", ethernet=True),
-        "LMDCE": _lexium("LMDCE", ethernet=True),
-        "LMM": _lexium("LMM")._replace(part="LMM15", points=MODULE_POINTS, auxiliary=False, free_ms=True),
-        "MDI": MDRIVE,
-        "MDIE": MDRIVE._replace(part="MDI1FRD23A7-EQ"),
-        "MDIX": MDRIVE._replace(part="MDI3CRL23C7-EQ", points=EXPANDED_POINTS),
-    }
-)
+MODELS: Mapping[str, Model] = {
+    "LMDOM": _lexium("LMDOM"),
+    "LMDCM": _lexium("LMDCM"),
+    "LMDOE": _lexium("LMDOE", ethernet=True),
+    "LMDCE": _lexium("LMDCE", ethernet=True),
+    "LMM": _lexium("LMM")._replace(part="LMM15", points=MODULE_POINTS, auxiliary=False, free_ms=True),
+    "MDI": MDRIVE,
+    "MDIE": MDRIVE._replace(part="MDI1FRD23A7-EQ"),
+    "MDIX": MDRIVE._replace(part="MDI3CRL23C7-EQ", points=EXPANDED_POINTS),
+}
 """By personality."""
