@@ -128,7 +128,8 @@ class Restarts:
         if ended_well and (drive.commands, drive.started_at) == sent and self._link.stops == stops:
             drive.state.referenced(axis)
             name = f" {axis}" if axis else ""
-            self._link.notify(f"{drive.shown}{name} is referenced: the homing has ended", drive.address)
+            check = "; check its place, as a homing may leave the position" if axis in drive.anchored else ""
+            self._link.notify(f"{drive.shown}{name} is referenced: the homing has ended{check}", drive.address)
 
 
 def _shown(name: str) -> str:

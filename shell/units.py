@@ -32,8 +32,9 @@ from multidrop.dialects.units import (
     quantity,
 )
 from multidrop.drives.drive import confirmed_motion
+from multidrop.drives.events import Unsolicited
 from multidrop.shell.configuration import TRAVEL
-from multidrop.shell.events import By
+from multidrop.shell.events import By, OnBus, SessionEvent
 from multidrop.shell.line_syntax import EVERYONE
 
 if TYPE_CHECKING:
@@ -89,6 +90,24 @@ class Units:
         self.shown = True
         """Positions are shown in units where an axis has a scale."""
         self._axes: WeakKeyDictionary[Drive, dict[str, Axis]] = WeakKeyDictionary()
+        workspace.subscribe(self._overhear)
+
+    def _overhear(self, event: SessionEvent) -> None:
+        """Note the commands of others that show: an echo of another master's, or a program's print for a drive."""
+        bus = self._workspace.buses.get(event.bus) if isinstance(event, OnBus) else None
+        if bus is None or not isinstance(event, OnBus) or not isinstance(event.event, Unsolicited):
+            return
+        for drive in bus.drives.values() if any(each.anchored for each in bus.drives.values()) else ():
+            for line in event.event.lines:
+                text = line.strip().removeprefix("@").removeprefix(drive.address)
+                homing = (
+                    drive.family.referencing(drive.state, text) if text != line.strip() or not drive.address else None
+                )
+                lost = drive.anchored & {homing.axis} if homing is not None else None
+                if lost:
+                    drive.state.reference_lost(lost)
+                    why = f"'{text}' of another sender: its places are not referenced"
+                    self._workspace.notify(f"{self._name(drive, '')}: {why}", bus=bus.name, warning=True)
 
     # Scales
 

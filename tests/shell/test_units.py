@@ -250,6 +250,18 @@ async def test_places_of_the_machine_need_a_reference(tmp_path):
         assert len(moves(shop)) == 1
 
 
+async def test_a_homing_of_another_sender_that_shows_takes_the_reference(tmp_path):
+    async with opened(tmp_path, units={"a": ANCHORED, "b": "5 mm/turn"}) as shop:
+        await run(shop, "@b PG 1", "@b LB G1", '@b PR "HM 1"', '@b PR "bHM 1"', "@b E", "@b PG", "@b EX G1")
+        await asyncio.sleep(1.0)
+        assert shop.session.units.referenced(shop.session.drive("line", "a"), "")
+        await run(shop, "@b PG 100", "@b LB G2", '@b PR "aHM 1"', "@b E", "@b PG", "@b EX G2")
+        await asyncio.sleep(1.0)
+        assert "a: 'HM 1' of another sender: its places are not referenced" in shop.warned()
+        with pytest.raises(Diagnostic, match="the position of a is not referenced"):
+            await run(shop, "@a MA {130 mm}")
+
+
 async def test_a_set_position_is_a_reference_where_the_scale_has_no_zero(tmp_path):
     async with opened(tmp_path, units={"a": "5 mm/turn"}) as shop:
         drive = shop.session.drive("line", "a")
@@ -310,6 +322,48 @@ async def test_a_move_within_the_travel_or_back_towards_it_is_allowed(tmp_path):
         await run(shop, "@a MR {-10 mm}", "/wait stopped")
         with pytest.raises(Diagnostic, match="the travel is"):
             await run(shop, "@a MR {1 mm}")
+
+
+LIMITED = {"scale": "1 mm/step", "travel": "0..100 mm"}
+
+
+async def test_travel_of_a_controller_follows_its_mode_axis_by_axis(tmp_path):
+    async with opened(tmp_path, ARM, units={"00.x": LIMITED, "00.y": "1 mm/step"}) as shop:
+        await run(shop, "ABS", "X50Y5000", "/wait stopped", "Y-5000", "/wait stopped", "X60", "/wait stopped", "INC")
+        for line in ("X41", "X{41 mm}Y1", "I-61:0"):
+            with pytest.raises(Diagnostic, match="00.x: .*the travel is 0 mm to 100 mm; nothing was sent"):
+                await run(shop, line)
+        await run(shop, "X40", "/wait stopped")
+        assert (await shop.session.drive().motion())[0].position == 100
+
+
+async def test_travel_of_a_module(tmp_path):
+    async with opened(tmp_path, MODULE, units={"1": LIMITED}) as shop:
+        await run(shop, "MVP ABS, 0, 100", "/wait stopped")
+        for line in ("MVP REL, 0, 1", "MVP ABS, 0, -1", "SAP 0, 0, 101"):
+            with pytest.raises(Diagnostic, match="the travel is 0 mm to 100 mm"):
+                await run(shop, line)
+        await run(shop, "MVP REL, 0, {-1 cm}")
+
+
+async def test_a_line_for_all_drives_is_asked_about_for_each_axis(tmp_path):
+    async with opened(tmp_path, units={"a": ANCHORED, "b": {**ANCHORED, "travel": "0..200 mm"}}) as shop:
+        shop.session.questions.agreed = True
+        with pytest.raises(Diagnostic, match="b: 'MA 1024000' ends at 220 mm, and the travel is 0 mm to 200 mm"):
+            await run(shop, "@* MA 1024000")
+        assert not moves(shop)
+        await run(shop, "@* MA 800000")
+        assert moves(shop) == ["MA 800000"]
+
+
+async def test_a_place_is_known_although_the_drive_moves(tmp_path):
+    async with opened(tmp_path, units={"a": ANCHORED}) as shop:
+        await run(shop, "@a MA {299 mm}")
+        await asyncio.sleep(0.5)
+        with pytest.raises(Diagnostic, match="the travel is 0 mm to 300 mm"):
+            await run(shop, "@a MA {301 mm}")
+        await run(shop, "@a MR {200 mm}")
+        assert any("travel not checked: it moves" in text for text in shop.told(Notified))
 
 
 async def test_an_end_that_is_not_known_is_said_once(tmp_path):
