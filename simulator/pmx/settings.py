@@ -1,23 +1,22 @@
 """The settings of a simulated PMX-2ED-SA: registers, flash, and the speed windows of appendix A.
 
-A register has the name of its ASCII command (`HSPDX`). Values are whole numbers; StepNLoop ratios are kept in
-thousandths. An individual speed, acceleration or correction amount of 0 means the global one (manual 7.1). Factory
-values are our choice where the manual prints none (7.15 to 7.20 name none at all).
+`registers.csv` has the registers: a register has the name of its ASCII command (`HSPDX`), `each` is one of each axis,
+`lost` one that STORE does not keep. Values are whole numbers; StepNLoop ratios are kept in thousandths. An individual
+speed, acceleration or correction amount of 0 means the global one (manual 7.1). Of an acceleration time no more is used
+than appendix A allows. Factory values are our choice where the manual prints none (7.15 to 7.20 name none at all).
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from typing import NamedTuple
 
 from multidrop.dialects.pmx.manual.script_parser import KEPT_VARIABLES
+from multidrop.dialects.rows import rows
 
 AXES = ("X", "Y")
 INT32 = 2**31
 FASTEST = 6_000_000
 """Pulses/s, the upper end of the last window."""
-LONGEST = 10_000_000
-"""The longest acceleration time that is accepted, ms; no more is used than appendix A allows."""
 VARIABLES = 64
 SCALE = 1000
 """StepNLoop ratios are kept in thousandths."""
@@ -34,62 +33,13 @@ class Register(NamedTuple):
     """Whether it can be set only while its axis is at rest."""
 
 
-FLAG = Register(0, 1)
-COUNT = Register(-INT32, INT32 - 1)
-
-GLOBAL = {
-    "HSPD": Register(1, FASTEST, 1000, kept=False),
-    "LSPD": Register(1, FASTEST, 100, kept=False),
-    "ACC": Register(1, LONGEST, 300, kept=False),
-    "DEC": Register(1, LONGEST, 300, kept=False),
-    "EDEC": FLAG,
-    "IERR": FLAG,
-    "RZ": FLAG,
-    "DB": Register(1, 5, 1),
-    "DOBOOT": Register(0, 255),
-    "EOBOOT": Register(0, 3, 3),
-    "HCA": Register(0, INT32 - 1, 1000),
-    "LCA": Register(0, INT32 - 1, 1000),
-    "SLOAD": Register(0, 3),
-    "TOC": Register(0, INT32 - 1),
+REGISTERS = {
+    row["name"] + axis: Register(
+        int(row["low"]), int(row["high"]), int(row["factory"]), not row["lost"], bool(row["idle"])
+    )
+    for row in rows(__file__, "registers.csv")
+    for axis in (AXES if row["each"] else ("",))
 }
-BY_AXIS = {
-    "HSPD": Register(0, FASTEST, kept=False),
-    "LSPD": Register(0, FASTEST, kept=False),
-    "ACC": Register(0, LONGEST, kept=False),
-    "DEC": Register(0, LONGEST, kept=False),
-    "HCA": Register(0, INT32 - 1),
-    "LCA": Register(0, INT32 - 1),
-    "POL": Register(0, 0x3FFF),
-    "SCV": FLAG,
-    "SL": Register(0, 1, idle=True),
-    "SLR": Register(1, 999_999, SCALE, idle=True),
-    "SLT": Register(0, INT32 - 1, 10),
-    "SLE": Register(0, INT32 - 1, 1000),
-    "SLA": Register(0, INT32 - 1, 10),
-    "SSPDM": Register(0, 9, kept=False, idle=True),
-}
-JOYSTICK = {
-    "JV1": Register(0, FASTEST, 10_000),
-    "JV2": Register(0, FASTEST, 10_000),
-    "JV3": Register(0, FASTEST, 1000),
-    "JV4": Register(0, FASTEST, 1000),
-    "JV5": Register(0, 5000, 100),
-    "JV6": Register(0, 5000, 100),
-    **{f"JL{n}": COUNT._replace(factory=place) for n, place in enumerate((-10_000, -9000, 9000, 10_000) * 2, 1)},
-}
-
-
-def _registers() -> Iterator[tuple[str, Register]]:
-    yield from GLOBAL.items()
-    yield from JOYSTICK.items()
-    yield "JO", Register(0, 3)
-    for name, register in BY_AXIS.items():
-        for axis in AXES:
-            yield name + axis, register
-
-
-REGISTERS = dict(_registers())
 
 
 class Window(NamedTuple):
