@@ -433,5 +433,7 @@ class Units(Generic[S]):
     """The axes whose positions may count from elsewhere, or otherwise, after a line."""
     reads: Callable[[S, str], tuple[str, Takes] | None]
     """What a question prints: its axis, and how that counts; None: no quantity."""
+    setting: Callable[[S, str], tuple[str, Takes] | None] | None = None
+    """What a setting holds: its axis, and how that counts; None in place of it: as the line that assigns one."""
     target: Callable[[S], Procedure[Takes]] | None = None
     """Read what a field of `Takes.TARGET` means now."""

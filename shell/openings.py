@@ -251,7 +251,7 @@ class _Opening:
         label(bus, connection)
         workspace.identified(bus)
         workspace.notify(described(bus), bus=bus.name)
-        for each in workspace.on_opened if not opened.hints.lazy else ():
+        for each in workspace.on_opened if workspace.scaled and not opened.hints.lazy else ():
             await each(bus)
         for text in crash_marks.left(workspace.settings.state, workspace.of(bus).port):
             workspace.notify(f"{bus.name}: {text}", bus=bus.name, warning=True)

@@ -88,8 +88,7 @@ class Session(Workspace):
         self.path = LinePath(self)
         self.openings = Openings(self, opener or partial(open_buses, state=self.settings.state), lazy, raw, tried)
         self._background: set[asyncio.Task[Any]] = set()
-        if self.scaled:
-            self.on_opened.append(self.units.opened)
+        self.on_opened.append(lambda bus: self.units.opened(bus))
 
     # Buses
 

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 
 from multidrop.dialects import Diagnostic, DriveError, Stopped
 from multidrop.dialects.program_files import Held, Stored
+from multidrop.dialects.units import Scale
 from multidrop.dialects.values import Snapshot
 from multidrop.drives.bus import Bus
 from multidrop.drives.drive import Drive
@@ -20,15 +22,18 @@ from multidrop.simulator.floor import Floor
 FORBIDDEN = "#@:/ "
 """Characters that the name of a bus in a cell file lacks."""
 
+Scales = Callable[[Drive], Mapping[str, Scale]]
+"""The scales of a drive by axis."""
 
-async def save(workspace: Workspace, file: str) -> None:
+
+async def save(workspace: Workspace, file: str, scales: Scales = lambda drive: {}) -> None:
     """Read every drive of every bus, and write one cell file. Raises Diagnostic, DriveError or TransportLost.
 
     A drive that cannot be read is named in the file and raised when the file is written.
     """
     new_file.check(file, printed=True)
     failures: list[DriveError] = []
-    buses = [await _bus(workspace, bus, failures) for bus in workspace.buses.values()]
+    buses = [await _bus(workspace, bus, failures, scales) for bus in workspace.buses.values()]
     text = write(buses)
     new_file.write(file, text, workspace.output)
     for bus in buses:
@@ -65,12 +70,12 @@ def described(snapshot: Snapshot) -> DriveText:
     return snapshots_of(FAMILIES[snapshot.kind]).describe(snapshot)
 
 
-async def _bus(workspace: Workspace, bus: Bus, failures: list[DriveError]) -> BusText:
+async def _bus(workspace: Workspace, bus: Bus, failures: list[DriveError], scales: Scales) -> BusText:
     drives: list[DriveText] = []
     missing: list[str] = []
     for drive in bus.drives.values():
         try:
-            drives.append(described(await read(workspace, drive)))
+            drives.append(replace(described(await read(workspace, drive)), units=scales(drive)))
         except Stopped:
             raise
         except DriveError as failure:

@@ -113,7 +113,9 @@ class Units:
 
     @property
     def own(self) -> tuple[str, ...]:
-        return self._workspace.settings.own_units
+        """The own units of the configuration, and those in which a simulated cell has scales."""
+        scales = (axis.scale for axes in self._axes.values() for axis in axes.values())
+        return (*self._workspace.settings.own_units, *(each.kind for each in scales if each.kind == each.unit.name))
 
     def axes(self, drive: Drive) -> dict[str, Axis]:
         """The scales of a drive by axis, as in `Motion.axis`."""
@@ -131,10 +133,13 @@ class Units:
         return found
 
     def _configured(self, drive: Drive) -> dict[str, Scale]:
+        """The scales of a line's drives: those of its simulated cell, and before them those of its saved connection."""
         bus = self._workspace.buses.get(drive.link.name)
-        connection = self._workspace.of(bus).connection if bus is not None and bus.link is drive.link else None
-        saved = self._workspace.settings.connections.get(connection.name) if connection is not None else None
-        return dict(saved.units) if saved is not None else {}
+        if bus is None or bus.link is not drive.link:
+            return {}
+        record = self._workspace.of(bus)
+        saved = self._workspace.settings.connections.get(record.connection.name) if record.connection else None
+        return {**record.opened.units, **(saved.units if saved is not None else {})}
 
     def of(self, drive: Drive, axis: str = "") -> Axis | None:
         """The scale of an axis; None: it has none."""
@@ -142,6 +147,25 @@ class Units:
         if found is not None and found.sure and _runs(drive):
             found.sure = False
         return found
+
+    def scales(self, drive: Drive) -> dict[str, Scale]:
+        """The scales of a drive by axis, for a cell file."""
+        return {name: axis.scale for name, axis in self.axes(drive).items()}
+
+    def given(self, drive: Drive, axis: str, number: float, takes: Takes = Takes.PLACE) -> tuple[float, str] | None:
+        """A number of an axis in its unit, and the unit with `?` while that is not sure; None: it has no scale."""
+        found = self.of(drive, axis)
+        if found is None or found.measure is None or not found.measure.counts(takes):
+            return None
+        unit = found.measure.unit_for(takes)
+        return round(found.measure.value(number, takes), 9), unit if found.sure else f"{unit}?"
+
+    def words(self, drive: Drive, axis: str, number: float, takes: Takes = Takes.PLACE) -> str:
+        """` (12.5 mm)`, to follow a number of an axis; empty where it has no scale, or a person wants no units."""
+        found = self.of(drive, axis) if self.shown else None
+        if found is None or found.measure is None or not found.measure.counts(takes):
+            return ""
+        return f" ({found.measure.shown(number, takes)}{'' if found.sure else '?'})"
 
     def referenced(self, drive: Drive, axis: str) -> bool:
         """Whether places of the machine count."""

@@ -11,6 +11,7 @@ import operator
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
 
 from multidrop.dialects import Diagnostic, DriveError, Motion
 from multidrop.drives.bus import Bus
@@ -19,6 +20,9 @@ from multidrop.shell.line_syntax import EVERYONE
 from multidrop.shell.stop_report import UNCONFIRMED, last_seen
 from multidrop.shell.workspace import Workspace
 from multidrop.transports import TransportLost
+
+if TYPE_CHECKING:  # few sessions need it
+    from multidrop.shell.units import Units
 
 LIMIT = 60.0
 """The default time limit, s."""
@@ -182,6 +186,10 @@ class Standing:
     why: str = ""
     unconfirmed: bool = False
     """It reads velocity 0, and its position may change."""
+    places: tuple[str, ...] = ()
+    """The position of each axis in its unit, ` (12.5 mm)`; empty where it has no scale."""
+    quantities: tuple[tuple[float, str] | None, ...] = ()
+    """The same as numbers, each with its unit."""
 
     @property
     def text(self) -> str:
@@ -189,38 +197,43 @@ class Standing:
         if not self.axes:
             return f"{self.name} not known ({self.why})"
         if self.unconfirmed:
-            return f"{self.name} {UNCONFIRMED}; now {' and '.join(str(each.position) for each in self.axes)}"
-        return f"{self.name} {' and '.join(map(_axis, self.axes))}"
+            now = " and ".join(f"{each.position}{place}" for each, place in self._placed)
+            return f"{self.name} {UNCONFIRMED}; now {now}"
+        return f"{self.name} {' and '.join(_axis(*each) for each in self._placed)}"
 
     @property
-    def fact(self) -> dict[str, int | dict[str, int]] | None:
+    def _placed(self) -> list[tuple[Motion, str]]:
+        return list(zip(self.axes, self.places or [""] * len(self.axes), strict=True))
+
+    @property
+    def fact(self) -> dict[str, Any] | None:
         """The position as an object for programs; None: not known."""
         if not self.axes:
             return None
-        if len(self.axes) == 1 and not self.axes[0].axis:
-            return {"position": self.axes[0].position, "velocity": self.axes[0].velocity}
-        return {each.axis: {"position": each.position, "velocity": each.velocity} for each in self.axes}
+        facts: dict[str, dict[str, Any]] = {}
+        for each, quantity in zip(self.axes, self.quantities or [None] * len(self.axes), strict=True):
+            facts[each.axis] = {"position": each.position, "velocity": each.velocity}
+            if quantity is not None:
+                facts[each.axis] |= {"quantity": quantity[0], "unit": quantity[1]}
+        return facts[""] if list(facts) == [""] else facts
 
 
-def _axis(each: Motion) -> str:
+def _axis(each: Motion, place: str) -> str:
     axis = f"{each.axis} " if each.axis else ""
-    return (
-        f"{axis}moves at {each.velocity} a second at {each.position}"
-        if each.velocity
-        else f"{axis}stands at {each.position}"
-    )
+    at = f"{each.position}{place}"
+    return f"{axis}moves at {each.velocity} a second at {at}" if each.velocity else f"{axis}stands at {at}"
 
 
-async def standings(workspace: Workspace, drives: Iterable[Drive]) -> tuple[Standing, ...]:
+async def standings(workspace: Workspace, drives: Iterable[Drive], units: Units | None = None) -> tuple[Standing, ...]:
     """Read the positions of drives: those of one bus in turn, ANSWER_LIMIT at most for each bus."""
     by_bus: dict[str, list[Drive]] = {}
     for drive in drives:
         by_bus.setdefault(drive.link.name, []).append(drive)
-    found = await asyncio.gather(*(_standing(workspace, each) for each in by_bus.values()))
+    found = await asyncio.gather(*(_standing(workspace, each, units) for each in by_bus.values()))
     return tuple(each for bus in found for each in bus)
 
 
-async def _standing(workspace: Workspace, drives: Sequence[Drive]) -> list[Standing]:
+async def _standing(workspace: Workspace, drives: Sequence[Drive], units: Units | None) -> list[Standing]:
     """Read the drives of one bus; the line has no time left for those that the limit leaves out."""
     found = {drive: Standing(workspace.display_name(drive), why="no time was left to ask") for drive in drives}
     with contextlib.suppress(TimeoutError):
@@ -238,6 +251,8 @@ async def _standing(workspace: Workspace, drives: Sequence[Drive]) -> list[Stand
                             unconfirmed=not (
                                 any(axis.velocity for axis in axes) or (drive.seen and drive.seen.at_rest())
                             ),
+                            places=tuple(units.words(drive, each.axis, each.position) for each in axes if units),
+                            quantities=tuple(units.given(drive, each.axis, each.position) for each in axes if units),
                         )
                 except (DriveError, TransportLost) as failure:
                     found[drive] = Standing(name, why=str(failure).removeprefix(f"{name}: "))

@@ -112,7 +112,7 @@ class Workspace(Channel):
         self.scaled = any(each.units for each in settings.connections.values())
         """An axis may have a scale."""
         self.on_opened: list[Callable[[Bus], Awaitable[None]]] = []
-        """Awaited with each bus whose drives were found."""
+        """Awaited with each bus whose drives were found, where an axis may have a scale."""
         self.plots: list[RunningPlot] = []
         self.plotted: tuple[Series, ...] = ()
         """The series that the screen plots; empty: the selected drive."""
@@ -134,6 +134,7 @@ class Workspace(Channel):
         unwatch = bus.watch(partial(self._on_bus, bus))
         record = self._open[bus] = OpenBus(bus, opened, connection, in_cell or bus.name, place, unwatch)
         self._open, self.buses = _in_order(self._open)
+        self.scaled = self.scaled or bool(opened.units)
         for text in opened.warnings:
             self.notify(f"{bus.name}: {text}", bus=bus.name, warning=True)
         bus.start()

@@ -14,9 +14,10 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from multidrop.dialects import Diagnostic
 from multidrop.dialects.files import toml_of, utf8_of
+from multidrop.dialects.units import check_own
 from multidrop.simulator.cell.drive_keys import check_inside
 from multidrop.simulator.cell.spec import BusSpec, Cell, DriveSpec, Endpoint, Faults
-from multidrop.simulator.cell.table import Folder, Table, quoted
+from multidrop.simulator.cell.table import Folder, Source, Table, quoted
 from multidrop.simulator.families import BY_PERSONALITY
 
 if TYPE_CHECKING:
@@ -35,6 +36,7 @@ DRIVE_KEYS = (
     "program_text",
     "instruction_us",
     "cse",
+    "units",
     "identity",
     "world",
 )
@@ -62,10 +64,17 @@ class Reader:
         They stay in that folder, or in what is `allow`ed by the person who opens the cell.
         """
         table = Table(toml_of(text, where), where)
-        table.only("seed", "bus")
+        table.only("seed", "own_units", "bus")
+        own = table.texts("own_units")
+        table = Table(table.values, where, Source(text, where, own))
+        try:
+            check_own(own)
+        except Diagnostic as problem:
+            raise Diagnostic(f"own_units: {problem.message}", table.at_line("own_units"), problem.hint) from None
         here = Folder(Path.cwd() if folder is None else folder, tuple(allow))
         cell = Cell(
             seed=table.integer("seed", 0),
+            own_units=own,
             buses=tuple(self._bus(each, where, here, text) for each in table.tables("bus", "[[bus]]")),
         )
         _check_cell(cell, where)
@@ -74,7 +83,7 @@ class Reader:
     def _bus(self, table: Table, where: str, folder: Folder, text: str) -> BusSpec:
         name = table.values.get("name")
         if isinstance(name, str) and name:
-            table = Table(table.values, f"{where}: [[bus]] {quoted(name)}")
+            table = table.placed(f"{where}: [[bus]] {quoted(name)}")
         table.only("name", "serve", "baud", "gather", "drive", "faults")
         name = table.text("name")
         if not name or not name.isprintable() or set(name) & set("#@:/ "):
@@ -216,6 +225,7 @@ class Placed(NamedTuple):
     bus: str
     spec: DriveSpec
     table: Mapping[str, Any]
+    own_units: tuple[str, ...] = ()
 
     @property
     def place(self) -> str:
@@ -250,12 +260,13 @@ def _drives(path: str, allow: Sequence[Path]) -> list[Placed]:
     shop = read(text, path, Path(path).absolute().parent, allow) if path else demo()
     tables = toml_of(text, path).get("bus", [])
     return [
-        Placed(path, bus.name, spec, table)
+        Placed(path, bus.name, spec, table, shop.own_units)
         for bus, rows in zip(shop.buses, tables, strict=True)
         for spec, table in zip(bus.drives, rows.get("drive", []), strict=True)
     ]
 
 
-def read_drive(table: Mapping[str, Any], where: str) -> DriveSpec:
+def read_drive(table: Mapping[str, Any], where: str, own_units: tuple[str, ...] = ()) -> DriveSpec:
     """Read the table of a drive, of which no file is read. Raises Diagnostic."""
-    return BY_PERSONALITY[table["personality"]].read_drive(Table(table, where), Folder(Path()))
+    source = Source(own_units=own_units)
+    return BY_PERSONALITY[table["personality"]].read_drive(Table(table, where, source), Folder(Path()))

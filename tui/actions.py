@@ -213,6 +213,10 @@ class Actions:
         """Type the line that runs a twin beside each drive of the selected bus, or ends the twins."""
         self._parts.outbox.type("/twin off" if self._parts.model.bus("").twinned else "/twin on")
 
+    def action_units(self) -> None:
+        """Type the line that shows the drives' own numbers, or units again."""
+        self._parts.outbox.type("/units off" if self._parts.session.units.shown else "/units on")
+
     async def action_log(self) -> None:
         await self.action_run_line("/log off" if self._parts.session.log is not None else "/log on")
 

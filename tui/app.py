@@ -14,6 +14,7 @@ from __future__ import annotations
 import asyncio
 import os
 from collections.abc import Sequence
+from functools import partial
 from typing import Any, ClassVar
 
 from rich.console import RenderableType
@@ -36,6 +37,7 @@ from multidrop.tui.assist import Assist
 from multidrop.tui.frame_scheduler import AGEING, Frames
 from multidrop.tui.keymap import FunctionKeys, keymap, named_key
 from multidrop.tui.outbox import Outbox
+from multidrop.tui.panels.view import figures_at
 from multidrop.tui.polling import Polling
 from multidrop.tui.presenter import Presenter
 from multidrop.tui.screen_model import Record, ScreenModel
@@ -94,7 +96,7 @@ class MultidropApp(App[int]):
         # With NO_COLOR, only this makes Textual take colours away altogether; else it makes greys of them.
         super().__init__(driver_class=driver, ansi_color=True if "NO_COLOR" in os.environ else None)
         self.session, self.urls, self.assist = session, list(urls), assist
-        self.model = ScreenModel(lambda: session.selected_bus, lambda: session.buses)
+        self.model = ScreenModel(lambda: session.selected_bus, lambda: session.buses, partial(figures_at, session))
         self.polling, self.macros = Polling(), FunctionKeys()
         self.keymap = keymap(bindings(), look.keys)
         self.presenter = Presenter(session, self.model, self.polling, self.macros, self.keymap)

@@ -84,6 +84,8 @@ def all_commands(
     yield from _choices(session, macros, keys)
     about = "simulated drives that run beside those of this line; every difference shows"
     yield Command(f"Twin {_other(switches.twin)}", about, "act.twin", keys.shown("twin"))
+    about = "the drives' own numbers in place of units, or units again"
+    yield Command("Units", about, "act.units", keys.shown("units"))
     yield Command("Search history", "the lines typed before", "act.search_history", keys.shown("history"))
     yield from _view(keys, switches)
     for name, _, meaning in verbs:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from enum import Enum
 from typing import NamedTuple
@@ -12,6 +12,7 @@ from typing import NamedTuple
 from multidrop.dialects.values import Conditions, Pace, Readings
 from multidrop.drives.events import Conditioned, Sample, Silent
 from multidrop.shell.events import Agreed, Diverged, Phase, Predicted, TwinEnded, TwinEvent
+from multidrop.tui.figures import NATIVE, Figures
 from multidrop.tui.text import age
 
 SPAN = 20.0
@@ -182,11 +183,18 @@ class Readout:
     settings_at: float = -math.inf
     twin: Beside | None = None
     """The twin of this axis; None: none runs."""
+    figures: Figures = NATIVE
+    """The form in which its numbers are shown."""
 
     @property
     def axes(self) -> list[Readout]:
         """All axes of the drive, the first one first."""
         return [self, *self.others.values()]
+
+    def show_in(self, figures: Callable[[str], Figures]) -> None:
+        """Show the numbers of each axis, by its name, in these figures from now on."""
+        for each in self.axes:
+            each.figures = figures(each.axis)
 
     def take(self, sample: Sample) -> None:
         """Take the reply to a poll. The axis of the first sample becomes the first axis."""

@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable, Container, Iterator
 from dataclasses import dataclass, field
+from functools import partial
 from typing import NamedTuple
 
 from multidrop.dialects import Priority, Request
@@ -36,8 +37,8 @@ from multidrop.shell.events import (
 from multidrop.shell.line_syntax import EVERYONE
 from multidrop.tui.curves.chart import Look
 from multidrop.tui.curves.samples import Traces
+from multidrop.tui.figures import NATIVE, Figures
 from multidrop.tui.readout import READ, Readout, State
-from multidrop.tui.text import digits
 
 # Changes of a drive between two readings, in words: a limit, an error, the end of a program, silence.
 #
@@ -88,7 +89,7 @@ def _conditioned(known: Readout, after: Conditions, failed_at: float) -> Iterato
     lit = {(lamp.name, lamp.function) for lamp in before.lamps if lamp.on}
     for lamp in after.lamps:
         if lamp.on and lamp.function in LIMITS and not lamp.output and (lamp.name, lamp.function) not in lit:
-            place = "" if last is None else f" at {digits(last.position)}"
+            place = "" if last is None else f" at {known.figures.place(last.position)}"
             stands = "; it stands" if last is not None and last.velocity == 0 else ""
             yield Happening(_named(f"{LIMITS[lamp.function]} reached{place}{stands}", after.axis), warning=True)
     told = failed_at >= known.conditioned_at or (after.error_text and after.error_text == known.trouble)
@@ -230,7 +231,14 @@ class ScreenModel:
     `current` names the bus for events without one; `opened` returns the names of the open buses.
     """
 
-    def __init__(self, current: Callable[[], str], opened: Callable[[], Container[str]]) -> None:
+    def __init__(
+        self,
+        current: Callable[[], str],
+        opened: Callable[[], Container[str]],
+        figures: Callable[[str, str, str], Figures] = lambda bus, address, axis: NATIVE,
+    ) -> None:
+        self.figures = figures
+        """Returns the figures of an axis: of a bus, an address, its name."""
         self.buses: dict[str, BusFacts] = {}
         self.traces, self.look = Traces(), Look()
         """The plotted samples, and how a person looks at them."""
@@ -337,6 +345,7 @@ class ScreenModel:
             self.traces.take(event.bus, inner)
         if isinstance(inner, Sample | Silent | Conditioned):
             readout = self.bus(event.bus).readout(inner.address)
+            readout.show_in(partial(self.figures, event.bus, inner.address))
             happened = list(changes_of(readout, inner))
             readout.note(inner)
             for each in happened:

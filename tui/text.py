@@ -23,21 +23,21 @@ def digits(value: int | None) -> str:
     return "–" if value is None else str(value)
 
 
-def short(value: float, step: float, width: int = 8) -> str:
+def short(value: float, step: float, width: int = 8, *, prefixes: bool = True) -> str:
     """Format a tick's label in k or M with its sign (`600k`, `-1.25M`) and as many decimals as `step` needs.
 
-    A label wider than `width` becomes the plain number, or its end (`…483648`). Neighbouring ticks never have equal
-    labels.
+    `prefixes` False: without k and M. A label wider than `width` becomes the plain number, or its end (`…483648`).
+    Neighbouring ticks never have equal labels.
     """
-    text = _scaled(value, step)
+    text = _scaled(value, step, prefixes)
     if len(text) <= width:
         return text
     plain = f"{value:.0f}"
     return plain if len(plain) <= width else f"…{plain[1 - width :]}"
 
 
-def _scaled(value: float, step: float) -> str:
-    for limit, unit in ((1e6, "M"), (1e3, "k"), (1.0, "")):
+def _scaled(value: float, step: float, prefixes: bool) -> str:
+    for limit, unit in ((1e6, "M"), (1e3, "k"), (1.0, ""))[0 if prefixes else 2 :]:
         if max(abs(value), step) >= limit or not unit:
             scaled = step / limit
             decimals = 0

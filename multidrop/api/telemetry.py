@@ -13,6 +13,7 @@ from typing import Any, NamedTuple, SupportsIndex, overload
 from multidrop.api.pictures import Curve, plot
 from multidrop.dialects import Diagnostic
 from multidrop.dialects.files import why
+from multidrop.dialects.units import Takes
 from multidrop.drives.drive import Drive
 from multidrop.drives.events import Lost
 from multidrop.drives.events import Sample as Read
@@ -31,6 +32,12 @@ class Sample(NamedTuple):
     axis: str
     position: int
     velocity: int
+    unit: str = ""
+    """The unit of the two below; empty where the axis has no scale. With `?`: the scale is not confirmed."""
+    place: float | None = None
+    """The position in that unit."""
+    speed: float | None = None
+    """The velocity in that unit a second."""
 
 
 class Samples(Sequence[Sample]):
@@ -73,8 +80,11 @@ class Samples(Sequence[Sample]):
         return Samples(row for row in self._rows if row.drive == drive and axis in ("", row.axis))
 
     def arrays(self) -> dict[str, list[str] | array[float] | array[int]]:
-        """The columns by name: lists of text, arrays of numbers, which numpy takes without a copy."""
-        return {
+        """The columns by name: lists of text, arrays of numbers, which numpy takes without a copy.
+
+        Where an axis has a scale: `unit`, `place` and `speed`, too.
+        """
+        columns: dict[str, list[str] | array[float] | array[int]] = {
             "elapsed": array("d", (row.elapsed for row in self._rows)),
             "time": array("d", (row.time for row in self._rows)),
             "drive": [row.drive for row in self._rows],
@@ -82,6 +92,12 @@ class Samples(Sequence[Sample]):
             "position": array("q", (row.position for row in self._rows)),
             "velocity": array("q", (row.velocity for row in self._rows)),
         }
+        if any(row.unit for row in self._rows):
+            columns["unit"] = [row.unit for row in self._rows]
+            for name in ("place", "speed"):
+                values = (getattr(row, name) for row in self._rows)
+                columns[name] = array("d", (math.nan if each is None else each for each in values))
+        return columns
 
     def arrow(self) -> Any:
         """The columns as a table of pyarrow. Raises Diagnostic where pyarrow is not installed."""
@@ -152,7 +168,12 @@ class AsyncTelemetry:
 
     def _sample(self, bus: str, read: Read) -> Sample:
         at, wall = read.at - self._begun, self._shell.wall(read.at).timestamp()
-        return Sample(at, wall, self._names[bus, read.address], read.axis, read.position, read.velocity)
+        found = Sample(at, wall, self._names[bus, read.address], read.axis, read.position, read.velocity)
+        drive = self._shell.buses[bus].drives.get(read.address) if self._shell.scaled else None
+        if drive is None or (place := self._shell.units.given(drive, read.axis, read.position, Takes.PLACE)) is None:
+            return found
+        speed = self._shell.units.given(drive, read.axis, read.velocity, Takes.VELOCITY)
+        return found._replace(unit=place[1], place=place[0], speed=speed[0] if speed is not None else None)
 
     def close(self) -> None:
         """End it. Samples that came can still be taken. May be called again."""

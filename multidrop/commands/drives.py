@@ -169,7 +169,11 @@ def params_restore(chosen: argparse.Namespace) -> int:
 def snapshot(chosen: argparse.Namespace) -> int:
     new_file.check(chosen.output, printed=True)
     printed = chosen.output == new_file.STANDARD_OUTPUT
-    return runner.run(chosen.urls, lambda session: snapshots.save(session, chosen.output), unsolicited=not printed)
+    return runner.run(
+        chosen.urls,
+        lambda session: snapshots.save(session, chosen.output, session.units.scales),
+        unsolicited=not printed,
+    )
 
 
 def apply(chosen: argparse.Namespace) -> int:

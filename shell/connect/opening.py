@@ -5,10 +5,11 @@ from __future__ import annotations
 import asyncio
 import sys
 import time
-from collections.abc import Awaitable, Callable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Awaitable, Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 from multidrop.dialects import Diagnostic, Family, Hints
@@ -23,6 +24,7 @@ from multidrop.transports import Unreachable
 from multidrop.transports.ssh import FarPort
 
 if TYPE_CHECKING:
+    from multidrop.dialects.units import Scale
     from multidrop.drives.port_journal import Keeper
     from multidrop.simulator.serving.in_process import SimBus
     from multidrop.simulator.serving.running import RunningFloor
@@ -45,6 +47,8 @@ class Opened:
     """The promises that its transport cannot keep."""
     reopen: Reopen | None = None
     """Opens its port again after a loss; None: it cannot be found again."""
+    units: Mapping[str, Scale] = field(default_factory=lambda: MappingProxyType({}))
+    """The scales that a simulated cell states for its drives, by address, or `ADDRESS.AXIS`."""
 
 
 BAUDED = ("serial", "rfc2217", "ssh")
@@ -225,5 +229,5 @@ async def _simulated(connection: Connection, naming: Naming) -> list[Opened]:
         )
         own = connection.name if connection.bus and connection.name else each.name
         bus = _bus(naming(own), each.transport, connection, hints.family)
-        found.append(Opened(bus, hints, each.floor, reopen=simulated(each)))
+        found.append(Opened(bus, hints, each.floor, reopen=simulated(each), units=each.units))
     return found

@@ -9,11 +9,12 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from datetime import datetime
 from functools import partial
 
 from multidrop.dialects import Diagnostic
+from multidrop.dialects.units import Takes
 from multidrop.dialects.values import UNREAD, Conditions
 from multidrop.drives.events import Conditioned, Lost, Sample, Unsolicited, Valued
 from multidrop.drives.telemetry import MODEST, USUAL, Subscription, Telemetry, Value
@@ -34,8 +35,8 @@ from multidrop.shell.plots.request import TABLES, PlotTarget, shown
 from multidrop.shell.plots.rerun_calls import AGREES, COLOURS, DIFFERS, RUNS, TWIN, Batch, Curve, Sink, State
 from multidrop.shell.plots.table import TableSink
 from multidrop.shell.roles import DIFFERENCE, RunningPlot, Series
+from multidrop.shell.session import Session
 from multidrop.shell.threads import in_thread
-from multidrop.shell.workspace import Workspace
 from multidrop.transports.sockets import exposed
 
 FILE_PERIOD, LIVE_PERIOD = 0.4, 0.1
@@ -97,12 +98,13 @@ class Plot:
     def label(self, bus: str, address: str, label: str) -> None:
         self._batch.labels[bus, address] = label
 
-    def sample(self, bus: str, sample: Sample) -> None:
+    def sample(self, bus: str, sample: Sample, units: Iterable[tuple[str, float]] = ()) -> None:
+        """Take a sample; `units`: what it is in the units of its axis, each with its word."""
         if not self._done:
             self.samples += 1
             drive = (bus, sample.address, sample.axis)
-            self._point(Curve(*drive, "position"), sample.at, sample.position)
-            self._point(Curve(*drive, "velocity"), sample.at, sample.velocity)
+            for word, value in (("position", sample.position), ("velocity", sample.velocity), *units):
+                self._point(Curve(*drive, word), sample.at, value)
 
     def value(self, bus: str, read: Valued) -> None:
         if not self._done:
@@ -244,7 +246,7 @@ carries is asked for: a reading takes the time of four samples."""
 
 
 async def begin(
-    workspace: Workspace, target: PlotTarget, series: Sequence[Series], period: float = MODEST
+    workspace: Session, target: PlotTarget, series: Sequence[Series], period: float = MODEST
 ) -> tuple[RunningPlot, Plot]:
     """Begin to plot drives and values, each every `period` s; 0: as fast as the line allows."""
     if not series:
@@ -265,7 +267,7 @@ async def begin(
     return running, plot
 
 
-def attach(workspace: Workspace, plot: Plot, series: Sequence[Series], period: float = MODEST) -> Callable[[], None]:
+def attach(workspace: Session, plot: Plot, series: Sequence[Series], period: float = MODEST) -> Callable[[], None]:
     """Feed the plot: poll drives and values every `period` s, and log the lines of their buses.
 
     The function returned ends the polling; so does the end of the plot. Raises Diagnostic for a bus that is not open.
@@ -276,7 +278,7 @@ def attach(workspace: Workspace, plot: Plot, series: Sequence[Series], period: f
     wanted, buses = set(series), {each.bus for each in series}
     for bus, address, _ in series:
         plot.label(bus, address, workspace.buses[bus].drives[address].label)
-    ends: list[Callable[[], None]] = [workspace.subscribe(partial(_take, plot, wanted, buses))]
+    ends: list[Callable[[], None]] = [workspace.subscribe(partial(_take, workspace, plot, wanted, buses))]
     for bus in sorted(buses):
         ends += _polls(
             workspace.buses[bus].telemetry, [each for each in dict.fromkeys(series) if each.bus == bus], period
@@ -294,14 +296,14 @@ def attach(workspace: Workspace, plot: Plot, series: Sequence[Series], period: f
     return detach
 
 
-def _take(plot: Plot, wanted: set[Series], buses: set[str], event: SessionEvent) -> None:
+def _take(workspace: Session, plot: Plot, wanted: set[Series], buses: set[str], event: SessionEvent) -> None:
     if not isinstance(event, OnBus):
         return _log(plot, buses, event)
     bus, inner = event
     if isinstance(inner, TwinEvent):
         return _twin(plot, wanted, bus, inner)
     if isinstance(inner, Sample) and Series(bus, inner.address) in wanted:
-        plot.sample(bus, inner)
+        plot.sample(bus, inner, _in_units(workspace, bus, inner) if workspace.scaled else ())
     elif isinstance(inner, Valued) and Series(bus, inner.address, inner.word) in wanted:
         plot.value(bus, inner)
     elif isinstance(inner, Conditioned) and Series(bus, inner.address) in wanted:
@@ -313,6 +315,18 @@ def _take(plot: Plot, wanted: set[Series], buses: set[str], event: SessionEvent)
     elif isinstance(inner, Unsolicited) and bus in buses:
         for text in inner.lines:
             plot.text(bus, "", inner.at, text, "reply")
+
+
+def _in_units(workspace: Session, bus: str, sample: Sample) -> Iterator[tuple[str, float]]:
+    """`position_mm` and `velocity_mm_per_s` of a sample; nothing of an axis without a scale."""
+    drive = workspace.buses[bus].drives.get(sample.address)
+    for word, number, takes in (
+        ("position", sample.position, Takes.PLACE),
+        ("velocity", sample.velocity, Takes.VELOCITY),
+    ):
+        given = workspace.units.given(drive, sample.axis, number, takes) if drive is not None else None
+        if given is not None:
+            yield f"{word}_{given[1].rstrip('?').replace('/', '_per_')}", given[0]
 
 
 def _polls(telemetry: Telemetry, series: Sequence[Series], period: float) -> Iterator[Callable[[], None]]:

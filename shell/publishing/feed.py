@@ -13,6 +13,7 @@ from typing import NamedTuple
 
 from multidrop.dialects import Diagnostic
 from multidrop.dialects.text import visible
+from multidrop.dialects.units import Takes
 from multidrop.dialects.values import UNREAD, Conditions
 from multidrop.drives.bus import Bus
 from multidrop.drives.events import Changed, Conditioned, Lost, Sample, Silent, Unsolicited
@@ -20,8 +21,8 @@ from multidrop.shell.events import Entered, Failed, Notified, OnBus, Printed, Se
 from multidrop.shell.log.files import Entry, line_of
 from multidrop.shell.publishing.broker import Message
 from multidrop.shell.publishing.publisher import Publisher
+from multidrop.shell.session import Session
 from multidrop.shell.streams.stdout import shortened
-from multidrop.shell.workspace import Workspace
 
 RESERVED = "+#/%"
 """The wildcards and the separator of MQTT, and the sign of an escape."""
@@ -78,7 +79,7 @@ ONLINE, LOST, BYE = "online", "lost", "bye"
 """Plain words: the states of this program, and of a line."""
 MOVING, AT_REST, NO_CURRENT, SILENT = "moving", "at rest", "no current", "silent"
 """The states of a drive; or LOST, with its line. NO_CURRENT: an axis is at rest, and nothing holds its load."""
-Fields = Mapping[str, int | str]
+Fields = Mapping[str, int | float | str]
 """`value`, and more facts."""
 
 
@@ -205,12 +206,15 @@ Put = Callable[[str, float, bool, Fields], None]
 """Publishes a value: `position`, its time, whether it is retained, and its facts."""
 
 
+Given = Callable[[str, float, Takes], tuple[float, str] | None]
+
+
 class DriveFeed:
     """The values of a drive that were published, and what is published next."""
 
-    def __init__(self, put: Put, period: float) -> None:
-        """`period`: between two samples, s."""
-        self._put, self._period = put, period
+    def __init__(self, put: Put, period: float, given: Given = lambda axis, number, takes: None) -> None:
+        """`period`: between two samples, s. `given`: a number of an axis in its unit, and the unit."""
+        self._put, self._period, self._given = put, period, given
         self._limits: dict[str, SampleLimit] = {}
         self._curves: dict[tuple[str, str], Curve] = {}
         """By what, and axis."""
@@ -251,9 +255,14 @@ class DriveFeed:
         self._say_state(at, self._motion())
         if not self._limits.setdefault(axis, SampleLimit(self._period)).passes(at):
             return
-        for what, value in (("position", sample.position), ("velocity", sample.velocity)):
+        for what, value, takes in (
+            ("position", sample.position, Takes.PLACE),
+            ("velocity", sample.velocity, Takes.VELOCITY),
+        ):
             for point in self._curves.setdefault((what, axis), Curve()).take(Point(at, value)):
-                self._put(what, point.at, False, {"value": point.value, "axis": axis})
+                given = self._given(axis, point.value, takes)
+                fields: Fields = {} if given is None else {"quantity": given[0], "unit": given[1]}
+                self._put(what, point.at, False, {"value": point.value, "axis": axis, **fields})
 
     def _motion(self) -> str:
         if any(self._moving.values()):
@@ -279,7 +288,7 @@ HEARTBEAT = 30.0
 class Feed:
     """Makes messages for a publisher of the events of a workspace, from `begin` to `end`."""
 
-    def __init__(self, workspace: Workspace, publisher: Publisher, topics: Topics, period: float) -> None:
+    def __init__(self, workspace: Session, publisher: Publisher, topics: Topics, period: float) -> None:
         """`period`: between two samples of a drive, s."""
         self._workspace, self._publisher, self._topics, self.period = workspace, publisher, topics, period
         self._lines: dict[str, _Line] = {}
@@ -316,7 +325,11 @@ class Feed:
         self._publisher.put(Message(topic, text, retain, bus))
 
     def drive_feed(self, bus: str, address: str) -> DriveFeed:
-        return DriveFeed(partial(self._put_value, bus, address), self.period)
+        return DriveFeed(partial(self._put_value, bus, address), self.period, partial(self._in_units, bus, address))
+
+    def _in_units(self, bus: str, address: str, axis: str, number: float, takes: Takes) -> tuple[float, str] | None:
+        found = self._workspace.buses[bus].drives.get(address) if self._workspace.scaled else None
+        return None if found is None else self._workspace.units.given(found, axis, number, takes)
 
     def _put_value(self, bus: str, address: str, what: str, at: float, retain: bool, fields: Fields) -> None:
         topic = self._topics.drive(bus, address, what)

@@ -195,7 +195,9 @@ class _Aftermath:
             while self._left:
                 await self._lines_of(self._left[0])
                 self._left.pop(0)
-            found = await standings(self._session, self._drives())
+            found = await standings(
+                self._session, self._drives(), self._session.units if self._session.scaled else None
+            )
             if found:
                 self._warn("; ".join(each.text for each in found))
         except asyncio.CancelledError:

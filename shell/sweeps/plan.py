@@ -109,7 +109,9 @@ def make(asked: Asked) -> Plan:
     drive = {name: each for name, each in chosen.table.items() if name not in OWN_KEYS}
     expects = tuple(asked.expect) or EXPECTED
     where = f"drive {chosen.spec.name}"
-    job = Job(asked.file, program, language, json.dumps(drive), where, keys, expects, asked.run, asked.until)
+    job = Job(
+        asked.file, program, language, json.dumps(drive), where, keys, expects, asked.run, asked.until, chosen.own_units
+    )
     place = asked.cell or ""
     if asked.cell is not None and len(cells.matching(asked.cell, allow)) != 1:
         place = chosen.place

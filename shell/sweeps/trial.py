@@ -218,6 +218,7 @@ class Job:
     expects: tuple[str, ...]
     run: str = ""
     until: float | None = None
+    own_units: tuple[str, ...] = ()
 
 
 Case = tuple[int, Sequence[Value | None]]
@@ -251,7 +252,7 @@ class Bench:
         for key, value in zip(self.job.keys, values, strict=True):
             if value is not None:
                 table = key.put(table, value)
-        return self.load(read_drive(table, self.job.where))
+        return self.load(read_drive(table, self.job.where, self.job.own_units))
 
     def tried(self, case: Case) -> Result:
         number, values = case
@@ -272,7 +273,7 @@ class Bench:
 def bench(job: Job) -> Bench:
     load = PROGRAMS[job.language].read(job.program, job.file)
     drive: Drive = json.loads(job.drive)
-    example = outcome_of(load(read_drive(drive, job.where)).run(job.run, 0.0))
+    example = outcome_of(load(read_drive(drive, job.where, job.own_units)).run(job.run, 0.0))
     return Bench(job, load, drive, tuple(parse_condition(each, example) for each in job.expects))
 
 

@@ -1,8 +1,9 @@
 """The KEY and the VALUES of `--vary KEY=VALUES`.
 
 A KEY is the place of a value in the table of a drive. VALUES are `a,b,c`, `A..B`, `A..B:STEP`, and all of them with
-commas between. Numbers are exact decimals until the last moment, so that ten steps of 0.1 are ten decimals. A text that
-has a comma or two dots is written in quotation marks, a list of TOML in its brackets.
+commas between; a unit may follow each, as in `290..310:5 mm`. Numbers are exact decimals until the last moment, so that
+ten steps of 0.1 are ten decimals. A text that has a comma or two dots is written in quotation marks, a list of TOML in
+its brackets.
 """
 
 from __future__ import annotations
@@ -29,7 +30,7 @@ MOST = 2000
 """The largest number of listed values that are looked at for a simpler one."""
 _NUMBER = r"[+-]?(?:\d{1,15}(?:\.\d{1,9})?|\.\d{1,9})(?:[eE][+-]?\d)?"
 _NUMERIC = re.compile(_NUMBER, re.ASCII)
-_RANGE = re.compile(rf"({_NUMBER})\.\.({_NUMBER})(?::({_NUMBER}))?", re.ASCII)
+_RANGE = re.compile(rf"({_NUMBER})\.\.({_NUMBER})(?::({_NUMBER}))?(?: +([A-Za-z]\w*))?", re.ASCII)
 _ITEM = re.compile(r'\s*(?P<item>"(?:[^"\\]|\\.)*"|\[(?:[^\]"\[]|"[^"]*"|\[[^\]]*\])*\]|[^,"\[]*)\s*(?P<end>,|$)')
 _VALID = "valid: a,b,c or A..B or A..B:STEP"
 
@@ -47,18 +48,23 @@ class Single:
 
 @dataclass(frozen=True)
 class Steps:
-    """The values of a range: `low`, `low + step` and so on, `count` of them."""
+    """The values of a range: `low`, `low + step` and so on, `count` of them, each with the unit if there is one."""
 
     low: Decimal
     step: Decimal
     count: int
+    unit: str = ""
 
     def at(self, index: int) -> Value:
-        return _plain(self.low + self.step * index)
+        number = self.low + self.step * index
+        return f"{number:f} {self.unit}" if self.unit else _plain(number)
 
-    def nearest(self, value: float) -> int:
-        """The index of the value that is nearest to a number."""
-        index = int(((Decimal(str(value)) - self.low) / self.step).to_integral_value())
+    def nearest(self, value: Value) -> int:
+        """The index of the value that is nearest to one; 0 for one without a number."""
+        number, _, unit = str(value).partition(" ")
+        if unit != self.unit or not _NUMERIC.fullmatch(number):
+            return 0
+        index = int(((Decimal(number) - self.low) / self.step).to_integral_value())
         return min(max(index, 0), self.count - 1)
 
 
@@ -133,11 +139,11 @@ def _piece(item: str, drawn: bool) -> Piece:
     match = _RANGE.fullmatch(item)
     if match is None:
         raise Diagnostic(f"{item} is not a range", hint="valid: A..B or A..B:STEP; a text in quotation marks")
-    low, high, step = match.groups()
-    return _steps(item, Decimal(low), Decimal(high), Decimal(step) if step else None, drawn)
+    low, high, step, unit = match.groups()
+    return _steps(item, Decimal(low), Decimal(high), Decimal(step) if step else None, drawn, unit or "")
 
 
-def _steps(item: str, low: Decimal, high: Decimal, step: Decimal | None, drawn: bool) -> Steps:
+def _steps(item: str, low: Decimal, high: Decimal, step: Decimal | None, drawn: bool, unit: str) -> Steps:
     places = max(0, -int(low.as_tuple().exponent), -int(high.as_tuple().exponent))
     if step is None:
         if places and not drawn and high - low < 1:
@@ -150,7 +156,7 @@ def _steps(item: str, low: Decimal, high: Decimal, step: Decimal | None, drawn: 
         raise Diagnostic(f"{item} has too many values", hint=f"valid: up to {LARGEST:.0e}, with a larger step")
     if not count:
         raise Diagnostic(f"{item} is an empty range", hint="the smaller end comes first, or the step is negative")
-    return Steps(low, step, count)
+    return Steps(low, step, count, unit)
 
 
 def _plain(number: Decimal) -> int | float:
@@ -164,12 +170,13 @@ def simpler(values: Values, value: Value, origin: Value | None) -> Sequence[Valu
     `origin` None is 0. Of a range, these are the values between.
     """
     origin = 0 if origin is None else origin
+    piece, numbers = values.pieces[0], isinstance(value, int | float) and isinstance(origin, int | float)
+    if len(values.pieces) == 1 and isinstance(piece, Steps) and (piece.unit or numbers):
+        first, last = piece.nearest(origin), piece.nearest(value)
+        return _Between(piece, range(first, last, 1 if last > first else -1))
     if not (isinstance(value, int | float) and isinstance(origin, int | float)):
         listed = [each.value for each in values.pieces if isinstance(each, Single)]
         return listed[: listed.index(value)] if value in listed else []
-    if len(values.pieces) == 1 and isinstance(piece := values.pieces[0], Steps):
-        first, last = piece.nearest(origin), piece.nearest(value)
-        return _Between(piece, range(first, last, 1 if last > first else -1))
     far = abs(value - origin)
     listed = [values.at(index) for index in range(min(values.count, MOST))]
     near = {abs(each - origin): each for each in listed if isinstance(each, int | float)}

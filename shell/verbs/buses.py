@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from multidrop.dialects import Diagnostic, Inexpressible
 from multidrop.dialects.text import whole
+from multidrop.dialects.units import Takes
 from multidrop.shell import configuration
 from multidrop.shell.finding import scanning
 from multidrop.shell.line_syntax import split_target
@@ -96,6 +97,16 @@ async def status(call: Call) -> None:
         raise Inexpressible(f"{call.session.display_name(drive)}: drives of this family do not report their state")
     for line in await drive.run(read(drive.state)):
         call.session.output(line)
+    units = call.session.units if call.session.scaled else None
+    if units is None or not units.shown or not units.axes(drive) or drive.programming:
+        return
+    for each in await drive.motion():
+        place = units.words(drive, each.axis, each.position, Takes.PLACE)
+        speed = units.words(drive, each.axis, each.velocity, Takes.VELOCITY)
+        if place:
+            lost = "" if units.referenced(drive, each.axis) else ", not referenced"
+            shown = ", ".join(filter(None, (part.strip(" ()") for part in (place, speed))))
+            call.session.output(f"{each.axis} in units: {shown}{lost}".lstrip())
 
 
 async def rename(call: Call) -> None:

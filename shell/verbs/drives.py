@@ -213,7 +213,7 @@ async def snapshot(call: Call) -> None:
     from multidrop.shell import snapshots  # and with it the simulator, which no other verb needs
 
     (file,) = call.words()
-    await snapshots.save(call.session, call.output_file(file))
+    await snapshots.save(call.session, call.output_file(file), call.session.units.scales)
 
 
 async def twin(call: Call) -> None:

@@ -227,7 +227,13 @@ WIDTH = 28
 async def help_(call: Call) -> None:
     word, selected = call.word(), call.session.selected
     language, product = (selected.family.language, selected.product) if selected else (FAMILIES[DEFAULT].language, "")
-    for line in explained(word, language, product) if word else overview():
+    lines = explained(word, language, product) if word else overview()
+    if word and selected and call.session.scaled and language.knows(word):
+        from multidrop.shell import setting_units
+
+        taken = setting_units.example(call.session.units, selected, word.upper())
+        lines = [*lines, f"  {'units':<10} {taken}"] if taken else lines
+    for line in lines:
         call.session.output(line, columns=True)
 
 

@@ -7,12 +7,15 @@ from __future__ import annotations
 
 import shlex
 from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import dataclass, replace
+from fractions import Fraction
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
 from multidrop.dialects import Diagnostic
 from multidrop.dialects.files import LARGEST_PROGRAM, bounded, program_of
+from multidrop.dialects.units import STEP, Basis, Measure, Quantity, Scale, quantity, scale
 from multidrop.simulator.cell.spec import Identity, Scalar, Value, WorldSpec
 from multidrop.simulator.cell.table import Folder, Table, quoted
 
@@ -24,6 +27,8 @@ Check = Callable[[Table, str, Value], None]
 """Refuses a word of `set`, or its value, that the product does not know. Raises Diagnostic."""
 WORLD_KEYS = ("home", "limit_plus", "limit_minus", "stall_at", "load", "inputs", "analog", "locked")
 """Keys of `world` for every drive."""
+POSITIONS = ("home", "limit_plus", "limit_minus", "stall_at", "index")
+"""Those that may have a unit."""
 ENCODER_KEYS = ("index", "encoder", "slip")
 """Further keys for a drive with a separate encoder."""
 
@@ -135,8 +140,62 @@ def read_variables(table: Table, valid: Callable[[str], bool], hint: str) -> Map
     return MappingProxyType(found)
 
 
-def read_world(table: Table, inputs: Sequence[int], counts: int) -> WorldSpec:
+def read_units(table: Table, axes: Sequence[str] = ("",)) -> Mapping[str, Scale]:
+    """Read `units`: the scale of the first axis, or a table with those of several, by axis."""
+    given = table.values.get("units")
+    by_axis = given if isinstance(given, dict) and "scale" not in given else {axes[0]: given}
+    found: dict[str, Scale] = {}
+    for axis, each in by_axis.items() if given is not None else ():
+        if axis not in axes:
+            hint = f"valid: {', '.join(axes)}" if axes[0] else 'as in units = "5 mm/turn"'
+            raise Diagnostic(f"units: no axis {quoted(axis)}", table.at_line("units"), hint)
+        try:
+            found[axis] = scale(each, table.source.own_units)
+        except Diagnostic as problem:
+            raise Diagnostic(f"units: {problem.message}", table.at_line("units"), problem.hint) from None
+    return MappingProxyType(found)
+
+
+@dataclass(frozen=True)
+class Motor:
+    """The scale of an axis, and the motor steps of the world in a turn of its motor and in one count of its drive.
+
+    `turn` None: nothing tells, for the reason `missing`.
+    """
+
+    scale: Scale | None
+    turn: Fraction | None
+    count: Fraction
+    missing: str = ""
+
+
+def _in_steps(table: Table, motor: Motor) -> Table:
+    """Convert positions with a unit (`"301 mm"`) to motor steps from the world's origin, by the scale without zero."""
+    values, given = dict(table.values), motor.scale
+    for key in POSITIONS:
+        several = isinstance(values.get(key), list)
+        places = values[key] if several else [values.get(key)]
+        if not any(isinstance(each, str) for each in places):
+            continue
+        try:
+            own = table.source.own_units
+            read = [quantity(each, own) if isinstance(each, str) else each for each in places]
+            if given is None:
+                raise Diagnostic("the drive has no scale", "", 'add units = "5 mm/turn" to its table')
+            by_step = replace(given, value=given.value / motor.count) if given.of == STEP else given
+            measure = Measure(by_step, Basis(turn=motor.turn, missing=motor.missing))
+            steps = [measure.steps(each) if isinstance(each, Quantity) else each for each in read]
+        except Diagnostic as problem:
+            raise Diagnostic(f"{key}: {problem.message}", table.at_line(key), problem.hint) from None
+        if several and given.value < 0 and all(isinstance(each, str) for each in places):
+            steps.reverse()
+        values[key] = steps if several else steps[0]
+    return table.with_values(values)
+
+
+def read_world(table: Table, inputs: Sequence[int], counts: int, motor: Motor) -> WorldSpec:
     """Read the surroundings of one axis of a drive with these inputs and an analog input up to `counts`."""
+    table = _in_steps(table, motor)
     changes = table.rows("inputs", (("seconds", 0, 1e9), ("input", min(inputs), max(inputs)), ("level", 0, 1)))
     for _, n, _ in changes:
         if n not in inputs:
@@ -162,9 +221,10 @@ def read_world(table: Table, inputs: Sequence[int], counts: int) -> WorldSpec:
 
 
 def read_worlds(
-    table: Table, axes: Sequence[str], keys: Sequence[str], inputs: Sequence[int], counts: int
+    table: Table, motors: Mapping[str, Motor], keys: Sequence[str], inputs: Sequence[int], counts: int
 ) -> tuple[WorldSpec, ...]:
     """Read the surroundings of each axis from a table of its own; keys without an axis belong to the first axis."""
+    axes = tuple(motors)
     table.only(*keys, *axes)
     parts = [table.table(axis, f"[bus.drive.world.{axis}]") for axis in axes]
     for part in parts:
@@ -173,5 +233,6 @@ def read_worlds(
     for key in keys:
         if key in first.values and key in table.values:
             raise first.wrong(key, "is given twice", f"keys without an axis belong to {axes[0]}")
-    both = Table({**table.values, **first.values}, first.where if first.values else table.where)
-    return tuple(read_world(part, inputs, counts) for part in (both, *parts[1:]))
+    both = table.merged(first)
+    pairs = zip((both, *parts[1:]), motors.values(), strict=True)
+    return tuple(read_world(part, inputs, counts, motor) for part, motor in pairs)

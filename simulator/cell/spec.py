@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING, NamedTuple
 if TYPE_CHECKING:
     from pathlib import Path
 
+    from multidrop.dialects.units import Scale
+
 Scalar = int | float | str
 Value = Scalar | tuple[str, ...]
 """A value of `set`: one line to the drive, or several."""
@@ -81,6 +83,8 @@ class DriveSpec:
     any_address: bool = False
     """A TMCL module that replies to every address."""
     cse: bool = False
+    units: Mapping[str, Scale] = field(default_factory=lambda: MappingProxyType({}))
+    """The scales of its axes, by their names; the empty name is an only axis."""
 
     def assignments(self) -> Iterator[tuple[str, str]]:
         """Yield `set` as pairs of name and value, in order; `IS = ["1,1,0", "2,2,0"]` gives two pairs."""
@@ -131,4 +135,5 @@ class Cell(NamedTuple):
     """A simulated shop floor."""
 
     seed: int = 0
+    own_units: tuple[str, ...] = ()
     buses: tuple[BusSpec, ...] = ()

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from difflib import get_close_matches
 from importlib.resources.abc import Traversable
 from math import inf, isfinite
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from multidrop.dialects import Diagnostic
 
@@ -42,11 +43,42 @@ def _link(path: Path) -> Path:
     return path.parent.resolve() / path.name
 
 
+class Source(NamedTuple):
+    """The text of a cell file, its name in messages, and the words for units that it declares."""
+
+    text: str = ""
+    name: str = ""
+    own_units: tuple[str, ...] = ()
+
+
+NOWHERE = Source()
+Way = tuple[tuple[str, int], ...]
+"""The way to a table: names, each with its number in a list of tables; 0: it is no list."""
+
+
 class Table:
     """One table of a TOML file and its place. Every reader raises Diagnostic."""
 
-    def __init__(self, values: Mapping[str, Any], where: str) -> None:
-        self.values, self.where = values, where
+    def __init__(self, values: Mapping[str, Any], where: str, source: Source = NOWHERE, way: Way = ()) -> None:
+        self.values, self.where, self.source, self._way = values, where, source, way
+
+    def at_line(self, key: str) -> str:
+        """The place of a key with its line, where the text is known."""
+        line = line_of(self.source.text, self._way, key)
+        name = self.source.name
+        return self.where.replace(name, f"{name}:{line}", 1) if line and name else self.where
+
+    def with_values(self, values: Mapping[str, Any]) -> Table:
+        return Table(values, self.where, self.source, self._way)
+
+    def placed(self, where: str) -> Table:
+        """The table by another name in messages."""
+        return Table(self.values, where, self.source, self._way)
+
+    def merged(self, other: Table) -> Table:
+        """Both tables as one, at the place of the other one if that has keys."""
+        place = other if other.values else self
+        return Table({**self.values, **other.values}, place.where, self.source, place._way)
 
     def only(self, *keys: str) -> None:
         """Refuse any other key."""
@@ -140,14 +172,17 @@ class Table:
         value = self.values.get(key, {})
         if not isinstance(value, dict):
             raise self.wrong(key, f"must be a table, not {shown(value)}")
-        return Table(value, f"{self.where}: {name}")
+        return Table(value, f"{self.where}: {name}", self.source, (*self._way, (key, 0)))
 
     def tables(self, key: str, name: str) -> list[Table]:
         """Read a list of tables within."""
         values = self.values.get(key, [])
         if not isinstance(values, list) or not all(isinstance(each, dict) for each in values):
             raise self.wrong(key, f"must be tables that begin with {name}")
-        return [Table(each, f"{self.where}: {name} {number}") for number, each in enumerate(values, 1)]
+        return [
+            Table(each, f"{self.where}: {name} {number}", self.source, (*self._way, (key, number)))
+            for number, each in enumerate(values, 1)
+        ]
 
     def _list(self, key: str, default: Sequence[Any] = ()) -> list[Any]:
         value = self.values.get(key, list(default))
@@ -168,6 +203,25 @@ class Table:
             bounds = f"from {low:g} to {high:g}" if isfinite(high) else f"{low:g} or more"
             raise self.wrong(key, f"must be {bounds}, not {shown(value)}")
         return float(value)
+
+
+def line_of(text: str, way: Way, key: str) -> int:
+    """The number of the line with a key of a table, or with the inline table that has it; 0: not found."""
+    counts: dict[str, int] = {}
+    here: Way = ()
+    for number, line in enumerate(text.splitlines(), 1):
+        if header := re.match(r"\s*\[(\[?)\s*([^\]]+?)\s*\]", line):
+            names = [each.strip().strip("\"'") for each in header[2].split(".")]
+            if header[1]:
+                place = ".".join(names)
+                counts = {each: n for each, n in counts.items() if not each.startswith(f"{place}.")}
+                counts[place] = counts.get(place, 0) + 1
+            here = tuple((name, counts.get(".".join(names[: n + 1]), 0)) for n, name in enumerate(names))
+        elif pair := re.match(r"\s*([^=#]+?)\s*=", line):
+            within = (*here, *((each.strip().strip("\"'"), 0) for each in pair[1].split(".")))
+            if within == (*way, (key, 0)) or (len(within) > len(here) and within == way[: len(within)]):
+                return number
+    return 0
 
 
 def nearest(word: str, valid: Sequence[str]) -> str:

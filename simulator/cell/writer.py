@@ -9,6 +9,7 @@ from typing import Any
 
 from multidrop.dialects.files import escaped_toml
 from multidrop.dialects.text import visible
+from multidrop.dialects.units import PLACES, Scale, decimal
 from multidrop.dialects.values import Reading, same
 from multidrop.simulator.cell.drive_keys import LONGEST
 
@@ -42,6 +43,8 @@ class DriveText:
     """The keys of each axis; "" is the only one."""
     ethernet: bool = False
     baud: int = 0
+    units: Mapping[str, Scale] = field(default_factory=lambda: MappingProxyType({}))
+    """The scales of its axes; "" is the only one."""
 
 
 @dataclass(frozen=True)
@@ -71,6 +74,9 @@ def write(buses: Sequence[BusText]) -> str:
 
     document = tomlkit.document()
     document.add(tomlkit.comment(HEAD))
+    scales = [scale for bus in buses for drive in bus.drives for scale in drive.units.values()]
+    if own := sorted({each.unit.name for each in scales if each.unit.name not in PLACES}):
+        document.add("own_units", own)
     tables = tomlkit.aot()
     for each in buses:
         tables.append(_bus(each))
@@ -109,6 +115,9 @@ def _drive(drive: DriveText) -> Any:
     table.add("name", drive.name)
     if drive.party:
         table.add("party", True)
+    if drive.units:
+        scales = {axis: _written(each) for axis, each in drive.units.items()}
+        table.add("units", scales[""] if "" in scales else _inline(scales))
     for text in (*drive.remarks, *_not_read(drive.unread)):
         table.add(tomlkit.comment(visible(text)))
     if drive.program:
@@ -118,6 +127,27 @@ def _drive(drive: DriveText) -> Any:
             table.add(key, _entries(entries))
     if drive.worlds:
         table.add("world", _world(drive.worlds))
+    return table
+
+
+def _written(scale: Scale) -> Any:
+    """A scale as it is read again: its text, or a table where it has more."""
+    found: dict[str, str | int] = {"scale": str(scale)}
+    if scale.anchored:
+        found["zero"] = scale.shown(scale.zero)
+    if scale.travel is not None:
+        low, high = (each / scale.unit.factor for each in scale.travel)
+        found["travel"] = f"{decimal(low)}..{decimal(high)} {scale.unit.name}"
+    if scale.full_steps is not None:
+        found["full_steps"] = scale.full_steps
+    return _inline(found) if len(found) > 1 else str(scale)
+
+
+def _inline(found: Mapping[str, Any]) -> Any:
+    import tomlkit
+
+    table = tomlkit.inline_table()
+    table.update(found)
     return table
 
 

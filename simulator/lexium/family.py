@@ -6,21 +6,25 @@ A drive as it was read from a unit becomes such a table, and a table the setting
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from difflib import get_close_matches
+from fractions import Fraction
 
 from multidrop.dialects.family import Motion
 from multidrop.dialects.mcode.manual.grammar import LineError, is_name, parse
 from multidrop.dialects.mcode.manual.statements import UNNAMED, canonical, size_of
 from multidrop.dialects.mcode.manual.table import lookup, words
+from multidrop.dialects.units import Scale
 from multidrop.dialects.values import VARIABLES, Reading, Scalar, Snapshot, Value, same
 from multidrop.simulator.cell.drive_keys import (
     WORLD_KEYS,
     Check,
+    Motor,
     common_keys,
     read_identity,
     read_settings,
+    read_units,
     read_variables,
     read_world,
 )
@@ -32,9 +36,10 @@ from multidrop.simulator.lexium.device import MCodeDevice
 from multidrop.simulator.lexium.ports.mcode import MCodePort
 from multidrop.simulator.lexium.ports.modbus import ModbusPort
 from multidrop.simulator.lexium.power import BAUDS
+from multidrop.simulator.lexium.state.memory import Memory
 from multidrop.simulator.lexium.state.models import MODELS
 from multidrop.simulator.wire import Transmission
-from multidrop.simulator.world import World
+from multidrop.simulator.world import REVOLUTION, World
 
 KEY_OF = {"DN": "name", "PY": "party"}
 """Mnemonics that have a key of their own in the table."""
@@ -53,6 +58,7 @@ def read_drive(table: Table, folder: Folder) -> DriveSpec:
     identity = table.table("identity", "[bus.drive.identity]")
     world = table.table("world", "[bus.drive.world]")
     world.only(*WORLD_KEYS)
+    settings, scales = read_settings(table.table("set", "set"), _checker(personality)), read_units(table)
 
     def valid(name: str) -> bool:
         return is_name(name) and lookup(name, personality) is None and len(name) <= model.longest_name
@@ -63,9 +69,19 @@ def read_drive(table: Table, folder: Folder) -> DriveSpec:
         party=table.boolean("party", False),
         variables=read_variables(variables, valid, "as in Q1"),
         identity=read_identity(identity, ("part", "version", "serial"), dict.fromkeys(counters, 1)),
-        set=read_settings(table.table("set", "set"), _checker(personality)),
-        world=read_world(world, model.points.inputs, model.points.analog),
+        set=settings,
+        world=read_world(world, model.points.inputs, model.points.analog, _motor(personality, settings, scales)),
+        units=scales,
     )
+
+
+def _motor(personality: str, settings: Mapping[str, Value], scales: Mapping[str, Scale]) -> Motor:
+    """A count is a motor step, or an encoder count where the drive moves in these (manual 3.4.2)."""
+    memory = Memory(personality)
+    memory.values.update((name, held) for name, held in settings.items() if isinstance(held, int | float))
+    lines = memory.values.get("EL", memory.model.encoder_lines)
+    turn = lines * 4 if memory.counting else memory.steps_per_turn
+    return Motor(scales.get(""), Fraction(REVOLUTION), Fraction(REVOLUTION) / Fraction(turn))
 
 
 def _checker(personality: str) -> Check:

@@ -5,20 +5,26 @@ A controller as it was read from a unit becomes such a table, and a table the se
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from fractions import Fraction
+
 from multidrop.dialects.family import Motion
 from multidrop.dialects.files import split_lines
 from multidrop.dialects.pmx.manual import program_file
 from multidrop.dialects.pmx.manual.program_file import Undecodable
 from multidrop.dialects.pmx.manual.script_compiler import ERASED
 from multidrop.dialects.program_files import errors
+from multidrop.dialects.units import Scale
 from multidrop.dialects.values import VARIABLES as USERS
 from multidrop.dialects.values import Snapshot, Value
 from multidrop.simulator.cell.drive_keys import (
     ENCODER_KEYS,
     WORLD_KEYS,
+    Motor,
     common_keys,
     read_identity,
     read_settings,
+    read_units,
     read_variables,
     read_worlds,
 )
@@ -33,7 +39,7 @@ from multidrop.simulator.pmx.device import PROGRAMS, PmxDevice, PmxPort
 from multidrop.simulator.pmx.settings import AXES, VARIABLES
 from multidrop.simulator.pmx.usb import UsbController
 
-NAMES_OF_AXES = "xy"
+NAMES_OF_AXES = ("x", "y")
 INPUTS, COUNTS = range(1, 9), 5000
 """Digital inputs, and the end of scale of the analog inputs in millivolts."""
 NAMES = tuple(f"V{n}" for n in range(VARIABLES))
@@ -49,8 +55,10 @@ def read_drive(table: Table, folder: Folder) -> DriveSpec:
     if table.boolean("party", False):
         raise table.wrong("party", "is for MCode drives", "leave it out: a PMX always has an address")
     world = table.table("world", "[bus.drive.world]")
-    x, y = read_worlds(world, ("x", "y"), (*WORLD_KEYS, *ENCODER_KEYS), INPUTS, COUNTS)
     settings = read_settings(table.table("set", "set"), _check_setting)
+    scales = read_units(table, NAMES_OF_AXES)
+    motors = {axis: _motor(settings, axis.upper(), scales.get(axis)) for axis in NAMES_OF_AXES}
+    x, y = read_worlds(world, motors, (*WORLD_KEYS, *ENCODER_KEYS), INPUTS, COUNTS)
     variables = table.table("variables", "[bus.drive.variables]")
     identity = table.table("identity", "[bus.drive.identity]")
     return DriveSpec(
@@ -61,7 +69,14 @@ def read_drive(table: Table, folder: Folder) -> DriveSpec:
         identity=read_identity(identity, ("part", "version"), {"position": len(AXES), "encoder": len(AXES)}),
         world=x,
         further=(y,),
+        units=scales,
     )
+
+
+def _motor(settings: Mapping[str, Setting], axis: str, scale: Scale | None) -> Motor:
+    """A count is a pulse, or with StepNLoop an encoder count of SLR pulses (7.17)."""
+    ratio = settings.get(f"SLR{axis}", 1) if settings.get(f"SL{axis}") in (1, "1") else 1
+    return Motor(scale, None, Fraction(str(ratio)), "a PMX does not tell the pulses of a turn (SW1 and SW2 set them)")
 
 
 def _check_setting(table: Table, word: str, value: Setting) -> None:

@@ -8,11 +8,13 @@ from __future__ import annotations
 
 import asyncio
 import os
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
+from types import MappingProxyType
 
 from multidrop.dialects import Diagnostic
+from multidrop.dialects.units import Scale
 from multidrop.simulator import cells
 from multidrop.simulator.cell.spec import BusSpec, Cell
 from multidrop.simulator.families import FAMILIES, family_of
@@ -40,6 +42,8 @@ class SimBus:
     again: Callable[[], Transport]
     """Makes another pipe to the bus, after the last one broke."""
     baud: int = 0
+    units: Mapping[str, Scale] = field(default_factory=lambda: MappingProxyType({}))
+    """The scales of its drives, by name, or `NAME.AXIS`."""
 
     @property
     def present(self) -> bool:
@@ -119,6 +123,7 @@ def _open(key: str, running: _Running, spec: BusSpec, path: str) -> SimBus:
         party=any(drive.party or family_of(drive.personality).addressed for drive in spec.drives),
         floor=running.floor,
         baud=spec.baud,
+        units={f"{drive.name}.{axis}".rstrip("."): each for drive in spec.drives for axis, each in drive.units.items()},
     )
 
 

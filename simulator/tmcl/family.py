@@ -8,7 +8,8 @@ table, and a table the settings to write to a unit.
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from fractions import Fraction
 from functools import partial
 
 from multidrop.dialects.family import Motion
@@ -17,14 +18,27 @@ from multidrop.dialects.program_files import errors
 from multidrop.dialects.tmcl.manual import program_file
 from multidrop.dialects.tmcl.manual.commands import Axis, Global
 from multidrop.dialects.tmcl.manual.instructions import spelled
-from multidrop.dialects.tmcl.manual.modules import BAUDS, GLOBAL, MODULES, PREFIX, USERS, Module, Parameter, module_of
+from multidrop.dialects.tmcl.manual.modules import (
+    AXIS,
+    BAUDS,
+    GLOBAL,
+    MODULES,
+    PREFIX,
+    USERS,
+    Module,
+    Parameter,
+    module_of,
+)
 from multidrop.dialects.tmcl.manual.program_file import ProgramLine
+from multidrop.dialects.units import Scale
 from multidrop.dialects.values import Snapshot, Value
 from multidrop.simulator.cell.drive_keys import (
     WORLD_KEYS,
+    Motor,
     common_keys,
     read_identity,
     read_settings,
+    read_units,
     read_variables,
     read_worlds,
 )
@@ -34,6 +48,7 @@ from multidrop.simulator.cell.table import Folder, Table, quoted
 from multidrop.simulator.cell.writer import DriveText, Entry, remark
 from multidrop.simulator.family import Family, Place, Shadow, Snapshots, StoredProgram, Unit
 from multidrop.simulator.tmcl.module import TmclModule, storable, worlds_of
+from multidrop.simulator.tmcl.motor import FULL
 from multidrop.simulator.tmcl.port import TmclPort
 
 VERSION_FORM = re.compile(r"\d{4}V\d{3}", re.ASCII)
@@ -41,6 +56,8 @@ GLOBAL_PREFIX = "G"
 COUNTS = 4095
 """The end of scale of an analog input."""
 VARIABLES = tuple(map(str, USERS))
+FULL_STEPS = 200
+"""Of a motor of 1.8 degrees, where the cell file says nothing else."""
 
 
 def read_drive(table: Table, folder: Folder) -> DriveSpec:
@@ -57,10 +74,12 @@ def read_drive(table: Table, folder: Folder) -> DriveSpec:
         raise table.wrong("party", "is for MCode drives", "leave it out: a module always has an address")
     common["personality"] = _canonical(common["personality"])
     module = module_of(common["personality"])
-    world, *further = read_worlds(
-        table.table("world", "[bus.drive.world]"), _names(module), WORLD_KEYS, inputs_of(module), COUNTS
-    )
     settings = read_settings(table.table("set", "set"), partial(_check_setting, module))
+    names = _names(module)
+    scales = read_units(table, names if module.motors > 1 else ("",))
+    motors = {name: _motor(settings, name, scales.get(name if module.motors > 1 else "")) for name in names}
+    surroundings = table.table("world", "[bus.drive.world]")
+    world, *further = read_worlds(surroundings, motors, WORLD_KEYS, inputs_of(module), COUNTS)
     variables = table.table("variables", "[bus.drive.variables]")
     rows = table.table("identity", "[bus.drive.identity]")
     identity = read_identity(rows, ("version",), {"position": module.motors})
@@ -78,7 +97,16 @@ def read_drive(table: Table, folder: Folder) -> DriveSpec:
         world=world,
         further=tuple(further),
         any_address=table.boolean("any_address", False),
+        units=scales,
     )
+
+
+def _motor(settings: Mapping[str, Setting], name: str, scale: Scale | None) -> Motor:
+    """A count is a microstep. A step of the world is 1/256 of a full step."""
+    word = f"{int(Axis.MICROSTEPS)}"
+    power = settings.get(word if name == "0" else f"{word}_{name}", AXIS[Axis.MICROSTEPS].fresh)
+    full_steps = (scale.full_steps if scale is not None else None) or FULL_STEPS
+    return Motor(scale, Fraction(full_steps * FULL), Fraction(FULL, 2 ** int(str(power))))
 
 
 def _canonical(personality: str) -> str:

@@ -222,3 +222,21 @@ def test_lost_output_is_said_beside_failed_cases(sweep, monkeypatch: pytest.Monk
     )
     done = sweep(*FAILING)
     assert (done.returncode, done.stderr) == (1, "the output cannot be written: No space left on device\n")
+
+
+def test_walls_are_varied_with_units_of_the_scale(sweep, tmp_path: Path) -> None:
+    text = bus("line", drive("LMDCM", "a", EE=1), baud=0).replace('name = "a"', 'name = "a"\nunits = "5 mm/turn"')
+    (tmp_path / "mm.toml").write_text(text)
+    (tmp_path / "turn.mxt").write_text(GO.replace("51200", "4000"))
+    wall = ("--cell", "mm.toml", "--vary", "stall_at=3..6 mm")
+    *cases, _ = objects(sweep(*wall, "--expect", "errors == []", "--json", file="turn.mxt"))
+    assert [(each["set"]["stall_at"], each["ok"]) for each in cases] == [
+        ("3 mm", False),
+        ("4 mm", False),
+        ("5 mm", True),
+        ("6 mm", True),
+    ]
+    _, row, command, _ = sweep(*wall, "--expect", "errors == []", file="turn.mxt").stdout.splitlines()
+    assert row.split()[-2:] == ["stall_at=3", "mm"] and "'stall_at=3 mm'" in command
+    refused = sweep("--cell", "mm.toml", "--vary", "stall_at=3 kg", file="turn.mxt")
+    assert refused.returncode == 2 and "stall_at=3 kg" in refused.stderr and "no unit kg" in refused.stderr

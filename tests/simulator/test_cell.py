@@ -159,7 +159,7 @@ IS_HINT = 'several lines: IS = ["1,1,0", "2,2,0"]'
     ("text", "expected"),
     [
         ("sed = 1", 'cell.toml: unknown key "sed"; did you mean "seed"?'),
-        ("zzz = 1", 'cell.toml: unknown key "zzz"; valid: seed, bus'),
+        ("zzz = 1", 'cell.toml: unknown key "zzz"; valid: seed, own_units, bus'),
         ("seed = 1.5", "cell.toml: seed must be a whole number, not 1.5"),
         ("seed = true", "cell.toml: seed must be a whole number, not true"),
         ("bus = 1", "cell.toml: bus must be tables that begin with [[bus]]"),
@@ -260,7 +260,8 @@ IS_HINT = 'several lines: IS = ["1,1,0", "2,2,0"]'
         ),
         (
             drive("[bus.drive.world]\nhome = '0'"),
-            f'{DRIVE}: [bus.drive.world]: home must be a number, not "0"',
+            f"{DRIVE.replace('.toml', '.toml:6')}: [bus.drive.world]: home: '0' is no number with a unit; "
+            "valid: NUMBER SPACE UNIT, as in 12.5 mm",
         ),
         (
             drive("[bus.drive.world]\ninputs = [[0.0, 1]]"),

@@ -10,6 +10,7 @@ from collections.abc import AsyncIterator, Callable, Sequence
 from contextlib import asynccontextmanager
 from dataclasses import dataclass, field, replace
 from datetime import datetime, timedelta
+from fractions import Fraction
 from types import SimpleNamespace
 from typing import Any
 
@@ -18,6 +19,8 @@ from textual.pilot import Pilot
 from multidrop.dialects import Diagnostic, DriveError, DriveState, Stopped
 from multidrop.dialects.families import FAMILIES
 from multidrop.dialects.family import Family
+from multidrop.dialects.units import Basis
+from multidrop.dialects.units import scale as scale_of
 from multidrop.dialects.values import UNREAD, Conditions, Lamp, Pace
 from multidrop.drives.events import Conditioned, Sample, Silent, Unsolicited
 from multidrop.drives.stopping import Fate
@@ -29,6 +32,7 @@ from multidrop.shell.prompt.complete import Completion
 from multidrop.shell.roles import RunningPlot, Series
 from multidrop.shell.state.backups import Drafts
 from multidrop.shell.stop_report import Found, Tally
+from multidrop.shell.units import Axis
 from multidrop.transports import TransportLost, Unreachable
 from multidrop.tui.app import MultidropApp
 from multidrop.tui.assist import Assist, StartEntry
@@ -127,6 +131,25 @@ class FakeMacros:
         return self.kept[name]
 
 
+class FakeUnits:
+    """The scales of drives, by address and axis, with what they rest on: 51200 steps a turn."""
+
+    def __init__(self) -> None:
+        self.shown = True
+        self.axes: dict[tuple[str, str], Axis] = {}
+
+    def give(self, address: str, scale: str | dict[str, Any], axis: str = "", turn: int = 51200) -> Axis:
+        found = self.axes[address, axis] = Axis(scale_of(scale))
+        found.accept(Basis((("MS", "256"),), Fraction(turn)))
+        return found
+
+    def of(self, drive: FakeDrive, axis: str = "") -> Axis | None:
+        return self.axes.get((drive.address, axis))
+
+    def referenced(self, drive: FakeDrive, axis: str) -> bool:
+        return not drive.unreferenced & {axis, ""}
+
+
 class FakeSession:
     """A session whose `lines` were run; a line in `refuses` fails; `gate` holds every line until it is set."""
 
@@ -135,6 +158,8 @@ class FakeSession:
         self.selected_bus = buses[0].name if buses else ""
         self.addresses = {bus.name: next(iter(bus.drives), "") for bus in buses}
         self.reconnections = SimpleNamespace(trying=[])
+        self.units = FakeUnits()
+        self.scaled = True
         self.raw: set[str] = set()
         self.latched = False
         self.recording = ""

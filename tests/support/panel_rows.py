@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 from multidrop.shell.events import SessionEvent
-from multidrop.tui.panels.view import View, glances_of
+from multidrop.tui.panels.view import View, figures_at, glances_of
 from multidrop.tui.screen_model import ScreenModel
 from multidrop.tui.widgets.lines import Row
 from tests.support.fake_session import FakeSession
@@ -15,7 +17,7 @@ def plain(*rows: Row) -> str:
 
 def view(session: FakeSession, *events: SessionEvent, polling: bool = True) -> View:
     """What the selected bus shows after these events."""
-    model = ScreenModel(lambda: session.selected_bus, lambda: session.buses)
+    model = ScreenModel(lambda: session.selected_bus, lambda: session.buses, partial(figures_at, session))
     for event in events:
         model.take(event)
     glances = glances_of(session, model, session.buses[session.selected_bus])

@@ -59,7 +59,7 @@ async def test_a_typed_move_is_seen_and_its_end_is_read(tmp_path: Path) -> None:
     async with press(tmp_path) as pilot:
         typed(pilot, "MR 102400", "enter")
         await until(pilot, lambda: "▶ moving" in status(pilot))
-        await until(pilot, lambda: "■ stopped" in status(pilot) and "102400" in status(pilot))
+        await until(pilot, lambda: "■ stopped" in status(pilot) and "10.00000 mm" in status(pilot))
         typed(pilot, "PR P", "enter")
         await until(pilot, lambda: "a     102400" in transcript(pilot))
 
@@ -89,14 +89,14 @@ async def test_a_macro_is_recorded_put_on_a_key_and_played(tmp_path: Path) -> No
         typed(pilot, "ctrl+p", "record", "enter", "nudge", "enter")
         await until(pilot, lambda: app_of(pilot).session.recording == "nudge")
         typed(pilot, "MR 1000", "enter")
-        await until(pilot, lambda: " 1000 " in status(pilot))
+        await until(pilot, lambda: " 0.09766 mm" in status(pilot))
         typed(pilot, "/record stop", "enter")
         await until(pilot, lambda: not app_of(pilot).session.recording)
         typed(pilot, "/key F4 nudge", "enter")
         await until(pilot, lambda: "F4 nudge" in app_of(pilot).main.lines("footer").plain)
         typed(pilot, "f4")
         await until(pilot, lambda: "» @a MR 1000" in transcript(pilot))
-        await until(pilot, lambda: " 2000 " in status(pilot))
+        await until(pilot, lambda: " 0.19531 mm" in status(pilot))
 
 
 async def test_an_unplugged_bus_says_so(tmp_path: Path) -> None:
@@ -116,7 +116,7 @@ async def test_a_lost_bus_comes_back_in_its_tab(tmp_path: Path) -> None:
         await until(pilot, lambda: "■ stopped" in status(pilot) and "press is back after" in transcript(pilot))
         assert not app_of(pilot).main.query_one(".banner").display
         typed(pilot, "MR 1000", "enter")
-        await until(pilot, lambda: " 1000 " in status(pilot))
+        await until(pilot, lambda: " 0.09766 mm" in status(pilot))
 
 
 async def test_a_controller_shows_both_axes_and_ctrl_x_stops_them(tmp_path: Path) -> None:

@@ -85,15 +85,15 @@ class Chart:
         return magnified(self._scale, zoom, min(max(centre, low), high))
 
     def draw(
-        self, shown: Sequence[tuple[Quantity, int]], window: Window, rows: int, scale: Scale, ink: Ink
+        self, shown: Sequence[tuple[Quantity, int, Scale]], window: Window, rows: int, scale: Scale, ink: Ink
     ) -> list[list[Run]]:
-        """Draw quantities, each with the number of its colour and dashes."""
+        """Draw quantities, each with the number of its colour and dashes, and `scale` in its own units."""
         raster = self._rasters.get((rows, window.columns))
         if raster is None:
             if len(self._rasters) >= KEPT:
                 self._rasters.clear()
             raster = self._rasters[rows, window.columns] = Raster()
-        curves = [Curve(self._columns[quantity], number) for quantity, number in shown]
+        curves = [Curve(self._columns[quantity], number, own) for quantity, number, own in shown]
         return raster.draw(curves, Frame(window.first, window.columns, rows, scale, ink))
 
     def value_at(self, quantity: Quantity, at: float) -> float | None:

@@ -182,6 +182,8 @@ class Curve(NamedTuple):
 
     columns: Columns
     number: int
+    scale: Scale | None = None
+    """The scale of its values where it is not that of the frame: they are shown in other units."""
 
 
 class Raster:
@@ -200,7 +202,7 @@ class Raster:
 
     def draw(self, curves: Sequence[Curve], frame: Frame) -> list[list[Run]]:
         """Draw a window, from top to bottom."""
-        valid = (frame.rows, frame.scale, frame.ink, *((each.columns, each.number) for each in curves))
+        valid = (frame.rows, frame.scale, frame.ink, *curves)
         if valid != self._valid:
             self._kept.clear()
             self._valid = valid
@@ -229,11 +231,11 @@ class Raster:
         self.drawn += 1
         ink, rows = frame.ink, frame.rows
         dots, owners = [0] * rows, [EMPTY] * rows
-        for columns, number in reversed(curves):
+        for columns, number, own in reversed(curves):
             for side in range(ink.wide):
                 at = x * ink.wide + side
                 column = columns.columns.get(at)
-                span = None if column is None else _span(column, frame.scale, rows * ink.tall)
+                span = None if column is None else _span(column, own or frame.scale, rows * ink.tall)
                 if span is None:
                     continue
                 for y in ink.dots(number, at, *span):
@@ -245,7 +247,7 @@ class Raster:
 
 def _span(column: Column, scale: Scale, dots: int) -> tuple[int, int] | None:
     """The dots of a column from top to bottom, with the line that comes from the column before; None: beyond it."""
-    top, bottom = scale.dot(column.high, dots), scale.dot(column.low, dots)
+    top, bottom = sorted((scale.dot(column.high, dots), scale.dot(column.low, dots)))
     if not isnan(column.come):
         come = scale.dot(column.come, dots)
         if come < top:

@@ -13,7 +13,7 @@ from typing import NamedTuple
 from multidrop.dialects.values import UNREAD, Conditions, Lamp, Pace
 from multidrop.tui.panels.view import NOT_REFERENCED, Glance, View, firmware_of, name_of
 from multidrop.tui.readout import READ, SWITCHES, Readout
-from multidrop.tui.text import age, at_words, digits, fit
+from multidrop.tui.text import age, at_words, fit
 from multidrop.tui.widgets.lines import Row, Span, spread, width_of
 
 # Lamps of inputs and outputs, the error, program and currents of an axis, as words with roles.
@@ -125,8 +125,8 @@ def facts_groups(readout: Readout, now: float) -> Iterator[list[Span]]:
 # nothing is drawn that looks like one.
 
 
-SOFTWARE, LEARNT, SEEN = "limits", "switches", "seen"
-"""Where a travel comes from: software limits, limit switches that were reached, the positions seen so far."""
+STATED, SOFTWARE, LEARNT, SEEN = "travel", "limits", "switches", "seen"
+"""Where a travel comes from: the scale, software limits, limit switches that were reached, the places seen so far."""
 SHORTEST_BAR = 6
 STEADY = 0.01
 """Share of the velocity below which a change counts as none."""
@@ -144,6 +144,8 @@ class Travel(NamedTuple):
 
 def travel_of(readout: Readout) -> Travel | None:
     """The best known travel; None before the axis was seen at two positions. What was seen reaches to the target."""
+    if readout.figures.travel is not None:
+        return Travel(*readout.figures.travel, STATED)
     limits = readout.conditions.limits if readout.conditions is not None else None
     if limits is not None:
         return Travel(*limits, SOFTWARE)
@@ -169,7 +171,12 @@ def bar(readout: Readout, width: int) -> str:
         cells[_cell(target, travel, width)] = "◇"
     beyond = "◀" if last.position < travel.low else "▶" if last.position > travel.high else ""
     cells[_cell(last.position, travel, width)] = beyond or "●"
+    if readout.figures.places.gain < 0:  # the lower end in units is at the left
+        cells = [MIRRORED.get(each, each) for each in reversed(cells)]
     return "".join(cells)
+
+
+MIRRORED = {"├": "┤", "┤": "├", "◀": "▶", "▶": "◀"}
 
 
 def _cell(position: int, travel: Travel, width: int) -> int:
@@ -236,14 +243,16 @@ def twin_rows(axis: Readout, unit: str, number: int, width: int, *, dim: bool) -
         return
     predicted, diverged = twin.predicted, twin.diverged
     role = "dim" if dim or twin.behind(axis.last) else "text"
-    velocity: list[Span] = [(digits(predicted.velocity), role), (f" {unit}/s ", "dim")]
-    yield spread([(f" {predicted.position:>{number}} ", role), ("twin", "dim")], velocity, width)
+    figures = axis.figures
+    velocity: list[Span] = [(figures.rate(predicted.velocity), role), (f" {figures.speed_unit or f'{unit}/s'} ", "dim")]
+    yield spread([(f" {figures.number(predicted.position):>{number}} ", role), ("twin", "dim")], velocity, width)
+    apart = figures.distance(predicted.difference)
     if diverged is None:
-        yield ((f" {predicted.difference:>+{number}} ", role), ("difference", "dim"))
+        yield ((f" {apart:>{number}} ", role), ("difference", "dim"))
         return
     alarm = "dim" if role == "dim" else "error"
-    limit: list[Span] = [(f"limit {digits(diverged.limit)} ", "dim")]
-    yield spread([(f" {SIGN} {predicted.difference:>+{number - 2}} ", alarm), ("difference", alarm)], limit, width)
+    limit: list[Span] = [(f"limit {figures.distance(diverged.limit).removeprefix('+')} ", "dim")]
+    yield spread([(f" {SIGN} {apart:>{number - 2}} ", alarm), ("difference", alarm)], limit, width)
     for text in at_words(", ".join(diverged.causes), width - 4)[:CAUSES]:
         yield ((f"   {text}", alarm),)
 
@@ -254,7 +263,7 @@ def differs(axis: Readout, *, causes: bool = True) -> str:
     if twin is None or twin.diverged is None:
         return ""
     now = (twin.predicted or twin.diverged).difference
-    return f"{SIGN} {now:+} {', '.join(twin.diverged.causes) if causes else ''}".rstrip()
+    return f"{SIGN} {axis.figures.distance(now)} {', '.join(twin.diverged.causes) if causes else ''}".rstrip()
 
 
 def alarm_words(trouble: str, axes: Sequence[Readout], room: int) -> str:
@@ -271,12 +280,12 @@ def difference_words(axis: Readout) -> str:
     twin = axis.twin
     if twin is None or twin.predicted is None or twin.diverged is not None:
         return ""
-    return f"twin {twin.predicted.difference:+}"
+    return f"twin {axis.figures.distance(twin.predicted.difference)}"
 
 
 NUMBER = 12
 """Width of the longest position, -2147483648, and a space."""
-WORDS = {SOFTWARE: "software limits", LEARNT: "between limit switches", SEEN: "seen so far"}
+WORDS = {STATED: "travel", SOFTWARE: "software limits", LEARNT: "between limit switches", SEEN: "seen so far"}
 
 
 def drive_title(view: View) -> Row:
@@ -319,21 +328,22 @@ def drive_rows(view: View, width: int, height: int) -> list[Row]:
 def axis_rows(glance: Glance, axis: Readout, now: float, width: int) -> list[Row]:
     """State and velocity, position and target, and the travel of an axis; its trouble, where it has any."""
     position, velocity, role = glance.values(now, axis)
-    unit = unit_of(axis, glance.unit)
+    unit, figures = unit_of(axis, glance.unit), axis.figures
     live = role != "dim" and axis.last is not None and axis.last.velocity != 0
     name = f" {axis.axis}" if axis.axis else ""
     rate = axis.conditions.speed_unit if axis.conditions is not None else f"{unit}/s"
-    speed: list[Span] = [(velocity, role), (f" {rate} ", "dim")]
+    speed: list[Span] = [(velocity, role), (f" {'' if figures.speed_unit else f'{rate} '}", "dim")]
     rows: list[Row] = [spread(_state(glance, axis, now, width - width_of(speed) - 1), speed, width)]
     rows += [((f"{name} {text}", role_of),) for text, role_of in _troubles(axis, now)]
     if not glance.counts(axis):
         verb = f"/referenced {glance.address}".rstrip()
         rows.append(((f"{name} {NOT_REFERENCED}: home it, set it, or {verb}", "strong"),))
     target = axis.conditions.target if axis.conditions is not None and live else None
-    arrow = f"   → {digits(target)}" if target is not None else ""
+    arrow = f"   → {figures.place(target)}" if target is not None else ""
     togo = to_go_words(axis, now) if live else ""
     right: list[Span] = [(f"{togo} to go ", "text")] if togo else []
-    rows.append(spread([(f" {position:>{NUMBER}} ", role), (unit, "dim"), (arrow, role)], right, width))
+    number, _, own = position.partition(" ")
+    rows.append(spread([(f" {number:>{NUMBER}} ", role), (own or unit, "dim"), (arrow, role)], right, width))
     rows += twin_rows(axis, unit, NUMBER, width, dim=role == "dim")
     return [*rows, *_travel_rows(axis, role, width)[: 1 if name else 2]]
 
@@ -369,8 +379,10 @@ def _travel_rows(axis: Readout, role: str, width: int) -> list[Row]:
     row: Row = ((f" {bar(axis, width - 2)}", drawn),)
     if travel is None:
         return [row, ((" travel not known", "dim"),)]
-    ends: list[Span] = [(f" {travel.low}", "dim")]
-    return [row, spread([*ends, (f"  {WORDS[travel.known_by]}", "dim")], [(f"{travel.high} ", "dim")], width)]
+    low, high = sorted((travel.low, travel.high), key=axis.figures.places.value)
+    ends: list[Span] = [(f" {axis.figures.place(low)}", "dim")]
+    right: list[Span] = [(f"{axis.figures.place(high)} ", "dim")]
+    return [row, spread([*ends, (f"  {WORDS[travel.known_by]}", "dim")], right, width)]
 
 
 def _condition_rows(glance: Glance, axis: Readout, now: float, width: int, *, named: bool) -> list[Row]:

@@ -26,7 +26,7 @@ from multidrop.tui.panels.drive import (
 )
 from multidrop.tui.panels.view import NOT_REFERENCED, Glance, View
 from multidrop.tui.readout import READ, SPAN, Readout, State
-from multidrop.tui.text import age, digits, fit
+from multidrop.tui.text import age, fit
 from multidrop.tui.widgets.lines import Row, Span, spread, width_of
 
 
@@ -98,13 +98,14 @@ def _axis_row(glance: Glance, axis: Readout, now: float, width: int, *, first: b
     """Name, state, place in the travel, position, velocity, and what matters most besides."""
     position, velocity, role = glance.values(now, axis)
     moves = axis.last is not None and axis.last.velocity != 0
-    per = "" if axis.conditions is not None and axis.conditions.speed else "/s"
+    own_speed = axis.figures.speed_unit or (axis.conditions is not None and axis.conditions.speed)
+    per, beyond = "" if own_speed else "/s", max(0, len(position) - NUMBER)
     row: list[Span] = [
         _name(glance, axis, first=first),
         (short_words(glance, axis, now), _state_role(glance, now)),
         (f"{bar(axis, BAR)} ", "dim" if role == "dim" else "text"),
         (f"{position:>{NUMBER}}", role),
-        (f"{f'{velocity}{per}' if moves else '':>{VELOCITY}} ", role),
+        (f"{f' {velocity}{per}' if moves else '':>{max(0, VELOCITY - beyond)}} ", role),
     ]
     room = width - width_of(row)
     text, text_role = _besides(glance, axis, now, room, live=role != "dim")
@@ -144,7 +145,7 @@ def _besides(glance: Glance, axis: Readout, now: float, room: int, *, live: bool
         return NOT_REFERENCED, "strong"
     target = axis.conditions.target if axis.conditions is not None else None
     if live and target is not None and axis.last is not None and axis.last.velocity:
-        return f"→ {digits(target)}  {to_go_words(axis, now)}".rstrip(), "text"
+        return f"→ {axis.figures.place(target)}  {to_go_words(axis, now)}".rstrip(), "text"
     return program_words(axis, now), "dim" if axis.program_aged(now) else "motion"
 
 

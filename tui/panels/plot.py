@@ -14,8 +14,10 @@ from multidrop.shell.roles import DIFFERENCE
 from multidrop.tui.curves.chart import Chart, Extent, Look, Window
 from multidrop.tui.curves.raster import CURSOR, EMPTY, TWINS, Ink, Scale, row_of, ticks, with_cursor
 from multidrop.tui.curves.samples import PREDICTED, Quantity
+from multidrop.tui.figures import NATIVE, Conversion, Figures
 from multidrop.tui.panels.view import View
 from multidrop.tui.polling import plotted
+from multidrop.tui.readout import Readout
 from multidrop.tui.text import age, digits, fit, short
 from multidrop.tui.widgets.lines import SERIES, Row, Span, width_of
 
@@ -33,6 +35,8 @@ class Line(NamedTuple):
     number: int
     twin: bool = False
     """A prediction of the drive's twin."""
+    figures: Figures = NATIVE
+    """The form in which its values are shown."""
 
     @property
     def stroke(self) -> int:
@@ -43,6 +47,25 @@ class Line(NamedTuple):
         if not self.twin:
             return self
         return self._replace(twin=False, quantity=self.quantity._replace(word=_MEASURED[self.quantity.word]))
+
+    @property
+    def conversion(self) -> Conversion:
+        """What is plotted in the unit that is shown."""
+        word, figures = self.of_drive.quantity.word, self.figures
+        if word == DIFFERENCE:
+            return Conversion(figures.places.gain)
+        return {"velocity": figures.speeds, "position": figures.places}.get(word, Conversion())
+
+    def text(self, plotted: float) -> str:
+        """A plotted value; in units with its unit, else a whole number has no decimals."""
+        figures, value = self.figures, self.conversion.value(plotted)
+        if figures.unit and self.unit:
+            return f"{round(value, figures.decimals) + 0.0:.{figures.decimals}f} {self.unit}"
+        return digits(int(value)) if value == int(value) else f"{value:.3f}"
+
+    def extent(self, plotted: Extent) -> Extent:
+        """A plotted extent in the unit that is shown."""
+        return Extent(*sorted(map(self.conversion.value, plotted)))
 
     @property
     def shown(self) -> str:
@@ -84,11 +107,12 @@ def groups(view: View) -> list[Group]:
             where = ":".join(filter(None, (bus if several or not address else "", address)))
             name = " ".join(filter(None, (where, drive.label, axis)))
             for each in [word] if word else PLOTTED:
-                unit = _unit(view, bus, address, axis, each) if word in ("", DIFFERENCE) else ""
-                lines = found.setdefault((each, name if view.model.look.apart else ""), [])
-                lines.append(Line(name, Quantity(bus, address, axis, each), unit, number))
+                unit, figures = _unit(view, bus, address, axis, each) if word in ("", DIFFERENCE) else ("", NATIVE)
+                key = " ".join(filter(None, (name if view.model.look.apart else "", unit if figures.unit else "")))
+                lines = found.setdefault((each, key), [])
+                lines.append(Line(name, Quantity(bus, address, axis, each), unit, number, figures=figures))
                 if not word and _recent(view, predicted := Quantity(bus, address, axis, PREDICTED[each])):
-                    lines.append(Line(name, predicted, unit, number, twin=True))
+                    lines.append(Line(name, predicted, unit, number, twin=True, figures=figures))
     order = sorted(found, key=lambda key: list(PLOTTED).index(key[0]) if key[0] in PLOTTED else 9)
     if view.model.look.apart:
         order = sorted(order, key=lambda key: min(line.number for line in found[key]))
@@ -102,11 +126,13 @@ def _recent(view: View, predicted: Quantity) -> bool:
     return trace is not None and trace.at[-1] >= end - look.span
 
 
-def _unit(view: View, bus: str, address: str, axis: str, quantity: str) -> str:
-    """`steps`, or what the drive counts; of a velocity, that a second or a unit of its own."""
-    axes = view.model.bus(bus).readout(address).axes
-    found = next((each.conditions for each in axes if each.axis == axis and each.conditions is not None), Conditions())
-    return found.speed_unit if quantity == "velocity" else found.unit
+def _unit(view: View, bus: str, address: str, axis: str, quantity: str) -> tuple[str, Figures]:
+    """`mm`, `steps`, or what the drive counts; of a velocity, that a second or a unit of its own; with the figures."""
+    found = next((each for each in view.model.bus(bus).readout(address).axes if each.axis == axis), Readout())
+    figures, own = found.figures, found.conditions or Conditions()
+    if quantity == "velocity":
+        return (f"{figures.speed_unit}{figures.sign}" if figures.speed_unit else own.speed_unit), figures
+    return (f"{figures.unit}{figures.sign}" if figures.unit else own.unit), figures
 
 
 def role_of(number: int) -> str:
@@ -144,18 +170,13 @@ def gutter(width: int) -> int:
     return min(30, max(20, width // 4)) if width >= NAMES else 0
 
 
-def shown_number(value: float) -> str:
-    """Format a value; a whole number has no decimals."""
-    return digits(int(value)) if value == int(value) else f"{value:.3f}"
-
-
 def chart_rows(view: View, shown: Shown, window: Window, width: int, height: int) -> list[Row]:
     """The rows of a chart, from top to bottom."""
     if height < 1:
         return []
     look = view.model.look
     scale = _scale(view, shown)
-    lines = [(line.quantity, line.stroke) for line in shown.moving]
+    lines = [(line.quantity, line.stroke, _own_scale(line, scale)) for line in shown.moving]
     drawn = shown.chart.draw(lines, window, height, scale, look.ink)
     marks = ticks(scale, height)
     zero = row_of(0.0, scale, height) if scale.low <= 0 <= scale.high else -1
@@ -163,11 +184,12 @@ def chart_rows(view: View, shown: Shown, window: Window, width: int, height: int
         marks.setdefault(zero, 0.0)
     ends = _line_ends(view, shown, scale, height, gutter(width))
     cursor = None if look.cursor is None else int(look.cursor // window.dot) // window.wide - window.first
+    in_units = any(line.figures.unit for line in shown.moving)
     rows: list[Row] = []
     for y, runs in enumerate(drawn):
         if cursor is not None:
             runs = with_cursor(runs, cursor, "│")
-        label = short(marks[y], scale.step) if y in marks else ""
+        label = short(marks[y], scale.step, prefixes=not in_units) if y in marks else ""
         tick = "┼" if y == zero else "┤" if y in marks else "│"
         rows.append(
             (
@@ -187,9 +209,18 @@ def _scale(view: View, shown: Shown) -> Scale:
     centre = shown.chart.value_at(first.quantity, view.now if look.cursor is None else look.cursor)
     trace = view.model.traces.get(first.quantity)
     newest = trace.values[-1] if trace is not None and trace.values else 0.0
-    extents = list(shown.moving.values())
-    middle = newest if centre is None else centre
-    return shown.chart.scale(extents, LEAST.get(word, 1.0), word == "velocity", look.zoom, middle)
+    extents = [line.extent(each) for line, each in shown.moving.items()]
+    if word == "position":  # a stated travel is the range of the chart
+        extents += [line.extent(Extent(*line.figures.travel)) for line in shown.moving if line.figures.travel]
+    middle, convert = newest if centre is None else centre, first.conversion
+    least = LEAST.get(word, 1.0) * abs(convert.gain)
+    return shown.chart.scale(extents, least, word == "velocity", look.zoom, convert.value(middle))
+
+
+def _own_scale(line: Line, scale: Scale) -> Scale:
+    """The scale of a chart in the numbers that are plotted; it falls where their sign is turned."""
+    gain, zero = line.conversion
+    return Scale((scale.low - zero) / gain, (scale.high - zero) / gain, scale.step)
 
 
 def _line_ends(view: View, shown: Shown, scale: Scale, rows: int, room: int) -> dict[int, tuple[Span, ...]]:
@@ -201,11 +232,12 @@ def _line_ends(view: View, shown: Shown, scale: Scale, rows: int, room: int) -> 
         at = look.cursor if look.cursor is not None else look.paused_at
         last = trace.values[-1] if trace is not None and trace.values else None
         value = last if at is None else shown.chart.value_at(line.quantity, at)
-        row = rows // 2 if value is None else row_of(min(max(value, scale.low), scale.high), scale, rows)
+        height = line.conversion.value(value or 0.0)
+        row = rows // 2 if value is None else row_of(min(max(height, scale.low), scale.high), scale, rows)
         missed = trace.overdue(view.now) if trace is not None and at is None else 0.0
-        text = "–" if value is None else shown_number(value)
+        text = "–" if value is None else line.text(value)
         shown_value = (f"{text} ({age(missed)})", "dim") if missed else (text, "strong")
-        found.append(((row, -(value or 0.0)), line, shown_value))
+        found.append(((row, -height), line, shown_value))
     found.sort(key=lambda each: each[0])
     ends: dict[int, tuple[Span, ...]] = {}
     for place, ((row, _), line, value_span) in enumerate(found[:rows]):
@@ -254,7 +286,7 @@ def cursor_row(view: View, width: int) -> Row:
             name = f"{line.shown} {group.word} "
             row += [
                 (name, role_of(line.number)),
-                ("not known" if value is None else shown_number(value), "strong"),
+                ("not known" if value is None else line.text(value), "strong"),
                 ("  ", "text"),
             ]
     return tuple(row)
@@ -375,11 +407,9 @@ def _words(view: View, line: Line, extent: Extent | None, velocity: Extent | Non
         trace = view.model.traces.get(line.quantity)
         why = "no samples yet" if trace is None else "no samples in this time"
         return ((name, role_of(line.number)), (why, "dim"))
-    value = (
-        shown_number(extent.low) if not extent.width else f"{shown_number(extent.low)} to {shown_number(extent.high)}"
-    )
+    value = line.text(extent.low) if not extent.width else f"{line.text(extent.low)} to {line.text(extent.high)}"
     rests = measured == "position" and (velocity is None or velocity == (0, 0))
-    text = f"{'at rest' if rests else 'steady'} at {value} {line.unit}".rstrip()
+    text = f"{'at rest' if rests else 'steady'} at {value} {'' if line.figures.unit else line.unit}".rstrip()
     trace = view.model.traces.get(line.quantity)
     missed = trace.overdue(view.now) if trace is not None and view.model.look.paused_at is None else 0.0
     if missed:

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 
 from multidrop.drives.bus import Bus
 from multidrop.shell.session import Session
+from multidrop.tui.figures import NATIVE, Figures, figures_of
 from multidrop.tui.readout import READ, Readout, State
 from multidrop.tui.screen_model import ScreenModel
-from multidrop.tui.text import digits, fit
+from multidrop.tui.text import fit
 from multidrop.tui.widgets.lines import Span
 
 STATE = 17
@@ -55,12 +57,13 @@ class Glance:
         return fit(f"{state.sign} {words}", width), "dim" if aged else state.role
 
     def values(self, now: float, axis: Readout | None = None) -> tuple[str, str, str]:
-        """Position, velocity, and their role: dim unless they are known to be current."""
+        """Position and velocity, each with its unit if they have one, and their role: dim unless they are current."""
         last = (axis or self.readout).last
         dim = self.lost or self.readout.silent_since is not None or self.readout.old(now) or self.storing
-        sign = "" if last is None or self.counts(axis or self.readout) else UNREFERENCED
-        position = sign + digits(None if last is None else last.position)
-        velocity = digits(None if last is None else last.velocity)
+        axis = axis or self.readout
+        sign = "" if last is None or self.counts(axis) else UNREFERENCED
+        position = sign + axis.figures.place(None if last is None else last.position)
+        velocity = axis.figures.speed(None if last is None else last.velocity)
         return position, velocity, "dim" if dim else "strong"
 
 
@@ -77,6 +80,8 @@ def firmware_of(glance: Glance) -> str:
 def glances_of(session: Session, model: ScreenModel, bus: Bus) -> list[Glance]:
     """The drives of a bus, as they are shown."""
     facts = model.bus(bus.name)
+    for address in bus.drives:
+        facts.readout(address).show_in(partial(figures_at, session, bus.name, address))
     chosen = session.selected if bus.name == session.selected_bus else None
     return [
         Glance(
@@ -92,6 +97,14 @@ def glances_of(session: Session, model: ScreenModel, bus: Bus) -> list[Glance]:
         )
         for address, drive in bus.drives.items()
     ]
+
+
+def figures_at(session: Session, bus: str, address: str, axis: str) -> Figures:
+    """The figures of an axis, as a person has chosen: in units, or as the drive counts."""
+    drive = session.buses[bus].drives.get(address) if session.scaled and bus in session.buses else None
+    if drive is None or not session.units.shown:
+        return NATIVE
+    return figures_of(session.units.of(drive, axis), session.units.referenced(drive, axis))
 
 
 @dataclass(frozen=True)

@@ -104,7 +104,8 @@ def drive_row(place: Place, now: float, width: int, chosen: bool) -> Row:
         room = width - width_of(row) - 2
         text, text_role = place.besides(room, now)
         return (*row, (fit(f"  {text}", room + 2), text_role))
-    row.append((f"{velocity:>{VELOCITY}} ", role))
+    beyond = max(0, len(position) - POSITION)
+    row.append((f"{f' {velocity}':>{max(0, VELOCITY - beyond)}} ", role))
     cells = SPARK if width >= ROOMY else FEW
     row.append((f"{spark(place.glance.readout, now, cells)}  ", "dim" if role == "dim" else "accent"))
     room = width - width_of(row)

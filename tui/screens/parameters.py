@@ -6,6 +6,7 @@ sends the lines that are shown. They go out as if they were typed, and then ever
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import ClassVar
 
@@ -14,6 +15,7 @@ from textual.binding import Binding, BindingType
 from multidrop.dialects import Diagnostic
 from multidrop.dialects.values import VARIABLES, Readings, Value
 from multidrop.drives.drive import Drive
+from multidrop.shell import setting_units
 from multidrop.shell.params import file as files
 from multidrop.shell.params.page import Edit, edit, found_in, meanings_of, parsed, rows
 from multidrop.shell.params.page import Row as Setting
@@ -64,8 +66,9 @@ class SettingsTable:
     def compare(self, name: str, values: dict[str, Value]) -> None:
         self.other, self.at = (name, values), 0
 
-    def rows(self, width: int, height: int) -> list[Row]:
-        return [self._row(each, width, n == self.at) for n, each in in_view(self.shown, self.at, height)]
+    def rows(self, width: int, height: int, units: Callable[[str, Value], str]) -> list[Row]:
+        """The rows in view; `units`: a value in units, to follow it."""
+        return [self._row(each, width, n == self.at, units) for n, each in in_view(self.shown, self.at, height)]
 
     def heading(self, view: View, glance: Glance | None, width: int) -> Row:
         """The drive, how many settings are shown, and when they were read."""
@@ -97,7 +100,7 @@ class SettingsTable:
         except Diagnostic:
             return f"{row.reading.name} {row.meaning}"
 
-    def _row(self, row: Setting, width: int, chosen: bool) -> Row:
+    def _row(self, row: Setting, width: int, chosen: bool, units: Callable[[str, Value], str]) -> Row:
         there: list[Span] = []
         if self.other is not None:
             there.append((f"{_aligned(row.other or '–')} ", "strong" if row.differs else "dim"))
@@ -111,7 +114,9 @@ class SettingsTable:
         ]
         room = width - sum(len(text) for text, _ in left)
         meaning = row.meaning or (row.reading.unit if len(row.reading.unit) > UNIT else "")
-        about = ("program variable  " if row.reading.section == VARIABLES else "") + meaning
+        shown = units(row.reading.name, row.reading.value).strip(" ()")
+        kind = "program variable" if row.reading.section == VARIABLES else ""
+        about = "  ".join(filter(None, (shown, kind, meaning)))
         return (*left, (fit(about, room), "dim"))
 
 
@@ -179,6 +184,10 @@ class ParametersPage(AskingPage):
 
     # What is shown
 
+    def _in_units(self, name: str, value: Value) -> str:
+        session, drive = self.host.session, self.host.session.selected
+        return setting_units.shown(session.units, drive, name, value) if session.scaled and drive is not None else ""
+
     def show(self, view: View) -> None:
         self._glance = view.chosen
         # Forget what was begun before a stop, or for another drive.
@@ -199,7 +208,7 @@ class ParametersPage(AskingPage):
         if self.said[0] == READING and self._table.found is not self._settings():
             self.say("", "dim")
         self._table.make(self._settings(), drive)
-        lines.put(self._table.rows(width, max(0, lines.size.height)) or self._nothing())
+        lines.put(self._table.rows(width, max(0, lines.size.height), self._in_units) or self._nothing())
         self.lines("heading").put([self._table.heading(view, self._glance, width)])
         self.lines("columns").put([self._table.columns(width)])
         self.lines("meaning").put([((f" {fit(self._table.about(drive), width - 2)}", "dim"),)])

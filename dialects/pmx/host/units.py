@@ -63,5 +63,5 @@ UNITS = Units(
     basis,
     disturbs,
     reads,
-    target,
+    target=target,
 )

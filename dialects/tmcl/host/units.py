@@ -35,6 +35,7 @@ PARAMETERS = {
     Axis.SEARCH_SPEED: Takes.SPEED,
     Axis.SWITCH_SPEED: Takes.SPEED,
 }
+_SETTING = re.compile(r"(\d{1,3})(?:_(\d))?", re.ASCII)
 _LINE = re.compile(rf"\s*(?:(ROR)|(MVP)\s+(ABS|REL)\s*,|(SAP)\s+(\d+)\s*,)\s*(\d+)\s*,\s*{VALUE}\s*", re.I)
 
 
@@ -103,6 +104,12 @@ def basis(state: TmclState, axis: str, full_steps: int | None) -> Procedure[Basi
     return Basis(named, turn, speed, Fraction(2 ** (pulse + ramp + 29), CLOCK**2), assumed)
 
 
+def setting(state: TmclState, name: str) -> tuple[str, Takes] | None:
+    found = _SETTING.fullmatch(name)
+    takes = PARAMETERS.get(Axis(int(found[1]))) if found is not None and int(found[1]) in PARAMETERS else None
+    return (_axis(state, int(found[2] or 0)), takes) if found is not None and takes is not None else None
+
+
 UNITS = Units(
     lambda state: [str(motor) for motor in range(state.motors)] if state.motors > 1 else [""],
     fields,
@@ -110,4 +117,5 @@ UNITS = Units(
     basis,
     disturbs,
     reads,
+    setting,
 )

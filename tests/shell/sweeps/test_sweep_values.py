@@ -38,6 +38,8 @@ def values(text: str, *, drawn: bool = False) -> list[object]:
         ('"5"', ["5"]),
         ("[[2.0, 1, 0]],[]", [[[2.0, 1, 0]], []]),
         ("1e3,-.5", [1000, -0.5]),
+        ("299..301 mm", ["299 mm", "300 mm", "301 mm"]),
+        ("1..0:-0.5 mm,2 cm", ["1.0 mm", "0.5 mm", "0.0 mm", "2 cm"]),
     ],
 )
 def test_values_are_lists_and_inclusive_ranges(text: str, expected: list[object]) -> None:
@@ -108,6 +110,8 @@ def test_draws_are_of_all_values_and_repeatable() -> None:
         ("1..3,2..4", 4, None, [1, 2, 3]),
         ("a,b,c", "c", None, ["a", "b"]),
         ("a,b,c", "a", "b", []),
+        ("290..310:5 mm", "305 mm", None, ["290 mm", "295 mm", "300 mm"]),
+        ("290..310:5 mm", "295 mm", "310 mm", ["310 mm", "305 mm", "300 mm"]),
     ],
 )
 def test_simpler_values_are_nearer_to_the_cells_own(text, value, origin, expected) -> None:

@@ -1,0 +1,38 @@
+"""Settings and words of drives in engineering units: for the table of parameters, and for help."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from multidrop.dialects.units import Takes
+
+if TYPE_CHECKING:
+    from multidrop.drives.drive import Drive
+    from multidrop.shell.units import Units
+
+
+def taken(drive: Drive, name: str) -> tuple[str, Takes] | None:
+    """What a setting or a word of a drive takes: its axis, and how that counts; None: no quantity."""
+    units = drive.family.units
+    if units.setting is not None:
+        return units.setting(drive.state, name)
+    line = drive.family.assign(name, "1")
+    fields = units.fields(drive.state, line) if line is not None else ()
+    return (fields[0].axis, fields[0].takes) if fields else None
+
+
+def shown(units: Units, drive: Drive, name: str, value: object) -> str:
+    """` (50 mm/s)`, to follow the value of a setting; empty where it has none in units."""
+    found = taken(drive, name) if isinstance(value, int | float) else None
+    return "" if found is None else units.words(drive, found[0], float(str(value)), found[1])
+
+
+def example(units: Units, drive: Drive, name: str) -> str:
+    """What a word takes, for a person: `a velocity without sign, as in {12.5 mm/s}; 1 mm/s is 10240`; else empty."""
+    found = taken(drive, name)
+    axis = units.of(drive, found[0]) if found is not None else None
+    if found is None or axis is None or axis.measure is None or not axis.measure.counts(found[1]):
+        return ""
+    takes = Takes.DISTANCE if found[1] is Takes.PLACE else found[1]
+    unit, one = axis.measure.unit_for(takes), f"{abs(1 / axis.measure.value(1, takes)):.6g}"
+    return f"{found[1].value}, as in {{12.5 {unit}}}; 1 {unit} is {one} ({axis.scale}){'' if axis.sure else '?'}"

@@ -1,0 +1,106 @@
+"""The numbers of an axis as they are shown: in engineering units where it has a scale, else as the drive counts.
+
+Each number in units has the form that can be typed back, between braces: `12.50000 mm`. It has a fixed number of
+decimals, as many as one count needs, so that nothing jumps while it changes.
+"""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from math import ceil, log10
+from typing import TYPE_CHECKING, NamedTuple
+
+from multidrop.dialects.units import Takes
+from multidrop.tui.text import digits
+
+if TYPE_CHECKING:
+    from multidrop.dialects.units import Measure
+    from multidrop.shell.units import Axis
+
+UNSURE = "?"
+"""The sign of a scale that could not be confirmed since a program began to run."""
+COARSER = 2
+"""Decimals that a velocity has less than a position."""
+
+
+class Conversion(NamedTuple):
+    """Numbers of a drive to units: `value = gain * number + zero`."""
+
+    gain: float = 1.0
+    zero: float = 0.0
+
+    def value(self, number: float) -> float:
+        return self.gain * number + self.zero
+
+
+class Figures(NamedTuple):
+    """The figures of one axis. Without a unit they are the drive's own numbers."""
+
+    unit: str = ""
+    speed_unit: str = ""
+    places: Conversion = Conversion()
+    speeds: Conversion = Conversion()
+    decimals: int = 0
+    sign: str = ""
+    """`?` after each unit while the scale is not confirmed."""
+    travel: tuple[int, int] | None = None
+    """The travel of the axis, counts; None: not stated, or positions do not count."""
+
+    def number(self, counts: int) -> str:
+        """A position without its unit."""
+        return _fixed(self.places.value(counts), self.decimals) if self.unit else digits(counts)
+
+    def place(self, counts: int | None) -> str:
+        """`12.50000 mm`, or `128000`; `–` if it is not known."""
+        return digits(counts) if counts is None or not self.unit else f"{self.number(counts)} {self.unit}{self.sign}"
+
+    def distance(self, counts: int) -> str:
+        """The same with its sign: `+0.50000 mm`."""
+        if not self.unit:
+            return f"{counts:+}"
+        return f"{_fixed(self.places.gain * counts, self.decimals, '+')} {self.unit}{self.sign}"
+
+    def rate(self, native: int) -> str:
+        """A velocity without its unit."""
+        value = self.speeds.value(native)
+        return _fixed(value, max(0, self.decimals - COARSER)) if self.speed_unit else digits(native)
+
+    def speed(self, native: int | None) -> str:
+        """`50.000 mm/s`, or `512000`."""
+        if native is None or not self.speed_unit:
+            return digits(native)
+        return f"{self.rate(native)} {self.speed_unit}{self.sign}"
+
+
+NATIVE = Figures()
+
+
+def figures_of(axis: Axis | None, referenced: bool) -> Figures:
+    """The figures of an axis: its drive's own numbers where it has no scale, or one of which the basis is not known.
+
+    `referenced`: its places count.
+    """
+    if axis is None or axis.measure is None:
+        return NATIVE
+    return _figures(axis.measure, axis.sure, referenced)
+
+
+@lru_cache(maxsize=256)
+def _figures(measure: Measure, sure: bool, referenced: bool) -> Figures:
+    gain, travel, zero = measure.value(1, Takes.DISTANCE), measure.scale.travel, measure.scale.zero
+    rated = measure.counts(Takes.VELOCITY)
+    ends = sorted(round((end - zero) / measure.count) for end in travel) if travel is not None and referenced else None
+    return Figures(
+        unit=measure.unit,
+        speed_unit=measure.unit_for(Takes.VELOCITY) if rated else "",
+        places=Conversion(gain, measure.value(0)),
+        speeds=Conversion(measure.value(1, Takes.VELOCITY)) if rated else Conversion(),
+        decimals=max(0, ceil(-log10(abs(gain)))),
+        sign="" if sure else UNSURE,
+        travel=None if ends is None else (ends[0], ends[1]),
+    )
+
+
+def _fixed(value: float, decimals: int, sign: str = "-") -> str:
+    """A number with its decimals; 0 has no minus."""
+    return f"{round(value, decimals) + 0.0:{sign}.{decimals}f}"
