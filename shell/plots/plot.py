@@ -98,13 +98,13 @@ class Plot:
     def label(self, bus: str, address: str, label: str) -> None:
         self._batch.labels[bus, address] = label
 
-    def sample(self, bus: str, sample: Sample, units: Iterable[tuple[str, float]] = ()) -> None:
-        """Take a sample; `units`: what it is in the units of its axis, each with its word."""
+    def sample(self, bus: str, sample: Sample, units: Iterable[tuple[str, float, str]] = ()) -> None:
+        """Take a sample; `units`: its quantities with their values and units where its axis has a scale."""
         if not self._done:
             self.samples += 1
             drive = (bus, sample.address, sample.axis)
-            for word, value in (("position", sample.position), ("velocity", sample.velocity), *units):
-                self._point(Curve(*drive, word), sample.at, value)
+            for word, value, unit in (("position", sample.position, ""), ("velocity", sample.velocity, ""), *units):
+                self._point(Curve(*drive, word, unit=unit), sample.at, value)
 
     def value(self, bus: str, read: Valued) -> None:
         if not self._done:
@@ -317,8 +317,8 @@ def _take(workspace: Session, plot: Plot, wanted: set[Series], buses: set[str], 
             plot.text(bus, "", inner.at, text, "reply")
 
 
-def _in_units(workspace: Session, bus: str, sample: Sample) -> Iterator[tuple[str, float]]:
-    """`position_mm` and `velocity_mm_per_s` of a sample; nothing of an axis without a scale."""
+def _in_units(workspace: Session, bus: str, sample: Sample) -> Iterator[tuple[str, float, str]]:
+    """Position and velocity of a sample in units; nothing of an axis without a scale."""
     drive = workspace.buses[bus].drives.get(sample.address)
     for word, number, takes in (
         ("position", sample.position, Takes.PLACE),
@@ -326,7 +326,7 @@ def _in_units(workspace: Session, bus: str, sample: Sample) -> Iterator[tuple[st
     ):
         given = workspace.units.given(drive, sample.axis, number, takes) if drive is not None else None
         if given is not None:
-            yield f"{word}_{given[1].rstrip('?').replace('/', '_per_')}", given[0]
+            yield word, given[0], given[1].rstrip("?")
 
 
 def _polls(telemetry: Telemetry, series: Sequence[Series], period: float) -> Iterator[Callable[[], None]]:

@@ -149,10 +149,21 @@ class Curve(NamedTuple):
     axis: str
     word: str
     twin: bool = False
+    unit: str = ""
+    """The unit of a curve beside that of what the drive counts."""
+
+    @property
+    def name(self) -> str:
+        """`position`, or `position_mm`, `velocity_mm_per_s`."""
+        return f"{self.word}_{self.unit.replace('/', '_per_')}" if self.unit else self.word
+
+    @property
+    def shown_unit(self) -> str:
+        return self.unit or UNITS.get(self.word, "")
 
     @property
     def place(self) -> tuple[str, ...]:
-        return (*self[:3], *(TWIN,) * self.twin, self.word)
+        return (*self[:3], *(TWIN,) * self.twin, self.name)
 
     @property
     def drive(self) -> tuple[str, ...]:
@@ -326,7 +337,7 @@ class Sink:
             path = entity_path(self._rr, *curve.place)
             if path not in self._paths:
                 new.add(path)
-                unit = f"({UNITS[curve.word]})" if curve.word in UNITS else ""
+                unit = f"({curve.shown_unit})" if curve.shown_unit else ""
                 named = self._names.get(entity_path(self._rr, *curve[:2]), " ".join(curve.drive[:2]))
                 predicted = curve.twin and curve.word != DIFFERENCE
                 name = " ".join((named, curve.axis, TWIN if predicted else "", curve.word, unit))

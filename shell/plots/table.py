@@ -20,7 +20,7 @@ from multidrop.dialects import Diagnostic
 from multidrop.dialects.text import visible
 from multidrop.shell.plots.file import GAP, SinkBroken, disk_full, synced, take_lock
 from multidrop.shell.plots.request import PlotTarget
-from multidrop.shell.plots.rerun_calls import TWIN, UNITS, Batch
+from multidrop.shell.plots.rerun_calls import TWIN, Batch
 
 COLUMNS = ("time", "elapsed", "bus", "drive", "axis", "name", "value", "unit", "text")
 """Time of day (UTC); seconds since the plot began; a quantity with its value and unit, or a state or a line with its
@@ -111,10 +111,10 @@ class TableSink:
 def _rows(batch: Batch) -> Iterator[tuple[Any, ...]]:
     """The rows of a batch, after the two times of each."""
     for curve, points in batch.curves.items():
-        name = f"{TWIN} {curve.word}" if curve.twin else curve.word
+        name = f"{TWIN} {curve.name}" if curve.twin else curve.name
         for elapsed, wall, value in points:
             shown = int(value) if value.is_integer() else value
-            yield elapsed, wall, curve.bus, curve.address, curve.axis, name, shown, UNITS.get(curve.word, ""), ""
+            yield elapsed, wall, curve.bus, curve.address, curve.axis, name, shown, curve.shown_unit, ""
     for state, changes in batch.states.items():
         for elapsed, wall, text in changes:
             yield elapsed, wall, state.bus, state.address, state.axis, state.name, "", "", text

@@ -19,7 +19,6 @@ from multidrop.dialects.tmcl.manual import program_file
 from multidrop.dialects.tmcl.manual.commands import Axis, Global
 from multidrop.dialects.tmcl.manual.instructions import spelled
 from multidrop.dialects.tmcl.manual.modules import (
-    AXIS,
     BAUDS,
     GLOBAL,
     MODULES,
@@ -77,7 +76,7 @@ def read_drive(table: Table, folder: Folder) -> DriveSpec:
     settings = read_settings(table.table("set", "set"), partial(_check_setting, module))
     names = _names(module)
     scales = read_units(table, names if module.motors > 1 else ("",))
-    motors = {name: _motor(settings, name, scales.get(name if module.motors > 1 else "")) for name in names}
+    motors = {name: _motor(module, settings, name, scales.get(name if module.motors > 1 else "")) for name in names}
     surroundings = table.table("world", "[bus.drive.world]")
     world, *further = read_worlds(surroundings, motors, WORLD_KEYS, inputs_of(module), COUNTS)
     variables = table.table("variables", "[bus.drive.variables]")
@@ -101,10 +100,10 @@ def read_drive(table: Table, folder: Folder) -> DriveSpec:
     )
 
 
-def _motor(settings: Mapping[str, Setting], name: str, scale: Scale | None) -> Motor:
+def _motor(module: Module, settings: Mapping[str, Setting], name: str, scale: Scale | None) -> Motor:
     """A count is a microstep. A step of the world is 1/256 of a full step."""
     word = f"{int(Axis.MICROSTEPS)}"
-    power = settings.get(word if name == "0" else f"{word}_{name}", AXIS[Axis.MICROSTEPS].fresh)
+    power = settings.get(word if name == "0" else f"{word}_{name}", module.axis[Axis.MICROSTEPS].fresh)
     full_steps = (scale.full_steps if scale is not None else None) or FULL_STEPS
     return Motor(scale, Fraction(full_steps * FULL), Fraction(FULL, 2 ** int(str(power))))
 
