@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from datetime import datetime
 from functools import partial
 
@@ -98,13 +98,17 @@ class Plot:
     def label(self, bus: str, address: str, label: str) -> None:
         self._batch.labels[bus, address] = label
 
-    def sample(self, bus: str, sample: Sample, units: Iterable[tuple[str, float, str]] = ()) -> None:
-        """Take a sample; `units`: its quantities with their values and units where its axis has a scale."""
+    def sample(self, bus: str, sample: Sample) -> None:
         if not self._done:
             self.samples += 1
             drive = (bus, sample.address, sample.axis)
-            for word, value, unit in (("position", sample.position, ""), ("velocity", sample.velocity, ""), *units):
-                self._point(Curve(*drive, word, unit=unit), sample.at, value)
+            self._point(Curve(*drive, "position"), sample.at, sample.position)
+            self._point(Curve(*drive, "velocity"), sample.at, sample.velocity)
+
+    def in_units(self, bus: str, sample: Sample, word: str, value: float, unit: str) -> None:
+        """Take a quantity of a sample in the unit of its axis, too."""
+        if not self._done:
+            self._point(Curve(bus, sample.address, sample.axis, word, unit=unit), sample.at, value)
 
     def value(self, bus: str, read: Valued) -> None:
         if not self._done:
@@ -303,7 +307,9 @@ def _take(workspace: Session, plot: Plot, wanted: set[Series], buses: set[str], 
     if isinstance(inner, TwinEvent):
         return _twin(plot, wanted, bus, inner)
     if isinstance(inner, Sample) and Series(bus, inner.address) in wanted:
-        plot.sample(bus, inner, _in_units(workspace, bus, inner) if workspace.scaled else ())
+        plot.sample(bus, inner)
+        for quantity in _in_units(workspace, bus, inner) if workspace.scaled else ():
+            plot.in_units(bus, inner, *quantity)
     elif isinstance(inner, Valued) and Series(bus, inner.address, inner.word) in wanted:
         plot.value(bus, inner)
     elif isinstance(inner, Conditioned) and Series(bus, inner.address) in wanted:

@@ -169,6 +169,9 @@ class Motor:
     missing: str = ""
 
 
+UNSCALED = Motor(None, None, Fraction(1))
+
+
 def _in_steps(table: Table, motor: Motor) -> Table:
     """Convert positions with a unit (`"301 mm"`) to motor steps from the world's origin, by the scale without zero."""
     values, given = dict(table.values), motor.scale
@@ -193,7 +196,7 @@ def _in_steps(table: Table, motor: Motor) -> Table:
     return table.with_values(values)
 
 
-def read_world(table: Table, inputs: Sequence[int], counts: int, motor: Motor) -> WorldSpec:
+def read_world(table: Table, inputs: Sequence[int], counts: int, motor: Motor = UNSCALED) -> WorldSpec:
     """Read the surroundings of one axis of a drive with these inputs and an analog input up to `counts`."""
     table = _in_steps(table, motor)
     changes = table.rows("inputs", (("seconds", 0, 1e9), ("input", min(inputs), max(inputs)), ("level", 0, 1)))
@@ -221,10 +224,14 @@ def read_world(table: Table, inputs: Sequence[int], counts: int, motor: Motor) -
 
 
 def read_worlds(
-    table: Table, motors: Mapping[str, Motor], keys: Sequence[str], inputs: Sequence[int], counts: int
+    table: Table,
+    axes: Sequence[str],
+    keys: Sequence[str],
+    inputs: Sequence[int],
+    counts: int,
+    motors: Mapping[str, Motor] = MappingProxyType({}),
 ) -> tuple[WorldSpec, ...]:
     """Read the surroundings of each axis from a table of its own; keys without an axis belong to the first axis."""
-    axes = tuple(motors)
     table.only(*keys, *axes)
     parts = [table.table(axis, f"[bus.drive.world.{axis}]") for axis in axes]
     for part in parts:
@@ -234,5 +241,5 @@ def read_worlds(
         if key in first.values and key in table.values:
             raise first.wrong(key, "is given twice", f"keys without an axis belong to {axes[0]}")
     both = table.merged(first)
-    pairs = zip((both, *parts[1:]), motors.values(), strict=True)
-    return tuple(read_world(part, inputs, counts, motor) for part, motor in pairs)
+    pairs = zip((both, *parts[1:]), axes, strict=True)
+    return tuple(read_world(part, inputs, counts, motors.get(axis, UNSCALED)) for part, axis in pairs)

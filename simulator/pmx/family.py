@@ -58,7 +58,7 @@ def read_drive(table: Table, folder: Folder) -> DriveSpec:
     settings = read_settings(table.table("set", "set"), _check_setting)
     scales = read_units(table, NAMES_OF_AXES)
     motors = {axis: _motor(settings, axis.upper(), scales.get(axis)) for axis in NAMES_OF_AXES}
-    x, y = read_worlds(world, motors, (*WORLD_KEYS, *ENCODER_KEYS), INPUTS, COUNTS)
+    x, y = read_worlds(world, NAMES_OF_AXES, (*WORLD_KEYS, *ENCODER_KEYS), INPUTS, COUNTS, motors)
     variables = table.table("variables", "[bus.drive.variables]")
     identity = table.table("identity", "[bus.drive.identity]")
     return DriveSpec(

@@ -78,7 +78,7 @@ def read_drive(table: Table, folder: Folder) -> DriveSpec:
     scales = read_units(table, names if module.motors > 1 else ("",))
     motors = {name: _motor(module, settings, name, scales.get(name if module.motors > 1 else "")) for name in names}
     surroundings = table.table("world", "[bus.drive.world]")
-    world, *further = read_worlds(surroundings, motors, WORLD_KEYS, inputs_of(module), COUNTS)
+    world, *further = read_worlds(surroundings, names, WORLD_KEYS, inputs_of(module), COUNTS, motors)
     variables = table.table("variables", "[bus.drive.variables]")
     rows = table.table("identity", "[bus.drive.identity]")
     identity = read_identity(rows, ("version",), {"position": module.motors})

@@ -99,6 +99,7 @@ class Session:
         self.buses = {"press": Bus(), "eth": Bus()}
         self.callbacks: list[Callable[[SessionEvent], None]] = []
         self.narrated: list[str] = []
+        self.scaled = False
 
     def subscribe(self, callback: Callable[[SessionEvent], None]) -> Callable[[], None]:
         self.callbacks.append(callback)

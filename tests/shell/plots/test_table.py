@@ -19,12 +19,14 @@ from multidrop.shell.plots.table import COLUMNS
 ENDINGS = ["csv", "parquet"]
 
 
-async def plotted(path: Path, position: int = 7) -> str:
+async def plotted(path: Path, position: int = 7, *, units: bool = False) -> str:
     clock, wall = (lambda: 0.0), (lambda at: datetime.fromtimestamp(1.8e9 + at, UTC))
     plot = await Plot.open(PlotTarget(file=path), clock=clock, wall=wall)
     plot.state("press", "a", "", "program", 0.25, "G1")
     plot.value("press", Valued(0.5, "b", "I1", 1.5))
     plot.sample("pmx", Sample(1.0, "00", position, -2, "x"))
+    if units:
+        plot.in_units("pmx", Sample(1.0, "00", position, -2, "x"), "velocity", -0.8, "um/s")
     plot.text("press", "a", 2.0, 'PR "x",\nP', "command")
     return await plot.close()
 
@@ -56,6 +58,12 @@ async def test_each_value_state_and_line_is_a_row(ending: str, tmp_path: Path) -
     assert [row["unit"] for row in found] == ["", "", "steps", "steps/s", ""]
     assert [found[0]["text"], found[4]["text"]] == ["G1", r'a: PR "x",\x0aP']
     assert str(found[1]["time"]).replace(" ", "T").startswith("2027-01-15T08:00:00.5")
+
+
+async def test_a_quantity_in_units_is_a_row_with_its_unit(tmp_path: Path) -> None:
+    await plotted(tmp_path / "run.csv", units=True)
+    named = {row["name"]: (row["value"], row["unit"]) for row in rows(tmp_path / "run.csv")}
+    assert (named["velocity"], named["velocity_um_per_s"]) == (("-2", "steps/s"), ("-0.8", "um/s"))
 
 
 @pytest.mark.parametrize("ending", ENDINGS)

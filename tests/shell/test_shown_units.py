@@ -1,0 +1,177 @@
+"""What a session shows and hands on in units: status, help, settings, snapshots, samples, MQTT, recordings."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from multidrop.api.telemetry import AsyncTelemetry
+from multidrop.drives.events import Sample
+from multidrop.shell import setting_units, snapshots
+from multidrop.shell.events import Output
+from multidrop.shell.plots.plot import attach
+from multidrop.shell.roles import Series
+from multidrop.shell.waits import standings
+from multidrop.simulator import cells
+from tests.shell.publishing.test_publish_feed import published
+from tests.support.cases import for_each
+from tests.support.cell_session import CellSession, bus, drive, party, pmx
+
+pytestmark = pytest.mark.virtual
+PRESS = bus("press", party("a", 'units = "5 mm/turn"'), party("b"))
+
+
+async def output(shop: CellSession, line: str) -> list[str]:
+    shop.events.clear()
+    await shop.session.run(line)
+    return [each.text for each in shop.events if isinstance(each, Output)]
+
+
+async def test_status_ends_with_the_place_in_units_unless_they_are_off(tmp_path: Path) -> None:
+    async with CellSession(tmp_path, PRESS) as shop:
+        await shop.session.run("@a MR {12.5 mm}")
+        await shop.session.run("/wait stopped")
+        assert (await output(shop, "/status a"))[-1] == "in units: 12.5 mm, 0 mm/s"
+        assert not any("units" in each for each in await output(shop, "/status b"))
+        await shop.session.run("/units off")
+        assert not any("units" in each for each in await output(shop, "/status a"))
+
+
+async def test_each_axis_of_a_controller_has_its_line(tmp_path: Path) -> None:
+    units = 'units = { x = "0.4 um/step", y = { scale = "-0.1 deg/step", zero = "90 deg" } }'
+    async with CellSession(tmp_path, bus("stage", pmx("00", units))) as shop:
+        await shop.session.run("ABS")
+        await shop.session.run("X1000")
+        await shop.session.run("/wait stopped")
+        assert (await output(shop, "/status"))[-2:] == [
+            "x in units: 0.4 mm".replace("0.4 mm", "400 um, 0 um/s"),
+            "y in units: 90 deg, 0 deg/s",
+        ]
+
+
+async def test_an_unsure_scale_carries_its_sign(tmp_path: Path) -> None:
+    program = 'program_text = """PG 1\nLB G1\nH 60000\nE\nPG\n"""'
+    async with CellSession(tmp_path, bus("press", party("a", 'units = "5 mm/turn"', program))) as shop:
+        await shop.session.run("EX G1")
+        assert (await output(shop, "/status a"))[-1] == "in units: 0 mm?, 0 mm/s?"
+
+
+@for_each(
+    ["word", "expected"],
+    [
+        ("VM", "  units      a velocity without sign, as in {12.5 mm/s}; 1 mm/s is 10240 (5 mm/turn)"),
+        ("MA", "  units      a position, as in {12.5 mm}; 1 mm is 10240 (5 mm/turn)"),
+        ("A", "  units      an acceleration without sign, as in {12.5 mm/s2}; 1 mm/s2 is 10240 (5 mm/turn)"),
+    ],
+)
+async def test_help_says_what_a_word_takes_in_units(word: str, expected: str, tmp_path: Path) -> None:
+    async with CellSession(tmp_path, PRESS) as shop:
+        assert (await output(shop, f"/help {word}"))[-1] == expected
+        assert "units  " not in (await output(shop, "/help PR"))[-1]
+
+
+@for_each(
+    ["personality", "scale", "name", "value", "expected"],
+    [
+        ("LMDCM", "5 mm/turn", "VM", 512000, " (50 mm/s)"),
+        ("LMDCM", "5 mm/turn", "A", 1024000, " (100 mm/s2)"),
+        ("LMDCM", "5 mm/turn", "RC", 25, ""),
+        ("LMDCM", "5 mm/turn", "DN", "a", ""),
+        ("PMX", "0.4 um/step", "HSPDX", 25000, " (10000 um/s)"),
+        ("PMX", "0.4 um/step", "SLRX", 2, ""),
+        ("TMCM-1241", "5 mm/turn", "4", 51200, " (5 mm/s)"),
+        ("TMCM-1241", "5 mm/turn", "6", 128, ""),
+    ],
+)
+async def test_settings_are_shown_in_units(
+    personality: str, scale: str, name: str, value: object, expected: str, tmp_path: Path
+) -> None:
+    named = {"LMDCM": "a", "PMX": "00"}.get(personality, "1")
+    cell = bus("press", drive(personality, named, f'units = "{scale}"', party=personality == "LMDCM"))
+    async with CellSession(tmp_path, cell) as shop:
+        (found,) = shop.session.buses["press"].drives.values()
+        assert setting_units.shown(shop.session.units, found, name, value) == expected
+
+
+async def test_a_snapshot_keeps_the_scales_of_the_session(tmp_path: Path) -> None:
+    given = 'units = { scale = "-5 mm/turn", zero = "120 mm", travel = "0..300 mm" }'
+    async with CellSession(tmp_path, bus("press", party("a", given), party("b"))) as shop:
+        await shop.session.run("/units b 360 deg/turn")
+        await snapshots.save(shop.session, str(tmp_path / "kept.toml"), shop.session.units.scales)
+    before = cells.load(tmp_path / "cell.toml").buses[0].drives
+    kept = cells.load(tmp_path / "kept.toml").buses[0].drives
+    assert dict(kept[0].units) == dict(before[0].units) and str(kept[1].units[""]) == "360 deg/turn"
+
+
+async def test_where_a_drive_stands_has_its_place_in_units(tmp_path: Path) -> None:
+    async with CellSession(tmp_path, PRESS) as shop:
+        drives = list(shop.session.buses["press"].drives.values())
+        await shop.session.run("@a MR {10 mm}")
+        await shop.session.run("/wait stopped")
+        one, other = await standings(shop.session, drives, shop.session.units)
+        assert (one.text, other.text) == ("a stands at 102400 (10 mm)", "b stands at 0")
+        assert one.fact == {"position": 102400, "velocity": 0, "quantity": 10.0, "unit": "mm"}
+        assert other.fact == {"position": 0, "velocity": 0}
+
+
+async def test_published_values_have_the_unit_as_a_further_field(tmp_path: Path) -> None:
+    async with CellSession(tmp_path, PRESS) as shop:
+        await shop.session.run("@a MR {10 mm}")
+        await shop.session.run("/wait stopped")
+        async with published(shop) as broker:
+            await asyncio.sleep(6)
+        last: dict[str, Any] = json.loads(broker.texts("p/press/a/position")[-1])
+        assert {key: last[key] for key in ("value", "quantity", "unit")} == {
+            "value": 102400,
+            "quantity": 10.0,
+            "unit": "mm",
+        }
+        assert json.loads(broker.texts("p/press/a/velocity")[-1])["unit"] == "mm/s"
+        assert set(json.loads(broker.texts("p/press/b/position")[-1])) == {"time", "value"}
+
+
+class Kept:
+    """A plot that keeps quantities in units."""
+
+    def __init__(self) -> None:
+        self.samples: set[str] = set()
+        self.units: set[tuple[str, str, float, str]] = set()
+
+    def __getattr__(self, name: str) -> Any:
+        return lambda *values: None
+
+    def sample(self, bus: str, sample: Sample) -> None:
+        self.samples.add(sample.address)
+
+    def in_units(self, bus: str, sample: Sample, word: str, value: float, unit: str) -> None:
+        self.units.add((sample.address, word, value, unit))
+
+
+async def test_a_recording_has_curves_in_units_beside_those_in_steps(tmp_path: Path) -> None:
+    plot: Any = Kept()
+    async with CellSession(tmp_path, PRESS) as shop:
+        await shop.session.run("@a MR {10 mm}")
+        await shop.session.run("/wait stopped")
+        detach = attach(shop.session, plot, [Series("press", "a"), Series("press", "b")], 0.5)
+        await asyncio.sleep(2)
+        detach()
+    assert plot.samples == {"a", "b"}
+    assert plot.units == {("a", "position", 10.0, "mm"), ("a", "velocity", 0.0, "mm/s")}
+
+
+async def test_samples_of_the_api_have_the_unit_as_a_further_field(tmp_path: Path) -> None:
+    async with CellSession(tmp_path, PRESS) as shop:
+        await shop.session.run("@a MR {10 mm}")
+        await shop.session.run("/wait stopped")
+        async with AsyncTelemetry(shop.session, list(shop.session.buses["press"].drives.values()), 10.0) as telemetry:
+            await asyncio.sleep(1)
+            samples = await telemetry.samples()
+    last, other = samples.of("a")[-1], samples.of("b")
+    assert (last.position, last.velocity, last.unit, last.place, last.speed) == (102400, 0, "mm", 10.0, 0.0)
+    assert (other[-1].unit, other[-1].place) == ("", None)
+    assert list(samples.arrays())[-3:] == ["unit", "place", "speed"]
+    assert "unit" not in other.arrays()
