@@ -86,6 +86,7 @@ MACHINES = {
     "MDIE": [bus("a", mcode("MDIE", OLDER.replace("VM = 100000", "EE = 1, VM = 40000")), baud=0)],
     "MDIX": [bus("a", mcode("MDIX", OLDER), baud=0)],
     "PMX": [bus("stages", pmx("00") + STAGES, pmx("07") + "\n" + RAW)],
+    "PMX on USB": [bus("first", pmx("00") + STAGES), bus("second", pmx("07") + "\n" + RAW)],
     "TMCM": [
         bus("t", tmcl("1", "set = { 4 = 40000, G75 = 5 }"), tmcl("7", "[bus.drive.identity]\nposition = -512"), baud=0)
     ],
@@ -117,7 +118,7 @@ async def taken(folder: Path, url: str, name: str) -> tuple[str, list[str]]:
 @pytest.mark.slow
 @pytest.mark.parametrize("machine", MACHINES)
 async def test_a_snapshot_opened_and_taken_again_gives_the_same_file(tmp_path, machine):
-    async with CellSession(tmp_path, *MACHINES[machine]) as cell:
+    async with CellSession(tmp_path, *MACHINES[machine], usb="USB" in machine) as cell:
         await snapshots.save(cell.session, str(tmp_path / "one.toml"))
     first = (tmp_path / "one.toml").read_text()
     again, _ = await taken(tmp_path, f"sim:{tmp_path / 'one.toml'}", "two.toml")

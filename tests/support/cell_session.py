@@ -4,16 +4,22 @@ from __future__ import annotations
 
 import json
 from collections.abc import AsyncIterator, Mapping, Sequence
-from contextlib import asynccontextmanager
+from contextlib import ExitStack, asynccontextmanager
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
+from unittest import mock
 
 from multidrop.dialects.units import scale
 from multidrop.drives.events import Traffic
 from multidrop.shell.configuration import Guarding, SavedConnection, Settings
 from multidrop.shell.events import Failed, Notified, OnBus, Output, Printed
 from multidrop.shell.session import Session
+from multidrop.simulator.cells import load
+from multidrop.simulator.floor import Floor
+from multidrop.simulator.serving.running import RunningFloor
+from multidrop.transports import libusb
+from tests.support.usb_stand_in import Plugged, Sockets
 
 
 def bus(name: str, *drives: str, baud: int = 9600, serve: Sequence[str] = ()) -> str:
@@ -72,10 +78,17 @@ async def session_on(folder: Path, cell: str, *, opened: bool = True, agreed: bo
         await session.close()
 
 
+def _on_usb(path: Path) -> dict[str, SavedConnection]:
+    """A saved connection for the first controller of each bus."""
+    buses = enumerate(load(path).buses, 1)
+    return {bus.name: SavedConnection(bus.name, f"usb:2ED{bus.drives[0].name}@1-{n}") for n, bus in buses}
+
+
 class CellSession:
     """`async with`: the session of a cell, open, and what it told. `bus:name` names a drive of the cell.
 
-    It agrees to every question. `units`: the scales of a saved connection; `guards`: those that are off.
+    It agrees to every question. `units`: the scales of a saved connection; `guards`: those that are off. `usb`: the cell
+    is of controllers; the first of each bus is on the USB of this machine, under the name of its bus.
     """
 
     def __init__(
@@ -86,10 +99,12 @@ class CellSession:
         units: Mapping[str, Any] = MappingProxyType({}),
         own: tuple[str, ...] = (),
         guards: Sequence[str] = (),
+        usb: bool = False,
     ) -> None:
         (folder / "cell.toml").write_text("".join(buses))
-        self.url = f"sim:{folder / 'cell.toml'}"
-        saved: dict[str, SavedConnection] = {}
+        self.path, self.usb = folder / "cell.toml", usb
+        self.url = f"sim:{self.path}"
+        saved = _on_usb(self.path) if usb else {}
         if units:
             scales = {axis: scale(found, own) for axis, found in units.items()}
             saved, self.url = {"saved": SavedConnection("saved", self.url, {}, scales)}, "saved"
@@ -97,21 +112,34 @@ class CellSession:
         settings = Settings(saved, folder / "config", folder / "state", off, own_units=own)
         self.session = Session(settings, reconnect=reconnect)
         self.session.questions.agreed = True
+        self._open = ExitStack()
         self.events: list[Any] = []
         self.session.subscribe(self.events.append)
 
     async def __aenter__(self) -> CellSession:
-        await self.session.open(self.url)
+        if self.usb:
+            self._running = RunningFloor(Floor(load(self.path)))
+            self._open.callback(self._running.close)
+            sides = [(name, self._running.floor.usb(name)[0]) for name in self.session.settings.connections]
+            plugged = [Plugged(self._running, name, side, f"1-{n}") for n, (name, side) in enumerate(sides, 1)]
+            self._open.enter_context(mock.patch.object(libusb, "LibusbCarrier", Sockets(*plugged)))
+        for url in self.session.settings.connections if self.usb else [self.url]:
+            await self.session.open(url)
         self.events.clear()
         return self
 
     async def __aexit__(self, *_: object) -> None:
         await self.session.close()
+        self._open.close()
 
     @property
     def floor(self) -> Any:
         """The simulated cell, which runs."""
-        return next(iter(self.session.cells.values()))
+        return self._running if self.usb else next(iter(self.session.cells.values()))
+
+    def address(self, number: str) -> str:
+        """The address of a controller: none on USB."""
+        return "" if self.usb else number
 
     def moving(self) -> set[str]:
         """Which drives move, in the simulator."""

@@ -11,9 +11,9 @@ FILE = "VA Q1=7   ' times\n' the main program\nPG 1\nLB G1\n  MR 100  ' there\n 
 LISTED = ["1  LB G1", "6  MR 100", "10  H", "12  E"]
 
 
-def shop_with(folder: Path, text: str = FILE, *buses: str, reconnect: bool = False) -> CellSession:
+def shop_with(folder: Path, text: str = FILE, *buses: str, reconnect: bool = False, usb: bool = False) -> CellSession:
     (folder / "p.mxt").write_text(text)
-    return CellSession(folder, *(buses or (LINE,)), reconnect=reconnect)
+    return CellSession(folder, *(buses or (LINE,)), reconnect=reconnect, usb=usb)
 
 
 def kept(folder: Path) -> list[Path]:

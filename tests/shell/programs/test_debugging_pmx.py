@@ -33,9 +33,9 @@ END
 '''
 
 
-@pytest.fixture
-async def stage(tmp_path: Path):
-    async with CellSession(tmp_path, bus("stage", pmx("00") + PROGRAM)) as made:
+@pytest.fixture(params=[False, True], ids=["line", "usb"])
+async def stage(tmp_path: Path, request: pytest.FixtureRequest):
+    async with CellSession(tmp_path, bus("stage", pmx("00") + PROGRAM), usb=request.param) as made:
         yield made
 
 
@@ -60,7 +60,7 @@ async def test_break_now_pauses_and_continue_goes_on(stage: CellSession) -> None
 
 
 async def test_a_traced_program_that_is_paused_shows_where(stage: CellSession) -> None:
-    trace = asyncio.ensure_future(stage.session.run("/trace 00 1"))
+    trace = asyncio.ensure_future(stage.session.run(f"/trace {stage.address('00')} 1"))
     await asyncio.sleep(0.5)
     await stage.session.run("SR1=2")
     await trace

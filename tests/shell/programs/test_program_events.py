@@ -53,9 +53,10 @@ async def test_a_break_point_is_published_until_it_is_removed(it: CellSession) -
     assert [each.break_point for each in it.events if isinstance(each, ProgramSeen)] == [""]
 
 
-async def test_a_controller_publishes_its_statements(tmp_path: Path) -> None:
+@pytest.mark.parametrize("usb", [False, True])
+async def test_a_controller_publishes_its_statements(tmp_path: Path, usb: bool) -> None:
     (tmp_path / "a.prg").write_text("PRG 0\nV1=5\nX1000\nEND\n")
-    async with CellSession(tmp_path, bus("pmx", pmx("00"))) as it:
+    async with CellSession(tmp_path, bus("pmx", pmx("00")), usb=usb) as it:
         await run(it, f"/download {tmp_path / 'a.prg'}")
         read = [each for each in it.events if isinstance(each, ProgramRead)]
         assert {"V1=5", "X1000", "END"} <= {text.strip() for _, text in read[-1].lines}

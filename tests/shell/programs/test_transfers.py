@@ -176,22 +176,28 @@ async def test_a_held_program_that_runs_is_ended_before_it_is_executed_again(tmp
 PMX_FILE = "; ten times\nPRG 0\n  V1=1   ; from one\n  WHILE V1<1000\n    V1=V1*10\n  ENDWHILE\nEND\n"
 
 
-async def test_a_controller_has_the_same_options_as_far_as_its_words_go(tmp_path: Path) -> None:
-    async with shop_with(tmp_path, FILE, bus("pmx", pmx("07"), baud=0)) as shop:
+@pytest.mark.parametrize("usb", [False, True])
+async def test_a_controller_has_the_same_options_as_far_as_its_words_go(tmp_path: Path, usb: bool) -> None:
+    here, who = ("", "pmx") if usb else ("07", "07")
+    async with shop_with(tmp_path, FILE, bus("pmx", pmx("07"), baud=0), usb=usb) as shop:
         file = tmp_path / "p.prg"
         file.write_text(PMX_FILE)
-        await shop.session.run(f"/download {file} 07 --save --run 0")
-        assert "07: it keeps programs at once; --save sends nothing" in shop.told()
-        assert shop.told()[-1] == "07: started (SR0=1)" and any("verified, " in text for text in shop.told())
-        await shop.session.run(f"/download {file} 07 --only-changed")
+        await shop.session.run(f"/download {file} {here} --save --run 0")
+        assert f"{who}: it keeps programs at once; --save sends nothing" in shop.told()
+        assert shop.told()[-1] == f"{who}: started (SR0=1)" and any("verified, " in text for text in shop.told())
+        await shop.session.run(f"/download {file} {here} --only-changed")
         assert shop.told()[-1].endswith("already; nothing was sent")
-        await shop.session.run(f"/upload {tmp_path / 'up.prg'} 07")
+        await shop.session.run(f"/upload {tmp_path / 'up.prg'} {here}")
         assert (tmp_path / "up.prg").read_text() == PMX_FILE
         file.write_text("PRG 0\nWHILE 1=1\nV2=V2+1\nENDWHILE\nEND\n")
         with pytest.raises(Diagnostic, match=r"no program 1 in the file \(nothing was sent\); programs: 0"):
-            await shop.session.run(f"/download {file} 07 --run 1")
+            await shop.session.run(f"/download {file} {here} --run 1")
         for _ in range(2):
-            await shop.session.run(f"/download {file} 07 --run 0")
-        assert "07: its program ran and was ended" in shop.warned()
+            await shop.session.run(f"/download {file} {here} --run 0")
+        assert f"{who}: its program ran and was ended" in shop.warned()
         backup = kept(tmp_path)[-1].read_text()
-        assert backup.startswith("; multidrop backup of pmx, drive 07, ") and "\nSA0=" in backup and "V2 = " in backup
+        assert (
+            backup.startswith("; multidrop backup of pmx, " + ("drive 07, " if here else ""))
+            and "\nSA0=" in backup
+            and "V2 = " in backup
+        )

@@ -140,8 +140,9 @@ async def test_a_drive_that_moves_gets_no_twin(tmp_path: Path) -> None:
         assert cell.written("press") == b""
 
 
-async def test_both_axes_of_a_controller_have_a_twin(tmp_path: Path) -> None:
-    async with CellSession(tmp_path, bus("line", pmx("00"))) as cell:
+@pytest.mark.parametrize("usb", [False, True])
+async def test_both_axes_of_a_controller_have_a_twin(tmp_path: Path, usb: bool) -> None:
+    async with CellSession(tmp_path, bus("line", pmx("00")), usb=usb) as cell:
         await run(cell, "HSPD=20000", "LSPD=1000", "ACC=300", "EO=3", "/twin on")
         await run(cell, "X10000", "/sleep 1.5", "Y-2000", "/sleep 1.5")
         assert of(cell, Diverged) == []
