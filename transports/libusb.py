@@ -59,6 +59,8 @@ class LibusbCarrier:
         self._transfers: dict[int, Any] = {}
         """Transfers that have not ended, by number."""
         self._spare: list[Any] = []
+        self._stalled: set[int] = set()
+        """Endpoints that the controller has halted; closing ends that."""
         self._last = 0
         self._ending = False
         self._thread: threading.Thread | None = None
@@ -114,6 +116,8 @@ class LibusbCarrier:
         if self._thread is not None:
             self._thread.join(1.0)
         with contextlib.suppress(self._usb1.USBError):
+            for endpoint in self._stalled:
+                self._handle.clearHalt(endpoint)
             self._handle.controlWrite(REQUEST_TYPE, REQUEST, Control.CLOSE, 0, b"", ASKING)
         self._handle.close()
         self._opened.close()
@@ -141,6 +145,8 @@ class LibusbCarrier:
             usb1.TRANSFER_TIMED_OUT: TIMEOUT,
         }
         status = ends.get(transfer.getStatus(), OTHER)
+        if status == STALLED:
+            self._stalled |= {transfer.getEndpoint()} & {IN, OUT}
         incoming = transfer.getEndpoint() == IN and status == 0
         data = bytes(transfer.getBuffer()[: transfer.getActualLength()]) if incoming else b""
         with self._guard:

@@ -87,8 +87,8 @@ def _on_usb(path: Path) -> dict[str, SavedConnection]:
 class CellSession:
     """`async with`: the session of a cell, open, and what it told. `bus:name` names a drive of the cell.
 
-    It agrees to every question. `units`: the scales of a saved connection; `guards`: those that are off. `usb`: the cell
-    is of controllers; the first of each bus is on the USB of this machine, under the name of its bus.
+    It agrees to every question. `units`: the scales of a saved connection; `guards`: those that are off. `usb`: the
+    cell is of controllers; the first of each bus is on the USB of this machine, under the name of its bus.
     """
 
     def __init__(
