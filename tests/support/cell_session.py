@@ -6,6 +6,7 @@ import json
 from collections.abc import AsyncIterator, Mapping, Sequence
 from contextlib import ExitStack, asynccontextmanager
 from pathlib import Path
+from random import Random
 from types import MappingProxyType
 from typing import Any
 from unittest import mock
@@ -121,7 +122,8 @@ class CellSession:
             self._running = RunningFloor(Floor(load(self.path)))
             self._open.callback(self._running.close)
             sides = [(name, self._running.floor.usb(name)[0]) for name in self.session.settings.connections]
-            plugged = [Plugged(self._running, name, side, f"1-{n}") for n, (name, side) in enumerate(sides, 1)]
+            places = enumerate(sides, 1)
+            plugged = [Plugged(self._running, name, side, f"1-{n}", Random(n)) for n, (name, side) in places]
             self._open.enter_context(mock.patch.object(libusb, "LibusbCarrier", Sockets(*plugged)))
         for url in self.session.settings.connections if self.usb else [self.url]:
             await self.session.open(url)
