@@ -107,15 +107,13 @@ class UsbPipe(Pipe):
         """Stops that have gone first, of which the loop has not taken note."""
         self._urgent = False
         """A stop is written next."""
-        self._stale = True
-        """What comes belongs to an earlier session."""
         self._problem: OSError | None = None
         """A transfer could not begin: the device is gone."""
 
     # Opening
 
     async def open(self) -> None:
-        """Open the interface, flush it, and drop what is stale. Raises OSError, TransportLost."""
+        """Open the interface, flush it, and drop what comes until `start`. Raises OSError, TransportLost."""
         self._carrier.start(self._done, self._break)
         for value in (Control.OPEN, Control.FLUSH):
             number = self._carrier.control(value)
@@ -129,7 +127,6 @@ class UsbPipe(Pipe):
                 raise TransferFailed(status)
         self._receiving = self._carrier.receive()
         await asyncio.sleep(STALE + self._carrier.delay)
-        self._stale = False
         if self._broken is not None:
             raise self._broken
 
@@ -278,7 +275,7 @@ class UsbPipe(Pipe):
             if number == self._flushing:
                 self._flushing = 0
             elif number == self._receiving:
-                if not (self._flushing or self._stale):
+                if not self._flushing:
                     reply = data.partition(b"\0")[0]
                     self._owed = max(0, self._owed - bool(reply))
                 self._receiving = self._begin_transfer(self._carrier.receive)

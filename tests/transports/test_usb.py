@@ -128,8 +128,10 @@ async def test_commands_leave_whole_and_one_at_a_time(carrier: Played, size: int
     assert carrier.sent == ["PX", "V1=5"]
     carrier.end("V1=5")
     carrier.end("IN", 0, b"")  # a packet of no bytes is no reply
+    host.pipe.write(b"PY\r")
+    assert carrier.sent == ["PX", "V1=5"]
     carrier.end("IN", 0, b"OK\0 and what was in the block before")
-    assert host.heard == b"3\rOK\r" and host.pipe.pending == 0
+    assert host.heard == b"3\rOK\r" and host.pipe.pending == 0 and carrier.sent == ["PX", "V1=5", "PY"]
 
 
 async def test_with_its_reply_no_command_is_preceded_by_a_flush(carrier: Played) -> None:
