@@ -236,6 +236,11 @@ class Drive:
             self.starting -= 1
 
     async def _send(self, text: str, check: Check | None) -> tuple[str, ...]:
+        if "{" in text:
+            from multidrop.dialects.units import quantities
+
+            for match in quantities(text):
+                raise Inexpressible(f"{self.shown}: '{text}': {match[0]} is not converted here; nothing was sent")
         to_all = self.state.address in GLOBAL
         if to_all and not self.codec.broadcasts:
             drives = self._neighbours.all_drives

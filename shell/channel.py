@@ -209,7 +209,8 @@ class Questions:
         except Stopped:
             raise Stopped(f"{where}: not done, as a stop came before the answer".removeprefix(": ")) from None
         if not agreed:
-            raise Diagnostic("the answer was no, so it was not done", where, self._channel.front.beforehand)
+            beforehand = f"{way} agrees beforehand" if beyond and front.beforehand else front.beforehand
+            raise Diagnostic("the answer was no, so it was not done", where, beforehand)
         self._channel.notify(f"{question}: the answer was yes")
 
     async def agrees(self, what: str) -> bool:

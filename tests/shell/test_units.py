@@ -6,7 +6,7 @@ from contextlib import asynccontextmanager
 
 import pytest
 
-from multidrop.dialects import Diagnostic, DriveError, Refused, Stopped
+from multidrop.dialects import Diagnostic, DriveError, Inexpressible, Refused, Stopped
 from multidrop.dialects.errors import Differs
 from multidrop.macros import Macro, Step
 from multidrop.shell.events import By, Notified
@@ -146,6 +146,14 @@ async def test_everything_else_is_sent_as_it_is(tmp_path):
             written.append([each for each in shop.written("line").split(b"\n") if b"MS" not in each])
     plain, scaled = ([each for each in lines if b"EF" not in each] for lines in written)
     assert plain == scaled
+
+
+async def test_no_drive_is_given_a_quantity_that_nothing_has_converted(tmp_path):
+    async with opened(tmp_path, units={"a": "5 mm/turn"}) as shop:
+        for drive in (shop.session.drive("line", "a"), shop.session.drive("line", "*")):
+            with pytest.raises(Inexpressible, match="{3 mm} is not converted here; nothing was sent"):
+                await drive.send("MR {3 mm}")
+        assert not shop.written("line")
 
 
 async def test_lines_of_all_drives_need_one_scale_and_check_each_drive(tmp_path):
