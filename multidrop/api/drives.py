@@ -20,8 +20,8 @@ from multidrop.shell.params import file as files
 from multidrop.shell.params.work import Difference, Options, differences, restore
 from multidrop.shell.programs import transfers
 from multidrop.shell.programs.transfers import Wanted
-from multidrop.shell.scripts.execution import ask
 from multidrop.shell.scripts.expression import Value, Word, written
+from multidrop.shell.scripts.questions import ask
 from multidrop.shell.units import BEYOND
 
 if TYPE_CHECKING:

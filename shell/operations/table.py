@@ -25,8 +25,11 @@ SCRIPT_WORDS = {
     "/else": "/else",
     "/end": "/end",
     "/repeat": "/repeat N",
+    "/while": "/while EXPR",
+    "/until": "/until EXPR",
     "/expect": '/expect "TEXT" [SECONDS]',
     "/assert": "/assert [@ADDR] EXPR OP EXPR [+- N]",
+    "/verify": "/verify [@ADDR] EXPR OP EXPR [+- N]",
     "/print": "/print TEXT",
     "/call": "/call FILE|MACRO [NAME=VALUE ...]",
 }

@@ -10,33 +10,25 @@ import contextlib
 from collections import deque
 from collections.abc import Awaitable, Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from types import MappingProxyType
 from typing import TypeVar
 
 from multidrop.dialects import Diagnostic, DriveError, Stopped
-from multidrop.drives.drive import Check, Drive
 from multidrop.macros import checked_values, fill
 from multidrop.shell import waits
 from multidrop.shell.events import FAILURES, By, Failed
-from multidrop.shell.line_syntax import join_target, pinned, split_target
-from multidrop.shell.playing import Playing, StepProgress, cast, played_by
+from multidrop.shell.playing import Playing, StepProgress, cast
 from multidrop.shell.scripts import words
 from multidrop.shell.scripts.captured_prints import Hearing
 from multidrop.shell.scripts.expression import (
-    Binary,
     Comparison,
-    Constant,
     Expression,
-    Measured,
     Name,
-    Unary,
     Value,
     Word,
     evaluate,
     number,
     quoted,
     unknowns,
-    value_of,
     written,
 )
 from multidrop.shell.scripts.model import (
@@ -51,123 +43,9 @@ from multidrop.shell.scripts.model import (
     ScriptLine,
 )
 from multidrop.shell.scripts.planning import bind
+from multidrop.shell.scripts.questions import Checks, Place, converted, drive_of, known
 from multidrop.shell.session import Session
-from multidrop.shell.workspace import LATCHED, Workspace
-
-
-class Place:
-    """The selection of one macro, which no other selection changes."""
-
-    def __init__(self, workspace: Workspace, caller: Place | None = None) -> None:
-        """Take the selection of the macro that calls this one, else the present one."""
-        self._workspace = workspace
-        self._at: tuple[str, str] = workspace.place if caller is None else caller._at
-
-    def pinned(self, line: str) -> str:
-        """The line, with an address where another drive is selected now."""
-        if self._workspace.place == self._at:
-            return line
-        words = line.split()
-        if words[:1] == ["/use"] and len(words) == 2 and self._is_address(words[1]):
-            return f"/use {join_target(self._at[0], words[1])}"
-        return pinned(line, *self._at)
-
-    def _is_address(self, word: str) -> bool:
-        """True if a word is the address of a drive on the macro's bus, and neither a bus nor a role."""
-        return ":" not in word and played_by(word) not in self._workspace.buses
-
-    def target(self, target: str) -> str:
-        """The target of a question, with what the macro's selection adds."""
-        bus, address = split_target(target)
-        if bus or self._workspace.place == self._at:
-            return target
-        return join_target(self._at[0], address or self._at[1])
-
-    def passed(self, line: str) -> None:
-        """Take the selection over after a `/use` of the macro."""
-        if line.split()[:1] == ["/use"]:
-            self._at = self._workspace.place
-
-
-Checks = dict[Word, Check]
-"""What runs right before a question, because a quantity is compared with its value."""
-
-
-async def converted(session: Session, tree: Expression, place: Place | None = None) -> tuple[Expression, Checks]:
-    """The expression with numbers of the drive in place of quantities. Raises Diagnostic."""
-    if isinstance(tree, Unary):
-        operand, checks = await converted(session, tree.operand, place)
-        return replace(tree, operand=operand), checks
-    if isinstance(tree, Binary):
-        left, checks = await converted(session, tree.left, place)
-        right, more = await converted(session, tree.right, place)
-        return replace(tree, left=left, right=right), checks | more
-    if not isinstance(tree, Comparison):
-        return tree, {}
-    word = next((each for each in (tree.left, tree.right) if isinstance(each, Word)), None)
-    found, checks = tree, Checks()
-    for part in ("left", "right", "within"):
-        each = getattr(tree, part)
-        if isinstance(each, Measured) and word is not None:
-            drive = drive_of(session, word, place)
-            question, within = _question(session, drive, word), part == "within"
-            value, checks[word] = await session.units.condition(drive, question, each.text, within)
-            found = replace(found, **{part: Constant(value)})  # type: ignore[arg-type]
-    return found, checks
-
-
-async def known(
-    session: Session,
-    tree: Expression,
-    values: Mapping[str, str],
-    by: By,
-    place: Place | None = None,
-    checks: Mapping[Word, Check] = MappingProxyType({}),
-) -> dict[Name | Word, Value]:
-    """Find the value of each name and word of an expression; each word is read once.
-
-    Raises Diagnostic for a word that is not a question, DriveError where a drive refuses or prints no single value.
-    """
-    found: dict[Name | Word, Value] = {}
-    for each in unknowns(tree):
-        if each not in found:
-            if isinstance(each, Name):
-                found[each] = value_of(values[each.name])
-            else:
-                found[each] = await ask(session, each, by, place, checks.get(each))
-    return found
-
-
-def drive_of(workspace: Workspace, word: Word, place: Place | None = None) -> Drive:
-    """Find the drive that a word asks. Raises Diagnostic or NoAnswer."""
-    bus, address = split_target(place.target(word.target) if place is not None else word.target)
-    return workspace.drive(bus, address or None)
-
-
-async def ask(session: Session, word: Word, by: By, place: Place | None = None, check: Check | None = None) -> Value:
-    """Read the value of a word. Raises Diagnostic, DriveError or TransportLost."""
-    drive = drive_of(session, word, place)
-    line = _question(session, drive, word)
-    await session.path.guard(drive, line, by)
-    printed = await drive.send(line, check)
-    if len(printed) != 1:
-        raise DriveError(f"{session.display_name(drive)}: {line} printed {len(printed)} lines; a value is one")
-    return value_of(printed[0])
-
-
-def _question(workspace: Workspace, drive: Drive, word: Word) -> str:
-    name = workspace.display_name(drive)
-    if drive.link.name in workspace.raw:
-        raise Diagnostic("is in raw mode, where no drive is asked", drive.link.name, "/raw off ends it")
-    if drive.programming:
-        raise DriveError(f"{name} is in program mode and would store the question; PG ends it")
-    line = word.text if word.line else drive.family.question(word.text)
-    if line is None:
-        raise Diagnostic(f"{word.text} has no value to read", name, "[LINE] asks with a line that prints one value")
-    if drive.starts(line):
-        raise Diagnostic(f"{word.shown} can start motion, and a question only reads; nothing was sent", name)
-    return line
-
+from multidrop.shell.workspace import LATCHED
 
 # The pace of a macro: as recorded, or as fast as its lines are done.
 
@@ -256,10 +134,22 @@ class Execution:
         """(bus, address) of the drives that its lines went to."""
         self.current: ScriptLine | None = None
         """The line under way; after an early end the last one before it."""
+        self.failed: list[str] = []
+        """The places of `/verify` lines that did not hold."""
         self.is_over = False
         """It ended early, and only the lines after that are executed."""
         self._heard = heard
         self._executed = executed
+
+    def check_verified(self) -> None:
+        """Raise CheckFailed at the end where a `/verify` did not hold."""
+        if not self.failed:
+            return
+        places = list(dict.fromkeys(self.failed))
+        more = f" and {len(places) - SHOWN} other places" if len(places) > SHOWN else ""
+        times = "a /verify" if len(self.failed) == 1 else f"{len(self.failed)} times a /verify"
+        self.session.automations.leave()  # it has come to its end: what moves goes on, as after a good one
+        raise CheckFailed(f"{times} did not hold: {', '.join(places[:SHOWN])}{more}; the rest was done")
 
     @property
     def _quits(self) -> bool:
@@ -336,11 +226,16 @@ class Execution:
             await self._step(node.line, frame)
 
     async def _repeat(self, node: Repeat, frame: Frame) -> None:
-        for _ in range(await self._own(node.line, frame, self._count)):
-            if self._quits:
-                return
+        """Execute a block a number of times, or as its condition says before each round."""
+        counted = node.line.word == "/repeat"
+        left = await self._own(node.line, frame, self._count) if counted else 0
+        while not self._quits and (left > 0 if counted else await self._goes_on(node.line, frame)):
+            left -= 1
             await asyncio.sleep(0)  # a body that sends nothing must not delay a stop
             await self.block(node.body, frame)
+
+    async def _goes_on(self, line: ScriptLine, frame: Frame) -> bool:
+        return await self._own(line, frame, self._condition) == (line.word == "/while")
 
     async def _call(self, node: CallFile, frame: Frame) -> None:
         given = await self._own(node.line, frame, self._given)
@@ -362,6 +257,12 @@ class Execution:
     async def _step(self, line: ScriptLine, frame: Frame) -> None:
         if line.word == "/set":
             await self._own(line, frame, self._set)
+        elif line.word == "/verify" and not self.is_over:
+            try:
+                await self._own(line, frame, self._assert, counts=True)
+            except CheckFailed as failure:
+                self.failed.append(line.where)
+                self.session.notify(f"{line.where}: {failure}", warning=True)
         elif line.word in self._checks:
             await self._own(line, frame, self._checks[line.word], counts=True)
         else:
@@ -432,7 +333,7 @@ class Execution:
 
     @property
     def _checks(self) -> Mapping[str, Work[None]]:
-        return {"/print": self._print, "/assert": self._assert, "/expect": self._expect}
+        return {"/print": self._print, "/assert": self._assert, "/verify": self._assert, "/expect": self._expect}
 
     async def _set(self, text: str, frame: Frame) -> None:
         name, tree = words.setting(text, frame.names)

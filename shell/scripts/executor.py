@@ -96,6 +96,7 @@ async def run_script(
             ending(execution, _Nobody().ended),
         ):
             await execution.block(script.body, Frame(dict(script.values), by))
+    execution.check_verified()
 
 
 async def run_typed(session: Session, lines: Sequence[str], executed: Executed) -> None:
@@ -145,6 +146,7 @@ async def play(
     rounds = f"{playing.rounds} round{'s' * (playing.rounds != 1)}" + ", ended by /quit" * session.quitting
     session.notify(f"macro {name}: {rounds} played in {session.now() - begun:.1f} s", outcome=True)
     watcher.ended(Ending(name, playing.rounds))
+    execution.check_verified()
 
 
 SHOWN = 3

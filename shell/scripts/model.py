@@ -58,7 +58,7 @@ class If:
 
 @dataclass(frozen=True)
 class Repeat:
-    """`/repeat`, `/end`."""
+    """`/repeat`, `/while` or `/until`, then `/end`."""
 
     line: ScriptLine
     body: Sequence[Node]
@@ -155,7 +155,7 @@ class Result:
 
     @property
     def check(self) -> bool:
-        return bool(self.line.where) and self.line.word in ("/assert", "/expect")
+        return bool(self.line.where) and self.line.word in ("/assert", "/expect", "/verify")
 
     def fact(self) -> dict[str, Any]:
         """The result as an object for programs; what is empty is left out."""

@@ -23,6 +23,7 @@ from multidrop.shell.scripts import words
 from multidrop.shell.scripts.expression import evaluate, unknowns
 from multidrop.shell.scripts.model import CallFile, CallMacro, If, MacroScript, Node, Repeat, Script, ScriptLine, Step
 
+LOOPS = ("/repeat", "/while", "/until")
 UNKNOWN = "0"
 """Stands for a value that is only known when the line is executed."""
 
@@ -196,7 +197,7 @@ class _Checker:
     def script(self) -> list[Node]:
         body, end = self._block()
         while end is not None:
-            self._wrong(end, f"{end.word} without {'/if' if end.word == '/else' else '/if or /repeat'}")
+            self._wrong(end, f"{end.word} without {'/if' if end.word == '/else' else 'a block'}")
             more, end = self._block()
             body += more
         return body
@@ -212,7 +213,7 @@ class _Checker:
         return body, None
 
     def _node(self, line: ScriptLine) -> Node:
-        if line.word in ("/if", "/repeat"):
+        if line.word in ("/if", *LOOPS):
             return self._nested(line)
         if line.word == "/call":
             return self._try(line, lambda text: self._call(line, text)) or Step(line)
@@ -231,7 +232,7 @@ class _Checker:
         return node
 
     def _steering(self, line: ScriptLine, text: str) -> None:
-        """Check the expression of an `/if` or `/repeat`; also its value, where that is known beforehand."""
+        """Check the expression of a block; also the number of an `/repeat`, where that is known beforehand."""
         tree = words.expression(text, self._names)
         if line.word == "/repeat" and not self._unknown(line.text) and not list(unknowns(tree)):
             words.repetitions(evaluate(tree, {}))
@@ -252,7 +253,7 @@ class _Checker:
         body, end = self._block()
         self._close(line, end)
         text = words.rest_of(line.text)
-        if not (text.isdecimal() and int(text) > 0):
+        if not (line.word == "/repeat" and text.isdecimal() and int(text) > 0):
             self._names = before
         return Repeat(line, body)
 
@@ -269,7 +270,7 @@ class _Checker:
         if word == "/set":
             name, _ = words.setting(text, self._names)
             self._names[name] = None
-        elif word == "/assert":
+        elif word in ("/assert", "/verify"):
             words.check(text, self._names)
         elif word == "/expect":
             words.expectation(text)

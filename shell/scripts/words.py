@@ -40,12 +40,12 @@ def rest_of(text: str) -> str:
 
 
 def expression(text: str, names: Collection[str]) -> Expression:
-    """Parse the expression of `/if` and `/repeat`."""
+    """Parse the expression of `/if`, `/repeat`, `/while` and `/until`."""
     return _parsed(text, rest_of(text), names, parse)
 
 
 def check(text: str, names: Collection[str]) -> Comparison:
-    """Parse `/assert`."""
+    """Parse `/assert` and `/verify`."""
     return _parsed(text, rest_of(text), names, parse_check)
 
 

@@ -62,6 +62,12 @@ async def shop(tmp_path):
         ("/set px @stages:00 PX\n/print {px}", ["0"]),
         ("/print 1\n/quit\n/print 2", ["1"]),
         ("/repeat 5\n/print 1\n/quit\n/end", ["1"]),
+        ("/set n 0\n/while n < 2\n/set n n + 1\n/print {n}\n/end", ["1", "2"]),
+        ("/while 0\n/print never\n/end", []),
+        ("/set n 0\n/until n == 2\n/set n n + 1\n/print {n}\n/end", ["1", "2"]),
+        ("/until 1\n/print never\n/end", []),
+        ("/until @a P >= 200\n@a MR 100\n/wait stopped\n/end\n@a PR P", ["200"]),
+        ("/while 1\n/print 1\n/quit\n/end", ["1"]),
     ],
 )
 async def test_blocks_and_values(text, printed, shop):
@@ -154,8 +160,9 @@ async def test_a_called_macro_is_played(shop):
     assert "no line takes the value wrod" in await shop.failure("/call say wrod=5", Diagnostic)
 
 
-async def test_a_stop_ends_a_loop_that_sends_nothing(shop):
-    running = asyncio.create_task(shop.session.tasks.run(shop.run("/repeat 1000000000\n/set x 1\n/end")))
+@pytest.mark.parametrize("head", ["/repeat 1000000000", "/while 1", "/until 0"])
+async def test_a_stop_ends_a_loop_that_sends_nothing(head, shop):
+    running = asyncio.create_task(shop.session.tasks.run(shop.run(f"{head}\n/set x 1\n/end")))
     await asyncio.sleep(0)
     for _ in range(20):
         await asyncio.sleep(0)
@@ -197,3 +204,46 @@ def test_a_report_replaces_nothing_but_a_report(name, tmp_path):
         report.begin()
     report.wrong((caught.value,))  # the end of the command does not write there, either
     assert (tmp_path / "script.txt").read_text() == "MR 100"
+
+
+async def test_a_verify_that_does_not_hold_goes_on_and_fails_the_end(shop):
+    text = "/verify P == 5\n/repeat 2\n/verify P == 0\n/verify P < 0\n/end\n/print on"
+    said = await shop.failure(text, CheckFailed)
+    assert shop.printed() == ["on"]
+    assert said == "3 times a /verify did not hold: s.txt:1, s.txt:4; the rest was done"
+    assert [(each.line.number, each.ok, each.check) for each in shop.results if each.check] == [
+        (1, False, True),
+        (3, True, True),
+        (4, False, True),
+        (3, True, True),
+        (4, False, True),
+    ]
+
+
+async def test_what_moves_goes_on_after_a_verify_that_did_not_hold(shop):
+    said = await shop.failure("@a SL 1000\n/verify @a P < 0", CheckFailed)
+    assert said == "a /verify did not hold: s.txt:2; the rest was done"
+    assert shop.session.automations.interrupted == []
+    await shop.session.run("@a PR V")
+    assert shop.printed()[-1] == "1000"
+
+
+async def test_a_verify_whose_question_fails_ends_the_script(shop):
+    said = await shop.failure("/verify QQ9 == 1\n/print on")
+    assert said.startswith("s.txt:1: ") and shop.printed() == []
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("/while 1\n/print a", "s.txt:1: /while has no /end"),
+        ("/until\n/end", "s.txt:1: /until: usage: /until EXPR"),
+        ("/while 1\n/else\n/end", "s.txt:2: /else does not belong to the /while of line 1"),
+        ("/verify P", "s.txt:1: /verify: P is not one comparison; valid: [@ADDR] EXPR OP EXPR [+- N]"),
+        ("/while {n} < 1\n/set n 1\n/end", "s.txt:1: "),
+        ("/until 1\n/set n 1\n/end\n/print {n}", "s.txt:4: "),
+    ],
+)
+async def test_a_wrong_loop_or_check_is_told_before_the_first_line(text, said, shop):
+    assert (await shop.failure(text, Diagnostic)).startswith(said)
+    assert shop.results == []

@@ -1,0 +1,142 @@
+"""What a script or a macro asks of drives: the values of an expression, at the place that is selected for it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from types import MappingProxyType
+
+from multidrop.dialects import Diagnostic, DriveError
+from multidrop.drives.drive import Check, Drive
+from multidrop.shell.events import By
+from multidrop.shell.line_syntax import join_target, pinned, split_target
+from multidrop.shell.playing import played_by
+from multidrop.shell.scripts.expression import (
+    Binary,
+    Comparison,
+    Constant,
+    Expression,
+    Measured,
+    Name,
+    Unary,
+    Value,
+    Word,
+    unknowns,
+    value_of,
+)
+from multidrop.shell.session import Session
+from multidrop.shell.workspace import Workspace
+
+
+class Place:
+    """The selection of one macro, which no other selection changes."""
+
+    def __init__(self, workspace: Workspace, caller: Place | None = None) -> None:
+        """Take the selection of the macro that calls this one, else the present one."""
+        self._workspace = workspace
+        self._at: tuple[str, str] = workspace.place if caller is None else caller._at
+
+    def pinned(self, line: str) -> str:
+        """The line, with an address where another drive is selected now."""
+        if self._workspace.place == self._at:
+            return line
+        words = line.split()
+        if words[:1] == ["/use"] and len(words) == 2 and self._is_address(words[1]):
+            return f"/use {join_target(self._at[0], words[1])}"
+        return pinned(line, *self._at)
+
+    def _is_address(self, word: str) -> bool:
+        """True if a word is the address of a drive on the macro's bus, and neither a bus nor a role."""
+        return ":" not in word and played_by(word) not in self._workspace.buses
+
+    def target(self, target: str) -> str:
+        """The target of a question, with what the macro's selection adds."""
+        bus, address = split_target(target)
+        if bus or self._workspace.place == self._at:
+            return target
+        return join_target(self._at[0], address or self._at[1])
+
+    def passed(self, line: str) -> None:
+        """Take the selection over after a `/use` of the macro."""
+        if line.split()[:1] == ["/use"]:
+            self._at = self._workspace.place
+
+
+Checks = dict[Word, Check]
+"""What runs right before a question, because a quantity is compared with its value."""
+
+
+async def converted(session: Session, tree: Expression, place: Place | None = None) -> tuple[Expression, Checks]:
+    """The expression with numbers of the drive in place of quantities. Raises Diagnostic."""
+    if isinstance(tree, Unary):
+        operand, checks = await converted(session, tree.operand, place)
+        return replace(tree, operand=operand), checks
+    if isinstance(tree, Binary):
+        left, checks = await converted(session, tree.left, place)
+        right, more = await converted(session, tree.right, place)
+        return replace(tree, left=left, right=right), checks | more
+    if not isinstance(tree, Comparison):
+        return tree, {}
+    word = next((each for each in (tree.left, tree.right) if isinstance(each, Word)), None)
+    found, checks = tree, Checks()
+    for part in ("left", "right", "within"):
+        each = getattr(tree, part)
+        if isinstance(each, Measured) and word is not None:
+            drive = drive_of(session, word, place)
+            question, within = _question(session, drive, word), part == "within"
+            value, checks[word] = await session.units.condition(drive, question, each.text, within)
+            found = replace(found, **{part: Constant(value)})  # type: ignore[arg-type]
+    return found, checks
+
+
+async def known(
+    session: Session,
+    tree: Expression,
+    values: Mapping[str, str],
+    by: By,
+    place: Place | None = None,
+    checks: Mapping[Word, Check] = MappingProxyType({}),
+) -> dict[Name | Word, Value]:
+    """Find the value of each name and word of an expression; each word is read once.
+
+    Raises Diagnostic for a word that is not a question, DriveError where a drive refuses or prints no single value.
+    """
+    found: dict[Name | Word, Value] = {}
+    for each in unknowns(tree):
+        if each not in found:
+            if isinstance(each, Name):
+                found[each] = value_of(values[each.name])
+            else:
+                found[each] = await ask(session, each, by, place, checks.get(each))
+    return found
+
+
+def drive_of(workspace: Workspace, word: Word, place: Place | None = None) -> Drive:
+    """Find the drive that a word asks. Raises Diagnostic or NoAnswer."""
+    bus, address = split_target(place.target(word.target) if place is not None else word.target)
+    return workspace.drive(bus, address or None)
+
+
+async def ask(session: Session, word: Word, by: By, place: Place | None = None, check: Check | None = None) -> Value:
+    """Read the value of a word. Raises Diagnostic, DriveError or TransportLost."""
+    drive = drive_of(session, word, place)
+    line = _question(session, drive, word)
+    await session.path.guard(drive, line, by)
+    printed = await drive.send(line, check)
+    if len(printed) != 1:
+        raise DriveError(f"{session.display_name(drive)}: {line} printed {len(printed)} lines; a value is one")
+    return value_of(printed[0])
+
+
+def _question(workspace: Workspace, drive: Drive, word: Word) -> str:
+    name = workspace.display_name(drive)
+    if drive.link.name in workspace.raw:
+        raise Diagnostic("is in raw mode, where no drive is asked", drive.link.name, "/raw off ends it")
+    if drive.programming:
+        raise DriveError(f"{name} is in program mode and would store the question; PG ends it")
+    line = word.text if word.line else drive.family.question(word.text)
+    if line is None:
+        raise Diagnostic(f"{word.text} has no value to read", name, "[LINE] asks with a line that prints one value")
+    if drive.starts(line):
+        raise Diagnostic(f"{word.shown} can start motion, and a question only reads; nothing was sent", name)
+    return line
