@@ -81,7 +81,7 @@ def test_a_right_script(text, check):
         ("/if 1\n", "s.txt:1: /if has no /end"),
         ("/sleep soon", "s.txt:1: /sleep: no time soon; valid: 0 to 86400 seconds; usage: /sleep SECONDS"),
         ("/repeat -1\n/end", "s.txt:1: /repeat: no number of repetitions -1; valid: 0 to 1000000000; usage: /repeat N"),
-        ("/end\n", "s.txt:1: /end without /if or /repeat"),
+        ("/end\n", "s.txt:1: /end without a block"),
         ("/else\n", "s.txt:1: /else without /if"),
         ("/repeat 2\n/else\n/end", "s.txt:2: /else does not belong to the /repeat of line 1"),
         ("/if 1\n/end x\n", "s.txt:2: /end: usage: /end"),
