@@ -115,7 +115,7 @@ async def test_every_error_of_a_macro_and_of_what_it_calls_is_told(shop: Shop) -
     assert told == [
         "macro m, step 1: /if: usage: /if EXPR",
         "macro far, step 1: /play: round would call itself: m -> round -> far -> round; use /repeat",
-        "macro round, step 2: /end without /if or /repeat",
+        "macro round, step 2: /end without a block",
         "macro m, step 4: /else without /if",
     ]
 
