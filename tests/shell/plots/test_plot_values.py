@@ -188,12 +188,13 @@ async def test_a_lost_line_ends_no_reading(tmp_path: Path, unplugged: bool) -> N
     ("drive", "endpoint", "word", "value"),
     [
         (pmx("00"), "", "DI", None),
+        (pmx("00"), "usb:", "DI", None),
         (ETHERNET, "?modbus", "VM", 768000.0),
         ('personality = "TMCM"\nname = "1"', "?dialect=tmcl", "AP4", None),
     ],
 )
 async def test_other_families(tmp_path: Path, drive: str, endpoint: str, word: str, value: Any) -> None:
-    async with CellSession(tmp_path, bus("line", drive)) as cell:
+    async with CellSession(tmp_path, bus("line", drive), usb=endpoint == "usb:") as cell:
         (address,) = cell.session.buses["line"].drives
         series = parse_series(cell.session, [word])
         assert series == (Series("line", address, word),)
