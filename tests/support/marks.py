@@ -24,9 +24,9 @@ from tests.support.virtual import VirtualLoop
 STARTS = frozenset({"subprocess.Popen", "os.fork", "os.forkpty", "os.posix_spawn", "os.system"})
 """Audit events of the interpreter, each of which is the start of a process."""
 
-REPEATING = ("wide", "nightly")
-"""Markers of products of parameters, which go the same ways again. Coverage is not measured in them: measuring makes
-the product two to three times slower."""
+REPEATING = ("wide", "nightly", "slow")
+"""Markers of products of parameters, floods and generated cases, which go the same ways again. Coverage is not measured
+in them: measuring makes the product two to three times slower."""
 
 _running: list[pytest.Item] = []
 """The test that runs, its fixtures included."""
