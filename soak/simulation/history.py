@@ -123,6 +123,8 @@ class History:
     """Drives that were said to stand, and moved."""
     written: list[tuple[float, str, bytes]] = field(default_factory=list)
     """Time, port and bytes of each write that the kernel took."""
+    full: list[tuple[float, str]] = field(default_factory=list)
+    """Time and port of each write of which the kernel took nothing."""
     opened: list[tuple[float, str, int]] = field(default_factory=list)
     """Time and line of each descriptor that was opened, and the number of writes before it."""
     passed: list[tuple[float, str]] = field(default_factory=list)

@@ -2,32 +2,54 @@
 
 from __future__ import annotations
 
+import re
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 from soak.simulation.departures import DEPARTURES
+from soak.simulation.history import Stop
 from soak.simulation.outcomes import OUTCOMES
 from soak.simulation.promises import PROMISES
-from soak.simulation.rule import Rule
+from soak.simulation.rule import Grant, Granted, Rule
 from soak.simulation.world import World
 
 SOON = 0.05
 """The time, s, in which the kernel takes a stop: a line that takes nothing meanwhile is lost, or flooded."""
 
 
-def _first(world: World) -> Iterator[str]:
-    """What leaves next on a line that can be written is its stop, after the rest of a message that must leave whole."""
-    for stop in world.history.stops:
-        for line, forms in stop.forms.items():
+FULL = Grant("a port that takes nothing", "A port that takes nothing")
+
+
+def _first(world: World) -> Iterator[str | Granted]:
+    """What leaves next on a line that can be written is its stop, after the rest of a message that must leave whole.
+
+    It leaves at once, whatever the loop does, unless the line is found to be lost.
+    """
+    history = world.history
+    for stop in history.stops:
+        killed = not stop.who and any(stop.at <= at <= stop.at + SOON for at in history.deaths)
+        for line, forms in {} if killed else stop.forms.items():
             first, rest = stop.own[line]  # the rest of a message that leaves whole; other rests are dropped
-            after = [(at, data) for at, port, data in world.history.written[first:] if port == line]
-            killed = any(stop.at <= at <= stop.at + SOON for at in world.history.deaths)
-            if after and after[0][0] <= stop.at + SOON and not (killed and not stop.who):
+            after = [(at, data) for at, port, data in history.written[first:] if port == line]
+            if not after or after[0][0] > stop.at + SOON:
+                again = any(name == line and at >= stop.at for at, name, _ in history.opened)
+                if not (again or _lost(world, line, stop)):
+                    left = f"nothing left before {after[0][0]:.3f}" if after else "nothing left"
+                    words = f"{line}: stop at {stop.at:.6f}, {left}"
+                    full = any(name == line and stop.at <= at <= stop.at + SOON for at, name in history.full)
+                    yield Granted(FULL, words) if full else words
+            else:
                 begun = b"".join(data for at, data in after if at <= stop.at + SOON)
                 left = [begun, *filter(None, [begun[rest:]])]
                 if not any(form.startswith(each) or each.startswith(form) for form in forms for each in left):
                     yield f"{line}: stop at {stop.at:.6f}, {begun!r} left at {after[0][0]:.6f}"
+
+
+def _lost(world: World, line: str, stop: Stop) -> bool:
+    """Whether a session says after a stop that a line was lost."""
+    said = re.compile(rf"{line[:2]}: .* was lost|{line[:2]}: .*; trying again")
+    return any(at >= stop.at and said.match(text) for at, text in world.history.notices)
 
 
 def _true(world: World) -> Iterator[str]:
@@ -54,7 +76,13 @@ RULES = (
     *OUTCOMES,
     *PROMISES,
     *DEPARTURES,
-    Rule("first", "What leaves next on a line that can be written is its stop.", "What a stop promises", _first),
+    Rule(
+        "first",
+        "What leaves next on a line that can be written is its stop, at once.",
+        "What a stop promises",
+        _first,
+        (FULL,),
+    ),
     Rule("stopped", "A drive that is said to be stopped does not move.", "What a stop promises", _true),
     Rule("ends", "Every wait ends; no task, thread, file, lock or defect is left.", "What a report means", _ends),
     Rule(

@@ -21,6 +21,9 @@ REPEATED = 2.0
 AFTER = 2.0
 """The longest time, s, between a damaged byte of a line and the end of that line: late bytes, and a slow wire."""
 
+OUTAGE = 10.0
+"""The longest time, s, in which a drive is without power, starts again, or owes a reply."""
+
 SEVEN_BITS = Grant("a checksum of seven or eight bits", "The checksum of CK has seven bits")
 NOISY_ACK = Grant("an ACK of noise", "An ACK without its command")
 NOISY_NAK = Grant("a NAK of noise", "A NAK of noise together with a lost ACK")
@@ -28,6 +31,7 @@ DOUBLED = Grant("a datagram that arrives twice", "A datagram that arrives twice"
 OTHERS_REPLY = Grant("a reply to another client's stop", "The reply to another client's stop")
 BARE_REFUSAL = Grant("a refusal of noise, without a checksum", "A refusal without a checksum")
 BARE_COMMAND = Grant("a damaged command without a checksum", "Noise on the line")
+NO_SIGN = Grant("a mode without a sign of execution", "0010")
 BARE_VALUE = Grant("a damaged value without a checksum", "Noise on the line")
 
 
@@ -142,6 +146,23 @@ def _executed_as_another(world: World, command: Command) -> bool:
     )
 
 
+def _unknown(world: World) -> Iterator[str | Granted]:
+    """A drive without power may owe a reply, which the next drive of its line is not believed before."""
+    if not world.climate.calm:
+        return
+    history = world.history
+    stops = [each.at for each in history.stops] + history.told.halts + history.deaths + [at for at, _ in history.passed]
+    for command, _, words in _cases(world):
+        if command.outcome is not Outcome.UNKNOWN or command.said == "cancelled":
+            continue
+        switched = [at for (line, _), times in world.cut.items() if line == command.line for at in times]
+        if any(command.began <= at <= command.ended for at in stops):
+            continue
+        if any(command.began - OUTAGE <= at <= command.ended for at in switched):
+            continue
+        yield Granted(NO_SIGN, words) if world.place(command.line).em == 2 else words
+
+
 # Values
 
 
@@ -214,6 +235,13 @@ OUTCOMES = (
         NOISE,
         _lost,
         (BARE_COMMAND, NOISY_ACK, SEVEN_BITS, OTHERS_REPLY),
+    ),
+    Rule(
+        "unknown",
+        "Without faults a command is not known only where a stop, a kill or a power-off cut it.",
+        "What a report means",
+        _unknown,
+        (NO_SIGN,),
     ),
     Rule(
         "credited",

@@ -25,7 +25,7 @@ ROOM = 4095
 
 
 Trace = Callable[[str, bytes], None]
-"""Notes the bytes that were written (">") or read ("<")."""
+"""Notes the bytes that were written (">") or read ("<"), and a write of which nothing was taken ("=")."""
 
 
 class Descriptor:
@@ -57,6 +57,7 @@ class Descriptor:
         """The number of bytes of a write that are taken now; all or a part unless `busy`. Raises BlockingIOError."""
         if room <= 0 or (busy and self.rng.random() < self.climate["full"]):
             self.loop.call_later(0.001 + self.rng.random() * 0.01, self.loop.writable, self._descriptor)
+            self.trace("=", b"")
             raise BlockingIOError(errno.EAGAIN, "no room")
         size = min(len(data), room)
         if size > (1 if busy else FEW) and self.rng.random() < self.climate["part"]:

@@ -35,6 +35,7 @@ from multidrop.shell.log import files, writer
 from multidrop.shell.session import Session
 from multidrop.shell.sharing.server import SharedPort
 from multidrop.shell.sharing.writer_turns import Say
+from multidrop.shell.workspace import LATCHED
 from multidrop.simulator import cells, wire
 from multidrop.simulator.cell.spec import Faults
 from multidrop.simulator.floor import Floor
@@ -168,6 +169,8 @@ class World:
                 self.history.written.append((self.loop.now, name, data))
                 if not who:
                     wrote(self, line, data)
+            elif way == "=":
+                self.history.full.append((self.loop.now, name))
             else:
                 self.history.received.setdefault(line, []).append((self.loop.now, data))
 
@@ -569,8 +572,12 @@ class WatchedSession(Session):
         if self._dead:
             return
         command.ended, command.said = self.now(), str(result)
-        notices = [text for at, text in self._world.history.notices if at >= command.began]
+        notices = [
+            text for at, text in self._world.history.notices if at >= command.began and f"'{command.text}'" in text
+        ]
         command.outcome = WORDS[word(result, notices)]
+        if isinstance(result, Diagnostic) or str(result) == LATCHED:  # before anything is sent
+            command.outcome = Outcome.NOT_SENT
         where = f"{command.line}:{command.drive} {command.text!r}"
         self._world.history.note(command.ended, "host", f"{where}: {command.outcome.value} ({command.said})")
 

@@ -89,7 +89,8 @@ def found(history: History, checksum: int = 1) -> dict[str, list[str | Granted]]
     """What the rules of commands and values find on a line of two drives, `a` and `b`."""
     place = Place("l", "mcode", ("a", "b"), 1, checksum, 9600, True)
     network = SimpleNamespace(doubled=[])
-    world: Any = SimpleNamespace(history=history, network=network, place=lambda line: place)
+    calm = SimpleNamespace(calm=False)
+    world: Any = SimpleNamespace(history=history, network=network, place=lambda line: place, climate=calm)
     return {rule.name: list(rule.check(world)) for rule in OUTCOMES if list(rule.check(world))}
 
 
