@@ -22,7 +22,7 @@ AFTER = 2.0
 """The longest time, s, between a damaged byte of a line and the end of that line: late bytes, and a slow wire."""
 
 OUTAGE = 10.0
-"""The longest time, s, in which a drive is without power, starts again, or owes a reply."""
+"""The longest time, s, in which a drive is without power, starts again, or owes a reply that was cut off."""
 
 SEVEN_BITS = Grant("a checksum of seven or eight bits", "The checksum of CK has seven bits")
 NOISY_ACK = Grant("an ACK of noise", "An ACK without its command")
@@ -147,7 +147,7 @@ def _executed_as_another(world: World, command: Command) -> bool:
 
 
 def _unknown(world: World) -> Iterator[str | Granted]:
-    """A drive without power may owe a reply, which the next drive of its line is not believed before."""
+    """A drive may owe a reply that was cut off: until it has come, a sign on its line may be its own."""
     if not world.climate.calm:
         return
     history = world.history
@@ -156,9 +156,7 @@ def _unknown(world: World) -> Iterator[str | Granted]:
         if command.outcome is not Outcome.UNKNOWN or command.said == "cancelled":
             continue
         switched = [at for (line, _), times in world.cut.items() if line == command.line for at in times]
-        if any(command.began <= at <= command.ended for at in stops):
-            continue
-        if any(command.began - OUTAGE <= at <= command.ended for at in switched):
+        if any(command.began - OUTAGE <= at <= command.ended for at in (*stops, *switched)):
             continue
         yield Granted(NO_SIGN, words) if world.place(command.line).em == 2 else words
 
