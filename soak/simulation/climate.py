@@ -32,9 +32,9 @@ FAULTS = {
     "reply again": 0.1,
     "reply of another": 0.05,
     # of USB, each packet
-    "usb late": 0.3,
+    "usb late": 0.2,
     "usb missing": 0.1,
-    "usb held": 0.3,
+    "usb held": 0.1,
     "usb stalled": 0.02,
     "usb empty": 0.1,
     # of the loop and of threads, each turn or step

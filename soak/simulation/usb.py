@@ -86,7 +86,7 @@ class UsbSockets(Sockets):
         """Give every controller the faults of another climate."""
         names = ("late", "missing", "held", "stalled", "empty")
         for each in self.plugged:
-            each.faults = UsbFaults(longest_held=1.5, **{name: climate[f"usb {name}"] for name in names})
+            each.faults = UsbFaults(longest_held=2.5, **{name: climate[f"usb {name}"] for name in names})
 
     def exchange(self) -> None:
         """Let each controller go to the socket of the next one."""
