@@ -594,7 +594,8 @@ def place_of_state() -> Iterator[Path]:
 
 def lived(seed: int, steps: Iterable[int], keep: bool = False, without: Collection[str] = ()) -> World:
     """Live one seed: these steps of its story, `without` these kinds of faults."""
-    climate, places = Climate.drawn(seed, without), drawn_places(Random(f"{seed} places"), Random(f"{seed} usb machine"))
+    climate = Climate.drawn(seed, without)
+    places = drawn_places(Random(f"{seed} places"), Random(f"{seed} usb machine"))
     history = History(keep=keep)
     loops: list[SimulatedLoop] = []
 
