@@ -184,6 +184,8 @@ class Scanning:
         self._woken: dict[Stage, dict[str, None]] = {}
         """The addresses that replied to a stop only."""
         self._everything = False
+        self._other = ""
+        """What shows that drives of another family reply on the line, in words."""
         self._said: set[str] = set()
         self._first: Bus | None = None
         """The bus of the first stage."""
@@ -205,6 +207,8 @@ class Scanning:
             await self._workspace.questions.confirm(f"{asks}; {first.scan.hazard}", self.port)
         async with self.stopping_all():
             await self.search([first], False)
+            if self._other:  # its drives would reply to each question of the other stages, too
+                others = []
             if others and (everything or not self.found):
                 so_far = f"{len(self.found)} found" if self.found else "no drive replies"
                 on = f"the search goes on with {listed(others)} ({about(others)})"
@@ -439,7 +443,8 @@ class Scanning:
         reach = replace(reach, asks=asks, cut=hints.cut, first_mark=hints.first_mark)
         with bus.link.received() as heard:
             outcome = await bus.search(stage.scan.search(reach, found, step))
-        self._warn(f"{port}: {stage.words}", filter(None, (*outcome.remarks, spoken(bytes(heard), stage.family))))
+        self._other = spoken(bytes(heard), stage.family) or self._other
+        self._warn(f"{port}: {stage.words}", filter(None, (*outcome.remarks, self._other)))
         return bool(outcome.echo)
 
     def _warn(self, where: str, texts: Iterable[str]) -> None:

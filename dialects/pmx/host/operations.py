@@ -276,6 +276,8 @@ LATE = 4
 """Numbers before the present one whose reply may come now."""
 CERTAIN = 5
 """Windows in which a late reply comes."""
+SHOWN = 3
+"""Replies that could not be read, until the rest is only counted."""
 BUSY = 2.5
 """The longest wait, in windows, where something else arrives."""
 
@@ -292,7 +294,8 @@ def search(reach: Reach, found: Found[PmxState], step: Step) -> Procedure[Outcom
                 remarks.append(f"{heard[:40]!r} was received at {state.address or 'no number'}: no controller's reply")
         step()
     yield from _identified([state for state in states if state.address == NUMBERS[-1]], seen, found)
-    return Outcome(tuple(remarks))
+    more = [f"at {len(remarks) - SHOWN} more numbers something was received"] if len(remarks) > SHOWN else []
+    return Outcome((*remarks[:SHOWN], *more))
 
 
 def _numbers(reach: Reach) -> tuple[str, ...]:

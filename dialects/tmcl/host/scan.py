@@ -70,7 +70,9 @@ def search(reach: Reach, found: Found[TmclState], step: Step) -> Procedure[Outco
         step()
     if unread:
         where = ", ".join(dict.fromkeys(unread))
-        remarks.append(f"no reply of one module was received at {where}: several may reply at once")
+        remarks.append(
+            f"what came at {where} is no module's reply: several may reply at once, or drives of another kind"
+        )
     return Outcome(tuple(remarks))
 
 

@@ -319,6 +319,16 @@ async def test_frames_of_nine_bytes_that_a_search_hears_are_named(family, title,
     with pytest.raises(NothingFound):
         await search.run([9600], False)
     assert any(text.endswith(f"{title} at 9600 baud: {TMCL}") for text in port.told())
+    assert len(port.told()) < 10
+
+
+async def test_a_search_that_hears_frames_of_nine_bytes_goes_on_to_no_other_rate_or_language(tmp_path):
+    port = Port(tmp_path, TALKATIVE)
+    port.session.questions.agreed = True
+    _, search = scanning(port)
+    with pytest.raises(NothingFound, match=r"\(MCode at 9600 baud; "):
+        await search.run([], True)
+    assert port.opened == [("mcode", 9600)]
 
 
 async def test_the_message_of_a_line_that_is_opened_in_mcode_names_tmcl(tmp_path):

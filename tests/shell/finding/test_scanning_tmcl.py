@@ -120,7 +120,8 @@ async def test_what_cannot_be_read_is_said_once_for_all_addresses(tmp_path):
     with pytest.raises(NothingFound):
         await search.run([9600], False)
     assert [text for text in port.told() if "several may reply at once" in text] == [
-        "/dev/ttyUSB9: TMCL at 9600 baud: no reply of one module was received at 1: several may reply at once"
+        "/dev/ttyUSB9: TMCL at 9600 baud: what came at 1 is no module's reply: several may reply at once, "
+        "or drives of another kind"
     ]
 
 
