@@ -138,7 +138,7 @@ def _module(row: Mapping[str, str]) -> Module:
         range(int(row["outputs"])),
         (*_numbers(row["analog"]), VOLTAGE, TEMPERATURE),
         chip_units,
-        Status.INVALID_VALUE if chip_units else Status.WRONG_TYPE,
+        Status(int(row["wrong_motor"])),
     )
 
 
