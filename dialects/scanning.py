@@ -83,7 +83,7 @@ class Scan(Generic[S]):
     waits: float = 0.0
     """The time of a search beside that of its steps, s."""
     slow: float = 0.0
-    """The time by which a reply of its drives begins later than the window allows, s."""
+    """The time by which a step may take longer than the window and its bytes, s."""
     stop: Callable[[Sequence[str]], Sequence[StopPiece]] = lambda asked: ()
     """The stop for addresses that were asked and have not replied; where one replies, its whole stop follows."""
 

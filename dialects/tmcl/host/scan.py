@@ -5,12 +5,16 @@ replies to every address, is put down to that module, once. Address 1 is asked f
 second of silence follows each of these questions, in which modules drop what another host left of a message: the
 frames after it are counted from their first byte. What cannot be read (several replies at once, or a late one that ran
 into the next question) has the addresses before it asked once more, with the time that the slowest module takes.
+
+A byte that is lost on its way has all modules count wrongly from there on, and reply to nothing. So after each block of
+addresses a module that has replied is asked once more; where no module replies, the block is asked again after a
+second of silence.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 
 from multidrop.dialects.codec import Kind, Procedure, StopPiece
 from multidrop.dialects.scanning import Found, Outcome, Reach, Scan, Step
@@ -23,57 +27,94 @@ SLOWEST = 0.3
 """The longest pause of a module before a reply (global parameter 75), and its reply, s."""
 LATE = 5
 """Addresses before the present one whose reply may have run into its question."""
+BLOCK = 32
+"""Addresses after which the count is checked."""
 HAZARD = (
     "a frame may hold bytes that MCode drives on the line obey: the addresses 3, 10, 13 and 27, and other bytes of a "
     "frame, are ^C, LF, CR and ESC to them"
 )
 
 
-def search(reach: Reach, found: Found[TmclState], step: Step) -> Procedure[Outcome]:
-    """Search for modules; report each as soon as it is identified, with the number of its motors."""
-    states: dict[str, TmclState] = {}
-    remarks: list[str] = []
-    asked: list[str] = []
-    unread: list[str] = []
-    again: set[str] = set()
-    for address in _addresses(reach):
-        reach.asks(address)
-        asked.append(address)
-        quiet = RESYNC if address == FACTORY else SLOWEST if address == ALL[-1] else reach.window + GAP
-        heard = yield from _heard(address, quiet)
-        if address == FACTORY and not replies_in(heard):
+@dataclass
+class _Search:
+    """One search of a line. Its steps return whether the adapter repeats what it sends."""
+
+    reach: Reach
+    found: Found[TmclState]
+    states: dict[str, TmclState] = field(default_factory=dict)
+    remarks: list[str] = field(default_factory=list)
+    asked: dict[str, None] = field(default_factory=dict)
+    unread: dict[str, None] = field(default_factory=dict)
+    again: set[str] = field(default_factory=set)
+    """Addresses that were asked with the longest time."""
+
+    @property
+    def window(self) -> float:
+        return self.reach.window + GAP
+
+    def ask(self, address: str) -> Procedure[bool]:
+        """Ask one address, and identify what replies."""
+        first = address == FACTORY and address not in self.asked
+        self.reach.asks(address)
+        self.asked[address] = None
+        heard = yield from _heard(address, RESYNC if first else SLOWEST if address == ALL[-1] else self.window)
+        if first and not replies_in(heard):
             heard += yield from _heard(address, RESYNC)
         if frame_of(int(address), IDENTITY) in heard:
-            return Outcome(echo=True)
+            return True
         if heard and not replies_in(heard):
-            for each in asked[-LATE:]:
-                if each not in again and each not in states:
-                    again.add(each)
+            for each in [*self.asked][-LATE:]:
+                if each not in self.again and each not in self.states:
+                    self.again.add(each)
                     heard += yield from _heard(each, SLOWEST)
             if not replies_in(heard):
-                unread.append(address)
+                self.unread[address] = None
         for name in replies_in(heard):
-            if name in states or name in reach.known:
-                continue
-            state = TmclState(Tmcl(), name)
-            state.named(name)
-            if not (yield from find(state)):
-                unread.append(address)
-                continue
-            states[name] = state
-            count_line([*states.values()])
-            if name not in asked:
-                remarks.append(
-                    f"module {name} replied to address {address}: it replies to every address, or another host asks it"
-                )
-            found(state)
-        step()
-    if unread:
-        where = ", ".join(dict.fromkeys(unread))
-        remarks.append(
-            f"what came at {where} is no module's reply: several may reply at once, or drives of another kind"
-        )
-    return Outcome(tuple(remarks))
+            if name not in self.states and name not in self.reach.known:
+                yield from self._identify(name, address)
+        return False
+
+    def _identify(self, name: str, address: str) -> Procedure[None]:
+        """Identify a module that replied, as this address was asked."""
+        state = TmclState(Tmcl(), name)
+        state.named(name)
+        if not (yield from find(state)):
+            self.unread[address] = None
+            return
+        self.states[name] = state
+        count_line([*self.states.values()])
+        if name not in self.asked:
+            why = "it replies to every address, or another host asks it"
+            self.remarks.append(f"module {name} replied to address {address}: {why}")
+        self.found(state)
+
+    def counted(self) -> Procedure[bool]:
+        """Whether a module that has replied does so again: no byte was lost on the way to it."""
+        known = next(reversed(self.states), "")
+        return bool(known and replies_in((yield from _heard(known, SLOWEST))))
+
+
+def search(reach: Reach, found: Found[TmclState], step: Step) -> Procedure[Outcome]:
+    """Search for modules; report each as soon as it is identified, with the number of its motors."""
+    own, addresses = _Search(reach, found), _addresses(reach)
+    for begin in range(0, len(addresses), BLOCK):
+        block = addresses[begin : begin + BLOCK]
+        for address in block:
+            if (yield from own.ask(address)):
+                return Outcome(echo=True)
+            step()
+        if len(addresses) == 1 or (yield from own.counted()):
+            continue
+        yield from _heard(FACTORY, RESYNC)
+        for address in block:
+            if address not in own.states:
+                yield from own.ask(address)
+        if own.states and not (yield from own.counted()):
+            own.remarks.append(f"the line loses bytes: modules at {block[0]} to {block[-1]} may have been missed")
+    if own.unread:
+        why = "is no module's reply: several may reply at once, or drives of another kind"
+        own.remarks.append(f"what came at {', '.join(own.unread)} {why}")
+    return Outcome(tuple(own.remarks))
 
 
 def _addresses(reach: Reach) -> Sequence[str]:
@@ -104,6 +145,6 @@ SCAN = Scan(
     asked=lambda reach: "addresses 1 to 255" if len(_addresses(reach)) > 1 else "address 1 only (--all: each address)",
     hazard=HAZARD,
     waits=2 * RESYNC,
-    slow=GAP,
+    slow=0.11,
     stop=stop,
 )

@@ -47,7 +47,7 @@ async def test_without_an_agreement_nothing_is_sent_and_the_question_names_hazar
         await search.run([9600], False)
     asks = "the search with TMCL at 9600 baud asks address 1 only (--all: each address), about 2 s"
     assert f"{asks}; {HAZARD}; nothing was sent" in str(refused.value) and "--yes" in str(refused.value)
-    with pytest.raises(Diagnostic, match="asks addresses 1 to 255, about 20 s"):
+    with pytest.raises(Diagnostic, match="asks addresses 1 to 255, about 40 s"):
         await search.run([9600], True)
     assert port.opened == []
 
@@ -269,3 +269,33 @@ async def test_a_module_that_stores_the_stop_is_taken_out_of_download_mode(tmp_p
         device.program.download(0)
     await running
     assert at_rest(port) == [True, True] and not any(device.program.storing for device in port.devices)
+
+
+@pytest.mark.parametrize("at", [100, 900, 1500])
+async def test_a_byte_that_is_lost_on_the_way_hides_no_module(tmp_path, at):
+    port = Port(tmp_path, line(*LINE))
+    found, search = scanning(port)
+    written = Port.opener
+
+    async def opener(connection, naming):
+        opened = await written(port, connection, naming)
+        [pipe], write, sent = port.pipes, port.pipes[0].write, []
+
+        def losing(data):
+            before = sum(map(len, sent))
+            sent.append(data)
+            return write(data[1:] if before <= at < before + len(data) else data)
+
+        pipe.write = losing
+        return opened
+
+    search = Scanning(port.session, opener, parse("/dev/ttyUSB9?dialect=tmcl"), lambda drive: found.append(drive))
+    await search.run([9600], True)
+    assert [each.state.address for each in found] == list(LINE)
+
+
+async def test_a_line_that_goes_on_losing_bytes_is_said(tmp_path):
+    port = Port(tmp_path, f"seed = 3\n{line(*LINE)}[bus.faults]\ndrop = 0.01\n")
+    _, search = scanning(port)
+    await search.run([9600], True)
+    assert any("the line loses bytes: modules at " in text and "may have been missed" in text for text in port.told())
