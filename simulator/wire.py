@@ -289,7 +289,7 @@ class Wire:
 
     def disturb(self, faults: Faults, rng: Random | None = None) -> None:
         """Have these faults from now on; `rng`: drawn from another source of chance."""
-        self._faults, self._harmful = faults, faults.harmful
+        self._faults = faults
         self._rng = rng or self._rng
 
     @property

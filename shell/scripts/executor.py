@@ -83,9 +83,7 @@ class _Nobody:
         """Take no notice."""
 
 
-async def run_script(
-    session: Session, script: Script, executed: Executed = lambda result: None, by: By = By.SCRIPT
-) -> None:
+async def run_script(session: Session, script: Script, executed: Executed = lambda result: None) -> None:
     """Execute a script. `executed` gets the result of each line. Raises the first failure."""
     own = script_claims(session, script)
     with hearing(session.subscribe) as heard:
@@ -95,7 +93,7 @@ async def run_script(
             ended_by_loss(execution, {link.name for link, _ in own}),
             ending(execution, _Nobody().ended),
         ):
-            await execution.block(script.body, Frame(dict(script.values), by))
+            await execution.block(script.body, Frame(dict(script.values), By.SCRIPT))
     execution.check_verified()
 
 

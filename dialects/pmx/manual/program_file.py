@@ -36,7 +36,7 @@ class Undecodable(Exception):
 
     def __init__(self, number: int, token: str) -> None:
         super().__init__(f"line {number} holds {token!r}, which this compiler never writes there")
-        self.number, self.token = number, token
+        self.number = number
 
 
 def decompile(lines: Sequence[str]) -> list[str]:
