@@ -18,6 +18,7 @@ TYPED: dict[bytes, list[str]] = {
     b"\x1b[A\x1b[B\x1b[H": ["up", "down", "home"],
     b"\x1bOP\x1bOR\x1b[18~\x1b[[A": ["f1", "f3", "f7", "f1"],
     b"\x1b[6;5~\x1b[1;5D\x1b[1;5Q": ["ctrl+pagedown", "ctrl+left", "ctrl+f2"],
+    b"\x1b[1;5S": ["ctrl+f4"],
     b"\x1b1\x1b9": ["alt+1", "alt+9"],
     b"\x1bMR 5\r": ["escape", "M", "R", "space", "5", "enter"],
     b"\x1bO1=1\r": ["escape", "O", "1", "equals_sign", "1", "enter"],

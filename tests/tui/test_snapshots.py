@@ -118,6 +118,16 @@ def test_snapshot_of_a_stop_that_a_program_survives(snap_compare: Compare, size:
     assert drawn(snap_compare, size, act)
 
 
+@pytest.mark.parametrize("keys", ["", "ctrl+t", "ctrl+a"], ids=["main", "plot", "drives"])
+@pytest.mark.parametrize("size", BOTH)
+def test_snapshot_in_units(snap_compare: Compare, size: str, keys: str) -> None:
+    """`a` has a scale and a travel, `b` one that is not confirmed, `c` none."""
+    session = demo_session()
+    session.units.give("a", {"scale": "5 mm/turn", "zero": "-20 mm", "travel": "-50..600 mm"})
+    session.units.give("b", "-360 deg/turn").sure = False
+    assert drawn(snap_compare, size, after(*filter(None, [keys])), session=session)
+
+
 def test_snapshot_of_values_that_have_grown_old(snap_compare: Compare) -> None:
     assert drawn(snap_compare, "120x40", after(later=3.0))
 

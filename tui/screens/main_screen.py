@@ -125,7 +125,7 @@ class MainScreen(Framed):
         named_key("drive", "ctrl+o", "act.choose_drive", "choose the drive that plain text goes to"),
         named_key("log", "", "act.log", "begin the session log, or end it"),
         named_key("twin", "ctrl+f2", "act.twin", "a twin beside each drive of the line, or none"),
-        named_key("units", "alt+u", "act.units", "positions in units, or in the drives' own numbers"),
+        named_key("units", "ctrl+f4", "act.units", "positions in units, or in the drives' own numbers"),
         named_key("history", "ctrl+r", "act.search_history", "search the lines typed before; again: older"),
         *(
             named_key(f"panel-{each.name}", each.key, f"act.panel('{each.name}')", f"panel: {each.about}")

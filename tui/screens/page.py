@@ -87,6 +87,7 @@ class Page(Framed):
         named_key("help", "f1", "act.help", "help for where you are"),
         Binding("ctrl+o", "act.choose_drive", show=False, priority=True),
         named_key("palette", "ctrl+p", "act.palette", "everything by name: type some letters of it"),
+        named_key("units", "ctrl+f4", "act.units", "positions in units, or in the drives' own numbers"),
     ]
     KEYS: ClassVar[Sequence[tuple[str, str]]] = ()
     """The keys of this page with their meanings."""
