@@ -61,6 +61,11 @@ def _units(session: Session) -> Units:
     return made
 
 
+def _apart(session: Session, drive: Drive, axis: str, steps: int) -> str:
+    """A distance of an axis in its unit, ` (0.5 mm)`; empty where it has no scale."""
+    return imported("multidrop.shell.setting_units:apart")(session.units, drive, axis, steps) if session.scaled else ""
+
+
 class Session(Workspace):
     """Everything that is open, and the path of a command. Needs a running event loop, and belongs to its thread."""
 
@@ -84,7 +89,7 @@ class Session(Workspace):
         (ADDR or BUS:ADDR) that the command line mentions, which are looked for where a URL states no drives.
         """
         super().__init__(settings or Settings(), reconnect)
-        self.automations, self.twins = Automations(self), Twins(self)
+        self.automations, self.twins = Automations(self), Twins(self, partial(_apart, self))
         self.path = LinePath(self)
         self.openings = Openings(self, opener or partial(open_buses, state=self.settings.state), lazy, raw, tried)
         self._background: set[asyncio.Task[Any]] = set()

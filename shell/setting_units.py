@@ -1,4 +1,4 @@
-"""Settings and words of drives in engineering units: for the table of parameters, and for help."""
+"""Settings, words and distances of drives in engineering units: for parameters, help, and twins."""
 
 from __future__ import annotations
 
@@ -36,3 +36,8 @@ def example(units: Units, drive: Drive, name: str) -> str:
     takes = Takes.DISTANCE if found[1] is Takes.PLACE else found[1]
     unit, one = axis.measure.unit_for(takes), f"{abs(1 / axis.measure.value(1, takes)):.6g}"
     return f"{found[1].value}, as in {{12.5 {unit}}}; 1 {unit} is {one} ({axis.scale}){'' if axis.sure else '?'}"
+
+
+def apart(units: Units, drive: Drive, axis: str, steps: int) -> str:
+    """A distance of an axis in its unit, ` (0.5 mm)`; empty where it has no scale."""
+    return units.words(drive, axis, steps, Takes.DISTANCE)

@@ -11,7 +11,7 @@ from multidrop.shell.events import FAILURES, Agreed, Diverged, OnBus, TwinEvent
 from multidrop.shell.twins.comparing import LIMIT
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Callable, Iterator, Sequence
 
     from multidrop.drives.bus import Bus
     from multidrop.drives.drive import Drive
@@ -22,7 +22,9 @@ if TYPE_CHECKING:
 class Twins:
     """The twins of all buses. Their code is imported, and a drive read, only once the first one begins."""
 
-    def __init__(self, workspace: Workspace) -> None:
+    def __init__(self, workspace: Workspace, in_units: Callable[[Drive, str, int], str]) -> None:
+        """`in_units`: a distance of an axis of a drive in its unit, ` (0.5 mm)`; empty: it has none."""
+        self._in_units = in_units
         self.wanted = False
         """Each bus whose drives are found gets twins."""
         self._workspace = workspace
@@ -164,9 +166,12 @@ class Twins:
     def rows(self) -> Iterator[str]:
         for twins in self._buses.values():
             for drive, beside in twins.besides.items():
-                apart = [f"{axis} {steps}".strip() for axis, steps in beside.differences.items()]
+                found = beside.differences.items()
+                apart = [f"{axis} {steps}".strip() for axis, steps in found]
+                units = [each.strip(" ()") for axis, steps in found if (each := self._in_units(drive, axis, steps))]
                 began = f"{self._workspace.wall(beside.begun):%H:%M:%S}"
                 said = f"apart by {', '.join(apart)} steps" if apart else "not compared yet"
+                said += f" ({', '.join(units)})" if units else ""
                 why = f": {', '.join(beside.causes)}" if beside.causes else ""
                 yield f"{self._workspace.display_name(drive)}: a twin since {began}, {said}{why}"
 
@@ -180,7 +185,9 @@ class Twins:
         if isinstance(event, Agreed):
             self._workspace.notify(f"{name}: agrees with its twin again, {when}", bus=bus.name)
             return
-        text = f"{name}: {abs(event.difference)} steps from its twin since {when} (limit {event.limit})"
+        drive, steps = bus.at(event.address), abs(event.difference)
+        units = self._in_units(drive, event.axis, steps)
+        text = f"{name}: {steps} steps{units} from its twin since {when} (limit {event.limit})"
         place = self._workspace.qualified_address(bus.at(event.address))
         hint = f"/twin on {place} sets it anew".replace("  ", " ")
         self._workspace.notify(f"{text}: {', '.join(event.causes)}; {hint}", bus=bus.name, warning=True)
