@@ -21,9 +21,7 @@ from multidrop.shell.events import OnBus, SessionEvent
 from multidrop.shell.session import Session
 
 
-class Sample(NamedTuple):
-    """Position and velocity of one axis of one drive."""
-
+class _Sample(NamedTuple):
     elapsed: float
     """Seconds since the telemetry began."""
     time: float
@@ -32,12 +30,22 @@ class Sample(NamedTuple):
     axis: str
     position: int
     velocity: int
+
+
+class Sample(_Sample):
+    """Position and velocity of one axis of one drive, in its own numbers; as a tuple it has only these."""
+
     unit: str = ""
     """The unit of the two below; empty where the axis has no scale. With `?`: the scale is not confirmed."""
     place: float | None = None
     """The position in that unit."""
     speed: float | None = None
     """The velocity in that unit a second."""
+
+    def in_units(self, unit: str, place: float, speed: float | None) -> Sample:
+        """Add the same in units, and return it."""
+        self.unit, self.place, self.speed = unit, place, speed
+        return self
 
 
 class Samples(Sequence[Sample]):
@@ -79,10 +87,10 @@ class Samples(Sequence[Sample]):
         """The samples of one drive; of one axis of it if that is named."""
         return Samples(row for row in self._rows if row.drive == drive and axis in ("", row.axis))
 
-    def arrays(self) -> dict[str, list[str] | array[float] | array[int]]:
+    def arrays(self, units: bool = False) -> dict[str, list[str] | array[float] | array[int]]:
         """The columns by name: lists of text, arrays of numbers, which numpy takes without a copy.
 
-        Where an axis has a scale: `unit`, `place` and `speed`, too.
+        `units`: also `unit`, `place` and `speed`; these are "" and NaN where an axis has no scale.
         """
         columns: dict[str, list[str] | array[float] | array[int]] = {
             "elapsed": array("d", (row.elapsed for row in self._rows)),
@@ -92,21 +100,21 @@ class Samples(Sequence[Sample]):
             "position": array("q", (row.position for row in self._rows)),
             "velocity": array("q", (row.velocity for row in self._rows)),
         }
-        if any(row.unit for row in self._rows):
+        if units:
             columns["unit"] = [row.unit for row in self._rows]
             for name in ("place", "speed"):
                 values = (getattr(row, name) for row in self._rows)
                 columns[name] = array("d", (math.nan if each is None else each for each in values))
         return columns
 
-    def arrow(self) -> Any:
-        """The columns as a table of pyarrow. Raises Diagnostic where pyarrow is not installed."""
+    def arrow(self, units: bool = False) -> Any:
+        """The columns of `arrays` as a table of pyarrow. Raises Diagnostic where pyarrow is not installed."""
         try:
             import pyarrow
         except ModuleNotFoundError:
             hint = "pip install pyarrow; arrays() needs nothing"
             raise Diagnostic("Arrow needs pyarrow, which is not installed", "samples", hint) from None
-        return pyarrow.table({name: pyarrow.array(column) for name, column in self.arrays().items()})
+        return pyarrow.table({name: pyarrow.array(column) for name, column in self.arrays(units).items()})
 
     def __arrow_c_stream__(self, requested_schema: object = None) -> object:
         """Return the columns for another library that speaks Arrow. Needs pyarrow."""
@@ -173,7 +181,7 @@ class AsyncTelemetry:
         if drive is None or (place := self._shell.units.given(drive, read.axis, read.position, Takes.PLACE)) is None:
             return found
         speed = self._shell.units.given(drive, read.axis, read.velocity, Takes.VELOCITY)
-        return found._replace(unit=place[1], place=place[0], speed=speed[0] if speed is not None else None)
+        return found.in_units(place[1], place[0], speed[0] if speed is not None else None)
 
     def close(self) -> None:
         """End it. Samples that came can still be taken. May be called again."""
