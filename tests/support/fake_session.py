@@ -32,7 +32,7 @@ from multidrop.shell.prompt.complete import Completion
 from multidrop.shell.roles import RunningPlot, Series
 from multidrop.shell.state.backups import Drafts
 from multidrop.shell.stop_report import Found, Tally
-from multidrop.shell.units import Axis
+from multidrop.shell.units import Axis, Units
 from multidrop.transports import TransportLost, Unreachable
 from multidrop.tui.app import MultidropApp
 from multidrop.tui.assist import Assist, StartEntry
@@ -131,22 +131,22 @@ class FakeMacros:
         return self.kept[name]
 
 
-class FakeUnits:
+class FakeUnits(Units):
     """The scales of drives, by address and axis, with what they rest on: 51200 steps a turn."""
 
     def __init__(self) -> None:
         self.shown = True
-        self.axes: dict[tuple[str, str], Axis] = {}
+        self.given_axes: dict[tuple[str, str], Axis] = {}
 
     def give(self, address: str, scale: str | dict[str, Any], axis: str = "", turn: int = 51200) -> Axis:
-        found = self.axes[address, axis] = Axis(scale_of(scale))
+        found = self.given_axes[address, axis] = Axis(scale_of(scale))
         found.accept(Basis((("MS", "256"),), Fraction(turn)))
         return found
 
-    def of(self, drive: FakeDrive, axis: str = "") -> Axis | None:
-        return self.axes.get((drive.address, axis))
+    def of(self, drive: Any, axis: str = "") -> Axis | None:
+        return self.given_axes.get((drive.address, axis))
 
-    def referenced(self, drive: FakeDrive, axis: str) -> bool:
+    def referenced(self, drive: Any, axis: str) -> bool:
         return not drive.unreferenced & {axis, ""}
 
 

@@ -125,6 +125,16 @@ async def test_search_compare_and_differences_only() -> None:
 
 
 @at_screen
+async def test_values_are_followed_by_what_they_are_in_units() -> None:
+    async with on_screen() as (pilot, _, session):
+        session.units.give("a", "5 mm/turn")
+        page = await opened(pilot, session)
+        shown = page.lines("table").plain.splitlines()
+        assert [each for each in shown if " VM " in each and "600000 steps/s" in each and "58.59375 mm/s" in each]
+        assert [each for each in shown if " MS " in each and "mm" not in each]
+
+
+@at_screen
 async def test_a_value_is_checked_then_shown_then_sent_and_read_again() -> None:
     async with on_screen() as (pilot, _, session):
         page = await opened(pilot, session)
