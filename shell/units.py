@@ -10,11 +10,12 @@ leaves the travel of its axis is asked about. For that, the position is read bef
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from contextvars import ContextVar
 from dataclasses import dataclass, replace
 from fractions import Fraction
-from typing import TYPE_CHECKING
+from functools import partial
+from typing import TYPE_CHECKING, NamedTuple
 from weakref import WeakKeyDictionary
 
 from multidrop.dialects import Diagnostic, DriveError, Procedure, Refused
@@ -80,6 +81,15 @@ class Line:
     text: str
     check: Check | None = None
     values: str = ""
+
+
+class Compared(NamedTuple):
+    """A quantity in a condition: the drive's own number, not rounded, and what runs right before the question."""
+
+    number: float
+    check: Check
+    shown: Callable[[float], str]
+    """Shows a value of the drive with its unit."""
 
 
 class Units:
@@ -361,11 +371,8 @@ class Units:
 
     # Quantities in conditions
 
-    async def condition(self, drive: Drive, question: str, text: str, within: bool = False) -> tuple[float, Check]:
-        """Convert a quantity that is compared with the value of a question; `within`: it is a tolerance.
-
-        Returns the drive's own number, not rounded, and what runs right before the question.
-        """
+    async def condition(self, drive: Drive, question: str, text: str, within: bool = False) -> Compared:
+        """Convert a quantity that is compared with the value of a question; `within`: it is a tolerance."""
         found = drive.family.units.reads(drive.state, question)
         if found is None:
             raise Diagnostic(
@@ -381,7 +388,8 @@ class Units:
             self._check_referenced([drive], axis)
         number = measure.number(given, takes)
         check = await self._check(drive, [axis], None, question)
-        return (abs(number) if within else number), check
+        shown = partial(measure.shown, takes=found[1])
+        return Compared(abs(number) if within else number, check, shown)
 
     async def reading(self, drive: Drive, axis: str, what: str, unit: str) -> float:
         """Read the position or the velocity of an axis in a unit; what its scale rests on comes first.

@@ -363,7 +363,9 @@ class Execution:
             return
         within = evaluate(tree.within, found)
         wanted = f"{tree.sign} {quoted(evaluate(tree.right, found))}" + (f" +- {written(within)}" if within else "")
-        raise CheckFailed(f"{text}: wanted {wanted}, seen {quoted(evaluate(tree.left, found))}")
+        seen = quoted(evaluate(tree.left, found))
+        units = (f" ({each.shown(number(found[word]))})" for word, each in checks.items())
+        raise CheckFailed(f"{text}: wanted {wanted}, seen {seen}{''.join(units)}")
 
     async def _expect(self, text: str, frame: Frame) -> None:
         wanted, seconds = words.expectation(text)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
-from types import MappingProxyType
+from typing import TYPE_CHECKING
 
 from multidrop.dialects import Diagnostic, DriveError
 from multidrop.drives.drive import Check, Drive
@@ -26,6 +26,9 @@ from multidrop.shell.scripts.expression import (
 )
 from multidrop.shell.session import Session
 from multidrop.shell.workspace import Workspace
+
+if TYPE_CHECKING:
+    from multidrop.shell.units import Compared
 
 
 class Place:
@@ -62,8 +65,8 @@ class Place:
             self._at = self._workspace.place
 
 
-Checks = dict[Word, Check]
-"""What runs right before a question, because a quantity is compared with its value."""
+Checks = dict[Word, "Compared"]
+"""The questions with whose values quantities are compared."""
 
 
 async def converted(session: Session, tree: Expression, place: Place | None = None) -> tuple[Expression, Checks]:
@@ -84,18 +87,13 @@ async def converted(session: Session, tree: Expression, place: Place | None = No
         if isinstance(each, Measured) and word is not None:
             drive = drive_of(session, word, place)
             question, within = _question(session, drive, word), part == "within"
-            value, checks[word] = await session.units.condition(drive, question, each.text, within)
-            found = replace(found, **{part: Constant(value)})  # type: ignore[arg-type]
+            checks[word] = compared = await session.units.condition(drive, question, each.text, within)
+            found = replace(found, **{part: Constant(compared.number)})  # type: ignore[arg-type]
     return found, checks
 
 
 async def known(
-    session: Session,
-    tree: Expression,
-    values: Mapping[str, str],
-    by: By,
-    place: Place | None = None,
-    checks: Mapping[Word, Check] = MappingProxyType({}),
+    session: Session, tree: Expression, values: Mapping[str, str], by: By, place: Place | None, checks: Checks
 ) -> dict[Name | Word, Value]:
     """Find the value of each name and word of an expression; each word is read once.
 
@@ -107,7 +105,7 @@ async def known(
             if isinstance(each, Name):
                 found[each] = value_of(values[each.name])
             else:
-                found[each] = await ask(session, each, by, place, checks.get(each))
+                found[each] = await ask(session, each, by, place, checks[each].check if each in checks else None)
     return found
 
 

@@ -128,7 +128,7 @@ async def wait(call: Call) -> None:
         drive, condition, check = call.drive(wanted.value.target), wanted.value, None
         if condition.quantity:
             line = waits.question(call.session, drive, condition)
-            number, check = await call.session.units.condition(drive, line, condition.quantity)
+            number, check, _ = await call.session.units.condition(drive, line, condition.quantity)
             condition = replace(condition, value=number)
         await waits.wait_value(call.session, drive, condition, wanted.limit, check)
     else:

@@ -401,7 +401,7 @@ async def test_a_script_keeps_quantities_and_a_value_may_be_one(tmp_path):
 async def test_a_condition_with_a_quantity_fails_and_is_refused_as_a_line_is(tmp_path):
     async with opened(tmp_path, units={"a": "5 mm/turn"}) as shop:
         for line, named in (
-            ("/assert @a P > {2.9 mm}", "wanted > 29696, seen 0"),
+            ("/assert @a P > {2.9 mm}", "wanted > 29696, seen 0 (0 mm)"),
             ("/assert @a P > {3 deg}", "the scale of the axis is 5 mm/turn"),
             ("/assert @a P + 1 > {3 mm}", "is not compared with one word of a drive"),
             ("/assert @a R1 > {3 mm}", "prints no quantity"),
