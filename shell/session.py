@@ -52,6 +52,7 @@ _MAYBE_QUANTITY = re.compile(r"\{|\d ?[A-Za-z]\w*(?:/\w+)?(?![\w/])")
 _published: ContextVar[list[BaseException] | None] = ContextVar("published", default=None)
 """The failures published in this task's outermost `run`."""
 BARE_WORDS = {"exit": "/quit", "quit": "/quit", "help": "/help", "?": "/help"}
+TRAVEL = "multidrop.shell.travel:ask"
 CALL = "multidrop.shell.verbs.call:Call"
 """One use of a verb; it knows this class, so this module has only its name."""
 
@@ -270,8 +271,9 @@ class LinePath:
         self._allow(by)
         text, check, values, stops = parsed.text, None, "", drive.stops
         if session.scaled or _MAYBE_QUANTITY.search(text):
-            line = await session.units.line(drive, text, by)
+            line = await session.units.line(drive, text)
             text, check, values = Command(line.text), line.check, line.values
+            await imported(TRAVEL)(session.units, drive, text, by)
         await self.guard(drive, text, by)
         if drive.stops != stops:
             raise Stopped(f"a stop came before '{text.strip()}' was sent")

@@ -1,17 +1,15 @@
-"""Engineering units at work: the scales of open drives, quantities in lines, the travel of moves.
+"""Engineering units at work: the scales of open drives, quantities in lines.
 
 Theory of operation. A line with a quantity becomes a line in the drive's own language before anything else asks about
 it: guards, recorders of motion and the drive never see a quantity. What the scale rests on was read before, at the
 opening or by `/units`. It is read again in the same conversation right before the line, and where it differs nothing is
-sent (`Drive.send`, `check`). The line is not converted with the new values: a person has to look first. A move that
-leaves the travel of its axis is asked about. For that, the position is read before the line.
+sent (`Drive.send`, `check`). The line is not converted with the new values: a person has to look first.
 """
 
 from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterable, Sequence
-from contextvars import ContextVar
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import partial
@@ -34,8 +32,7 @@ from multidrop.dialects.units import (
 )
 from multidrop.drives.drive import confirmed_motion
 from multidrop.drives.events import Unsolicited
-from multidrop.shell.configuration import TRAVEL
-from multidrop.shell.events import By, OnBus, SessionEvent
+from multidrop.shell.events import OnBus, SessionEvent
 from multidrop.shell.line_syntax import EVERYONE
 
 if TYPE_CHECKING:
@@ -43,8 +40,6 @@ if TYPE_CHECKING:
     from multidrop.drives.drive import Check, Drive
     from multidrop.shell.workspace import Workspace
 
-BEYOND: ContextVar[bool] = ContextVar("beyond", default=False)
-"""The moves of this task may leave their travel."""
 _BRACES = re.compile(r"\{\s*[+-]?[.,]?\d[^{}\"]*\s[^{}\"]*\}")
 """Braces that hold a number and more: a quantity, or one that is written wrongly."""
 _BARE = re.compile(r"([+-]?(?:\d+[.,]?\d*|[.,]\d+)) ?([A-Za-z]\w*?(?:/(?:s2|s|min))?)(?![a-z0-9_/])", re.ASCII)
@@ -96,7 +91,7 @@ class Units:
     """The units of one session."""
 
     def __init__(self, workspace: Workspace) -> None:
-        self._workspace = workspace
+        self.workspace = workspace
         self.shown = True
         """Positions are shown in units where an axis has a scale."""
         self._axes: WeakKeyDictionary[Drive, dict[str, Axis]] = WeakKeyDictionary()
@@ -104,7 +99,7 @@ class Units:
 
     def _overhear(self, event: SessionEvent) -> None:
         """Note the commands of others that show: an echo of another master's, or a program's print for a drive."""
-        bus = self._workspace.buses.get(event.bus) if isinstance(event, OnBus) else None
+        bus = self.workspace.buses.get(event.bus) if isinstance(event, OnBus) else None
         if bus is None or not isinstance(event, OnBus) or not isinstance(event.event, Unsolicited):
             return
         for drive in bus.drives.values() if any(each.anchored for each in bus.drives.values()) else ():
@@ -117,7 +112,7 @@ class Units:
                 if lost:
                     drive.state.reference_lost(lost)
                     why = f"'{text}' of another sender: its places are not referenced"
-                    self._workspace.notify(f"{self._name(drive, '')}: {why}", bus=bus.name, warning=True)
+                    self.workspace.notify(f"{self.name(drive, '')}: {why}", bus=bus.name, warning=True)
 
     # Scales
 
@@ -125,7 +120,7 @@ class Units:
     def own(self) -> tuple[str, ...]:
         """The own units of the configuration, and those in which a simulated cell has scales."""
         scales = (axis.scale for axes in self._axes.values() for axis in axes.values())
-        return (*self._workspace.settings.own_units, *(each.kind for each in scales if each.kind == each.unit.name))
+        return (*self.workspace.settings.own_units, *(each.kind for each in scales if each.kind == each.unit.name))
 
     def axes(self, drive: Drive) -> dict[str, Axis]:
         """The scales of a drive by axis, as in `Motion.axis`."""
@@ -144,11 +139,11 @@ class Units:
 
     def _configured(self, drive: Drive) -> dict[str, Scale]:
         """The scales of a line's drives: those of its simulated cell, and before them those of its saved connection."""
-        bus = self._workspace.buses.get(drive.link.name)
+        bus = self.workspace.buses.get(drive.link.name)
         if bus is None or bus.link is not drive.link:
             return {}
-        record = self._workspace.of(bus)
-        saved = self._workspace.settings.connections.get(record.connection.name) if record.connection else None
+        record = self.workspace.of(bus)
+        saved = self.workspace.settings.connections.get(record.connection.name) if record.connection else None
         return {**record.opened.units, **(saved.units if saved is not None else {})}
 
     def of(self, drive: Drive, axis: str = "") -> Axis | None:
@@ -186,20 +181,20 @@ class Units:
         axes = self.axes(drive)
         axes[axis] = Axis(scale)
         _anchor(drive, axes)
-        self._workspace.scaled = True
+        self.workspace.scaled = True
         return axes[axis]
 
     async def confirm(self, drive: Drive) -> None:
         """Read what the scales of a drive rest on, and take it as it is. Raises DriveError or TransportLost."""
         for name, axis in self.axes(drive).items():
-            axis.accept(await self._read(drive, name, axis.scale))
+            axis.accept(await self.read(drive, name, axis.scale))
             if _runs(drive):
                 axis.sure = False
-        self._workspace.changed()
+        self.workspace.changed()
 
     async def opened(self, bus: Bus) -> None:
         """Read what the scales of a bus rest on; say which of them are for no drive, or cannot be read."""
-        workspace = self._workspace
+        workspace = self.workspace
         for drive in bus.drives.values():
             try:
                 await self.confirm(drive)
@@ -216,12 +211,12 @@ class Units:
                 if address not in known or name.lower() not in axes:
                     workspace.notify(f"{bus.name}: units has {key}, which no drive there is", warning=True)
 
-    async def _read(self, drive: Drive, axis: str, scale: Scale) -> Basis:
+    async def read(self, drive: Drive, axis: str, scale: Scale) -> Basis:
         return await drive.run(drive.family.units.basis(drive.state, axis, scale.full_steps))
 
     async def measure(self, drive: Drive, axis: str) -> Measure:
         """The measure of an axis; what it rests on is read where it was not. Raises Diagnostic where there is none."""
-        found, name = self.of(drive, axis), self._name(drive, axis)
+        found, name = self.of(drive, axis), self.name(drive, axis)
         if found is None:
             raise Diagnostic(f"{name} has no scale", "", f"/units {name} 5 mm/turn gives it one")
         if found.basis is None:
@@ -230,22 +225,19 @@ class Units:
             raise Diagnostic(f"{name}: {found.problem}")
         return found.measure
 
-    def _name(self, drive: Drive, axis: str) -> str:
-        shown = self._workspace.display_name(drive) or drive.shown
+    def name(self, drive: Drive, axis: str) -> str:
+        shown = self.workspace.display_name(drive) or drive.shown
         return f"{shown}.{axis}" if axis else shown
 
     # Quantities in lines
 
-    async def line(self, drive: Drive, text: str, by: By) -> Line:
-        """Convert the quantities of a line for a drive, and ask before a move that leaves its travel.
+    async def line(self, drive: Drive, text: str) -> Line:
+        """Convert the quantities of a line for a drive.
 
         Raises Diagnostic for a quantity that the line or the axis cannot take, Refused in program mode.
         """
         found = self._quantities(drive, text)
-        line = await self._converted(drive, text, found) if found else Line(text)
-        if not drive.programming:
-            await self._travel(drive, line.text, by)
-        return line
+        return await self._converted(drive, text, found) if found else Line(text)
 
     def _quantities(self, drive: Drive, text: str) -> list[re.Match[str]]:
         """The quantities of a line. Raises Diagnostic for one that is written wrongly."""
@@ -264,16 +256,16 @@ class Units:
         return found
 
     async def _converted(self, drive: Drive, text: str, found: Sequence[re.Match[str]]) -> Line:
-        name = self._workspace.display_name(drive) or drive.shown
+        name = self.workspace.display_name(drive) or drive.shown
         if drive.programming:
             raise Refused(f"{name} is in program mode, which takes no quantity; nothing was sent")
-        drives = self._meant(drive)
+        drives = self.meant(drive)
         fields = {field.start: field for field in drive.family.units.fields(drives[0].state, text)}
         for match in found:
             if match.start() not in fields:
                 valid = f"valid: {drive.family.units.words}, each with one"
                 raise Diagnostic(f"{match[0]}: no quantity is taken here; nothing was sent", text.strip(), valid)
-        target = await self._target(drives, fields.values())
+        target = await self.target(drives, fields.values())
         pieces, values, at, wanted = [], [], 0, set[str]()
         for match in found:
             field = fields[match.start()]
@@ -292,16 +284,16 @@ class Units:
         sent = "".join(pieces) + text[at:]
         return Line(sent, await self._check(drive, sorted(wanted), target, sent), ", ".join(values))
 
-    def _meant(self, drive: Drive) -> list[Drive]:
+    def meant(self, drive: Drive) -> list[Drive]:
         """The drives that a line goes to."""
         if drive.address not in EVERYONE:
             return [drive]
-        found = self._workspace.bus(drive.link.name).all_drives
+        found = self.workspace.bus(drive.link.name).all_drives
         if not found:
             raise Diagnostic(f"{drive.link.name}: no drive has replied, so no scale is known; nothing was sent")
         return found
 
-    async def _target(self, drives: Sequence[Drive], fields: Iterable[Field]) -> Takes | None:
+    async def target(self, drives: Sequence[Drive], fields: Iterable[Field]) -> Takes | None:
         """Read what a target means to each of these drives. Raises Diagnostic where they differ."""
         if not any(field.takes is Takes.TARGET for field in fields):
             return None
@@ -315,20 +307,20 @@ class Units:
         found = [await self.measure(each, axis) for each in drives]
         for each, other in zip(drives, found, strict=True):
             if (other.count, other.scale.zero, other.basis) != (found[0].count, found[0].scale.zero, found[0].basis):
-                names = f"{self._name(drives[0], axis)} and {self._name(each, axis)}"
+                names = f"{self.name(drives[0], axis)} and {self.name(each, axis)}"
                 raise Diagnostic(f"{names} have different scales; nothing was sent", "", "name one drive")
         return found[0]
 
     def _check_referenced(self, drives: Sequence[Drive], axis: str) -> None:
         for each in drives:
             if not self.referenced(each, axis):
-                name = self._name(each, axis)
+                name = self.name(each, axis)
                 hint = f"home it, or /units here {name} 0 {axis_unit(self.of(each, axis))} where it is"
                 raise Diagnostic(f"the position of {name} is not referenced; nothing was sent", "", hint)
 
     async def _check(self, drive: Drive, axes: Sequence[str], target: Takes | None, text: str) -> Check:
         """What runs right before a line: what its quantities rest on is read again, of every drive that takes it."""
-        drives = self._meant(drive)
+        drives = self.meant(drive)
         rests = {each: [(axis, self.axes(each)[axis]) for axis in axes] for each in drives}
 
         def check(each: Drive) -> Procedure[None]:
@@ -355,16 +347,16 @@ class Units:
         """Read what a scale rests on. Raises Differs where it is not what was accepted."""
         found = yield from drive.family.units.basis(drive.state, name, axis.scale.full_steps)
         if axis.basis is None or found.settings != axis.basis.settings:
-            self._lost(drive, name, axis)
+            self.lost(drive, name, axis)
             before = dict(axis.basis.settings) if axis.basis is not None else {}
             was = [
                 f"{key} was {before.get(key)} and is {now} now" for key, now in found.settings if before.get(key) != now
             ]
-            hint = f"/units {self._name(drive, name)} takes it as it is now"
+            hint = f"/units {self.name(drive, name)} takes it as it is now"
             raise Differs(f"{drive.shown}: {', '.join(was)}: its scale rests on that, so '{text}' was not sent; {hint}")
         axis.sure = not _runs(drive)
 
-    def _lost(self, drive: Drive, name: str, axis: Axis) -> None:
+    def lost(self, drive: Drive, name: str, axis: Axis) -> None:
         axis.sure = False
         if axis.scale.anchored:
             drive.state.reference_lost([name])
@@ -376,11 +368,11 @@ class Units:
         found = drive.family.units.reads(drive.state, question)
         if found is None:
             raise Diagnostic(
-                f"{text}: '{question}' prints no quantity", self._name(drive, ""), "compare it with a number"
+                f"{text}: '{question}' prints no quantity", self.name(drive, ""), "compare it with a number"
             )
         axis, takes = found
         if drive.programming:
-            raise Refused(f"{self._name(drive, '')} is in program mode, which takes no quantity")
+            raise Refused(f"{self.name(drive, '')} is in program mode, which takes no quantity")
         measure, given = await self.measure(drive, axis), quantity(text.strip("{}"), self.own)
         if within:
             takes = {Takes.PLACE: Takes.DISTANCE, Takes.VELOCITY: Takes.SPEED}.get(takes, takes)
@@ -407,59 +399,6 @@ class Units:
         number = motion.position if takes is Takes.PLACE else motion.velocity
         return float(measure.base(number, takes, wanted))
 
-    # Travel
-
-    async def _travel(self, drive: Drive, text: str, by: By) -> None:
-        """Ask before a move that leaves the travel of its axis; say once where the end is not known."""
-        if drive.address in EVERYONE and not self._workspace.bus(drive.link.name).all_drives:
-            return
-        for each in self._meant(drive):
-            limited = {name: axis for name, axis in self.axes(each).items() if axis.scale.travel is not None}
-            if not limited or not each.starts(text):
-                continue
-            fields = [field for field in each.family.units.fields(each.state, text) if field.moves]
-            ends = each.family.guards is not None and each.family.guards.only_ends(text)
-            if not fields and not ends and each.family.referencing(each.state, text) is None:
-                for name, axis in limited.items():
-                    self._unchecked(each, name, axis, f"the end of '{text}' is not known")
-            for field in fields:
-                if field.axis in limited:
-                    await self._leaves(each, field, limited[field.axis], text, by)
-
-    def _unchecked(self, drive: Drive, name: str, axis: Axis, why: str) -> None:
-        if not axis.told:
-            axis.told = True
-            self._workspace.notify(f"{self._name(drive, name)}: travel not checked: {why}", bus=drive.link.name)
-
-    async def _leaves(self, drive: Drive, field: Field, axis: Axis, text: str, by: By) -> None:
-        name, travel = self._name(drive, field.axis), axis.scale.travel
-        assert travel is not None
-        takes = await self._target([drive], [field]) or field.takes
-        measure = await self.measure(drive, field.axis)
-        now = await self._read(drive, field.axis, axis.scale)
-        if axis.basis is None or now.settings != axis.basis.settings:
-            self._lost(drive, field.axis, axis)
-        if not self.referenced(drive, field.axis):
-            why = "its position is not referenced"
-            if takes is Takes.PLACE:
-                return await self._confirm(f"'{text}' may leave the travel: {why}", name, by)
-            return self._unchecked(drive, field.axis, axis, why)
-        motion = next((each for each in await confirmed_motion(drive) if each.axis == field.axis), None)
-        at_rest = motion is not None and not motion.velocity
-        if motion is None or not (at_rest or takes is Takes.PLACE):
-            return self._unchecked(drive, field.axis, axis, "it moves")
-        number = int(text[field.start : field.stop])
-        end = number if takes is Takes.PLACE else motion.position + number
-        begin = motion.position if at_rest else end
-        axis.told = False
-        if _leaves(measure.exact(begin), measure.exact(end), travel):
-            low, high = (axis.scale.shown(each) for each in travel)
-            await self._confirm(f"'{text}' ends at {measure.shown(end)}, and the travel is {low} to {high}", name, by)
-
-    async def _confirm(self, what: str, name: str, by: By) -> None:
-        if not (BEYOND.get() or TRAVEL in self._workspace.settings.guards.off):
-            await self._workspace.questions.confirm(what, name, by=by, beyond=True)
-
     # Here
 
     async def here(self, drive: Drive, axis: str, text: str) -> Axis:
@@ -468,7 +407,7 @@ class Units:
         await self.confirm(drive)
         motion = next((each for each in await confirmed_motion(drive) if each.axis == axis), None)
         if motion is None or motion.velocity:
-            raise Diagnostic(f"{self._name(drive, axis)} moves", "/units here", "wait until it is at rest")
+            raise Diagnostic(f"{self.name(drive, axis)} moves", "/units here", "wait until it is at rest")
         found = self.axes(drive)[axis]
         if given.unit.kind != measure.scale.kind or given.unit.per:
             raise Diagnostic(f"{given}: the scale is {measure.scale}", "/units here", f"use {measure.unit}")
@@ -479,20 +418,12 @@ class Units:
         if basis is not None:
             found.accept(basis)
         drive.state.referenced(axis)
-        self._workspace.changed()
+        self.workspace.changed()
         return found
 
 
 def axis_unit(axis: Axis | None) -> str:
     return axis.scale.unit.name if axis is not None else "mm"
-
-
-def _leaves(begin: Fraction, end: Fraction, travel: tuple[Fraction, Fraction]) -> bool:
-    """Whether a move ends outside; not where it only comes back towards the travel."""
-    low, high = travel
-    if low <= end <= high:
-        return False
-    return not (end < begin and end > high) and not (begin < end < low)
 
 
 def _names(drive: Drive) -> set[str]:

@@ -22,7 +22,7 @@ from multidrop.shell.programs import transfers
 from multidrop.shell.programs.transfers import Wanted
 from multidrop.shell.scripts.expression import Value, Word, written
 from multidrop.shell.scripts.questions import ask
-from multidrop.shell.units import BEYOND
+from multidrop.shell.travel import BEYOND
 
 if TYPE_CHECKING:
     from multidrop.api.telemetry import AsyncTelemetry

@@ -88,7 +88,7 @@ async def test_a_mode_that_changed_meanwhile_stops_the_line(tmp_path):
     async with opened(tmp_path, ARM, units={"00.x": "1 mm/step"}) as shop:
         await run(shop, "ABS")
         drive = shop.session.drive()
-        line = await shop.session.units.line(drive, "X{2 mm}", By.OPERATOR)
+        line = await shop.session.units.line(drive, "X{2 mm}")
         await run(shop, "INC")
         with pytest.raises(Differs, match="ABS or INC was set meanwhile; 'X2' was not sent"):
             await drive.send(line.text, line.check)

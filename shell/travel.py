@@ -1,0 +1,83 @@
+"""The travel of axes: a move whose end is known, and leaves it, is asked about. A help for people, and no limit switch.
+
+The position is read before the line. Where the end is not known (a velocity, a program, a move in motion) that is said
+once. A move back towards the travel is never asked about.
+"""
+
+from __future__ import annotations
+
+from contextvars import ContextVar
+from fractions import Fraction
+
+from multidrop.dialects.units import Field, Takes
+from multidrop.drives.drive import Drive, confirmed_motion
+from multidrop.shell.configuration import TRAVEL
+from multidrop.shell.events import By
+from multidrop.shell.line_syntax import EVERYONE
+from multidrop.shell.units import Axis, Units
+
+BEYOND: ContextVar[bool] = ContextVar("beyond", default=False)
+"""The moves of this task may leave their travel."""
+
+
+async def ask(units: Units, drive: Drive, text: str, by: By) -> None:
+    """Ask before a move that leaves the travel of its axis; say once where the end is not known."""
+    if drive.programming or (drive.address in EVERYONE and not units.workspace.bus(drive.link.name).all_drives):
+        return
+    for each in units.meant(drive):
+        limited = {name: axis for name, axis in units.axes(each).items() if axis.scale.travel is not None}
+        if not limited or not each.starts(text):
+            continue
+        fields = [field for field in each.family.units.fields(each.state, text) if field.moves]
+        ends = each.family.guards is not None and each.family.guards.only_ends(text)
+        if not fields and not ends and each.family.referencing(each.state, text) is None:
+            for name, axis in limited.items():
+                _unchecked(units, each, name, axis, f"the end of '{text}' is not known")
+        for field in fields:
+            if field.axis in limited:
+                await _check(units, each, field, limited[field.axis], text, by)
+
+
+def _unchecked(units: Units, drive: Drive, name: str, axis: Axis, why: str) -> None:
+    if not axis.told:
+        axis.told = True
+        units.workspace.notify(f"{units.name(drive, name)}: travel not checked: {why}", bus=drive.link.name)
+
+
+async def _check(units: Units, drive: Drive, field: Field, axis: Axis, text: str, by: By) -> None:
+    name, travel = units.name(drive, field.axis), axis.scale.travel
+    assert travel is not None
+    takes = await units.target([drive], [field]) or field.takes
+    measure = await units.measure(drive, field.axis)
+    now = await units.read(drive, field.axis, axis.scale)
+    if axis.basis is None or now.settings != axis.basis.settings:
+        units.lost(drive, field.axis, axis)
+    if not units.referenced(drive, field.axis):
+        why = "its position is not referenced"
+        if takes is Takes.PLACE:
+            return await _confirm(units, f"'{text}' may leave the travel: {why}", name, by)
+        return _unchecked(units, drive, field.axis, axis, why)
+    motion = next((each for each in await confirmed_motion(drive) if each.axis == field.axis), None)
+    at_rest = motion is not None and not motion.velocity
+    if motion is None or not (at_rest or takes is Takes.PLACE):
+        return _unchecked(units, drive, field.axis, axis, "it moves")
+    number = int(text[field.start : field.stop])
+    end = number if takes is Takes.PLACE else motion.position + number
+    begin = motion.position if at_rest else end
+    axis.told = False
+    if _leaves(measure.exact(begin), measure.exact(end), travel):
+        low, high = (axis.scale.shown(each) for each in travel)
+        await _confirm(units, f"'{text}' ends at {measure.shown(end)}, and the travel is {low} to {high}", name, by)
+
+
+async def _confirm(units: Units, what: str, name: str, by: By) -> None:
+    if not (BEYOND.get() or TRAVEL in units.workspace.settings.guards.off):
+        await units.workspace.questions.confirm(what, name, by=by, beyond=True)
+
+
+def _leaves(begin: Fraction, end: Fraction, travel: tuple[Fraction, Fraction]) -> bool:
+    """Whether a move ends outside; not where it only comes back towards the travel."""
+    low, high = travel
+    if low <= end <= high:
+        return False
+    return not (end < begin and end > high) and not (begin < end < low)
