@@ -226,7 +226,7 @@ class UsbLine(NoisyLine):
     @contextlib.contextmanager
     def _noise(self) -> Iterator[None]:
         level = self.setup.level
-        self._plugged.faults = UsbFaults(level, self.setup.latest, level, level, 0.4, level, level)
+        self._plugged.faults = UsbFaults(level, self.setup.latest, level, level, 2.5, level, level)
         work = asyncio.get_running_loop().create_task(self._disturb())
         try:
             yield
