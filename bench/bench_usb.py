@@ -17,6 +17,7 @@ from random import Random
 
 sys.path.insert(0, str(Path(__file__).parent.parent))
 
+from bench_line import transact
 from report import Row, compared, main
 
 from multidrop.dialects.pmx.host.codec import Pmx
@@ -89,13 +90,13 @@ async def bare(reply_time: float, trips: int) -> tuple[float, float]:
 
 
 async def through_bus(reply_time: float, trips: int) -> tuple[float, float]:
-    """`Bus.ask`, one after the other."""
+    """Requests of a bus, one after the other."""
     floor, sockets = plugged(reply_time)
     bus = Bus("bench", await open_usb(sockets("")))
     bus.start()
 
     async def once() -> str:
-        return str((await bus.link.transact(REQUEST)).reply.text)
+        return str((await transact(bus.link, REQUEST)).reply.text)
 
     try:
         return await timed(once, trips)
