@@ -51,8 +51,8 @@ def _words(command: Command) -> str:
     return f"{where}, typed at {command.typed:.3f}"
 
 
-def _pattern(world: World, command: Command) -> re.Pattern[bytes]:
-    return re.compile(LANGUAGES[world.place(command.line).language].sent(command.text))
+def _left(world: World, command: Command, data: bytes) -> bool:
+    return LANGUAGES[world.place(command.line).language].carries(data, command.text)
 
 
 def _nothing_before(world: World) -> Iterator[str]:
@@ -67,7 +67,7 @@ def _nothing_before(world: World) -> Iterator[str]:
         if key not in after:
             left = b"".join(data for _, port, data in history.written[key[0] :] if port == line)
             after[key] = left.replace(b"\xff\xff", b"\xff") if world.place(each.line).kind == "rfc2217" else left
-        if _pattern(world, each).search(after[key]):
+        if _left(world, each, after[key]):
             yield f"{_words(each)}, stop at {stop.at:.3f}, written after it"
 
 
@@ -75,8 +75,8 @@ def _never_again(world: World) -> Iterator[str]:
     """The bytes of a command leave on two connections."""
     connections = [*_connections(world)]
     for each in world.history.commands.values():
-        pattern, line = _pattern(world, each), each.line + each.who
-        times = [known.at for known in connections if known.line == line and pattern.search(known.data)]
+        line = each.line + each.who
+        times = [known.at for known in connections if known.line == line and _left(world, each, known.data)]
         if len(times) > 1:
             yield f"{_words(each)}, left on the connections of {', '.join(f'{at:.3f}' for at in times)}"
 

@@ -16,6 +16,8 @@ from soak.simulation.clock import SimulatedLoop
 
 FEW = 3
 """Bytes that an empty buffer of a socket takes whole."""
+GATHER = 0.7
+"""How many ports gather the bytes of a reply, as hardware mostly does; the others bring each byte by itself."""
 ROOM = 4095
 """Bytes that a tty takes before a write has to wait."""
 
@@ -73,8 +75,10 @@ class Descriptor:
         if self._waiting:
             return
         self._waiting = True
-        late = self.rng.random() * 0.02 if self.rng.random() < self.climate["late read"] else 0.0
-        self.loop.call_later(late, self._readable)
+        if self.rng.random() < self.climate["late read"]:
+            self.loop.call_later(self.rng.random() * 0.02, self._readable)
+        else:
+            self.loop.call_soon(self._readable)
 
     def _readable(self) -> None:
         self._waiting = False
@@ -100,6 +104,7 @@ class Port(Descriptor, Listener):
         self._received = bytearray()
         self._source = floor.source()
         self._gone = False
+        self.gathers = rng.random() < GATHER
         self._detach = floor.attach(bus, self)
 
     # The kernel's side of a descriptor

@@ -12,6 +12,7 @@ FIXED = {
     2177: "the conditions of a drive that nobody wanted any more, which were read as that was said",
     373: "a view of a relay's bytes, held by the error of a failed send (of the simulation itself)",
     797: "the error of a refused Modbus write, whose flag was read too late, which the next line was blamed for",
+    15: "a terminal that hung up after the end of the story (of the simulation itself)",
     116: "the error of a Modbus write that was refused after its time-out, which the next line was blamed for",
     3025: "a script's line that a macro recorded, and played (of the simulation itself)",
     4478: "a line that waited for the end of a download, taken for one of program mode (of the simulation itself)",

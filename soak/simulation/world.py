@@ -122,6 +122,8 @@ class World:
     session: Session = field(init=False)
     person: Person = field(init=False)
     terminal: Terminal = field(init=False)
+    ending: bool = False
+    """The story is told: this life is the last but one."""
     ready: asyncio.Event = field(default_factory=asyncio.Event)
     """A session is open, and somebody types at it."""
     witnesses: dict[tuple[str, str], Witness] = field(default_factory=dict)
@@ -445,6 +447,7 @@ class World:
     async def end(self) -> None:
         """End the faults, wait until nothing runs, and close; after kills once more, as the next session does."""
         await self.ready.wait()
+        self.ending = True
         self.process.arm(0, "")
         self.cut_ins.hurry()
         self.cut_ins.end()
@@ -490,7 +493,7 @@ class World:
 
     def hang_up(self) -> None:
         """Hang up the terminal: the session ends in an orderly way, and after a while another one begins."""
-        if self.ready.is_set() and not self.process.dead:
+        if self.ready.is_set() and not (self.process.dead or self.ending):
             self.ready.clear()
             self.cut_ins.hurry()
             self.cut_ins.end()
