@@ -509,6 +509,7 @@ class World:
             return  # killed meanwhile, which begins the next life
         process.arm(0, "")
         ending.result()
+        await asyncio.sleep(0.1)  # a look-up of a name that nobody waits for any more ends
         self.stops = sum(not stop.who for stop in self.history.stops)
         self.beside_it.clear()
         opened = [each for each in self.kernel.descriptors.values() if each.owner is process and not each.closed]
