@@ -75,7 +75,9 @@ class Restarts:
             if trouble:
                 self._link.notify(trouble[0], warning=True)
 
-        return asyncio.get_running_loop().create_task(guarded())
+        task = asyncio.get_running_loop().create_task(guarded())
+        task.add_done_callback(lambda done: work.close())  # one that is cancelled before it begins awaits nothing
+        return task
 
     async def _look(self, drive: Drive, sign: str, rested: Mapping[str, int], before: Mapping[str, Value]) -> None:
         """Read the drive once; say a restart that shows, once.
