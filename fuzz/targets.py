@@ -28,6 +28,8 @@ from multidrop.shell import configuration, line_syntax
 from multidrop.shell.connect import urls
 from multidrop.simulator import cells
 from multidrop.simulator.floor import Floor
+from multidrop.transports.performax import PACKET
+from multidrop.transports.usbip import RET_SUBMIT, SUBMIT, Malformed, Transfer, Transfers
 
 Target = Callable[[bytes], object]
 REPLY_LIMIT = 1 << 20
@@ -148,6 +150,23 @@ def modbus_port(data: bytes) -> None:
     assert answered < REPLY_LIMIT
 
 
+def usb(data: bytes) -> None:
+    """The messages of USB/IP, of both sides; then requests and packets to the USB side of a simulated controller."""
+    for answers in (False, True):
+        messages = Transfers(answers)
+        messages.wanted = {1, 2}
+        with contextlib.suppress(Malformed):
+            for each in messages.feed(data):
+                assert each.pack()
+    (side,) = Floor(cells.read(CELL.format("PMX"))).usb("one")
+    for number, at in enumerate(range(0, len(data), 8)):
+        piece = data[at : at + 8]
+        status, reply = side.request(piece.ljust(8, b"\0"))
+        assert status <= 0 and len(reply) <= 255
+        assert side.receive(piece, number * 0.02) == b""
+    assert all(len(each) == PACKET for each in side.replies)
+
+
 def _text(data: bytes) -> str:
     return data.decode("utf-8", "replace")
 
@@ -228,6 +247,7 @@ TARGETS: Mapping[str, Target] = {
     "line": line,
     "port": port,
     "modbus_port": modbus_port,
+    "usb": usb,
     "url": _quietly(urls.parse),
     "configuration": _quietly(lambda text: configuration.parse(text, "multidrop.toml")),
     "cell": _quietly(_cell),
@@ -242,7 +262,18 @@ SEEDS: Mapping[str, tuple[bytes, ...]] = {
     "line": (b"\0\0\0\x0051200\r\n>", b"\1\1\1\x00\x01\x02\r\n"),
     "port": (b"\0PR P\rMR 100\r\x1b", b"\4@00PX\r", b"\5\x01\x04\0\0\0\0\0\0\x05", b"\1PG 100\rLB Ga\rE\rPG\rEX Ga\r"),
     "modbus_port": (bytes.fromhex("00010000000601030057 0002".replace(" ", "")),),
-    "url": (b"/dev/ttyUSB0?drives=a,b&baud=9600", b"tcp://[::1]:503?party=1", b"sim:c.toml#press"),
+    "usb": (
+        Transfer(SUBMIT, 1, 2, length=3, data=b"PX\0").pack(),
+        Transfer(RET_SUBMIT, 1, length=3, data=b"12\0").pack(),
+        bytes.fromhex("8006000100001200 4002010000000000") + b"V1=1234\0",
+    ),
+    "url": (
+        b"/dev/ttyUSB0?drives=a,b&baud=9600",
+        b"tcp://[::1]:503?party=1",
+        b"sim:c.toml#press",
+        b"usb:2ED01@1-1.4",
+        b"usbip://[::1]:3240/1-1",
+    ),
     "configuration": (b'[connections.a]\nurl = "sim:"\nnames = { a = "left" }\n',),
     "cell": (json.dumps("x").encode(), CELL.format("LMDCM").encode()),
     "macro": (b'name = "go"\nkey = "F3"\n[[step]]\nafter = 0.5\nline = "@b MR 100"\n',),

@@ -14,7 +14,7 @@ def test_seeds_and_findings_break_nothing(name):
         TARGETS[name](data)
 
 
-@pytest.mark.parametrize("name", ["decode", "line", "port", "modbus_port", "typed", "program"])
+@pytest.mark.parametrize("name", ["decode", "line", "port", "modbus_port", "usb", "typed", "program"])
 def test_changed_seeds_break_nothing(name):
     @examples(15, 2000)
     @given(st.data())
