@@ -48,6 +48,12 @@ def breaches_in_logs(folder: Path, history: History) -> Iterator[str]:
             )
 
 
+def backups(folder: Path) -> dict[str, str]:
+    """The backups of programs that are on the disk, by path."""
+    found = sorted((folder / "state" / "backups").rglob("*"))
+    return {str(path): path.read_text() for path in found if path.is_file() and path.suffix != ".tmp"}
+
+
 def _is_json(path: Path) -> bool:
     try:
         json.loads(path.read_text())

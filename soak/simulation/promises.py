@@ -8,7 +8,10 @@ from collections.abc import Iterator
 from soak.simulation.outcomes import BARE_COMMAND, became
 from soak.simulation.rule import Granted, Rule
 from soak.simulation.told import Put
-from soak.simulation.world import World
+from soak.simulation.world import NUMBER, World
+
+PLACE = re.compile(r"(?:backup: |before is in )(\S+)")
+"""What names a backup."""
 
 
 def _automation(world: World) -> Iterator[str]:
@@ -34,6 +37,31 @@ def _stored(world: World) -> Iterator[str | Granted]:
             if (each.line, each.drive, each.text) == (put.line, put.drive, put.text) and each.at >= put.at:
                 words = f"{put.line}:{put.drive} {put.text!r} of program mode, executed at {each.at:.3f}"
                 yield Granted(BARE_COMMAND, words) if became(world, each.line, each.at) else words
+
+
+def _programs(world: World) -> Iterator[str | Granted]:
+    """A download of which no trace is left in the drive breaks nothing, and so does one that a power-up took away."""
+    told = world.history.told
+    for run in told.runs.values():
+        done = run.download
+        if done is None or run.began < 0 or done.new == done.old:
+            continue
+        at = world.cut.get((done.line, done.drive), [])
+        if any(run.began <= each <= run.ended for each in at):
+            continue
+        if not run.failure:
+            whole = any(re.findall(NUMBER, done.text)[-1] in line for line in done.new)
+        else:
+            coded = world.place(done.line).language == "pmx"
+            old = [
+                part for line in done.old for part in (re.findall(NUMBER, line) if coded else [line.partition(" ")[2]])
+            ]
+            named = {each for at, text in world.history.notices if at >= run.began for each in PLACE.findall(text)}
+            whole = any(all(each.strip() in told.backups.get(path, "") for each in old) for path in named)
+        if not whole:
+            when = f"{run.began:.3f} to {run.ended:.3f}"
+            words = f"{run.typed!r} from {when} ({run.failure or 'done'}): {done.old}, {done.new}"
+            yield Granted(BARE_COMMAND, words) if became(world, done.line, run.ended) else words
 
 
 def _raw(world: World) -> Iterator[str]:
@@ -68,6 +96,13 @@ PROMISES = (
         "In program mode a line is stored, not executed.",
         "Lines that ask first",
         _stored,
+        (BARE_COMMAND,),
+    ),
+    Rule(
+        "programs",
+        "A download leaves the old program, the new one, or a backup that is named.",
+        "What a report means",
+        _programs,
         (BARE_COMMAND,),
     ),
     Rule("raw", "What leaves in raw mode is what was typed, and stops.", "What a report means", _raw),

@@ -67,6 +67,8 @@ class Put:
 class Told:
     """All of it, in its order."""
 
+    backups: dict[str, str] = field(default_factory=dict)
+    """The backups of programs that are on the disk at the end, by path."""
     runs: dict[str, Run] = field(default_factory=dict)
     """By the typed line."""
     repeated: dict[Line, int] = field(default_factory=dict)

@@ -52,7 +52,7 @@ from soak.simulation.clock import Deadlock, SimulatedLoop
 from soak.simulation.cut_ins import UP, CutIns
 from soak.simulation.disk import Disk
 from soak.simulation.far import share
-from soak.simulation.files_left import breaches_in_logs, unreadable
+from soak.simulation.files_left import backups, breaches_in_logs, unreadable
 from soak.simulation.history import Command, Damage, Executed, Held, History, Outcome, Shown, Stop
 from soak.simulation.kernel import WHO, Kernel
 from soak.simulation.network import Network
@@ -466,6 +466,7 @@ class World:
             await self._live()
             await self._close()
         self.history.unreadable += unreadable(self.folder, "the end", self.history)
+        self.history.told.backups = backups(self.folder)
         self.history.logged += breaches_in_logs(self.folder, self.history)
         for other in self.others:
             await other.leave()
