@@ -214,6 +214,7 @@ SIGNS: Sequence[Entry] = (
     ("□", "at rest without current: nothing holds the load"),
     ("~", "the position does not count since a restart: home it, set it, or /referenced"),
     ("? ·", "does not reply; not read lately"),
+    ("mm?", "a program ran, or a setting changed, since the scale was confirmed: /units ADDR"),
     ("≠", "the position differs from that of the drive's twin by more than the limit"),
     ("◆", "program mode: lines are stored, not executed"),
 )
