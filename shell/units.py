@@ -9,7 +9,7 @@ sent (`Drive.send`, `check`). The line is not converted with the new values: a p
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import partial
@@ -266,13 +266,14 @@ class Units:
                 valid = f"valid: {drive.family.units.words}, each with one"
                 raise Diagnostic(f"{match[0]}: no quantity is taken here; nothing was sent", text.strip(), valid)
         target = await self.target(drives, fields.values())
-        pieces, values, at, wanted = [], [], 0, set[str]()
+        pieces, values, at, used, placed = [], [], 0, dict[str, Measure](), set[str]()
         for match in found:
             field = fields[match.start()]
             takes = target if field.takes is Takes.TARGET and target is not None else field.takes
             given, measure = quantity(match[0][1:-1], self.own), await self._common(drives, field.axis)
             if takes is Takes.PLACE:
                 self._check_referenced(drives, field.axis)
+                placed.add(field.axis)
             try:
                 number = measure.native(given, takes)
             except Diagnostic as problem:
@@ -280,9 +281,9 @@ class Units:
             pieces += [text[at : match.start()], str(number)]
             values.append(measure.shown(number, takes))
             at = match.end()
-            wanted.add(field.axis)
+            used[field.axis] = measure
         sent = "".join(pieces) + text[at:]
-        return Line(sent, await self._check(drive, sorted(wanted), target, sent), ", ".join(values))
+        return Line(sent, await self._check(drive, used, target, sent, placed), ", ".join(values))
 
     def meant(self, drive: Drive) -> list[Drive]:
         """The drives that a line goes to."""
@@ -318,14 +319,21 @@ class Units:
                 hint = f"home it, or /units here {name} 0 {axis_unit(self.of(each, axis))} where it is"
                 raise Diagnostic(f"the position of {name} is not referenced; nothing was sent", "", hint)
 
-    async def _check(self, drive: Drive, axes: Sequence[str], target: Takes | None, text: str) -> Check:
-        """What runs right before a line: what its quantities rest on is read again, of every drive that takes it."""
+    async def _check(
+        self, drive: Drive, used: Mapping[str, Measure], target: Takes | None, text: str, placed: Collection[str] = ()
+    ) -> Check:
+        """What runs right before a line: what its quantities rest on is read again, of every drive that takes it.
+
+        `used`: the measures by axis that made its numbers, whatever is accepted meanwhile. `placed`: the axes of its
+        places.
+        """
         drives = self.meant(drive)
-        rests = {each: [(axis, self.axes(each)[axis]) for axis in axes] for each in drives}
 
         def check(each: Drive) -> Procedure[None]:
-            for name, axis in rests[each]:
-                yield from self._same(each, name, axis, text)
+            for name, measure in used.items():
+                yield from self._same(each, name, measure, text)
+                if name in placed and not self.referenced(each, name):
+                    raise Differs(f"{self.name(each, name)}: its reference was lost meanwhile; '{text}' was not sent")
             units = each.family.units
             if target is not None and units.target is not None and (yield from units.target(each.state)) is not target:
                 raise Differs(f"{each.shown}: ABS or INC was set meanwhile; '{text}' was not sent")
@@ -343,12 +351,15 @@ class Units:
 
         return still
 
-    def _same(self, drive: Drive, name: str, axis: Axis, text: str) -> Procedure[None]:
-        """Read what a scale rests on. Raises Differs where it is not what was accepted."""
-        found = yield from drive.family.units.basis(drive.state, name, axis.scale.full_steps)
-        if axis.basis is None or found.settings != axis.basis.settings:
+    def _same(self, drive: Drive, name: str, measure: Measure, text: str) -> Procedure[None]:
+        """Read what a scale rests on. Raises Differs where it is not what a measure was made with."""
+        found = yield from drive.family.units.basis(drive.state, name, measure.scale.full_steps)
+        axis = self.axes(drive)[name]
+        if axis.scale != measure.scale:
+            raise Differs(f"{drive.shown}: its scale was changed meanwhile; '{text}' was not sent")
+        if found.settings != measure.basis.settings:
             self.lost(drive, name, axis)
-            before = dict(axis.basis.settings) if axis.basis is not None else {}
+            before = dict(measure.basis.settings)
             was = [
                 f"{key} was {before.get(key)} and is {now} now" for key, now in found.settings if before.get(key) != now
             ]
@@ -379,7 +390,7 @@ class Units:
         elif takes is Takes.PLACE:
             self._check_referenced([drive], axis)
         number = measure.number(given, takes)
-        check = await self._check(drive, [axis], None, question)
+        check = await self._check(drive, {axis: measure}, None, question)
         shown = partial(measure.shown, takes=found[1])
         return Compared(abs(number) if within else number, check, shown)
 
@@ -394,7 +405,7 @@ class Units:
         measure.number(wanted, takes)  # of the same kind
         if takes is Takes.PLACE:
             self._check_referenced([drive], axis)
-        await drive.run(self._same(drive, axis, self.axes(drive)[axis], f"{what} in {unit}"))
+        await drive.run(self._same(drive, axis, measure, f"{what} in {unit}"))
         motion = next(each for each in await drive.motion() if each.axis == axis)
         number = motion.position if takes is Takes.PLACE else motion.velocity
         return float(measure.base(number, takes, wanted))

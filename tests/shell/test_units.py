@@ -219,6 +219,18 @@ async def test_a_changed_setting_refuses_each_quantity_until_a_person_takes_it(t
         assert moves(shop) == ["MR 5120" if change is not by_encoder else "MR 800"]
 
 
+async def test_what_is_accepted_after_a_line_was_converted_does_not_send_it(tmp_path):
+    changes = {"MS was 256 and is 128 now": ["@a MS=128", "/units a"], "scale was": ["/units a 4 mm/turn"]}
+    async with opened(tmp_path, units={"a": "5 mm/turn"}) as shop:
+        drive = shop.session.drive("line", "a")
+        for why, change in changes.items():
+            line = await shop.session.units.line(drive, "MR {1 mm}")
+            await run(shop, *change)
+            with pytest.raises(Differs, match=why):
+                await drive.send(line.text, line.check)
+        assert not [each for each in moves(shop) if each.startswith("MR")]
+
+
 async def test_in_program_mode_a_quantity_is_refused(tmp_path):
     async with opened(tmp_path, units={"a": "5 mm/turn"}) as shop:
         await run(shop, "@a PG 1")
@@ -268,6 +280,16 @@ async def test_a_homing_of_another_sender_that_shows_takes_the_reference(tmp_pat
         assert "a: 'HM 1' of another sender: its places are not referenced" in shop.warned()
         with pytest.raises(Diagnostic, match="the position of a is not referenced"):
             await run(shop, "@a MA {130 mm}")
+
+
+async def test_a_place_is_not_sent_once_its_reference_is_lost(tmp_path):
+    async with opened(tmp_path, units={"a": ANCHORED}) as shop:
+        drive = shop.session.drive("line", "a")
+        line = await shop.session.units.line(drive, "MA {130 mm}")
+        await run(shop, "@a P=5")
+        with pytest.raises(Differs, match="a: its reference was lost meanwhile; 'MA 102400' was not sent"):
+            await drive.send(line.text, line.check)
+        assert moves(shop) == ["P=5"]
 
 
 async def test_a_set_position_is_a_reference_where_the_scale_has_no_zero(tmp_path):
