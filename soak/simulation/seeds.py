@@ -17,6 +17,7 @@ FIXED = {
     3025: "a script's line that a macro recorded, and played (of the simulation itself)",
     4478: "a line that waited for the end of a download, taken for one of program mode (of the simulation itself)",
     10177: "a value of a drive that was without power, set while the question ran (of the simulation itself)",
+    14645666: "a backup in a state folder whose own name was not synced, lost in a power cut",
     12175655: "the K of another client's OK, which was shown as a value",
 }
 DERIVED = 12

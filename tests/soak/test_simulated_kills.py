@@ -7,6 +7,7 @@ import gc
 import os
 from collections.abc import Awaitable, Callable, Iterator
 from contextlib import ExitStack
+from datetime import datetime
 from functools import partial
 from pathlib import Path
 from random import Random
@@ -15,6 +16,7 @@ import pytest
 
 from multidrop.macros.atomic import create_atomically, make_folder, write_atomically
 from multidrop.shell import threads
+from multidrop.shell.state.backups import write_backup
 from multidrop.shell.state.store import Store
 from soak.simulation.climate import Climate
 from soak.simulation.clock import SimulatedLoop
@@ -242,6 +244,17 @@ def test_a_new_file_in_a_new_folder_survives_a_power_cut(bench: Bench) -> None:
     made: list[Path] = []
     cut(bench, create, 20)
     assert [each.read_bytes() for each in made] == [b"whole"] * 20
+
+
+def test_a_backup_survives_a_power_cut_in_a_state_folder_that_was_just_made(bench: Bench) -> None:
+    def create(path: Path) -> None:
+        state = path.with_name(f"state-{len(made)}")
+        state.mkdir()
+        made.append(write_backup(state, datetime(2026, 1, 1), "l0", "a", ".mxt", "PG"))
+
+    made: list[Path] = []
+    cut(bench, create, 20)
+    assert [each.read_bytes() for each in made] == [b"PG"] * 20
 
 
 def test_a_new_file_whose_name_cannot_be_made_durable_is_not_there(make: Callable[..., Bench]) -> None:
