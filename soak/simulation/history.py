@@ -152,6 +152,8 @@ class History:
     """The kill that is armed is a power cut."""
     unreadable: list[str] = field(default_factory=list)
     """Files that a session could not read at its start."""
+    owing: list[str] = field(default_factory=list)
+    """Drives to which something is owed after the last session."""
     logged: list[str] = field(default_factory=list)
     """Breaches that the session logs show."""
     told: Told = field(default_factory=Told)

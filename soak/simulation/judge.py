@@ -68,6 +68,17 @@ def _logged(world: World) -> Iterator[str]:
     yield from world.history.logged
 
 
+SAID = Grant("a session that says that it cannot", "What a report means")
+
+
+def _restored(world: World) -> Iterator[str | Granted]:
+    said = re.compile(r"may be EM=0 now|the next one cannot repair this port")
+    for found in world.history.owing:
+        line = found[:2]
+        warned = any(line in text and said.search(text) for _, text in world.history.notices)
+        yield Granted(SAID, found) if warned else found
+
+
 def _ends(world: World) -> Iterator[str]:
     yield from world.history.defects
 
@@ -92,6 +103,13 @@ RULES = (
         _readable,
     ),
     Rule("shown", "What the terminal does not show is counted there.", "0013", _shown),
+    Rule(
+        "restored",
+        "A setting that a session has borrowed from a drive is restored by it, or by the next one.",
+        "What a report means",
+        _restored,
+        (SAID,),
+    ),
     Rule("log", "A session log breaks no rule of `log judge`.", "What a report means", _logged),
 )
 

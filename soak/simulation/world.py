@@ -462,10 +462,11 @@ class World:
             self.person.type(b"n")  # the answer to a question, if there is one
             await asyncio.sleep(1.0)
         await self._close()
-        if self.history.lives > 1:
+        if self.history.lives > 1 or self._owing():
             await self._live()
             await self._close()
         self.history.unreadable += unreadable(self.folder, "the end", self.history)
+        self.history.owing += self._owing()
         self.history.told.backups = backups(self.folder)
         self.history.logged += breaches_in_logs(self.folder, self.history)
         for other in self.others:
@@ -479,6 +480,17 @@ class World:
         self.history.defects += [f"task left: {each.get_coro()}" for each in left]
         self.history.defects += [f"open: {each!r}" for each in self.kernel.descriptors.values() if not each.closed]
         self.history.defects += [f"thread left: {each.name}" for each in self.scheduler.running]
+
+    def _owing(self) -> list[str]:
+        """The MCode drives in another echo mode than at the beginning, which no act sets, or in program mode."""
+        found = []
+        for (line, drive), witness in self.witnesses.items():
+            place = self.place(line)
+            if place.language == "mcode":
+                mode, stores = int(witness.device.memory.values["EM"]), witness.device.programming is not None
+                if mode != place.em or stores:
+                    found.append(f"{line}:{drive} has EM={mode}, not {place.em}" + ", and stores lines" * stores)
+        return found
 
     async def _close(self) -> None:
         """Close the session in an orderly way."""
