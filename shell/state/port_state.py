@@ -25,7 +25,7 @@ from urllib.parse import quote
 from multidrop.dialects import DriveState, Owed
 from multidrop.dialects.state import Remembered
 from multidrop.drives.port_journal import Keeper
-from multidrop.macros.atomic import sync_folder
+from multidrop.macros.atomic import make_folder, sync_folder
 from multidrop.shell.state.store import Damaged, Store, digest
 
 if sys.platform == "win32":
@@ -194,7 +194,7 @@ class PortState(Keeper):
 
         Raises BlockingIOError if another process holds it, OSError.
         """
-        self._store.folder.mkdir(parents=True, exist_ok=True)
+        make_folder(self._store.folder)  # a record in it is to survive a power cut
         flags = os.O_RDWR | os.O_CREAT | getattr(os, "O_CLOEXEC", 0)
         line = os.open(self._store.folder / f"{self._name}.line", flags, 0o600)
         try:

@@ -18,6 +18,7 @@ FIXED = {
     4478: "a line that waited for the end of a download, taken for one of program mode (of the simulation itself)",
     10177: "a value of a drive that was without power, set while the question ran (of the simulation itself)",
     14645666: "a backup in a state folder whose own name was not synced, lost in a power cut",
+    13622070: "a folder that a power cut took away, with the echo mode that was owed to a drive",
     12175655: "the K of another client's OK, which was shown as a value",
 }
 DERIVED = 12

@@ -14,6 +14,7 @@ from multidrop.dialects.mcode.host.codec import MCode
 from multidrop.dialects.mcode.host.state import MCodeState
 from multidrop.dialects.state import Remembered
 from multidrop.dialects.tmcl.host.codec import Tmcl, TmclState
+from multidrop.macros import atomic
 from multidrop.shell.state.port_state import MOST, MOST_REPLIED, PortMemory, PortState
 
 PORT = "/dev/serial/by-id/usb-FTDI/RS485: 1"
@@ -323,3 +324,11 @@ def test_a_second_session_on_a_port_reads_the_memory_and_leaves_it_alone(tmp_pat
     assert PortState(tmp_path, "host:503").memory.drives == (B,)
     first.close()
     second.close()
+
+
+def test_the_folder_of_a_record_survives_a_power_cut(tmp_path, monkeypatch):
+    synced = []
+    monkeypatch.setattr(atomic, "sync_folder", synced.append)
+    for _ in range(2):
+        PortState(tmp_path / "state", "port").close()
+    assert synced == [tmp_path / "state", tmp_path], "once, as they are made"
