@@ -184,7 +184,8 @@ class _Session:
 
     def _printed(self, entry: Entry) -> Iterator[tuple[str, str]]:
         exchanges = self._exchanges.get((entry.bus, entry.drive))
-        if exchanges is None:  # they were sent before this part of the log
+        asked = any(key[:2] == (entry.bus, entry.drive) for key in self._last)
+        if exchanges is None or not asked:  # what it answers was typed before the log began
             return
         found = [_named(sent, received, entry.text) for sent, received in exchanges]
         names = {name for each in found if each is not None for name in each}

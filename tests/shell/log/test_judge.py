@@ -185,6 +185,12 @@ def test_a_gap_or_a_new_session_begins_anew(gap: dict[str, Any], tmp_path: Path)
     assert ("after a stop", where + 3) not in found(rows, tmp_path)
 
 
+def test_a_reply_to_what_was_typed_before_the_log_began_is_not_judged(tmp_path: Path) -> None:
+    printed = {"kind": "printed", "bus": "l", "drive": "a", "text": "384112"}
+    assert found([*HEAD, *asked("V", "0"), printed], tmp_path) == []
+    assert found([*HEAD, typed("PR P"), *asked("V", "0"), printed], tmp_path) == [("credited", 6)]
+
+
 def test_what_another_origin_types_meanwhile_is_no_silence(tmp_path: Path) -> None:
     rows = [*HEAD, typed("MR 1", by="macro"), command("MR 1")[0], typed("MR 2"), said("a does not reply", "failed")]
     assert found([*rows, typed("MR 3", by="macro")], tmp_path) == []
