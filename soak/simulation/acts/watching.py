@@ -72,8 +72,8 @@ class WatchedPath(LinePath):
                 history.told.raw.append(put)
                 return put
             drive = session.drive(bus.name, parsed.address)
-            typed_in = drive.programming and drive not in transfers._under_way  # else it waits, and is sent after that
-            if typed_in and (command := history.commands.pop(typed, None)) is not None:
+            waits = drive in transfers._under_way or bus._stopping.tasks  # for the end of program mode
+            if drive.programming and not waits and (command := history.commands.pop(typed, None)) is not None:
                 put = Put(session.now(), command.line, command.drive, command.text)
                 history.told.stored.append(put)
                 return put
