@@ -174,6 +174,12 @@ class Scale:
         """A place in base units, in the scale's unit."""
         return f"{decimal(base / self.unit.factor, 9)} {self.unit.name}"
 
+    @property
+    def shown_travel(self) -> str:
+        """The travel as it is typed, `0..300 mm`; empty without one."""
+        ends = [decimal(each / self.unit.factor) for each in self.travel or ()]
+        return f"{'..'.join(ends)} {self.unit.name}" if ends else ""
+
     def with_zero(self, at: Fraction) -> Scale:
         """The same scale whose position 0 is elsewhere."""
         return Scale(self.value, self.unit, self.of, at, self.travel, self.full_steps, True)

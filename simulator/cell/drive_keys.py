@@ -157,7 +157,7 @@ def read_units(table: Table, axes: Sequence[str] = ("",)) -> Mapping[str, Scale]
 
 
 @dataclass(frozen=True)
-class Motor:
+class AxisScale:
     """The scale of an axis, and the motor steps of the world in a turn of its motor and in one count of its drive.
 
     `turn` None: nothing tells, for the reason `missing`.
@@ -169,12 +169,12 @@ class Motor:
     missing: str = ""
 
 
-UNSCALED = Motor(None, None, Fraction(1))
+UNSCALED = AxisScale(None, None, Fraction(1))
 
 
-def _in_steps(table: Table, motor: Motor) -> Table:
+def _in_steps(table: Table, axis: AxisScale) -> Table:
     """Convert positions with a unit (`"301 mm"`) to motor steps from the world's origin, by the scale without zero."""
-    values, given = dict(table.values), motor.scale
+    values, given = dict(table.values), axis.scale
     for key in POSITIONS:
         several = isinstance(values.get(key), list)
         places = values[key] if several else [values.get(key)]
@@ -185,8 +185,8 @@ def _in_steps(table: Table, motor: Motor) -> Table:
             read = [quantity(each, own) if isinstance(each, str) else each for each in places]
             if given is None:
                 raise Diagnostic("the drive has no scale", "", 'add units = "5 mm/turn" to its table')
-            by_step = replace(given, value=given.value / motor.count) if given.of == STEP else given
-            measure = Measure(by_step, Basis(turn=motor.turn, missing=motor.missing))
+            by_step = replace(given, value=given.value / axis.count) if given.of == STEP else given
+            measure = Measure(by_step, Basis(turn=axis.turn, missing=axis.missing))
             steps = [measure.steps(each) if isinstance(each, Quantity) else each for each in read]
         except Diagnostic as problem:
             raise Diagnostic(f"{key}: {problem.message}", table.at_line(key), problem.hint) from None
@@ -196,9 +196,9 @@ def _in_steps(table: Table, motor: Motor) -> Table:
     return table.with_values(values)
 
 
-def read_world(table: Table, inputs: Sequence[int], counts: int, motor: Motor = UNSCALED) -> WorldSpec:
+def read_world(table: Table, inputs: Sequence[int], counts: int, axis: AxisScale = UNSCALED) -> WorldSpec:
     """Read the surroundings of one axis of a drive with these inputs and an analog input up to `counts`."""
-    table = _in_steps(table, motor)
+    table = _in_steps(table, axis)
     changes = table.rows("inputs", (("seconds", 0, 1e9), ("input", min(inputs), max(inputs)), ("level", 0, 1)))
     for _, n, _ in changes:
         if n not in inputs:
@@ -229,7 +229,7 @@ def read_worlds(
     keys: Sequence[str],
     inputs: Sequence[int],
     counts: int,
-    motors: Mapping[str, Motor] = MappingProxyType({}),
+    scales: Mapping[str, AxisScale] = MappingProxyType({}),
 ) -> tuple[WorldSpec, ...]:
     """Read the surroundings of each axis from a table of its own; keys without an axis belong to the first axis."""
     table.only(*keys, *axes)
@@ -242,4 +242,4 @@ def read_worlds(
             raise first.wrong(key, "is given twice", f"keys without an axis belong to {axes[0]}")
     both = table.merged(first)
     pairs = zip((both, *parts[1:]), axes, strict=True)
-    return tuple(read_world(part, inputs, counts, motors.get(axis, UNSCALED)) for part, axis in pairs)
+    return tuple(read_world(part, inputs, counts, scales.get(axis, UNSCALED)) for part, axis in pairs)

@@ -9,7 +9,7 @@ from typing import Any
 
 from multidrop.dialects.files import escaped_toml
 from multidrop.dialects.text import visible
-from multidrop.dialects.units import PLACES, Scale, decimal
+from multidrop.dialects.units import PLACES, Scale
 from multidrop.dialects.values import Reading, same
 from multidrop.simulator.cell.drive_keys import LONGEST
 
@@ -75,7 +75,7 @@ def write(buses: Sequence[BusText]) -> str:
     document = tomlkit.document()
     document.add(tomlkit.comment(HEAD))
     scales = [scale for bus in buses for drive in bus.drives for scale in drive.units.values()]
-    if own := sorted({each.unit.name for each in scales if each.unit.name not in PLACES}):
+    if own := sorted({each.unit.name for each in scales}.difference(PLACES)):
         document.add("own_units", own)
     tables = tomlkit.aot()
     for each in buses:
@@ -136,8 +136,7 @@ def _written(scale: Scale) -> Any:
     if scale.anchored:
         found["zero"] = scale.shown(scale.zero)
     if scale.travel is not None:
-        low, high = (each / scale.unit.factor for each in scale.travel)
-        found["travel"] = f"{decimal(low)}..{decimal(high)} {scale.unit.name}"
+        found["travel"] = scale.shown_travel
     if scale.full_steps is not None:
         found["full_steps"] = scale.full_steps
     return _inline(found) if len(found) > 1 else str(scale)

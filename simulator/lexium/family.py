@@ -19,8 +19,8 @@ from multidrop.dialects.units import Scale
 from multidrop.dialects.values import VARIABLES, Reading, Scalar, Snapshot, Value, same
 from multidrop.simulator.cell.drive_keys import (
     WORLD_KEYS,
+    AxisScale,
     Check,
-    Motor,
     common_keys,
     read_identity,
     read_settings,
@@ -70,18 +70,18 @@ def read_drive(table: Table, folder: Folder) -> DriveSpec:
         variables=read_variables(variables, valid, "as in Q1"),
         identity=read_identity(identity, ("part", "version", "serial"), dict.fromkeys(counters, 1)),
         set=settings,
-        world=read_world(world, model.points.inputs, model.points.analog, _motor(personality, settings, scales)),
+        world=read_world(world, model.points.inputs, model.points.analog, _axis_scale(personality, settings, scales)),
         units=scales,
     )
 
 
-def _motor(personality: str, settings: Mapping[str, Value], scales: Mapping[str, Scale]) -> Motor:
+def _axis_scale(personality: str, settings: Mapping[str, Value], scales: Mapping[str, Scale]) -> AxisScale:
     """A count is a motor step, or an encoder count where the drive moves in these (manual 3.4.2)."""
     memory = Memory(personality)
     memory.values.update((name, held) for name, held in settings.items() if isinstance(held, int | float))
     lines = memory.values.get("EL", memory.model.encoder_lines)
     turn = lines * 4 if memory.counting else memory.steps_per_turn
-    return Motor(scales.get(""), Fraction(REVOLUTION), Fraction(REVOLUTION) / Fraction(turn))
+    return AxisScale(scales.get(""), Fraction(REVOLUTION), Fraction(REVOLUTION) / Fraction(turn))
 
 
 def _checker(personality: str) -> Check:

@@ -20,7 +20,7 @@ from multidrop.dialects.values import Snapshot, Value
 from multidrop.simulator.cell.drive_keys import (
     ENCODER_KEYS,
     WORLD_KEYS,
-    Motor,
+    AxisScale,
     common_keys,
     read_identity,
     read_settings,
@@ -57,8 +57,8 @@ def read_drive(table: Table, folder: Folder) -> DriveSpec:
     world = table.table("world", "[bus.drive.world]")
     settings = read_settings(table.table("set", "set"), _check_setting)
     scales = read_units(table, NAMES_OF_AXES)
-    motors = {axis: _motor(settings, axis.upper(), scales.get(axis)) for axis in NAMES_OF_AXES}
-    x, y = read_worlds(world, NAMES_OF_AXES, (*WORLD_KEYS, *ENCODER_KEYS), INPUTS, COUNTS, motors)
+    geared = {axis: _axis_scale(settings, axis.upper(), scales.get(axis)) for axis in NAMES_OF_AXES}
+    x, y = read_worlds(world, NAMES_OF_AXES, (*WORLD_KEYS, *ENCODER_KEYS), INPUTS, COUNTS, geared)
     variables = table.table("variables", "[bus.drive.variables]")
     identity = table.table("identity", "[bus.drive.identity]")
     return DriveSpec(
@@ -73,10 +73,12 @@ def read_drive(table: Table, folder: Folder) -> DriveSpec:
     )
 
 
-def _motor(settings: Mapping[str, Setting], axis: str, scale: Scale | None) -> Motor:
+def _axis_scale(settings: Mapping[str, Setting], axis: str, scale: Scale | None) -> AxisScale:
     """A count is a pulse, or with StepNLoop an encoder count of SLR pulses (7.17)."""
     ratio = settings.get(f"SLR{axis}", 1) if settings.get(f"SL{axis}") in (1, "1") else 1
-    return Motor(scale, None, Fraction(str(ratio)), "a PMX does not tell the pulses of a turn (SW1 and SW2 set them)")
+    return AxisScale(
+        scale, None, Fraction(str(ratio)), "a PMX does not tell the pulses of a turn (SW1 and SW2 set them)"
+    )
 
 
 def _check_setting(table: Table, word: str, value: Setting) -> None:

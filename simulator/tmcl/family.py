@@ -33,7 +33,7 @@ from multidrop.dialects.units import Scale
 from multidrop.dialects.values import Snapshot, Value
 from multidrop.simulator.cell.drive_keys import (
     WORLD_KEYS,
-    Motor,
+    AxisScale,
     common_keys,
     read_identity,
     read_settings,
@@ -76,9 +76,11 @@ def read_drive(table: Table, folder: Folder) -> DriveSpec:
     settings = read_settings(table.table("set", "set"), partial(_check_setting, module))
     names = _names(module)
     scales = read_units(table, names if module.motors > 1 else ("",))
-    motors = {name: _motor(module, settings, name, scales.get(name if module.motors > 1 else "")) for name in names}
+    geared = {
+        name: _axis_scale(module, settings, name, scales.get(name if module.motors > 1 else "")) for name in names
+    }
     surroundings = table.table("world", "[bus.drive.world]")
-    world, *further = read_worlds(surroundings, names, WORLD_KEYS, inputs_of(module), COUNTS, motors)
+    world, *further = read_worlds(surroundings, names, WORLD_KEYS, inputs_of(module), COUNTS, geared)
     variables = table.table("variables", "[bus.drive.variables]")
     rows = table.table("identity", "[bus.drive.identity]")
     identity = read_identity(rows, ("version",), {"position": module.motors})
@@ -100,12 +102,12 @@ def read_drive(table: Table, folder: Folder) -> DriveSpec:
     )
 
 
-def _motor(module: Module, settings: Mapping[str, Setting], name: str, scale: Scale | None) -> Motor:
+def _axis_scale(module: Module, settings: Mapping[str, Setting], name: str, scale: Scale | None) -> AxisScale:
     """A count is a microstep. A step of the world is 1/256 of a full step."""
     word = f"{int(Axis.MICROSTEPS)}"
     power = settings.get(word if name == "0" else f"{word}_{name}", module.axis[Axis.MICROSTEPS].fresh)
     full_steps = (scale.full_steps if scale is not None else None) or FULL_STEPS
-    return Motor(scale, Fraction(full_steps * FULL), Fraction(FULL, 2 ** int(str(power))))
+    return AxisScale(scale, Fraction(full_steps * FULL), Fraction(FULL, 2 ** int(str(power))))
 
 
 def _canonical(personality: str) -> str:

@@ -294,9 +294,9 @@ def test_a_cell_takes_one_edge_or_two():
         ("[]", "home must be one position or two, as in [-2000, 0]"),
         ("[2, 1]", "home must go up, not from 2 to 1"),
         ("[2, 2]", "home must go up, not from 2 to 2"),
-        ('["a", 1]', 'home must be a number, not "a"'),
+        ('["a", 1]', "home: 'a' is no number with a unit"),
         ("[1, inf]", "home must be from -1.09951e+12 to 1.09951e+12, not inf"),
-        ('"x"', 'home must be a number, not "x"'),
+        ('"x"', "home: 'x' is no number with a unit"),
     ],
 )
 def test_what_is_wrong_with_the_edges_is_told(home, told):
