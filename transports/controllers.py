@@ -144,7 +144,7 @@ def chosen(found: list[Found], target: str) -> Found:
     else:
         matching = [each for each in found if number in ("", each.number) and place in ("", each.place)]
     if not matching:
-        raise Unreachable(f"usb:{target}: not there; controllers on USB: {listed}")
+        raise Unreachable(f"usb:{target} is not there; controllers on USB: {listed}")
     if len(matching) > 1:
         raise Unreachable(f"usb:{target}: {len(matching)} controllers; name one of {listed}")
     return matching[0]

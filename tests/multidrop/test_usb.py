@@ -99,7 +99,7 @@ def test_without_a_controller_the_urls_say_so(cell):
     for url in ("usb:", "usb:2ED01", "usb:2ED01@1-1.4", "usb:0"):
         done = cell.run("send", url, "PX")
         assert (done.returncode, done.stdout) == (3, "")
-        assert f"{url}: not there; controllers on USB: none" in done.stderr, done.stderr
+        assert f"{url} is not there; controllers on USB: none" in done.stderr, done.stderr
     done = cell.run("scan", "usb:")
     assert (done.returncode, done.stdout) == (3, "")
 

@@ -174,7 +174,7 @@ async def test_another_controller_in_its_place_is_not_taken_for_it(shop: CellSes
     await asyncio.sleep(30)
     assert shop.session.buses["first"].lost
     assert any(
-        "usb:2ED00@1-1: not there; controllers on USB: usb:2ED00@1-9, usb:2ED07@1-1" in text for text in shop.told()
+        "usb:2ED00@1-1 is not there; controllers on USB: usb:2ED00@1-9, usb:2ED07@1-1" in text for text in shop.told()
     )
     one.place, other.place = "1-1", "1-2"
     await back(shop, "first")

@@ -143,7 +143,7 @@ def test_two_controllers_are_told_apart_by_number_place_and_index(here: Machine)
     for url, number in (("usb:2ED07", "2ED07"), ("usb:2ED00@1-1", "2ED00"), ("usb:1", "2ED07")):
         assert here.send("DN", url=url).stdout == f"{number}\n", url
     elsewhere = one_line(here.send("DN", url="usb:2ED07@1-1"), 3)
-    assert elsewhere == "usb:2ED07@1-1: not there; controllers on USB: usb:2ED00@1-1, usb:2ED07@1-2"
+    assert elsewhere == "usb:2ED07@1-1 is not there; controllers on USB: usb:2ED00@1-1, usb:2ED07@1-2"
     listed = here.process("ports").stdout
     assert re.findall(r"^usb:\S+", listed, re.M) == ["usb:2ED00@1-1", "usb:2ED07@1-2"]
 
@@ -218,7 +218,7 @@ def test_unplugged_while_a_reply_is_awaited_it_is_lost_and_another_is_not_taken_
     here.fault(f"unplug {FIRST}")
     out, err = shell.process.communicate("V1\n", timeout=PATIENCE)
     assert (shell.process.returncode, out, err) == (3, "", "usb:2ED00@1-1 was lost: unplugged, or without power\n")
-    assert one_line(here.send("V1"), 3) == "usb:2ED00: not there; controllers on USB: usb:2ED07@1-2"
+    assert one_line(here.send("V1"), 3) == "usb:2ED00 is not there; controllers on USB: usb:2ED07@1-2"
     here.fault(f"plug {FIRST}")
     assert here.send("V1").stdout == "5\n"
 
