@@ -106,6 +106,8 @@ class Transport(ABC):
     """The promises of others that it cannot keep, for a person who opens it."""
     network = False
     """It leads to a network port, which may be a drive's own."""
+    identity = ""
+    """What tells the device from another one that comes to its place; empty: nothing does."""
     round_trip: float | None = None
     """The time to the far side and back, s; None: not measured."""
 

@@ -213,6 +213,8 @@ class UsbipCarrier:
         self._last = 0
         self._cancelled: dict[int, int] = {}
         """The transfers that are being cancelled, by the number of the request."""
+        self._described: dict[int, asyncio.Future[bytes]] = {}
+        """Descriptors that are waited for."""
         self._messages = Transfers(answers=True)
         self._reading: asyncio.Task[None] | None = None
 
@@ -222,6 +224,23 @@ class UsbipCarrier:
 
     def control(self, value: Control) -> int:
         return self._submit(0, setup=setup(value))
+
+    async def number(self) -> str:
+        """The device number: the serial number of its descriptor; empty where the device tells none in time."""
+        try:
+            async with asyncio.timeout(ANSWER):
+                device = await self._descriptor(0x0100, 0)
+                text = await self._descriptor(0x0300 | device[16], 0x0409) if len(device) > 16 and device[16] else b""
+        except (TimeoutError, OSError):
+            return ""
+        return text[2:].decode("utf-16-le", "replace")
+
+    async def _descriptor(self, value: int, language: int) -> bytes:
+        """A descriptor by type and index; empty where the device has none."""
+        number = self._submit(0x80, setup=struct.pack("<BBHHH", 0x80, 6, value, language, PACKET))
+        found: asyncio.Future[bytes] = self._loop.create_future()
+        self._described[number] = found
+        return await found
 
     def send(self, data: bytes) -> int:
         return self._submit(OUT, data=data)
@@ -276,7 +295,10 @@ class UsbipCarrier:
         try:
             while data := await self._loop.sock_recv(self._socket, 4096):
                 for each in self._messages.feed(data):
-                    if each.kind == RET_SUBMIT:
+                    if (described := self._described.pop(each.number, None)) is not None:
+                        if not described.done():
+                            described.set_result(each.data if each.status == 0 else b"")
+                    elif each.kind == RET_SUBMIT:
                         self._done(each.number, each.status, each.data)
                     elif (number := self._cancelled.pop(each.number, 0)) and each.status:  # 0: it had ended before
                         self._messages.wanted.discard(number)

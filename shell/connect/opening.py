@@ -186,7 +186,10 @@ async def _transport(
         from multidrop.transports.usb import open_usb
         from multidrop.transports.usbip import imported
 
-        return await open_usb(await imported(connection.host, connection.port, connection.target, within))
+        carrier = await imported(connection.host, connection.port, connection.target, within)
+        opened = await open_usb(carrier)
+        opened.identity = await carrier.number()
+        return opened
     from multidrop.transports.sockets import open_tcp, open_udp
 
     if connection.scheme == "udp":

@@ -87,7 +87,12 @@ def host_again(open_: Callable[[float], Awaitable[Transport]], took: float) -> R
 
     async def again(old: Transport) -> Transport:
         await old.close()
-        return await _at_the_same_baud(await open_(min(max(SHORTEST, PATIENCE * took), SLOWEST)), old)
+        opened = await open_(min(max(SHORTEST, PATIENCE * took), SLOWEST))
+        if opened.identity != old.identity:
+            await opened.close()
+            another = f"another controller, {opened.identity}," if opened.identity else "a controller without a number"
+            raise Unreachable(f"{opened.name}: {another} is in the place of {old.identity or 'one without a number'}")
+        return await _at_the_same_baud(opened, old)
 
     return again
 

@@ -7,10 +7,13 @@ import subprocess
 
 import pytest
 
+from multidrop.shell.configuration import Settings
+from multidrop.shell.events import Notified
+from multidrop.shell.session import Session
 from tests.support.cell_session import TCP, bus, pmx
 from tests.support.front_door import Home
 from tests.support.processes import Running
-from tests.support.until import PATIENCE
+from tests.support.until import PATIENCE, until
 
 pytestmark = pytest.mark.process
 
@@ -113,3 +116,19 @@ def test_without_the_library_the_error_names_the_extra(cell):
     done = cell.process("send", "usb:", "PX", env=environment(cell.folder) | {"PYTHONPATH": str(hidden)})
     assert done.returncode == 3 and "pip install 'multidrop[usb]'" in done.stderr, done.stderr
     assert cell.process("ports", env=environment(cell.folder) | {"PYTHONPATH": str(hidden)}).returncode == 0
+
+
+async def test_another_controller_at_the_same_bus_id_is_not_taken_for_it(home):
+    where = home.serve(CELL).endpoints["stages"]["usbip"].replace("/1-2", "/1-1")
+    session = Session(Settings(state=home.folder / "own"), reconnect=True)
+    session.questions.agreed = True
+    told = []
+    session.subscribe(lambda event: told.append(event.text) if isinstance(event, Notified) else None)
+    (bus,) = await session.open(where)
+    assert bus.link.transport.identity == "2ED00"
+    for line in ("DN=2ED05", "STORE"):
+        await session.run(line)
+    home.sim.say("/sim power 00 off", "/sim power 00 on")
+    await until(lambda: any("another controller, 2ED05, is in the place of 2ED00" in text for text in told))
+    assert bus.lost
+    await session.close()
