@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 import subprocess
+from concurrent.futures import ThreadPoolExecutor
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -56,6 +58,7 @@ def test_the_makers_client_works_on_a_pseudo_terminal_and_over_tcp(tmp_path: Pat
 
 
 SPEED = 20
+AT_ONCE = 4
 EXAMPLES = {
     "TMCM1140/TMCL/rotate_demo.py": "",
     "TMCM1140/TMCL/StallGuard2_demo.py": "stall_at = 3000000",
@@ -91,9 +94,10 @@ def test_every_example_of_the_maker_for_a_simulated_module_runs_to_its_end(tmp_p
     said = running.until('{"ready": true}')
     places = [json.loads(line)["endpoint"].removeprefix("tcp://") for line in said if "endpoint" in line]
     runner = str(SUPPORT / "example_pytrinamic.py")
-    for example, place in zip(EXAMPLES, places, strict=True):
-        script = [str(python), runner, example, place, str(SPEED)]
-        done = subprocess.run(script, capture_output=True, text=True, timeout=PATIENCE)
+    scripts = [[str(python), runner, *each, str(SPEED)] for each in zip(EXAMPLES, places, strict=True)]
+    with ThreadPoolExecutor(AT_ONCE) as pool:  # an example waits most of its time
+        ended = list(pool.map(partial(subprocess.run, capture_output=True, text=True, timeout=2 * PATIENCE), scripts))
+    for example, done in zip(EXAMPLES, ended, strict=True):
         assert done.returncode == 0, (example, done.stdout[-500:], done.stderr)
         ends = ENDS.get(example.rpartition("/")[2], ("",))
         assert any(each in done.stdout for each in ends), (example, done.stdout)
