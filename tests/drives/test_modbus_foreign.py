@@ -15,6 +15,7 @@ from multidrop.dialects import Hints, NoAnswer, Priority, Refused
 from multidrop.dialects.families import family_of
 from multidrop.dialects.modbus.host import framing
 from multidrop.dialects.modbus.manual.registers import REGISTERS
+from multidrop.drives import stopping
 from multidrop.drives.bus import Bus
 from multidrop.drives.drive import still
 from multidrop.drives.events import Notice, Traffic, Unsolicited
@@ -72,7 +73,8 @@ async def test_it_is_opened_and_read_and_written():
 
 
 @pytest.mark.parametrize(("busy", "fate"), [(0, Fate.STANDING), (1, Fate.RUNNING)])
-async def test_a_stop_is_confirmed_by_the_register_of_the_program(busy, fate):
+async def test_a_stop_is_confirmed_by_the_register_of_the_program(busy, fate, monkeypatch):
+    monkeypatch.setattr(stopping, "RAMP", 2.0)
     async with opened(BY=busy) as (bus, heard):
         (drive,) = await bus.identify(Hints())
         heard.clear()
