@@ -38,6 +38,7 @@ TABLE: Mapping[str, Row] = {
             "multidrop.dialects.mcode.manual.program_checker",
             "multidrop.dialects.mcode.manual.editing",
             ("mcode", "mxt"),
+            {"lexium": "multidrop.dialects.mcode.manual.conversion"},
         ),
     ),
     "modbus": Row("multidrop.dialects.modbus.family:MODBUS", scheme="modbus"),

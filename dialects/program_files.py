@@ -7,9 +7,10 @@ from __future__ import annotations
 
 import importlib
 import re
-from collections.abc import Callable, Container, Iterable, Sequence
+from collections.abc import Callable, Container, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, NamedTuple, Protocol, cast
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, cast
 
 from multidrop.dialects.errors import Diagnostic, Refused
 from multidrop.dialects.files import SourceLine
@@ -123,6 +124,34 @@ class Entry(NamedTuple):
     start: str
 
 
+class Conversion(NamedTuple):
+    """A program made into one for other drives: its text, each change, and what cannot be converted.
+
+    `changes` and `refused` have lines of the original; `inserted` is the line before which there is a new one, or 0.
+    """
+
+    text: str
+    changes: Sequence[Problem]
+    refused: Sequence[Problem]
+    inserted: int = 0
+
+
+class Converter(Protocol):
+    """A conversion of programs: a module of a family's manual."""
+
+    TARGETS: Sequence[str]
+    """The products to convert for, the usual one first."""
+
+    def source(self, text: str) -> str:
+        """Return the product that a program is for. Raises Diagnostic where it is for none that can be converted."""
+
+    def convert(self, text: str, product: str) -> Conversion:
+        """Convert a correct program for a product."""
+
+    def worlds(self, text: str) -> Iterable[tuple[str, Mapping[str, Any], Mapping[str, Any]]]:
+        """Yield worlds to try both programs in: a description, and the world's table in a cell file for each drive."""
+
+
 class FileLanguage(Protocol):
     """The language of program files: a module of a family's manual."""
 
@@ -161,6 +190,8 @@ class ProgramFiles(NamedTuple):
     """The module that is the `EditingLanguage`."""
     ids: tuple[str, ...]
     """The names by which editors know the language."""
+    converters: Mapping[str, str] = MappingProxyType({})
+    """By the name of what they convert to: modules that are a `Converter`."""
 
     @property
     def language(self) -> FileLanguage:

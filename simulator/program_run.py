@@ -30,12 +30,13 @@ class Debugging:
     """Wishes of a person who debugs a program.
 
     `trace`: report every executed line; otherwise only those that change a watched value. `breaks` are `LINE`, `LABEL`,
-    or either with `,PASSES`. `watch` names variables.
+    or either with `,PASSES`. `watch` names variables. `outputs`: report changes of outputs.
     """
 
     trace: bool = False
     breaks: Sequence[str] = ()
     watch: Sequence[str] = ()
+    outputs: bool = False
 
     @property
     def wanted(self) -> bool:

@@ -5,7 +5,7 @@
 #    source ~/.local/share/bash_completion/multidrop
 # See also: https://github.com/scop/bash-completion/blob/main/doc/configuration.md
 
-_shtab_multidrop_program_subparsers=(check test sweep list diff upload download)
+_shtab_multidrop_program_subparsers=(check test sweep convert list diff upload download)
 _shtab_multidrop_params_subparsers=(backup diff restore)
 _shtab_multidrop_macro_subparsers=(list show play edit describe rename copy delete key import export)
 _shtab_multidrop_log_subparsers=(show follow grep judge replay)
@@ -21,6 +21,7 @@ _shtab_multidrop_sim_option_strings=(-h --help --allow --json --speed)
 _shtab_multidrop_program_check_option_strings=(-h --help --language --personality --format --json)
 _shtab_multidrop_program_test_option_strings=(-h --help --language --personality --cell --until --run --trace --break --watch --json)
 _shtab_multidrop_program_sweep_option_strings=(-h --help --language --cell --vary --expect --random --seed --run --until --jobs --cluster --yes --json --junit)
+_shtab_multidrop_program_convert_option_strings=(-h --help --to --personality -o --output --until)
 _shtab_multidrop_program_list_option_strings=(-h --help --drive --json)
 _shtab_multidrop_program_diff_option_strings=(-h --help --drive --json)
 _shtab_multidrop_program_upload_option_strings=(-h --help --drive --raw)
@@ -80,6 +81,7 @@ _shtab_multidrop_program_test___cell_COMPGEN=_shtab_compgen_files
 _shtab_multidrop_program_sweep_pos_0_COMPGEN=_shtab_compgen_files
 _shtab_multidrop_program_sweep___cell_COMPGEN=_shtab_compgen_files
 _shtab_multidrop_program_sweep___junit_COMPGEN=_shtab_compgen_files
+_shtab_multidrop_program_convert_pos_0_COMPGEN=_shtab_compgen_files
 _shtab_multidrop_program_list_pos_0_COMPGEN=_multidrop_url
 _shtab_multidrop_program_diff_pos_0_COMPGEN=_shtab_compgen_files
 _shtab_multidrop_program_diff_pos_1_COMPGEN=_multidrop_url
@@ -117,7 +119,8 @@ _shtab_multidrop_program_check___personality_choices=(LMDOM LMDCM LMDOE LMDCE LM
 _shtab_multidrop_program_test___language_choices=(mcode pmx tmcl)
 _shtab_multidrop_program_test___personality_choices=(LMDOM LMDCM LMDOE LMDCE LMM MDI MDIE MDIX PMX TMCM TMCM-1140 TMCM-1141 TMCM-1161 TMCM-1240 TMCM-1241 TMCM-1276 TMCM-3110 TMCM-6110)
 _shtab_multidrop_program_sweep___language_choices=(mcode pmx tmcl)
-_shtab_multidrop_program_pos_0_choices=(check test sweep list diff upload download)
+_shtab_multidrop_program_convert___to_choices=(lexium)
+_shtab_multidrop_program_pos_0_choices=(check test sweep convert list diff upload download)
 _shtab_multidrop_params_pos_0_choices=(backup diff restore)
 _shtab_multidrop_macro_pos_0_choices=(list show play edit describe rename copy delete key import export)
 _shtab_multidrop_scan___dialect_choices=(mcode pmx tmcl)
@@ -173,6 +176,8 @@ _shtab_multidrop_program_sweep__h_nargs=0
 _shtab_multidrop_program_sweep___help_nargs=0
 _shtab_multidrop_program_sweep___yes_nargs=0
 _shtab_multidrop_program_sweep___json_nargs=0
+_shtab_multidrop_program_convert__h_nargs=0
+_shtab_multidrop_program_convert___help_nargs=0
 _shtab_multidrop_program_list__h_nargs=0
 _shtab_multidrop_program_list___help_nargs=0
 _shtab_multidrop_program_list___json_nargs=0

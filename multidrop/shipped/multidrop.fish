@@ -65,7 +65,7 @@ function _shtab_multidrop_using
   test "$_shtab_multidrop_cmdpath" = "$argv"
 end
 
-set -g _shtab_multidrop_commands demo tui shell send run sim program 'program check' 'program test' 'program sweep' 'program list' 'program diff' 'program upload' 'program download' params 'params backup' 'params diff' 'params restore' macro 'macro list' 'macro show' 'macro play' 'macro edit' 'macro describe' 'macro rename' 'macro copy' 'macro delete' 'macro key' 'macro import' 'macro export' plot poll publish share snapshot ports relay scan rescue log 'log show' 'log follow' 'log grep' 'log judge' 'log replay' config 'config path' 'config show' 'config check' help lsp report completion
+set -g _shtab_multidrop_commands demo tui shell send run sim program 'program check' 'program test' 'program sweep' 'program convert' 'program list' 'program diff' 'program upload' 'program download' params 'params backup' 'params diff' 'params restore' macro 'macro list' 'macro show' 'macro play' 'macro edit' 'macro describe' 'macro rename' 'macro copy' 'macro delete' 'macro key' 'macro import' 'macro export' plot poll publish share snapshot ports relay scan rescue log 'log show' 'log follow' 'log grep' 'log judge' 'log replay' config 'config path' 'config show' 'config check' help lsp report completion
 set -g _shtab_multidrop_opts_with_value --against --allow --baud --break --cell --cluster --dialect --drive --every --expect --jobs --junit --language --on --other --output --page --personality --random --rate --rfc2217 --role --rows --run --save --seed --serve --set --speed --tcp --times --to --until --vary --watch --with -o
 
 complete -c multidrop -e
@@ -148,6 +148,13 @@ complete -c multidrop -n '_shtab_multidrop_using program sweep' -l yes -d 'answe
 complete -c multidrop -n '_shtab_multidrop_using program sweep' -l json -d 'print one JSON object a case, and a summary'
 complete -c multidrop -n '_shtab_multidrop_using program sweep' -l junit -xka "(__fish_complete_path (commandline -ct))" -d 'write the cases to a JUnit XML file'
 complete -c multidrop -n '_shtab_multidrop_using program sweep; and test $_shtab_multidrop_npos -eq 0' -ka "(__fish_complete_path (commandline -ct))" -d 'MCode (.mxt, .txt) or A-SCRIPT (.prg, .asc) or TMCL (.tmc)'
+complete -c multidrop -n '_shtab_multidrop_using program; and test $_shtab_multidrop_npos -eq 0' -a convert -d 'Make a program file into one for other drives, name each change, and run both beside each other.'
+complete -c multidrop -n '_shtab_multidrop_using program convert' -s h -l help -d 'show this help message and exit'
+complete -c multidrop -n '_shtab_multidrop_using program convert' -l to -xka "lexium" -d 'what the new file is for: lexium'
+complete -c multidrop -n '_shtab_multidrop_using program convert' -l personality -x -d 'the product of these drives (default: the usual one)'
+complete -c multidrop -n '_shtab_multidrop_using program convert' -s o -l output -x -d 'the new file; -: standard output'
+complete -c multidrop -n '_shtab_multidrop_using program convert' -l until -x -d 'virtual seconds of each run (default: 5)'
+complete -c multidrop -n '_shtab_multidrop_using program convert; and test $_shtab_multidrop_npos -eq 0' -ka "(__fish_complete_path (commandline -ct))" -d 'MCode (.mxt, .txt) or A-SCRIPT (.prg, .asc) or TMCL (.tmc)'
 complete -c multidrop -n '_shtab_multidrop_using program; and test $_shtab_multidrop_npos -eq 0' -a list -d 'Print the program in a drive.'
 complete -c multidrop -n '_shtab_multidrop_using program list' -s h -l help -d 'show this help message and exit'
 complete -c multidrop -n '_shtab_multidrop_using program list' -l drive -x -d 'the drive (default: the first), or all; may be repeated'

@@ -177,6 +177,13 @@ def checked_personality() -> Mapping[str, Any]:
     return personality("the drive that the program is for")
 
 
+def converted() -> Mapping[str, Any]:
+    from multidrop.dialects.families import program_languages
+
+    names = [name for files in program_languages().values() for name in files.converters]
+    return typed("what the new file is for: %(choices)s", choices=names, required=True)
+
+
 def edited_personality() -> Mapping[str, Any]:
     return personality("the drive that programs are for, unless the editor names one")
 

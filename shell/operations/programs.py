@@ -9,6 +9,7 @@ from multidrop.shell.operations.arguments import (
     YES,
     address,
     checked_personality,
+    converted,
     count,
     drives,
     duration,
@@ -100,6 +101,19 @@ PROGRAM_SWEEP = Operation(
         "--yes": YES,
         "--json": "print one JSON object a case, and a summary",
         "--junit FILE": "write the cases to a JUnit XML file",
+    },
+)
+PROGRAM_CONVERT = Operation(
+    command="program convert",
+    meaning="make a program file into one for other drives, name each change, and run both beside each other",
+    run="programs.convert",
+    examples=["program convert shuttle.mxt --to lexium -o shuttle-lmd.mxt"],
+    arguments={
+        "FILE": titles,
+        "--to DRIVES": converted,
+        "--personality P": typed("the product of these drives (default: the usual one)", type=str.upper),
+        "-o|--output FILE2": typed("the new file; -: standard output", required=True),
+        "--until SECONDS": typed("virtual seconds of each run (default: 5)", type=duration, default=5.0),
     },
 )
 LIST = Operation(

@@ -99,6 +99,19 @@ class Failed(Event):
         return f"error {self.code}, {text_of_error(self.code, self.personality)}"
 
 
+@dataclass(frozen=True)
+class Output(Event):
+    """The outputs that the program has made active, after a line that changed them."""
+
+    active: tuple[int, ...]
+
+    def fact(self, real: float) -> dict[str, Any]:
+        return {"t": round(self.t, 6), "outputs": list(self.active)}
+
+    def lines(self, file: str, real: float) -> Iterator[Line]:
+        yield Line(f"{self.t:10.4f}  active outputs: {', '.join(map(str, self.active)) or 'none'}")
+
+
 class ProgramRun:
     """One file on one drive. Raises Diagnostic for a drive that refuses its settings."""
 
@@ -118,6 +131,8 @@ class ProgramRun:
         self._executed: dict[int, ProgramLine] = {}
         self._held = ""
         self._errors: list[int] = []
+        self._active: tuple[int, ...] = ()
+        self._switched: list[Event] = []
 
     def run(self, label: str = "", until: float | None = None, debugging: Debugging = NO_DEBUGGING) -> Iterator[Event]:
         """Load the file and run it from a label or an address (SU, else address 1), for `until` seconds at most.
@@ -133,6 +148,8 @@ class ProgramRun:
         if debugging.wanted:
             self._recorder = self._recording(debugging)
             self._interpreter.watch(self._before, self._after)
+        elif debugging.outputs:
+            self._interpreter.watch(None, self._outputs)
         yield from self._execute(until)
 
     def refusals(self) -> Iterator[Failed]:
@@ -235,6 +252,13 @@ class ProgramRun:
             text = self._source[found.number - 1].strip()
             recorder.after(self._device.now, found.number, text, recorder.changed())
 
+    def _outputs(self, line: int) -> None:
+        device = self._device
+        active = tuple(n for n, on in device.output_lines.driven.items() if on)
+        if active != self._active:
+            self._active = active
+            self._switched.append(Output(device.now, active))
+
     # Running.
 
     def _execute(self, until: float | None) -> Iterator[Event]:
@@ -262,7 +286,8 @@ class ProgramRun:
 
     def _news(self) -> Iterator[Event]:
         """Yield what was executed, printed and what failed since the last look, in order."""
-        news: list[Event] = [] if self._recorder is None else [*self._recorder.take()]
+        news: list[Event] = [*self._switched] if self._recorder is None else [*self._recorder.take()]
+        self._switched.clear()
         for t, text in self._device.prints():
             *whole, self._held = (self._held + text).split(CRLF)
             news += [Printed(t, each) for each in whole]
