@@ -1,4 +1,4 @@
-"""Write the completions for bash, zsh and fish and the man page from the parser of the command line.
+"""Write the completions for bash, zsh, fish and PowerShell, and the man page from the parser of the command line.
 
 The files are kept in the repository, so that an installation needs neither this program nor its libraries.
 
@@ -27,40 +27,70 @@ from multidrop.commands.serving import FILES
 from multidrop.shell.connect.url_forms import URL_FORMS
 
 SHIPPED = ROOT / "multidrop" / "shipped"
-PATHS = {"FILE", "SCRIPT", "CELL", "FILE.rrd|rerun+http://HOST:PORT/proxy"}
-"""The metavars of arguments that are files."""
-URL = {"bash": "_multidrop_url", "zsh": "_multidrop_url", "fish": "(_multidrop_url)"}
+PATH = re.compile(r"(FILE|SCRIPT|CELL|PATH)\b")
+"""The beginning of the metavars of arguments that are files."""
+VALUES = {"URL": "url", "URL2": "url", "PORT-OR-URL": "url", "ADDR": "drive", "NAME": "macro", "NAME|off": "macro"}
+"""What is listed for a metavar; NAME in the commands on macros only."""
 
-# Connections, ports and simulated buses, listed without a start of Python.
-LIST = r"""
+# Connections, ports and simulated buses; drives of saved connections; macros: listed without a start of Python.
+CONFIG = '"${MULTIDROP_CONFIG_DIR:-${XDG_CONFIG_HOME:-$HOME/.config}/multidrop}'
+LISTS = {
+    "url": rf"""
   printf '%s\n' sim: 'sim:#press' 'sim:#eth' 'sim:#pmx' tcp:// udp:// modbus:// rfc2217:// ssh://
   for each in /dev/serial/by-id/* /dev/ttyUSB* /dev/ttyACM*; do [ -e "$each" ] && printf '%s\n' "$each"; done
-  file="${MULTIDROP_CONFIG_DIR:-${XDG_CONFIG_HOME:-$HOME/.config}/multidrop}/multidrop.toml"
+  file={CONFIG}/multidrop.toml"
   [ -r "$file" ] && sed -n 's/^ *\[connections\.\([A-Za-z0-9_-]*\)\].*/\1/p' "$file"
-"""
-LIST_FISH = r"""
-  printf '%s\n' sim: 'sim:#press' 'sim:#eth' 'sim:#pmx' tcp:// udp:// modbus:// rfc2217:// ssh://
-  find /dev/serial/by-id -type l 2>/dev/null
-  find /dev -maxdepth 1 '(' -name 'ttyUSB*' -o -name 'ttyACM*' ')' 2>/dev/null
+""",
+    "drive": rf"""
+  printf '%s\n' all
+  file={CONFIG}/multidrop.toml"
+  [ -r "$file" ] && sed -n 's/.*[?&]drives=\([^"&]*\).*/\1/p' "$file" | tr , '\n' | sort -u
+""",
+    "macro": rf"""
+  for each in macros/*.toml {CONFIG}/macros"/*.toml; do
+    [ -e "$each" ] && printf '%s\n' "${{each##*/}}" | sed 's/[.]toml$//'
+  done
+""",
+}
+FISH_CONFIG = """
   set -l folder $MULTIDROP_CONFIG_DIR
   test -n "$folder"; or set folder "$XDG_CONFIG_HOME/multidrop"
   test -d "$folder"; or set folder "$HOME/.config/multidrop"
+"""
+FISH_LISTS = {
+    "url": rf"""
+  printf '%s\n' sim: 'sim:#press' 'sim:#eth' 'sim:#pmx' tcp:// udp:// modbus:// rfc2217:// ssh://
+  find /dev/serial/by-id -type l 2>/dev/null
+  find /dev -maxdepth 1 '(' -name 'ttyUSB*' -o -name 'ttyACM*' ')' 2>/dev/null{FISH_CONFIG}
   test -r "$folder/multidrop.toml"; or return
   sed -n 's/^ *\[connections\.\([A-Za-z0-9_-]*\)\].*/\1/p' "$folder/multidrop.toml"
-"""
-BASH = f"""
-_multidrop_urls() {{
-  local each file{LIST}  true
-}}
-_multidrop_url() {{
-  local each
-  while IFS= read -r each; do
-    [[ "$each" == "$1"* ]] && printf '%s\\n' "$each"
-  done < <(_multidrop_urls)
-  [[ "$1" == sim:* ]] && compgen -P sim: -f -X '!*.toml' -- "${{1#sim:}}"
-  true
-}}
-"""
+""",
+    "drive": rf"""
+  printf '%s\n' all{FISH_CONFIG}
+  test -r "$folder/multidrop.toml"; or return
+  sed -n 's/.*[?&]drives=\([^"&]*\).*/\1/p' "$folder/multidrop.toml" | tr , '\n' | sort -u
+""",
+    "macro": rf"""{FISH_CONFIG}
+  find macros "$folder/macros" -maxdepth 1 -name '*.toml' 2>/dev/null | sed 's!.*/!!; s/[.]toml$//'
+""",
+}
+POWERSHELL_LISTS = {
+    "url": r"""
+  'sim:', 'sim:#press', 'sim:#eth', 'sim:#pmx', 'tcp://', 'udp://', 'modbus://', 'rfc2217://', 'ssh://'
+  try { [System.IO.Ports.SerialPort]::GetPortNames() } catch { }
+  Select-String -Path (Join-Path (_multidrop_folder) 'multidrop.toml') -ErrorAction SilentlyContinue `
+    -Pattern '^ *\[connections\.([A-Za-z0-9_-]+)\]' | ForEach-Object { $_.Matches[0].Groups[1].Value }
+""",
+    "drive": r"""
+  'all'
+  Select-String -Path (Join-Path (_multidrop_folder) 'multidrop.toml') -ErrorAction SilentlyContinue `
+    -Pattern '[?&]drives=([^"&]*)' | ForEach-Object { $_.Matches[0].Groups[1].Value -split ',' }
+""",
+    "macro": r"""
+  Get-ChildItem -Path 'macros', (Join-Path (_multidrop_folder) 'macros') -Filter '*.toml' `
+    -ErrorAction SilentlyContinue | ForEach-Object { $_.BaseName }
+""",
+}
 # bash divides words at colons: they are joined for the parser, and the candidates lose what the line already has.
 BASH_WORDS = """
 _multidrop() {
@@ -79,19 +109,70 @@ _multidrop() {
 }
 complete -o bashdefault -F _multidrop multidrop
 """
-ZSH = f"""
-_multidrop_url() {{
+
+
+def listed(kind: str) -> str:
+    """The function of bash that prints the values that begin with what is typed."""
+    own = """  [[ "$1" == sim:* ]] && compgen -P sim: -f -X '!*.toml' -- "${1#sim:}"\n""" if kind == "url" else ""
+    return f"""
+_multidrop_{kind}s() {{
+  local each file{LISTS[kind]}  true
+}}
+_multidrop_{kind}() {{
+  local each
+  while IFS= read -r each; do
+    [[ "$each" == "$1"* ]] && printf '%s\\n' "$each"
+  done < <(_multidrop_{kind}s)
+{own}  true
+}}
+"""
+
+
+def listed_zsh(kind: str) -> str:
+    """The function of zsh that adds the values."""
+    return f"""
+_multidrop_{kind}() {{
   local each file
   local -a found
-  found=(${{(f)"$(setopt localoptions nonomatch; {LIST.strip()}; true)"}})
+  found=(${{(f)"$(setopt localoptions nonomatch; {LISTS[kind].strip()}; true)"}})
   compadd -a found
 }}
 """
-FISH = f"""
-function _multidrop_url{LIST_FISH}  true
-end
+
+
+def listed_powershell(kind: str) -> str:
+    """The function of PowerShell that gives the values that begin with what is typed."""
+    return f"""
+function _multidrop_{kind} {{
+  param([string]$WordToComplete)
+  @({POWERSHELL_LISTS[kind]}  ) | Where-Object {{ $_ -like "$WordToComplete*" }}
+}}
 """
-PREAMBLE = {"bash": BASH, "zsh": ZSH, "fish": FISH}
+
+
+FOLDER = r"""
+function _multidrop_folder {
+  if ($env:MULTIDROP_CONFIG_DIR) { return $env:MULTIDROP_CONFIG_DIR }
+  if ($env:LOCALAPPDATA) { return Join-Path $env:LOCALAPPDATA 'multidrop' }
+  if ($env:XDG_CONFIG_HOME) { return Join-Path $env:XDG_CONFIG_HOME 'multidrop' }
+  Join-Path $HOME '.config/multidrop'
+}
+"""
+PREAMBLE = {
+    "bash": "".join(map(listed, LISTS)),
+    "zsh": "".join(map(listed_zsh, LISTS)),
+    "fish": "".join(f"\nfunction _multidrop_{kind}{text}  true\nend\n" for kind, text in FISH_LISTS.items()),
+    "powershell": FOLDER + "".join(map(listed_powershell, LISTS)),
+}
+FLAG = "$currentActionIsPositional = $false\n        continue"
+FLAG_DONE = """$currentActionIsPositional = $false
+        if ($currentActionNargs -eq '0') {
+          $currentActionKey = "${prefix}_pos_${completedPositionals}"
+          $currentActionNargs = Get-ActionNargs $currentActionKey
+          $currentActionIsPositional = $true
+        }
+        continue"""
+"""After a flag of PowerShell's line the next word is a place: shtab takes it for the flag's value."""
 SECTIONS = {
     "URLS": [
         *((form.example, form.meaning) for form in URL_FORMS.values()),
@@ -131,21 +212,26 @@ def completion(shell: str) -> str:
     """The completion for one shell."""
     parser = build()
     parser.add_all()
-    for action in actions(parser):
-        if action.metavar == "URL":
-            action.complete = URL  # type: ignore[attr-defined]
-        elif action.metavar in PATHS:
+    for action, command in actions(parser):
+        kind = VALUES.get(action.metavar) if isinstance(action.metavar, str) else None
+        if kind and (kind != "macro" or " macro " in command):
+            name = f"_multidrop_{kind}"
+            action.complete = {**dict.fromkeys(FILES, name), "fish": f"({name})"}  # type: ignore[attr-defined]
+        elif isinstance(action.metavar, str) and PATH.match(action.metavar):
             action.complete = shtab.FILE  # type: ignore[attr-defined]
-    text = shtab.complete(parser, shell, preamble=PREAMBLE)
+    text = shtab.complete(parser, shell, preamble=PREAMBLE[shell])
+    if shell == "powershell":
+        assert text.count(FLAG) == 1
+        text = text.replace(FLAG, FLAG_DONE)
     return (
         "\n".join(line.rstrip() for line in text.strip().splitlines()) + "\n" + (BASH_WORDS if shell == "bash" else "")
     )
 
 
-def actions(parser: argparse.ArgumentParser) -> Iterator[argparse.Action]:
-    """All arguments of a parser and of its commands."""
+def actions(parser: argparse.ArgumentParser) -> Iterator[tuple[argparse.Action, str]]:
+    """All arguments of a parser and of its commands, each with its command."""
     for action in parser._actions:
-        yield action
+        yield action, f"{parser.prog} "
         if isinstance(action, argparse._SubParsersAction):
             for part in action.choices.values():
                 yield from actions(part)

@@ -14,7 +14,7 @@ from multidrop.commands import fail
 from multidrop.dialects import Diagnostic
 from multidrop.shell.streams.stdout import write
 
-FILES = {"bash": "multidrop.bash", "zsh": "_multidrop", "fish": "multidrop.fish"}
+FILES = {"bash": "multidrop.bash", "zsh": "_multidrop", "fish": "multidrop.fish", "powershell": "multidrop.ps1"}
 """The completion of each shell in `multidrop/shipped`, which `make shipped` writes."""
 
 

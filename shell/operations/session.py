@@ -237,7 +237,7 @@ COMPLETION = Operation(
     meaning="print the completion of this command line for a shell",
     run="serving.completion",
     examples=["completion bash > ~/.local/share/bash-completion/completions/multidrop", "completion fish | source"],
-    arguments={"shell": typed(None, choices=("bash", "zsh", "fish"))},
+    arguments={"shell": typed(None, choices=("bash", "zsh", "fish", "powershell"))},
 )
 LOG_GROUP = Operation(command="log", meaning="show, follow, search, judge and replay session logs, which /log begins")
 CONFIG = Operation(command="config", meaning="show and check the configuration: saved connections, keys, colours")
