@@ -164,6 +164,10 @@ class Front:
     """Its editor of files, in which Ctrl+X stops."""
     screen: Callable[[str], Awaitable[None]] | None = None
     """Shows a page of the screen by its name, or `tour`, or raises Diagnostic."""
+    clear: Callable[[], None] | None = None
+    """Empties what it shows."""
+    page: Callable[[Sequence[str]], None] | None = None
+    """Shows long help, a screenful at a time."""
     transcripts: Transcripts | None = None
     """The transcripts on its screen."""
 
@@ -239,6 +243,34 @@ class Questions:
     async def _in_turn(self, ask: Callable[[], Awaitable[T]]) -> T:
         async with self._turn:
             return await ask()
+
+
+SILENCE = 1.0
+"""The time from which a wait is named, s."""
+
+
+class UnderWay:
+    """What a session is waiting for: the lines that run, the URLs that are being opened."""
+
+    def __init__(self, channel: Channel) -> None:
+        self._channel = channel
+        self._open: list[tuple[str, float]] = []
+
+    @contextmanager
+    def __call__(self, what: str) -> Iterator[None]:
+        entry = (what, self._channel.now())
+        self._open.append(entry)
+        try:
+            yield
+        finally:
+            self._open.remove(entry)
+
+    @property
+    def text(self) -> str:
+        """The latest of them and its seconds, `running /wait idle, 3 s`; empty in the first second."""
+        what, since = self._open[-1] if self._open else ("", 0.0)
+        took = self._channel.now() - since
+        return f"{what}, {took:.0f} s" if what and took >= SILENCE else ""
 
 
 PERIOD = 0.1

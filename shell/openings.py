@@ -17,6 +17,7 @@ from multidrop.shell.connect.opening import Opened, Opener, port_name
 from multidrop.shell.connect.urls import Connection, parse
 from multidrop.shell.line_syntax import EVERYONE, split_target
 from multidrop.shell.raw import RawLine
+from multidrop.shell.secrets import url_without_secrets
 from multidrop.shell.state import crash_marks
 from multidrop.shell.workspace import BeingOpened, Workspace
 from multidrop.transports import TransportLost
@@ -147,7 +148,8 @@ class Openings:
             )
         try:
             in_turn = self._cells if connection.scheme == SIMULATED else contextlib.nullcontext()
-            with opening.listed(connection.name or connection.text):
+            shown = connection.name or url_without_secrets(connection.text)
+            with opening.listed(connection.name or connection.text), self._workspace.under_way(f"opening {shown}"):
                 async with in_turn:
                     found = await self._opener(connection, opening.named)
             addresses = {label: address for address, label in connection.labels.items()}

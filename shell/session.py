@@ -160,10 +160,10 @@ class Session(Workspace):
         if self.front.ready is not None:
             await self.front.ready()
         target, place = DriveLine(""), self.place
-        with _published_failures() as published:
+        typed = line if isinstance(line, str) else line.typed
+        with _published_failures() as published, self.under_way(f"running {typed.strip()}"):
             try:
                 if since is not None and since != self.stops:
-                    typed = line if isinstance(line, str) else line.typed
                     raise Stopped(f"a stop came after '{typed.strip()}' was typed; it was not sent")
                 parsed = _raw_line(self, line) or (parse(line) if isinstance(line, str) else line)
                 if isinstance(parsed, DriveLine):

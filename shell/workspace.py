@@ -19,7 +19,7 @@ from multidrop.dialects import Diagnostic, NoAnswer
 from multidrop.drives.events import BusEvent, Changed, Lost, Notice, Unsolicited, isolated
 from multidrop.macros import MacroStore, Recorder
 from multidrop.shell import stop_report
-from multidrop.shell.channel import Channel, Questions, Tasks
+from multidrop.shell.channel import Channel, Questions, Tasks, UnderWay
 from multidrop.shell.configuration import Settings
 from multidrop.shell.connect.reconnect import Reconnections
 from multidrop.shell.events import Failed, Notified, OnBus, StateChanged
@@ -97,7 +97,7 @@ class Workspace(Channel):
         """The time of the last stop, s of the session's clock."""
         self.opening: list[BeingOpened] = []
         """The URLs that are being opened, which no stop reaches yet."""
-        self.tasks, self.questions = Tasks(self.changed), Questions(self)
+        self.tasks, self.questions, self.under_way = Tasks(self.changed), Questions(self), UnderWay(self)
         self.addressed: set[tuple[str, str]] = set()
         """(bus, address) of every drive that this session sent a line to; `/wait` waits for them."""
         self.macros = MacroStore(settings.macros, settings.project_macros)

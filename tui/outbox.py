@@ -19,7 +19,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 from multidrop.shell.line_syntax import Place, pinned
-from multidrop.shell.prompt.line_queue import BURST, Line
+from multidrop.shell.prompt.line_queue import BURST, LEAVING, Line
 from multidrop.shell.session import Session
 
 NAMED = 4
@@ -63,7 +63,7 @@ class Outbox:
 
     def type(self, text: str) -> None:
         line, now = self._line(text), asyncio.get_running_loop().time()
-        if line.verb == "/quit":
+        if line.verb in LEAVING:
             self._session.start(text, since=line.since)
             return
         burst = self._latest if now - self._last < BURST else None

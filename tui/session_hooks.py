@@ -29,6 +29,7 @@ class Hooks:
             renamed=parts.selection.rename,
             edit=self._edit,
             screen=self._show_page,
+            clear=actions.action_clear,
             transcripts=Transcripts(
                 lambda: parts.main.times, self._set_times, self._choose, self._save, self._offer_unsent
             ),

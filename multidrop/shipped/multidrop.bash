@@ -75,6 +75,7 @@ _shtab_multidrop_run_pos_0_COMPGEN=_shtab_compgen_files
 _shtab_multidrop_run___on_COMPGEN=_multidrop_url
 _shtab_multidrop_run___junit_COMPGEN=_shtab_compgen_files
 _shtab_multidrop_sim_pos_0_COMPGEN=_shtab_compgen_files
+_shtab_multidrop_sim___allow_COMPGEN=_shtab_compgen_files
 _shtab_multidrop_program_check_pos_0_COMPGEN=_shtab_compgen_files
 _shtab_multidrop_program_test_pos_0_COMPGEN=_shtab_compgen_files
 _shtab_multidrop_program_test___cell_COMPGEN=_shtab_compgen_files
@@ -83,30 +84,58 @@ _shtab_multidrop_program_sweep___cell_COMPGEN=_shtab_compgen_files
 _shtab_multidrop_program_sweep___junit_COMPGEN=_shtab_compgen_files
 _shtab_multidrop_program_convert_pos_0_COMPGEN=_shtab_compgen_files
 _shtab_multidrop_program_list_pos_0_COMPGEN=_multidrop_url
+_shtab_multidrop_program_list___drive_COMPGEN=_multidrop_drive
 _shtab_multidrop_program_diff_pos_0_COMPGEN=_shtab_compgen_files
 _shtab_multidrop_program_diff_pos_1_COMPGEN=_multidrop_url
+_shtab_multidrop_program_diff___drive_COMPGEN=_multidrop_drive
 _shtab_multidrop_program_upload_pos_0_COMPGEN=_multidrop_url
 _shtab_multidrop_program_upload_pos_1_COMPGEN=_shtab_compgen_files
+_shtab_multidrop_program_upload___drive_COMPGEN=_multidrop_drive
 _shtab_multidrop_program_download_pos_0_COMPGEN=_multidrop_url
 _shtab_multidrop_program_download_pos_1_COMPGEN=_shtab_compgen_files
+_shtab_multidrop_program_download___drive_COMPGEN=_multidrop_drive
 _shtab_multidrop_params_backup_pos_0_COMPGEN=_multidrop_url
 _shtab_multidrop_params_backup_pos_1_COMPGEN=_shtab_compgen_files
+_shtab_multidrop_params_backup___drive_COMPGEN=_multidrop_drive
 _shtab_multidrop_params_diff_pos_0_COMPGEN=_multidrop_url
 _shtab_multidrop_params_diff_pos_1_COMPGEN=_shtab_compgen_files
+_shtab_multidrop_params_diff___drive_COMPGEN=_multidrop_drive
+_shtab_multidrop_params_diff___against_COMPGEN=_multidrop_url
+_shtab_multidrop_params_diff___other_COMPGEN=_multidrop_drive
 _shtab_multidrop_params_restore_pos_0_COMPGEN=_multidrop_url
 _shtab_multidrop_params_restore_pos_1_COMPGEN=_shtab_compgen_files
+_shtab_multidrop_params_restore___drive_COMPGEN=_multidrop_drive
+_shtab_multidrop_macro_show_pos_0_COMPGEN=_multidrop_macro
+_shtab_multidrop_macro_play_pos_0_COMPGEN=_multidrop_macro
 _shtab_multidrop_macro_play___on_COMPGEN=_multidrop_url
 _shtab_multidrop_macro_play___junit_COMPGEN=_shtab_compgen_files
+_shtab_multidrop_macro_edit_pos_0_COMPGEN=_multidrop_macro
+_shtab_multidrop_macro_describe_pos_0_COMPGEN=_multidrop_macro
+_shtab_multidrop_macro_rename_pos_0_COMPGEN=_multidrop_macro
+_shtab_multidrop_macro_copy_pos_0_COMPGEN=_multidrop_macro
+_shtab_multidrop_macro_delete_pos_0_COMPGEN=_multidrop_macro
+_shtab_multidrop_macro_key_pos_1_COMPGEN=_multidrop_macro
 _shtab_multidrop_macro_import_pos_0_COMPGEN=_shtab_compgen_files
 _shtab_multidrop_macro_export_pos_0_COMPGEN=_shtab_compgen_files
+_shtab_multidrop_macro_export_pos_1_COMPGEN=_multidrop_macro
 _shtab_multidrop_plot_pos_0_COMPGEN=_multidrop_url
+_shtab_multidrop_plot___drive_COMPGEN=_multidrop_drive
+_shtab_multidrop_plot___to_COMPGEN=_shtab_compgen_files
 _shtab_multidrop_poll_pos_0_COMPGEN=_multidrop_url
+_shtab_multidrop_poll___drive_COMPGEN=_multidrop_drive
 _shtab_multidrop_publish_pos_0_COMPGEN=_multidrop_url
 _shtab_multidrop_share_pos_0_COMPGEN=_multidrop_url
 _shtab_multidrop_snapshot_pos_0_COMPGEN=_multidrop_url
+_shtab_multidrop_snapshot__o_COMPGEN=_shtab_compgen_files
+_shtab_multidrop_snapshot___output_COMPGEN=_shtab_compgen_files
+_shtab_multidrop_scan_pos_0_COMPGEN=_multidrop_url
+_shtab_multidrop_rescue_pos_0_COMPGEN=_multidrop_url
 _shtab_multidrop_log_show_pos_0_COMPGEN=_shtab_compgen_files
+_shtab_multidrop_log_show___drive_COMPGEN=_multidrop_drive
 _shtab_multidrop_log_follow_pos_0_COMPGEN=_shtab_compgen_files
+_shtab_multidrop_log_follow___drive_COMPGEN=_multidrop_drive
 _shtab_multidrop_log_grep_pos_1_COMPGEN=_shtab_compgen_files
+_shtab_multidrop_log_grep___drive_COMPGEN=_multidrop_drive
 _shtab_multidrop_log_judge_pos_0_COMPGEN=_shtab_compgen_files
 _shtab_multidrop_log_replay_pos_0_COMPGEN=_shtab_compgen_files
 _shtab_multidrop_log_replay___to_COMPGEN=_multidrop_url
@@ -129,7 +158,7 @@ _shtab_multidrop_log_pos_0_choices=(show follow grep judge replay)
 _shtab_multidrop_config_pos_0_choices=(path show check)
 _shtab_multidrop_help___dialect_choices=(mcode modbus pmx tmcl)
 _shtab_multidrop_lsp___personality_choices=(LMDOM LMDCM LMDOE LMDCE LMM MDI MDIE MDIX)
-_shtab_multidrop_completion_pos_0_choices=(bash zsh fish)
+_shtab_multidrop_completion_pos_0_choices=(bash zsh fish powershell)
 _shtab_multidrop_pos_0_choices=(demo tui shell send run sim program params macro plot poll publish share snapshot ports relay scan rescue log config help lsp report completion)
 
 _shtab_multidrop_demo__h_nargs=0
@@ -347,6 +376,36 @@ _multidrop_url() {
     [[ "$each" == "$1"* ]] && printf '%s\n' "$each"
   done < <(_multidrop_urls)
   [[ "$1" == sim:* ]] && compgen -P sim: -f -X '!*.toml' -- "${1#sim:}"
+  true
+}
+
+_multidrop_drives() {
+  local each file
+  printf '%s\n' all
+  file="${MULTIDROP_CONFIG_DIR:-${XDG_CONFIG_HOME:-$HOME/.config}/multidrop}/multidrop.toml"
+  [ -r "$file" ] && sed -n 's/.*[?&]drives=\([^"&]*\).*/\1/p' "$file" | tr , '\n' | sort -u
+  true
+}
+_multidrop_drive() {
+  local each
+  while IFS= read -r each; do
+    [[ "$each" == "$1"* ]] && printf '%s\n' "$each"
+  done < <(_multidrop_drives)
+  true
+}
+
+_multidrop_macros() {
+  local each file
+  for each in macros/*.toml "${MULTIDROP_CONFIG_DIR:-${XDG_CONFIG_HOME:-$HOME/.config}/multidrop}/macros"/*.toml; do
+    [ -e "$each" ] && printf '%s\n' "${each##*/}" | sed 's/[.]toml$//'
+  done
+  true
+}
+_multidrop_macro() {
+  local each
+  while IFS= read -r each; do
+    [[ "$each" == "$1"* ]] && printf '%s\n' "$each"
+  done < <(_multidrop_macros)
   true
 }
 

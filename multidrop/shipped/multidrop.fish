@@ -13,8 +13,29 @@ function _multidrop_url
   set -l folder $MULTIDROP_CONFIG_DIR
   test -n "$folder"; or set folder "$XDG_CONFIG_HOME/multidrop"
   test -d "$folder"; or set folder "$HOME/.config/multidrop"
+
   test -r "$folder/multidrop.toml"; or return
   sed -n 's/^ *\[connections\.\([A-Za-z0-9_-]*\)\].*/\1/p' "$folder/multidrop.toml"
+  true
+end
+
+function _multidrop_drive
+  printf '%s\n' all
+  set -l folder $MULTIDROP_CONFIG_DIR
+  test -n "$folder"; or set folder "$XDG_CONFIG_HOME/multidrop"
+  test -d "$folder"; or set folder "$HOME/.config/multidrop"
+
+  test -r "$folder/multidrop.toml"; or return
+  sed -n 's/.*[?&]drives=\([^"&]*\).*/\1/p' "$folder/multidrop.toml" | tr , '\n' | sort -u
+  true
+end
+
+function _multidrop_macro
+  set -l folder $MULTIDROP_CONFIG_DIR
+  test -n "$folder"; or set folder "$XDG_CONFIG_HOME/multidrop"
+  test -d "$folder"; or set folder "$HOME/.config/multidrop"
+
+  find macros "$folder/macros" -maxdepth 1 -name '*.toml' 2>/dev/null | sed 's!.*/!!; s/[.]toml$//'
   true
 end
 
@@ -107,7 +128,7 @@ complete -c multidrop -n '_shtab_multidrop_using run' -l beyond -d 'let moves le
 complete -c multidrop -n '_shtab_multidrop_using run; and test $_shtab_multidrop_npos -eq 0' -ka "(__fish_complete_path (commandline -ct))" -d 'a file of lines as typed at the prompt, or a Python program (.py); -: standard input'
 complete -c multidrop -n '_shtab_multidrop_using; and test $_shtab_multidrop_npos -eq 0' -a sim -d 'Serve a simulated cell to other programs; the demo cell without CELL.'
 complete -c multidrop -n '_shtab_multidrop_using sim' -s h -l help -d 'show this help message and exit'
-complete -c multidrop -n '_shtab_multidrop_using sim' -l allow -x -d 'let paths of the cell lead there, too: a file or a folder outside its own; may be repeated'
+complete -c multidrop -n '_shtab_multidrop_using sim' -l allow -xka "(__fish_complete_path (commandline -ct))" -d 'let paths of the cell lead there, too: a file or a folder outside its own; may be repeated'
 complete -c multidrop -n '_shtab_multidrop_using sim' -l json -d 'print the endpoints as JSON objects, one a line'
 complete -c multidrop -n '_shtab_multidrop_using sim' -l speed -x -d 'run time N times as fast'
 complete -c multidrop -n '_shtab_multidrop_using sim; and test $_shtab_multidrop_npos -eq 0' -ka "(__fish_complete_path (commandline -ct))" -d 'a cell file (TOML)'
@@ -157,24 +178,24 @@ complete -c multidrop -n '_shtab_multidrop_using program convert' -l until -x -d
 complete -c multidrop -n '_shtab_multidrop_using program convert; and test $_shtab_multidrop_npos -eq 0' -ka "(__fish_complete_path (commandline -ct))" -d 'MCode (.mxt, .txt) or A-SCRIPT (.prg, .asc) or TMCL (.tmc)'
 complete -c multidrop -n '_shtab_multidrop_using program; and test $_shtab_multidrop_npos -eq 0' -a list -d 'Print the program in a drive.'
 complete -c multidrop -n '_shtab_multidrop_using program list' -s h -l help -d 'show this help message and exit'
-complete -c multidrop -n '_shtab_multidrop_using program list' -l drive -x -d 'the drive (default: the first), or all; may be repeated'
+complete -c multidrop -n '_shtab_multidrop_using program list' -l drive -xka "(_multidrop_drive)" -d 'the drive (default: the first), or all; may be repeated'
 complete -c multidrop -n '_shtab_multidrop_using program list' -l json -d 'print one JSON object a line of the drive: drive, at, text'
 complete -c multidrop -n '_shtab_multidrop_using program list; and test $_shtab_multidrop_npos -eq 0' -ka "(_multidrop_url)" -d 'what to open'
 complete -c multidrop -n '_shtab_multidrop_using program; and test $_shtab_multidrop_npos -eq 0' -a diff -d 'Compare a program file with the program in a drive; exit code 0: the same, 1: lines differ.'
 complete -c multidrop -n '_shtab_multidrop_using program diff' -s h -l help -d 'show this help message and exit'
-complete -c multidrop -n '_shtab_multidrop_using program diff' -l drive -x -d 'the drive (default: the first), or all; may be repeated'
+complete -c multidrop -n '_shtab_multidrop_using program diff' -l drive -xka "(_multidrop_drive)" -d 'the drive (default: the first), or all; may be repeated'
 complete -c multidrop -n '_shtab_multidrop_using program diff' -l json -d 'print one JSON object a difference: drive, line, here, at, there'
 complete -c multidrop -n '_shtab_multidrop_using program diff; and test $_shtab_multidrop_npos -eq 0' -ka "(__fish_complete_path (commandline -ct))" -d 'MCode (.mxt, .txt) or A-SCRIPT (.prg, .asc) or TMCL (.tmc)'
 complete -c multidrop -n '_shtab_multidrop_using program diff; and test $_shtab_multidrop_npos -eq 1' -ka "(_multidrop_url)" -d 'what to open'
 complete -c multidrop -n '_shtab_multidrop_using program; and test $_shtab_multidrop_npos -eq 0' -a upload -d 'Save the program in a drive to a new file.'
 complete -c multidrop -n '_shtab_multidrop_using program upload' -s h -l help -d 'show this help message and exit'
-complete -c multidrop -n '_shtab_multidrop_using program upload' -l drive -x -d 'the drive (default: the first), or all; all or several: FILE is a new folder of files; may be repeated'
+complete -c multidrop -n '_shtab_multidrop_using program upload' -l drive -xka "(_multidrop_drive)" -d 'the drive (default: the first), or all; all or several: FILE is a new folder of files; may be repeated'
 complete -c multidrop -n '_shtab_multidrop_using program upload' -l raw -d 'save the lines as they are stored, without remarks'
 complete -c multidrop -n '_shtab_multidrop_using program upload; and test $_shtab_multidrop_npos -eq 0' -ka "(_multidrop_url)" -d 'what to open'
 complete -c multidrop -n '_shtab_multidrop_using program upload; and test $_shtab_multidrop_npos -eq 1' -ka "(__fish_complete_path (commandline -ct))" -d 'the new file; it can be downloaded again; -: standard output'
 complete -c multidrop -n '_shtab_multidrop_using program; and test $_shtab_multidrop_npos -eq 0' -a download -d 'Back up what a drive holds, send it a program file, and read that back.'
 complete -c multidrop -n '_shtab_multidrop_using program download' -s h -l help -d 'show this help message and exit'
-complete -c multidrop -n '_shtab_multidrop_using program download' -l drive -x -d 'the drive (default: the first), or all; may be repeated'
+complete -c multidrop -n '_shtab_multidrop_using program download' -l drive -xka "(_multidrop_drive)" -d 'the drive (default: the first), or all; may be repeated'
 complete -c multidrop -n '_shtab_multidrop_using program download' -l save -d 'save it with S, so that power-off does not lose it'
 complete -c multidrop -n '_shtab_multidrop_using program download' -l run -x -d 'execute the program at this label at the end'
 complete -c multidrop -n '_shtab_multidrop_using program download' -l only-changed -d 'send nothing where the drive holds it already'
@@ -186,21 +207,21 @@ complete -c multidrop -n '_shtab_multidrop_using; and test $_shtab_multidrop_npo
 complete -c multidrop -n '_shtab_multidrop_using params' -s h -l help -d 'show this help message and exit'
 complete -c multidrop -n '_shtab_multidrop_using params; and test $_shtab_multidrop_npos -eq 0' -a backup -d 'Save all settings of a drive to a new file.'
 complete -c multidrop -n '_shtab_multidrop_using params backup' -s h -l help -d 'show this help message and exit'
-complete -c multidrop -n '_shtab_multidrop_using params backup' -l drive -x -d 'the drive (default: the first); all or several: FILE is a folder of files; may be repeated'
+complete -c multidrop -n '_shtab_multidrop_using params backup' -l drive -xka "(_multidrop_drive)" -d 'the drive (default: the first); all or several: FILE is a folder of files; may be repeated'
 complete -c multidrop -n '_shtab_multidrop_using params backup; and test $_shtab_multidrop_npos -eq 0' -ka "(_multidrop_url)" -d 'what to open'
 complete -c multidrop -n '_shtab_multidrop_using params backup; and test $_shtab_multidrop_npos -eq 1' -ka "(__fish_complete_path (commandline -ct))" -d 'the new file; -: standard output'
 complete -c multidrop -n '_shtab_multidrop_using params; and test $_shtab_multidrop_npos -eq 0' -a diff -d 'Print what differs from a file, another drive or the defaults; exit code 0: nothing, 1: something.'
 complete -c multidrop -n '_shtab_multidrop_using params diff' -s h -l help -d 'show this help message and exit'
-complete -c multidrop -n '_shtab_multidrop_using params diff' -l drive -x -d 'the drive (default: the first); all or several: FILE is a folder of files; may be repeated'
-complete -c multidrop -n '_shtab_multidrop_using params diff' -l against -x -d 'compare with a drive there'
-complete -c multidrop -n '_shtab_multidrop_using params diff' -l other -x -d 'the drive to compare with (default: the first of URL2)'
+complete -c multidrop -n '_shtab_multidrop_using params diff' -l drive -xka "(_multidrop_drive)" -d 'the drive (default: the first); all or several: FILE is a folder of files; may be repeated'
+complete -c multidrop -n '_shtab_multidrop_using params diff' -l against -xka "(_multidrop_url)" -d 'compare with a drive there'
+complete -c multidrop -n '_shtab_multidrop_using params diff' -l other -xka "(_multidrop_drive)" -d 'the drive to compare with (default: the first of URL2)'
 complete -c multidrop -n '_shtab_multidrop_using params diff' -l defaults -d 'compare with the defaults'
 complete -c multidrop -n '_shtab_multidrop_using params diff' -l json -d 'print one JSON object a line'
 complete -c multidrop -n '_shtab_multidrop_using params diff; and test $_shtab_multidrop_npos -eq 0' -ka "(_multidrop_url)" -d 'what to open'
 complete -c multidrop -n '_shtab_multidrop_using params diff; and test $_shtab_multidrop_npos -eq 1' -ka "(__fish_complete_path (commandline -ct))" -d 'a file of `params backup`'
 complete -c multidrop -n '_shtab_multidrop_using params; and test $_shtab_multidrop_npos -eq 0' -a restore -d 'Send the settings of a file that differ, in an order that the drive accepts; asks first.'
 complete -c multidrop -n '_shtab_multidrop_using params restore' -s h -l help -d 'show this help message and exit'
-complete -c multidrop -n '_shtab_multidrop_using params restore' -l drive -x -d 'the drive (default: the first); all or several: FILE is a folder of files; may be repeated'
+complete -c multidrop -n '_shtab_multidrop_using params restore' -l drive -xka "(_multidrop_drive)" -d 'the drive (default: the first); all or several: FILE is a folder of files; may be repeated'
 complete -c multidrop -n '_shtab_multidrop_using params restore' -l dry-run -d 'show the steps, and send nothing'
 complete -c multidrop -n '_shtab_multidrop_using params restore' -l save -d 'keep the settings over power-off (S, STORE, STAP)'
 complete -c multidrop -n '_shtab_multidrop_using params restore' -l communication -d 'restore communication settings too'
@@ -215,6 +236,7 @@ complete -c multidrop -n '_shtab_multidrop_using macro; and test $_shtab_multidr
 complete -c multidrop -n '_shtab_multidrop_using macro list' -s h -l help -d 'show this help message and exit'
 complete -c multidrop -n '_shtab_multidrop_using macro; and test $_shtab_multidrop_npos -eq 0' -a show -d 'Print a macro'"'"'s file.'
 complete -c multidrop -n '_shtab_multidrop_using macro show' -s h -l help -d 'show this help message and exit'
+complete -c multidrop -n '_shtab_multidrop_using macro show; and test $_shtab_multidrop_npos -eq 0' -ka "(_multidrop_macro)" -d NAME
 complete -c multidrop -n '_shtab_multidrop_using macro; and test $_shtab_multidrop_npos -eq 0' -a play -d 'Play a macro: once, several rounds, or until it is interrupted.'
 complete -c multidrop -n '_shtab_multidrop_using macro play' -s h -l help -d 'show this help message and exit'
 complete -c multidrop -n '_shtab_multidrop_using macro play' -l on -xka "(_multidrop_url)" -d 'what to open; may be repeated'
@@ -226,21 +248,28 @@ complete -c multidrop -n '_shtab_multidrop_using macro play' -l json -d 'print o
 complete -c multidrop -n '_shtab_multidrop_using macro play' -l junit -xka "(__fish_complete_path (commandline -ct))" -d 'write the checks to a JUnit XML file'
 complete -c multidrop -n '_shtab_multidrop_using macro play' -l yes -d 'answer every question with yes beforehand'
 complete -c multidrop -n '_shtab_multidrop_using macro play' -l beyond -d 'let moves leave the travel of their axis, which --yes does not'
+complete -c multidrop -n '_shtab_multidrop_using macro play; and test $_shtab_multidrop_npos -eq 0' -ka "(_multidrop_macro)" -d NAME
 complete -c multidrop -n '_shtab_multidrop_using macro; and test $_shtab_multidrop_npos -eq 0' -a edit -d 'Open a macro'"'"'s file in the editor of VISUAL or EDITOR; it changes only once the whole text is right.'
 complete -c multidrop -n '_shtab_multidrop_using macro edit' -s h -l help -d 'show this help message and exit'
+complete -c multidrop -n '_shtab_multidrop_using macro edit; and test $_shtab_multidrop_npos -eq 0' -ka "(_multidrop_macro)" -d NAME
 complete -c multidrop -n '_shtab_multidrop_using macro; and test $_shtab_multidrop_npos -eq 0' -a describe -d 'Change a macro'"'"'s note.'
 complete -c multidrop -n '_shtab_multidrop_using macro describe' -s h -l help -d 'show this help message and exit'
+complete -c multidrop -n '_shtab_multidrop_using macro describe; and test $_shtab_multidrop_npos -eq 0' -ka "(_multidrop_macro)" -d NAME
 complete -c multidrop -n '_shtab_multidrop_using macro; and test $_shtab_multidrop_npos -eq 0' -a rename -d 'Give a macro another name.'
 complete -c multidrop -n '_shtab_multidrop_using macro rename' -s h -l help -d 'show this help message and exit'
+complete -c multidrop -n '_shtab_multidrop_using macro rename; and test $_shtab_multidrop_npos -eq 0' -ka "(_multidrop_macro)" -d NAME
 complete -c multidrop -n '_shtab_multidrop_using macro; and test $_shtab_multidrop_npos -eq 0' -a copy -d 'Copy a macro; --project: into the folder macros of the current folder.'
 complete -c multidrop -n '_shtab_multidrop_using macro copy' -s h -l help -d 'show this help message and exit'
 complete -c multidrop -n '_shtab_multidrop_using macro copy' -l project -d 'into the folder macros of the current folder'
+complete -c multidrop -n '_shtab_multidrop_using macro copy; and test $_shtab_multidrop_npos -eq 0' -ka "(_multidrop_macro)" -d NAME
 complete -c multidrop -n '_shtab_multidrop_using macro; and test $_shtab_multidrop_npos -eq 0' -a delete -d 'Delete a macro; asks first.'
 complete -c multidrop -n '_shtab_multidrop_using macro delete' -s h -l help -d 'show this help message and exit'
 complete -c multidrop -n '_shtab_multidrop_using macro delete' -l yes -d 'answer every question with yes beforehand'
+complete -c multidrop -n '_shtab_multidrop_using macro delete; and test $_shtab_multidrop_npos -eq 0' -ka "(_multidrop_macro)" -d NAME
 complete -c multidrop -n '_shtab_multidrop_using macro; and test $_shtab_multidrop_npos -eq 0' -a key -d 'Put a macro on a function key, or free the key.'
 complete -c multidrop -n '_shtab_multidrop_using macro key' -s h -l help -d 'show this help message and exit'
 complete -c multidrop -n '_shtab_multidrop_using macro key' -l page -x -d 'a number or a word (default: 1)'
+complete -c multidrop -n '_shtab_multidrop_using macro key; and test $_shtab_multidrop_npos -eq 1' -ka "(_multidrop_macro)" -d 'off: free the key'
 complete -c multidrop -n '_shtab_multidrop_using macro; and test $_shtab_multidrop_npos -eq 0' -a import -d 'Make macros of a vendor'"'"'s function-key strings, one a line: F2 STRING ; comment.'
 complete -c multidrop -n '_shtab_multidrop_using macro import' -s h -l help -d 'show this help message and exit'
 complete -c multidrop -n '_shtab_multidrop_using macro import' -l force -d 'replace the macros of these names'
@@ -248,18 +277,19 @@ complete -c multidrop -n '_shtab_multidrop_using macro import; and test $_shtab_
 complete -c multidrop -n '_shtab_multidrop_using macro; and test $_shtab_multidrop_npos -eq 0' -a export -d 'Write macros to a new file of a vendor'"'"'s function-key strings.'
 complete -c multidrop -n '_shtab_multidrop_using macro export' -s h -l help -d 'show this help message and exit'
 complete -c multidrop -n '_shtab_multidrop_using macro export; and test $_shtab_multidrop_npos -eq 0' -ka "(__fish_complete_path (commandline -ct))" -d 'the new file (-: standard output)'
+complete -c multidrop -n '_shtab_multidrop_using macro export; and test $_shtab_multidrop_npos -ge 1' -ka "(_multidrop_macro)" -d 'a macro (default: those on keys)'
 complete -c multidrop -n '_shtab_multidrop_using; and test $_shtab_multidrop_npos -eq 0' -a plot -d 'Plot position, velocity and values until interrupted: to a file, or to a viewer served here or elsewhere.'
 complete -c multidrop -n '_shtab_multidrop_using plot' -s h -l help -d 'show this help message and exit'
-complete -c multidrop -n '_shtab_multidrop_using plot' -l drive -x -d 'a drive, or ADDR.WORD for a value that it prints (default: all drives)'
+complete -c multidrop -n '_shtab_multidrop_using plot' -l drive -xka "(_multidrop_drive)" -d 'a drive, or ADDR.WORD for a value that it prints (default: all drives)'
 complete -c multidrop -n '_shtab_multidrop_using plot' -l rate -x -d 'samples a second of each drive, at most (default: 50); max: as fast as the line allows'
-complete -c multidrop -n '_shtab_multidrop_using plot' -l to -x -d 'a file for rerun or a table (an existing one is added to), or a viewer elsewhere'
+complete -c multidrop -n '_shtab_multidrop_using plot' -l to -xka "(__fish_complete_path (commandline -ct))" -d 'a file for rerun or a table (an existing one is added to), or a viewer elsewhere'
 complete -c multidrop -n '_shtab_multidrop_using plot' -l serve -x -d 'serve a viewer'"'"'s data here'
 complete -c multidrop -n '_shtab_multidrop_using plot' -l no-reconnect -d 'give up a lost connection, and do not try again'
 complete -c multidrop -n '_shtab_multidrop_using plot; and test $_shtab_multidrop_npos -eq 0' -ka "(_multidrop_url)" -d 'what to open'
 complete -c multidrop -n '_shtab_multidrop_using; and test $_shtab_multidrop_npos -eq 0' -a poll -d 'Print values of drives in a row every so many seconds, until interrupted.'
 complete -c multidrop -n '_shtab_multidrop_using poll' -s h -l help -d 'show this help message and exit'
 complete -c multidrop -n '_shtab_multidrop_using poll' -l every -x -d 'the time from one row to the next'
-complete -c multidrop -n '_shtab_multidrop_using poll' -l drive -x -d 'the drives of names without an address (default: all); may be repeated'
+complete -c multidrop -n '_shtab_multidrop_using poll' -l drive -xka "(_multidrop_drive)" -d 'the drives of names without an address (default: all); may be repeated'
 complete -c multidrop -n '_shtab_multidrop_using poll' -l rows -x -d 'end after this number of rows'
 complete -c multidrop -n '_shtab_multidrop_using poll' -l json -d 'print one JSON object a value: time (UTC), bus, drive, name, value (null: not known)'
 complete -c multidrop -n '_shtab_multidrop_using poll' -l no-reconnect -d 'give up a lost connection, and do not try again'
@@ -277,7 +307,7 @@ complete -c multidrop -n '_shtab_multidrop_using share' -l json -d 'print the en
 complete -c multidrop -n '_shtab_multidrop_using share; and test $_shtab_multidrop_npos -eq 0' -ka "(_multidrop_url)" -d 'the port to lend'
 complete -c multidrop -n '_shtab_multidrop_using; and test $_shtab_multidrop_npos -eq 0' -a snapshot -d 'Read every drive into a new cell file, which the simulator opens as the same machine.'
 complete -c multidrop -n '_shtab_multidrop_using snapshot' -s h -l help -d 'show this help message and exit'
-complete -c multidrop -n '_shtab_multidrop_using snapshot' -s o -l output -x -d 'the new file; -: standard output'
+complete -c multidrop -n '_shtab_multidrop_using snapshot' -s o -l output -xka "(__fish_complete_path (commandline -ct))" -d 'the new file; -: standard output'
 complete -c multidrop -n '_shtab_multidrop_using snapshot; and test $_shtab_multidrop_npos -ge 0' -ka "(_multidrop_url)" -d 'what to open'
 complete -c multidrop -n '_shtab_multidrop_using; and test $_shtab_multidrop_npos -eq 0' -a ports -d 'List the serial ports of this machine, with their stable names.'
 complete -c multidrop -n '_shtab_multidrop_using ports' -s h -l help -d 'show this help message and exit'
@@ -293,6 +323,7 @@ complete -c multidrop -n '_shtab_multidrop_using scan' -l json -d 'print one JSO
 complete -c multidrop -n '_shtab_multidrop_using scan' -l all -d 'go on after the first drives that reply; with --dialect tmcl, ask every address and not only 1'
 complete -c multidrop -n '_shtab_multidrop_using scan' -l yes -d 'answer every question with yes beforehand'
 complete -c multidrop -n '_shtab_multidrop_using scan' -l save -x -d 'save what was found as a connection of this name'
+complete -c multidrop -n '_shtab_multidrop_using scan; and test $_shtab_multidrop_npos -eq 0' -ka "(_multidrop_url)" -d 'the port to search; its baud rate is tried first'
 complete -c multidrop -n '_shtab_multidrop_using; and test $_shtab_multidrop_npos -eq 0' -a rescue -d 'Free a drive that does not reply, step by step; ask before what may do harm, and before FD, which erases.'
 complete -c multidrop -n '_shtab_multidrop_using rescue' -s h -l help -d 'show this help message and exit'
 complete -c multidrop -n '_shtab_multidrop_using rescue' -l baud -x -d 'this baud rate only'
@@ -302,23 +333,24 @@ complete -c multidrop -n '_shtab_multidrop_using rescue' -l all -d 'take every s
 complete -c multidrop -n '_shtab_multidrop_using rescue' -l plain -d 'then set EM=0, CK=0 and PY=0 in the drive, after a question'
 complete -c multidrop -n '_shtab_multidrop_using rescue' -l erase -d 'go as far as FD, which erases; it is asked about as well'
 complete -c multidrop -n '_shtab_multidrop_using rescue' -l yes -d 'answer every question with yes beforehand'
+complete -c multidrop -n '_shtab_multidrop_using rescue; and test $_shtab_multidrop_npos -eq 0' -ka "(_multidrop_url)" -d 'the port to search; its baud rate is tried first'
 complete -c multidrop -n '_shtab_multidrop_using; and test $_shtab_multidrop_npos -eq 0' -a log -d 'Show, follow, search, judge and replay session logs, which /log begins.'
 complete -c multidrop -n '_shtab_multidrop_using log' -s h -l help -d 'show this help message and exit'
 complete -c multidrop -n '_shtab_multidrop_using log; and test $_shtab_multidrop_npos -eq 0' -a show -d 'Print a session log: typed lines, bytes both ways, replies, notices, failures.'
 complete -c multidrop -n '_shtab_multidrop_using log show' -s h -l help -d 'show this help message and exit'
-complete -c multidrop -n '_shtab_multidrop_using log show' -l drive -x -d 'entries of this drive only, ADDR or BUS:ADDR; may be repeated'
+complete -c multidrop -n '_shtab_multidrop_using log show' -l drive -xka "(_multidrop_drive)" -d 'entries of this drive only, ADDR or BUS:ADDR; may be repeated'
 complete -c multidrop -n '_shtab_multidrop_using log show' -l all -d 'show the bytes of polls, too'
 complete -c multidrop -n '_shtab_multidrop_using log show' -l json -d 'print the entries as they are in the file'
 complete -c multidrop -n '_shtab_multidrop_using log show; and test $_shtab_multidrop_npos -eq 0' -ka "(__fish_complete_path (commandline -ct))" -d 'a session log (default: the newest)'
 complete -c multidrop -n '_shtab_multidrop_using log; and test $_shtab_multidrop_npos -eq 0' -a follow -d 'Print the end of a session log, and what is added to it, until interrupted.'
 complete -c multidrop -n '_shtab_multidrop_using log follow' -s h -l help -d 'show this help message and exit'
-complete -c multidrop -n '_shtab_multidrop_using log follow' -l drive -x -d 'entries of this drive only, ADDR or BUS:ADDR; may be repeated'
+complete -c multidrop -n '_shtab_multidrop_using log follow' -l drive -xka "(_multidrop_drive)" -d 'entries of this drive only, ADDR or BUS:ADDR; may be repeated'
 complete -c multidrop -n '_shtab_multidrop_using log follow' -l all -d 'show the bytes of polls, too'
 complete -c multidrop -n '_shtab_multidrop_using log follow' -l json -d 'print the entries as they are in the file'
 complete -c multidrop -n '_shtab_multidrop_using log follow; and test $_shtab_multidrop_npos -eq 0' -ka "(__fish_complete_path (commandline -ct))" -d 'a session log (default: the newest)'
 complete -c multidrop -n '_shtab_multidrop_using log; and test $_shtab_multidrop_npos -eq 0' -a grep -d 'Print the entries of a session log that match; exit code 0: some do, 1: none does.'
 complete -c multidrop -n '_shtab_multidrop_using log grep' -s h -l help -d 'show this help message and exit'
-complete -c multidrop -n '_shtab_multidrop_using log grep' -l drive -x -d 'entries of this drive only, ADDR or BUS:ADDR; may be repeated'
+complete -c multidrop -n '_shtab_multidrop_using log grep' -l drive -xka "(_multidrop_drive)" -d 'entries of this drive only, ADDR or BUS:ADDR; may be repeated'
 complete -c multidrop -n '_shtab_multidrop_using log grep' -l all -d 'show the bytes of polls, too'
 complete -c multidrop -n '_shtab_multidrop_using log grep' -l json -d 'print the entries as they are in the file'
 complete -c multidrop -n '_shtab_multidrop_using log grep' -s i -l ignore-case -d 'a and A are the same'
@@ -357,4 +389,4 @@ complete -c multidrop -n '_shtab_multidrop_using report' -s o -l output -xka "(_
 complete -c multidrop -n '_shtab_multidrop_using report' -l yes -d 'write it without a question'
 complete -c multidrop -n '_shtab_multidrop_using; and test $_shtab_multidrop_npos -eq 0' -a completion -d 'Print the completion of this command line for a shell.'
 complete -c multidrop -n '_shtab_multidrop_using completion' -s h -l help -d 'show this help message and exit'
-complete -c multidrop -n '_shtab_multidrop_using completion; and test $_shtab_multidrop_npos -eq 0' -ka "bash zsh fish" -d shell
+complete -c multidrop -n '_shtab_multidrop_using completion; and test $_shtab_multidrop_npos -eq 0' -ka "bash zsh fish powershell" -d shell

@@ -14,7 +14,7 @@ from functools import partial
 
 from multidrop.shell import configuration, stop_report
 from multidrop.shell.automation import outcome, settled
-from multidrop.shell.channel import Front
+from multidrop.shell.channel import SILENCE, Front
 from multidrop.shell.events import FAILURES, SessionEvent, StateChanged
 from multidrop.shell.exit_codes import INTERRUPTED, exit_code
 from multidrop.shell.log.writer import begin as begin_log
@@ -93,15 +93,25 @@ async def _run(
         host = _Host(session, printer, interrupted)
         stop = partial(session.stop, "Ctrl+X")
         keys = on_stop_key(session.stop_ahead, stop, host.interrupt) if watch_keys else nullcontext()
+        ticking = asyncio.create_task(_tick(session, printer)) if sys.stderr.isatty() else None
         with on_signals(host.interrupt), keys as keyboard:
             ask = asker(keyboard) if asks else None
             session.front = Front(ask, ready=streams.ready, beforehand="--yes agrees beforehand")
             try:
                 code = await host.result(urls, body)
             finally:
+                if ticking is not None:
+                    ticking.cancel()
                 await session.close()
             await finish(streams, lambda: host.interrupted or session.latched)
             return code
+
+
+async def _tick(session: Session, printer: Printer) -> None:
+    """Name what is under way in each second in which nothing was printed."""
+    while True:
+        await asyncio.sleep(SILENCE / 2)
+        printer.tick("" if session.questions.open.busy else session.under_way.text)
 
 
 class _Host:

@@ -27,6 +27,12 @@ def has_transcript(workspace: Workspace) -> bool:
     return workspace.front.transcripts is not None
 
 
+def has_something_to_clear(workspace: Workspace) -> bool:
+    return workspace.front.clear is not None
+
+
+ON_SCREEN = (has_screen, has_transcript)
+"""The conditions of verbs that need the screen."""
 HELP = Operation(
     usage="/help [WORD|NUMBER]",
     help="""Explain a verb, a command of the drives or an error number.
@@ -143,6 +149,17 @@ QUIT = Operation(
     """,
     work="session:quit_",
     immediate=True,
+)
+EXIT = Operation(usage="/exit", help="End multidrop, as /quit does.", work="session:quit_", immediate=True)
+CLEAR = Operation(
+    usage="/clear",
+    help="""Empty the terminal; on the screen, the transcript of the selected bus.
+
+    No drive notices. A log and the history keep their lines.
+    """,
+    work="session:clear",
+    immediate=True,
+    fits=has_something_to_clear,
 )
 TIMES = Operation(
     usage="/times [off|clock|start|last]",

@@ -11,12 +11,18 @@ from collections.abc import Iterator, Sequence
 from multidrop.shell.operations import buses, drives, macros, programs, session
 from multidrop.shell.operations.operation import Operation
 
-VERB_ORDER = """
-    /open /close /use /drives /scan /referenced /units /status /check /trace /step /continue /break /watch /help
-    /macros /macro /key /play /params /plot /list /upload /download /raw /hex /bytes /record /register /coil
-    /device /page /tour /stop /resume /log /quit /sim /snapshot /rename /tab /keep /times /filter /save
-    /unsent /twin /sleep /wait
-"""
+VERB_GROUPS = {
+    "Stop and end": "/stop /resume /quit /exit",
+    "Lines and drives": "/open /close /use /drives /scan /status /units /referenced /rename /tab /keep",
+    "Settings and values": "/params /snapshot /plot /twin /register /coil /device",
+    "Programs of drives": "/check /download /upload /list /trace /step /continue /break /watch",
+    "Macros": "/macros /macro /record /play /key",
+    "Waits": "/wait /sleep",
+    "Bytes": "/raw /hex /bytes",
+    "The session and its screen": "/help /clear /log /page /tour /times /filter /save /unsent",
+    "Simulated drives": "/sim",
+}
+"""The verbs in the order and the groups of `/help`."""
 COMMAND_ORDER = """demo tui shell send run sim program params macro plot poll publish share snapshot ports relay scan
     rescue log config help lsp report completion"""
 SCRIPT_WORDS = {
@@ -45,7 +51,7 @@ def _ordered(found: dict[str, Operation], order: Sequence[str]) -> dict[str, Ope
     return {name: found[name] for name in (*order, *(each for each in found if each not in order))}
 
 
-VERBS = _ordered({each.name: each for each in _declared() if each.usage}, VERB_ORDER.split())
+VERBS = _ordered({each.name: each for each in _declared() if each.usage}, " ".join(VERB_GROUPS.values()).split())
 """By name, in the order of `/help`."""
 COMMANDS = _ordered({each.command: each for each in _declared() if each.command}, COMMAND_ORDER.split())
 """By their words, in the order of `--help`; the parts of a group after it."""

@@ -128,7 +128,8 @@ BURST = 0.5
 """The time between two Enters, s, below which no person can have read the reply to the first."""
 SHOWN = 10
 """The number of unsent lines that are shown one by one."""
-AHEAD = ("/stop", "/quit")
+LEAVING = ("/quit", "/exit")
+AHEAD = ("/stop", *LEAVING)
 """Verbs that run at once, whatever waits or failed."""
 
 
@@ -184,7 +185,7 @@ class LineQueue:
         self.running = ""
         """The line that runs now."""
         self.count = 0
-        """The number of lines entered, without /quit."""
+        """The number of lines entered, without those that end it."""
 
     def enter(self, text: str) -> None:
         """Take the lines of one Enter. They count as typed now, whenever their turn comes."""
@@ -202,7 +203,7 @@ class LineQueue:
 
     def _take(self, line: Line) -> None:
         concurrent = _concurrent(line)
-        self.count += bool(line.text.strip()) and line.verb != "/quit"
+        self.count += bool(line.text.strip()) and line.verb not in LEAVING
         if line.verb in AHEAD:
             self._session.start(line.sent, since=line.since)
         elif self._held:

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import os
 import sys
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack
@@ -18,13 +19,17 @@ from functools import partial
 
 from prompt_toolkit import PromptSession
 from prompt_toolkit.application import create_app_session, get_app_or_none
-from prompt_toolkit.application.current import set_app
+from prompt_toolkit.application.current import get_app_session, set_app
+from prompt_toolkit.auto_suggest import AutoSuggestFromHistory, ConditionalAutoSuggest
 from prompt_toolkit.buffer import Buffer
-from prompt_toolkit.filters import is_searching
+from prompt_toolkit.filters import Condition, is_searching
+from prompt_toolkit.formatted_text import StyleAndTextTuples
 from prompt_toolkit.key_binding import KeyBindings, KeyPressEvent
 from prompt_toolkit.keys import Keys
-from prompt_toolkit.output import create_output
+from prompt_toolkit.output import ColorDepth, create_output
 from prompt_toolkit.search import stop_search
+from prompt_toolkit.styles import Style
+from prompt_toolkit.utils import is_dumb_terminal
 
 from multidrop.dialects import Diagnostic
 from multidrop.dialects.files import lines_of
@@ -39,12 +44,18 @@ from multidrop.shell.prompt.keyboard import Keyboard, on_signals, terminal
 from multidrop.shell.prompt.keys import KeyboardInput, PromptQuestion
 from multidrop.shell.prompt.line_queue import History, LineQueue, shown
 from multidrop.shell.prompt.terminal_input import filled
-from multidrop.shell.prompt.view import LinesAbove, SessionCompleter, SharedHistory, Toolbar
+from multidrop.shell.prompt.view import LinesAbove, Pager, PlainOutput, SessionCompleter, SharedHistory, Toolbar
 from multidrop.shell.session import Session
 from multidrop.shell.signals import early_ends
 from multidrop.shell.streams.event_printer import Printer
 from multidrop.shell.streams.stdout import finish, nonblocking, report, write
 
+STYLE = Style.from_dict(
+    {"prompt": "ansicyan", "question": "ansiyellow", "stop": "ansired", "auto-suggestion": "ansibrightblack"}
+)
+"""Colours among the terminal's own sixteen; NO_COLOR and a dumb terminal have none."""
+TICK = 1.0
+"""The time between two updates of the seconds that a line has run, s."""
 FIRST_FRAME = 0.05
 """The longest wait for the first frame, s."""
 
@@ -86,7 +97,8 @@ async def _run(make: Callable[[], Session], urls: Sequence[str], agreed: bool, b
             keyboard = Keyboard(descriptor, signals=False)
             keyboard.stop_ahead = session.stop_ahead
             input_ = KeyboardInput(stack.enter_context(keyboard))
-        stack.enter_context(create_app_session(input=input_, output=create_output(always_prefer_tty=True)))
+        output = PlainOutput() if is_dumb_terminal() else create_output(always_prefer_tty=True)
+        stack.enter_context(create_app_session(input=input_, output=output))
         prompt = Prompt(session, input_)
         stack.enter_context(on_signals(prompt.interrupt))
         try:
@@ -113,12 +125,23 @@ class Prompt:
             completer=SessionCompleter(session),
             complete_while_typing=True,
             bottom_toolbar=lambda: self._toolbar(),
+            auto_suggest=ConditionalAutoSuggest(AutoSuggestFromHistory(), Condition(lambda: not self._question.shown)),
+            style=STYLE,
+            color_depth=ColorDepth.DEPTH_1_BIT if "NO_COLOR" in os.environ else None,
+            output=get_app_session().output,
         )
+        self._pager = Pager(session, self._prompt.app)
+        self._naming: asyncio.Task[None] | None = None
+        """Reads which drives move, after Ctrl+C."""
         self._toolbar = Toolbar(session, self._lines, self._prompt)
         self._question = PromptQuestion(self._prompt.app, self._ask_alone)
         self._prompt.key_bindings = self._bindings()
         fill = partial(filled, self._question.ask_text, partial(session.notify, warning=True))
-        session.front = Front(self._question.ask, fill, before_quit=self._may_quit)
+        session.front = Front(
+            self._question.ask, fill, before_quit=self._may_quit, clear=self._prompt.app.renderer.clear
+        )
+        session.front.page = self._pager.show
+        self._prompt.app.after_render += lambda _: self._echo(self._typing())
         self._accept = self._prompt.default_buffer.accept_handler
         self._prompt.default_buffer.accept_handler = self._accepted
         if input_ is not None:
@@ -175,7 +198,7 @@ class Prompt:
         await self._session.open_all(urls)
 
     async def _read(self, urls: Sequence[str]) -> None:
-        worker = asyncio.create_task(self._work(urls))
+        worker, ticking = asyncio.create_task(self._work(urls)), asyncio.create_task(self._tick())
         worker.add_done_callback(lambda _: self._end())
 
         def begin() -> None:
@@ -197,10 +220,26 @@ class Prompt:
             self._lines.drop("the prompt has ended")
             await self._leave()
             self._lines.close()
-            worker.cancel()
-            await asyncio.gather(worker, return_exceptions=True)
+            others = [ticking, self._naming] if self._naming is not None else [ticking]
+            for task in (worker, *others):
+                task.cancel()
+            await asyncio.gather(worker, *others, return_exceptions=True)
         if not worker.cancelled():
             worker.result()
+
+    async def _tick(self) -> None:
+        """Draw the seconds for which something has been under way."""
+        while True:
+            await asyncio.sleep(TICK)
+            if self._prompt.app.is_running and self._session.under_way.text:
+                self._prompt.app.invalidate()
+
+    async def _name_moving(self) -> None:
+        """Name the drives that move or may move: Ctrl+C has stopped none of them."""
+        if moving := await self._session.in_motion():
+            for text in moving:
+                self._session.notify(text, warning=True)
+            self._session.notify("Ctrl+C stopped nothing; Ctrl+X stops all drives", warning=True)
 
     async def _may_quit(self) -> bool:
         """Return True to end. While drives move or may move, only a second question in a row returns True."""
@@ -226,10 +265,19 @@ class Prompt:
         for line in outcome(self._session, halts):
             write(sys.stderr, line)
 
+    def _echo(self, typed: str) -> None:
+        if isinstance(plain := self._prompt.app.output, PlainOutput):
+            plain.echo(self._message()[0][1], typed)
+
     def _accepted(self, buffer: Buffer) -> bool:
+        self._echo(buffer.text)
         if self._question.takes(buffer.text):
             buffer.reset()  # an answer is not a line: the history does not keep it
             return True
+        if not buffer.text.strip() and self._pager.more():
+            buffer.reset()
+            return True
+        self._pager.rest.clear()
         self._lines.enter(buffer.text or self._session.enter_alone())
         if self._input is not None:
             self._input.rest()
@@ -319,6 +367,8 @@ class Prompt:
                 self._question.no()
             else:
                 event.current_buffer.reset()
+                if self._naming is None or self._naming.done():
+                    self._naming = asyncio.create_task(self._name_moving())
 
         @bindings.add(Keys.BracketedPaste)
         def paste(event: KeyPressEvent) -> None:
@@ -335,10 +385,10 @@ class Prompt:
         self._question.bind(bindings)
         return bindings
 
-    def _message(self) -> str:
+    def _message(self) -> StyleAndTextTuples:
         if self._question.shown:
-            return self._question.shown
+            return [("class:question", self._question.shown)]
         drive = self._session.selected
         if (bus := self._session.selected_bus) in self._session.raw:
-            return f"{bus} raw> "
-        return f"{self._session.display_name(drive) if drive else bus}> "
+            return [("class:prompt", f"{bus} raw> ")]
+        return [("class:prompt", f"{self._session.display_name(drive) if drive else bus}> ")]

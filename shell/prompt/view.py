@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import re
 import sys
 from collections import deque
 from collections.abc import AsyncGenerator, Iterable, Iterator, Sequence
@@ -20,7 +21,9 @@ from prompt_toolkit import PromptSession
 from prompt_toolkit.application import Application, in_terminal
 from prompt_toolkit.completion import CompleteEvent, Completer, Completion
 from prompt_toolkit.document import Document
+from prompt_toolkit.formatted_text import StyleAndTextTuples
 from prompt_toolkit.history import History as PromptHistory
+from prompt_toolkit.output import ColorDepth, DummyOutput
 
 from multidrop.shell import stop_report
 from multidrop.shell.events import Progressed
@@ -28,7 +31,8 @@ from multidrop.shell.openings import model
 from multidrop.shell.prompt import complete
 from multidrop.shell.prompt.line_queue import History, LineQueue
 from multidrop.shell.session import Session
-from multidrop.shell.streams.output_streams import LineStream, Outlet
+from multidrop.shell.streams.event_printer import laid_out
+from multidrop.shell.streams.output_streams import Colour, LineStream, Outlet
 from multidrop.shell.threads import Loss
 from multidrop.shell.workspace import Workspace
 
@@ -48,6 +52,9 @@ BREATH = 0.01
 """The time between two updates while lines wait, s."""
 SLICE = 0.05
 """The longest time, s, for which an update hides the prompt."""
+BELOW = 4
+"""The rows that a page of help leaves free: the prompt, its toolbar, the line about more, a row of the page before."""
+ESCAPES = re.compile("\x1b\\[[0-9;]*[A-Za-z]")
 CHUNK = 16 * 1024
 """The number of characters after which the terminal is asked whether it keeps up; less than a writer's limit."""
 
@@ -55,9 +62,12 @@ CHUNK = 16 * 1024
 class Stream(LineStream):
     """A text stream whose lines appear above the prompt. `keep`: never drop a line (warnings and failures)."""
 
-    def __init__(self, lines: LinesAbove, keep: bool) -> None:
-        self._lines, self._keep = lines, keep
+    def __init__(self, lines: LinesAbove, keep: bool, colour: str = "") -> None:
+        self._lines, self._keep, self._colour = lines, keep, colour
         self._begun = ""
+
+    def coloured(self, colour: Colour) -> LineStream:
+        return Stream(self._lines, self._keep, colour.value) if self._lines.coloured else self
 
     @property
     def encoding(self) -> str:  # type: ignore[override]
@@ -79,7 +89,7 @@ class Stream(LineStream):
         """Show lines, after what was begun."""
         if self._begun:
             self.write("\n")
-        self._lines.add(lines, self._keep)
+        self._lines.add([f"{self._colour}{line}\x1b[m" for line in lines] if self._colour else lines, self._keep)
 
 
 class LinesAbove:
@@ -101,6 +111,7 @@ class LinesAbove:
         stdout = getattr(app.output, "stdout", None)
         self._writer = stdout.writer if isinstance(stdout, Outlet) else None
         self.on_terminal = stdout is not None and stdout.isatty()
+        self.coloured = self.on_terminal and app.color_depth is not ColorDepth.DEPTH_1_BIT
 
     def add(self, lines: Sequence[str], keep: bool) -> None:
         """Queue lines; the oldest give way."""
@@ -209,6 +220,69 @@ class LinesAbove:
                 self._write(text)
 
 
+class PlainOutput(DummyOutput):
+    """The output of a dumb terminal: lines, and an echo of the prompt and what is typed. Nothing is drawn over."""
+
+    stdout: TextIO
+
+    def __init__(self) -> None:
+        self.stdout = sys.stdout if sys.stdout.isatty() else sys.stderr
+        self._echoed = ""
+        """The prompt and the text that the last row shows."""
+
+    def encoding(self) -> str:
+        return self.stdout.encoding or "utf-8"
+
+    def get_default_color_depth(self) -> ColorDepth:
+        return ColorDepth.DEPTH_1_BIT
+
+    def write_raw(self, data: str) -> None:
+        self.stdout.write("\n" * bool(self._echoed) + ESCAPES.sub("", data))
+        self._echoed = ""
+
+    def flush(self) -> None:
+        self.stdout.flush()
+
+    def echo(self, message: str, typed: str) -> None:
+        """Show the prompt and what is typed: what is new, or all of it in a new row."""
+        now, before = message + typed, self._echoed
+        if now != before:
+            self.stdout.write(now.removeprefix(before) if now.startswith(before) else f"\n{now}")
+            self.flush()
+            self._echoed = now
+
+
+class Pager:
+    """Long help, a screenful at a time: Enter on an empty line shows the next one. It takes no key and waits for none.
+
+    `rest`: the lines that are not shown yet.
+    """
+
+    def __init__(self, session: Session, app: Application[Any]) -> None:
+        self._session, self._app = session, app
+        self.rest: list[str] = []
+
+    def show(self, lines: Sequence[str]) -> None:
+        self.rest = list(lines)
+        self.more()
+
+    def more(self) -> bool:
+        """Show the next lines; False where there are none. In raw mode, where Enter sends a byte, show all of them."""
+        size, rows, shown = self._app.output.get_size(), 0, 0
+        for shown, line in enumerate(self.rest):
+            rows += len(laid_out(line, size.columns))
+            if rows > max(1, size.rows - BELOW) and shown and self._session.selected_bus not in self._session.raw:
+                break
+        else:
+            shown = len(self.rest)
+        for line in self.rest[:shown]:
+            self._session.output(line, columns=True)
+        del self.rest[:shown]
+        if self.rest:
+            self._session.notify(f"Enter shows the next of {len(self.rest)} more lines")
+        return shown > 0
+
+
 # The last line of the prompt: the stop key, what runs, and a hint for the line that is being typed.
 
 
@@ -223,11 +297,10 @@ class Toolbar:
         self.progress: Progressed | None = None
         """The last progress of the job that runs."""
 
-    def __call__(self) -> str:
+    def __call__(self) -> StyleAndTextTuples:
         session = self._session
         room = self._prompt.app.output.get_size().columns - len(f"{STOP}  ")
         parts = [
-            STOP,
             f"✗ {session.selected_bus} lost" if session.selected_bus in session.reconnections.trying else "",
             stop_report.headline(session.tally(), room) if session.latched else "",
             " ".join(f"▶ {each.short}" for each in session.playing),
@@ -236,13 +309,14 @@ class Toolbar:
             self._running(),
             complete.hint(session, self._prompt.default_buffer.text) or self._selection(),
         ]
-        return "  ".join(part for part in parts if part)
+        return [("class:stop", STOP), ("", "".join(f"  {part}" for part in parts if part))]
 
     def _running(self) -> str:
         """The line that runs, or the progress of its job."""
         if self.progress is not None:
             return self.progress.text
-        return f"running {self._lines.running}" if self._lines.running and self._session.busy else ""
+        running = f"running {self._lines.running}" if self._lines.running and self._session.busy else ""
+        return self._session.under_way.text or running
 
     def _selection(self) -> str:
         drive = self._session.selected

@@ -5,11 +5,12 @@ from __future__ import annotations
 import re
 import sys
 import textwrap
-from typing import TextIO
+from typing import TextIO, cast
 
 from multidrop.dialects.text import visible
 from multidrop.drives.events import Unsolicited
 from multidrop.shell.events import Bytes, Failed, Notified, OnBus, Output, Printed, Progressed, SessionEvent
+from multidrop.shell.streams.output_streams import Colour, LineStream
 from multidrop.shell.streams.stdout import StatusLine, write
 
 _COLUMN = re.compile(r" *(?:\S(?:.*?\S)? {2,}(?=\S))?")
@@ -46,9 +47,14 @@ class Printer:
         self._unsolicited = unsolicited
         self._last = ""
         self._progress = StatusLine()
+        self._job = False
+        """A job shows its own progress."""
+        self._quiet = 0
+        """The number of ticks since something was written."""
 
     def show(self, event: SessionEvent) -> None:
         if isinstance(event, Progressed):
+            self._job = not event.over
             if event.over:
                 self._progress.erase()
             elif not self._talkative:
@@ -74,14 +80,28 @@ class Printer:
         elif isinstance(event, Output | Printed):
             self._write(sys.stdout, event.text)
         elif self._talkative or (isinstance(event, Notified) and (event.warning or event.outcome)):
-            self.notify(event.text)
+            warning = Colour.WARNING if isinstance(event, Notified) and event.warning else None
+            self.notify(event.text, Colour.FAILURE if isinstance(event, Failed) else warning)
 
-    def notify(self, text: str) -> None:
+    def notify(self, text: str, colour: Colour | None = None) -> None:
         """Write a line to standard error. The same line twice in a row is written once, unless talkative."""
         if text != self._last or self._talkative:
             self._last = text
-            self._write(sys.stderr, text)
+            stream = sys.stderr
+            if colour is not None and isinstance(stream, LineStream):
+                stream = cast(TextIO, stream.coloured(colour))
+            self._write(stream, text)
+
+    def tick(self, under_way: str) -> None:
+        """Show what is under way once nothing was written for two ticks."""
+        self._quiet += 1
+        if not self._job and self._quiet > 2:
+            if under_way:
+                self._progress.show(under_way)
+            else:
+                self._progress.erase()
 
     def _write(self, stream: TextIO, *lines: str, spare: bool = False) -> None:
+        self._quiet = 0
         self._progress.erase()
         write(stream, *lines, spare=spare)

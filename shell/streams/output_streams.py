@@ -15,6 +15,7 @@ import select
 import stat
 import sys
 from collections.abc import Callable, Iterator, Sequence
+from enum import Enum
 from functools import partial
 from typing import TextIO
 
@@ -49,6 +50,13 @@ def descriptor_writer(
     return BoundedWriter(write, notice, ended, limit)
 
 
+class Colour(Enum):
+    """The colours of lines at a prompt, as a terminal takes them."""
+
+    FAILURE = "\x1b[31m"
+    WARNING = "\x1b[33m"
+
+
 class LineStream(io.TextIOBase):
     """A text stream in place of a standard stream that takes whole lines at once."""
 
@@ -58,6 +66,10 @@ class LineStream(io.TextIOBase):
         A file loses none.
         """
         raise NotImplementedError
+
+    def coloured(self, colour: Colour) -> LineStream:
+        """The same stream with its lines in a colour, where it shows colours."""
+        return self
 
 
 class Outlet(LineStream):

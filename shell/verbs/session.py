@@ -17,7 +17,8 @@ from multidrop.shell.log import files
 from multidrop.shell.log.writer import SessionLog
 from multidrop.shell.new_file import STANDARD_OUTPUT
 from multidrop.shell.operations.operation import Operation
-from multidrop.shell.operations.table import VERBS
+from multidrop.shell.operations.session import ON_SCREEN
+from multidrop.shell.operations.table import VERB_GROUPS, VERBS
 from multidrop.shell.operations.usage import split
 from multidrop.shell.roles import EVERYTHING, TIMES, Filter, Transcripts
 from multidrop.shell.verbs.call import Call, words
@@ -66,6 +67,13 @@ async def quit_(call: Call) -> None:
     ask = call.session.front.before_quit
     if ask is None or await ask():
         call.session.quit()
+
+
+async def clear(call: Call) -> None:
+    call.words()
+    if call.session.front.clear is None:
+        raise Diagnostic("no terminal is shown here", call.verb.name)
+    call.session.front.clear()
 
 
 _TEXT = re.compile(r"""(?P<quote>["'])(?P<text>.+?)(?P=quote)(?:\s+(?P<seconds>\S+))?""")
@@ -233,6 +241,9 @@ async def help_(call: Call) -> None:
 
         taken = setting_units.example(call.session.units, selected, word.upper())
         lines = [*lines, f"  {'units':<10} {taken}"] if taken else lines
+    if call.session.front.page is not None:
+        call.session.front.page(lines)
+        return
     for line in lines:
         call.session.output(line, columns=True)
 
@@ -245,13 +256,16 @@ def explained(word: str, language: Language, product: str = "") -> list[str]:
 
 
 def overview() -> list[str]:
-    """All verbs, a line each; a long usage has a line of its own."""
-    lines = []
-    for each in VERBS.values():
-        if len(each.usage) > WIDTH:
-            lines.append(each.usage)
-        lines.append(f"{each.usage if len(each.usage) <= WIDTH else '':<{WIDTH}}  {each.lines[0]}")
-    return lines
+    """All verbs in their groups, a line each; a long usage has a line of its own."""
+    lines: list[str] = []
+    for title, names in VERB_GROUPS.items():
+        lines += ["", f"{title}:"] if lines else [f"{title}:"]
+        for each in map(VERBS.__getitem__, names.split()):
+            if len(each.usage) > WIDTH:
+                lines.append(each.usage)
+            mark = "[screen] " * (each.fits in ON_SCREEN)
+            lines.append(f"{each.usage if len(each.usage) <= WIDTH else '':<{WIDTH}}  {mark}{each.lines[0]}")
+    return [*lines, "", "[screen]: only on the screen, which multidrop tui shows"]
 
 
 def described(name: str, language: Language | None = None, product: str = "") -> list[str]:
@@ -261,7 +275,8 @@ def described(name: str, language: Language | None = None, product: str = "") ->
     """
     language = language or FAMILIES[DEFAULT].language
     if name.startswith("/") and name in VERBS:
-        return VERBS[name].described()
+        verb = VERBS[name]
+        return [*verb.described(), *["Needs the screen, which multidrop tui shows."] * (verb.fits in ON_SCREEN)]
     for each in (language, *languages()):
         if each.knows(name):
             return each.describe(name, product if each is language else "")

@@ -2,6 +2,7 @@
 
 import importlib.util
 import os
+import re
 import subprocess
 import sys
 
@@ -40,7 +41,11 @@ def test_the_man_page_has_every_command():
 @pytest.fixture
 def home(tmp_path):
     (tmp_path / ".config" / "multidrop").mkdir(parents=True)
-    (tmp_path / ".config" / "multidrop" / "multidrop.toml").write_text('[connections.gantry]\nurl = "sim:"\n')
+    (tmp_path / ".config" / "multidrop" / "multidrop.toml").write_text(
+        '[connections.gantry]\nurl = "sim:#press?drives=a,b"\n'
+    )
+    (tmp_path / ".config" / "multidrop" / "macros").mkdir()
+    (tmp_path / ".config" / "multidrop" / "macros" / "shuttle.toml").touch()
     (tmp_path / "cell.toml").touch()
     return tmp_path
 
@@ -61,6 +66,8 @@ CASES = {
     "multidrop run go.txt --on modb": ["modbus://"],
     "multidrop plot sim: --ser": ["--serve"],
     "multidrop completion f": ["fish"],
+    "multidrop macro play shu": ["shuttle"],
+    "multidrop params backup gantry --drive a": ["all", "a"],
 }
 
 
@@ -92,6 +99,17 @@ def test_fish_completes(home):
 def test_zsh_takes_the_file(home):
     load = "fpath=($1 $fpath); autoload -Uz compinit; compinit -u; print $_comps[multidrop]"
     assert completed(home, "zsh", "-f", "-c", load, "zsh", str(SHIPPED)) == ["_multidrop"]
+
+
+def test_powershell_has_every_command_and_what_is_listed():
+    """No PowerShell runs here: the text is compared with the tree of commands."""
+    text = (SHIPPED / "multidrop.ps1").read_text()
+    assert [name for name in parts("") if f"'{name}'" not in text] == []
+    assert re.search(r"'_shtab_multidrop_send_pos_0' = '_multidrop_url'", text)
+    assert re.search(r"'_shtab_multidrop_macro_play_pos_0' = '_multidrop_macro'", text)
+    assert re.search(r"'_shtab_multidrop_params_backup___drive' = '_multidrop_drive'", text)
+    assert len(re.findall(r"^function _multidrop_(url|drive|macro|folder) \{", text, re.M)) == 4
+    assert text.count("{") == text.count("}")
 
 
 @pytest.mark.process

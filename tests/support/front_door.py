@@ -114,15 +114,15 @@ class Home:
         out, err = process.communicate(stdin, timeout=PATIENCE)
         return Done(process.returncode, out, err)
 
-    def terminal(self, *arguments: str, columns: int = 80) -> Any:
-        """Start a process on a pseudo-terminal of its own."""
+    def terminal(self, *arguments: str, columns: int = 80, **variables: str) -> Any:
+        """Start a process on a pseudo-terminal of its own; `variables`: more of its environment."""
         import pexpect
 
         child = pexpect.spawn(
             sys.executable,
             ["-m", "multidrop", *arguments],
             cwd=self.folder,
-            env=environment(self.folder),
+            env=environment(self.folder) | variables,
             timeout=PATIENCE,
             encoding="utf-8",
             dimensions=(24, columns),

@@ -12,6 +12,7 @@ from prompt_toolkit.application import Application, AppSession, create_app_sessi
 from prompt_toolkit.data_structures import Size
 from prompt_toolkit.input import PipeInput, create_pipe_input
 from prompt_toolkit.output import DummyOutput
+from prompt_toolkit.output import Output as Terminal
 
 from multidrop.shell.configuration import Settings
 from multidrop.shell.events import Entered, Notified, Output
@@ -85,10 +86,10 @@ class Typist:
 
 
 @contextlib.asynccontextmanager
-async def typist(folder: Path) -> AsyncIterator[Typist]:
-    """Run a prompt whose settings and state are in this folder."""
+async def typist(folder: Path, output: Terminal | None = None) -> AsyncIterator[Typist]:
+    """Run a prompt whose settings and state are in this folder. `output`: its terminal; a wide one by default."""
     session = Session(Settings(folder=folder / "config", state=folder / "state"))
-    with create_pipe_input() as keys, create_app_session(input=keys, output=Wide()) as terminal:
+    with create_pipe_input() as keys, create_app_session(input=keys, output=output or Wide()) as terminal:
         made = Typist(session, keys, terminal)
         try:
             await until(lambda: made.running)

@@ -5,12 +5,15 @@ import contextlib
 import io
 
 import pytest
+from prompt_toolkit.output import ColorDepth
 
 from multidrop.dialects import Diagnostic, Stopped
 from multidrop.macros import Macro, Step
 from multidrop.shell.events import Progressed
 from multidrop.shell.macro_arguments import value_fields
 from multidrop.shell.prompt.terminal_input import PAUSE, at_terminal
+from multidrop.shell.prompt.view import PlainOutput
+from multidrop.shell.verbs.session import overview
 from tests.support.typist import typist as typist_in
 from tests.support.until import until
 
@@ -92,6 +95,113 @@ async def test_ctrl_r_finds_a_line_of_an_earlier_run(tmp_path):
         typist.send("\x04")
         await typist.ends()
         assert typist.entered == ["/help VM"]
+
+
+async def test_clear_and_exit_are_verbs(typist):
+    typist.send("/clear\r/exit\r")
+    assert await typist.ends() == 0
+    assert typist.entered == ["/clear", "/exit"]
+
+
+async def test_a_suggestion_from_the_history_is_taken_by_a_key_and_never_sent_by_enter(tmp_path):
+    (tmp_path / "state").mkdir()
+    (tmp_path / "state" / "history").write_text("/help MR\n/help VM\n")
+    async with typist_in(tmp_path) as typist:
+        typist.send("/help ")
+        await until(lambda: "> /help VM" in typist.screen)
+        typist.send("M\r")
+        await until(lambda: typist.entered == ["/help M"])
+        await asyncio.sleep(LONG)
+        typist.send("/help V")
+        await until(lambda: "> /help VM" in typist.screen)
+        typist.send("\x1b[C\r")
+        await until(lambda: typist.entered == ["/help M", "/help VM"])
+
+
+async def test_a_value_that_is_asked_for_is_not_completed_from_the_history(tmp_path):
+    (tmp_path / "state").mkdir()
+    (tmp_path / "state" / "history").write_text("1000\n")
+    async with typist_in(tmp_path) as typist:
+        asking = asyncio.create_task(typist.session.questions.fill_in("macro m", FIELDS))
+        await typist.shows(TURNS.rstrip())
+        await asyncio.sleep(LONG)
+        typist.send("1")
+        await asyncio.sleep(LONG)
+        assert typist.screen.startswith(f"{TURNS}1\n")
+        typist.send("\x04")
+        await asyncio.gather(asking, return_exceptions=True)
+
+
+async def test_ctrl_c_names_the_drives_that_run_and_the_key_that_stops_them(typist):
+    typist.send("/open sim:#press\r@b SL 5000\r")
+    await until(lambda: "@b SL 5000" in typist.entered)
+    await asyncio.sleep(1)
+    typist.send("MR 5\x03")
+    await until(lambda: "Ctrl+C stopped nothing; Ctrl+X stops all drives" in typist.notices)
+    assert "b moves at 5000 a second" in typist.notices
+    assert typist.entered == ["/open sim:#press", "@b SL 5000"] and not typist.session.latched
+
+
+async def test_ctrl_c_says_nothing_while_all_drives_stand(typist):
+    typist.send("/open sim:#press\r")
+    await until(lambda: "a>" in typist.screen)
+    typist.send("\x03")
+    await asyncio.sleep(5)
+    assert not any("Ctrl+C" in each for each in typist.notices)
+
+
+async def test_the_toolbar_counts_the_seconds_of_what_runs(typist):
+    typist.send("/sleep 1000\r")
+    await until(lambda: "running /sleep 1000, 3 s" in typist.screen)
+    typist.send("\x18")
+    await until(lambda: "running" not in typist.screen)
+
+
+async def test_long_help_is_shown_a_screenful_at_a_time_and_any_line_ends_it(typist):
+    typist.send("/help\r")
+    await until(lambda: any("Enter shows the next of" in each for each in typist.notices))
+    first = len(typist.output)
+    assert first < typist.app.output.get_size().rows
+    typist.send("\r")
+    await until(lambda: len(typist.output) > first)
+    assert typist.output == overview()[: len(typist.output)]
+    typist.send("/help VM\r")
+    await until(lambda: any(line.startswith("VM:") for line in typist.output))
+    shown = len(typist.output)
+    typist.send("\r/sleep 0\r")
+    await until(lambda: "/sleep 0" in typist.entered)
+    assert len(typist.output) == shown
+
+
+async def test_in_raw_mode_help_is_shown_whole_as_enter_sends_a_byte(typist):
+    typist.send("/raw open sim:#press\r/help\r")
+    await until(lambda: typist.output[-1:] == overview()[-1:])
+
+
+async def test_no_color_has_no_colours(tmp_path, monkeypatch):
+    for name, depth in ("NO_COLOR", ColorDepth.DEPTH_1_BIT), ("OTHER", ColorDepth.DEPTH_8_BIT):
+        monkeypatch.delenv("NO_COLOR", raising=False)
+        monkeypatch.setenv(name, "")
+        async with typist_in(tmp_path) as typist:
+            assert (typist.app._color_depth() or ColorDepth.DEPTH_8_BIT) is depth
+
+
+async def test_a_dumb_terminal_gets_lines_and_an_echo_and_no_escape_sequence(tmp_path, capsys):
+    async with typist_in(tmp_path, PlainOutput()) as typist:
+        typist.send("/help VM\r")
+        await until(lambda: typist.output)
+        await asyncio.sleep(1)
+        question = asyncio.create_task(typist.session.questions.confirm("CP erases the program", "a"))
+        await asyncio.sleep(LONG)
+        typist.send("n")
+        await asyncio.gather(question, return_exceptions=True)
+        typist.send("/quit\r")
+        assert await typist.ends() == 0
+    printed = capsys.readouterr()
+    shown = printed.err
+    assert "\x1b" not in shown + printed.out
+    for text in ("> /help VM\n", "\na: CP erases the program. Go on? [y/N] \n> /quit"):
+        assert text in shown
 
 
 # A question: one key answers, but no key that was typed before the question could be read.

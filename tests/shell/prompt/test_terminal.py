@@ -36,3 +36,20 @@ def test_a_signal_ends_the_prompt(home):
     child.expect("recording m; /record stop ends it")
     child.kill(15)
     assert read_to_end(child) == 130
+
+
+def test_a_wait_is_named_after_a_second_of_silence(home):
+    child = home.terminal("send", "sim:#press", "/sleep 2", "PR P")
+    child.expect("running /sleep 2, 1 s")
+    child.expect("\r0\r")
+    assert read_to_end(child) == 0
+
+
+def test_in_a_dumb_terminal_lines_are_typed_and_the_end_comes(home):
+    child = home.terminal("shell", "sim:#press", TERM="dumb")
+    child.expect("a> ")
+    child.send("PR P\r")
+    child.expect("\r\n0\r\n")
+    child.send("/quit\r")
+    assert read_to_end(child) == 0
+    assert "\x1b" not in child.before

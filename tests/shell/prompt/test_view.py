@@ -7,6 +7,7 @@ import asyncio
 import pytest
 
 from multidrop.shell.prompt.view import BURST, CHUNK, LONG_PAUSE, MANY, MOST, PATIENCE, PAUSE, LinesAbove, Stream
+from multidrop.shell.streams.output_streams import Colour
 
 pytestmark = pytest.mark.virtual
 
@@ -132,3 +133,14 @@ async def test_the_end_does_not_wait_for_a_flood_and_loses_no_warning():
     missing = f"{5000 - (len(lines) - 3)} lines are missing here: the terminal did not take them"
     assert (lines[:3], lines[-1]) == (["STILL MOVING", missing, "x" * 62], "STOPPED")
     assert len(above.writer.kept) < 2 * CHUNK
+
+
+async def test_failures_are_coloured_where_the_terminal_shows_colours():
+    above = Above()
+    stream = Stream(above, keep=True)
+    assert stream.coloured(Colour.FAILURE) is stream
+    above.coloured = True
+    stream.coloured(Colour.FAILURE).lines(["a refused 'VM=5'"], spare=False)
+    stream.lines(["plain"], spare=False)
+    await asyncio.sleep(10)
+    assert above.lines == ["\x1b[31ma refused 'VM=5'\x1b[m", "plain"]
