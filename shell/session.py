@@ -161,7 +161,7 @@ class Session(Workspace):
             await self.front.ready()
         target, place = DriveLine(""), self.place
         typed = line if isinstance(line, str) else line.typed
-        with _published_failures() as published, self.under_way(f"running {typed.strip()}"):
+        with self.under_way(f"running {typed.strip()}"), _published_failures() as published:
             try:
                 if since is not None and since != self.stops:
                     raise Stopped(f"a stop came after '{typed.strip()}' was typed; it was not sent")
