@@ -9,7 +9,7 @@ WORKERS := $(shell $(PYTHON) -c 'import os; print((os.cpu_count() or 1) + 1)')
 PYTEST = $(BIN)/python -m pytest --dist worksteal -n $(WORKERS)
 PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check
 
-.PHONY: demo test quick nightly check format lint types types-here types-darwin types-win32 contracts measured coverage bench readme shipped pictures package fuzz soak simulate snapshots clean
+.PHONY: demo test quick nightly check format lint types types-here types-darwin types-win32 contracts measured coverage bench readme shipped pictures docs package fuzz soak simulate snapshots clean
 
 demo: $(VENV)/.run
 	$(BIN)/multidrop demo
@@ -68,6 +68,17 @@ shipped: $(VENV)/.dev
 # The pictures of the README and the docs, taken of the program on the demo cell.
 pictures: $(VENV)/.dev
 	$(BIN)/python packaging/pictures.py
+
+# The pages as a site in .site, with a search and without a network: `python3 -m http.server -d .site` shows it. mkdocs has
+# an environment of its own; zensical 0.1, its successor, needs packages that not every index has.
+DOCS := $(VENV)/docs
+docs: $(DOCS)/.done
+	$(DOCS)/bin/mkdocs build --quiet --strict --config-file packaging/mkdocs.yml
+
+$(DOCS)/.done: packaging/docs-requirements.txt
+	$(PYTHON) -m venv $(DOCS)
+	$(DOCS)/bin/python -m pip install --quiet --disable-pip-version-check -r $<
+	touch $@
 
 # The wheel and the source distribution, in dist.
 package: $(VENV)/.dev

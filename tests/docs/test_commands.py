@@ -5,6 +5,7 @@ A block that begins with a remark of just a file's name (`# line.toml`, `' turn.
 
 from __future__ import annotations
 
+import asyncio
 import contextlib
 import doctest
 import io
@@ -19,62 +20,60 @@ from unittest import mock
 import pytest
 
 from multidrop.__main__ import main
-from tests.support.paths import ROOT
+from tests.support.pages import PAGES, blocks
 from tests.support.processes import environment
 from tests.support.until import PATIENCE
+from tests.support.virtual import VirtualLoop
 
 pytestmark = pytest.mark.process
 
-BLOCK = re.compile(r"^```console\n(.*?)^```", re.S | re.M)
-FILE = re.compile(r"^```\w*\n((?:[#';]|//) ([\w-]+\.\w+)\n.*?)^```", re.S | re.M)
+WORDS = r"(?:[^|&;<>$`\"'*?~{}]|'[^']*'|\"[^\"$`]*\")*?"
+PLAIN = re.compile(
+    rf"""multidrop (?!sim |relay |tui|shell|demo){WORDS}(?: 2>&1)?(?P<code>; echo "exit code \$\?")?\Z"""
+)
+"""A command that needs nothing of a shell: it runs in the process of the test, on a clock that does not wait."""
 
 
-PLAIN = re.compile(r"multidrop (send|program) (?:[^|&;<>$`\"']|'[^']*')*$")
-"""A command that needs nothing of a shell: it runs in the process of the test."""
-
-
-def everything(folder: Path, env: dict[str, str], *arguments: str) -> str:
+def everything(folder: Path, env: dict[str, str], command: str) -> str:
     """What a command prints, errors among the rest."""
     printed = io.StringIO()
+    echo = PLAIN.match(command)["code"]
+    words = shlex.split(command.removesuffix(echo or "").removesuffix(" 2>&1"))
+    runner = asyncio.Runner
     with (
         contextlib.chdir(folder),
         mock.patch.dict(os.environ, env),
+        mock.patch("asyncio.Runner", lambda **more: runner(**more | {"loop_factory": VirtualLoop})),
         contextlib.redirect_stdout(printed),
         contextlib.redirect_stderr(printed),
     ):
-        main(arguments)
-    return printed.getvalue()
+        code = main(words[1:])
+    return printed.getvalue() + (f"exit code {code}\n" if echo else "")
 
 
-def commands(text: str) -> list[tuple[str, str]]:
+def commands(page: str) -> list[tuple[str, str]]:
     """(command, expected output) of every `$` line in the console blocks."""
     found: list[tuple[str, str]] = []
-    for block in BLOCK.findall(text):
-        for part in re.split(r"^\$ ", block, flags=re.M)[1:]:
+    for block in blocks(page, "console"):
+        for part in re.split(r"^\$ ", block.text, flags=re.M)[1:] if not block.mark else ():
             command, _, expected = part.partition("\n")
             found.append((command, expected))
     return found
 
 
-PAGES = {
-    str(path.relative_to(ROOT)): text
-    for path in (ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md")))
-    if commands(text := path.read_text(encoding="utf-8"))
-}
-
-
-@pytest.mark.parametrize("page", PAGES)
+@pytest.mark.parametrize("page", [page for page in PAGES if commands(page)])
 def test_the_commands_of_a_page_print_what_it_says(page: str, tmp_path: Path) -> None:
-    for content, file in FILE.findall(PAGES[page]):
-        (tmp_path / file).write_text(content, encoding="utf-8")
+    for block in blocks(page):
+        if block.file:
+            (tmp_path / block.file).write_text(block.text, encoding="utf-8")
     env = environment(tmp_path) | {
         "PATH": f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}",
         "MULTIDROP_CONFIG_DIR": str(tmp_path),
         "MULTIDROP_STATE_DIR": str(tmp_path),
     }
-    for command, expected in commands(PAGES[page]):
+    for command, expected in commands(page):
         if page != "README.md" and PLAIN.match(command):
-            printed = everything(tmp_path, env, *shlex.split(command)[1:])
+            printed = everything(tmp_path, env, command)
         else:
             shell = ["bash", "-c", f"exec 2>&1; {command}"]
             printed = subprocess.run(
