@@ -1,4 +1,4 @@
-"""For mkdocs: links that leave the folder of the pages lead to the files of the repository, which the site does not have."""
+"""For mkdocs: a link that leaves the folder of the pages leads to a file of the repository, which the site lacks."""
 
 from __future__ import annotations
 
