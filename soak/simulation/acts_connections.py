@@ -8,6 +8,7 @@ from contextvars import copy_context
 from random import Random
 from typing import TYPE_CHECKING
 
+from soak.simulation.hearing import typed
 from soak.simulation.kernel import WHO, Adapter
 from soak.simulation.person import Person
 
@@ -33,7 +34,7 @@ class Other:
         self._opening = world.loop.create_task(self.session.open_all([place.name], lambda number, failure: None))
 
     def _typed(self, data: bytes) -> None:
-        self._world.typed(data, self.session, SECOND)
+        typed(self._world, data, self.session, SECOND)
 
     async def leave(self) -> None:
         """Close the session."""

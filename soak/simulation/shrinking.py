@@ -9,7 +9,8 @@ from dataclasses import dataclass, replace
 
 from soak.simulation.climate import Climate
 from soak.simulation.judge import judged
-from soak.simulation.world import World, lived
+from soak.simulation.living import lived
+from soak.simulation.world import World
 
 LONGEST = 60.0
 """Real seconds that shrinking takes at most."""

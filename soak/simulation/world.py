@@ -7,75 +7,54 @@ person types, and what happens meanwhile. All of it runs on the real session, it
 from __future__ import annotations
 
 import asyncio
-import contextlib
-import logging
 import re
-import shutil
-import tempfile
 import threading
-from collections.abc import Collection, Coroutine, Iterable, Iterator
-from contextlib import AsyncExitStack, ExitStack
-from contextvars import Context, ContextVar
+from collections.abc import Coroutine
+from contextlib import AsyncExitStack
+from contextvars import Context
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
 from random import Random
-from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any
 
-from multidrop.dialects import Diagnostic, DriveError
-from multidrop.drives.bus import Bus
-from multidrop.drives.events import LOG, Ended
-from multidrop.drives.stopping import stop_forms
 from multidrop.shell.automation import settled
 from multidrop.shell.configuration import Settings, parse
-from multidrop.shell.events import Failed, Notified, OnBus, Output, Printed
-from multidrop.shell.line_syntax import TypedLine
 from multidrop.shell.log import files, writer
 from multidrop.shell.session import Session
 from multidrop.shell.sharing.server import SharedPort
 from multidrop.shell.sharing.writer_turns import Say
-from multidrop.shell.workspace import LATCHED
 from multidrop.simulator import cells, wire
 from multidrop.simulator.cell.spec import Faults
 from multidrop.simulator.floor import Floor
 from multidrop.simulator.serving.endpoints import serve_bus
 from multidrop.simulator.serving.running import RunningFloor
-from multidrop.transports import TransportLost, pipe, telnet, usb
-from multidrop.transports.relay import Kind, frame
-from soak.judge import Witness, Word, word
+from soak.judge import Witness
 from soak.languages import LANGUAGES, PROGRAM
-from soak.simulation.acts.seams import SEAMS
-from soak.simulation.acts.watching import WatchedPath, examine_before_a_stop, wrote
+from soak.simulation.acts.watching import wrote
 from soak.simulation.climate import Climate
-from soak.simulation.clock import Deadlock, SimulatedLoop
-from soak.simulation.cut_ins import UP, CutIns
+from soak.simulation.clock import SimulatedLoop
+from soak.simulation.cut_ins import CutIns
 from soak.simulation.disk import Disk
 from soak.simulation.far import share
 from soak.simulation.files_left import backups, breaches_in_logs, unreadable
-from soak.simulation.history import Command, Damage, Executed, Held, History, Outcome, Shown, Stop
+from soak.simulation.hearing import heard, typed
+from soak.simulation.history import Command, Damage, Executed, Held, History, Stop
 from soak.simulation.kernel import WHO, Kernel
 from soak.simulation.network import Network
 from soak.simulation.person import Person
-from soak.simulation.places import SERIAL, Place, drawn_places
+from soak.simulation.places import SERIAL, Place
 from soak.simulation.ports import Trace
 from soak.simulation.process import Process
-from soak.simulation.story import STOP, tell
+from soak.simulation.story import STOP
 from soak.simulation.terminal import Terminal
 from soak.simulation.threads import Scheduler
 from soak.simulation.wall import Wall
+from soak.simulation.watched_session import WatchedSession
 
 if TYPE_CHECKING:
     from soak.simulation.acts_connections import Other
 
-STOPPED = re.compile(r"(?:(\w+): )(?:(\w+): )?stopped, velocity 0 ")
-WORDS = {
-    Word.DONE: Outcome.OK,
-    Word.UNCONFIRMED: Outcome.UNKNOWN,
-    Word.REFUSED: Outcome.REFUSED,
-    Word.NOT_EXECUTED: Outcome.NOT_SENT,
-    Word.UNKNOWN: Outcome.UNKNOWN,
-}
 HARMLESS = {"flip": 0.0, "drop": 0.0, "double": 0.0, "insert": 0.0}
 """Bytes on a network are not damaged: TCP repairs or ends the connection, and a damaged datagram is dropped."""
 HARMED = wire.harmed
@@ -85,8 +64,6 @@ LONGEST = 400.0
 """Virtual seconds in which everything that was begun ends, once the faults are over."""
 FORGETS = ("IP", "FD")
 """Lines that put values back to the saved ones, as a power-up does."""
-ASKED: ContextVar[tuple[str, float] | None] = ContextVar("asked", default=None)
-"""The question that runs in this task, and when it began; None: none that the judge knows."""
 
 
 class WireRandom(Random):
@@ -262,7 +239,7 @@ class World:
     def another(self, place: Place, who: str) -> Session:
         """A session of another person, which opens a line that is shared."""
         made = WatchedSession(self.settings(self.folder / who), self)
-        made.subscribe(lambda event: self.heard(event, who))
+        made.subscribe(lambda event: heard(self, event, who))
         return made
 
     # Lives of the session
@@ -286,7 +263,7 @@ class World:
     def _open_session(self, process: Process) -> None:
         files.PROCESS = process.number
         self.session = WatchedSession(self.settings(self.folder), self, process)
-        self.session.subscribe(self.heard)
+        self.session.subscribe(partial(heard, self))
         self.terminal = Terminal(self.loop)
         self.session.subscribe(self.terminal.show)
         writer.begin(self.session)
@@ -334,79 +311,8 @@ class World:
 
     # What happens
 
-    def heard(self, event: object, who: str = "") -> None:
-        """Take what a session says."""
-        if not who and self.process.dead:
-            return
-        if isinstance(event, OnBus):
-            self.history.exchanges += isinstance(event.event, Ended)
-            return
-        if isinstance(event, Notified | Failed | Printed | Output):
-            self.history.note(self.loop.now, type(event).__name__, event.text)
-            self.history.notices.append((self.loop.now, event.text))
-        if isinstance(event, Notified):
-            self.history.unsent(event.text)
-            if (found := STOPPED.match(event.text)) is not None:
-                self._judge_stopped(found[1], found[2] or "", who)
-        if isinstance(event, Printed) and (asked := ASKED.get()) is not None:
-            names = self.place(event.bus).names
-            drive = event.address if event.address in names else names[0]
-            form, began, restarts = self.history.questions[asked[0]], asked[1], self.restarts(event.bus, drive)
-            self.history.shown.append(Shown(event.bus, drive, event.text, form, began, self.loop.now, restarts))
-
-    def _judge_stopped(self, line: str, drive: str, who: str) -> None:
-        """Note a drive that is said to stand and moves, unless a line has started it since the stop."""
-        now = self.floor.now()
-        for placed in self.floor.floor.drives:
-            if placed.bus != line or (drive and placed.spec.name != drive):
-                continue
-            since = max((each.at for each in self.history.stops if each.who == who), default=0.0)
-            name = placed.spec.name
-            started = any(
-                each.at >= since and (each.line, each.drive) == (line, name) for each in self.history.executed
-            )
-            if not started and any(each.velocity for each in placed.unit.shadow.motion(now)):
-                self.history.untrue.append(f"{self.loop.now:.3f} {line}:{name} is said to be stopped, and moves")
-
     def _typed(self, data: bytes) -> None:
-        self.typed(data, self.session)
-
-    def typed(self, data: bytes, session: Session, who: str = "") -> None:
-        """Take what somebody types; at a stop, note what has to leave next on each line."""
-        self.history.note(self.loop.now, f"key{who}", data.replace(bytes(self.folder), b"~").hex())
-        if data[:1] in (b"y", b"Y"):
-            self.history.told.yes.append(self.loop.now)
-        if STOP in data:
-            buses = {name: bus for name, bus in session.buses.items() if not bus.link.lost}
-            forms = {f"{name}{who}": self._forms(bus) for name, bus in buses.items()}
-            trying = session.reconnections.trying
-            lost = tuple(name + who for name, bus in session.buses.items() if bus.link.lost and name in trying)
-            self.history.stops.append(Stop(self.loop.now, forms, who, len(self.history.written), lost))
-
-    @contextlib.contextmanager
-    def ahead(self) -> Iterator[None]:
-        """Note what the stop's thread writes meanwhile: the one that runs this."""
-        stop, me = self.history.stops[-1], threading.get_ident()
-        self.stopping[me] = stop
-        try:
-            yield
-        finally:
-            del self.stopping[me]
-            stop.done = len(self.history.written)
-            for name in stop.forms:
-                stop.own.setdefault(name, (stop.done, self.kernel.rest(name)))
-
-    def _forms(self, bus: Bus) -> tuple[bytes, ...]:
-        """What a stop of a line may begin with."""
-        forms, kind = stop_forms(bus.roster), self.place(bus.name).kind
-        found = (forms.immediate,) if forms.framed else (forms.immediate, forms.unterminated)
-        if kind == "rfc2217":
-            purge = b"" if forms.framed else telnet.message(telnet.Setting.PURGE, telnet.PURGE_UNSENT)
-            return tuple(purge + telnet.escaped(each) for each in found)
-        if kind == "ssh":
-            drop = b"" if forms.framed else frame(Kind.DROP)
-            return tuple(beat + drop + bytes((Kind.DATA,)) for each in found for beat in (b"", frame(Kind.BEAT)))
-        return found
+        typed(self, data, self.session)
 
     # The story
 
@@ -538,152 +444,3 @@ class World:
         await self.session.automations.over()
         await settled(self.session)
         await self._leave()
-
-
-class WatchedSession(Session):
-    """A session that notes what the caller of each line got."""
-
-    def __init__(self, settings: Settings, world: World, process: Process | None = None) -> None:
-        super().__init__(settings, reconnect=True)
-        self._world, self._process = world, process
-        self.path = WatchedPath(self, world)
-
-    @property
-    def _dead(self) -> bool:
-        return self._process is not None and self._process.dead
-
-    def stop_ahead(self) -> None:
-        """Write the stop, and note it."""
-        with self._world.ahead():
-            super().stop_ahead()
-
-    def stop(self, why: str = "stop", follows: bool = True) -> None:
-        """Stop everything, and note it."""
-        examine_before_a_stop(self._world)
-        self._world.history.told.halts.append(self.now())
-        super().stop(why, follows)
-
-    async def run(self, line: str | TypedLine, *arguments: Any, **named: Any) -> None:
-        """Run a line, and note its outcome."""
-        text = (line if isinstance(line, str) else line.typed).strip()
-        history = self._world.history
-        command = history.commands.get(text)
-        ASKED.set((text, self.now()) if text in history.questions else None)
-        if command is None:
-            return await super().run(line, *arguments, **named)
-        command.began = self.now()
-        command.times += self.recording.startswith("r")
-        try:
-            await super().run(line, *arguments, **named)
-        except (DriveError, Diagnostic, TransportLost) as failure:
-            self._ended(command, failure)
-            raise
-        except asyncio.CancelledError:
-            if not self._dead:
-                command.outcome, command.said, command.ended = Outcome.UNKNOWN, "cancelled", self.now()
-            raise
-        else:
-            self._ended(command, ())
-
-    def _ended(self, command: Command, result: tuple[str, ...] | BaseException) -> None:
-        if self._dead:
-            return
-        command.ended, command.said = self.now(), str(result)
-        notices = [
-            text for at, text in self._world.history.notices if at >= command.began and f"'{command.text}'" in text
-        ]
-        command.outcome = WORDS[word(result, notices)]
-        if isinstance(result, Diagnostic) or str(result) == LATCHED:  # before anything is sent
-            command.outcome = Outcome.NOT_SENT
-        where = f"{command.line}:{command.drive} {command.text!r}"
-        self._world.history.note(command.ended, "host", f"{where}: {command.outcome.value} ({command.said})")
-
-
-@contextlib.contextmanager
-def place_of_state() -> Iterator[Path]:
-    """A folder for the files of one world."""
-    folder = Path(tempfile.mkdtemp(prefix="simulate-", dir="/dev/shm" if Path("/dev/shm").is_dir() else None))
-    try:
-        yield folder
-    finally:
-        shutil.rmtree(folder, ignore_errors=True)
-
-
-def lived(seed: int, steps: Iterable[int], keep: bool = False, without: Collection[str] = ()) -> World:
-    """Live one seed: these steps of its story, `without` these kinds of faults."""
-    climate = Climate.drawn(seed, without)
-    places = drawn_places(Random(f"{seed} places"), Random(f"{seed} usb machine"))
-    history = History(keep=keep)
-    loops: list[SimulatedLoop] = []
-
-    def factory() -> SimulatedLoop:
-        loops.append(SimulatedLoop(Random(f"{seed} loop")))
-        return loops[0]
-
-    with place_of_state() as folder, asyncio.Runner(loop_factory=factory) as runner:
-        loop = runner.get_loop()
-        assert isinstance(loop, SimulatedLoop)
-        wall, scheduler = Wall(loop), Scheduler(loop, Random(f"{seed} threads"), climate["slow thread"])
-        history.folder = str(folder)
-        disk = Disk(f"{folder}/", loop, wall, climate, Random(f"{seed} disk"), partial(_noted, history, loop))
-        cut_ins = CutIns(lambda name: history.count("stops held up" if name == UP else "cut-ins"), loop)
-        world = World(seed, loop, history, climate, places, folder, wall, scheduler, disk, cut_ins)
-
-        async def life() -> None:
-            await world.begin()
-            for step in steps:
-                await tell(world, step)
-            await world.end()
-
-        with ExitStack() as stack:
-            stack.enter_context(wall.installed())
-            stack.enter_context(scheduler.installed())
-            stack.enter_context(disk.installed())
-            stack.enter_context(world.kernel.installed())
-            stack.enter_context(contextlib.chdir(folder))
-            for seam in ((wire, "harmed", world.harmed), *SEAMS):
-                stack.enter_context(_replaced(*seam))
-            locks = SimpleNamespace(**{**vars(threading), "Lock": cut_ins.lock})
-            for shared in (pipe, usb):
-                stack.enter_context(_replaced(shared, "threading", locks))
-            stack.callback(cut_ins.kill)
-            stack.enter_context(_logged(history))
-            try:
-                runner.run(life())
-            except Deadlock as defect:
-                history.defects.append(str(defect))
-        history.defects += [str(each.get("exception") or each.get("message")) for each in loop.defects]
-    return world
-
-
-def _noted(history: History, loop: SimulatedLoop, what: str, path: str) -> None:
-    history.note(loop.now, f"disk {what}", path)
-
-
-@contextlib.contextmanager
-def _replaced(module: Any, name: str, value: Any) -> Iterator[None]:
-    before = getattr(module, name)
-    setattr(module, name, value)
-    try:
-        yield
-    finally:
-        setattr(module, name, before)
-
-
-@contextlib.contextmanager
-def _logged(history: History) -> Iterator[None]:
-    """Take what the product writes to its log of defects."""
-
-    class Defects(logging.Handler):
-        def emit(self, record: logging.LogRecord) -> None:
-            cause = record.exc_info[1] if record.exc_info else ""
-            history.defects.append(f"{record.getMessage()}: {cause!r}")
-
-    handler, propagated = Defects(logging.ERROR), LOG.propagate
-    LOG.addHandler(handler)
-    LOG.propagate = False
-    try:
-        yield
-    finally:
-        LOG.propagate = propagated
-        LOG.removeHandler(handler)

@@ -11,8 +11,8 @@ import pytest
 from multidrop.transports.pipe import DescriptorPipe
 from soak.simulation.cut_ins import UP, Aim, CutIns, points
 from soak.simulation.judge import broken
+from soak.simulation.living import lived
 from soak.simulation.story import ACTS, stop_cuts_in
-from soak.simulation.world import lived
 from tests.support.paths import ROOT
 
 LIST = ROOT / "tests" / "soak" / "points.txt"

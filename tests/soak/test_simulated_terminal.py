@@ -9,8 +9,9 @@ import pytest
 from soak.simulation.climate import FAULTS, Climate
 from soak.simulation.history import Outcome
 from soak.simulation.judge import broken
+from soak.simulation.living import lived
 from soak.simulation.story import ACTS
-from soak.simulation.world import World, lived
+from soak.simulation.world import World
 
 Live = Callable[..., World]
 

@@ -17,6 +17,7 @@ from soak.simulation.__main__ import main
 from soak.simulation.climate import FAULTS
 from soak.simulation.history import Command, Damage, Executed, Held, History, Outcome, Shown
 from soak.simulation.judge import RULES, Judgement, broken
+from soak.simulation.living import lived
 from soak.simulation.outcomes import OUTCOMES
 from soak.simulation.places import Place
 from soak.simulation.rule import Granted, Rule
@@ -24,7 +25,6 @@ from soak.simulation.runs import derived, lives, result, run, verdict
 from soak.simulation.seeds import DERIVED, FIXED
 from soak.simulation.shrinking import Life, shrunk
 from soak.simulation.trace import readable
-from soak.simulation.world import lived
 from tests.support.paths import ROOT
 from tests.support.until import PATIENCE
 

@@ -1,0 +1,82 @@
+"""What a session says and what somebody types, as it happens: notes of both for the judge."""
+
+from __future__ import annotations
+
+import re
+from typing import TYPE_CHECKING
+
+from multidrop.drives.bus import Bus
+from multidrop.drives.events import Ended
+from multidrop.drives.stopping import stop_forms
+from multidrop.shell.events import Failed, Notified, OnBus, Output, Printed
+from multidrop.shell.session import Session
+from multidrop.transports import telnet
+from multidrop.transports.relay import Kind, frame
+from soak.simulation.acts.phrases import STOP
+from soak.simulation.history import Shown, Stop
+from soak.simulation.watched_session import ASKED
+
+if TYPE_CHECKING:
+    from soak.simulation.world import World
+
+STOPPED = re.compile(r"(?:(\w+): )(?:(\w+): )?stopped, velocity 0 ")
+
+
+def heard(world: World, event: object, who: str = "") -> None:
+    """Take what a session says."""
+    if not who and world.process.dead:
+        return
+    if isinstance(event, OnBus):
+        world.history.exchanges += isinstance(event.event, Ended)
+        return
+    if isinstance(event, Notified | Failed | Printed | Output):
+        world.history.note(world.loop.now, type(event).__name__, event.text)
+        world.history.notices.append((world.loop.now, event.text))
+    if isinstance(event, Notified):
+        world.history.unsent(event.text)
+        if (found := STOPPED.match(event.text)) is not None:
+            _judge_stopped(world, found[1], found[2] or "", who)
+    if isinstance(event, Printed) and (asked := ASKED.get()) is not None:
+        names = world.place(event.bus).names
+        drive = event.address if event.address in names else names[0]
+        form, began, restarts = world.history.questions[asked[0]], asked[1], world.restarts(event.bus, drive)
+        world.history.shown.append(Shown(event.bus, drive, event.text, form, began, world.loop.now, restarts))
+
+
+def _judge_stopped(world: World, line: str, drive: str, who: str) -> None:
+    """Note a drive that is said to stand and moves, unless a line has started it since the stop."""
+    now = world.floor.now()
+    for placed in world.floor.floor.drives:
+        if placed.bus != line or (drive and placed.spec.name != drive):
+            continue
+        since = max((each.at for each in world.history.stops if each.who == who), default=0.0)
+        name = placed.spec.name
+        started = any(each.at >= since and (each.line, each.drive) == (line, name) for each in world.history.executed)
+        if not started and any(each.velocity for each in placed.unit.shadow.motion(now)):
+            world.history.untrue.append(f"{world.loop.now:.3f} {line}:{name} is said to be stopped, and moves")
+
+
+def typed(world: World, data: bytes, session: Session, who: str = "") -> None:
+    """Take what somebody types; at a stop, note what has to leave next on each line."""
+    world.history.note(world.loop.now, f"key{who}", data.replace(bytes(world.folder), b"~").hex())
+    if data[:1] in (b"y", b"Y"):
+        world.history.told.yes.append(world.loop.now)
+    if STOP in data:
+        buses = {name: bus for name, bus in session.buses.items() if not bus.link.lost}
+        forms = {f"{name}{who}": _forms(world, bus) for name, bus in buses.items()}
+        trying = session.reconnections.trying
+        lost = tuple(name + who for name, bus in session.buses.items() if bus.link.lost and name in trying)
+        world.history.stops.append(Stop(world.loop.now, forms, who, len(world.history.written), lost))
+
+
+def _forms(world: World, bus: Bus) -> tuple[bytes, ...]:
+    """What a stop of a line may begin with."""
+    forms, kind = stop_forms(bus.roster), world.place(bus.name).kind
+    found = (forms.immediate,) if forms.framed else (forms.immediate, forms.unterminated)
+    if kind == "rfc2217":
+        purge = b"" if forms.framed else telnet.message(telnet.Setting.PURGE, telnet.PURGE_UNSENT)
+        return tuple(purge + telnet.escaped(each) for each in found)
+    if kind == "ssh":
+        drop = b"" if forms.framed else frame(Kind.DROP)
+        return tuple(beat + drop + bytes((Kind.DATA,)) for each in found for beat in (b"", frame(Kind.BEAT)))
+    return found
