@@ -62,6 +62,8 @@ def typed(world: World, data: bytes, session: Session, who: str = "") -> None:
     if data[:1] in (b"y", b"Y"):
         world.history.told.yes.append(world.loop.now)
     if STOP in data:
+        if not who:
+            world.history.told.latches.append((world.loop.now, True))
         buses = {name: bus for name, bus in session.buses.items() if not bus.link.lost}
         forms = {f"{name}{who}": _forms(world, bus) for name, bus in buses.items()}
         trying = session.reconnections.trying

@@ -139,6 +139,8 @@ class History:
     """The number of times that one was typed."""
     held: list[Held] = field(default_factory=list)
     shown: list[Shown] = field(default_factory=list)
+    peaks: dict[str, int] = field(default_factory=dict)
+    """The most of each that has waited: see `bounds`."""
     exchanges: int = 0
     """Requests that have ended."""
     notices: list[tuple[float, str]] = field(default_factory=list)

@@ -17,7 +17,9 @@ from soak.simulation.act import Act
 from soak.simulation.acts.automation import AUTOMATION
 from soak.simulation.acts.files import FILES
 from soak.simulation.acts.hand import HAND
+from soak.simulation.acts.meetings import MEETINGS
 from soak.simulation.acts_kill import files, kill, power_cut
+from soak.simulation.bounds import sample
 from soak.simulation.cut_ins import drawn_aim
 
 if TYPE_CHECKING:
@@ -136,15 +138,29 @@ ACTS = (
 )
 
 
+MEETING = 0.3
+"""How many seeds have the acts of `MEETINGS`, and how many of their steps: the other stories are without them."""
+
+
+def _drawn(world: World, step: int, rng: Random) -> Act:
+    """Draw the act of a step."""
+    act = rng.choices(ACTS, [each.weight for each in ACTS])[0]
+    apart = Random(f"{world.seed} meeting {step}")
+    if Random(f"{world.seed} meetings").random() < MEETING and apart.random() < MEETING:
+        return apart.choices(MEETINGS, [each.weight for each in MEETINGS])[0]
+    return act
+
+
 async def tell(world: World, step: int) -> None:
     """Let one thing happen, once a session is there, and time pass."""
     await world.ready.wait()
     rng = Random(f"{world.seed} step {step}")
     world.step, world.said = step, 0
-    act = rng.choices(ACTS, [each.weight for each in ACTS])[0]
+    act = _drawn(world, step, rng)
     pause = rng.random() ** 2 * rng.choice((0.05, 0.6, 1.0, 2.0))
     if not act.fault or not world.climate.calm:
         world.history.count(act.name)
         world.history.note(world.loop.now, "step", f"{step}: {act.name}")
         act.do(world, rng)
     await asyncio.sleep(pause)
+    sample(world)

@@ -35,6 +35,8 @@ class Terminal(BoundedWriter):
         self._loop, self._room, self._slow = loop, -1, False
         """`_room`: bytes that it takes now; less than 0: any number."""
         self.shown = bytearray()
+        self.most = 0
+        """The most bytes that have waited; a single line is taken whatever its length."""
         self.put_so_far = 0
         """The number of lines that were to be shown."""
         null = os.open(os.devnull, os.O_WRONLY)
@@ -85,7 +87,10 @@ class Terminal(BoundedWriter):
     def put(self, data: bytes, keep: bool = False, count: int = 1) -> bool:
         """Queue lines."""
         self.put_so_far += count
-        return super().put(data, keep, count)
+        before, taken = self._held, super().put(data, keep, count)
+        if taken and before and not keep:
+            self.most = max(self.most, self._held)
+        return taken
 
     @property
     def due(self) -> bool:

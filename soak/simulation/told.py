@@ -39,6 +39,8 @@ class Run:
     download: Download | None = None
     began: float = -1.0
     ended: float = -1.0
+    automatic: bool = False
+    """A macro or a script, which a stop keeps from beginning until `/resume`."""
     failure: str = ""
     """Why it ended early; empty: it did not."""
 
@@ -76,6 +78,8 @@ class Told:
     guarded: list[Guarded] = field(default_factory=list)
     yes: list[float] = field(default_factory=list)
     """When a yes was typed."""
+    latches: list[tuple[float, bool]] = field(default_factory=list)
+    """When a stop came, and when `/resume` or the next session let automation run again."""
     halts: list[float] = field(default_factory=list)
     """When everything was stopped."""
     stored: list[Put] = field(default_factory=list)

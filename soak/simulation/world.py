@@ -262,6 +262,7 @@ class World:
 
     def _open_session(self, process: Process) -> None:
         files.PROCESS = process.number
+        self.history.told.latches.append((self.loop.now, False))
         self.session = WatchedSession(self.settings(self.folder), self, process)
         self.session.subscribe(partial(heard, self))
         self.terminal = Terminal(self.loop)
@@ -296,11 +297,19 @@ class World:
         await asyncio.sleep(away)
         await self._live()
 
+    def _faults(self, place: Place) -> Faults:
+        """The faults of a wire in this climate."""
+        return self.climate.wire if place.noisy else replace(self.climate.wire, **HARMLESS)
+
+    def weather(self, place: Place, **worse: Any) -> None:
+        """Change some faults of a wire for a while; without any: put them back."""
+        if not self.ending:
+            self.floor.floor.wires[place.name].disturb(replace(self._faults(place), **worse))
+
     def faults(self, on: bool) -> None:
         """Let the faults begin or end."""
         for name, each in self.floor.floor.wires.items():
-            faults = self.climate.wire if self.place(name).noisy else replace(self.climate.wire, **HARMLESS)
-            each.disturb(faults if on else Faults(), WireRandom(self.seed, name))
+            each.disturb(self._faults(self.place(name)) if on else Faults(), WireRandom(self.seed, name))
         self.loop.late = self.climate["late timer"] if on else 0.0
         self.kernel.quiet(self.climate if on else Climate(self.seed))
         if not on:

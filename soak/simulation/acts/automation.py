@@ -198,7 +198,7 @@ def macro(world: World, rng: Random) -> None:
     """Play a macro of a file."""
     name = f"m{world.step}"
     times, fast = rng.choice((1, 1, 1, 2)), rng.random() < 0.3
-    run = Run(name, f"/play {name}" + f" --times {times}" * (times > 1) + " --fast" * fast)
+    run = Run(name, f"/play {name}" + f" --times {times}" * (times > 1) + " --fast" * fast, automatic=True)
     lines = Lines(world, rng, run)
     steps = body(lines)
     text = f'name = "{name}"\n'
@@ -236,7 +236,7 @@ def recorded(world: World, rng: Random) -> None:
 
 def script(world: World, rng: Random) -> None:
     """Run a script beside the prompt, as `multidrop run` does in a session of its own."""
-    run = Run(f"s{world.step}", f"s{world.step}.txt")
+    run = Run(f"s{world.step}", f"s{world.step}.txt", automatic=True)
     lines = Lines(world, rng, run)
     (world.folder / run.typed).write_text("\n".join(body(lines)))
     bystander(world)

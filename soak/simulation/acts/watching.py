@@ -45,7 +45,10 @@ class WatchedPath(LinePath):
 
     async def verb(self, parsed: VerbLine, by: By) -> None:
         """Run a verb; one that works by itself has an end."""
-        run = self._world.history.told.runs.get(parsed.typed.strip())
+        told = self._world.history.told
+        if parsed.name == "/resume":
+            told.latches.append((self._world.loop.now, False))
+        run = told.runs.get(parsed.typed.strip())
         work = super().verb(parsed, by)
         await (work if run is None else watched(self._world, run, work))
 
@@ -124,7 +127,7 @@ def examine_before_a_stop(world: World) -> None:
     """Look at the drives of the early ends so far: afterwards everything stands."""
     told, now = world.history.told, world.loop.now
     for run in list(told.unexamined.values()):
-        if run.ended < now - RAMP and not world.climate.wire.harmful:
+        if run.ended < now - RAMP and not (world.climate.wire.harmful or world.history.damage):
             examine(world, run)
     told.unexamined.clear()
 
@@ -160,6 +163,7 @@ def _only_ended_by(world: World, run: Run, started: Executed) -> bool:
         or any(others)
         or started.line in told.raw_written  # ESC and ^C are typed there
         or world.climate.wire.harmful
+        or world.history.damage.get(started.line)
         or any(at >= started.at for at in world.cut.get((started.line, started.drive), []))
         or _said(world, started.line, started.at, re.compile("stopped as well|trying again|was lost|restart"))
     )

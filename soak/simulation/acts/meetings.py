@@ -1,0 +1,115 @@
+"""Acts in which meets what seldom does: a stop key that is held down, a drive that babbles or replies late, a burst of
+noise, prints of a program between replies, a macro that is played before `/resume`.
+
+One seed in three has them beside the others: see `story.tell`.
+"""
+
+from __future__ import annotations
+
+from random import Random
+from typing import TYPE_CHECKING
+
+from soak.languages import LANGUAGES
+from soak.simulation.act import Act
+from soak.simulation.acts.automation import later, macro, script
+from soak.simulation.acts.files import download
+from soak.simulation.acts.phrases import STOP
+from soak.simulation.bounds import sample
+from soak.simulation.history import Damage
+
+if TYPE_CHECKING:
+    from soak.simulation.places import Place
+    from soak.simulation.ports import Port
+    from soak.simulation.world import World
+
+REPEAT = 1 / 30
+"""The time between two keys of one that is held down, s."""
+BABBLE = (b"U" * 64, 0.007)
+"""What a drive babbles at a time, and how often, s: what a drive at another baud rate looks like."""
+
+
+def _several(world: World, rng: Random, place: Place | None = None) -> None:
+    """Type some commands for one line."""
+    for _ in range(rng.randrange(2, 7)):
+        world.person.type(world.command(rng, place), rng.choice((0.0, 0.0, 0.3)))
+
+
+def held_down(world: World, rng: Random) -> None:
+    """Hold the stop key down."""
+    _several(world, rng)
+    keys = rng.randrange(5, 40)
+    for number in range(keys):
+        later(world, 0.2 + number * REPEAT, STOP)
+    later(world, 0.4 + keys * REPEAT, b"/resume\r")
+
+
+def babbles(world: World, rng: Random) -> None:
+    """Let a drive print without an end."""
+    if not world.kernel.adapters:
+        return
+    adapter = rng.choice(world.kernel.adapters)
+    for number in range(int(rng.random() ** 2 * 160)):
+        world.loop.call_later(number * BABBLE[1], _babble, world, adapter.line, adapter.opened)
+    _several(world, rng, world.place(adapter.line))
+
+
+def _babble(world: World, line: str, port: Port | None) -> None:
+    if port is not None and not (port.closed or world.ending):
+        world.history.damage.setdefault(line, []).append(Damage(world.loop.now, b"", BABBLE[0]))
+        port.receive(BABBLE[0])
+        world.loop.call_later(0.001, sample, world)
+
+
+def late_replies(world: World, rng: Random) -> None:
+    """Let the drives of a line reply late for a while, mostly later than the time-out."""
+    place = rng.choice(world.places)
+    world.weather(place, delay=(0.1, 0.3 + rng.random() * 2.5))
+    world.loop.call_later(rng.random() * 6, world.weather, place)
+    _several(world, rng, place)
+
+
+def noise(world: World, rng: Random) -> None:
+    """Let there be much noise on a line for a while."""
+    place = rng.choice([each for each in world.places if each.noisy] or world.places)
+    kinds = ("flip", "drop", "double", "insert")
+    world.weather(place, **{kind: rng.random() ** 2 * 0.05 for kind in kinds if place.noisy and rng.random() < 0.6})
+    world.loop.call_later(rng.random() * 4, world.weather, place)
+    _several(world, rng, place)
+
+
+def prints(world: World, rng: Random) -> None:
+    """Let the program of a drive run that prints, as an input starts it."""
+    places = [each for each in world.places if each.language == "mcode"]
+    if not places:
+        return
+    place = rng.choice(places)
+    witness = world.witnesses[place.name, rng.choice(place.names)]
+    if witness.device.programming is None:
+        LANGUAGES[place.language].print_on(witness, world.floor.now())
+        world.floor.floor.wires[place.name].look_again()
+    _several(world, rng, place)
+
+
+def latched(world: World, rng: Random) -> None:
+    """Type the stop, and start a macro or a script before `/resume`."""
+    world.stops += 1
+    world.person.type(STOP)
+    rng.choice((macro, script))(world, rng)
+    later(world, 1 + rng.random() * 2, b"/resume\r")
+
+
+def stopped_download(world: World, rng: Random) -> None:
+    """Send a program to a drive, and stop in the middle of that."""
+    download(world, rng)
+    later(world, rng.random() * 5, rng.choice((STOP, b"\x03")) + b"/resume\r")
+
+
+MEETINGS = (
+    Act("stop held down", 1, held_down),
+    Act("babble", 1, babbles, fault=True),
+    Act("late replies", 3, late_replies, fault=True),
+    Act("noise", 3, noise, fault=True),
+    Act("program prints", 2, prints),
+    Act("macro before resume", 1, latched),
+    Act("download stopped", 1, stopped_download),
+)

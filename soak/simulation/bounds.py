@@ -1,0 +1,56 @@
+"""What waits in a session, against the bounds that docs/safety.md names: the most of each that a history has seen."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from multidrop.drives.inbox import LONGEST_TAIL
+from multidrop.drives.line import Flight
+from soak.simulation.terminal import LIMIT
+
+if TYPE_CHECKING:
+    from multidrop.drives.bus import Bus
+    from soak.simulation.world import World
+
+
+@dataclass(frozen=True)
+class Bound:
+    """The largest number of something that waits. `waits` gives the number now, for each place where it may wait."""
+
+    name: str
+    most: int
+    waits: Callable[[World], Iterator[int]]
+
+
+def _lines(waits: Callable[[Bus], int]) -> Callable[[World], Iterator[int]]:
+    return lambda world: (waits(bus) for bus in world.session.buses.values())
+
+
+def _unended(bus: Bus) -> int:
+    """The bytes of a print without an end. A reply that is awaited ends by its time."""
+    line = bus.link.line
+    return 0 if isinstance(line._state, Flight) or line.inbox.codec.numbered else len(line.inbox.buffer)
+
+
+BOUNDS = (
+    Bound("bytes before a terminal", LIMIT, lambda world: iter((world.terminal.most,))),
+    Bound("bytes of a print without an end", LONGEST_TAIL, _lines(_unended)),
+    Bound("bytes before a port", 4096, _lines(lambda bus: bus.link.transport.pending)),
+    Bound("pieces of a stop", 64, _lines(lambda bus: len(bus.link.line._repeats))),
+)
+
+
+def sample(world: World) -> None:
+    """Note how much waits now."""
+    peaks = world.history.peaks
+    for bound in BOUNDS:
+        peaks[bound.name] = max((*bound.waits(world), peaks.get(bound.name, 0)))
+
+
+def beyond(world: World) -> Iterator[str]:
+    """What was more than its bound."""
+    for bound in BOUNDS:
+        if (found := world.history.peaks.get(bound.name, 0)) > bound.most:
+            yield f"{found} {bound.name}, and not {bound.most} at most"
