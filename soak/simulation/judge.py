@@ -7,6 +7,7 @@ from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 
+from soak.simulation.bounds import beyond
 from soak.simulation.departures import DEPARTURES
 from soak.simulation.history import Stop
 from soak.simulation.outcomes import OUTCOMES
@@ -110,6 +111,7 @@ RULES = (
         _restored,
         (SAID,),
     ),
+    Rule("bounded", "What waits in a session is bounded.", "What a report means", beyond),
     Rule("log", "A session log breaks no rule of `log judge`.", "What a report means", _logged),
 )
 

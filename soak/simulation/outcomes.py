@@ -9,6 +9,7 @@ from __future__ import annotations
 import re
 from bisect import bisect_left
 from collections.abc import Iterator
+from math import inf
 
 from soak.languages import TICKS
 from soak.simulation.history import Command, Damage, Held, History, Outcome, Shown
@@ -71,9 +72,9 @@ def _took(history: History, command: Command, byte: bytes) -> bool:
     return any(each.after.count(byte) < each.before.count(byte) for each in found)
 
 
-def became(world: World, line: str, at: float) -> bool:
-    """Whether noise can have made another line of what left: on a line without a checksum."""
-    return not world.place(line).checked and bool(_damage(world.history, line, at - AFTER, at))
+def became(world: World, line: str, at: float, since: float = inf) -> bool:
+    """Whether noise can have made another line of what left, or of what came: on a line without a checksum."""
+    return not world.place(line).checked and bool(_damage(world.history, line, min(at, since) - AFTER, at))
 
 
 def _twice(world: World) -> Iterator[str | Granted]:
@@ -161,6 +162,24 @@ def _unknown(world: World) -> Iterator[str | Granted]:
         yield Granted(NO_SIGN, words) if world.place(command.line).em == 2 else words
 
 
+def _half(world: World) -> Iterator[str | Granted]:
+    """A drive executes the beginning of a line, which nobody has typed as a line of its own."""
+    history = world.history
+    told = history.told
+    typed = {(each.line, each.text) for each in history.commands.values()}
+    typed |= {(line, text) for line, _, text in told.repeated} | {(each.line, each.text) for each in told.stored}
+    typed |= {(line, text) for run in told.runs.values() for line, _, text in (*run.texts, *run.on_stop)}
+    for each in history.executed:
+        if not NUMBERED.fullmatch(each.text) or (each.line, each.text) in typed:
+            continue
+        whole = [text for line, text in typed if line == each.line and text.startswith(each.text)]
+        if whole:
+            words = f"{each.line}:{each.drive} executed {each.text!r} at {each.at:.3f}, which begins {whole[0]!r}"
+            noise = _damage(history, each.line, each.at - AFTER, each.at)
+            grant = SEVEN_BITS if world.place(each.line).checked else BARE_COMMAND
+            yield Granted(grant, words) if noise else words
+
+
 # Values
 
 
@@ -216,6 +235,8 @@ def _sealed_frame(heard: bytes, text: str) -> bool:
     )
 
 
+NUMBERED = re.compile(r"(?:[A-Z]\w*[ =]|X|SAP 194, 0, |MVP ABS, 0, )\d+")
+"""The lines of the acts, which end with a number, and their beginnings."""
 NOISE = "Noise on the line"
 OUTCOMES = (
     Rule(
@@ -241,6 +262,7 @@ OUTCOMES = (
         _unknown,
         (NO_SIGN,),
     ),
+    Rule("half", "No part of a line is executed.", "What a stop promises", _half, (SEVEN_BITS, BARE_COMMAND)),
     Rule(
         "credited",
         "A value is credited to the drive that gave it, and to the question that asked for it.",

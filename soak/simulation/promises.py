@@ -40,7 +40,10 @@ def _stored(world: World) -> Iterator[str | Granted]:
 
 
 def _programs(world: World) -> Iterator[str | Granted]:
-    """A download of which no trace is left in the drive breaks nothing, and so does one that a power-up took away."""
+    """A download of which no trace is left in the drive breaks nothing, and so does one that a power-up took away.
+
+    Where it has named a backup, that has the old program, whatever came of the download.
+    """
     told = world.history.told
     for run in told.runs.values():
         done = run.download
@@ -49,19 +52,17 @@ def _programs(world: World) -> Iterator[str | Granted]:
         at = world.cut.get((done.line, done.drive), [])
         if any(run.began <= each <= run.ended for each in at):
             continue
+        coded = world.place(done.line).language == "pmx"
+        old = [part for line in done.old for part in (re.findall(NUMBER, line) if coded else [line.partition(" ")[2]])]
+        named = {each for at, text in world.history.notices if at >= run.began for each in PLACE.findall(text)}
+        whole = any(all(each.strip() in told.backups.get(path, "") for each in old) for path in named)
         if not run.failure:
-            whole = any(re.findall(NUMBER, done.text)[-1] in line for line in done.new)
-        else:
-            coded = world.place(done.line).language == "pmx"
-            old = [
-                part for line in done.old for part in (re.findall(NUMBER, line) if coded else [line.partition(" ")[2]])
-            ]
-            named = {each for at, text in world.history.notices if at >= run.began for each in PLACE.findall(text)}
-            whole = any(all(each.strip() in told.backups.get(path, "") for each in old) for path in named)
+            new = any(re.findall(NUMBER, done.text)[-1] in line for line in done.new)
+            whole = new and (whole or not named & told.backups.keys())
         if not whole:
             when = f"{run.began:.3f} to {run.ended:.3f}"
             words = f"{run.typed!r} from {when} ({run.failure or 'done'}): {done.old}, {done.new}"
-            yield Granted(BARE_COMMAND, words) if became(world, done.line, run.ended) else words
+            yield Granted(BARE_COMMAND, words) if became(world, done.line, run.ended, run.began) else words
 
 
 def _raw(world: World) -> Iterator[str]:
@@ -77,7 +78,26 @@ def _raw(world: World) -> Iterator[str]:
                 yield f"{line}: {put.text!r} left {left} times, and was typed {typed} times"
 
 
+def _latched(world: World) -> Iterator[str]:
+    """Lines of a macro or a script that began after a stop and before `/resume` are executed before that."""
+    told = world.history.told
+    for run in told.runs.values():
+        held = [on for at, on in told.latches if at <= run.began][-1:]
+        if not run.automatic or held != [True]:
+            continue
+        until = next((at for at, on in told.latches if at > run.began and not on), float("inf"))
+        for each in world.history.executed:
+            if (each.line, each.drive, each.text) in run.texts and run.began <= each.at < until:
+                yield f"{each.line}:{each.drive} {each.text!r} of {run.typed!r}, begun after a stop, at {each.at:.3f}"
+
+
 PROMISES = (
+    Rule(
+        "latched",
+        "No macro and no script that begins between a stop and `/resume` sends anything.",
+        "What a stop promises",
+        _latched,
+    ),
     Rule(
         "automation",
         "Drives that automation moved are stopped at its early end, and no others.",
