@@ -14,6 +14,7 @@ from datetime import datetime
 from typing import NamedTuple
 
 from multidrop.dialects import Diagnostic
+from multidrop.shell.events import By
 from multidrop.shell.line_syntax import EVERYONE, DriveLine, parse
 from multidrop.shell.log.files import BEGIN, Entry, Line
 
@@ -24,7 +25,7 @@ RULES = {
     "first": "What is sent first on a line after a stop is its stop.",
     "stopped": "A drive is said to have stopped after two replies since the stop, or since one before it.",
     "credited": "A printed line was received after its drive was asked, and from a drive of no other name.",
-    "silence": "A typed command to which nothing was received is reported.",
+    "silence": "A command that a person typed, to which nothing was received, is reported.",
 }
 KEPT = 20
 """The exchanges of a drive in which a printed line is looked for."""
@@ -136,7 +137,7 @@ class _Session:
         if entry.raw or not entry.bus:
             return
         origin = entry.bus, entry.drive, entry.by
-        before = self._last.get(origin)
+        before = self._last.get(origin) if entry.by == By.OPERATOR.value else None  # several macros may play at once
         if before is not None and before.sent and not (before.heard or before.reported or entry.drive in EVERYONE):
             yield "silence", f"{before.text!r} was sent, nothing was received, and nothing was said of it"
         text = _text(entry.text)

@@ -43,6 +43,13 @@ def held_down(world: World, rng: Random) -> None:
     later(world, 0.4 + keys * REPEAT, b"/resume\r")
 
 
+def within_a_line(world: World, rng: Random) -> None:
+    """Type the stop while a line is on the wire."""
+    place = rng.choice([each for each in world.places if each.baud] or world.places)
+    world.person.type(world.command(rng, place))
+    later(world, 0.0005 + rng.random() * 0.02, STOP + b"/resume\r")
+
+
 def babbles(world: World, rng: Random) -> None:
     """Let a drive print without an end."""
     if not world.kernel.adapters:
@@ -106,6 +113,7 @@ def stopped_download(world: World, rng: Random) -> None:
 
 MEETINGS = (
     Act("stop held down", 1, held_down),
+    Act("stop within a line", 3, within_a_line),
     Act("babble", 1, babbles, fault=True),
     Act("late replies", 3, late_replies, fault=True),
     Act("noise", 3, noise, fault=True),

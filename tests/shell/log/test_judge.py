@@ -196,6 +196,14 @@ def test_what_another_origin_types_meanwhile_is_no_silence(tmp_path: Path) -> No
     assert found([*rows, typed("MR 3", by="macro")], tmp_path) == []
 
 
+@pytest.mark.parametrize(("by", "breaches"), [("operator", ["silence"]), ("macro", []), ("script", [])])
+def test_of_several_macros_or_scripts_that_run_at_once_one_may_wait_for_its_reply(
+    by: str, breaches: list[str], tmp_path: Path
+) -> None:
+    rows = [*HEAD, typed("MR 1", by=by), command("MR 1")[0], typed("MR 2", by=by)]
+    assert [rule for rule, _ in found(rows, tmp_path)] == breaches
+
+
 def test_frames_name_the_drive_that_replied(tmp_path: Path) -> None:
     def frame(*data: int) -> str:
         return bytes((*data, sum(data) & 0xFF)).decode("latin-1")
