@@ -21,6 +21,7 @@ from typing import Any
 from multidrop.drives.events import Sample
 from multidrop.macros import Macro
 from multidrop.macros.model import Step
+from multidrop.shell.batch.replay import VirtualLoop
 from multidrop.shell.configuration import Settings
 from multidrop.shell.events import Failed, OnBus
 from multidrop.shell.scripts.executor import play
@@ -29,7 +30,6 @@ from multidrop.simulator import cells
 from multidrop.simulator.floor import Floor
 from multidrop.simulator.serving.endpoints import serve_bus
 from multidrop.simulator.serving.running import RunningFloor
-from tests.support.virtual import VirtualLoop
 
 TABS = 8
 SLICES = 8

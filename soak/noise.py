@@ -11,9 +11,9 @@ from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 
+from multidrop.shell.batch.replay import VirtualLoop
 from soak.judge import Ledger
 from soak.noisy_line import Setup, in_memory, on_usb, served
-from tests.support.virtual import VirtualLoop
 
 CHUNK = 250
 """Commands of one line; the next one has another seed."""

@@ -64,8 +64,8 @@ class Setup:
         """The faults of the wire."""
         level = self.level
         every = Faults(flip=level, drop=level, double=level, insert=level, late=level, late_by=(0.01, self.latest))
-        hangs = {"hangup_after": 5.0, "hangup_for": 1.0} if self.hangups else {}
-        return replace(every, delay=(0.0, 0.02), **hangs)
+        after, lasts = (5.0, 1.0) if self.hangups else (None, None)
+        return replace(every, delay=(0.0, 0.02), hangup_after=after, hangup_for=lasts)
 
     @property
     def shown(self) -> str:
@@ -251,7 +251,7 @@ class UsbLine(NoisyLine):
 async def on_usb(setup: Setup, folder: Path) -> AsyncIterator[NoisyLine]:
     """A controller on the USB of a machine in memory, for a loop with virtual time."""
     floor = RunningFloor(Floor(cells.load(str(setup.write(folder)))))
-    plugged = Plugged(floor, BUS, floor.floor.usb(BUS)[0], "1-1", Random(setup.seed))
+    plugged = Plugged(floor, BUS, floor.floor.usb(BUS)[0], "1-1", Random(setup.seed))  # type: ignore[arg-type]
     with (
         contextlib.closing(floor),
         mock.patch.object(libusb, "LibusbCarrier", Sockets(plugged)),

@@ -6,15 +6,14 @@ import asyncio
 from collections.abc import Callable
 from contextvars import copy_context
 from random import Random
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from soak.simulation.hearing import typed
-from soak.simulation.kernel import WHO, Adapter
+from soak.simulation.kernel import WHO
 from soak.simulation.person import Person
 
 if TYPE_CHECKING:
     from soak.simulation.places import Place
-    from soak.simulation.usb import Socket
     from soak.simulation.world import World
 
 LONG = 12.0
@@ -102,7 +101,7 @@ def _bring_back(world: World) -> None:
 
 def busy(world: World, rng: Random) -> None:
     """Pull an adapter; another program opens its port before it is back, and closes it after a while."""
-    adapters = [*world.kernel.adapters, *world.kernel.usb.plugged]
+    adapters: list[Any] = [*world.kernel.adapters, *world.kernel.usb.plugged]
     if not adapters:
         return
     adapter = rng.choice(adapters)
@@ -112,7 +111,7 @@ def busy(world: World, rng: Random) -> None:
     world.loop.call_later(rng.random() * 8, _release, adapter)
 
 
-def _release(adapter: Adapter | Socket) -> None:
+def _release(adapter: Any) -> None:
     adapter.held = False
 
 

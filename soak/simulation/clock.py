@@ -159,7 +159,9 @@ class SimulatedLoop(asyncio.BaseEventLoop):
             handle.cancel()
         return handle
 
-    def call_at(self, when: float, callback: Any, *args: Any, context: Any = None) -> asyncio.TimerHandle:
+    def call_at(  # type: ignore[override]
+        self, when: float, callback: Any, *args: Any, context: Any = None
+    ) -> asyncio.TimerHandle:
         """Call at a time, unless the process that wants it is dead then."""
         timer = super().call_at(when, callback, *args, context=context)
         if gone(timer._context):  # type: ignore[attr-defined]

@@ -142,15 +142,16 @@ class FarSide:
 
     def _turn(self) -> None:
         self._timer = None
-        before, words = relay.select, "the relay has ended"
+        seam: Any = relay
+        before, words = seam.select, "the relay has ended"
         waits = [0.0]
-        relay.select = SimpleNamespace(select=lambda *given: self._ready(waits, *given))  # type: ignore[assignment]
+        seam.select = SimpleNamespace(select=lambda *given: self._ready(waits, *given))
         try:
             alive = self._loop._turn()
         except (TransportLost, relay.Garbled) as problem:
             alive, words = False, f"multidrop: {problem}"
         finally:
-            relay.select = before
+            seam.select = before
         if alive:
             self._come_back(waits[0])
         else:

@@ -52,7 +52,9 @@ def _judge_stopped(world: World, line: str, drive: str, who: str) -> None:
         since = max((each.at for each in world.history.stops if each.who == who), default=0.0)
         name = placed.spec.name
         started = any(each.at >= since and (each.line, each.drive) == (line, name) for each in world.history.executed)
-        if not started and any(each.velocity for each in placed.unit.shadow.motion(now)):
+        shadow = placed.unit.shadow
+        assert shadow is not None
+        if not started and any(each.velocity for each in shadow.motion(now)):
             world.history.untrue.append(f"{world.loop.now:.3f} {line}:{name} is said to be stopped, and moves")
 
 
@@ -68,7 +70,7 @@ def typed(world: World, data: bytes, session: Session, who: str = "") -> None:
         forms = {f"{name}{who}": _forms(world, bus) for name, bus in buses.items()}
         trying = session.reconnections.trying
         lost = tuple(name + who for name, bus in session.buses.items() if bus.link.lost and name in trying)
-        world.history.stops.append(Stop(world.loop.now, forms, who, len(world.history.written), lost))
+        world.history.stops.append(Stop(world.loop.now, forms, who, len(world.history.written), lost=lost))
 
 
 def _forms(world: World, bus: Bus) -> tuple[bytes, ...]:

@@ -72,9 +72,9 @@ class Kernel:
         seed: int,
         climate: Climate,
         network: Network,
-        trace: Callable[[str, str, str], Trace],
+        trace: Callable[[str, str], Trace],
     ) -> None:
-        """`trace` makes the notebook of a descriptor: of whose it is, what it is called, and of which line."""
+        """`trace` makes the notebook of a descriptor: of whose it is, and of which line."""
         self.loop, self.climate, self.network = loop, climate, network
         self.calm = climate.calm
         self.rng = Random(f"{seed} kernel")
@@ -189,11 +189,11 @@ class Kernel:
 
     def read(self, number: int, most: int) -> bytes:
         """Read a descriptor."""
-        return self._at(number).recv(most)
+        return bytes(self._at(number).recv(most))
 
     def write(self, number: int, data: Any) -> int:
         """Write a descriptor."""
-        return self._at(number).send(data)
+        return int(self._at(number).send(data))
 
     def unsent(self, number: int) -> int:
         """Bytes that have not left."""

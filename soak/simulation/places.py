@@ -112,7 +112,7 @@ TARGETS = {
 
 def drawn_places(rng: Random, usb: Random) -> list[Place]:
     """Draw a machine of one to three lines. `usb` draws which of them are controllers on USB."""
-    places = []
+    places: list[Place] = []
     for number in range(rng.choice((1, 1, 1, 2, 2, 3))):
         [kind] = rng.choices(list(KINDS), list(KINDS.values()))
         language = rng.choice(("mcode", "mcode", "mcode", "pmx", "tmcl"))

@@ -13,6 +13,7 @@ from random import Random
 from multidrop.simulator.serving.running import Listener, RunningFloor
 from soak.simulation.climate import Climate
 from soak.simulation.clock import SimulatedLoop
+from soak.simulation.process import Process
 
 FEW = 3
 """Bytes that an empty buffer of a socket takes whole."""
@@ -36,6 +37,8 @@ class Descriptor:
     def __init__(self, loop: SimulatedLoop, rng: Random, climate: Climate, trace: Trace) -> None:
         self.loop, self.rng, self.climate, self.trace = loop, rng, climate, trace
         self.closed = False
+        self.owner: Process | None = None
+        """The process whose it is; None: the world's."""
         self.rest = 0
         """Bytes of a write that has begun and that the kernel has not taken."""
         self._descriptor = loop.descriptor()

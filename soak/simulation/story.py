@@ -68,7 +68,12 @@ def hang_up(world: World, rng: Random) -> None:
     """Type some lines, and hang up the terminal in the middle of them."""
     world.person.type(b"".join(world.command(rng) for _ in range(rng.randrange(3))), rng.choice((0.0, 0.02)))
     process = world.process
-    world.loop.call_later(rng.random() ** 2 * 0.5, lambda: world.process is process and world.hang_up())
+
+    def gone() -> None:
+        if world.process is process:
+            world.hang_up()
+
+    world.loop.call_later(rng.random() ** 2 * 0.5, gone)
 
 
 def stop_cuts_in(world: World, rng: Random) -> None:

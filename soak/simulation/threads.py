@@ -47,15 +47,16 @@ class Scheduler:
     @contextlib.contextmanager
     def installed(self) -> Iterator[None]:
         """Put simulated threads and conditions in place of those of `multidrop.shell.threads`."""
-        before = threads.threading
+        seam: Any = threads
+        before = seam.threading
         made = SimpleNamespace(
             Thread=lambda **given: Thread(self, **given), Condition=lambda lock=None: Condition(self), Lock=before.Lock
         )
-        threads.threading = made  # type: ignore[assignment]
+        seam.threading = made
         try:
             yield
         finally:
-            threads.threading = before
+            seam.threading = before
 
 
 class Condition:

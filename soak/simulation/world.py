@@ -55,7 +55,7 @@ from soak.simulation.watched_session import WatchedSession
 if TYPE_CHECKING:
     from soak.simulation.acts_connections import Other
 
-HARMLESS = {"flip": 0.0, "drop": 0.0, "double": 0.0, "insert": 0.0}
+HARMLESS: dict[str, Any] = {"flip": 0.0, "drop": 0.0, "double": 0.0, "insert": 0.0}
 """Bytes on a network are not damaged: TCP repairs or ends the connection, and a damaged datagram is dropped."""
 HARMED = wire.harmed
 NUMBER = r"\d{7,8}"
@@ -291,7 +291,11 @@ class World:
         if power:
             self.loop.call_soon(self.disk.cut_power, rng, context=Context())
         away = rng.random() ** 2 * AWAY + power * AWAY
-        self.loop.create_task(self._again(away), context=Context())
+        self._start(self._again(away))
+
+    def _start(self, work: Coroutine[Any, Any, None]) -> None:
+        """Begin work that no process does."""
+        self.loop.create_task(work, context=Context())
 
     async def _again(self, away: float) -> None:
         await asyncio.sleep(away)
@@ -308,15 +312,16 @@ class World:
 
     def faults(self, on: bool) -> None:
         """Let the faults begin or end."""
-        for name, each in self.floor.floor.wires.items():
-            each.disturb(self._faults(self.place(name)) if on else Faults(), WireRandom(self.seed, name))
+        for name, disturbed in self.floor.floor.wires.items():
+            disturbed.disturb(self._faults(self.place(name)) if on else Faults(), WireRandom(self.seed, name))
         self.loop.late = self.climate["late timer"] if on else 0.0
         self.kernel.quiet(self.climate if on else Climate(self.seed))
         if not on:
             self.network.heal()
             self.terminal.reader()
-            for held in (*self.kernel.adapters, *self.kernel.usb.plugged):
-                held.held = False
+            holders: list[Any] = [*self.kernel.adapters, *self.kernel.usb.plugged]
+            for each in holders:
+                each.held = False
 
     # What happens
 
@@ -427,7 +432,7 @@ class World:
             self.cut_ins.end()
             self.history.deaths.append(self.loop.now)
             self.history.note(self.loop.now, "hang-up", "")
-            self.person.hang_up(lambda: self.loop.create_task(self._hung_up(), context=Context()) and None)
+            self.person.hang_up(lambda: self._start(self._hung_up()))
 
     async def _hung_up(self) -> None:
         process, rng = self.process, Random(f"{self.seed} hang-up {self.history.lives}")
