@@ -12,14 +12,15 @@ import contextlib
 import re
 import sys
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Callable, Coroutine, Sequence
 from datetime import datetime, timedelta
 from pathlib import Path
 from unittest import mock
 
 ROOT = Path(__file__).resolve().parent.parent
-sys.path.insert(0, str(ROOT))
+sys.path[:0] = [str(ROOT), str(ROOT / "packaging")]
 
+from film import moving
 from textual import _time
 from textual.pilot import Pilot
 
@@ -82,15 +83,69 @@ SCENES: dict[str, tuple[tuple[int, int], Sequence[Step]]] = {
 """Each picture's size in cells, and what is done before it is taken: lines, pages, keys, seconds."""
 
 
+MOVING = "tour"
+TOUR: Sequence[tuple[str, float]] = (
+    ("PR VR", 0.6),
+    ("MR {12.5 mm}", 1.4),
+    ("@b SL 200000", 1.2),
+    ("VM=5", 1.6),
+    ("SL 100000", 1.4),
+    ("", 2.4),
+)
+"""The moving picture: lines, each with the seconds after it; an empty one is the stop."""
+TYPED, FRAME = 0.1, 0.25
+"""Seconds between two typed characters, and between two other frames."""
+
+
+def filmed() -> str:
+    """The moving picture as SVG."""
+    return _run(_work(SMALL, _film))
+
+
+async def _film(app: MultidropApp, pilot: Pilot[int]) -> str:
+    frames = list[tuple[float, str]]()
+    at = 0.0
+
+    async def frame(seconds: float) -> None:
+        nonlocal at
+        await asyncio.sleep(seconds)
+        await pilot.pause()
+        at = round(at + seconds, 2)
+        frames.append((at if frames else 0.0, _steady(app.export_screenshot(title="multidrop"))))
+
+    await frame(0.0)
+    for line, seconds in TOUR:
+        for length in range(len(line)):
+            app.main.entry.value = line[: length + 1]
+            app.main.entry.cursor_position = length + 1
+            await frame(TYPED)
+        await pilot.press("enter" if line else "ctrl+x")
+        for _ in range(round(seconds / FRAME)):
+            await frame(FRAME)
+    return moving(frames)
+
+
 def taken(name: str) -> str:
     """The picture as SVG."""
+
+    async def still(app: MultidropApp, pilot: Pilot[int]) -> str:
+        for step in SCENES[name][1]:
+            await _do(app, pilot, step)
+        await pilot.pause()
+        return _steady(app.export_screenshot(title="multidrop"))
+
+    return _run(_work(SCENES[name][0], still))
+
+
+def _run(work: Coroutine[None, None, str]) -> str:
     with asyncio.Runner(loop_factory=VirtualLoop) as runner:
         loop = runner.get_loop()
         with mock.patch.object(_time, "get_time", loop.time):
-            return runner.run(_take(*SCENES[name]))
+            return runner.run(work)
 
 
-async def _take(size: tuple[int, int], scene: Sequence[Step]) -> str:
+async def _work(size: tuple[int, int], take: Callable[[MultidropApp, Pilot[int]], Coroutine[None, None, str]]) -> str:
+    """Open the program on the demo cell, and take its picture."""
     with tempfile.TemporaryDirectory() as name, contextlib.chdir(name):
         settings = _settings(Path(name))
         session = Session(settings)
@@ -102,10 +157,7 @@ async def _take(size: tuple[int, int], scene: Sequence[Step]) -> str:
                     while len(session.buses) < 3 or not all(bus.drives for bus in session.buses.values()):
                         await asyncio.sleep(0.05)
                     await asyncio.sleep(2.0)
-                    for step in scene:
-                        await _do(app, pilot, step)
-                    await pilot.pause()
-                    return _steady(app.export_screenshot(title="multidrop"))
+                    return await take(app, pilot)
         finally:
             await session.close()
 
@@ -151,8 +203,8 @@ def _steady(svg: str) -> str:
 def main() -> int:
     """Write the named pictures, or all."""
     PICTURES.mkdir(exist_ok=True)
-    for name in sys.argv[1:] or SCENES:
-        (PICTURES / f"{name}.svg").write_text(taken(name))
+    for name in sys.argv[1:] or (MOVING, *SCENES):
+        (PICTURES / f"{name}.svg").write_text(filmed() if name == MOVING else taken(name))
     return 0
 
 
