@@ -229,7 +229,7 @@ def _shadow(device: TmclModule, names: Sequence[str]) -> Shadow:
             for name, motor in motors.items()
         )
 
-    return Shadow(lambda: None, motion, lambda name, position, now: motors[name].stand_at(position, now))
+    return Shadow(device.unwatch, motion, lambda name, position, now: motors[name].stand_at(position, now))
 
 
 TMCL = Family(

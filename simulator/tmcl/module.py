@@ -85,6 +85,8 @@ class TmclModule:
         self._notify = 0
         self._notices: list[tuple[float, int]] = []
         self._now = 0.0
+        self._watched, self._heard = True, 0.0
+        """The time of the last command of a host; infinite after the heartbeat has stopped the motors."""
         self._outputs = dict.fromkeys(self.table.outputs, 0)
         self._variables: dict[int, int] = {}
         self._fresh()
@@ -148,6 +150,7 @@ class TmclModule:
     def execute(self, call: Call, now: float) -> Answer | None:
         """Carry out a command of a host; its reply, or None where it gives none."""
         self.advance(now)
+        self._heard = now
         if self.program.storing and call.command < CONTROL:
             return Answer(Status.STORED if self.program.store(call) else Status.MAXIMUM_EXCEEDED, call.value)
         try:
@@ -161,7 +164,7 @@ class TmclModule:
         self.advance(now)
         if on == self.powered:
             return
-        self.powered = on
+        self.powered, self._heard = on, now
         self._notify = 0
         self._notices.clear()
         self.program.halt(reset=True)
@@ -175,6 +178,10 @@ class TmclModule:
         self._variables = dict(self._kept_variables)
         if on and self._global[Global.AUTOSTART]:
             self.program.run(now)
+
+    def unwatch(self) -> None:
+        """Switch the heartbeat off: the twin of a module does not hear what keeps that awake."""
+        self._watched = False
 
     def supply(self, on: bool, now: float) -> None:
         """Do nothing: the module has one supply."""
@@ -399,11 +406,22 @@ class TmclModule:
         events = [at for motor in self.motors for at in motor.events(after)]
         if self.program.running:  # an input may be an interrupt
             events += [at for world in self.worlds if (at := world.next_change(after)) is not None]
-        return min((at for at in (*events, self.program.due) if at > after), default=inf)
+        return min((at for at in (*events, self.program.due, self._silent_at) if at > after), default=inf)
+
+    @property
+    def _silent_at(self) -> float:
+        """When the heartbeat (global parameter 68) stops the motors; infinite: never."""
+        return self._heard + (self._watched * self._global[Global.HEARTBEAT] / 1000 or inf)
 
     def _live(self, t: float) -> None:
         if not self.powered:
             return
+        if self._silent_at <= t:
+            self._heard = inf
+            for motor in self.motors:
+                if motor.moving(t) or motor.search is not None:
+                    motor.end_search()
+                    motor.rotate(0, t)
         for n, motor in enumerate(self.motors):
             motor.live(t)
             if self._notify >> n & 1 and motor.positioning and motor.reached(t):

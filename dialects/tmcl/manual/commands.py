@@ -359,6 +359,7 @@ class Global(IntEnum):
     BAUD = 65
     ADDRESS = 66
     TEXT_MODE = 67
+    HEARTBEAT = 68
     PAUSE = 75
     HOST_ADDRESS = 76
     AUTOSTART = 77

@@ -221,3 +221,44 @@ def test_a_stalled_motor_stops_when_it_becomes_that_fast_whenever_it_is_asked():
             module.ask("GAP 3, 0")
         places.add(module.ask("GAP 1, 0"))
     assert places == {800}  # v^2 / 2a
+
+
+def test_the_heartbeat_stops_a_motor_where_no_command_comes_and_any_command_keeps_it_awake():
+    module = Module(settings={"G68": 500})
+    module.ask("ROR 0, 1000")
+    for _ in range(5):
+        module.wait(0.4)
+        assert module.ask("GAP 3, 0") == 1000
+    module.wait(2.0)
+    assert module.device.motors[0].read(3, module.now) == 0
+    there = module.ask("GAP 1, 0")
+    module.ask("ROR 0, 1000")
+    module.wait(0.4)
+    assert module.ask("GAP 1, 0") > there
+
+
+@pytest.mark.parametrize("settings", [{}, {"G68": 0}])
+def test_without_a_heartbeat_a_motor_runs_on(settings):
+    module = Module(settings=settings)
+    module.ask("ROR 0, 1000")
+    module.wait(100.0)
+    assert module.ask("GAP 3, 0") == 1000
+
+
+def test_the_heartbeat_ends_a_search_and_leaves_a_motor_at_rest_alone():
+    module = Module(settings={"G68": 500, "193": 1}, limit_minus=-(10**9))
+    module.ask("MVP ABS, 0, 10")
+    module.rest()
+    module.wait(2.0)
+    assert (module.ask("GAP 8, 0"), module.ask("GGP 68, 0")) == (1, 500)
+    module.ask("RFS START, 0")
+    module.wait(2.0)
+    assert (module.ask("RFS STATUS, 0"), module.ask("GAP 3, 0")) == (0, 0)
+
+
+def test_a_twin_hears_no_reads_and_is_not_stopped_by_a_heartbeat():
+    module = Module(settings={"G68": 500})
+    module.device.unwatch()
+    module.ask("ROR 0, 1000")
+    module.wait(5.0)
+    assert module.ask("GAP 3, 0") == 1000
