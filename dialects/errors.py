@@ -31,6 +31,14 @@ class Differs(DriveError):
     """A drive does not hold what it should hold."""
 
 
+class Timeout(DriveError, TimeoutError):
+    """A wait ran out. What it waited for may still happen."""
+
+
+class Unreferenced(DriveError):
+    """A drive may have been restarted or moved while its line was lost, so nothing that moves it was sent."""
+
+
 class Diagnostic(Exception):
     """Text that a person wrote is wrong: what, where (`file:line`, bus, verb) and the remedy."""
 
@@ -42,3 +50,8 @@ class Diagnostic(Exception):
         head = f"{self.where}: " if self.where else ""
         tail = f"; {self.hint}" if self.hint else ""
         return f"{head}{self.message}{tail}"
+
+
+PUBLIC = (DriveError, Refused, NoAnswer, Stopped, Inexpressible, Differs, Timeout, Unreferenced, Diagnostic)
+for _each in PUBLIC:
+    _each.__module__ = "multidrop"  # a traceback shows the name by which a program catches it

@@ -352,6 +352,29 @@ Controls = Mapping[str, Control]
 
 
 @dataclass(frozen=True)
+class Actions:
+    """What a program asks of a drive of any family, as lines of this one. An axis is as in `Motion.axis`."""
+
+    homings: Callable[[str], Mapping[str, Mapping[str, str]]]
+    """The lines that home an axis, by mode (the first is the usual one), then by direction.
+
+    An empty direction: the drive's own settings fix it.
+    """
+    run: Callable[[str, int | str], tuple[str, ...]]
+    """The lines that run at a velocity with a sign; it may be a quantity. Raises Inexpressible."""
+    output: Callable[[int, bool], str]
+    """The line that switches an output."""
+    error: str = ""
+    """The word that reads the number of the error and clears it."""
+    clear: Callable[[str], str] | None = None
+    """The line that clears the error of an axis, where reading does not."""
+    no_error: str = ""
+    """The reason for which no error can be read; empty: one can."""
+    word: Callable[[str, str], str] = lambda word, axis: word
+    """A word for an axis other than the first."""
+
+
+@dataclass(frozen=True)
 class Values(Generic[S]):
     """What a family reads of its drives for a person, the settings that it changes, and the controls of an axis."""
 
@@ -370,5 +393,6 @@ class Values(Generic[S]):
     """Read a value that was read before. Raises NoAnswer or Stopped, and Refused where the drive lost the value."""
     controls: Callable[[S, str], Controls]
     """The controls of an axis."""
+    actions: Actions
     own: Callable[[S, str], bool] = lambda state, word: True
     """Whether a checked word belongs to the language; any other would be a name that a person gave."""

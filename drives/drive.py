@@ -22,7 +22,7 @@ from multidrop.dialects import (
     SourceLine,
     Stopped,
 )
-from multidrop.dialects.errors import Differs
+from multidrop.dialects.errors import Differs, Unreferenced
 from multidrop.dialects.families import FAMILIES, program_languages
 from multidrop.dialects.family import Programs
 from multidrop.dialects.program_files import Held, ProgramFiles
@@ -150,6 +150,12 @@ class Drive:
         """Number of lines under way that can start it, and that it may still refuse."""
         self.commands = 0
         """Number of requests sent to it that may do more than ask."""
+        self.homings: dict[str, tuple[int, float, int]] = {}
+        """What had been sent, and the stops, as the last homing of each axis had begun."""
+        self.homed: dict[str, bool] = {}
+        """The axes whose last homing was seen to end, and whether it ended well."""
+        self.hold = ""
+        """The reason for which nothing may start it while its position is not referenced; empty: there is none."""
         self.link: Link = conversations.link
         self.family: Family[Any] = FAMILIES[state.codec.family]
         self._conversations = conversations
@@ -218,6 +224,7 @@ class Drive:
         text = text if isinstance(text, Command) else Command(text)
         if not self.starts(text):
             return await self._send(text, check)
+        self.check_start(text)
         before = {each: each.commanded_at for each in self._meant}
         self.starts_now()
         noted = self.commanded_at
@@ -251,7 +258,7 @@ class Drive:
             procedure = _checked(check(self), procedure)
         if to_all:
             return await self.run(self._to_all(procedure, text))
-        stored = self.state.programming
+        stored, before = self.state.programming, self._sent
         known = protection(self.link, self.family) if not self.state.address else None
         refused = False
         try:
@@ -269,12 +276,47 @@ class Drive:
             if not (refused or stored):
                 self._disturbed(text)
         self._values.took(known, text)
-        found = self.family.referencing(self.state, text) if self.state.unreferenced and not stored else None
+        asked = not stored and (self.state.unreferenced or self.starts(text))
+        found = self.family.referencing(self.state, text) if asked else None
         if found is not None and found.homing:
-            self._neighbours.homes(self, found.axis)
+            self._homes(found.axis, before)
+            if self.state.unreferenced:
+                self._neighbours.homes(self, found.axis)
         elif found is not None and found.axis not in self.anchored:
             self.state.referenced(found.axis)
         return printed
+
+    @property
+    def _sent(self) -> tuple[int, float, int]:
+        return self.commands, self.started_at, self.link.stops
+
+    def _homes(self, axis: str, before: tuple[int, float, int]) -> None:
+        """Note the homing of an axis; it does not disturb those of other axes."""
+        now = self.homings[axis] = self._sent
+        self.homed.pop(axis, None)
+        same = [each for each, sent in self.homings.items() if (sent[0], sent[2]) == (before[0], before[2])]
+        self.homings.update(dict.fromkeys(same, now))
+
+    async def homing_ended(self, axis: str) -> bool:
+        """Whether the last homing of an axis, after which the drive rests, ended well and as the last command."""
+        sent = self.homings.get(axis)
+        well = await self.run(self.family.homed(self.state))
+        if self.homings.get(axis) == sent:
+            self.homed[axis] = well and sent == self._sent
+        return self.homed.get(axis, False)
+
+    def check_start(self, text: str = "") -> None:
+        """Raise Unreferenced where a line must not start it, or a drive that the line is for, as `hold` says."""
+        for each in self._meant:
+            guards = each.family.guards
+            ends = bool(text) and (
+                each.family.referencing(each.state, text) is not None or (guards is not None and guards.only_ends(text))
+            )
+            if each.hold and each.state.unreferenced and not ends:
+                raise Unreferenced(
+                    f"{each.shown}: {each.hold}: its position is not referenced, and '{text or 'this'}' was not sent; "
+                    f"home it, set its position, or accept() if it is right"
+                )
 
     def _disturbed(self, text: str) -> None:
         """Note the places of the machine that a line, which may have been executed, has left without a reference."""

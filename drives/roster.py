@@ -59,7 +59,7 @@ class Restarts:
     def homes(self, drive: Drive, axis: str) -> None:
         if (before := self._homings.pop((drive, axis), None)) is not None:
             before.cancel()
-        work = self._to_its_end(drive, axis, (drive.commands, drive.started_at))
+        work = self._to_its_end(drive, axis)
         task = self._begin(f"watching the homing of {drive.shown}", work)
         self._homings[drive, axis] = task
 
@@ -118,16 +118,15 @@ class Restarts:
             warning=True,
         )
 
-    async def _to_its_end(self, drive: Drive, axis: str, sent: tuple[int, float]) -> None:
-        """Wait until the drive rests; the axis is referenced if nothing was `sent` in between and no error is set."""
-        stops = self._link.stops
+    async def _to_its_end(self, drive: Drive, axis: str) -> None:
+        """Wait until the drive rests; the axis is referenced if nothing was sent in between and no error is set."""
         try:
             while not await still(drive):
                 await asyncio.sleep(PAUSE)
-            ended_well = await drive.run(drive.family.homed(drive.state))
+            ended_well = await drive.homing_ended(axis)
         except (DriveError, TransportLost):
             return
-        if ended_well and (drive.commands, drive.started_at) == sent and self._link.stops == stops:
+        if ended_well:
             drive.state.referenced(axis)
             name = f" {axis}" if axis else ""
             check = "; check its place, as a homing may leave the position" if axis in drive.anchored else ""

@@ -344,6 +344,7 @@ class LinePath:
 
     def starting(self, drive: Drive) -> None:
         """Note that the next request can start motion or a program of a drive."""
+        drive.check_start()
         self._session.addressed.add((drive.link.name, drive.address))
         self._session.automations.starts(drive)
         drive.starts_now()

@@ -10,10 +10,11 @@ import contextlib
 import operator
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 from multidrop.dialects import Diagnostic, DriveError, Motion
+from multidrop.dialects.errors import Timeout
 from multidrop.drives.bus import Bus
 from multidrop.drives.drive import REST, Check, Drive, Running, confirmed_motion
 from multidrop.shell.line_syntax import EVERYONE
@@ -86,11 +87,13 @@ async def sleep(duration: float) -> None:
     await asyncio.sleep(duration)
 
 
-async def wait(workspace: Workspace, limit: float, *, idle: bool, drives: Sequence[Drive] | None = None) -> None:
+async def wait(
+    workspace: Workspace, limit: float, *, idle: bool, drives: Sequence[Drive] | None = None, said: str = ""
+) -> None:
     """Wait until every drive is at rest in two readings; with `idle`, also until no program runs.
 
-    `drives` None: those that this session sent a line to, else the selected one. Raises DriveError after `limit`
-    seconds, and for a drive in program mode (it would store the question).
+    `drives` None: those that this session sent a line to, else the selected one. `said`: what a person called this.
+    Raises Timeout after `limit` seconds, DriveError for a drive in program mode (it would store the question).
     """
     deadline = workspace.now() + limit
     if drives is None:
@@ -100,8 +103,8 @@ async def wait(workspace: Workspace, limit: float, *, idle: bool, drives: Sequen
         drives = list(dict.fromkeys(found)) or [workspace.drive()]
     while moving := await _moving(workspace, drives, idle):
         if workspace.now() >= deadline:
-            verb = "/wait idle" if idle else "/wait stopped"
-            raise DriveError(f"{verb}: {workspace.display_name(moving)} still runs after {limit:g} s")
+            verb = said or ("/wait idle" if idle else "/wait stopped")
+            raise Timeout(f"{verb}: {workspace.display_name(moving)} still runs after {limit:g} s")
         await sleep(APART)
 
 
@@ -123,17 +126,20 @@ async def _moving(workspace: Workspace, drives: Sequence[Drive], idle: bool) -> 
 
 
 async def wait_value(
-    workspace: Workspace, drive: Drive, wanted: Condition, limit: float, check: Check | None = None
+    workspace: Workspace, drive: Drive, wanted: Condition, limit: float, units: Units | None, said: str = "/wait"
 ) -> None:
-    """Wait until a drive reports a value. Raises DriveError after `limit` seconds, Diagnostic for no such value.
+    """Wait until a drive reports a value. Raises Timeout after `limit` seconds, Diagnostic for no such value.
 
-    `check`: see `Drive.send`.
+    `units`: where it is a quantity.
     """
-    line, name = question(workspace, drive, wanted), workspace.display_name(drive)
+    line, name, check = question(workspace, drive, wanted), workspace.display_name(drive), None
+    if units is not None:
+        number, check, _ = await units.condition(drive, line, wanted.quantity)
+        wanted = replace(wanted, value=number)
     deadline = workspace.now() + limit
     while not wanted.holds(seen := await _value(workspace, drive, line, check)):
         if workspace.now() >= deadline:
-            raise DriveError(f"/wait {wanted.text}: {name} still reports {seen} after {limit:g} s")
+            raise Timeout(f"{said} {wanted.text}: {name} still reports {seen} after {limit:g} s")
         await sleep(APART)
 
 
@@ -162,11 +168,11 @@ async def _value(workspace: Workspace, drive: Drive, line: str, check: Check | N
 async def wait_text(workspace: Workspace, text: str, limit: float) -> None:
     """Wait until a drive prints a text; what came since the line before counts.
 
-    Raises DriveError after `limit` seconds.
+    Raises Timeout after `limit` seconds.
     """
     if not await workspace.lately.finds(text, limit):
         seen = ", ".join(f'"{line}"' for line in workspace.lately.last(SHOWN)) or "nothing"
-        raise DriveError(f'/wait "{text}": not printed within {limit:g} s; seen {seen}')
+        raise Timeout(f'/wait "{text}": not printed within {limit:g} s; seen {seen}')
 
 
 FRESH = 1.0

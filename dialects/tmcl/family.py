@@ -2,8 +2,7 @@
 
 It has no URL scheme: its frames contain bytes that other drives obey, so nothing tries it on an unknown line before a
 person has agreed. A guarded line wears the EEPROM out, forgets what is stored, starts programs later, or changes how
-the module is reached. A stop is never guarded. Values have numbers, not words: SAP and SGP set them, so no line assigns
-one.
+the module is reached. A stop is never guarded. Values have numbers; a word is the name of a parameter (`parameter`).
 """
 
 from __future__ import annotations
@@ -110,10 +109,10 @@ TMCL = Family(
     homed=operations.homed,
     language=help,
     rests_in_place=True,
-    question=lambda word: None,
+    question=commands.asked,
     move=move,
     move_to=move_to,
-    assign=lambda word, value: None,
+    assign=commands.assigned,
     guards=Guards(GUARDS, lambda state, text: guarded(text, state.address), word_of, only_ends),
     programs_at="multidrop.dialects.tmcl.host.programs:PROGRAM_FILES",
     debugging_at="multidrop.dialects.tmcl.host.programs:DEBUGGING",

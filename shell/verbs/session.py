@@ -5,7 +5,6 @@ from __future__ import annotations
 import asyncio
 import difflib
 import re
-from dataclasses import replace
 from typing import NamedTuple
 
 from multidrop.dialects import Diagnostic, Stopped
@@ -133,12 +132,8 @@ async def wait(call: Call) -> None:
     if wanted.text:
         await waits.wait_text(call.session, wanted.text, wanted.limit)
     elif wanted.value is not None:
-        drive, condition, check = call.drive(wanted.value.target), wanted.value, None
-        if condition.quantity:
-            line = waits.question(call.session, drive, condition)
-            number, check, _ = await call.session.units.condition(drive, line, condition.quantity)
-            condition = replace(condition, value=number)
-        await waits.wait_value(call.session, drive, condition, wanted.limit, check)
+        drive, units = call.drive(wanted.value.target), call.session.units if wanted.value.quantity else None
+        await waits.wait_value(call.session, drive, wanted.value, wanted.limit, units)
     else:
         await waits.wait(call.session, wanted.limit, idle=wanted.idle)
 

@@ -494,5 +494,6 @@ VALUES = Values(
     first=first,
     again=again,
     controls=points.controls,
+    actions=points.ACTIONS,
     own=own,
 )

@@ -16,6 +16,7 @@ from multidrop.dialects.values import (
     STOP,
     TO,
     UNREAD,
+    Actions,
     Conditions,
     Control,
     Controls,
@@ -165,3 +166,16 @@ CONTROLS: Controls = {
 
 def controls(state: DriveState, axis: str) -> Controls:
     return CONTROLS
+
+
+def homings(axis: str) -> Mapping[str, Mapping[str, str]]:
+    """Each creeps off against the direction of the search. (MCode reference 5.1.53, 5.1.54.)"""
+    return {mode: {"-": f"{word} 1", "+": f"{word} 3"} for mode, word in (("home", "HM"), ("index", "HI"))}
+
+
+ACTIONS = Actions(
+    homings=homings,
+    run=lambda axis, velocity: (f"SL {velocity}",),
+    output=lambda number, on: f"O{number}={on:d}",
+    error="ER",
+)

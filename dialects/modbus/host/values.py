@@ -224,4 +224,5 @@ VALUES = Values(
     first=lambda state, word: again(state, word, Priority.OPERATOR),
     again=again,
     controls=points.controls,
+    actions=points.ACTIONS,
 )

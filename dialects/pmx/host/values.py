@@ -18,7 +18,7 @@ from dataclasses import replace
 from functools import partial
 
 from multidrop.dialects.codec import Priority, Procedure, Request
-from multidrop.dialects.errors import Diagnostic, Refused
+from multidrop.dialects.errors import Diagnostic, Inexpressible, Refused
 from multidrop.dialects.pmx.host.codec import PmxState
 from multidrop.dialects.pmx.host.operations import (
     LATER,
@@ -56,6 +56,7 @@ from multidrop.dialects.values import (
     STOP,
     TO,
     VARIABLES,
+    Actions,
     Change,
     Conditions,
     Control,
@@ -405,6 +406,25 @@ def controls(state: DriveState, axis: str) -> Controls:
     }
 
 
+SEARCHES: Mapping[str, str] = {"home": "H", "home slow": "HL", "limit": "L", "index": "Z", "home index": "ZH"}
+"""The commands of homing by what they use. (7.10.)"""
+
+
+def homings(axis: str) -> Mapping[str, Mapping[str, str]]:
+    return {mode: {sign: f"{word}{axis.upper()}{sign}" for sign in "-+"} for mode, word in SEARCHES.items()}
+
+
+def run(axis: str, velocity: int | str) -> tuple[str, ...]:
+    """Set the axis's high speed, and jog; a velocity of 0 stops it."""
+    name = axis.upper()
+    if isinstance(velocity, str):
+        raise Inexpressible(f"{velocity}: a PMX has speeds without a sign, which a scale may turn; give steps a second")
+    return (f"HSPD{name}={abs(velocity)}", f"J{name}{'-' if velocity < 0 else '+'}") if velocity else (f"STOP{name}",)
+
+
+ACTIONS = Actions(
+    homings=homings, run=run, output=lambda number, on: f"DO{number}={on:d}", clear=lambda axis: f"CLR{axis.upper()}"
+)
 VALUES = Values(
     parameters=PARAMETERS,
     snapshot=take,
@@ -414,4 +434,5 @@ VALUES = Values(
     first=lambda state, word: again(state, word, Priority.OPERATOR),
     again=again,
     controls=controls,
+    actions=ACTIONS,
 )

@@ -304,11 +304,11 @@ def moving(state: TmclState) -> Procedure[bool]:
     return False
 
 
-def busy(state: TmclState) -> Procedure[bool]:
+def busy(state: TmclState, priority: Priority = Priority.OPERATOR) -> Procedure[bool]:
     """Whether its program runs; a module that knows neither question has none."""
     for call in (Call(Command.GGP, Global.PROGRAM_STATUS), PROGRAM):
         try:
-            return mode_of((yield from read(state, call))) == Running.RUNS
+            return mode_of((yield from read(state, call, priority))) == Running.RUNS
         except Refused as refused:
             if refused.code not in LACKS:
                 raise

@@ -23,7 +23,7 @@ from multidrop.dialects.text import whole
 from multidrop.dialects.tmcl.host.codec import TmclState, call_of, line_in, parse_reply
 from multidrop.dialects.tmcl.host.operations import LACKS, answered, busy, moving, perform, read, store, who
 from multidrop.dialects.tmcl.manual import program_file
-from multidrop.dialects.tmcl.manual.commands import Call, Command, Global
+from multidrop.dialects.tmcl.manual.commands import Call, Command, Global, parameter
 from multidrop.dialects.tmcl.manual.instructions import EMPTY, MEMORY, Word, spelled
 
 ERASED = 255
@@ -361,16 +361,12 @@ def watched_call(name: str) -> Call:
     registers = {"A": 2, "X": 3}
     if name in registers:
         return Call(Command.PROGRAM_STATUS, registers[name])
-    head = "AP" if name.startswith("AP") else "V" if name.startswith("V") else ""
-    number, _, motor = name.removeprefix(head).partition("/")
-    if head and (found := whole(number, 0, 255)) is not None and (head == "AP" or "/" not in name):
-        if head == "V":
-            return Call(Command.GGP, found, 2)
-        if (axis := whole(motor or "0", 0, 5)) is not None:
-            call = Call(Command.GAP, found, axis)
-            if call.changed_by_reading:
-                raise Diagnostic(f"{name} cannot be watched: reading it clears it", "", f"{call} reads it once")
-            return call
+    if name.startswith("V") and (found := whole(name[1:], 0, 255)) is not None:
+        return Call(Command.GGP, found, 2)
+    if (call := parameter(name)) is not None:
+        if call.changed_by_reading:
+            raise Diagnostic(f"{name} cannot be watched: reading it clears it", "", f"{call} reads it once")
+        return call
     raise Diagnostic(f"{name} cannot be watched", "", "valid: A, X, V0 to V255, AP and a parameter, as AP1 or AP1/2")
 
 

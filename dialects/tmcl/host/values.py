@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Collection, Mapping, Sequence
+from dataclasses import replace
 from functools import partial
 
 from multidrop.dialects.codec import Priority, Procedure
@@ -15,7 +16,7 @@ from multidrop.dialects.program_files import Held
 from multidrop.dialects.tmcl.host.codec import TmclState
 from multidrop.dialects.tmcl.host.operations import busy, motors, moving, perform, read, who
 from multidrop.dialects.tmcl.host.programs import read_held
-from multidrop.dialects.tmcl.manual.commands import STARTING_PARAMETERS, Axis, Call, Command, Global
+from multidrop.dialects.tmcl.manual.commands import STARTING_PARAMETERS, Axis, Call, Command, Global, parameter
 from multidrop.dialects.tmcl.manual.modules import BAUDS, MODULES, RELATIVE_FROM, Module, Parameter, module_of
 from multidrop.dialects.values import (
     BY,
@@ -26,6 +27,7 @@ from multidrop.dialects.values import (
     HOME_PLUS,
     STOP,
     TO,
+    Actions,
     Change,
     Conditions,
     Control,
@@ -55,7 +57,6 @@ UNITS = (Axis.UNIT_MODE, Axis.PULSE_DIVISOR, Axis.RAMP_DIVISOR)
 """Parameters that change the meaning of others, and so are written first."""
 NOT_STORED = (3, 6)
 """The statuses of a module that lacks a parameter, or does not store it: wrong type, command not available."""
-_NAME = re.compile(r"(G?)(\d{1,3})(?:_(\d))?", re.ASCII)
 
 
 def setting_names(module: Module, motors: int) -> tuple[str, ...]:
@@ -93,7 +94,8 @@ def plan(state: TmclState, present: Readings, wanted: Mapping[str, Value], allow
     """Order the steps to the wanted values. Raises Diagnostic for a value that the module refuses."""
     module = module_of(state.product)
     now, names = present.values, setting_names(module, state.motors or 1)
-    changed = {name.upper(): value for name, value in wanted.items() if not same(value, now.get(name.upper()))}
+    changed = {_own(name): value for name, value in wanted.items() if not same(value, now.get(_own(name)))}
+    allowed = replace(allowed, named=frozenset(map(_own, allowed.named)))
     withheld = {name: reason for name in changed if (reason := _risk(name, changed[name], now, allowed))}
     goal = {name: _checked(name, value, names, module) for name, value in changed.items() if name not in withheld}
     order = [name for name in names if name in goal]
@@ -104,8 +106,14 @@ def plan(state: TmclState, present: Readings, wanted: Mapping[str, Value], allow
 
 def _parts(name: str) -> tuple[bool, int, int]:
     """Divide a name: whether it is a global parameter, the number, the motor."""
-    found = _NAME.fullmatch(name)
-    return (bool(found[1]), int(found[2]), int(found[3] or 0)) if found else (False, -1, 0)
+    found = parameter(name)
+    return (found.command == Command.GGP, found.type, found.motor) if found is not None else (False, -1, 0)
+
+
+def _own(name: str) -> str:
+    """The name of a setting as files have it, `4`, `4_1` or `G75`, however a person spells it."""
+    of_module, number, motor = _parts(name)
+    return name.upper() if number < 0 else f"{GLOBAL_PREFIX if of_module else ''}{number}{f'_{motor}' if motor else ''}"
 
 
 def _checked(name: str, value: Value, names: Collection[str], module: Module) -> int:
@@ -182,6 +190,8 @@ SWITCHES = ((Axis.HOME_SWITCH, "home"), (Axis.RIGHT_SWITCH, "lim+"), (Axis.LEFT_
 RAMP = (Axis.MAXIMUM_VELOCITY, Axis.MAXIMUM_ACCELERATION)
 SETTINGS = (Axis.RUN_CURRENT, Axis.STANDBY_CURRENT, Axis.FREEWHEELING, *RAMP)
 KNOWN = (*STATE, *(axis for axis, _ in SWITCHES), *SETTINGS)
+RUNS = "RUNS"
+"""Whether the module's program runs."""
 ABSENT = "absent"
 """A parameter that the module refuses: it lacks it."""
 FULL_CURRENT = 255
@@ -191,7 +201,7 @@ def parts(state: TmclState, facts: Facts) -> Sequence[Part[TmclState]]:
     """The parts of a module, for each motor that was counted; at first they are counted."""
     if not state.motors:
         return (Part("motors", _count),)
-    found: list[Part[TmclState]] = []
+    found: list[Part[TmclState]] = [Part("program", _program)]
     for motor in range(state.motors):
         asked = [*STATE, *(axis for axis, _ in SWITCHES if facts.get(_key(axis, motor)) != ABSENT)]
         found.append(Part(f"motor {motor}", partial(_parameters, motor=motor, wanted=asked)))
@@ -207,6 +217,10 @@ def _key(axis: Axis, motor: int) -> str:
 def _count(state: TmclState) -> Procedure[Facts]:
     yield from motors(state, Priority.POLL)
     return {}
+
+
+def _program(state: TmclState) -> Procedure[Facts]:
+    return {RUNS: int((yield from busy(state, Priority.POLL)))}
 
 
 def _parameters(state: TmclState, motor: int, wanted: Sequence[Axis]) -> Procedure[Facts]:
@@ -233,6 +247,8 @@ def _conditions(state: TmclState, facts: Facts, motor: int) -> Conditions:
     return Conditions(
         axis=str(motor) if state.motors > 1 else "",
         lamps=tuple(Lamp("", function, bool(values[axis])) for axis, function in SWITCHES if axis in values),
+        program="running" if facts.get(RUNS) else "",
+        runs=bool(facts[RUNS]) if RUNS in facts else None,
         target=None if values.get(Axis.POSITION_REACHED) else values.get(Axis.TARGET_POSITION),
         run_current=None if run is None else round(run * 100 / FULL_CURRENT),
         hold_current=None if hold is None else round(hold * 100 / FULL_CURRENT),
@@ -243,23 +259,20 @@ def _conditions(state: TmclState, facts: Facts, motor: int) -> Conditions:
     )
 
 
-_AXIS_WORD = re.compile(r"AP(\d{1,3})(?:/(\d))?", re.IGNORECASE | re.ASCII)
-
-
 def check(state: TmclState, word: str) -> str:
-    found = _AXIS_WORD.fullmatch(word)
-    if found is None or int(found[1]) > 255:
+    found = parameter(word)
+    if found is None:
         raise Diagnostic(f"{word} cannot be polled", hint="valid: AP and a parameter, /MOTOR after it; as AP206, AP1/1")
-    if Call(Command.GAP, int(found[1])).changed_by_reading:
-        raise Diagnostic(f"{word} cannot be polled: reading it clears it", hint=f"GAP {found[1]}, 0 reads it once")
-    return word.upper()
+    if found.changed_by_reading:
+        raise Diagnostic(f"{word} cannot be polled: reading it clears it", hint=f"{found} reads it once")
+    return f"AP{word}" if word[0].isdigit() else word.upper()
 
 
 def again(state: TmclState, word: str, priority: Priority) -> Procedure[float]:
     """Read a parameter, none whose reading changes the module: `check` refuses that."""
-    found = _AXIS_WORD.fullmatch(word)
+    found = parameter(word)
     assert found is not None
-    return float((yield from read(state, Call(Command.GAP, int(found[1]), int(found[2] or 0)), priority)))
+    return float((yield from read(state, found, priority)))
 
 
 def take(state: TmclState, progress: Progress) -> Procedure[Snapshot]:
@@ -315,6 +328,19 @@ def controls(state: TmclState, axis: str) -> Controls:
     }
 
 
+def _word(word: str, axis: str) -> str:
+    found = parameter(word)
+    plain = axis not in ("", "0") and found is not None and found.command == Command.GAP and not found.motor
+    return f"{word}_{axis}" if plain and not re.search(r"[_/]\d$", word) else word
+
+
+ACTIONS = Actions(
+    homings=lambda axis: {"search": {"": f"RFS START, {axis or '0'}"}},
+    run=lambda axis, velocity: (f"ROR {axis or '0'}, {velocity}",),
+    output=lambda number, on: f"SIO {number}, 2, {on:d}",
+    no_error="a module has no error to read: each refusal says its own; read('AP208') shows the driver's flags",
+    word=_word,
+)
 VALUES = Values(
     parameters=PARAMETERS,
     snapshot=take,
@@ -324,4 +350,5 @@ VALUES = Values(
     first=lambda state, word: again(state, word, Priority.OPERATOR),
     again=again,
     controls=controls,
+    actions=ACTIONS,
 )

@@ -367,3 +367,36 @@ class Global(IntEnum):
     DOWNLOAD_MODE = 129
     PROGRAM_COUNTER = 130
     SUPPRESS_REPLY = 255
+
+
+_NAMES: Mapping[str, Axis | Global] = {each.name.replace("_", ""): each for each in (*Global, *Axis)}
+_PARAMETER = re.compile(r"(?:(AP|G)?(\d{1,3})|([A-Z]\w*?[A-Z]))(?:[_/](\d))?", re.ASCII)
+
+
+def parameter(name: str) -> Call | None:
+    """The command that reads a parameter: `4`, `AP4` or `maximum_velocity`; `G75` or `pause` is a global one.
+
+    `4_1` or `AP4/1` is that of motor 1. None: no parameter has that name.
+    """
+    found = _PARAMETER.fullmatch(name.strip().upper())
+    if found is None:
+        return None
+    named = _NAMES.get(found[3].replace("_", "")) if found[3] else None
+    number = named if named is not None else int(found[2] or len(BYTE))
+    of_module = isinstance(named, Global) or found[1] == "G"
+    if number not in BYTE or (of_module and found[4]):
+        return None
+    return Call(Command.GGP if of_module else Command.GAP, int(number), int(found[4] or 0))
+
+
+def asked(name: str) -> str | None:
+    """The line that prints a parameter; None for none, and for one that reading changes."""
+    call = parameter(name)
+    return str(call) if call is not None and not call.changed_by_reading else None
+
+
+def assigned(name: str, value: str) -> str | None:
+    """The line that sets a parameter."""
+    call = parameter(name)
+    word = "SGP" if call is not None and call.command == Command.GGP else "SAP"
+    return f"{word} {call.type}, {call.motor}, {value}" if call is not None else None
