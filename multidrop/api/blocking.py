@@ -27,7 +27,7 @@ def blocking(method: Callable[Concatenate[Any, P], Coroutine[Any, Any, T]]) -> C
     """Make the blocking form of an awaited method, for an object with `awaited` and `call`."""
 
     def call(self: Any, /, *arguments: P.args, **named: P.kwargs) -> T:
-        found: T = self.call(lambda: method(self.awaited, *arguments, **named))
+        found: T = self._call(lambda: method(self._awaited, *arguments, **named))
         return found
 
     return update_wrapper(call, method, ("__doc__", "__name__", "__annotations__"), ())
@@ -43,17 +43,17 @@ class Session:
     def __init__(self, *urls: str, yes: bool = False, beyond: bool = False, notice: Notice = log) -> None:
         """Open the connections; see `connect`."""
         self._notices = Notices(notice)
-        self.awaited = AsyncSession(urls, yes=yes, beyond=beyond, notice=self._notices)
-        self.thread = LoopThread()
-        self.leaving = contextlib.ExitStack()
+        self._awaited = AsyncSession(urls, yes=yes, beyond=beyond, notice=self._notices)
+        self._thread = LoopThread()
+        self._leaving = contextlib.ExitStack()
         """The contexts that end after everything is closed, and before the thread does."""
         try:
-            self.call(self.awaited.open)
+            self._call(self._awaited._open)
         except BaseException:
-            self.thread.end()
+            self._thread.end()
             self._notices.end()
             raise
-        endings.opened(self)
+        endings.opened(self, self._end_early)
 
     # Beginning and end
 
@@ -73,56 +73,56 @@ class Session:
         """Close everything. Drives go on as they are. May be called again."""
         self._close(stop=False)
 
-    def end_early(self) -> None:
+    def _end_early(self) -> None:
         """Stop what was started, and close."""
         self._close(stop=True)
 
     def _close(self, stop: bool) -> None:
         endings.closing(self)
-        if self.thread.alive:
+        if self._thread.alive:
             try:
-                self.call(lambda: self.awaited.close(stop=stop))
+                self._call(lambda: self._awaited.close(stop=stop))
             finally:
-                self.leaving.close()
-            self.thread.end()
+                self._leaving.close()
+            self._thread.end()
             self._notices.end()
         endings.closed(self)
 
-    def call(self, work: Callable[[], Coroutine[Any, Any, T]]) -> T:
+    def _call(self, work: Callable[[], Coroutine[Any, Any, T]]) -> T:
         """Await work in the session's thread. An interruption while waiting stops what the session started."""
-        if not self.thread.alive:
+        if not self._thread.alive:
             raise Diagnostic(*CLOSED)
         future = None
         try:
-            future = self.thread.begin(work())
+            future = self._thread.begin(work())
             return future.result()
         except (KeyboardInterrupt, SystemExit):  # of this thread: no call raises them
             if future is None or not future.done():
                 with contextlib.suppress(Diagnostic):
-                    self.thread.begin(self.awaited.interrupt()).result()
+                    self._thread.begin(self._awaited._break_off()).result()
             raise
 
-    def run_there(self, function: Callable[[], T]) -> T:
+    def _run_there(self, function: Callable[[], T]) -> T:
         """Call a function in the session's thread."""
 
         async def run() -> T:
             return function()
 
-        return self.call(run)
+        return self._call(run)
 
     # Drives
 
     @property
     def drives(self) -> list[Drive]:
         """Every drive that was found."""
-        return [Drive(self, each) for each in self.run_there(lambda: self.awaited.drives)]
+        return [Drive(self, each) for each in self._run_there(lambda: self._awaited.drives)]
 
     def drive(self, address: str = "", axis: str = "") -> Drive:
         """The drive at an address: `a`, `press:a`, a name of the saved connection; without one the selected drive.
 
         `axis`: for a drive with several, such as `y`; by default the first. Raises Diagnostic, NoAnswer.
         """
-        return Drive(self, self.run_there(lambda: self.awaited.drive(address, axis)))
+        return Drive(self, self._run_there(lambda: self._awaited.drive(address, axis)))
 
     # Lines, scripts, samples
 
@@ -134,7 +134,7 @@ class Session:
 
         A rate of `math.inf` is as fast as the line allows.
         """
-        return Telemetry(self, self.run_there(lambda: self.awaited.telemetry(*addresses, rate=rate)))
+        return Telemetry(self, self._run_there(lambda: self._awaited.telemetry(*addresses, rate=rate)))
 
     # Stop
 
@@ -143,31 +143,31 @@ class Session:
 
         It ends calls of other threads with Stopped, and refuses calls that send commands until `resume`.
         """
-        shell = self.awaited.shell
+        shell = self._awaited._shell
 
         async def stop() -> StopReport:
-            return await self.awaited.stop()
+            return await self._awaited.stop()
 
         shell.stop_ahead()
         try:
-            return self.call(stop)
+            return self._call(stop)
         except (KeyboardInterrupt, SystemExit):
-            self.thread.soon(shell.stop)  # which must follow what was written ahead
+            self._thread.soon(shell.stop)  # which must follow what was written ahead
             raise
 
     resume = blocking(AsyncSession.resume)
 
     def _repr_html_(self) -> str:
         """Return a table of the drives, for a notebook."""
-        return self.awaited._repr_html_()
+        return self._awaited._repr_html_()
 
 
 class Drive(DriveFacts):
     """A drive of a session. Steps are the drive's own units: motor steps, or counts with its encoder in use."""
 
     def __init__(self, session: Session, awaited: AsyncDrive) -> None:
-        super().__init__(awaited.calls, awaited.drive, awaited.axis)
-        self.awaited, self.call = awaited, session.call
+        super().__init__(awaited._calls, awaited._drive, awaited.axis)
+        self._awaited, self._call = awaited, session._call
         self._session = session
         self.programs = Programs(session, awaited.programs)
         self.parameters = Parameters(session, awaited.parameters)
@@ -184,30 +184,30 @@ class Drive(DriveFacts):
     @property
     def position(self) -> int:
         """The position, read now."""
-        return self.call(self.awaited.position)
+        return self._call(self._awaited.position)
 
     @property
     def velocity(self) -> int:
         """The velocity, signed, per second, read now."""
-        return self.call(self.awaited.velocity)
+        return self._call(self._awaited.velocity)
 
     @property
     def moving(self) -> bool:
         """True if it moves, read now."""
-        return self.call(self.awaited.moving)
+        return self._call(self._awaited.moving)
 
     @property
     def motion(self) -> Motion:
         """Position and velocity of its axis at one time, read now."""
-        return self.call(self.awaited.motion)
+        return self._call(self._awaited.motion)
 
     def stop(self) -> StopReport:
         """Stop this drive now; return what is known of it then. It refuses nothing afterwards."""
 
         async def stop() -> StopReport:
-            return await self.awaited.stop()
+            return await self._awaited.stop()
 
-        return self.call(stop)
+        return self._call(stop)
 
     def telemetry(self, rate: float = RATE) -> Telemetry:
         """Read position and velocity `rate` times a second at most, as an iterator of samples."""
@@ -218,7 +218,7 @@ class Programs:
     """The program of one drive. Raises Inexpressible where its family has none."""
 
     def __init__(self, session: Session, awaited: AsyncPrograms) -> None:
-        self.awaited, self.call = awaited, session.call
+        self._awaited, self._call = awaited, session._call
 
     list = blocking(AsyncPrograms.list)
     upload = blocking(AsyncPrograms.upload)
@@ -229,7 +229,7 @@ class Parameters:
     """The settings of one drive. Raises Inexpressible where the host reads none of its family."""
 
     def __init__(self, session: Session, awaited: AsyncParameters) -> None:
-        self.awaited, self.call = awaited, session.call
+        self._awaited, self._call = awaited, session._call
 
     read = blocking(AsyncParameters.read)
     backup = blocking(AsyncParameters.backup)
@@ -241,13 +241,13 @@ class Telemetry:
     """Samples from now until `close`, the end of the session, or the loss of a line: iterate over it."""
 
     def __init__(self, session: Session, awaited: AsyncTelemetry) -> None:
-        self.awaited, self.call = awaited, session.call
+        self._awaited, self._call = awaited, session._call
         self._session = session
 
     @property
     def missed(self) -> int:
         """The number of samples that were dropped because the program did not take them."""
-        return self.awaited.missed
+        return self._awaited.missed
 
     def __enter__(self) -> Telemetry:
         """Return it; the end of the block closes it."""
@@ -260,7 +260,7 @@ class Telemetry:
     def close(self) -> None:
         """End it. Samples that came can still be taken. May be called again."""
         with contextlib.suppress(Diagnostic):
-            self._session.run_there(self.awaited.close)
+            self._session._run_there(self._awaited.close)
 
     def __iter__(self) -> Iterator[Sample]:
         """Return it."""
@@ -269,7 +269,7 @@ class Telemetry:
     def __next__(self) -> Sample:
         """Wait for the next sample. Raises TransportLost once the samples before the loss are taken."""
         try:
-            return self.call(self.awaited.__anext__)
+            return self._call(self._awaited.__anext__)
         except StopAsyncIteration:
             raise StopIteration from None
 

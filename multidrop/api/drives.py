@@ -139,41 +139,41 @@ class DriveFacts:
     """The facts of a drive that are known without asking it."""
 
     def __init__(self, calls: Calls, drive: Drive, axis: str) -> None:
-        self.drive = drive
+        self._drive = drive
         self.axis = axis
         """The axis that it moves and reads; empty: the first."""
-        self.calls = calls
+        self._calls = calls
 
     @property
     def name(self) -> str:
         """Its address, with the bus where several are open."""
-        return self.calls.shell.display_name(self.drive)
+        return self._calls.shell.display_name(self._drive)
 
     @property
     def address(self) -> str:
         """Its address on the wire; empty where it needs none."""
-        return self.drive.address
+        return self._drive.address
 
     @property
     def product(self) -> str:
         """The short name of the product, such as LMDCM; empty if unknown."""
-        return self.drive.product
+        return self._drive.product
 
     @property
     def version(self) -> str:
         """The version that it reports."""
-        return self.drive.version
+        return self._drive.version
 
     @property
     def referenced(self) -> bool:
         """False after a restart that was seen, until a homing has ended or the position was set."""
-        lost = self.drive.state.unreferenced
+        lost = self._drive.state.unreferenced
         return not (lost & {self.axis.lower(), ""} if self.axis else lost)
 
     @property
     def target(self) -> str:
         """Its address with its bus, as after an `@`."""
-        return join_target(self.drive.link.name, self.drive.address)
+        return join_target(self._drive.link.name, self._drive.address)
 
     def __repr__(self) -> str:
         """Return its name and product."""
@@ -182,7 +182,7 @@ class DriveFacts:
 
     def _repr_html_(self) -> str:
         """Return what is known of it, for a notebook."""
-        seen = "" if self.drive.seen is None else f"{self.drive.seen.velocity}"
+        seen = "" if self._drive.seen is None else f"{self._drive.seen.velocity}"
         heads = ("drive", "axis", "product", "version", "last velocity")
         return table("drive", heads, [(self.name, self.axis, self.product, self.version, seen)])
 
@@ -201,11 +201,11 @@ class AsyncDrive(DriveFacts):
     async def send(self, line: str) -> list[str]:
         """Send a line in the drive's own language; return the lines that it prints. Raises Refused, NoAnswer."""
         printed: list[str] = []
-        await self.calls.run(lambda: self._send(line), printed)
+        await self._calls.run(lambda: self._send(line), printed)
         return printed
 
     async def _send(self, *lines: str, beyond: bool = False) -> None:
-        shell = self.calls.shell
+        shell = self._calls.shell
         if beyond:
             BEYOND.set(True)  # in the context of this call
         for line in lines:
@@ -215,18 +215,18 @@ class AsyncDrive(DriveFacts):
         """Read the value of a word of the drive, such as `VM`; `[LINE]` asks with a line that prints one value."""
         line = name.startswith("[") and name.endswith("]")
         word = Word(name[1:-1] if line else name, self.target, line)
-        shell = self.calls.shell
+        shell = self._calls.shell
         if not line and not _WORD.fullmatch(name):
             raise Diagnostic(f"{name!r} is not a word of a drive", self.name, "valid: as in read('VM')")
-        return await self.calls.run(lambda: ask(shell, word, By.SCRIPT))
+        return await self._calls.run(lambda: ask(shell, word, By.SCRIPT))
 
     async def write(self, name: str, value: Value) -> None:
         """Give a word of the drive a value. Raises Refused; Diagnostic where its language has no such form."""
-        line = self.drive.family.assign(name, written(value)) if _WORD.fullmatch(name) else None
+        line = self._drive.family.assign(name, written(value)) if _WORD.fullmatch(name) else None
         if line is None:
             raise Diagnostic(f"no line gives {name!r} a value", self.name, "send() takes any line of the drive")
         self._check_executes()
-        await self.calls.run(lambda: self._send(line))
+        await self._calls.run(lambda: self._send(line))
 
     # Motion
 
@@ -236,26 +236,26 @@ class AsyncDrive(DriveFacts):
         `beyond`: it may leave the travel of its axis. Raises Refused; Diagnostic for a unit that its scale has not;
         TypeError for a fraction of a step.
         """
-        await self._move(self.drive.family.move(self.axis, _amount(steps, unit)), beyond)
+        await self._move(self._drive.family.move(self.axis, _amount(steps, unit)), beyond)
 
     async def move_to(self, position: float, unit: str = "", *, beyond: bool = False) -> None:
         """Begin to move to a position: whole steps, or a number of a unit. As `move` in all else."""
-        await self._move(self.drive.family.move_to(self.axis, _amount(position, unit)), beyond)
+        await self._move(self._drive.family.move_to(self.axis, _amount(position, unit)), beyond)
 
     async def _move(self, lines: tuple[str, ...], beyond: bool) -> None:
         self._check_executes()
         if not self._axis_known:
             await self.motion()
-        async with self.calls.moves(self.drive):  # a mode and its move belong together
-            await self.calls.run(lambda: self._send(*lines, beyond=beyond))
+        async with self._calls.moves(self._drive):  # a mode and its move belong together
+            await self._calls.run(lambda: self._send(*lines, beyond=beyond))
 
     async def wait(self, timeout: float = waits.LIMIT, *, idle: bool = False) -> None:
         """Wait until two readings show it at rest; with `idle` also until no program runs.
 
         Raises DriveError after `timeout` seconds.
         """
-        shell, drives = self.calls.shell, [self.drive]
-        await self.calls.run(lambda: waits.wait(shell, timeout, idle=idle, drives=drives))
+        shell, drives = self._calls.shell, [self._drive]
+        await self._calls.run(lambda: waits.wait(shell, timeout, idle=idle, drives=drives))
 
     async def position(self) -> int:
         """Read the position."""
@@ -275,18 +275,18 @@ class AsyncDrive(DriveFacts):
 
     async def _in(self, what: str, unit: str) -> float:
         self._check_executes()
-        units, axis = self.calls.shell.units, self.axis.lower()
-        return await self.calls.run(lambda: units.reading(self.drive, axis, what, unit))
+        units, axis = self._calls.shell.units, self.axis.lower()
+        return await self._calls.run(lambda: units.reading(self._drive, axis, what, unit))
 
     async def moving(self) -> bool:
         """Read whether it moves; at rest, two readings say so."""
         self._check_executes()
-        return not await self.calls.run(lambda: still(self.drive))
+        return not await self._calls.run(lambda: still(self._drive))
 
     async def motion(self) -> Motion:
         """Read position and velocity of its axis at one time."""
         self._check_executes()
-        axes = await self.calls.run(self.drive.motion)
+        axes = await self._calls.run(self._drive.motion)
         wanted = self.axis.lower()
         found = next((each for each in axes if wanted in ("", each.axis.lower())), None)
         if found is None:
@@ -297,18 +297,18 @@ class AsyncDrive(DriveFacts):
 
     def _check_executes(self) -> None:
         """Raise Refused in program mode, where the drive would store a line or a question."""
-        if self.drive.programming:
+        if self._drive.programming:
             raise Refused(f"{self.name} is in program mode and would store this; PG ends it")
 
     # Stop, samples
 
     def stop(self) -> Stopping:
         """Stop this drive now; await what is returned for the report. It refuses nothing afterwards."""
-        shell = self.calls.shell
-        halt = shell.bus(self.drive.link.name).stop([self.drive])
+        shell = self._calls.shell
+        halt = shell.bus(self._drive.link.name).stop([self._drive])
         several = len(shell.buses) > 1
         return Stopping(shell, lambda: stop_report.of_halts([halt], shell.wall(halt.at), several))
 
     def telemetry(self, rate: float = 50.0) -> AsyncTelemetry:
         """Read position and velocity `rate` times a second at most, as an iterator of samples."""
-        return self.calls.telemetry([self.drive], rate)
+        return self._calls.telemetry([self._drive], rate)

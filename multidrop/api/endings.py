@@ -14,7 +14,6 @@ import signal
 import sys
 import threading
 from collections.abc import Callable
-from typing import Protocol
 
 from multidrop.shell.exit_codes import READER_GONE
 from multidrop.shell.signals import SIGNALS
@@ -24,20 +23,14 @@ SIGNALLED = 128
 """The exit code after a signal is this and its number."""
 
 
-class Endable(Protocol):
-    """A session that must not outlive the process."""
-
-    def end_early(self) -> None:
-        """Stop what was started, and close."""
-
-
-_open: set[Endable] = set()
+_open: dict[object, Callable[[], object]] = {}
+"""The sessions that must not outlive the process, and what stops what each has started, and closes it."""
 _handled: dict[int, Callable[..., object] | int | None] = {}
 
 
-def opened(session: Endable) -> None:
+def opened(session: object, end: Callable[[], object]) -> None:
     """End a session with the process, unless it is `closed` before."""
-    _open.add(session)
+    _open[session] = end
     if threading.current_thread() is threading.main_thread():
         for each in SIGNALS:
             if each not in _handled and signal.getsignal(each) is signal.SIG_DFL:
@@ -46,16 +39,16 @@ def opened(session: Endable) -> None:
             stdout.watch_reader(signal.SIGTERM)
 
 
-def closing(session: Endable) -> None:
+def closing(session: object) -> None:
     """Note that a session is being closed: a reader that leaves does not interrupt the end of the last one."""
-    if _open == {session} and signal.SIGTERM in _handled:
+    if [*_open] == [session] and signal.SIGTERM in _handled:
         stdout.work_done()
 
 
-def closed(session: Endable) -> None:
+def closed(session: object) -> None:
     """Forget a session; the last one gives the signals back."""
     flush_printed()
-    _open.discard(session)
+    _open.pop(session, None)
     if not _open and threading.current_thread() is threading.main_thread():
         for each, before in _handled.items():
             if signal.getsignal(each) is _exit:
@@ -80,9 +73,9 @@ def _exit(number: int, _: object) -> None:
 
 
 def _end_all() -> None:
-    for session in list(_open):
+    for end in list(_open.values()):
         with contextlib.suppress(KeyboardInterrupt):
-            session.end_early()
+            end()
 
 
 def _register() -> None:

@@ -76,8 +76,8 @@ class AsyncSession:
 
     async def __aenter__(self) -> AsyncSession:
         """Open the connections. Raises Diagnostic, TransportLost, NoAnswer."""
-        await self.open()
-        endings.opened(self)
+        await self._open()
+        endings.opened(self, self._end_early)
         return self
 
     async def __aexit__(
@@ -89,13 +89,13 @@ class AsyncSession:
         finally:
             endings.closed(self)
 
-    def end_early(self) -> None:
+    def _end_early(self) -> None:
         """Write the stop of every line: the process ends, and the event loop does no more."""
         if self._calls.opened:
-            self.shell.stop_ahead()
+            self._shell.stop_ahead()
             self._notice("a session was not closed; the stop of its lines was sent, and no drive was asked", True)
 
-    async def open(self) -> None:
+    async def _open(self) -> None:
         """Open the connections and find their drives. Moves nothing."""
         if self._calls.opened:
             return
@@ -116,9 +116,9 @@ class AsyncSession:
 
     async def add(self, /, *urls: str, **named: str) -> None:
         """Open further connections; those with a name become buses of that name. Moves nothing."""
-        await self._calls.run(lambda: self.shell.open_all(urls))
+        await self._calls.run(lambda: self._shell.open_all(urls))
         for name, url in named.items():
-            await self._calls.run(partial(self.shell.open, url, name))
+            await self._calls.run(partial(self._shell.open, url, name))
 
     async def close(self, *, stop: bool = False) -> None:
         """Close everything. Drives go on as they are, unless a `stop` is asked for. May be called again."""
@@ -128,9 +128,9 @@ class AsyncSession:
             if stop:
                 await self._interrupt()
             await self._calls.end()
-            await settled(self.shell)  # a stop that is under way is repeated and confirmed
-            if self.shell.latched:
-                self._notice(f"stop: {stop_report.words(self.shell.tally())}", True)
+            await settled(self._shell)  # a stop that is under way is repeated and confirmed
+            if self._shell.latched:
+                self._notice(f"stop: {stop_report.words(self._shell.tally())}", True)
         finally:
             await self._calls.closed().close()
 
@@ -143,11 +143,11 @@ class AsyncSession:
             self._notice(event.text, event.warning)
 
     @property
-    def shell(self) -> Shell:
+    def _shell(self) -> Shell:
         """The session of the house, with its events and everything else. Raises Diagnostic where none is open."""
         return self._calls.shell
 
-    async def interrupt(self) -> None:
+    async def _break_off(self) -> None:
         """End all calls, and stop what this session started. It stays open."""
         if self._calls.accepted:
             await self._interrupt()
@@ -158,24 +158,24 @@ class AsyncSession:
     @property
     def drives(self) -> list[AsyncDrive]:
         """Every drive that was found."""
-        return [AsyncDrive(self._calls, drive) for bus in self.shell.buses.values() for drive in bus.drives.values()]
+        return [AsyncDrive(self._calls, drive) for bus in self._shell.buses.values() for drive in bus.drives.values()]
 
     def drive(self, address: str = "", axis: str = "") -> AsyncDrive:
         """The drive at an address: `a`, `press:a`, a name of the saved connection; without one the selected drive.
 
         `axis`: for a drive with several, such as `y`; by default the first. Raises Diagnostic, NoAnswer.
         """
-        return AsyncDrive(self._calls, self.found(address), axis)
+        return AsyncDrive(self._calls, self._found(address), axis)
 
-    def found(self, address: str) -> Drive:
+    def _found(self, address: str) -> Drive:
         """The drive at an address, if there is one. Raises Diagnostic, NoAnswer."""
         from multidrop.shell.line_syntax import EVERYONE, split_target
 
         bus, own = split_target(address)
-        drive = self.shell.drive(bus, own or None)
-        known = self.shell.bus(bus).drives
+        drive = self._shell.drive(bus, own or None)
+        known = self._shell.bus(bus).drives
         if drive.address in EVERYONE or drive.address not in known:
-            hint = f"found: {', '.join(map(self.shell.display_name, known.values()))}" if known else ""
+            hint = f"found: {', '.join(map(self._shell.display_name, known.values()))}" if known else ""
             raise Diagnostic(f"no drive {address}", "session.drive", hint or "no drive has replied there")
         return drive
 
@@ -184,7 +184,7 @@ class AsyncSession:
     async def send(self, line: str) -> list[str]:
         """Run a line as typed at the prompt (`PR P`, `@b MR 100`, `/drives`); return the lines that it prints."""
         printed: list[str] = []
-        await self._calls.run(lambda: self.shell.run(line, By.SCRIPT), printed)
+        await self._calls.run(lambda: self._shell.run(line, By.SCRIPT), printed)
         return printed
 
     async def run(self, file: str, /, **values: object) -> Run:
@@ -192,9 +192,9 @@ class AsyncSession:
         from multidrop.shell.scripts.executor import run_script
         from multidrop.shell.scripts.reading import read_script  # with all verbs, which few programs need
 
-        script = read_script(file, {name: str(value) for name, value in values.items()}, self.shell.macros)
+        script = read_script(file, {name: str(value) for name, value in values.items()}, self._shell.macros)
         results: list[Result] = []
-        await self._calls.run(lambda: run_script(self.shell, script, results.append))
+        await self._calls.run(lambda: run_script(self._shell, script, results.append))
         return Run(file, tuple(results))
 
     def telemetry(self, *addresses: str, rate: float = RATE) -> AsyncTelemetry:
@@ -202,7 +202,7 @@ class AsyncSession:
 
         A rate of `math.inf` is as fast as the line allows.
         """
-        drives = [self.found(each) for each in addresses] or [each.drive for each in self.drives]
+        drives = [self._found(each) for each in addresses] or [each._drive for each in self.drives]
         return self._calls.telemetry(drives, rate)
 
     # Stop
@@ -212,17 +212,17 @@ class AsyncSession:
 
         It ends all calls with Stopped, and refuses further ones that send commands until `resume`.
         """
-        shell = self.shell
+        shell = self._shell
         shell.stop("session.stop()")
         return Stopping(shell, shell.tally)
 
     async def resume(self) -> None:
         """Let commands be sent again after a stop."""
-        self.shell.resume()
+        self._shell.resume()
 
     def _repr_html_(self) -> str:
         """Return a table of the drives, for a notebook."""
-        return drives_table(self.shell) if self._calls.opened else "<p>multidrop: a closed session</p>"
+        return drives_table(self._shell) if self._calls.opened else "<p>multidrop: a closed session</p>"
 
 
 def connect_async(*urls: str, yes: bool = False, beyond: bool = False) -> AsyncSession:

@@ -59,7 +59,7 @@ class ReportedSession(Session):
         self._failed: tuple[BaseException, Result] | None = None
         """The last call, if it failed, and its result: the program may end with it, or go on."""
         super().__init__(yes=yes, beyond=beyond, notice=notice)
-        self.awaited.shell.subscribe(self._take)
+        self._awaited._shell.subscribe(self._take)
 
     def _take(self, event: SessionEvent) -> None:
         if isinstance(event, Entered):
@@ -67,13 +67,13 @@ class ReportedSession(Session):
         elif isinstance(event, Printed | Output):
             self._printed.append(event.text)
 
-    def call(self, work: Callable[[], Coroutine[Any, Any, T]]) -> T:
+    def _call(self, work: Callable[[], Coroutine[Any, Any, T]]) -> T:
         """Await work, and report it if it has sent a line."""
         self.went_on()
         self._sent, self._printed = [], []
         begun = datetime.now().astimezone()
         try:
-            done = super().call(work)
+            done = super()._call(work)
         except FAILURES as failure:
             if self._sent:
                 self._failed = failure, self._result(str(failure), begun)
@@ -244,7 +244,7 @@ class _Execution:
 
     def _watch_keys(self, session: ReportedSession) -> None:
         """Watch for the stop key, to the end of the session, where standard input is a terminal: it belongs to it."""
-        shell = session.awaited.shell
+        shell = session._awaited._shell
 
         def stop() -> None:
             self._stopped = session.stopped_by_person = True
@@ -252,13 +252,13 @@ class _Execution:
             _interrupt()
 
         def after_continue(callback: Callable[[], None]) -> Callable[[], object]:
-            self._on_continue.append(partial(session.thread.soon, callback))
+            self._on_continue.append(partial(session._thread.soon, callback))
             return self._on_continue.clear
 
         keys = on_stop_key(shell.stop_ahead, stop, _interrupt, after_continue)
-        session.thread.enter(keys, session.leaving)
+        session._thread.enter(keys, session._leaving)
         if self._on_continue:
-            session.leaving.enter_context(replaced("stdin", _NoInput()))
+            session._leaving.enter_context(replaced("stdin", _NoInput()))
 
     # The program
 

@@ -28,7 +28,7 @@ def url(tmp_path: Path) -> str:
 
 def moving(session: Any) -> set[str]:
     """The drives that move, in the simulator."""
-    floor = next(iter(session.shell.cells.values()))
+    floor = next(iter(session._shell.cells.values()))
     return {each.spec.name for each in floor.floor.drives if moves(each.device, floor.now())}
 
 

@@ -45,7 +45,7 @@ def session(url: str) -> Iterator[Session]:
 
 def floor(session: Session) -> Any:
     """The simulated cell, which outlives the session."""
-    return next(iter(session.awaited.shell.cells.values()))
+    return next(iter(session._awaited._shell.cells.values()))
 
 
 def moving(cell: Any) -> set[str]:
@@ -55,7 +55,7 @@ def moving(cell: Any) -> set[str]:
 
 def soon(session: Session, seconds: float, function: Any) -> None:
     """Call a function in the session's thread, in a while."""
-    session.thread.soon(lambda: asyncio.get_running_loop().call_later(seconds, function))
+    session._thread.soon(lambda: asyncio.get_running_loop().call_later(seconds, function))
 
 
 def test_lines_moves_and_words(session: Session) -> None:
@@ -145,16 +145,16 @@ def test_an_interruption_of_a_call_stops_at_once(
 
     def begin(work: Any) -> Any:
         future = ordinary(work)
-        monkeypatch.setattr(session.thread, "begin", ordinary)
+        monkeypatch.setattr(session._thread, "begin", ordinary)
         soon(session, after, lambda: os.kill(os.getpid(), signal.SIGINT))
         return future
 
-    ordinary, a, before = session.thread.begin, session.drive("a"), signal.signal(signal.SIGINT, handler)
+    ordinary, a, before = session._thread.begin, session.drive("a"), signal.signal(signal.SIGINT, handler)
     try:
         for _ in range(2):
             a.send(RUN)
             assert moving(floor(session)) == {"a"}
-            monkeypatch.setattr(session.thread, "begin", begin)
+            monkeypatch.setattr(session._thread, "begin", begin)
             with pytest.raises(ends):
                 a.wait(timeout=80000)
             assert moving(floor(session)) == set()
@@ -191,7 +191,7 @@ def test_the_end_of_the_process_stops_what_is_open(url: str) -> None:
     cell = floor(session)
     session.drive("a").send(RUN)
     endings._end_all()
-    assert moving(cell) == set() and not session.thread.alive
+    assert moving(cell) == set() and not session._thread.alive
 
 
 @pytest.mark.parametrize("name", ["TERM", "HUP", "QUIT", "ALRM", "USR1", "USR2", "XCPU"])

@@ -43,7 +43,7 @@ async def test_telemetry_follows_a_move_and_ends_with_its_block(url: str) -> Non
         assert steps and all(0.04 < each < 0.07 for each in steps)
         assert max(each.velocity for each in samples) > 0 == opened.missed
         assert [each async for each in opened] == [] and len(await opened.samples()) == 0
-        polled = session.shell.buses["press"].telemetry
+        polled = session._shell.buses["press"].telemetry
         assert polled.period("a") == math.inf
 
 
