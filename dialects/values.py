@@ -13,7 +13,7 @@ from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from math import isclose
 from types import MappingProxyType
-from typing import Generic, TypeVar
+from typing import Any, Generic, TypeVar
 
 from multidrop.dialects.codec import Priority, Procedure
 from multidrop.dialects.errors import Refused
@@ -371,7 +371,9 @@ class Actions:
     no_error: str = ""
     """The reason for which no error can be read; empty: one can."""
     word: Callable[[str, str], str] = lambda word, axis: word
-    """A word for an axis other than the first."""
+    """A word as the drive has it, for an axis."""
+    ports: Callable[[Any], Mapping[int, str]] = lambda state: {}
+    """The lines that read inputs which no conditions have, by number."""
 
 
 @dataclass(frozen=True)

@@ -251,6 +251,8 @@ class Conversation(Generic[T]):
         if self._unproven and not self._cleaning_up:
             done = "stored" if self._request is not None and self._request.kind is Kind.PROGRAM else "executed"
             error = TransportLost(f"{error}; it is not known whether '{self._unproven}' was {done}")
+            error.unproven = self._unproven
+        error.executed = self._executed
         self._fail(error)
 
     def _take(self, transaction: Transaction) -> Request | None:

@@ -156,6 +156,8 @@ class Drive:
         """The axes whose last homing was seen to end, and whether it ended well."""
         self.hold = ""
         """The reason for which nothing may start it while its position is not referenced; empty: there is none."""
+        self.strict = False
+        """A restart is such a reason."""
         self.link: Link = conversations.link
         self.family: Family[Any] = FAMILIES[state.codec.family]
         self._conversations = conversations
@@ -287,6 +289,12 @@ class Drive:
         return printed
 
     @property
+    def rested(self) -> Mapping[str, int]:
+        """Its positions as last read at rest; none where a program ran, or something was sent since."""
+        at, commands, positions = self.resting
+        return positions if self.calm and self.started_at <= at and commands == self.commands else {}
+
+    @property
     def _sent(self) -> tuple[int, float, int]:
         return self.commands, self.started_at, self.link.stops
 
@@ -303,16 +311,17 @@ class Drive:
         well = await self.run(self.family.homed(self.state))
         if self.homings.get(axis) == sent:
             self.homed[axis] = well and sent == self._sent
+            if self.homed[axis]:
+                self.state.referenced(axis)
         return self.homed.get(axis, False)
 
     def check_start(self, text: str = "") -> None:
         """Raise Unreferenced where a line must not start it, or a drive that the line is for, as `hold` says."""
-        for each in self._meant:
-            guards = each.family.guards
-            ends = bool(text) and (
-                each.family.referencing(each.state, text) is not None or (guards is not None and guards.only_ends(text))
-            )
-            if each.hold and each.state.unreferenced and not ends:
+        for each in [drive for drive in self._meant if drive.hold and drive.state.unreferenced]:
+            guards, state = each.family.guards, each.state
+            moved = {field.axis for field in each.family.units.fields(state, text)}
+            ends = each.family.referencing(state, text) is not None or (guards is not None and guards.only_ends(text))
+            if not ends and (not moved or moved & state.unreferenced):
                 raise Unreferenced(
                     f"{each.shown}: {each.hold}: its position is not referenced, and '{text or 'this'}' was not sent; "
                     f"home it, set its position, or accept() if it is right"

@@ -46,9 +46,8 @@ class Restarts:
 
     def replied_again(self, drive: Drive, sign: str = "") -> None:
         """Compare a drive with what was known of it; `sign`: it has shown already that it restarted."""
-        at, commands, positions = drive.resting
         # What was known of it, unless a program ran, or something was sent since that can change it.
-        rested = positions if drive.calm and drive.started_at <= at and commands == drive.commands else {}
+        rested = drive.rested
         known = [facts for facts, read_at in drive.settings.values() if drive.calm and read_at == drive.commands]
         before = {name: value for facts in known for name, value in facts.items()}
         running = self._tasks.get(drive)
@@ -110,6 +109,7 @@ class Restarts:
             signs.append(f"{_shown(name)} {_text(before[name])} before, {_text(settings[name])} now")
         more = f"; {len(signs) - NAMED} more differ" if len(signs) > NAMED else ""
         drive.state.reference_lost(axis.axis for axis in axes)
+        drive.hold = "it was restarted" if drive.strict else ""
         verb = f"/referenced {drive.address}".rstrip()
         self._link.notify(
             f"{drive.shown} was restarted ({'; '.join(signs[:NAMED])}{more}): its position is not referenced; "

@@ -50,6 +50,12 @@ if sys.platform != "win32":
 class TransportLost(Exception):
     """The pipe broke, or could not be opened. The text names the pipe and the reason."""
 
+    __module__ = "multidrop"
+    unproven = ""
+    """The command of which it is not known whether it was executed."""
+    executed = ""
+    """The last command that is known to be executed, where no other one is in doubt."""
+
     def again(self) -> TransportLost:
         """The same loss for another caller: places are noted on what each one is raised."""
         return type(self)(*self.args)
@@ -57,6 +63,8 @@ class TransportLost(Exception):
 
 class Unreachable(TransportLost):
     """The pipe could not be opened: no such port, in use, refused, no such host."""
+
+    __module__ = "multidrop"
 
 
 class Undelivered(TransportLost):

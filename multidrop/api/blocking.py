@@ -6,21 +6,26 @@ So it works in a notebook, too, whose own loop runs already.
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Callable, Coroutine, Iterator
+from collections.abc import Callable, Coroutine
 from functools import update_wrapper
 from types import TracebackType
-from typing import Any, Concatenate, ParamSpec, TypeVar
+from typing import Any, Concatenate, Generic, ParamSpec, TypeVar, overload
 
 from multidrop.api import endings
 from multidrop.api.calls import CLOSED, StopReport
-from multidrop.api.drives import AsyncDrive, AsyncParameters, AsyncPrograms, DriveFacts
+from multidrop.api.drives import AsyncDrive, DriveFacts
+from multidrop.api.events import Event
+from multidrop.api.programs import AsyncParameters, AsyncPrograms
 from multidrop.api.sessions import AsyncSession, Notice, log
+from multidrop.api.streams import AsyncStream
 from multidrop.api.telemetry import RATE, AsyncTelemetry, Sample
 from multidrop.api.threads import LoopThread, Notices
-from multidrop.dialects import Diagnostic, Motion
+from multidrop.dialects import Diagnostic
+from multidrop.drives.telemetry import PERIOD
 
 P = ParamSpec("P")
 T = TypeVar("T")
+Self = TypeVar("Self", bound="Stream[Any]")
 
 
 def blocking(method: Callable[Concatenate[Any, P], Coroutine[Any, Any, T]]) -> Callable[Concatenate[Any, P], T]:
@@ -33,6 +38,21 @@ def blocking(method: Callable[Concatenate[Any, P], Coroutine[Any, Any, T]]) -> C
     return update_wrapper(call, method, ("__doc__", "__name__", "__annotations__"), ())
 
 
+class Reading(Generic[T]):
+    """A property that reads now, made from an awaited method, for an object with `_awaited` and `_call`."""
+
+    def __init__(self, method: Callable[[Any], Coroutine[Any, Any, T]]) -> None:
+        self._method, self.__doc__ = method, method.__doc__
+
+    @overload
+    def __get__(self, found: None, kind: type) -> Reading[T]: ...
+    @overload
+    def __get__(self, found: Any, kind: type) -> T: ...
+    def __get__(self, found: Any, kind: type) -> T | Reading[T]:
+        """Read it."""
+        return self if found is None else found._call(lambda: self._method(found._awaited))
+
+
 class Session:
     """Open connections and their drives: `with connect(URL) as session`. Any thread may use it.
 
@@ -40,10 +60,12 @@ class Session:
     call, and the end of the process while it is open.
     """
 
-    def __init__(self, *urls: str, yes: bool = False, beyond: bool = False, notice: Notice = log) -> None:
+    def __init__(
+        self, *urls: str, yes: bool = False, beyond: bool = False, reconnect: bool = False, notice: Notice = log
+    ) -> None:
         """Open the connections; see `connect`."""
         self._notices = Notices(notice)
-        self._awaited = AsyncSession(urls, yes=yes, beyond=beyond, notice=self._notices)
+        self._awaited = AsyncSession(urls, yes=yes, beyond=beyond, reconnect=reconnect, notice=self._notices)
         self._thread = LoopThread()
         self._leaving = contextlib.ExitStack()
         """The contexts that end after everything is closed, and before the thread does."""
@@ -68,6 +90,7 @@ class Session:
         self._close(stop=failure is not None)
 
     add = blocking(AsyncSession.add)
+    wait_back = blocking(AsyncSession.wait_back)
 
     def close(self) -> None:
         """Close everything. Drives go on as they are. May be called again."""
@@ -136,6 +159,13 @@ class Session:
         """
         return Telemetry(self, self._run_there(lambda: self._awaited.telemetry(*addresses, rate=rate)))
 
+    def events(self, *addresses: str, every: float = PERIOD) -> Events:
+        """Iterate over what happens to drives (all without an address) and their lines: see `Event`.
+
+        `every`: seconds between two readings of a drive.
+        """
+        return Events(self, self._run_there(lambda: self._awaited.events(*addresses, every=every)))
+
     # Stop
 
     def stop(self) -> StopReport:
@@ -156,6 +186,10 @@ class Session:
             raise
 
     resume = blocking(AsyncSession.resume)
+
+    def __repr__(self) -> str:
+        """Return its lines and their drives."""
+        return repr(self._awaited)
 
     def _repr_html_(self) -> str:
         """Return a table of the drives, for a notebook."""
@@ -180,26 +214,23 @@ class Drive(DriveFacts):
     wait = blocking(AsyncDrive.wait)
     position_in = blocking(AsyncDrive.position_in)
     velocity_in = blocking(AsyncDrive.velocity_in)
+    run_at = blocking(AsyncDrive.run_at)
+    wait_for = blocking(AsyncDrive.wait_for)
+    home = blocking(AsyncDrive.home)
+    accept = blocking(AsyncDrive.accept)
+    enable = blocking(AsyncDrive.enable)
+    disable = blocking(AsyncDrive.disable)
+    set_output = blocking(AsyncDrive.set_output)
+    read_error = blocking(AsyncDrive.read_error)
 
-    @property
-    def position(self) -> int:
-        """The position, read now."""
-        return self._call(self._awaited.position)
-
-    @property
-    def velocity(self) -> int:
-        """The velocity, signed, per second, read now."""
-        return self._call(self._awaited.velocity)
-
-    @property
-    def moving(self) -> bool:
-        """True if it moves, read now."""
-        return self._call(self._awaited.moving)
-
-    @property
-    def motion(self) -> Motion:
-        """Position and velocity of its axis at one time, read now."""
-        return self._call(self._awaited.motion)
+    position = Reading(AsyncDrive.position)
+    velocity = Reading(AsyncDrive.velocity)
+    moving = Reading(AsyncDrive.moving)
+    motion = Reading(AsyncDrive.motion)
+    homed = Reading(AsyncDrive.homed)
+    error = Reading(AsyncDrive.error)
+    inputs = Reading(AsyncDrive.inputs)
+    limits = Reading(AsyncDrive.limits)
 
     def stop(self) -> StopReport:
         """Stop this drive now; return what is known of it then. It refuses nothing afterwards."""
@@ -237,19 +268,14 @@ class Parameters:
     restore = blocking(AsyncParameters.restore)
 
 
-class Telemetry:
-    """Samples from now until `close`, the end of the session, or the loss of a line: iterate over it."""
+class Stream(Generic[T]):
+    """What happens from now until `close`, the end of the session, or the loss of a line: iterate over it."""
 
-    def __init__(self, session: Session, awaited: AsyncTelemetry) -> None:
-        self._awaited, self._call = awaited, session._call
+    def __init__(self, session: Session, awaited: AsyncStream[T]) -> None:
+        self._stream, self._call = awaited, session._call
         self._session = session
 
-    @property
-    def missed(self) -> int:
-        """The number of samples that were dropped because the program did not take them."""
-        return self._awaited.missed
-
-    def __enter__(self) -> Telemetry:
+    def __enter__(self: Self) -> Self:
         """Return it; the end of the block closes it."""
         return self
 
@@ -258,29 +284,47 @@ class Telemetry:
         self.close()
 
     def close(self) -> None:
-        """End it. Samples that came can still be taken. May be called again."""
+        """End it. What came before can still be taken. May be called again."""
         with contextlib.suppress(Diagnostic):
-            self._session._run_there(self._awaited.close)
+            self._session._run_there(self._stream.close)
 
-    def __iter__(self) -> Iterator[Sample]:
+    def __iter__(self: Self) -> Self:
         """Return it."""
         return self
 
-    def __next__(self) -> Sample:
-        """Wait for the next sample. Raises TransportLost once the samples before the loss are taken."""
+    def __next__(self) -> T:
+        """Wait for the next one. Raises what ends it once all before are taken."""
         try:
-            return self._call(self._awaited.__anext__)
+            return self._call(self._stream.__anext__)
         except StopAsyncIteration:
             raise StopIteration from None
+
+
+class Events(Stream[Event]):
+    """Events of drives and lines, until `close` or the end of the session: iterate over them."""
+
+
+class Telemetry(Stream[Sample]):
+    """Samples from now until `close`, the end of the session, or the loss of a line: iterate over it."""
+
+    def __init__(self, session: Session, awaited: AsyncTelemetry) -> None:
+        super().__init__(session, awaited)
+        self._awaited = awaited
+
+    @property
+    def missed(self) -> int:
+        """The number of samples that were dropped because the program did not take them."""
+        return self._awaited.missed
 
     samples = blocking(AsyncTelemetry.samples)
 
 
-def connect(*urls: str, yes: bool = False, beyond: bool = False) -> Session:
+def connect(*urls: str, yes: bool = False, beyond: bool = False, reconnect: bool = False) -> Session:
     """Open connections as on the command line: ports, URLs, saved connections, `sim:`. Moves nothing.
 
     `yes`: questions, such as that of a restore, are answered with yes beforehand. `beyond`: moves may leave the travel
-    of their axis, which `yes` does not include. Raises Diagnostic for a wrong URL, Unreachable where there is no
+    of their axis, which `yes` does not include. `reconnect`: a lost connection is tried again until it is back; calls
+    raise Lost meanwhile, and Unreferenced after it where a drive is not as it was. Raises Diagnostic for a wrong URL, Unreachable where there is no
     connection, NoAnswer where no drive replies.
     """
-    return Session(*urls, yes=yes, beyond=beyond)
+    return Session(*urls, yes=yes, beyond=beyond, reconnect=reconnect)

@@ -14,6 +14,8 @@ from dataclasses import dataclass
 from typing import Any, TypeVar
 from weakref import WeakKeyDictionary, WeakSet
 
+from multidrop.api.returns import Returns
+from multidrop.api.streams import AsyncStream
 from multidrop.api.telemetry import AsyncTelemetry
 from multidrop.dialects import Diagnostic, Stopped
 from multidrop.drives.drive import Drive
@@ -21,11 +23,34 @@ from multidrop.shell import stop_report
 from multidrop.shell.automation import ENDING, outcome, settled
 from multidrop.shell.events import Output, Printed, SessionEvent
 from multidrop.shell.session import Session
+from multidrop.transports import TransportLost, Unreachable
 
 T = TypeVar("T")
+S = TypeVar("S", bound="AsyncStream[Any]")
 CLOSED = ("the session is closed", "session", "connect(URL) opens one")
 _printed: ContextVar[list[str] | None] = ContextVar("printed", default=None)
 """The lines that the current call has printed."""
+
+
+class Lost(TransportLost):
+    """The connection is lost. The text says what is known of the call; nothing of it is sent again.
+
+    `unproven`: the command of which it is not known whether it was executed; empty: none is in doubt.
+    """
+
+    __module__ = "multidrop"
+
+
+def lost(error: TransportLost) -> TransportLost:
+    """What a call raises for a loss."""
+    if isinstance(error, Unreachable | Lost):
+        return error
+    known = f"'{error.executed}' was executed" if error.executed else "no command of this call is in doubt"
+    found = Lost(str(error) if error.unproven else f"{error}; {known}")
+    found.unproven, found.executed = error.unproven, error.executed
+    for note in getattr(error, "__notes__", ()):
+        found.add_note(note)
+    return found
 
 
 class Calls:
@@ -42,7 +67,9 @@ class Calls:
         """The number of stops by interruptions whose outcome was returned."""
         self._tasks: set[asyncio.Task[Any]] = set()
         self._moves: WeakKeyDictionary[Drive, asyncio.Lock] = WeakKeyDictionary()
-        self._telemetry: WeakSet[AsyncTelemetry] = WeakSet()
+        self._streams: WeakSet[AsyncStream[Any]] = WeakSet()
+        self.returns: Returns | None = None
+        """What compares the drives after a lost connection; None: no connection comes back."""
 
     @property
     def opened(self) -> bool:
@@ -76,8 +103,10 @@ class Calls:
     def closed(self) -> Session:
         """End all telemetry, and give the session up."""
         shell, self._shell = self.shell, None
-        for each in self._telemetry:
+        for each in self._streams:
             each.close()
+        if self.returns is not None:
+            self.returns.close()
         return shell
 
     def moves(self, drive: Drive) -> asyncio.Lock:
@@ -88,9 +117,12 @@ class Calls:
         """Begin to read drives until the session is closed. Raises Diagnostic."""
         if not rate > 0:
             raise Diagnostic(f"no rate {rate:g}", "telemetry", "valid: above 0, samples a second; math.inf")
-        opened = AsyncTelemetry(self.shell, drives, rate)
-        self._telemetry.add(opened)
-        return opened
+        return self.kept(AsyncTelemetry(self.shell, drives, rate))
+
+    def kept(self, stream: S) -> S:
+        """Close a stream with the session."""
+        self._streams.add(stream)
+        return stream
 
     async def begin(self) -> None:
         """Begin an automation."""
@@ -116,6 +148,8 @@ class Calls:
         """
         if not self.accepted:
             raise Diagnostic(*CLOSED)
+        if self.returns is not None:
+            await self.returns.compared()
         if not self._going:
             raise Stopped("the session is being interrupted; nothing was sent")
         context = self._context.copy()
@@ -125,6 +159,8 @@ class Calls:
         task.add_done_callback(self._tasks.discard)
         try:
             return await task
+        except TransportLost as error:
+            raise lost(error) from None
         except asyncio.CancelledError:
             caller = asyncio.current_task()
             if caller is not None and caller.cancelling():

@@ -2,124 +2,36 @@
 
 from __future__ import annotations
 
+import contextlib
 import operator
 import re
-from collections.abc import Collection
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 from multidrop.api.calls import Calls, Stopping
+from multidrop.api.events import Fault, fault_of
 from multidrop.api.pictures import table
-from multidrop.dialects import Diagnostic, Motion, Refused
+from multidrop.api.programs import AsyncParameters, AsyncPrograms
+from multidrop.dialects import Diagnostic, DriveError, Family, Inexpressible, Motion, Refused
 from multidrop.dialects.units import QUANTITY
+from multidrop.dialects.values import DISABLE, ENABLE, Conditions
+from multidrop.dialects.values import Value as Fact
 from multidrop.drives.drive import still
 from multidrop.macros import model
-from multidrop.shell import new_file, program_listing, stop_report, waits
+from multidrop.shell import stop_report, waits
 from multidrop.shell.events import By
 from multidrop.shell.line_syntax import join_target
-from multidrop.shell.params import file as files
-from multidrop.shell.params.work import Difference, Options, differences, restore
-from multidrop.shell.programs import transfers
-from multidrop.shell.programs.transfers import Wanted
 from multidrop.shell.scripts.expression import Value, Word, written
 from multidrop.shell.scripts.questions import ask
 from multidrop.shell.travel import BEYOND
 
 if TYPE_CHECKING:
     from multidrop.api.telemetry import AsyncTelemetry
-    from multidrop.dialects.values import Readings
     from multidrop.drives.drive import Drive
 
 
-Lines = list[str]
-
-
-class AsyncPrograms:
-    """The program of one drive. Raises Inexpressible where its family has none."""
-
-    def __init__(self, calls: Calls, drive: Drive) -> None:
-        self._calls, self._drive = calls, drive
-
-    async def list(self) -> Lines:
-        """Read the program as a listing, with the remarks of its file where those are known."""
-        shell = self._calls.shell
-        return await self._calls.run(lambda: program_listing.readable(shell, self._drive))
-
-    async def upload(self, file: str = "", *, raw: bool = False) -> Lines:
-        """Read the program as the lines of a file; write them to a new `file` if one is named.
-
-        `raw`: as they are stored. Raises Diagnostic for a file that exists.
-        """
-        if file:
-            new_file.check(file)
-        shell = self._calls.shell
-        lines = await self._calls.run(lambda: program_listing.upload(shell, self._drive, raw))
-        if file:
-            new_file.write(file, "".join(f"{line}\n" for line in lines))
-        return lines
-
-    async def download(
-        self,
-        file: str,
-        text: str | None = None,
-        *,
-        save: bool = False,
-        verify: bool = True,
-        only_changed: bool = False,
-        run: str = "",
-    ) -> None:
-        """Check a program file, back up what the drive holds, send the file, and compare.
-
-        `text`: what a file of that name would hold. `save`: keep it over power-off. `run`: the label to execute then.
-        Raises Diagnostic for the file, Refused, NoAnswer, Differs.
-        """
-        shell, wanted = self._calls.shell, Wanted(verify, save, only_changed, run)
-        await self._calls.run(lambda: transfers.download(shell, self._drive, file, wanted, text))
-
-
-class AsyncParameters:
-    """The settings of one drive. Raises Inexpressible where the host reads none of its family."""
-
-    def __init__(self, calls: Calls, drive: Drive) -> None:
-        self._calls, self._drive = calls, drive
-
-    async def read(self) -> Readings:
-        """Read every setting: `.values` by name, `.defaults`, and each with its unit in `.readings`."""
-        shell = self._calls.shell
-        return await self._calls.run(lambda: files.read(shell, self._drive, "reading"))
-
-    async def backup(self, file: str) -> Readings:
-        """Read every setting, and write them to a new file. Raises Diagnostic for a file that exists."""
-        new_file.check(file)
-        found = await self.read()
-        identity = files.identity(self._drive.state, self._drive.family.values.parameters.language)
-        new_file.write(file, files.formatted(identity, found))
-        return found
-
-    async def diff(self, file: str = "") -> list[Difference]:
-        """Compare with a file, or without one with the defaults: (name, value here, value there)."""
-        there = files.load(file) if file else None
-        found = await self.read()
-        return differences(found, there, self._calls.shell.display_name(self._drive))
-
-    async def restore(
-        self,
-        file: str,
-        *,
-        save: bool = False,
-        named: Collection[str] = (),
-        communication: bool = False,
-        other_product: bool = False,
-        dry_run: bool = False,
-    ) -> list[str]:
-        """Send what differs from a file; return the steps. It needs `connect(URL, yes=True)`, or `dry_run`.
-
-        `named`: settings that are only written when named, since they can move the motor or lock the drive.
-        """
-        shell, printed = self._calls.shell, list[str]()
-        options = Options(frozenset(named), communication, save, dry_run, other_product)
-        loaded = files.load(file)
-        await self._calls.run(lambda: restore(shell, self._drive, loaded, options), printed)
-        return printed
+A = TypeVar("A", Motion, Conditions)
 
 
 def _amount(number: float, unit: str) -> int | str:
@@ -133,6 +45,42 @@ def _amount(number: float, unit: str) -> int | str:
 
 
 _WORD = re.compile(r"[A-Za-z]\w*", re.ASCII)
+
+
+class Limits(NamedTuple):
+    """The ends of an axis; None: the drive has no such limit, or does not report it."""
+
+    minus: bool | None
+    """The minus switch is active."""
+    plus: bool | None
+    travel: tuple[int, int] | None
+    """The positions between which software limits let it move."""
+
+
+async def conditions(drive: Drive, slow: bool = True) -> tuple[Conditions, ...]:
+    """Read the conditions of each axis; without those of `slow` parts where they are not wanted.
+
+    What such a part has read since the last command is not read again. Raises Inexpressible where the drive is set to
+    reply in a way in which nothing is asked.
+    """
+    values, facts, asked = drive.family.values, dict[str, Fact](), set[str]()
+    while left := [
+        each for each in values.parts(drive.state, facts) if each.name not in asked and (slow or not each.slow)
+    ]:
+        part = left[0]
+        asked.add(part.name)
+        found, at = drive.settings.get(part.name, ({}, -1)) if part.slow else ({}, -1)
+        if at != drive.commands:
+            commands = drive.commands
+            with contextlib.suppress(Refused):
+                found = await drive.run(part.read(drive.state))
+                if part.slow:
+                    drive.settings[part.name] = (found, commands)
+        facts.update(found)
+    if not asked:
+        raise Inexpressible(f"{drive.shown}: its state is not asked for as it is set to reply (EM=3)")
+    found_now: tuple[Conditions, ...] = values.fold(drive.state, facts)
+    return found_now
 
 
 class DriveFacts:
@@ -176,9 +124,9 @@ class DriveFacts:
         return join_target(self._drive.link.name, self._drive.address)
 
     def __repr__(self) -> str:
-        """Return its name and product."""
+        """Return its name, product and version."""
         axis = f", axis {self.axis}" if self.axis else ""
-        return f"<{self.name or 'drive'} {self.product}{axis}>"
+        return f"<drive {self.name or self.target}: {self.product} {self.version}".strip() + f"{axis}>"
 
     def _repr_html_(self) -> str:
         """Return what is known of it, for a notebook."""
@@ -211,8 +159,12 @@ class AsyncDrive(DriveFacts):
         for line in lines:
             await shell.run(f"@{self.target} {line}", By.SCRIPT)
 
-    async def read(self, name: str) -> Value:
-        """Read the value of a word of the drive, such as `VM`; `[LINE]` asks with a line that prints one value."""
+    async def read(self, name: str | int) -> Value:
+        """Read the value of a word of the drive, such as `VM`; of TMCL a parameter by number or name.
+
+        `[LINE]` asks with a line that prints one value.
+        """
+        name = self._word(name)
         line = name.startswith("[") and name.endswith("]")
         word = Word(name[1:-1] if line else name, self.target, line)
         shell = self._calls.shell
@@ -220,8 +172,12 @@ class AsyncDrive(DriveFacts):
             raise Diagnostic(f"{name!r} is not a word of a drive", self.name, "valid: as in read('VM')")
         return await self._calls.run(lambda: ask(shell, word, By.SCRIPT))
 
-    async def write(self, name: str, value: Value) -> None:
+    def _word(self, name: str | int) -> str:
+        return self._family.values.actions.word(str(name), self.axis)
+
+    async def write(self, name: str | int, value: Value) -> None:
         """Give a word of the drive a value. Raises Refused; Diagnostic where its language has no such form."""
+        name = self._word(name)
         line = self._drive.family.assign(name, written(value)) if _WORD.fullmatch(name) else None
         if line is None:
             raise Diagnostic(f"no line gives {name!r} a value", self.name, "send() takes any line of the drive")
@@ -236,26 +192,167 @@ class AsyncDrive(DriveFacts):
         `beyond`: it may leave the travel of its axis. Raises Refused; Diagnostic for a unit that its scale has not;
         TypeError for a fraction of a step.
         """
-        await self._move(self._drive.family.move(self.axis, _amount(steps, unit)), beyond)
+        await self._move(self._family.move(self.axis, _amount(steps, unit)), beyond)
 
     async def move_to(self, position: float, unit: str = "", *, beyond: bool = False) -> None:
         """Begin to move to a position: whole steps, or a number of a unit. As `move` in all else."""
-        await self._move(self._drive.family.move_to(self.axis, _amount(position, unit)), beyond)
+        await self._move(self._family.move_to(self.axis, _amount(position, unit)), beyond)
 
-    async def _move(self, lines: tuple[str, ...], beyond: bool) -> None:
+    async def run_at(self, velocity: float, unit: str = "") -> None:
+        """Begin to run at a velocity, negative for minus: whole steps a second, or a number of a unit. 0 ends it.
+
+        On a PMX the axis's `HSPD` stays at it, and a unit is refused.
+        """
+        await self._move(self._family.values.actions.run(self._first, _amount(velocity, unit)), False)
+
+    async def _move(self, lines: tuple[str, ...], beyond: bool = False) -> None:
         self._check_executes()
         if not self._axis_known:
             await self.motion()
-        async with self._calls.moves(self._drive):  # a mode and its move belong together
+        drive = self._drive
+        async with self._calls.moves(drive):  # a mode and its move belong together
+            kept = [name for name, (_, at) in drive.settings.items() if at == drive.commands]
+            commands = drive.commands + len(lines)
             await self._calls.run(lambda: self._send(*lines, beyond=beyond))
+            if drive.commands == commands and "=" not in "".join(lines):  # a move changes no setting
+                drive.settings |= {name: (drive.settings[name][0], commands) for name in kept}
 
     async def wait(self, timeout: float = waits.LIMIT, *, idle: bool = False) -> None:
         """Wait until two readings show it at rest; with `idle` also until no program runs.
 
-        Raises DriveError after `timeout` seconds.
+        Raises Timeout after `timeout` seconds, DriveError where a homing has ended with an error.
         """
-        shell, drives = self._calls.shell, [self._drive]
-        await self._calls.run(lambda: waits.wait(shell, timeout, idle=idle, drives=drives))
+        await self._calls.run(lambda: self._wait(timeout, idle))
+
+    async def _wait(self, timeout: float, idle: bool) -> None:
+        drive = self._drive
+        await waits.wait(self._calls.shell, timeout, idle=idle, drives=[drive], said="wait")
+        for axis in [each for each in drive.homings if each not in drive.homed]:
+            if not await drive.homing_ended(axis) and await self._fault() is not None:
+                raise DriveError(f"{self.name}: the homing has ended with an error; read_error() reads and clears it")
+        if self._calls.returns is not None:
+            await drive.motion()
+
+    async def wait_for(self, condition: str, timeout: float = waits.LIMIT) -> None:
+        """Wait until the drive reports a value: `I1=1`, `P>=51200`, `P > {10 mm}`. Raises Timeout, Diagnostic."""
+        wanted, shell = waits.condition(condition), self._calls.shell
+        if wanted is None or wanted.target:
+            raise Diagnostic(f"no condition {condition!r}", self.name, "valid: as in wait_for('I1=1')")
+        wanted = replace(wanted, word=self._word(wanted.word))
+        units = shell.units if wanted.quantity else None
+        await self._calls.run(lambda: waits.wait_value(shell, self._drive, wanted, timeout, units, "wait_for"))
+
+    # Homing
+
+    async def home(self, direction: str = "", mode: str = "") -> None:
+        """Begin to home in a direction, `-` or `+`; `wait` waits for its end.
+
+        `mode`: what it looks for, as the family has it: `home` (the switch), `index`. Raises Diagnostic with the
+        choices; a direction is left out where the drive's own settings fix it.
+        """
+        modes = self._family.values.actions.homings(self._first)
+        lines = modes.get(mode or next(iter(modes)))
+        if lines is None:
+            raise Diagnostic(f"no mode {mode}", f"home() of {self.name}", f"valid: {', '.join(modes)}")
+        if direction not in lines:
+            what = f"no direction {direction!r}" if direction else "it needs a direction"
+            hint = ", ".join(f"home({sign!r}) sends {line}" for sign, line in lines.items())
+            if "" in lines:
+                what, hint = "the drive's own settings fix its direction", f"home() sends {lines['']}"
+            raise Diagnostic(what, f"home() of {self.name}", hint)
+        await self._move((lines[direction],))
+
+    async def homed(self) -> bool:
+        """Whether the last homing of this session has ended well, and its position counts since.
+
+        A drive does not keep that it was homed. Reads the drive where a homing may just have ended.
+        """
+        drive, axis = self._drive, self._first
+        if axis in drive.homings and axis not in drive.homed:
+            self._check_executes()
+            if not await self._calls.run(lambda: still(drive)):
+                return False
+            await self._calls.run(lambda: drive.homing_ended(axis))
+        return drive.homed.get(axis, False) and self.referenced
+
+    async def accept(self) -> None:
+        """Take the position as right, as `/referenced` does: it counts again, and moves are sent again."""
+        shell = self._calls.shell
+        await self._calls.run(lambda: shell.run(f"/referenced {self.target}".strip(), By.SCRIPT))
+
+    # Current, inputs and outputs, errors
+
+    async def enable(self) -> None:
+        """Switch the current of the motor on. Raises Inexpressible where its family has no command for it."""
+        await self._control(ENABLE)
+
+    async def disable(self) -> None:
+        """Switch the current of the motor off: **a load that hangs may drop**. Raises as `enable`."""
+        await self._control(DISABLE)
+
+    async def _control(self, name: str) -> None:
+        control = self._family.values.controls(self._drive.state, self._first)[name]
+        if control.absent:
+            raise Inexpressible(f"{self.name}: no {name}(): {control.absent}")
+        self._check_executes()
+        await self._calls.run(lambda: self._send(*control.filled()))
+        if name == DISABLE:
+            text = f"{self.name}: {control.about}; a load that hangs may drop"
+            self._calls.shell.notify(text, bus=self._drive.link.name, warning=True)
+
+    async def set_output(self, number: int, value: bool) -> None:
+        """Switch an output on or off, by its number in the drive's language. Raises Refused where it has none."""
+        self._check_executes()
+        await self._calls.run(lambda: self._send(self._family.values.actions.output(number, bool(value))))
+
+    async def inputs(self) -> dict[int | str, bool]:
+        """Read the inputs: True is active. By number, and by function where they have one: `home`, `lim+`, `lim-`."""
+        found: dict[int | str, bool] = {}
+        for lamp in (await self._conditions()).lamps:
+            if not lamp.output and lamp.on is not None:
+                found |= {int(lamp.name): lamp.on} if lamp.name.isdigit() else {}
+                found |= {lamp.function: lamp.on} if lamp.function else {}
+        for number, line in self._family.values.actions.ports(self._drive.state).items():
+            found[number] = bool(await self.read(f"[{line}]"))
+        return found
+
+    async def limits(self) -> Limits:
+        """Read the limit switches, and the travel between software limits."""
+        found = await self._conditions()
+        on = {lamp.function: lamp.on for lamp in found.lamps if not lamp.output}
+        return Limits(on.get("lim-"), on.get("lim+"), found.limits)
+
+    async def error(self) -> Fault | None:
+        """Read what is known of its error and leave it set; None: there is none. `read_error` has its number.
+
+        Raises Inexpressible where its family has no error to read.
+        """
+        if why := self._family.values.actions.no_error:
+            raise Inexpressible(f"{self.name}: {why}")
+        return await self._fault()
+
+    async def _fault(self) -> Fault | None:
+        return fault_of(await self._conditions(slow=False))
+
+    async def read_error(self) -> Fault | None:
+        """Read the error **and clear it**; None: there was none. Raises as `error`."""
+        found, actions = None, self._family.values.actions
+        if not actions.error:
+            found = await self.error()
+        elif code := await self.read(actions.error):
+            text = f"error {code}"
+            with contextlib.suppress(Diagnostic):
+                text = self._family.language.describe_error(int(code), self.product)[0]
+            found = Fault(int(code), text)
+        if found is not None and (clear := actions.clear) is not None:
+            await self._calls.run(lambda: self._send(clear(self._first)))
+        return found
+
+    async def _conditions(self, slow: bool = True) -> Conditions:
+        self._check_executes()
+        return self._of_axis(await self._calls.run(lambda: conditions(self._drive, slow)))
+
+    # Position and velocity
 
     async def position(self) -> int:
         """Read the position."""
@@ -286,14 +383,26 @@ class AsyncDrive(DriveFacts):
     async def motion(self) -> Motion:
         """Read position and velocity of its axis at one time."""
         self._check_executes()
-        axes = await self._calls.run(self._drive.motion)
+        found = self._of_axis(await self._calls.run(self._drive.motion))
+        self._axis_known = True
+        return found
+
+    def _of_axis(self, axes: Sequence[A]) -> A:
         wanted = self.axis.lower()
         found = next((each for each in axes if wanted in ("", each.axis.lower())), None)
         if found is None:
             names = ", ".join(each.axis for each in axes if each.axis)
             raise Diagnostic(f"no axis {self.axis}", self.name, f"valid: {names}" if names else "it has one axis")
-        self._axis_known = True
         return found
+
+    @property
+    def _family(self) -> Family[Any]:
+        return self._drive.family
+
+    @property
+    def _first(self) -> str:
+        """Its axis as in `Motion.axis`."""
+        return self.axis.lower() or self._family.units.axes(self._drive.state)[0]
 
     def _check_executes(self) -> None:
         """Raise Refused in program mode, where the drive would store a line or a question."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import logging
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -12,15 +13,20 @@ from typing import TYPE_CHECKING, TypeVar
 from multidrop.api import endings
 from multidrop.api.calls import Calls, Stopping
 from multidrop.api.drives import AsyncDrive
+from multidrop.api.events import AsyncEvents
 from multidrop.api.pictures import drives_table, table
+from multidrop.api.returns import Returns
 from multidrop.api.telemetry import RATE, AsyncTelemetry
-from multidrop.dialects import Diagnostic
-from multidrop.shell import stop_report
+from multidrop.dialects import Diagnostic, DriveError
+from multidrop.dialects.errors import Timeout
+from multidrop.drives.telemetry import PERIOD
+from multidrop.shell import stop_report, waits
 from multidrop.shell.automation import settled
 from multidrop.shell.channel import Front
 from multidrop.shell.configuration import load
 from multidrop.shell.events import By, Notified, SessionEvent
 from multidrop.shell.session import Session as Shell
+from multidrop.transports import TransportLost
 
 if TYPE_CHECKING:
     from multidrop.drives.drive import Drive
@@ -66,8 +72,17 @@ class AsyncSession:
     Leaving it by an exception stops every drive that it has set in motion.
     """
 
-    def __init__(self, urls: Sequence[str], *, yes: bool = False, beyond: bool = False, notice: Notice) -> None:
+    def __init__(
+        self,
+        urls: Sequence[str],
+        *,
+        yes: bool = False,
+        beyond: bool = False,
+        reconnect: bool = False,
+        notice: Notice,
+    ) -> None:
         self._urls = urls
+        self._reconnect = reconnect
         self._yes, self._beyond = yes, beyond
         self._notice = notice
         self._calls = Calls()
@@ -101,11 +116,13 @@ class AsyncSession:
             return
         from multidrop.shell.log.writer import begin as begin_log
 
-        shell = Shell(load())
+        shell = Shell(load(), reconnect=self._reconnect)
         shell.questions.agreed, shell.questions.beyond = self._yes, self._beyond
         shell.front = Front(way="connect(URL, yes=True)", beyond="beyond=True")
         shell.subscribe(self._take)
         self._calls.open(shell)
+        if self._reconnect:
+            self._calls.returns = Returns(shell)
         begin_log(shell)
         try:
             await self._calls.begin()
@@ -119,6 +136,28 @@ class AsyncSession:
         await self._calls.run(lambda: self._shell.open_all(urls))
         for name, url in named.items():
             await self._calls.run(partial(self._shell.open, url, name))
+        if (returns := self._calls.returns) is not None:
+            for drive in self.drives:
+                with contextlib.suppress(DriveError):  # it is read again, or nothing is known of it
+                    await self._calls.run(partial(returns.note, drive._drive))
+
+    async def wait_back(self, timeout: float = waits.LIMIT) -> None:
+        """Wait until every lost connection is back. Raises Timeout, and Lost where one is not tried again."""
+        await self._calls.run(lambda: self._back(timeout))
+        if self._calls.returns is not None:
+            await self._calls.returns.compared()
+
+    async def _back(self, timeout: float) -> None:
+        shell = self._shell
+        deadline = shell.now() + timeout
+        while gone := [bus for bus in shell.buses.values() if bus.link.loss is not None]:
+            names = ", ".join(bus.name for bus in gone)
+            for bus in gone:
+                if bus.name not in shell.reconnections.trying:
+                    raise TransportLost(f"{bus.link.loss}; connect(URL, reconnect=True) tries it again")
+            if shell.now() >= deadline:
+                raise Timeout(f"wait_back: {names} still lost after {timeout:g} s")
+            await waits.sleep(waits.APART)
 
     async def close(self, *, stop: bool = False) -> None:
         """Close everything. Drives go on as they are, unless a `stop` is asked for. May be called again."""
@@ -220,11 +259,26 @@ class AsyncSession:
         """Let commands be sent again after a stop."""
         self._shell.resume()
 
+    def events(self, *addresses: str, every: float = PERIOD) -> AsyncEvents:
+        """Iterate over what happens to drives (all without an address) and their lines: see `Event`.
+
+        `every`: seconds between two readings of a drive.
+        """
+        drives = [self._found(each) for each in addresses] or [each._drive for each in self.drives]
+        return self._calls.kept(AsyncEvents(self._shell, drives, every))
+
+    def __repr__(self) -> str:
+        """Return its lines and their drives."""
+        if not self._calls.opened:
+            return "<multidrop: a closed session>"
+        lines = [f"{bus.name}: {', '.join(bus.drives) or 'no drive'}" for bus in self._shell.buses.values()]
+        return f"<multidrop: {'; '.join(lines) or 'nothing is open'}>"
+
     def _repr_html_(self) -> str:
         """Return a table of the drives, for a notebook."""
         return drives_table(self._shell) if self._calls.opened else "<p>multidrop: a closed session</p>"
 
 
-def connect_async(*urls: str, yes: bool = False, beyond: bool = False) -> AsyncSession:
+def connect_async(*urls: str, yes: bool = False, beyond: bool = False, reconnect: bool = False) -> AsyncSession:
     """Make a session for `async with`, in the running event loop. Arguments as for `connect`."""
-    return AsyncSession(urls, yes=yes, beyond=beyond, notice=log)
+    return AsyncSession(urls, yes=yes, beyond=beyond, reconnect=reconnect, notice=log)

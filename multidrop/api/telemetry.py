@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import asyncio
 import math
 from array import array
 from collections import deque
@@ -11,6 +10,7 @@ from pathlib import Path
 from typing import Any, NamedTuple, SupportsIndex, overload
 
 from multidrop.api.pictures import Curve, plot
+from multidrop.api.streams import AsyncStream
 from multidrop.dialects import Diagnostic
 from multidrop.dialects.files import why
 from multidrop.dialects.units import Takes
@@ -139,40 +139,33 @@ KEPT = 200_000
 """The number of samples that wait to be taken; then the oldest are dropped."""
 
 
-class AsyncTelemetry:
+class AsyncTelemetry(AsyncStream[Sample]):
     """Samples from now until `close`, the end of the session, or the loss of a line. Polls only while it is open."""
 
     def __init__(self, shell: Session, drives: Sequence[Drive], rate: float = RATE) -> None:
         """Begin to read. A rate of `math.inf` is as fast as the line allows."""
         self.missed = 0
         """The number of samples that were dropped because the program did not take them."""
-        self._shell = shell
-        self._names = {(drive.link.name, drive.address): self._shell.display_name(drive) for drive in drives}
-        self._rows: deque[Sample] = deque()
-        self._news = asyncio.Event()
-        self._lost: Exception | None = None
-        self._begun = self._shell.now()
-        period = 1.0 / rate
-        self._leave = self._shell.subscribe(self._take)
-        self._subscriptions = [
-            shell.buses[bus].telemetry.subscribe([own for name, own in self._names if name == bus], period)
-            for bus in dict.fromkeys(bus for bus, _ in self._names)
-        ]
-        self._open = True
+        self._names = {(drive.link.name, drive.address): shell.display_name(drive) for drive in drives}
+        self._begun = shell.now()
+        super().__init__(
+            shell,
+            [
+                shell.buses[bus].telemetry.subscribe([own for name, own in self._names if name == bus], 1.0 / rate)
+                for bus in dict.fromkeys(bus for bus, _ in self._names)
+            ],
+        )
 
     def _take(self, event: SessionEvent) -> None:
         if not isinstance(event, OnBus):
             return
         if isinstance(event.event, Read) and (event.bus, event.event.address) in self._names:
-            self._rows.append(self._sample(event.bus, event.event))
+            self._add(self._sample(event.bus, event.event))
             if len(self._rows) > KEPT:
                 self._rows.popleft()
                 self.missed += 1
         elif isinstance(event.event, Lost) and any(bus == event.bus for bus, _ in self._names):
-            self._lost = event.event.error
-        else:
-            return
-        self._news.set()
+            self._end(event.event.error)
 
     def _sample(self, bus: str, read: Read) -> Sample:
         at, wall = read.at - self._begun, self._shell.wall(read.at).timestamp()
@@ -182,38 +175,6 @@ class AsyncTelemetry:
             return found
         speed = self._shell.units.given(drive, read.axis, read.velocity, Takes.VELOCITY)
         return found.in_units(place[1], place[0], speed[0] if speed is not None else None)
-
-    def close(self) -> None:
-        """End it. Samples that came can still be taken. May be called again."""
-        if self._open:
-            self._open = False
-            self._leave()
-            for each in self._subscriptions:
-                each.close()
-            self._news.set()
-
-    async def __aenter__(self) -> AsyncTelemetry:
-        """Return it; the end of the block closes it."""
-        return self
-
-    async def __aexit__(self, *_: object) -> None:
-        """Close it."""
-        self.close()
-
-    def __aiter__(self) -> AsyncTelemetry:
-        """Return it."""
-        return self
-
-    async def __anext__(self) -> Sample:
-        """Wait for the next sample. Raises TransportLost once the samples before the loss are taken."""
-        while not self._rows:
-            if self._lost is not None:
-                raise self._lost
-            if not self._open:
-                raise StopAsyncIteration
-            self._news.clear()
-            await self._news.wait()
-        return self._rows.popleft()
 
     async def samples(self) -> Samples:
         """Take all samples that have come and were not taken yet."""

@@ -189,13 +189,17 @@ class Reconnections:
         if before in self._ways:
             self._ways[now] = self._ways.pop(before)
 
+    def tries(self, name: str) -> bool:
+        """Whether a bus is tried again when it is lost."""
+        return name in self._ways
+
     def waiting_for(self, port: str) -> str:
         """The name of the bus that is being tried again on a port; empty if there is none."""
         return next((name for name, way in self._ways.items() if port and way[2] == port and name in self._tasks), "")
 
     def lost(self, bus: Bus) -> bool:
         """Begin to try a lost bus; whether it is tried."""
-        if bus.name not in self._ways:
+        if not self.tries(bus.name):
             return False
         hints, reopen, _ = self._ways[bus.name]
         if earlier := self._tasks.get(bus.name):  # which is back, and reads what moves

@@ -329,9 +329,12 @@ def controls(state: TmclState, axis: str) -> Controls:
 
 
 def _word(word: str, axis: str) -> str:
+    """A parameter by its number, of the motor that it names or that is meant; any other word as it is."""
     found = parameter(word)
-    plain = axis not in ("", "0") and found is not None and found.command == Command.GAP and not found.motor
-    return f"{word}_{axis}" if plain and not re.search(r"[_/]\d$", word) else word
+    if found is None:
+        return word
+    named = re.search(r"[_/]\d$", word) is not None
+    return f"G{found.type}" if found.command == Command.GGP else f"AP{found.type}_{found.motor if named else axis or 0}"
 
 
 ACTIONS = Actions(
@@ -340,6 +343,7 @@ ACTIONS = Actions(
     output=lambda number, on: f"SIO {number}, 2, {on:d}",
     no_error="a module has no error to read: each refusal says its own; read('AP208') shows the driver's flags",
     word=_word,
+    ports=lambda state: {port: f"GIO {port}, 0" for port in module_of(state.product).inputs},
 )
 VALUES = Values(
     parameters=PARAMETERS,

@@ -1,0 +1,108 @@
+"""Events of drives and their lines, as a program takes them: `for event in session.events()`."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+from multidrop.api.streams import AsyncStream
+from multidrop.dialects.values import UNREAD, Conditions
+from multidrop.drives.drive import Drive
+from multidrop.drives.events import Changed, Conditioned, Lost
+from multidrop.shell.events import OnBus, SessionEvent
+from multidrop.shell.session import Session
+
+Kind = Literal["limit", "error", "program ended", "lost", "back"]
+LIMITS = {"lim+": "the plus limit is reached", "lim-": "the minus limit is reached"}
+
+
+@dataclass(frozen=True)
+class Fault:
+    """The error of a drive. It reads as its text."""
+
+    code: int | None
+    """Its number; None: reading it would clear it, which `read_error` does."""
+    text: str
+
+    def __str__(self) -> str:
+        """Return the text."""
+        return self.text
+
+
+def fault_of(found: Conditions) -> Fault | None:
+    """The error that conditions report; None: there is none."""
+    if found.error == UNREAD:
+        return Fault(None, "an error is set; read_error() reads and clears its number")
+    return Fault(found.error, found.error_text or f"error {found.error}") if found.error else None
+
+
+@dataclass(frozen=True)
+class Event:
+    """Something that happened. It reads as one line."""
+
+    kind: Kind
+    """`limit`, `error` and `program ended` are of a drive, `lost` and `back` of a line."""
+    name: str
+    """The drive, with the axis where it has several, or the line."""
+    text: str
+    time: float
+    """Time of day, seconds since 1970."""
+
+    def __str__(self) -> str:
+        """Return the line."""
+        return f"{self.name}: {self.text}"
+
+
+class AsyncEvents(AsyncStream[Event]):
+    """Events from now until `close` or the end of the session. Limits and errors that are there already come first.
+
+    The conditions of the drives are read while it is open, as they report nothing by themselves.
+    """
+
+    def __init__(self, shell: Session, drives: Sequence[Drive], every: float) -> None:
+        self._drives = {(drive.link.name, drive.address): drive for drive in drives}
+        self._state: dict[str, frozenset[tuple[Kind, str]]] = {}
+        self._running: dict[str, str] = {}
+        buses = dict.fromkeys(bus for bus, _ in self._drives)
+        self._away = {bus for bus in buses if shell.buses[bus].link.away is not None}
+        super().__init__(
+            shell,
+            [
+                shell.buses[bus].telemetry.watch([own for each, own in self._drives if each == bus], every)
+                for bus in buses
+            ],
+        )
+
+    def _take(self, event: SessionEvent) -> None:
+        bus = self._shell.buses.get(event.bus) if isinstance(event, OnBus) else None
+        if bus is None or not isinstance(event, OnBus) or all(each != event.bus for each, _ in self._drives):
+            return
+        if isinstance(event.event, Conditioned):
+            drive = self._drives.get((event.bus, event.event.address))
+            for each in event.event.conditions if drive is not None else ():
+                self._compare(f"{self._shell.display_name(drive)} {each.axis}".strip(), each)
+        elif isinstance(event.event, Lost):
+            self._away.add(event.bus)
+            self._publish("lost", event.bus, str(event.event.error))
+            if not any(self._shell.reconnections.tries(each) or each not in self._away for each, _ in self._drives):
+                self._end(StopAsyncIteration())
+        elif isinstance(event.event, Changed) and event.bus in self._away and bus.link.away is None:
+            self._away.discard(event.bus)
+            self._publish("back", event.bus, "the line is back")
+
+    def _compare(self, name: str, now: Conditions) -> None:
+        """Publish what is new: a limit, an error, the end of a program."""
+        found: set[tuple[Kind, str]] = {
+            ("limit", LIMITS[lamp.function]) for lamp in now.lamps if lamp.on and lamp.function in LIMITS
+        }
+        if (fault := fault_of(now)) is not None:
+            found.add(("error", fault.text))
+        for kind, text in sorted(found - self._state.get(name, frozenset())):
+            self._publish(kind, name, text)
+        if not now.program and (ended := self._running.get(name)):
+            self._publish("program ended", name, f"its program has ended ({ended})")
+        self._state[name], self._running[name] = frozenset(found), now.program
+
+    def _publish(self, kind: Kind, name: str, text: str) -> None:
+        self._add(Event(kind, name, text, self._shell.wall(self._shell.now()).timestamp()))

@@ -1,0 +1,108 @@
+"""The program and the settings of one drive, awaited."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from typing import TYPE_CHECKING
+
+from multidrop.api.calls import Calls
+from multidrop.shell import new_file, program_listing
+from multidrop.shell.params import file as files
+from multidrop.shell.params.work import Difference, Options, differences, restore
+from multidrop.shell.programs import transfers
+from multidrop.shell.programs.transfers import Wanted
+
+if TYPE_CHECKING:
+    from multidrop.dialects.values import Readings
+    from multidrop.drives.drive import Drive
+
+Lines = list[str]
+
+
+class AsyncPrograms:
+    """The program of one drive. Raises Inexpressible where its family has none."""
+
+    def __init__(self, calls: Calls, drive: Drive) -> None:
+        self._calls, self._drive = calls, drive
+
+    async def list(self) -> Lines:
+        """Read the program as a listing, with the remarks of its file where those are known."""
+        shell = self._calls.shell
+        return await self._calls.run(lambda: program_listing.readable(shell, self._drive))
+
+    async def upload(self, file: str = "", *, raw: bool = False) -> Lines:
+        """Read the program as the lines of a file; write them to a new `file` if one is named.
+
+        `raw`: as they are stored. Raises Diagnostic for a file that exists.
+        """
+        if file:
+            new_file.check(file)
+        shell = self._calls.shell
+        lines = await self._calls.run(lambda: program_listing.upload(shell, self._drive, raw))
+        if file:
+            new_file.write(file, "".join(f"{line}\n" for line in lines))
+        return lines
+
+    async def download(
+        self,
+        file: str,
+        text: str | None = None,
+        *,
+        save: bool = False,
+        verify: bool = True,
+        only_changed: bool = False,
+        run: str = "",
+    ) -> None:
+        """Check a program file, back up what the drive holds, send the file, and compare.
+
+        `text`: what a file of that name would hold. `save`: keep it over power-off. `run`: the label to execute then.
+        Raises Diagnostic for the file, Refused, NoAnswer, Differs.
+        """
+        shell, wanted = self._calls.shell, Wanted(verify, save, only_changed, run)
+        await self._calls.run(lambda: transfers.download(shell, self._drive, file, wanted, text))
+
+
+class AsyncParameters:
+    """The settings of one drive. Raises Inexpressible where the host reads none of its family."""
+
+    def __init__(self, calls: Calls, drive: Drive) -> None:
+        self._calls, self._drive = calls, drive
+
+    async def read(self) -> Readings:
+        """Read every setting: `.values` by name, `.defaults`, and each with its unit in `.readings`."""
+        shell = self._calls.shell
+        return await self._calls.run(lambda: files.read(shell, self._drive, "reading"))
+
+    async def backup(self, file: str) -> Readings:
+        """Read every setting, and write them to a new file. Raises Diagnostic for a file that exists."""
+        new_file.check(file)
+        found = await self.read()
+        identity = files.identity(self._drive.state, self._drive.family.values.parameters.language)
+        new_file.write(file, files.formatted(identity, found))
+        return found
+
+    async def diff(self, file: str = "") -> list[Difference]:
+        """Compare with a file, or without one with the defaults: (name, value here, value there)."""
+        there = files.load(file) if file else None
+        found = await self.read()
+        return differences(found, there, self._calls.shell.display_name(self._drive))
+
+    async def restore(
+        self,
+        file: str,
+        *,
+        save: bool = False,
+        named: Collection[str] = (),
+        communication: bool = False,
+        other_product: bool = False,
+        dry_run: bool = False,
+    ) -> list[str]:
+        """Send what differs from a file; return the steps. It needs `connect(URL, yes=True)`, or `dry_run`.
+
+        `named`: settings that are only written when named, since they can move the motor or lock the drive.
+        """
+        shell, printed = self._calls.shell, list[str]()
+        options = Options(frozenset(named), communication, save, dry_run, other_product)
+        loaded = files.load(file)
+        await self._calls.run(lambda: restore(shell, self._drive, loaded, options), printed)
+        return printed

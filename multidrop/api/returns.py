@@ -1,0 +1,139 @@
+"""Drives after a lost connection: what was known of each is read again before anything may start it.
+
+Where `reconnect` is wanted, a drive is read while it rests after each command: its positions and its settings. After
+the return of its line these are read again. Where they are not the same, or the last command was too recent for them
+to be known, its position does not count, and nothing starts it (`Drive.hold`) until it counts again.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+from collections.abc import Mapping
+from typing import NamedTuple
+
+from multidrop.dialects import DriveError, NoAnswer, Priority, Refused
+from multidrop.dialects.values import Value, differing
+from multidrop.drives.bus import Bus
+from multidrop.drives.drive import Drive
+from multidrop.drives.events import Changed, Lost, isolated
+from multidrop.shell.events import OnBus, SessionEvent
+from multidrop.shell.session import Session
+from multidrop.transports import TransportLost
+
+PAUSE = 0.25
+"""The time between two looks for drives to read, s."""
+UNKNOWN = "a command was too recent, when its line was lost, to tell whether it is as it was"
+
+
+class Known(NamedTuple):
+    """What was known of a drive when its line was lost; without positions it had moved or was commanded since."""
+
+    identity: Mapping[str, Value]
+    positions: Mapping[str, int]
+    settings: Mapping[str, Value] | None
+
+
+def _identity(drive: Drive) -> Mapping[str, Value]:
+    state = drive.state
+    return {"product": state.product, "version": state.version, "part": state.part, "serial number": state.serial}
+
+
+def _known(drive: Drive) -> Known:
+    parts = [part.name for part in drive.family.values.parts(drive.state, {}) if part.slow]
+    current = all(name in drive.settings and drive.settings[name][1] == drive.commands for name in parts)
+    settings = {name: value for part in parts for name, value in drive.settings[part][0].items()} if current else None
+    return Known(_identity(drive), drive.rested, settings)
+
+
+async def _settings(drive: Drive, *, every: bool = False) -> dict[str, Value]:
+    """Read the settings of a drive, and with `every` all of its conditions. Raises NoAnswer."""
+    found = dict[str, Value]()
+    for part in drive.family.values.parts(drive.state, {}):
+        if part.slow or every:
+            facts: Mapping[str, Value] = {}
+            with contextlib.suppress(Refused):
+                facts = await drive.run(part.read(drive.state))
+            if part.slow:
+                drive.settings[part.name] = facts, drive.commands
+                found |= facts
+    return found
+
+
+class Returns:
+    """The drives of one session that comes back by itself."""
+
+    def __init__(self, shell: Session) -> None:
+        self._shell = shell
+        self._lost: dict[Bus, dict[Drive, Known]] = {}
+        self._tasks: dict[Bus, asyncio.Task[None]] = {}
+        self._following = asyncio.get_running_loop().create_task(self._follow())
+        self._leave = shell.subscribe(self._take)
+
+    def close(self) -> None:
+        """End it."""
+        self._leave()
+        for task in (self._following, *self._tasks.values()):
+            task.cancel()
+
+    async def compared(self) -> None:
+        """Wait until what came back is compared."""
+        if running := [task for task in self._tasks.values() if not task.done()]:
+            await asyncio.wait(running)
+
+    async def note(self, drive: Drive) -> None:
+        """Read what a return is compared with, unless it is known. Raises DriveError or TransportLost."""
+        drive.strict = True
+        if not drive.rested:
+            await drive.motion(Priority.POLL)
+        if _known(drive).settings is None or not drive.calm:
+            await _settings(drive, every=not drive.calm)
+
+    async def _follow(self) -> None:
+        while True:
+            for bus in [each for each in self._shell.buses.values() if each.link.away is None]:
+                for drive in list(bus.drives.values()):
+                    if not (drive.programming or drive.transferring or drive.state.settings_unknown):
+                        with isolated(f"reading {drive.shown}"), contextlib.suppress(DriveError, TransportLost):
+                            await self.note(drive)
+            await asyncio.sleep(PAUSE)
+
+    def _take(self, event: SessionEvent) -> None:
+        bus = self._shell.buses.get(event.bus) if isinstance(event, OnBus) else None
+        if bus is None or not isinstance(event, OnBus):
+            return
+        if isinstance(event.event, Lost) and bus not in self._lost:
+            self._lost[bus] = {drive: _known(drive) for drive in bus.all_drives}
+        elif isinstance(event.event, Changed) and bus in self._lost and bus.link.away is None and not self._busy(bus):
+            self._tasks[bus] = asyncio.get_running_loop().create_task(self._compare(bus))
+
+    def _busy(self, bus: Bus) -> bool:
+        return bus in self._tasks and not self._tasks[bus].done()
+
+    async def _compare(self, bus: Bus) -> None:
+        for drive, before in self._lost[bus].items():
+            trouble = [UNKNOWN]
+            with isolated(f"the return of {drive.shown}", trouble):
+                trouble[:] = await self._differences(bus, drive, before)
+            if bus.link.away is not None:
+                return  # lost again: compared after the next return
+            if trouble:
+                drive.hold = "; ".join(trouble)
+                drive.state.reference_lost(drive.family.units.axes(drive.state))
+                text = f"{self._shell.display_name(drive)}: {drive.hold}: nothing moves it until its position counts"
+                self._shell.notify(text, bus=bus.name, warning=True)
+        del self._lost[bus]
+
+    async def _differences(self, bus: Bus, drive: Drive, before: Known) -> list[str]:
+        if drive not in bus.drives.values():
+            return ["it has not replied since its line was lost"]
+        try:
+            axes, now = await drive.motion(), await _settings(drive)
+        except (DriveError, TransportLost) as failure:
+            return ["it does not reply since its line was lost" if isinstance(failure, NoAnswer) else str(failure)]
+        if not before.positions or before.settings is None:
+            return [UNKNOWN]
+        was = {f"{axis} position".strip(): position for axis, position in before.positions.items()}
+        places = {f"{axis.axis} position".strip(): axis.position for axis in axes}
+        found = differing({**before.identity, **before.settings, **was}, {**_identity(drive), **now, **places})
+        return [f"{name.replace('_', ' ')} {old} before its line was lost, {new} now" for name, old, new in found]
