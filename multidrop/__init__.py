@@ -20,11 +20,17 @@ if TYPE_CHECKING:
     from typing import Any
 
     from multidrop.api.blocking import Drive as Drive
+    from multidrop.api.blocking import Events as Events
     from multidrop.api.blocking import Session as Session
     from multidrop.api.blocking import Telemetry as Telemetry
     from multidrop.api.blocking import connect as connect
+    from multidrop.api.calls import Lost as Lost
     from multidrop.api.calls import StopReport as StopReport
     from multidrop.api.drives import AsyncDrive as AsyncDrive
+    from multidrop.api.drives import Limits as Limits
+    from multidrop.api.events import AsyncEvents as AsyncEvents
+    from multidrop.api.events import Event as Event
+    from multidrop.api.events import Fault as Fault
     from multidrop.api.sessions import AsyncSession as AsyncSession
     from multidrop.api.sessions import Run as Run
     from multidrop.api.sessions import connect_async as connect_async
@@ -41,6 +47,8 @@ if TYPE_CHECKING:
     from multidrop.dialects.errors import NoAnswer as NoAnswer
     from multidrop.dialects.errors import Refused as Refused
     from multidrop.dialects.errors import Stopped as Stopped
+    from multidrop.dialects.errors import Timeout as Timeout
+    from multidrop.dialects.errors import Unreferenced as Unreferenced
     from multidrop.transports import TransportLost as TransportLost
     from multidrop.transports import Unreachable as Unreachable
 
@@ -48,6 +56,41 @@ __version__ = "0.1.0"
 if not os.path.isdir(os.path.join(__path__[0], "shell")):  # a checkout without symbolic links: the rooms lie beside
     __path__.append(os.path.dirname(os.path.abspath(__path__[0])))
 _PLACES = {
+    "multidrop.api.blocking": (
+        "Drive",
+        "Events",
+        "Session",
+        "Telemetry",
+        "connect",
+    ),
+    "multidrop.api.calls": (
+        "Lost",
+        "StopReport",
+    ),
+    "multidrop.api.drives": (
+        "AsyncDrive",
+        "Limits",
+    ),
+    "multidrop.api.events": (
+        "AsyncEvents",
+        "Event",
+        "Fault",
+    ),
+    "multidrop.api.sessions": (
+        "AsyncSession",
+        "Run",
+        "connect_async",
+    ),
+    "multidrop.api.simulated": (
+        "SimulatedCell",
+        "simulate",
+    ),
+    "multidrop.api.telemetry": (
+        "AsyncTelemetry",
+        "Sample",
+        "Samples",
+        "read_rrd",
+    ),
     "multidrop.dialects.errors": (
         "Diagnostic",
         "Differs",
@@ -56,14 +99,13 @@ _PLACES = {
         "NoAnswer",
         "Refused",
         "Stopped",
+        "Timeout",
+        "Unreferenced",
     ),
-    "multidrop.api.blocking": ("Drive", "Session", "Telemetry", "connect"),
-    "multidrop.api.calls": ("StopReport",),
-    "multidrop.api.drives": ("AsyncDrive",),
-    "multidrop.api.sessions": ("AsyncSession", "Run", "connect_async"),
-    "multidrop.api.simulated": ("SimulatedCell", "simulate"),
-    "multidrop.api.telemetry": ("AsyncTelemetry", "Sample", "Samples", "read_rrd"),
-    "multidrop.transports": ("TransportLost", "Unreachable"),
+    "multidrop.transports": (
+        "TransportLost",
+        "Unreachable",
+    ),
 }
 _PUBLIC = {name: module for module, names in _PLACES.items() for name in names}
 __all__ = [*_PUBLIC]
@@ -73,3 +115,8 @@ def __getattr__(name: str) -> Any:
     if name not in _PUBLIC:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     return getattr(importlib.import_module(_PUBLIC[name]), name)
+
+
+def __dir__() -> list[str]:
+    """The public names, for Tab."""
+    return sorted((*__all__, "__version__", "__doc__"))

@@ -324,7 +324,7 @@ def connect(*urls: str, yes: bool = False, beyond: bool = False, reconnect: bool
 
     `yes`: questions, such as that of a restore, are answered with yes beforehand. `beyond`: moves may leave the travel
     of their axis, which `yes` does not include. `reconnect`: a lost connection is tried again until it is back; calls
-    raise Lost meanwhile, and Unreferenced after it where a drive is not as it was. Raises Diagnostic for a wrong URL, Unreachable where there is no
-    connection, NoAnswer where no drive replies.
+    raise Lost meanwhile, and calls that move a drive raise Unreferenced after it, where the drive is not as it was.
+    Raises Diagnostic for a wrong URL, Unreachable where there is no connection, NoAnswer where no drive replies.
     """
     return Session(*urls, yes=yes, beyond=beyond, reconnect=reconnect)

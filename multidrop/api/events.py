@@ -80,8 +80,9 @@ class AsyncEvents(AsyncStream[Event]):
             return
         if isinstance(event.event, Conditioned):
             drive = self._drives.get((event.bus, event.event.address))
-            for each in event.event.conditions if drive is not None else ():
-                self._compare(f"{self._shell.display_name(drive)} {each.axis}".strip(), each)
+            if drive is not None:
+                for each in event.event.conditions:
+                    self._compare(f"{self._shell.display_name(drive)} {each.axis}".strip(), each)
         elif isinstance(event.event, Lost):
             self._away.add(event.bus)
             self._publish("lost", event.bus, str(event.event.error))
