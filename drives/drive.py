@@ -307,6 +307,8 @@ class Drive:
 
     async def homing_ended(self, axis: str) -> bool:
         """Whether the last homing of an axis, after which the drive rests, ended well and as the last command."""
+        if axis in self.homed:
+            return self.homed[axis]
         sent = self.homings.get(axis)
         well = await self.run(self.family.homed(self.state))
         if self.homings.get(axis) == sent:

@@ -98,7 +98,7 @@ class Restarts:
         at_rest = all(axis.velocity == 0 for axis in axes)
         jumped = [axis for axis in axes if at_rest and axis.position == 0 != rested.get(axis.axis, 0)]
         changed = [name for name, value in settings.items() if name in before and value != before[name]]
-        if not (sign or jumped or changed):
+        if not (sign or jumped or changed) or (drive.hold and drive.state.unreferenced):  # or that was said
             return
         signs = [sign] if sign else []
         for axis in axes:
@@ -109,7 +109,7 @@ class Restarts:
             signs.append(f"{_shown(name)} {_text(before[name])} before, {_text(settings[name])} now")
         more = f"; {len(signs) - NAMED} more differ" if len(signs) > NAMED else ""
         drive.state.reference_lost(axis.axis for axis in axes)
-        drive.hold = "it was restarted" if drive.strict else ""
+        drive.hold = f"it was restarted ({signs[0]})" if drive.strict else ""
         verb = f"/referenced {drive.address}".rstrip()
         self._link.notify(
             f"{drive.shown} was restarted ({'; '.join(signs[:NAMED])}{more}): its position is not referenced; "

@@ -126,7 +126,7 @@ class DriveFacts:
     def __repr__(self) -> str:
         """Return its name, product and version."""
         axis = f", axis {self.axis}" if self.axis else ""
-        return f"<drive {self.name or self.target}: {self.product} {self.version}".strip() + f"{axis}>"
+        return f"<drive {self.name or self.target}: {self.version or self.product}" + f"{axis}>"
 
     def _repr_html_(self) -> str:
         """Return what is known of it, for a notebook."""
@@ -156,6 +156,8 @@ class AsyncDrive(DriveFacts):
         shell = self._calls.shell
         if beyond:
             BEYOND.set(True)  # in the context of this call
+        for line in filter(self._drive.starts, lines):  # before a setting that belongs to a refused move
+            self._drive.check_start(line)
         for line in lines:
             await shell.run(f"@{self.target} {line}", By.SCRIPT)
 
@@ -273,7 +275,7 @@ class AsyncDrive(DriveFacts):
             if not await self._calls.run(lambda: still(drive)):
                 return False
             await self._calls.run(lambda: drive.homing_ended(axis))
-        return drive.homed.get(axis, False) and self.referenced
+        return drive.homed.get(axis, False) and not drive.state.unreferenced & {axis, ""}
 
     async def accept(self) -> None:
         """Take the position as right, as `/referenced` does: it counts again, and moves are sent again."""

@@ -39,27 +39,6 @@ def _identity(drive: Drive) -> Mapping[str, Value]:
     return {"product": state.product, "version": state.version, "part": state.part, "serial number": state.serial}
 
 
-def _known(drive: Drive) -> Known:
-    parts = [part.name for part in drive.family.values.parts(drive.state, {}) if part.slow]
-    current = all(name in drive.settings and drive.settings[name][1] == drive.commands for name in parts)
-    settings = {name: value for part in parts for name, value in drive.settings[part][0].items()} if current else None
-    return Known(_identity(drive), drive.rested, settings)
-
-
-async def _settings(drive: Drive, *, every: bool = False) -> dict[str, Value]:
-    """Read the settings of a drive, and with `every` all of its conditions. Raises NoAnswer."""
-    found = dict[str, Value]()
-    for part in drive.family.values.parts(drive.state, {}):
-        if part.slow or every:
-            facts: Mapping[str, Value] = {}
-            with contextlib.suppress(Refused):
-                facts = await drive.run(part.read(drive.state))
-            if part.slow:
-                drive.settings[part.name] = facts, drive.commands
-                found |= facts
-    return found
-
-
 class Returns:
     """The drives of one session that comes back by itself."""
 
@@ -67,6 +46,8 @@ class Returns:
         self._shell = shell
         self._lost: dict[Bus, dict[Drive, Known]] = {}
         self._tasks: dict[Bus, asyncio.Task[None]] = {}
+        self._refused: set[tuple[Drive, str]] = set()
+        """Parts that a drive refuses: each refusal may start a subroutine for errors in it."""
         self._following = asyncio.get_running_loop().create_task(self._follow())
         self._leave = shell.subscribe(self._take)
 
@@ -86,8 +67,31 @@ class Returns:
         drive.strict = True
         if not drive.rested:
             await drive.motion(Priority.POLL)
-        if _known(drive).settings is None or not drive.calm:
-            await _settings(drive, every=not drive.calm)
+        if self._known(drive).settings is None or not drive.calm:
+            await self._settings(drive, every=not drive.calm)
+
+    async def _settings(self, drive: Drive, *, every: bool = False) -> dict[str, Value]:
+        """Read the settings of a drive, and with `every` all of its conditions. Raises NoAnswer."""
+        found = dict[str, Value]()
+        for part in drive.family.values.parts(drive.state, {}):
+            if (part.slow or every) and (drive, part.name) not in self._refused:
+                commands = drive.commands
+                try:
+                    facts = await drive.run(part.read(drive.state))
+                except Refused:
+                    self._refused.add((drive, part.name))
+                    continue
+                if part.slow:
+                    drive.settings[part.name] = facts, commands
+                    found |= facts
+        return found
+
+    def _known(self, drive: Drive) -> Known:
+        parts = [part.name for part in drive.family.values.parts(drive.state, {}) if part.slow]
+        parts = [name for name in parts if (drive, name) not in self._refused]
+        current = all(name in drive.settings and drive.settings[name][1] == drive.commands for name in parts)
+        settings = {k: value for name in parts for k, value in drive.settings[name][0].items()} if current else None
+        return Known(_identity(drive), drive.rested, settings)
 
     async def _follow(self) -> None:
         while True:
@@ -103,7 +107,7 @@ class Returns:
         if bus is None or not isinstance(event, OnBus):
             return
         if isinstance(event.event, Lost) and bus not in self._lost:
-            self._lost[bus] = {drive: _known(drive) for drive in bus.all_drives}
+            self._lost[bus] = {drive: self._known(drive) for drive in bus.all_drives}
         elif isinstance(event.event, Changed) and bus in self._lost and bus.link.away is None and not self._busy(bus):
             self._tasks[bus] = asyncio.get_running_loop().create_task(self._compare(bus))
 
@@ -128,7 +132,7 @@ class Returns:
         if drive not in bus.drives.values():
             return ["it has not replied since its line was lost"]
         try:
-            axes, now = await drive.motion(), await _settings(drive)
+            axes, now = await drive.motion(), await self._settings(drive)
         except (DriveError, TransportLost) as failure:
             return ["it does not reply since its line was lost" if isinstance(failure, NoAnswer) else str(failure)]
         if not before.positions or before.settings is None:

@@ -35,7 +35,7 @@ def moving(session: Any) -> set[str]:
 async def test_lines_words_and_moves(url: str) -> None:
     async with connect_async(f"{url}#press") as session:
         b = session.drive("b")
-        assert (b.name, b.address, b.product, repr(b)) == ("b", "b", "LMDCM", "<b LMDCM>")
+        assert (b.name, b.address, b.product, repr(b)) == ("b", "b", "LMDCM", "<drive b: LMDCM 6.002, Hw: 3.2>")
         assert [each.name for each in session.drives] == ["a", "b"]
         await b.move(51200)
         assert await b.moving() and await b.velocity() > 0
@@ -230,7 +230,7 @@ async def test_an_interruption_stops_and_the_session_goes_on(url: str) -> None:
             await a.move(FAR)
             waiting = asyncio.create_task(a.wait())
             await asyncio.sleep(0.5)
-            await session.interrupt()
+            await session._break_off()
             with pytest.raises(Stopped, match="interrupted"):
                 await waiting
             assert moving(session) == set()
@@ -241,7 +241,7 @@ async def test_a_call_during_an_interruption_sends_nothing(url: str) -> None:
     async with connect_async(f"{url}#press") as session:
         a = session.drive("a")
         await a.move(FAR)
-        interrupting = asyncio.create_task(session.interrupt())
+        interrupting = asyncio.create_task(session._break_off())
         await asyncio.sleep(0)
         with pytest.raises(Stopped, match="nothing was sent"):
             await a.move(FAR)
@@ -290,12 +290,12 @@ async def test_an_interrupted_macro_executes_its_last_lines(
         playing = asyncio.create_task(session.send("/play go"))
         await asyncio.sleep(2)
         assert moving(session) == {"a"}
-        await session.interrupt()
+        await session._break_off()
         with pytest.raises(Stopped, match="interrupted"):
             await playing
         assert moving(session) == set() and await session.drive("a").read("R1") == 5
         await session.drive("a").move(FAR)
-        await session.interrupt()
+        await session._break_off()
         assert moving(session) == set()
 
 

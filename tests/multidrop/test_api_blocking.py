@@ -60,7 +60,7 @@ def soon(session: Session, seconds: float, function: Any) -> None:
 
 def test_lines_moves_and_words(session: Session) -> None:
     a = session.drive("a")
-    assert (a.name, a.address, a.axis, a.product, repr(a)) == ("a", "a", "", "LMDCM", "<a LMDCM>")
+    assert (a.name, a.address, a.axis, a.product, repr(a)) == ("a", "a", "", "LMDCM", f"<drive a: {a.version}>")
     assert a.version and [each.name for each in session.drives] == ["a", "b"]
     a.move(51200)
     a.wait()
