@@ -242,7 +242,7 @@ class Drive(DriveFacts):
 
     def telemetry(self, rate: float = RATE) -> Telemetry:
         """Read position and velocity `rate` times a second at most, as an iterator of samples."""
-        return self._session.telemetry(self.target, rate=rate)
+        return self._session.telemetry(self._target, rate=rate)
 
 
 class Programs:

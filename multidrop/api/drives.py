@@ -119,14 +119,14 @@ class DriveFacts:
         return not (lost & {self.axis.lower(), ""} if self.axis else lost)
 
     @property
-    def target(self) -> str:
+    def _target(self) -> str:
         """Its address with its bus, as after an `@`."""
         return join_target(self._drive.link.name, self._drive.address)
 
     def __repr__(self) -> str:
         """Return its name, product and version."""
         axis = f", axis {self.axis}" if self.axis else ""
-        return f"<drive {self.name or self.target}: {self.version or self.product}" + f"{axis}>"
+        return f"<drive {self.name or self._target}: {self.version or self.product}" + f"{axis}>"
 
     def _repr_html_(self) -> str:
         """Return what is known of it, for a notebook."""
@@ -159,7 +159,7 @@ class AsyncDrive(DriveFacts):
         for line in filter(self._drive.starts, lines):  # before a setting that belongs to a refused move
             self._drive.check_start(line)
         for line in lines:
-            await shell.run(f"@{self.target} {line}", By.SCRIPT)
+            await shell.run(f"@{self._target} {line}", By.SCRIPT)
 
     async def read(self, name: str | int) -> Value:
         """Read the value of a word of the drive, such as `VM`; of TMCL a parameter by number or name.
@@ -168,7 +168,7 @@ class AsyncDrive(DriveFacts):
         """
         name = self._word(name)
         line = name.startswith("[") and name.endswith("]")
-        word = Word(name[1:-1] if line else name, self.target, line)
+        word = Word(name[1:-1] if line else name, self._target, line)
         shell = self._calls.shell
         if not line and not _WORD.fullmatch(name):
             raise Diagnostic(f"{name!r} is not a word of a drive", self.name, "valid: as in read('VM')")
@@ -280,7 +280,7 @@ class AsyncDrive(DriveFacts):
     async def accept(self) -> None:
         """Take the position as right, as `/referenced` does: it counts again, and moves are sent again."""
         shell = self._calls.shell
-        await self._calls.run(lambda: shell.run(f"/referenced {self.target}".strip(), By.SCRIPT))
+        await self._calls.run(lambda: shell.run(f"/referenced {self._target}".strip(), By.SCRIPT))
 
     # Current, inputs and outputs, errors
 
