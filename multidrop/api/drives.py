@@ -7,6 +7,7 @@ import operator
 import re
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 from multidrop.api.calls import Calls, Stopping
@@ -88,6 +89,7 @@ class DriveFacts:
 
     def __init__(self, calls: Calls, drive: Drive, axis: str) -> None:
         self._drive = drive
+        self._family: Family[Any] = drive.family
         self.axis = axis
         """The axis that it moves and reads; empty: the first."""
         self._calls = calls
@@ -135,12 +137,27 @@ class DriveFacts:
         return table("drive", heads, [(self.name, self.axis, self.product, self.version, seen)])
 
 
+def _first(drive: DriveFacts) -> str:
+    """Its axis as in `Motion.axis`."""
+    return drive.axis.lower() or drive._family.units.axes(drive._drive.state)[0]
+
+
+def _of_axis(drive: DriveFacts, axes: Sequence[A]) -> A:
+    wanted = drive.axis.lower()
+    found = next((each for each in axes if wanted in ("", each.axis.lower())), None)
+    if found is None:
+        names = ", ".join(each.axis for each in axes if each.axis)
+        raise Diagnostic(f"no axis {drive.axis}", drive.name, f"valid: {names}" if names else "it has one axis")
+    return found
+
+
 class AsyncDrive(DriveFacts):
     """A drive of a session. Steps are the drive's own units: motor steps, or counts with its encoder in use."""
 
     def __init__(self, calls: Calls, drive: Drive, axis: str = "") -> None:
         super().__init__(calls, drive, axis)
         self._axis_known = not axis
+        self._actions = drive.family.values.actions
         self.programs = AsyncPrograms(calls, drive)
         self.parameters = AsyncParameters(calls, drive)
 
@@ -166,7 +183,7 @@ class AsyncDrive(DriveFacts):
 
         `[LINE]` asks with a line that prints one value.
         """
-        name = self._word(name)
+        name = self._actions.word(str(name), self.axis)
         line = name.startswith("[") and name.endswith("]")
         word = Word(name[1:-1] if line else name, self._target, line)
         shell = self._calls.shell
@@ -174,12 +191,9 @@ class AsyncDrive(DriveFacts):
             raise Diagnostic(f"{name!r} is not a word of a drive", self.name, "valid: as in read('VM')")
         return await self._calls.run(lambda: ask(shell, word, By.SCRIPT))
 
-    def _word(self, name: str | int) -> str:
-        return self._family.values.actions.word(str(name), self.axis)
-
     async def write(self, name: str | int, value: Value) -> None:
         """Give a word of the drive a value. Raises Refused; Diagnostic where its language has no such form."""
-        name = self._word(name)
+        name = self._actions.word(str(name), self.axis)
         line = self._drive.family.assign(name, written(value)) if _WORD.fullmatch(name) else None
         if line is None:
             raise Diagnostic(f"no line gives {name!r} a value", self.name, "send() takes any line of the drive")
@@ -205,7 +219,7 @@ class AsyncDrive(DriveFacts):
 
         On a PMX the axis's `HSPD` stays at it, and a unit is refused.
         """
-        await self._move(self._family.values.actions.run(self._first, _amount(velocity, unit)), False)
+        await self._move(self._actions.run(_first(self), _amount(velocity, unit)), False)
 
     async def _move(self, lines: tuple[str, ...], beyond: bool = False) -> None:
         self._check_executes()
@@ -224,23 +238,21 @@ class AsyncDrive(DriveFacts):
 
         Raises Timeout after `timeout` seconds, DriveError where a homing has ended with an error.
         """
-        await self._calls.run(lambda: self._wait(timeout, idle))
-
-    async def _wait(self, timeout: float, idle: bool) -> None:
-        drive = self._drive
-        await waits.wait(self._calls.shell, timeout, idle=idle, drives=[drive], said="wait")
+        drive, shell = self._drive, self._calls.shell
+        await self._calls.run(lambda: waits.wait(shell, timeout, idle=idle, drives=[drive], said="wait"))
         for axis in [each for each in drive.homings if each not in drive.homed]:
-            if not await drive.homing_ended(axis) and await self._fault() is not None:
+            well = await self._calls.run(partial(drive.homing_ended, axis))
+            if not (well or self._actions.no_error) and await self.error() is not None:
                 raise DriveError(f"{self.name}: the homing has ended with an error; read_error() reads and clears it")
         if self._calls.returns is not None:
-            await drive.motion()
+            await self.motion()
 
     async def wait_for(self, condition: str, timeout: float = waits.LIMIT) -> None:
         """Wait until the drive reports a value: `I1=1`, `P>=51200`, `P > {10 mm}`. Raises Timeout, Diagnostic."""
         wanted, shell = waits.condition(condition), self._calls.shell
         if wanted is None or wanted.target:
             raise Diagnostic(f"no condition {condition!r}", self.name, "valid: as in wait_for('I1=1')")
-        wanted = replace(wanted, word=self._word(wanted.word))
+        wanted = replace(wanted, word=self._actions.word(wanted.word, self.axis))
         units = shell.units if wanted.quantity else None
         await self._calls.run(lambda: waits.wait_value(shell, self._drive, wanted, timeout, units, "wait_for"))
 
@@ -252,7 +264,7 @@ class AsyncDrive(DriveFacts):
         `mode`: what it looks for, as the family has it: `home` (the switch), `index`. Raises Diagnostic with the
         choices; a direction is left out where the drive's own settings fix it.
         """
-        modes = self._family.values.actions.homings(self._first)
+        modes = self._actions.homings(_first(self))
         lines = modes.get(mode or next(iter(modes)))
         if lines is None:
             raise Diagnostic(f"no mode {mode}", f"home() of {self.name}", f"valid: {', '.join(modes)}")
@@ -269,7 +281,7 @@ class AsyncDrive(DriveFacts):
 
         A drive does not keep that it was homed. Reads the drive where a homing may just have ended.
         """
-        drive, axis = self._drive, self._first
+        drive, axis = self._drive, _first(self)
         if axis in drive.homings and axis not in drive.homed:
             self._check_executes()
             if not await self._calls.run(lambda: still(drive)):
@@ -284,28 +296,26 @@ class AsyncDrive(DriveFacts):
 
     # Current, inputs and outputs, errors
 
-    async def enable(self) -> None:
+    async def enable(self, on: bool = True) -> None:
         """Switch the current of the motor on. Raises Inexpressible where its family has no command for it."""
-        await self._control(ENABLE)
-
-    async def disable(self) -> None:
-        """Switch the current of the motor off: **a load that hangs may drop**. Raises as `enable`."""
-        await self._control(DISABLE)
-
-    async def _control(self, name: str) -> None:
-        control = self._family.values.controls(self._drive.state, self._first)[name]
+        name = ENABLE if on else DISABLE
+        control = self._family.values.controls(self._drive.state, _first(self))[name]
         if control.absent:
             raise Inexpressible(f"{self.name}: no {name}(): {control.absent}")
         self._check_executes()
         await self._calls.run(lambda: self._send(*control.filled()))
-        if name == DISABLE:
+        if not on:
             text = f"{self.name}: {control.about}; a load that hangs may drop"
             self._calls.shell.notify(text, bus=self._drive.link.name, warning=True)
+
+    async def disable(self) -> None:
+        """Switch the current of the motor off: **a load that hangs may drop**. Raises as `enable`."""
+        await self.enable(False)
 
     async def set_output(self, number: int, value: bool) -> None:
         """Switch an output on or off, by its number in the drive's language. Raises Refused where it has none."""
         self._check_executes()
-        await self._calls.run(lambda: self._send(self._family.values.actions.output(number, bool(value))))
+        await self._calls.run(lambda: self._send(self._actions.output(number, bool(value))))
 
     async def inputs(self) -> dict[int | str, bool]:
         """Read the inputs: True is active. By number, and by function where they have one: `home`, `lim+`, `lim-`."""
@@ -314,7 +324,7 @@ class AsyncDrive(DriveFacts):
             if not lamp.output and lamp.on is not None:
                 found |= {int(lamp.name): lamp.on} if lamp.name.isdigit() else {}
                 found |= {lamp.function: lamp.on} if lamp.function else {}
-        for number, line in self._family.values.actions.ports(self._drive.state).items():
+        for number, line in self._actions.ports(self._drive.state).items():
             found[number] = bool(await self.read(f"[{line}]"))
         return found
 
@@ -329,16 +339,13 @@ class AsyncDrive(DriveFacts):
 
         Raises Inexpressible where its family has no error to read.
         """
-        if why := self._family.values.actions.no_error:
+        if why := self._actions.no_error:
             raise Inexpressible(f"{self.name}: {why}")
-        return await self._fault()
-
-    async def _fault(self) -> Fault | None:
         return fault_of(await self._conditions(slow=False))
 
     async def read_error(self) -> Fault | None:
         """Read the error **and clear it**; None: there was none. Raises as `error`."""
-        found, actions = None, self._family.values.actions
+        found, actions = None, self._actions
         if not actions.error:
             found = await self.error()
         elif code := await self.read(actions.error):
@@ -347,12 +354,12 @@ class AsyncDrive(DriveFacts):
                 text = self._family.language.describe_error(int(code), self.product)[0]
             found = Fault(int(code), text)
         if found is not None and (clear := actions.clear) is not None:
-            await self._calls.run(lambda: self._send(clear(self._first)))
+            await self._calls.run(lambda: self._send(clear(_first(self))))
         return found
 
     async def _conditions(self, slow: bool = True) -> Conditions:
         self._check_executes()
-        return self._of_axis(await self._calls.run(lambda: conditions(self._drive, slow)))
+        return _of_axis(self, await self._calls.run(lambda: conditions(self._drive, slow)))
 
     # Position and velocity
 
@@ -385,26 +392,9 @@ class AsyncDrive(DriveFacts):
     async def motion(self) -> Motion:
         """Read position and velocity of its axis at one time."""
         self._check_executes()
-        found = self._of_axis(await self._calls.run(self._drive.motion))
+        found = _of_axis(self, await self._calls.run(self._drive.motion))
         self._axis_known = True
         return found
-
-    def _of_axis(self, axes: Sequence[A]) -> A:
-        wanted = self.axis.lower()
-        found = next((each for each in axes if wanted in ("", each.axis.lower())), None)
-        if found is None:
-            names = ", ".join(each.axis for each in axes if each.axis)
-            raise Diagnostic(f"no axis {self.axis}", self.name, f"valid: {names}" if names else "it has one axis")
-        return found
-
-    @property
-    def _family(self) -> Family[Any]:
-        return self._drive.family
-
-    @property
-    def _first(self) -> str:
-        """Its axis as in `Motion.axis`."""
-        return self.axis.lower() or self._family.units.axes(self._drive.state)[0]
 
     def _check_executes(self) -> None:
         """Raise Refused in program mode, where the drive would store a line or a question."""
