@@ -9,7 +9,7 @@ WORKERS := $(shell $(PYTHON) -c 'import os; print((os.cpu_count() or 1) + 1)')
 PYTEST = $(BIN)/python -m pytest --dist worksteal -n $(WORKERS)
 PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check
 
-.PHONY: demo test quick nightly check format lint types types-here types-darwin types-win32 contracts measured coverage bench readme shipped pictures docs package fuzz soak simulate snapshots clean
+.PHONY: demo test quick nightly check format lint types types-here types-darwin types-win32 contracts measured coverage bench readme shipped pictures docs package fuzz soak simulate snapshots windows clean
 
 demo: $(VENV)/.run
 	$(BIN)/multidrop demo
@@ -22,7 +22,12 @@ quick: $(VENV)/.dev
 	$(BIN)/python -m pytest --dist worksteal -n $(shell $(PYTHON) -c 'import os; print(os.cpu_count() or 1)') -m "not process and not tui and not wide and not slow" --hypothesis-profile=quick
 
 nightly: $(VENV)/.dev
+	$(MAKE) windows
 	MULTIDROP_KILLS=12 $(PYTEST) --nightly --hypothesis-profile=search
+
+# The tests for Windows, under Wine, with a CPython for Windows in .venv/windows; TESTS="-x tests/macros": some of them.
+windows: $(VENV)/.dev
+	$(BIN)/python packaging/windows.py $(TESTS)
 
 # Cheap checks first, side by side: what is wrong is said early. The tests are last, so their summary ends the output.
 check: $(VENV)/.dev

@@ -173,7 +173,8 @@ def escaped_toml(text: str) -> str:
 
 def why(problem: OSError | ValueError) -> str:
     """Describe why a file cannot be opened. ValueError: its name contains a NUL."""
-    return getattr(problem, "strerror", None) or str(problem)
+    number = getattr(problem, "errno", None)
+    return os.strerror(number) if number else str(problem)  # on Windows `strerror` is in the language of the system
 
 
 _TOML = re.compile(

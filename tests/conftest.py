@@ -23,16 +23,15 @@ from multidrop.simulator.floor import Floor
 from tests.support.faults import disturb
 from tests.support.procedure import ProcedureRunner
 
-pytest_plugins = ["tests.support.marks", "tests.support.front_door"]
-if os.name == "posix":
-    pytest_plugins.append("tests.support.served_cell")
+pytest_plugins = ["tests.support.marks", "tests.support.front_door", "tests.support.served_cell"]
 
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 sys.dont_write_bytecode = False
 # A test run starts hundreds of processes: without kept bytecode each of them compiles every module.
 
 signal.signal(signal.SIGINT, signal.default_int_handler)
-signal.signal(signal.SIGHUP, signal.SIG_DFL)
+if sys.platform != "win32":
+    signal.signal(signal.SIGHUP, signal.SIG_DFL)
 # A test run in the background ignores both signals, and would pass that on to programs that must obey them.
 
 settings.register_profile(

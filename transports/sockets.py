@@ -59,6 +59,15 @@ _WHY = {
     errno.EHOSTUNREACH: "no route to that host; check the address, its power and the network",
     errno.ENETUNREACH: "no route to that network; check the address and this machine's own network",
 }
+_WINDOWS = {
+    64: errno.ECONNRESET,
+    121: errno.ETIMEDOUT,
+    1225: errno.ECONNREFUSED,
+    1231: errno.ENETUNREACH,
+    1232: errno.EHOSTUNREACH,
+    1236: errno.ECONNRESET,
+}
+"""Errors of Windows that Python gives no number of its own."""
 
 
 async def open_tcp(host: str, port: int, scheme: str = "tcp", within: float | None = None) -> Transport:
@@ -102,7 +111,8 @@ def explain(error: OSError | None) -> str:
         return "closed by the other end; check its power and the network"
     if isinstance(error, socket.gaierror):
         return "unknown host name; check the spelling, or give its address"
-    return _WHY.get(error.errno or 0) or (os.strerror(error.errno) if error.errno else str(error))
+    number = _WINDOWS.get(getattr(error, "winerror", 0) or 0, error.errno or 0)
+    return _WHY.get(number) or (os.strerror(number) if number else str(error))
 
 
 async def connected(

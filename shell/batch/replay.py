@@ -111,6 +111,7 @@ class VirtualLoop(asyncio.SelectorEventLoop):
     def __init__(self) -> None:
         self._impatient = _Impatient()
         super().__init__(self._impatient)
+        self._clock_resolution = 1e-9  # that of the real clock, 16 ms on Windows, would let timers pass one another
 
     def time(self) -> float:
         return self._impatient.skipped

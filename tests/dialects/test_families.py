@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import ast
-from pathlib import Path
 
 import pytest
 
@@ -11,8 +10,8 @@ from multidrop.dialects.families import DEFAULT, FAMILIES, TABLE, family_of, lan
 from multidrop.dialects.family import Hints
 from multidrop.shell.connect import urls
 from multidrop.shell.connect.url_forms import URL_FORMS
+from tests.support.paths import sources
 
-ROOT = Path(__file__).parents[2]
 ROOMS = ("drives", "shell", "tui", "macros", "multidrop")
 SCHEMES = {"shell/connect/url_forms.py"}
 """The table of URL schemes, where `modbus` is a scheme."""
@@ -20,10 +19,9 @@ SCHEMES = {"shell/connect/url_forms.py"}
 
 def test_no_front_end_names_a_family() -> None:
     named = {
-        f"{path.relative_to(ROOT)}:{node.lineno}: {node.value}"
-        for room in ROOMS
-        for path in (ROOT / room).rglob("*.py")
-        if path.relative_to(ROOT).as_posix() not in SCHEMES
+        f"{name}:{node.lineno}: {node.value}"
+        for name, path in sources(*ROOMS)
+        if name not in SCHEMES
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
         if isinstance(node, ast.Constant) and node.value in FAMILIES
     }

@@ -166,6 +166,7 @@ def test_a_name_that_is_empty_is_shown_as_one():
 
 
 @pytest.mark.skipif(not ENDLESS.exists(), reason="no /dev/zero here")
+@pytest.mark.fork
 async def test_a_simulation_refuses_an_endless_standard_input_and_reads_a_file(tmp_path: Path) -> None:
     loop, taken = asyncio.get_running_loop(), []
     with ENDLESS.open() as stdin, pytest.raises(Diagnostic, match="standard input: is larger than 1 MB"):

@@ -5,15 +5,14 @@ from __future__ import annotations
 import ast
 from collections.abc import Iterator
 from dataclasses import fields
-from pathlib import Path
 
 import pytest
 
 from multidrop.dialects.mcode.host.state import MCodeState
 from multidrop.dialects.modbus.host.codec import ModbusState
 from multidrop.dialects.pmx.host.codec import PmxState
+from tests.support.paths import sources
 
-ROOT = Path(__file__).parents[2]
 ROOMS = ("dialects", "drives", "shell", "tui", "macros", "multidrop")
 STATE_FILES = {"dialects/state.py", "dialects/mcode/host/state.py"} | {
     f"dialects/{family}/host/codec.py" for family in ("modbus", "pmx", "tmcl")
@@ -47,9 +46,8 @@ def breaches(source: str) -> Iterator[str]:
 def test_no_other_file_assigns_to_a_field_of_a_drives_state() -> None:
     found = {
         f"{name}:{each}"
-        for room in ROOMS
-        for path in (ROOT / room).rglob("*.py")
-        if (name := path.relative_to(ROOT).as_posix()) not in STATE_FILES
+        for name, path in sources(*ROOMS)
+        if name not in STATE_FILES
         for each in breaches(path.read_text(encoding="utf-8"))
     }
     assert found == set()

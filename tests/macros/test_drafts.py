@@ -9,6 +9,7 @@ import pytest
 from multidrop.dialects.errors import Diagnostic
 from multidrop.macros import MacroStore
 from multidrop.macros.store import begin_draft, finish_draft
+from tests.support.posix import has_mode
 
 TEXT = b"# mine\nname = 'm'\n[[step]]\nline = 'MR 1' # far\n"
 
@@ -28,7 +29,7 @@ def folder(tmp_path: Path) -> Path:
 
 def test_a_right_text_replaces_the_macro_byte_for_byte(store: MacroStore, folder: Path) -> None:
     draft = begin_draft(store, folder, "m")
-    assert draft.file.read_bytes() == TEXT and draft.file.stat().st_mode & 0o777 == 0o600
+    assert draft.file.read_bytes() == TEXT and has_mode(draft.file, 0o600)
     draft.file.write_bytes(TEXT.replace(b"1", b"2"))
     assert finish_draft(store, draft) == f"macro m: 1 line in {store.path('m')}"
     assert store.path("m").read_bytes() == TEXT.replace(b"1", b"2")

@@ -126,7 +126,7 @@ def test_paths_of_a_cell_leave_its_folder_where_the_configuration_allows_it(own_
 
 
 @pytest.mark.process
-@pytest.mark.skipif(sys.platform == "win32", reason="serves a pseudo-terminal")
+@pytest.mark.pty
 def test_paths_of_a_cell_leave_its_folder_where_its_server_is_given_allow(own_cell):
     running = Running("sim", "cell/own.toml", "--allow", "feed.mxt", "--allow", "p.tty", "--json", folder=own_cell)
     try:

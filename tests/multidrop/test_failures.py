@@ -11,10 +11,10 @@ import subprocess
 import sys
 import time
 
-import pexpect
 import pytest
 
 from tests.support.front_door import Home, read_to_end
+from tests.support.posix import pexpect
 from tests.support.processes import Running, Tap, environment
 from tests.support.until import PATIENCE
 

@@ -6,12 +6,12 @@ import json
 import sys
 import time
 
-import pexpect
 import pyte
 import pytest
 
 from tests.support.front_door import read_to_end
 from tests.support.hostile_drive import ACTING, HOSTILE, OVERRIDE, hostile_url  # noqa: F401
+from tests.support.posix import pexpect
 from tests.support.processes import environment
 from tests.support.until import PATIENCE
 

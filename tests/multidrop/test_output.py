@@ -17,6 +17,7 @@ pytestmark = pytest.mark.process
 FULL = Path("/dev/full")
 
 
+@pytest.mark.fork
 @pytest.mark.skipif(not FULL.exists(), reason="no /dev/full here")
 @pytest.mark.parametrize("variables", [{}, {"PYTHONUNBUFFERED": "1"}])
 @pytest.mark.parametrize("arguments", [["send", "sim:#press", "PR P", "PR V"], ["--version"], ["send", "--help"]])
@@ -119,6 +120,7 @@ def test_the_reader_of_a_persons_own_program_leaves(home):
         (["--version"], ">&-", 0, ""),
     ],
 )
+@pytest.mark.fork
 def test_closed_standard_streams_are_no_crash(home, arguments, closed, code, told):
     words = shlex.join([sys.executable, "-m", "multidrop", *arguments])
     done = subprocess.run(

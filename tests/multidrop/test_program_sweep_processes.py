@@ -43,7 +43,7 @@ def gone(pid: int) -> bool:
     return not subprocess.run(["pgrep", "-P", str(pid)], capture_output=True, text=True).stdout.strip()
 
 
-@pytest.mark.skipif(sys.platform == "win32", reason="no such signals")
+@pytest.mark.fork
 def test_an_interrupted_sweep_reports_what_is_done_and_leaves_no_process(folder: Path, home: Home) -> None:
     command = ["program", "sweep", "slow.mxt", "--vary", "seed=1..5000", "--jobs", "2", "--json", "--junit", "r.xml"]
     with open(folder / "errors", "wb") as log:

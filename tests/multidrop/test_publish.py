@@ -69,7 +69,7 @@ def test_a_cell_is_published_nothing_is_commanded_and_the_will_says_a_kill(
 
 
 @pytest.mark.process
-@pytest.mark.skipif(sys.platform == "win32", reason="signals")
+@pytest.mark.fork
 def test_the_encrypted_form_needs_the_right_authority_and_login_and_sigterm_says_bye(
     mosquitto: Mosquitto, tmp_path: Path, multidrop: Any
 ) -> None:

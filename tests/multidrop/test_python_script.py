@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 import signal
 import subprocess
 import sys
@@ -20,7 +19,7 @@ from tests.support.until import PATIENCE
 from tests.support.virtual import VirtualLoop
 
 HEAD = "from multidrop.script import session, values\na = session.drive('a')\n"
-POSIX = pytest.mark.skipif(os.name != "posix", reason="signals of POSIX")
+POSIX = pytest.mark.fork
 
 
 @pytest.fixture
@@ -167,7 +166,7 @@ def in_one_file(shop: Any, *command: str) -> str:
         ("session.send('VM=5')", "job.py:3: b refused"),
         ("raise SystemExit('not today')", "not today"),
         ("session.stop()", "stop: b reads velocity 0"),
-        ("import os; os.kill(os.getpid(), 15)", "interrupted"),
+        pytest.param("import os; os.kill(os.getpid(), 15)", "interrupted", marks=POSIX),
     ],
 )
 def test_what_a_program_printed_comes_before_what_is_said_of_its_end(shop: Any, end: str, said: str) -> None:

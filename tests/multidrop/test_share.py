@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import signal
 import socket
-import sys
 from pathlib import Path
 
 import pytest
@@ -16,7 +15,7 @@ from tests.support.until import PATIENCE
 
 
 @pytest.mark.process
-@pytest.mark.skipif(sys.platform == "win32", reason="sends SIGINT")
+@pytest.mark.fork
 def test_it_serves_says_who_writes_and_ends_well_on_a_signal(tmp_path: Path) -> None:
     running = Running("share", "sim:#press", "--rfc2217", "0", "--json", folder=tmp_path)
     try:

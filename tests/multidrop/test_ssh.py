@@ -8,7 +8,6 @@ import os
 import signal
 import subprocess
 import sys
-import tty
 from collections.abc import Iterator
 from functools import partial
 from pathlib import Path
@@ -25,8 +24,11 @@ from multidrop.transports.serial_ports import lock_owner
 from multidrop.transports.ssh import FarPort
 from multidrop.transports.ssh_session import open_ssh, reason
 from tests.support.cell_session import bus, party
+from tests.support.posix import tty
 from tests.support.ssh_server import fake_ssh, far_programs, script, ssh_server
 from tests.support.until import until
+
+pytestmark = pytest.mark.fork
 
 CELL = bus("press", party("a"), baud=0)
 

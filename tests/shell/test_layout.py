@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import pty
 import struct
 import sys
 
@@ -15,6 +14,7 @@ from multidrop.dialects.families import languages
 from multidrop.shell.events import Output, Printed
 from multidrop.shell.operations.table import VERBS
 from multidrop.shell.streams.event_printer import Printer, laid_out
+from tests.support.posix import pty
 
 NOTE = "  note       beyond one comparison it is read from left to right: R1=1&MV as (R1=1)&MV, KF&12=12 as (KF&12)=12"
 

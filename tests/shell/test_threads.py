@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import pty
 import threading
 
 import pytest
@@ -11,6 +10,7 @@ import pytest
 from multidrop.shell.log.writer import Disk
 from multidrop.shell.streams.output_streams import descriptor_writer
 from multidrop.shell.threads import BoundedWriter
+from tests.support.posix import pty
 from tests.support.until import PATIENCE
 
 DESTINATIONS = ("terminal", "pipe", "file", "log")

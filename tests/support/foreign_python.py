@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import fcntl
 import subprocess
 import sys
 import venv
@@ -12,6 +11,7 @@ from pathlib import Path
 import pytest
 
 from tests.support.paths import ROOT
+from tests.support.posix import fcntl
 
 TABLES_ONLY = ("pytrinamic==0.2.26", "typing_extensions", "pyserial==3.5")
 """What the tables of the maker's TMCL library need."""

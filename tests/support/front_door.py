@@ -116,7 +116,7 @@ class Home:
 
     def terminal(self, *arguments: str, columns: int = 80, **variables: str) -> Any:
         """Start a process on a pseudo-terminal of its own; `variables`: more of its environment."""
-        import pexpect
+        from tests.support.posix import pexpect
 
         child = pexpect.spawn(
             sys.executable,
@@ -156,7 +156,7 @@ class Home:
 
 def read_to_end(child: Any) -> int:
     """Read a terminal until its process has ended; return the exit code, negative for a signal."""
-    import pexpect
+    from tests.support.posix import pexpect
 
     child.expect(pexpect.EOF)
     child.wait()  # to close its terminal before that would end it by a signal

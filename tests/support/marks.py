@@ -5,12 +5,16 @@
 `needs` names programs of others, such as `mbpoll`: without them a test is skipped, or fails (`tests.support.tools`).
 `wide` marks a product of parameters. An ordinary run takes its corners and its diagonal; `--nightly` takes all of it,
 and the tests with the marker `nightly`.
+`pty`, `fork`, `AF_UNIX` and `tmux` mark what Windows has not (`tests.support.posix`): there such tests are left out.
 """
 
 from __future__ import annotations
 
 import asyncio
 import gc
+import os
+import re
+import subprocess
 import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -18,6 +22,7 @@ from typing import Any
 
 import pytest
 
+from tests.support.posix import LEFT_OUT, left_out, only_posix
 from tests.support.tools import tool
 from tests.support.virtual import VirtualLoop
 
@@ -40,6 +45,14 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 def pytest_configure() -> None:
     """Watch for processes until the run ends: an audit hook cannot be removed."""
     sys.addaudithook(_watch)
+    if sys.platform == "win32":
+        os.kill = _no_signal  # type: ignore[assignment]
+        subprocess.Popen.send_signal = _no_signal  # type: ignore[assignment,method-assign]
+
+
+def _no_signal(to: object, number: int) -> None:
+    """Leave out a test that would send a signal, which Windows takes for an order to end a process at once."""
+    left_out("fork")
 
 
 def _watch(event: str, _: Any) -> None:
@@ -58,9 +71,38 @@ def pytest_asyncio_loop_factories(item: pytest.Item) -> dict[str, Callable[[], a
     return {"virtual": VirtualLoop} if item.get_closest_marker("virtual") else {"real": asyncio.new_event_loop}
 
 
+def left_out_whole(file: Path) -> str | None:
+    """Return the marker by which every test of a file needs POSIX, read without an import of the file."""
+    marks = re.search(r"^pytestmark = (?:\[[^\]]*\]|.*)", file.read_text(encoding="utf-8"), re.MULTILINE)
+    return next((name for name in LEFT_OUT if marks and f"pytest.mark.{name}" in marks[0]), None)
+
+
+def pytest_ignore_collect(collection_path: Path) -> bool | None:
+    """Pass over a file that only POSIX can import."""
+    windows = sys.platform == "win32" and collection_path.name.startswith("test_")
+    return True if windows and left_out_whole(collection_path) else None
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_makereport(item: pytest.Item, call: pytest.CallInfo[None]) -> Iterator[pytest.TestReport]:
+    """Under Windows, take a test for left out that asks Python for what only POSIX has."""
+    report = yield
+    marker = sys.platform == "win32" and call.excinfo and only_posix(call.excinfo)
+    if marker:
+        report.outcome = "skipped"
+        report.longrepr = (str(item.path), item.location[1] or 0, f"{marker}: {LEFT_OUT[marker]}")
+    return report
+
+
 @pytest.hookimpl(tryfirst=True)
 def pytest_runtest_setup(item: pytest.Item) -> None:
-    """Look for the programs of others that a test needs."""
+    """Leave out what the platform has not; look for the programs of others that a test needs."""
+    if sys.platform == "win32":
+        for name in LEFT_OUT:
+            if item.get_closest_marker(name):
+                left_out(name)
+        if (mark := item.get_closest_marker("wine")) and "MULTIDROP_WINE" in os.environ:
+            pytest.skip(f"wine: {mark.args[0]}")
     for mark in item.iter_markers("needs"):
         for name in mark.args:
             tool(name)

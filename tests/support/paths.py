@@ -2,8 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
 SUPPORT = ROOT / "tests" / "support"
+ROOMS = ("multidrop", "tui", "shell", "macros", "drives", "simulator", "dialects", "transports")
 FACTS = ROOT.parent / "shared" / "facts"
+
+
+def sources(*rooms: str) -> Iterator[tuple[str, Path]]:
+    """Yield the Python files of rooms, by their names below the root. The links in `multidrop/` are not followed."""
+    for path in (path for room in rooms for path in (ROOT / room).rglob("*.py")):
+        parts = path.relative_to(ROOT).parts
+        if parts[0] != "multidrop" or parts[1] not in ROOMS:
+            yield "/".join(parts), path

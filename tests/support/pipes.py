@@ -8,7 +8,6 @@ import os
 import socket
 import threading
 import time
-import tty
 from collections.abc import AsyncIterator, Awaitable, Callable
 from dataclasses import dataclass, field
 
@@ -22,6 +21,7 @@ from multidrop.transports.rfc2217 import open_rfc2217
 from multidrop.transports.serial_port import SerialDevice, open_serial
 from multidrop.transports.sockets import SocketDevice, open_tcp, open_udp, set_socket_options
 from tests.support.lent_port import lent
+from tests.support.posix import tty
 from tests.support.until import PATIENCE
 
 

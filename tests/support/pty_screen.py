@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import os
-import pty
-import tty
+import sys
 from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
 from typing import Any
@@ -16,9 +15,12 @@ from textual.driver import Driver
 from textual.geometry import Size
 
 from multidrop.tui.app import MultidropApp
-from multidrop.tui.terminal.driver import Terminal
 from tests.support.fake_session import FakeAssist, FakeSession, demo_session, driver_of
+from tests.support.posix import pty, tty
 from tests.support.until import PATIENCE
+
+if sys.platform != "win32":
+    from multidrop.tui.terminal.driver import Terminal
 
 
 class PtyScreen:

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import fcntl
 import re
 import signal
 import socket
 import struct
-import termios
 import time
 
 import pytest
@@ -16,6 +14,7 @@ from multidrop.dialects.mcode.host.codec import MCode
 from multidrop.dialects.mcode.host.framing import sealed
 from tests.support.cell_session import TCP, bus, party
 from tests.support.front_door import Home
+from tests.support.posix import fcntl, termios
 from tests.support.until import PATIENCE
 
 CELL = bus("press", party("b"), baud=0, serve=TCP)
@@ -27,8 +26,8 @@ BR G1
 E
 PG
 """
-OTHERS = [pytest.param(number, marks=pytest.mark.nightly) for number in (signal.SIGINT, signal.SIGHUP)]
-SIGNALS = [signal.SIGTERM, signal.SIGQUIT, *OTHERS]
+INT, HUP, TERM, QUIT = (getattr(signal, f"SIG{name}", name) for name in ("INT", "HUP", "TERM", "QUIT"))
+SIGNALS = [TERM, QUIT, *(pytest.param(number, marks=pytest.mark.nightly) for number in (INT, HUP))]
 """Signals that end a program, some of them in every run where a test starts a process for each."""
 FLOOD = 250_000
 """Bytes, more than a terminal and a queue in front of it hold."""

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from multidrop.transports.serial_ports import PortInfo, list_ports, natural
+from multidrop.transports.serial_ports import PortInfo, list_ports, natural, stable_name
 
 
 def machine(monkeypatch: pytest.MonkeyPatch, root: Path, names: Sequence[str]) -> list[str]:
@@ -34,6 +34,7 @@ def test_ports_come_in_the_order_of_their_numbers(monkeypatch: pytest.MonkeyPatc
     assert [Path(port.device).name for port in list_ports(tmp_path)] == ["ttyACM0", "ttyUSB9", "ttyUSB10"]
 
 
+@pytest.mark.fork
 def test_the_stable_name_is_the_adapters_else_the_sockets(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     first, second, _ = machine(monkeypatch, tmp_path, ["ttyUSB0", "ttyUSB1", "ttyUSB2"])
     by_id = link(tmp_path, "dev/serial/by-id", "usb-FTDI_A10-if00-port0", first)
@@ -64,3 +65,8 @@ def test_listing_this_machine_works() -> None:
 def test_natural_order_is_that_of_the_numbers(numbers: list[int], prefix: str) -> None:
     names = [f"{prefix}{number}" for number in numbers]
     assert sorted(names, key=natural) == [f"{prefix}{number}" for number in sorted(numbers)]
+
+
+def test_on_macos_a_ports_own_name_has_the_adapters_serial_number(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("sys.platform", "darwin")
+    assert stable_name("/dev/cu.usbserial-A5069RR4") == "/dev/cu.usbserial-A5069RR4"

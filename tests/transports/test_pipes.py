@@ -7,8 +7,6 @@ import contextlib
 import os
 import re
 import select
-import sys
-import termios
 import threading
 import time
 
@@ -16,10 +14,11 @@ import pytest
 
 from multidrop.transports.rfc2217 import PIECE
 from tests.support.pipes import KINDS, PATIENCE, STREAMS, rig
+from tests.support.posix import termios
 
 pytestmark = [
     pytest.mark.slow,
-    pytest.mark.skipif(sys.platform == "win32", reason="the far ends are pseudo-terminals"),
+    pytest.mark.pty,
     pytest.mark.filterwarnings(r"ignore:set(Daemon|Name)\(\):DeprecationWarning"),
 ]
 

@@ -32,6 +32,8 @@ from multidrop.transports.relay_pipe import RelayEndpoint, RelayPipe
 from multidrop.transports.serial_ports import lock_owner
 from tests.support.lent_port import SocketConnection, lent
 
+pytestmark = pytest.mark.fork
+
 FRAMES = st.lists(st.tuples(st.sampled_from(Kind), st.binary(max_size=40)), max_size=20)
 HELD = 16
 """Bytes that the driver of the port holds."""

@@ -6,22 +6,20 @@ import asyncio
 import os
 import socket
 import subprocess
-import sys
-import termios
-import tty
 from pathlib import Path
 
 import pytest
 
 from multidrop.transports import TransportLost, Unreachable
 from multidrop.transports.rfc2217 import Rfc2217Pipe, open_rfc2217
+from tests.support.posix import termios, tty
 from tests.support.tools import tool
 from tests.support.until import PATIENCE, until
 
 pytestmark = [
     pytest.mark.process,
     pytest.mark.needs("ser2net"),
-    pytest.mark.skipif(sys.platform == "win32", reason="the far end is a pseudo-terminal"),
+    pytest.mark.pty,
 ]
 CONFIGURATION = """connection: &line
   accepter: telnet(rfc2217),tcp,127.0.0.1,{port}

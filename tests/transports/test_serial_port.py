@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import errno
 import os
+import re
 import subprocess
 import sys
 import threading
@@ -17,12 +18,8 @@ import serial
 from multidrop.transports import Unreachable
 from multidrop.transports.pipe import in_thread
 from multidrop.transports.serial_port import open_error, open_serial
+from tests.support.posix import termios
 from tests.support.until import PATIENCE
-
-if sys.platform == "win32":
-    pytest.skip("the ports are pseudo-terminals", allow_module_level=True)
-
-import termios
 
 LOCKS = """
 import fcntl, os, sys
@@ -94,8 +91,9 @@ async def test_the_port_is_raw_and_at_its_rate(pty: tuple[int, str], baud: int) 
 
 def rate(descriptor: int) -> int:
     """The true rate in Linux's termios2, custom ones included."""
-    import fcntl
     import struct
+
+    from tests.support.posix import fcntl
 
     settings = fcntl.ioctl(descriptor, 0x802C542A, bytes(44))
     return int(struct.unpack("4I B 19s 2I", settings)[-1])
@@ -103,7 +101,7 @@ def rate(descriptor: int) -> int:
 
 async def test_an_empty_slot_is_no_port(tmp_path: Path) -> None:
     path = str(tmp_path / "ttyUSB0")
-    with pytest.raises(Unreachable, match=f"^no port {path}; .*`multidrop ports`"):
+    with pytest.raises(Unreachable, match=f"^no port {re.escape(path)}; .*`multidrop ports`"):
         await open_serial(path)
 
 
@@ -143,11 +141,13 @@ async def test_a_port_that_goes_while_it_is_opened_is_unreachable_and_closed(
     assert len(os.listdir("/dev/fd")) == before
 
 
+@pytest.mark.fork
 def test_a_missing_permission_names_the_group() -> None:
     error = serial.SerialException(errno.EACCES, "could not open port")
     assert "usermod -aG dialout" in str(open_error("/dev/ttyNOWHERE", error))
 
 
+@pytest.mark.fork
 def test_a_busy_port_is_in_use() -> None:
     error = serial.SerialException(errno.EBUSY, "could not open port")
     assert str(open_error("/dev/ttyNOWHERE", error)) == "/dev/ttyNOWHERE is in use by another program; close it there"

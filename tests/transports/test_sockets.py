@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import socket
+import struct
 import sys
 from collections.abc import Iterator
 
@@ -16,10 +17,7 @@ from multidrop.transports.rfc2217 import open_rfc2217
 from multidrop.transports.sockets import open_tcp, open_udp
 from tests.support.until import PATIENCE
 
-pytestmark = [
-    pytest.mark.skipif(sys.platform == "win32", reason="looks at descriptors"),
-    pytest.mark.filterwarnings(r"ignore:set(Daemon|Name)\(\):DeprecationWarning"),
-]
+pytestmark = pytest.mark.filterwarnings(r"ignore:set(Daemon|Name)\(\):DeprecationWarning")
 
 
 class Ear:
@@ -39,6 +37,13 @@ def closed_port() -> Iterator[int]:
     with socket.socket() as taken:
         taken.bind(("127.0.0.1", 0))
         yield taken.getsockname()[1]
+
+
+@pytest.mark.parametrize(("number", "told"), [(1225, "nothing listens there"), (1231, "no route to that network")])
+def test_errors_that_windows_alone_numbers_are_told_as_elsewhere(number: int, told: str) -> None:
+    error = OSError(22, "Invalid argument")
+    error.winerror = number  # type: ignore[attr-defined]
+    assert sockets.explain(error).startswith(told)
 
 
 async def test_a_refused_connection_says_where_and_why(closed_port: int) -> None:
@@ -109,7 +114,8 @@ async def test_a_name_server_that_is_silent_is_asked_once_at_a_time(monkeypatch:
 async def test_a_tcp_connection_sends_at_once_and_keeps_little_in_the_system() -> None:
     with socket.create_server(("127.0.0.1", 0)) as listener:
         transport = await open_tcp(*listener.getsockname())
-        inner: socket.socket = transport._endpoint._socket  # type: ignore[attr-defined]
+        device = "_device" if sys.platform == "win32" else "_endpoint"
+        inner: socket.socket = getattr(transport, device)._socket
         assert inner.getsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY)
         assert inner.getsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE)
         assert inner.getsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF) <= 2 * 8192
@@ -145,6 +151,7 @@ async def test_each_udp_write_is_one_datagram_and_an_empty_one_is_no_end() -> No
         await transport.close()
 
 
+@pytest.mark.wine("its datagram sockets do not tell that nobody listens")
 async def test_udp_to_where_nothing_listens_is_lost() -> None:
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as taken:
         taken.bind(("127.0.0.1", 0))
@@ -161,12 +168,15 @@ async def test_a_reset_is_a_loss() -> None:
         transport, ear = await open_tcp(*listener.getsockname()), Ear()
         transport.start(ear.heard.append, ear.lost.set_result)
         client, _ = listener.accept()
-        client.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, b"\1\0\0\0\0\0\0\0")
+        client.setsockopt(
+            socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("HH" if sys.platform == "win32" else "ii", 1, 0)
+        )
         client.close()
         assert "cut the connection" in await ear.loss()
         await transport.close()
 
 
+@pytest.mark.fork
 async def test_when_a_write_finds_the_pipe_broken_what_had_come_is_delivered_first() -> None:
     near, far = socket.socketpair()
     near.setblocking(False)
@@ -181,6 +191,7 @@ async def test_when_a_write_finds_the_pipe_broken_what_had_come_is_delivered_fir
     await transport.close()
 
 
+@pytest.mark.fork
 async def test_a_pipe_that_broke_before_its_start_says_so_then() -> None:
     near, far = socket.socketpair()
     near.setblocking(False)

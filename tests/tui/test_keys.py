@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import os
 from collections.abc import Iterator
 from contextlib import AsyncExitStack
 
@@ -19,7 +18,7 @@ from tests.support.examples import examples
 from tests.support.fake_session import FakeAssist, demo_session
 from tests.support.pty_screen import PtyScreen, on_a_pty
 
-pytestmark = [pytest.mark.tui, pytest.mark.skipif(os.name != "posix", reason="pseudo-terminals")]
+pytestmark = [pytest.mark.tui, pytest.mark.pty]
 HOME, UP, DOWN, LEFT = b"\x1b[H", b"\x1b[A", b"\x1b[B", b"\x1b[D"
 BACKSPACE, CTRL_U, TAB, ENTER = b"\x7f", b"\x15", b"\t", b"\r"
 SELECTOR, HISTORY, PALETTE, QUIT, PLOT = b"\x0f", b"\x12", b"\x10", b"\x11", b"\x14"

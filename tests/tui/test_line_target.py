@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import os
 from pathlib import Path
 
 import pytest
@@ -19,7 +18,7 @@ from tests.support.fake_session import FakeBus, FakeDrive, FakeSession, demo_ses
 from tests.support.pty_screen import demo, on_a_pty
 from tests.support.real_screen import real_app
 
-pytestmark = [pytest.mark.tui, pytest.mark.skipif(os.name != "posix", reason="pseudo-terminals")]
+pytestmark = [pytest.mark.tui, pytest.mark.pty]
 NEXT_BUS, BUS_1, BUS_2 = b"\x1b[6;5~", b"\x1b1", b"\x1b2"
 
 

@@ -15,7 +15,7 @@ import pytest
 from tests.support.paths import SUPPORT
 from tests.support.until import PATIENCE
 
-pytestmark = [pytest.mark.process, pytest.mark.needs("tmux")]
+pytestmark = [pytest.mark.process, pytest.mark.needs("tmux"), pytest.mark.tmux]
 
 
 class Tmux:

@@ -5,19 +5,18 @@ from __future__ import annotations
 import os
 import signal
 import sys
-import termios
 import time
 from collections.abc import Iterator
 from pathlib import Path
 
-import pexpect
 import pytest
 
 from tests.support.front_door import read_to_end
 from tests.support.paths import SUPPORT
+from tests.support.posix import pexpect, termios
 from tests.support.until import PATIENCE
 
-pytestmark = pytest.mark.skipif(os.name != "posix", reason="pseudo-terminals")
+pytestmark = pytest.mark.pty
 PROGRAM = SUPPORT / "screen_program.py"
 STOP = "\x18"
 

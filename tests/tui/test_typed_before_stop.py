@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import os
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from pathlib import Path
@@ -21,7 +20,7 @@ from tests.support.pty_screen import PtyScreen, demo, on_a_pty
 from tests.support.real_screen import real_app
 from tests.support.until import PATIENCE
 
-pytestmark = [pytest.mark.tui, pytest.mark.skipif(os.name != "posix", reason="pseudo-terminals")]
+pytestmark = [pytest.mark.tui, pytest.mark.pty]
 STOP = b"\x18"
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import signal
 
 import pyte
@@ -11,7 +10,7 @@ import pytest
 from tests.support.front_door import read_to_end
 from tests.support.served_cell import FLOOD, LOG, SIGNALS, Shop, ends, until
 
-pytestmark = [pytest.mark.process, pytest.mark.skipif(os.name != "posix", reason="pseudo-terminals")]
+pytestmark = [pytest.mark.process, pytest.mark.pty]
 F3 = "\x1bOR"
 LINES = (f"/log {LOG}", "@press:b SL 100000", "@noisy:a EX G1", "/sleep 1000")
 

@@ -1,7 +1,6 @@
 """Ending with drives in motion: a terminal asks once and names them, a pipe does not."""
 
 import asyncio
-import os
 import signal
 
 import pytest
@@ -64,7 +63,7 @@ async def test_what_a_stop_ends_is_waited_for_and_no_reason_to_ask(tmp_path):
             await playing
 
 
-@pytest.mark.skipif(os.name != "posix", reason="pseudo-terminals")
+@pytest.mark.pty
 @pytest.mark.parametrize("end", ["/quit\r", "\x04"])
 def test_the_prompt_asks_once_while_a_drive_moves(shop, end):
     child = shop.terminal("shell", "press")
@@ -82,7 +81,7 @@ def test_the_prompt_asks_once_while_a_drive_moves(shop, end):
     assert read_to_end(child) == 0 and shop.velocity() == 5000
 
 
-@pytest.mark.skipif(os.name != "posix", reason="pseudo-terminals")
+@pytest.mark.pty
 @pytest.mark.parametrize(("early", "keys"), [(False, "/quit\r"), (False, "\x04"), (True, "PR V\r\x04")])
 def test_the_prompt_ends_at_once_where_nothing_moves(shop, keys, early):
     child = shop.terminal("shell", "press")
@@ -98,7 +97,7 @@ def test_a_pipe_is_not_asked(shop):
     assert piped.end() == 0 and piped.errors == [] and shop.velocity() == 5000
 
 
-@pytest.mark.skipif(os.name != "posix", reason="pseudo-terminals")
+@pytest.mark.pty
 @pytest.mark.parametrize("front", ["tui", "shell"])
 @pytest.mark.parametrize("mine", [True, False], ids=["a macro's", "an operator's"])
 def test_a_signal_stops_what_a_macro_started_and_not_what_an_operator_did(shop, front, mine):

@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import asyncio
-import fcntl
 import os
 import signal
 import socket
-import sys
 from collections.abc import AsyncIterator
 from contextlib import AsyncExitStack, asynccontextmanager
 from pathlib import Path
@@ -24,10 +22,11 @@ from multidrop.simulator.cells import load
 from multidrop.simulator.floor import Floor
 from multidrop.simulator.serving.endpoints import Served, serve_bus
 from multidrop.simulator.serving.running import RunningFloor
+from tests.support.posix import fcntl
 from tests.support.processes import Running
 from tests.support.until import until
 
-pytestmark = [pytest.mark.process, pytest.mark.skipif(sys.platform == "win32", reason="pseudo-terminals")]
+pytestmark = [pytest.mark.process, pytest.mark.pty]
 CELL = """
 [[bus]]
 name = "press"

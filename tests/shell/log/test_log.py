@@ -225,6 +225,7 @@ def test_a_file_that_cannot_be_opened_is_named(session, tmp_path):
         SessionLog(session, str(tmp_path / "gone" / "day.log"))
 
 
+@pytest.mark.fork
 def test_a_full_disk_ends_the_log_with_one_warning(session):
     session.log = SessionLog(session, "/dev/full")
     session.publish(Notified(1.0, "first"), Notified(1.0, "second"))

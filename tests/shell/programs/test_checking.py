@@ -76,7 +76,7 @@ def test_a_file_with_errors_is_not_touched(tmp_path: Path) -> None:
     assert spelled(file) == WRONG.encode() and os.listdir(tmp_path) == ["a.mxt"]
 
 
-@pytest.mark.skipif(os.name != "posix", reason="symbolic links")
+@pytest.mark.fork
 def test_a_link_stays_a_link(tmp_path: Path) -> None:
     (tmp_path / "real.mxt").write_text("vm 5000\n")
     (link := tmp_path / "a.mxt").symlink_to("real.mxt")
@@ -112,7 +112,7 @@ def test_a_file_that_is_read_only_stays_as_it_is(tmp_path: Path, monkeypatch: py
     assert file.read_text() == "vm 5000\n"
 
 
-@pytest.mark.skipif(os.name != "posix", reason="named pipes")
+@pytest.mark.fork
 def test_only_a_regular_file_is_replaced(tmp_path: Path) -> None:
     (file := tmp_path / "a.mxt").write_text("vm 5000\n")
     checked = examine(str(file), "LMDCM")

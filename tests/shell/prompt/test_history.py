@@ -8,6 +8,7 @@ import pytest
 
 from multidrop.shell.prompt import line_queue
 from multidrop.shell.prompt.line_queue import History
+from tests.support.posix import has_mode
 from tests.support.until import PATIENCE
 
 
@@ -21,7 +22,7 @@ def test_lines_are_kept_between_runs_oldest_first(tmp_path):
     for line in ("PR P", "  ", "MR 100", "two\nlines"):
         kept.append(line)
     assert History(kept.path).lines() == ["PR P", "MR 100"]
-    assert kept.path.stat().st_mode & 0o777 == 0o600
+    assert has_mode(kept.path, 0o600)
 
 
 def test_a_history_that_cannot_be_kept_costs_no_line(tmp_path):
@@ -51,7 +52,7 @@ def test_a_file_that_is_cut_keeps_its_mode(tmp_path, three_kept):
         filled(kept.path)
         kept.path.chmod(mode)
         kept.lines()
-        assert kept.path.stat().st_mode & 0o777 == mode
+        assert has_mode(kept.path, mode)
 
 
 def test_a_file_made_anew_is_for_its_user_only(tmp_path, three_kept):
@@ -59,7 +60,7 @@ def test_a_file_made_anew_is_for_its_user_only(tmp_path, three_kept):
     for number in range(9):
         kept.append(f"MR {number}")
         assert kept.lines()[-1] == f"MR {number}"
-    assert kept.path.stat().st_mode & 0o777 == 0o600
+    assert has_mode(kept.path, 0o600)
     assert len(kept.path.read_text().splitlines()) <= 6
 
 

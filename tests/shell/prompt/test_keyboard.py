@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import asyncio
 import os
-import pty
-import termios
 import threading
 
 import pytest
@@ -13,9 +11,10 @@ import pytest
 from multidrop.shell.prompt.keyboard import Keyboard
 from multidrop.shell.prompt.raw_terminal import _waiting as waiting
 from multidrop.shell.prompt.terminal_input import PAUSE, at_keyboard
+from tests.support.posix import pty, termios
 from tests.support.until import PATIENCE
 
-pytestmark = pytest.mark.skipif(os.name != "posix", reason="pseudo-terminals")
+pytestmark = pytest.mark.pty
 
 
 class Typed:

@@ -14,7 +14,7 @@ from tests.support.front_door import read_to_end
 from tests.support.processes import Tap
 from tests.support.served_cell import SIGNALS, ends, until
 
-pytestmark = [pytest.mark.process, pytest.mark.skipif(os.name != "posix", reason="pseudo-terminals")]
+pytestmark = [pytest.mark.process, pytest.mark.pty]
 PASTE = "\x1b[200~"
 
 

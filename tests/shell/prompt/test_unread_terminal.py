@@ -5,19 +5,18 @@ The judge is the simulated drive, which a second process asks.
 
 from __future__ import annotations
 
-import fcntl
 import os
 import re
 import signal
 import struct
-import termios
 
 import pytest
 
 from tests.support.front_door import read_to_end
+from tests.support.posix import fcntl, termios
 from tests.support.served_cell import FLOOD, LOG, ends, until
 
-pytestmark = [pytest.mark.process, pytest.mark.skipif(os.name != "posix", reason="pseudo-terminals")]
+pytestmark = [pytest.mark.process, pytest.mark.pty]
 FULL = 4000
 """Bytes that wait in a terminal when it is full, as far as the master can see."""
 

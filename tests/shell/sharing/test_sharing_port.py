@@ -6,9 +6,6 @@ import asyncio
 import contextlib
 import os
 import socket
-import sys
-import termios
-import tty
 from collections.abc import AsyncIterator
 from functools import partial
 from pathlib import Path
@@ -27,10 +24,11 @@ from multidrop.shell.sharing.writer_turns import NOT_REACHED, TURN, Say
 from multidrop.transports import TransportLost, Unreachable, telnet
 from multidrop.transports.rfc2217 import open_rfc2217
 from multidrop.transports.telnet import OPTION, Setting, message
+from tests.support.posix import termios, tty
 from tests.support.until import PATIENCE, until
 
 pytestmark = [
-    pytest.mark.skipif(sys.platform == "win32", reason="the port is a pseudo-terminal"),
+    pytest.mark.pty,
     pytest.mark.filterwarnings(r"ignore:set(Daemon|Name)\(\):DeprecationWarning"),
 ]
 

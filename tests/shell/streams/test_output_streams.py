@@ -7,7 +7,6 @@ import contextlib
 import errno
 import json
 import os
-import pty
 import re
 import select
 import sys
@@ -19,6 +18,7 @@ import pytest
 from multidrop.shell import threads
 from multidrop.shell.streams import output_streams, stdout
 from multidrop.shell.streams.output_streams import descriptor_writer
+from tests.support.posix import pty
 from tests.support.served_cell import until
 from tests.support.until import PATIENCE
 
@@ -253,6 +253,7 @@ async def test_a_reader_that_takes_nothing_is_given_up_at_the_end(monkeypatch, h
         assert os.fstat(sys.stdout.fileno()).st_rdev == os.stat(os.devnull).st_rdev
 
 
+@pytest.mark.fork
 async def test_a_full_disk_is_told_at_the_end(monkeypatch):
     with open("/dev/full", "w") as full:
         monkeypatch.setattr(sys, "stdout", full)

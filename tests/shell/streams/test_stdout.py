@@ -1,7 +1,6 @@
 import contextlib
 import io
 import os
-import pty
 import signal
 import socket
 import sys
@@ -15,6 +14,7 @@ from multidrop.shell.exit_codes import exit_code
 from multidrop.shell.streams.event_printer import Printer
 from multidrop.shell.streams.stdout import ReaderWatch, report, write
 from multidrop.transports import TransportLost, Unreachable
+from tests.support.posix import pty
 
 
 @pytest.mark.parametrize(

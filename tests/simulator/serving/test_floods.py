@@ -9,7 +9,6 @@ import os
 import select
 import socket
 import struct
-import termios
 import tracemalloc
 from collections.abc import AsyncIterator, Awaitable, Callable
 from contextlib import AsyncExitStack
@@ -25,6 +24,7 @@ from multidrop.simulator.serving import running
 from multidrop.simulator.serving.endpoints import BACKLOG, serve_bus
 from multidrop.simulator.serving.running import RunningFloor
 from multidrop.simulator.wire import Wire
+from tests.support.posix import termios
 from tests.support.until import PATIENCE
 
 pytestmark = pytest.mark.slow
@@ -357,7 +357,7 @@ def test_commands_that_wait_for_the_line_feed_of_a_party_line_are_bounded() -> N
 def test_select_knows_packet_mode() -> None:
     """That a flush is seen while a pseudo-terminal is not read depends on it."""
     master, slave = os.openpty()
-    import fcntl
+    from tests.support.posix import fcntl
 
     fcntl.ioctl(master, termios.TIOCPKT, struct.pack("i", 1))
     os.write(slave, b"x" * 100)

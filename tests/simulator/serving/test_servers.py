@@ -4,15 +4,12 @@ from __future__ import annotations
 
 import asyncio
 import errno
-import fcntl
 import json
 import os
 import re
 import signal
 import socket
 import sys
-import termios
-import tty
 from collections.abc import AsyncIterator, Awaitable, Callable
 from contextlib import AsyncExitStack
 from pathlib import Path
@@ -28,6 +25,7 @@ from multidrop.simulator.serving.in_process import connect
 from multidrop.simulator.serving.running import RunningFloor
 from multidrop.transports import TransportLost
 from tests.support.paths import ROOT
+from tests.support.posix import fcntl, termios, tty
 from tests.support.until import PATIENCE
 
 CELL = """
