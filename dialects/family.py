@@ -16,6 +16,7 @@ from multidrop.dialects.on_demand import imported, imported_if
 from multidrop.dialects.state import DriveState, Owed, Remembered
 
 if TYPE_CHECKING:
+    from multidrop.dialects.certifying import Certifying
     from multidrop.dialects.debugging import Debugging
     from multidrop.dialects.program_files import Difference, Held
     from multidrop.dialects.scanning import Scan
@@ -265,6 +266,8 @@ class Family(Generic[S]):
     """The place of its `Debugging`."""
     scan_at: str = ""
     """The place of its `Scan`."""
+    certifying_at: str = ""
+    """The place of its `Certifying`."""
     registers: Registers[S] | None = None
     baud: int = 9600
     """The default baud of a serial line."""
@@ -304,6 +307,12 @@ class Family(Generic[S]):
     def debugging(self) -> Debugging[S] | None:
         """Observes the programs of its drives; None: they cannot be observed."""
         found: Debugging[S] | None = imported_if(self.debugging_at)
+        return found
+
+    @property
+    def certifying(self) -> Certifying[S] | None:
+        """The questions of a certificate to its drives; None: there are none."""
+        found: Certifying[S] | None = imported_if(self.certifying_at)
         return found
 
     @property

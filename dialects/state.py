@@ -14,9 +14,9 @@ from multidrop.dialects.codec import Codec
 
 @dataclass(frozen=True)
 class Owed:
-    """An echo mode to restore in a drive, or a download to end, and how to recognise that drive.
+    """An echo mode to restore in a drive, or a download to end, or settings, and how to recognise that drive.
 
-    `serial` is empty where the drive does not report one.
+    `serial` is empty where the drive does not report one. `lines` restore settings; empty: it is one of the others.
     """
 
     em: int
@@ -25,6 +25,7 @@ class Owed:
     version: str
     part: str
     serial: str = ""
+    lines: str = ""
 
     def like(self, state: DriveState) -> bool:
         """Whether this may be the same drive, apart from its serial number."""

@@ -34,6 +34,21 @@ def check(path: str | Path, *, printed: bool = False) -> None:
     raise Diagnostic("exists already", str(path), "name a new file")
 
 
+def check_space(path: str, size: int) -> None:
+    """Check that the disk takes a new file of this size, before there is a text for it. Raises Diagnostic."""
+    check(path, printed=True)
+    if path == STANDARD_OUTPUT:
+        return
+    from multidrop.macros.atomic import create_atomically
+
+    probe = Path(path).with_name(f".{os.path.basename(path)}.{os.urandom(4).hex()}")
+    try:
+        create_atomically(probe, bytes(size))
+        probe.unlink()
+    except (OSError, ValueError) as problem:
+        raise Diagnostic(f"cannot be written: {why(problem)}", path) from None
+
+
 def check_folder(path: str | Path) -> None:
     """Raise Diagnostic where the folder of a file to write does not exist: a wrong name makes no folders."""
     if not os.path.isdir(os.path.dirname(os.path.abspath(path))):

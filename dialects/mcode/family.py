@@ -50,6 +50,7 @@ MCODE = Family(
     repairs=True,
     remember=remember,
     scan_at="multidrop.dialects.mcode.host.scan:SCAN",
+    certifying_at="multidrop.dialects.mcode.host.programs:CERTIFYING",
     values_at="multidrop.dialects.mcode.host.values:VALUES",
     units_at="multidrop.dialects.mcode.host.units:UNITS",
     stop_bytes=STOP_BYTES,

@@ -59,6 +59,7 @@ MODBUS = Family(
     guards=Guards(guards.NAMES, guarded, guards.word_of, guards.only_ends),
     protection=CYBER_SECURITY,
     prepare=pdu_codec,
+    certifying_at="multidrop.dialects.modbus.host.operations:CERTIFYING",
     values_at="multidrop.dialects.modbus.host.values:VALUES",
     units_at="multidrop.dialects.modbus.host.units:UNITS",
 )

@@ -85,6 +85,7 @@ PMX = Family(
     guards=Guards(GUARDS, lambda state, text: guarded(text, state.address), word_of, only_ends),
     scan_at="multidrop.dialects.pmx.host.operations:SCAN",
     debugging_at="multidrop.dialects.pmx.host.programs:DEBUGGING",
+    certifying_at="multidrop.dialects.pmx.host.operations:CERTIFYING",
     values_at="multidrop.dialects.pmx.host.values:VALUES",
     units_at="multidrop.dialects.pmx.host.units:UNITS",
     stop_bytes=STOP_BYTES,

@@ -117,6 +117,7 @@ TMCL = Family(
     programs_at="multidrop.dialects.tmcl.host.programs:PROGRAM_FILES",
     debugging_at="multidrop.dialects.tmcl.host.programs:DEBUGGING",
     repairs=True,
+    certifying_at="multidrop.dialects.tmcl.host.operations:CERTIFYING",
     values_at="multidrop.dialects.tmcl.host.values:VALUES",
     units_at="multidrop.dialects.tmcl.host.units:UNITS",
     stop_bytes=STOP_BYTES,

@@ -12,7 +12,7 @@ from multidrop.dialects import Diagnostic
 from multidrop.dialects.families import program_language_of, program_languages
 from multidrop.dialects.files import program_text_of
 from multidrop.dialects.program_files import errors
-from multidrop.shell import configuration, new_file, program_listing, snapshots
+from multidrop.shell import certificate, configuration, new_file, program_listing, snapshots
 from multidrop.shell.batch import runner
 from multidrop.shell.line_syntax import split_target
 from multidrop.shell.new_file import STANDARD_OUTPUT
@@ -174,6 +174,28 @@ def snapshot(chosen: argparse.Namespace) -> int:
         lambda session: snapshots.save(session, chosen.output, session.units.scales),
         unsolicited=not printed,
     )
+
+
+def certify(chosen: argparse.Namespace) -> int:
+    """Write a report, or compare a drive with one; report a wrong file before anything is opened."""
+    if is_several(chosen.drive):
+        raise Diagnostic(f"--drive {chosen.drive}: a report is of one drive", "certify", "name one")
+    if chosen.compare:
+        certificate.load(chosen.compare)
+    else:
+        new_file.check(chosen.output, printed=True)
+    differs = False
+
+    async def work(session: Session) -> None:
+        nonlocal differs
+        [drive] = targets(session, chosen.drive)
+        if chosen.compare:
+            differs = await certificate.compare(session, drive, chosen.compare)
+        else:
+            await certificate.certify(session, drive, chosen.output)
+
+    code = runner.run([chosen.url], work, agreed=chosen.yes, unsolicited=False, tried=[chosen.drive])
+    return code or (DIFFERS if differs else 0)
 
 
 def apply(chosen: argparse.Namespace) -> int:

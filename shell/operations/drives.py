@@ -213,6 +213,25 @@ SNAPSHOT_APPLY = Operation(
         "--yes": YES,
     },
 )
+CERTIFY = Operation(
+    command="certify",
+    meaning="ask a drive the questions that our rulings leave open, for a report; or compare a drive with a report",
+    run="drives.certify",
+    examples=[
+        "certify press --drive a -o report.toml",
+        "certify sim:#press --drive a -o report.toml --yes",
+        "certify --compare report.toml sim:#press --drive a",
+    ],
+    arguments={
+        "URL": WHAT,
+        "--drive ADDR": drives("the drive (default: the first)"),
+        "-o | --compare": {
+            "-o|--output FILE": "the new report; -: standard output",
+            "--compare FILE": "print where the answers differ from this report; exit code 0: nowhere, 1: somewhere",
+        },
+        "--yes": "agree to small moves beforehand; without, a terminal is asked",
+    },
+)
 TWIN = Operation(
     usage="/twin [on [ADDR ...] | off | limit STEPS]",
     help="""Run a simulated drive beside a real one, and warn where the two differ.

@@ -136,7 +136,8 @@ class PortState(Keeper):
         if self._line < 0 or not known.product:
             return
         async with self._writing:
-            owed = [each for each in self.owed if not (each.like(known) and each.serial == known.serial)]
+            own = ("", known.serial)
+            owed = [each for each in self.owed if not (each.like(known) and each.serial in own)]
             owed += [known.restore] if known.restore else []
             if tuple(owed) == self.owed:
                 return
@@ -221,7 +222,8 @@ class PortState(Keeper):
         path = self._store.folder / f"{self._name}.json"
         try:
             self.owed = self._store.load(
-                path.name, lambda found: tuple(_row(Owed, each, em=int) for each in found["owed"])[-MOST:]
+                path.name,
+                lambda found: tuple(_row(Owed, {"lines": "", **each}, em=int) for each in found["owed"])[-MOST:],
             )
         except FileNotFoundError:
             return

@@ -5,8 +5,9 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 from dataclasses import replace
-from functools import lru_cache
+from functools import lru_cache, partial
 
+from multidrop.dialects.certifying import repaired
 from multidrop.dialects.codec import End, Kind, Priority, Procedure, Reply, Request
 from multidrop.dialects.errors import DriveError, Inexpressible, NoAnswer, Refused
 from multidrop.dialects.family import Motion
@@ -131,7 +132,8 @@ def put_back_found(state: MCodeState, owed: Sequence[Owed]) -> Procedure[None]:
         return
     if any(each.serial for each in alike):
         state.serial_read((yield from serial_number(state)))
-    mine = next((each for each in alike if each.serial == state.serial), None)
+    yield from repaired(state, owed, partial(perform, state))
+    mine = next((each for each in alike if each.serial == state.serial and not each.lines), None)
     if mine is None or state.codec.em != 0:  # another host has set it since
         return
     state.owes(mine)
@@ -289,7 +291,7 @@ def perform(state: MCodeState, text: str) -> Procedure[tuple[str, ...]]:
         return ()
     if state.programming:
         return (yield from program_line(state, request))
-    if state.restore is not None:
+    if state.restore is not None and not state.restore.lines:
         yield from put_back(state)
         request = state.codec.request(state.address, text)
     if classify.enters_program(request.text):

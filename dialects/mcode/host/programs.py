@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from itertools import zip_longest
 
+from multidrop.dialects.certifying import Certifying, Occupied
 from multidrop.dialects.codec import Procedure
 from multidrop.dialects.family import Programs
 from multidrop.dialects.files import SourceLine
 from multidrop.dialects.mcode.host import classify, operations, program_readout
+from multidrop.dialects.mcode.host.before_request import value_of
 from multidrop.dialects.mcode.host.download import clears_itself, download
 from multidrop.dialects.mcode.host.operations import immediate
 from multidrop.dialects.mcode.host.program_readout import (
@@ -29,6 +32,7 @@ from multidrop.dialects.mcode.host.program_readout import (
 from multidrop.dialects.mcode.host.state import MCodeState
 from multidrop.dialects.mcode.manual import guards
 from multidrop.dialects.mcode.manual.grammar import Argument, Compare, LineError, Name, Number, Statement, Unary, parse
+from multidrop.dialects.mcode.manual.mnemonic import ETHERNET, EXPANDED
 from multidrop.dialects.mcode.manual.statements import canonical
 from multidrop.dialects.mcode.manual.table import lookup
 from multidrop.dialects.program_files import Difference, Held, Stored, first_difference
@@ -213,3 +217,43 @@ PROGRAMS: Programs[MCodeState] = Programs(
     names=program_readout.read_names,
     offered=program_readout.offered,
 )
+
+
+# The questions of a certificate.
+#
+# An immediate error runs a resident OE subroutine, and reading ER clears it. So the program is listed first, and LK is
+# read before that: a drive that is locked refuses L with an error. (MCode reference 5.1.40, 5.1.75, 5.1.94.)
+
+
+def _traits(state: MCodeState) -> set[str]:
+    """The firmware, the port, and how the drive is set, as far as questions depend on it."""
+    found = {
+        "mdrive" if state.product in EXPANDED | {"MDI", "MDIE"} else "lexium",
+        "ethernet" if ETHERNET.match(state.product) else "serial",
+    }
+    found |= {"base"} if state.product == "MDI" else set()
+    found |= {"party" if state.codec.party else "alone"}
+    return found | ({"named"} if state.name.isalnum() else set())
+
+
+def _occupied(state: MCodeState) -> Procedure[Occupied]:
+    """Find out whether an error stands, or a program is stored."""
+    error, locked = (yield from value_of(state, 'EF," ",LK', "[01] [01]")).split()
+    if error == "1":
+        return Occupied("an error stands (EF=1), and reading it clears it: PR ER does, then ask again")
+    if locked == "1":
+        return Occupied(errors=f"its program is locked (LK=1), so it cannot be listed; {_SUBROUTINE}")
+    lines = yield from operations.listing(state, "")
+    return Occupied(errors=f"a program is stored ({len(lines)} lines); {_SUBROUTINE}" if lines else "")
+
+
+def _masked(address: str, raw: bytes) -> str:
+    """Replace the drive's name, and check bytes, which depend on it."""
+    text, name = raw.decode("latin-1"), re.escape(address)
+    if name:
+        text = re.sub(rf'(?m)^{name}(?=[A-Z])|(?<="){name}(?=")|(?<=~){name}', "NAME", text)
+    return re.sub("[\x80-\xff]", "<check>", text)
+
+
+_SUBROUTINE = "an error would run its subroutine for errors (OE)"
+CERTIFYING = Certifying(__file__, "PR {}", "{}={}", _traits, _occupied, masked=_masked)

@@ -8,6 +8,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Sequence
 
+from multidrop.dialects.certifying import Certifying
 from multidrop.dialects.codec import End, Kind, Priority, Procedure, Reply, Request
 from multidrop.dialects.errors import Inexpressible, NoAnswer, Refused
 from multidrop.dialects.exchange import unanswered
@@ -341,3 +342,9 @@ def identify(hints: Hints) -> Procedure[list[ModbusState]]:
     if (yield from flagged(state)):
         state.note(f"{who(state)}: its error flag is set (EF=1); PR ER shows and clears the error")
     return [state]
+
+
+CERTIFYING = Certifying[ModbusState](
+    __file__, "PR {}", "{}={}", lambda state: {"closed"} if state.product.startswith("LMDC") else set()
+)
+"""All only read: over Modbus no program is listed, so nothing that may raise an error is asked."""

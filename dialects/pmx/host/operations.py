@@ -6,6 +6,7 @@ import re
 from collections.abc import Sequence
 from dataclasses import replace
 
+from multidrop.dialects.certifying import Certifying
 from multidrop.dialects.codec import End, Kind, Priority, Procedure, Reply, Request
 from multidrop.dialects.errors import Inexpressible, NoAnswer, Refused
 from multidrop.dialects.exchange import Exchange
@@ -338,3 +339,6 @@ SCAN = Scan(
     CLEARS,
     asked=lambda reach: "numbers 00 to 99",
 )
+
+CERTIFYING = Certifying[PmxState](__file__, "{}", "{}={}", refused="{text}")
+"""A refused command runs nothing in a controller (7.19.4: only a running program has a subroutine for errors)."""

@@ -6,7 +6,9 @@ Identification only reads: nothing moves, and no error is cleared.
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 
+from multidrop.dialects.certifying import Certifying, repaired
 from multidrop.dialects.codec import End, Kind, Priority, Procedure, Reply, Request
 from multidrop.dialects.errors import Inexpressible, NoAnswer, Refused, Stopped
 from multidrop.dialects.exchange import Exchange
@@ -111,7 +113,7 @@ def _replied(state: TmclState, request: Request) -> Procedure[Reply]:
         if status == Status.STORED:
             state.found_storing()
             state.note(f"{who(state)} is in download mode and stored '{request.text}'; {END} or a stop ends that")
-        elif status == Status.DONE and state.restore is not None:
+        elif status == Status.DONE and state.restore is not None and not state.restore.lines:
             state.owes_nothing()
         return reply
     except (Stopped, GeneratorExit):
@@ -374,12 +376,14 @@ def identify(hints: Hints) -> Procedure[list[TmclState]]:
     for name in names:
         state = TmclState(Tmcl(), name)
         state.named(name)
-        if any(each.name == name for each in hints.owed):
+        if any(each.name == name and not each.lines for each in hints.owed):
             yield from _end_download(state, "the last session left it in download mode")
         if not (yield from find(state)):
             state.note(f"{who(state)} does not reply")
         found.append(state)
     count_line(found)
+    for state in found:
+        yield from repaired(state, hints.owed, partial(perform, state))
     if not any(state.product for state in found):
         tried = ", ".join(state.address for state in found)
         raise NoAnswer(f"no module replies at {tried}; check power, baud and addresses (drives=1,2,...)")
@@ -426,3 +430,9 @@ def find(state: TmclState) -> Procedure[bool]:
 def _end_download(state: TmclState, why: str) -> Procedure[None]:
     yield state.codec.request(state.address, END, Call(Command.END_DOWNLOAD))
     state.note(f"{who(state)}: {why}; it was ended with 133: check the program in the module")
+
+
+CERTIFYING = Certifying[TmclState](
+    __file__, "GAP {}", "SAP {}, {}", refused="status {code}", masked=lambda address, raw: raw[2:-1].hex(" ")
+)
+"""A refused command runs nothing in a module. Replies are shown without their two addresses and their checksum."""

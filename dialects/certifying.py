@@ -1,0 +1,130 @@
+"""The questions of a certificate: the table of a family, and the restoring of the settings that a question changes.
+
+A table has one question in a row: the lines that are sent, what they may do, and the answer by our rulings.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from typing import Generic, NamedTuple, TypeVar
+
+from multidrop.dialects.codec import Procedure
+from multidrop.dialects.errors import NoAnswer, Refused
+from multidrop.dialects.rows import rows
+from multidrop.dialects.state import DriveState, Owed
+
+S = TypeVar("S", bound=DriveState)
+Perform = Callable[[str], Procedure[tuple[str, ...]]]
+"""Carries out a typed line."""
+NOTHING, ERROR, MODE, MOVES = "nothing", "error", "mode", "moves"
+DOES = (NOTHING, MODE, ERROR, MOVES)
+"""What a question may do: only read; also change a setting for a while; also raise an error; also move the motor."""
+BYTES, FITS = "bytes", "fits"
+"""What the answer is, in place of the printed lines: the bytes of the replies; whether they are as our ruling says."""
+
+
+class Question(NamedTuple):
+    """One question to a drive."""
+
+    name: str
+    asks: frozenset[str]
+    """The traits that a drive must have (`Certifying.traits`)."""
+    does: str
+    shows: str
+    """BYTES, FITS, or empty: the printed lines, the error numbers."""
+    keeps: tuple[str, ...]
+    """The settings that it changes, to be restored from the last to the first."""
+    lines: tuple[str, ...]
+    """What is sent. `{WORD}`, `{WORD+100}`: the value that the drive has before; `/wait`: until it is at rest."""
+    ruled: str
+    """The form of the answer by our rulings, a regular expression."""
+
+
+class Occupied(NamedTuple):
+    """Why some questions are not asked of a drive now; empty: they are."""
+
+    changes: str = ""
+    """The reason for all but those that only read."""
+    errors: str = ""
+    """The reason for those that may raise an error."""
+
+    def reason(self, does: str) -> str:
+        return "" if does == NOTHING else self.changes or (self.errors if does in (ERROR, MOVES) else "")
+
+
+@dataclass(frozen=True)
+class Certifying(Generic[S]):
+    """The questions to the drives of a family."""
+
+    module: str
+    """The `__file__` of the module beside which `questions.csv` is."""
+    reads: str
+    """The line that prints a setting."""
+    writes: str
+    """The line that gives a setting a value."""
+    traits: Callable[[S], set[str]] = lambda state: set()
+    """What a drive has that some questions need."""
+    occupied: Callable[[S], Procedure[Occupied]] | None = None
+    """Find out what must not be asked of a drive at rest without a running program; raises no error and clears none."""
+    refused: str = "error {code}"
+    """The answer of a drive that refuses: its error number, or the text of its reply (`{text}`)."""
+    masked: Callable[[str, bytes], str] = lambda address, raw: raw.decode("latin-1")
+    """The bytes of a reply of the drive at an address as a text, without its name."""
+
+    def questions(self, state: S) -> list[Question]:
+        """The questions for a drive, in order; of several with one name the first."""
+        own, found = self.traits(state), dict[str, Question]()
+        for each in self.table:
+            if each.asks <= own:
+                found.setdefault(each.name, each)
+        return list(found.values())
+
+    @property
+    def table(self) -> list[Question]:
+        return [
+            Question(
+                row["name"],
+                frozenset(row["asks"].split()),
+                row["does"],
+                row["shows"],
+                tuple(filter(None, row["keeps"].split("; "))),
+                tuple(row["lines"].split(" // ")),
+                row["ruled"],
+            )
+            for row in rows(self.module, "questions.csv")
+        ]
+
+
+def owed(state: DriveState, lines: Sequence[str]) -> Owed:
+    """What is owed to a drive while a question has changed its settings: these lines restore them."""
+    return Owed(0, state.name, state.product, state.version, state.part, state.serial, "\n".join(lines))
+
+
+def restored(state: DriveState, perform: Perform) -> Procedure[None]:
+    """Restore the settings that a question has changed. A drive without a reply is owed them still.
+
+    A refusal is noted: sending the line again would change nothing.
+    """
+    assert state.restore is not None
+    for line in state.restore.lines.splitlines():
+        try:
+            yield from perform(line)
+        except Refused as refusal:
+            state.note(f"'{line}', the setting before a certificate's question, was refused: {refusal}")
+    state.owes_nothing()
+
+
+def repaired(state: DriveState, left: Iterable[Owed], perform: Perform) -> Procedure[None]:
+    """Restore, in this very drive only, the settings that an interrupted certificate has left, and say so."""
+    for mine in left:
+        if mine.lines and mine.like(state) and mine.serial in ("", state.serial):
+            state.owes(mine)
+            settings = ", ".join(mine.lines.splitlines())
+            try:
+                yield from restored(state, perform)
+            except NoAnswer as error:
+                state.note(f"{settings}: not restored after an interrupted certificate: {error}")
+            else:
+                state.note(f"an interrupted certificate left other settings; restored: {settings}")
+            return

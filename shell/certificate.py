@@ -1,0 +1,284 @@
+"""Certificates: the answers of a drive to the questions that our rulings leave open, and two drives compared by them.
+
+Theory of operation. A question is a row of the family's table. Its lines go the way of a typed line; its answer is what
+they print, or refuse. What a question changes is owed to the drive from before its first line: it is restored after the
+last one, after a stop, and by the next session if this one is killed. Questions that move the motor come last, after a
+person's word. A report has neither serial number nor name of a host, a port or the drive. Decision 0096.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import partial
+from typing import Any
+
+from multidrop.dialects import Diagnostic, DriveError, NoAnswer, Refused
+from multidrop.dialects.certifying import BYTES, FITS, MOVES, Occupied, Question, owed, restored
+from multidrop.dialects.files import escaped_toml, text_of, toml_of
+from multidrop.dialects.on_demand import imported
+from multidrop.drives.drive import Drive
+from multidrop.drives.events import Concluded, Transaction
+from multidrop.shell import new_file
+from multidrop.shell.channel import running
+from multidrop.shell.events import By
+from multidrop.shell.session import TRAVEL, Session
+from multidrop.shell.waits import wait
+from multidrop.transports import TransportLost
+
+HEAD = (
+    "What a drive answers to the questions of `multidrop certify`, one text for each line that was sent.",
+    "It holds no serial number, and no name of a host, a port, a person or the drive.",
+)
+SPACE = 64 * 1024
+"""More bytes than a report has."""
+NO_REPLY, AS_RULED, DONE = "no reply", "as ruled", "ok"
+WAIT, SLEEP = "/wait", "/sleep "
+"""Lines of a question that are not sent: until the drive rests, and for a time, s."""
+UNREACHED = "the questions ended before it"
+NO_CONSENT = "they move the motor, and nobody agreed to that (--yes agrees beforehand)"
+LONGEST_MOVE = 60.0
+_VALUE = re.compile(r"\{([A-Z]\w*|\d+, \d+)([+-]\d+)?\}", re.ASCII)
+
+
+@dataclass
+class Report:
+    """The answers of one drive, one for each line that was sent, and why other questions were not asked."""
+
+    drive: dict[str, str]
+    answers: dict[str, list[str]] = field(default_factory=dict)
+    unlike: list[str] = field(default_factory=list)
+    """The questions whose answer is not that of our ruling."""
+    unasked: dict[str, str] = field(default_factory=dict)
+
+    def text(self) -> str:
+        import tomlkit  # takes 30 ms to import
+
+        document = tomlkit.document()
+        for line in HEAD:
+            document.add(tomlkit.comment(line))
+        document["drive"] = self.drive
+        document["answers"] = self.answers
+        document["other_than_ruled"] = {"questions": self.unlike}
+        document["not_asked"] = {
+            why: [name for name, each in self.unasked.items() if each == why] for why in self.unasked.values()
+        }
+        return escaped_toml(tomlkit.dumps(document))
+
+
+def load(path: str) -> Report:
+    """Read a report. Raises Diagnostic."""
+    tables = toml_of(text_of(path), path)
+    drive, answers = tables.get("drive"), tables.get("answers")
+    if not (isinstance(drive, dict) and isinstance(drive.get("family"), str) and isinstance(answers, dict) and answers):
+        raise Diagnostic("is not a report with answers", path, "`multidrop certify URL -o FILE` writes one")
+    for name, lines in answers.items():
+        if not (isinstance(lines, list) and all(isinstance(line, str) for line in lines)):
+            raise Diagnostic("must be a list of texts", f"{path}: [answers] {name}")
+    return Report(dict(drive), dict(answers))
+
+
+async def certify(session: Session, drive: Drive, file: str) -> None:
+    """Ask a drive all questions, and write the report; one that ends early has what is known then."""
+    new_file.check_space(file, SPACE)
+    asking = Asking(session, drive)
+    try:
+        await asking.all()
+    finally:
+        _write(session, asking.report, file)
+    found, who = asking.report, session.display_name(drive)
+    others = f"; {len(found.unlike)} not as our rulings have it: {', '.join(found.unlike)}" if found.unlike else ""
+    counts = f"{len(found.answers)} questions answered, {len(found.unasked)} not asked"
+    session.notify(f"{who}: {counts}{others}{new_file.place(file)}", outcome=True)
+    for reason in dict.fromkeys(found.unasked.values()):
+        count = sum(each == reason for each in found.unasked.values())
+        session.notify(f"{who}: {count} not asked: {reason}", warning=True)
+
+
+def _write(session: Session, report: Report, file: str) -> None:
+    """Write a report; onto standard output where the disk takes no file, as the drive was asked. Raises Diagnostic."""
+    try:
+        new_file.write(file, report.text(), session.output)
+    except Diagnostic:
+        new_file.write(new_file.STANDARD_OUTPUT, report.text(), session.output)
+        raise
+
+
+async def compare(session: Session, drive: Drive, file: str) -> bool:
+    """Put the questions of a report to a drive, and print where its answers differ; whether they do.
+
+    An answer of the report that cannot be compared counts as a difference.
+    """
+    theirs, who = load(file), session.display_name(drive)
+    if theirs.drive["family"] != drive.family.name:
+        raise Diagnostic(f"has answers of the family {theirs.drive['family']}; {who} is of {drive.family.name}", file)
+    asking = Asking(session, drive)
+    try:
+        await asking.all(theirs.answers)
+    finally:
+        here, same = asking.report, 0
+        for name, there in theirs.answers.items():
+            own = here.answers.get(name)
+            same += own == there
+            if own is None:
+                why = here.unasked.get(name, f"no question to {drive.product}")
+                session.output(f"{name}: not compared: {why}")
+            elif own != there:
+                session.output(f"{name}: here {_shown(own)}; in {file} {_shown(there)}")
+        session.notify(f"{who}: {same} of {len(theirs.answers)} answers of {file} are the same", outcome=True)
+    return same != len(theirs.answers)
+
+
+def _shown(answers: Sequence[str]) -> str:
+    return " // ".join(each.encode("unicode_escape").decode() for each in answers)
+
+
+class Asking:
+    """The questions put to one drive, and its report so far."""
+
+    def __init__(self, session: Session, drive: Drive) -> None:
+        self._session, self._drive, self._who = session, drive, session.display_name(drive)
+        found = drive.family.certifying
+        if found is None:
+            raise Diagnostic(f"no questions are known for drives of {drive.family.name}", self._who)
+        self._table, state = found, drive.state
+        known = {"family": drive.family.name, "product": state.product, "version": state.version, "part": state.part}
+        known["traits"] = " ".join(sorted(found.traits(state)))
+        self.report = Report({key: text for key, text in known.items() if text})
+
+    async def all(self, wanted: Mapping[str, Any] | None = None) -> None:
+        """Ask all questions, or those that are `wanted`; those that move the motor come last."""
+        found = self._table.questions(self._drive.state)
+        questions = [each for each in found if wanted is None or each.name in wanted]
+        moving = [each for each in questions if each.does == MOVES]
+        self.report.unasked = {each.name: UNREACHED for each in questions}
+        with running(self._session, f"{self._who}: certify") as progress:
+            occupied = await self._occupied()
+            still = [each for each in questions if each.does != MOVES]
+            for number, question in enumerate(still):
+                progress(number, len(questions))
+                await self._unless(occupied.reason(question.does), question)
+            if not moving:
+                return
+            reason = (await self._occupied()).reason(MOVES) or await self._consent(moving)
+            reason = reason or (await self._occupied()).reason(MOVES)  # a person may have thought for a while
+            for number, question in enumerate(moving, len(still)):
+                progress(number, len(questions))
+                await self._unless(reason, question)
+
+    async def _occupied(self) -> Occupied:
+        """Why some questions must not be asked now."""
+        drive = self._drive
+        if drive.programming:
+            raise Refused(f"{self._who} is in program mode and would store every question; PG ends that")
+        if await drive.run(drive.family.moving(drive.state)):
+            return Occupied("it moved")
+        if await drive.busy():
+            return Occupied("its program ran")
+        ask = self._table.occupied
+        return Occupied() if ask is None else await drive.run(ask(drive.state))
+
+    async def _consent(self, moving: Sequence[Question]) -> str:
+        """Ask a person, unless --yes has agreed; the reason why the motor must not be moved."""
+        names = ", ".join(each.name for each in moving)
+        what = (
+            f"{self._who}: {len(moving)} more questions move the motor by 2000 steps at most, and back ({names}); move?"
+        )
+        questions = self._session.questions
+        return "" if questions.agreed or await questions.agrees(what) else NO_CONSENT
+
+    async def _unless(self, reason: str, question: Question) -> None:
+        """Ask one question, unless there is a reason against it; restore what it changes, after a stop too."""
+        if reason:
+            self.report.unasked[question.name] = reason
+            return
+        table, state = self._table, self._drive.state
+        words = dict.fromkeys(found[1] for line in (*question.lines, question.ruled) for found in _VALUE.finditer(line))
+        try:
+            values = {word: await self._value(word) for word in words}
+            kept = [table.writes.format(word, await self._value(word)) for word in question.keeps]
+        except Refused as refusal:
+            self.report.unasked[question.name] = f"a value that it needs was refused (error {refusal.code})"
+            return
+        if kept:
+            state.owes(owed(state, kept[::-1]))
+        try:
+            answers = [await self._answer(question, _filled(line, values)) for line in question.lines]
+        finally:
+            if kept:
+                await self._restore(kept)
+        del self.report.unasked[question.name]
+        fits = re.fullmatch(_filled(question.ruled, values), " // ".join(answers), re.DOTALL) is not None
+        if not fits:
+            self.report.unlike.append(question.name)
+        self.report.answers[question.name] = [AS_RULED] if fits and question.shows == FITS else answers
+
+    async def _restore(self, kept: Sequence[str]) -> None:
+        """Restore what a question has changed; say what a drive without a reply is still owed."""
+        drive = self._drive
+        try:
+            await drive.run(restored(drive.state, partial(drive.family.perform, drive.state)))
+        except (DriveError, TransportLost):
+            text = f"{', '.join(kept)}: not restored; the next session on this port does that"
+            self._session.notify(f"{self._who}: {text}", warning=True)
+            raise
+
+    async def _value(self, word: str) -> str:
+        """Read the value of a setting; a name without its quotation marks."""
+        printed = await self._drive.send(self._table.reads.format(word))
+        if not printed:
+            raise NoAnswer(f"{self._who} printed nothing for {word}")
+        return printed[0].strip()
+
+    async def _answer(self, question: Question, line: str) -> str:
+        """Send one line once, as a typed line is sent; return its answer as a text."""
+        drive, session, table = self._drive, self._session, self._table
+        if line == WAIT:
+            await wait(session, LONGEST_MOVE, idle=False, drives=[drive])
+            return DONE
+        if line.startswith(SLEEP):
+            await asyncio.sleep(float(line.removeprefix(SLEEP)))
+            return DONE
+        if question.does == MOVES and session.scaled:
+            await imported(TRAVEL)(session.units, drive, line, By.OPERATOR)
+        if drive.starts(line):
+            session.path.starting(drive)
+        taken: list[Transaction] = []
+
+        def note(concluded: Concluded) -> None:
+            if concluded.state is drive.state:
+                taken.extend(each for each in concluded.transactions if each.request.text == line)
+
+        leave = session.buses[drive.link.name].witnesses.add(note)
+        try:
+            text = "; ".join(await self._sent(line)) or DONE
+        except Refused as refusal:
+            text = table.refused.format(code=refusal.code, text=taken[-1].reply.text if taken else "")
+        except NoAnswer:
+            text = NO_REPLY
+        finally:
+            leave()
+        if question.shows == BYTES:
+            text = table.masked(taken[0].request.address, taken[0].reply.raw) if taken else NO_REPLY
+        return text.replace(drive.state.serial, "SERIAL") if drive.state.serial else text
+
+    async def _sent(self, line: str) -> tuple[str, ...]:
+        drive, (verb, *numbers) = self._drive, line.split(" ")
+        if verb == "/register":
+            address, count = (int(each, 0) for each in numbers)
+            return await drive.run(drive.family.registers.read(drive.state, address, count))
+        if verb == "/coil":
+            return await drive.run(drive.family.registers.read_coil(drive.state, int(numbers[0])))
+        return await drive.send(line)
+
+
+def _filled(text: str, values: Mapping[str, str]) -> str:
+    """Put values in place of `{WORD}`, and of `{WORD+100}` a sum."""
+
+    def value(found: re.Match[str]) -> str:
+        here = values[found[1]].strip('"')
+        return str(int(here) + int(found[2])) if found[2] else here
+
+    return _VALUE.sub(value, text)
