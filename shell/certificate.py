@@ -87,7 +87,8 @@ async def certify(session: Session, drive: Drive, file: str) -> None:
     try:
         await asking.all()
     finally:
-        _write(session, asking.report, file)
+        if asking.report.answers:
+            _write(session, asking.report, file)
     found, who = asking.report, session.display_name(drive)
     others = f"; {len(found.unlike)} not as our rulings have it: {', '.join(found.unlike)}" if found.unlike else ""
     counts = f"{len(found.answers)} questions answered, {len(found.unasked)} not asked"
@@ -226,7 +227,7 @@ class Asking:
             raise
 
     async def _value(self, word: str) -> str:
-        """Read the value of a setting; a name without its quotation marks."""
+        """Read the value of a setting."""
         printed = await self._drive.send(self._table.reads.format(word))
         if not printed:
             raise NoAnswer(f"{self._who} printed nothing for {word}")
@@ -266,11 +267,12 @@ class Asking:
 
     async def _sent(self, line: str) -> tuple[str, ...]:
         drive, (verb, *numbers) = self._drive, line.split(" ")
-        if verb == "/register":
+        registers = drive.family.registers
+        if registers is not None and verb == "/register":
             address, count = (int(each, 0) for each in numbers)
-            return await drive.run(drive.family.registers.read(drive.state, address, count))
-        if verb == "/coil":
-            return await drive.run(drive.family.registers.read_coil(drive.state, int(numbers[0])))
+            return await drive.run(registers.read(drive.state, address, count))
+        if registers is not None and verb == "/coil":
+            return await drive.run(registers.read_coil(drive.state, int(numbers[0])))
         return await drive.send(line)
 
 
@@ -278,7 +280,7 @@ def _filled(text: str, values: Mapping[str, str]) -> str:
     """Put values in place of `{WORD}`, and of `{WORD+100}` a sum."""
 
     def value(found: re.Match[str]) -> str:
-        here = values[found[1]].strip('"')
+        here = values[found[1]]
         return str(int(here) + int(found[2])) if found[2] else here
 
     return _VALUE.sub(value, text)

@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
+from typing import Any
 
 import pytest
 
+from multidrop.dialects.certifying import BYTES, DOES, FITS, MODE, NOTHING, Certifying
+from multidrop.dialects.families import FAMILIES
 from tests.support.paths import ROOT
 
 DOCS = ROOT / "docs"
@@ -29,9 +32,45 @@ def test_the_index_names_every_chapter_and_holds_no_ruling_itself() -> None:
 @pytest.mark.parametrize("path", CHAPTERS, ids=lambda path: path.stem)
 def test_every_ruling_says_what_it_rests_on(path: Path) -> None:
     head, *rulings = rows(path.read_text(encoding="utf-8"))
-    assert head == ["matter", "what the sources say", "what we do", "evidence"]
+    assert head == ["matter", "what the sources say", "what we do", "evidence", "question"]
     for row in rulings:
-        assert len(row) == 4 and EVIDENCE.fullmatch(row[3]), row
+        assert len(row) == 5 and EVIDENCE.fullmatch(row[3]), row
+
+
+def tables() -> dict[str, Certifying[Any]]:
+    return {name: family.certifying for name, family in FAMILIES.items() if family.certifying is not None}
+
+
+def test_every_ruling_names_its_questions_or_why_none_decides_it_and_every_question_decides_one() -> None:
+    index = rows((DOCS / "rulings.md").read_text(encoding="utf-8"))
+    reasons = {row[0].strip("`") for row in index[index.index(["reason", "no question decides it, because"]) + 1 :]}
+    known = {(name, each.name) for name, table in tables().items() for each in table.table}
+    own, named, used = {"modbus", "pmx", "tmcl"}, set(), set()
+    for path in CHAPTERS:
+        family = path.stem if path.stem in own else "mcode"
+        for row in rows(path.read_text(encoding="utf-8"))[1:]:
+            if row[4] in reasons:
+                used.add(row[4])
+                continue
+            found = re.findall(r"`([\w-]+)`", row[4])
+            assert ", ".join(f"`{name}`" for name in found) == row[4] and found, row
+            named |= {(family, name) for name in found}
+    assert (named, used) == (known, reasons)
+
+
+@pytest.mark.parametrize("name", tables())
+def test_no_question_is_guarded_stores_anything_or_changes_what_no_session_restores(name: str) -> None:
+    family, table = FAMILIES[name], tables()[name]
+    for question in table.table:
+        assert question.does in DOES and question.shows in ("", BYTES, FITS)
+        assert question.shows != FITS or question.ruled != ".*"
+        assert not question.keeps or (family.repairs and question.does != NOTHING), question
+        for line in question.lines:
+            state = family.new_state(family.codec, "")
+            assert family.guards is None or family.guards.find(state, line) is None, line
+            assert not re.match(r"(S|IP|CP|FD|PG|LK|STORE|ST[AG]P|UG|ER)\b", line), line
+            if question.does in (NOTHING, MODE) and not line.startswith("/"):
+                assert not family.codec.starts_motion(line), line
 
 
 @pytest.mark.parametrize("path", [DOCS / "rulings.md", *CHAPTERS], ids=lambda path: path.stem)

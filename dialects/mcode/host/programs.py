@@ -9,6 +9,7 @@ from itertools import zip_longest
 
 from multidrop.dialects.certifying import Certifying, Occupied
 from multidrop.dialects.codec import Procedure
+from multidrop.dialects.errors import Refused
 from multidrop.dialects.family import Programs
 from multidrop.dialects.files import SourceLine
 from multidrop.dialects.mcode.host import classify, operations, program_readout
@@ -29,7 +30,7 @@ from multidrop.dialects.mcode.host.program_readout import (
     size_of_file,
     upload,
 )
-from multidrop.dialects.mcode.host.state import MCodeState
+from multidrop.dialects.mcode.host.state import MCodeState, who
 from multidrop.dialects.mcode.manual import guards
 from multidrop.dialects.mcode.manual.grammar import Argument, Compare, LineError, Name, Number, Statement, Unary, parse
 from multidrop.dialects.mcode.manual.mnemonic import ETHERNET, EXPANDED
@@ -232,15 +233,14 @@ def _traits(state: MCodeState) -> set[str]:
         "ethernet" if ETHERNET.match(state.product) else "serial",
     }
     found |= {"base"} if state.product == "MDI" else set()
-    found |= {"party" if state.codec.party else "alone"}
-    return found | ({"named"} if state.name.isalnum() else set())
+    return found | {"party" if state.codec.party else "alone"}
 
 
 def _occupied(state: MCodeState) -> Procedure[Occupied]:
-    """Find out whether an error stands, or a program is stored."""
+    """Find out whether a program is stored. Raises Refused where an error stands."""
     error, locked = (yield from value_of(state, 'EF," ",LK', "[01] [01]")).split()
     if error == "1":
-        return Occupied("an error stands (EF=1), and reading it clears it: PR ER does, then ask again")
+        raise Refused(f"{who(state)} has an error (EF=1) that the questions would clear: read it with PR ER, then ask")
     if locked == "1":
         return Occupied(errors=f"its program is locked (LK=1), so it cannot be listed; {_SUBROUTINE}")
     lines = yield from operations.listing(state, "")
