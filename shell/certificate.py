@@ -15,7 +15,7 @@ from dataclasses import dataclass, field
 from functools import partial
 from typing import Any
 
-from multidrop.dialects import Diagnostic, DriveError, NoAnswer, Refused
+from multidrop.dialects import Diagnostic, DriveError, NoAnswer, Refused, Stopped
 from multidrop.dialects.certifying import BYTES, FITS, MOVES, Occupied, Question, owed, restored
 from multidrop.dialects.files import escaped_toml, text_of, toml_of
 from multidrop.dialects.on_demand import imported
@@ -183,12 +183,13 @@ class Asking:
 
     async def _consent(self, moving: Sequence[Question]) -> str:
         """Ask a person, unless --yes has agreed; the reason why the motor must not be moved."""
+        questions, stops = self._session.questions, self._drive.stops
         names = ", ".join(each.name for each in moving)
-        what = (
-            f"{self._who}: {len(moving)} more questions move the motor by 2000 steps at most, and back ({names}); move?"
-        )
-        questions = self._session.questions
-        return "" if questions.agreed or await questions.agrees(what) else NO_CONSENT
+        what = f"{self._who}: {len(moving)} more questions move the motor by 2000 steps at most, and back ({names})"
+        agreed = questions.agreed or await questions.agrees(what)
+        if self._drive.stops != stops:
+            raise Stopped(f"{self._who}: a stop came before the answer")
+        return "" if agreed else NO_CONSENT
 
     async def _unless(self, reason: str, question: Question) -> None:
         """Ask one question, unless there is a reason against it; restore what it changes, after a stop too."""

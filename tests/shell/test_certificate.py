@@ -47,11 +47,7 @@ def rows(family, *traits):
 PLANTS = [
     *(("lexium", each) for each in rows("mcode", "lexium", "serial", "alone")),
     *(("ethernet", each) for each in rows("mcode", "ethernet") if each.asks),
-    *(
-        ("mdrive", each)
-        for each in rows("mcode", "mdrive", "serial", "alone", "base")
-        if {"mdrive", "base"} & each.asks
-    ),
+    *(("mdrive", each) for each in rows("mcode", "mdrive", "base") if each.asks),
     *(("pmx", each) for each in rows("pmx")),
     *(("tmcl", each) for each in rows("tmcl")),
 ]
@@ -240,22 +236,32 @@ async def test_a_locked_drive_is_not_listed(cell):
 async def test_nothing_moves_without_a_yes(cell):
     cell.session.questions.agreed = False
     device, asks = cell.device("w:!"), []
-    report = await asked(cell)
-    assert {"new-target", "move-while-stopping", "settling"} == {*report.unasked}
+    moving = ("new-target", "move-while-stopping", "settling")
+    report = await asked(cell, "bits", *moving)
+    assert {*moving} == {*report.unasked} and {*report.answers} == {"bits"}
 
     async def no(question):
         asks.append(question)
         return False
 
     cell.session.front = Front(no)
-    assert {*(await asked(cell)).unasked} == {*report.unasked} and "move the motor by 2000 steps at most" in asks[0]
+    assert {*(await asked(cell, *moving)).unasked} == {*moving} and "move the motor by 2000 steps at most" in asks[0]
     assert device.position(cell.floor.now()) == 0
+
+    async def stop(question):
+        cell.session.stop("Ctrl+X")
+        await asyncio.sleep(1)
+
+    cell.session.front = Front(stop)
+    with pytest.raises(Stopped):
+        await asked(cell, *moving)
+    cell.session.resume()
 
     async def yes(question):
         return True
 
     cell.session.front = Front(yes)
-    assert not (await asked(cell)).unasked
+    assert not (await asked(cell, "settling")).unasked
 
 
 @pytest.mark.virtual
@@ -332,7 +338,7 @@ async def test_a_drive_that_falls_silent_ends_the_questions(cell):
 
 
 @pytest.mark.virtual
-@on(bus("w", party("a"), party("b", CK=0)))
+@on(bus("w", party("a"), party("b", CK=0), baud=0))
 async def test_a_report_has_no_serial_number_and_no_name_and_is_compared(cell, tmp_path):
     session, file = cell.session, str(tmp_path / "r.toml")
     await certify(session, session.drive("w", "a"), file)
