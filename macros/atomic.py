@@ -5,11 +5,28 @@ from __future__ import annotations
 import contextlib
 import errno
 import os
+import re
 import sys
+import time
 from pathlib import Path
+from urllib.parse import quote
 
+_DEVICES = re.compile(r"CON|PRN|AUX|NUL|(COM|LPT)[0-9]", re.IGNORECASE)
 UNABLE = (errno.EINVAL, errno.ENOTSUP, errno.ENOSYS, errno.EACCES, errno.EPERM)
 """What a disk says that has no sync of a folder, and a folder that may be written and not read."""
+
+
+def reserved(name: str) -> bool:
+    """True if Windows takes a file's name for a device, in any folder and with any ending: `COM5.line` is COM5."""
+    return _DEVICES.fullmatch(name.partition(".")[0].rstrip()) is not None
+
+
+def safe_name(text: str) -> str:
+    """A file name for a text, safe on every system; `unquote` gives the text back (docs/decisions/0090)."""
+    name = quote(text, safe="")
+    if reserved(name):
+        name = f"%{ord(name[0]):02X}{name[1:]}"
+    return f"{name[:-1]}%2E" if name.endswith(".") else name
 
 
 def write_atomically(path: Path, data: bytes, mode: int = 0o666, *, synced: bool = True) -> None:
@@ -28,7 +45,7 @@ def write_atomically(path: Path, data: bytes, mode: int = 0o666, *, synced: bool
             file.flush()
             if synced:
                 os.fsync(file.fileno())
-        os.replace(beside, target)
+        _replace(beside, target)
     except BaseException:
         with contextlib.suppress(OSError):
             beside.unlink()
@@ -36,6 +53,22 @@ def write_atomically(path: Path, data: bytes, mode: int = 0o666, *, synced: bool
     if synced:
         with contextlib.suppress(OSError):  # the file is whole already
             sync_folder(target.parent)
+
+
+PATIENCE = 0.3
+"""The longest wait, s, for another program that has the file open on Windows, such as one that looks for viruses."""
+
+
+def _replace(new: Path, old: Path) -> None:
+    until = time.monotonic() + PATIENCE
+    while True:
+        try:
+            os.replace(new, old)
+            return
+        except PermissionError:
+            if sys.platform != "win32" or time.monotonic() > until:
+                raise
+            time.sleep(0.01)
 
 
 def create_atomically(path: Path, data: bytes) -> None:

@@ -10,11 +10,13 @@ from __future__ import annotations
 
 import math
 import re
+import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 from multidrop.dialects.errors import Diagnostic
 from multidrop.dialects.text import visible
+from multidrop.macros.atomic import reserved
 
 _UNIT = r"(?:(?:[mcu]?m|in|deg|rad|m?turn)(?:/s2?|/min)?|m?rpm)"
 _QUANTITY = r"\{[+-]?(?:\d{1,16}(?:\.\d{0,16})?|\.\d{1,16}) [A-Za-z][A-Za-z0-9_/]*\}"
@@ -316,6 +318,8 @@ def check_name(name: str, where: str = "") -> None:
     if not NAME.fullmatch(name):
         hint = "use up to 64 letters, digits, - and _, the first of them no -"
         raise Diagnostic(f"invalid macro name {name!r}", where, hint)
+    if sys.platform == "win32" and reserved(name):
+        raise Diagnostic(f"Windows takes {name} for a device", where, "use another name")
 
 
 def check(macro: Macro, where: str = "", at: At | None = None) -> None:

@@ -32,6 +32,9 @@ SOON = 0.5
 """The time after which a front end says that it waits for them, s."""
 POLL = 0.02
 """The time between two looks for the end of automations, s."""
+TRIAL = 10.0
+"""The time for the trial of the stop key, s."""
+AGREED = "/resume agrees to that, and lets drives move (send, run: --yes)"
 Claim = tuple["Link", str]
 """A link and an address on it; a global address is all of the link."""
 _current: ContextVar[Automation | None] = ContextVar("automation", default=None)
@@ -118,6 +121,8 @@ class Automations:
         Raises Diagnostic where it may not: another automation has the drive. `only_ends`: with a line that can only
         end motion, which is refused to no `still` one.
         """
+        if self._workspace.doubted and not only_ends:
+            raise Diagnostic(self._workspace.doubted, drive.shown, f"press Ctrl+X once; {AGREED}")
         automation = _current.get()
         if automation is None:
             return False
@@ -258,3 +263,16 @@ def outcome(workspace: Workspace, halts: list[Halt]) -> list[str]:
     if others := [workspace.display_name(drive) for halt in sent for drive in halt.others]:
         lines.append(f"stopped as well, because the stop of their line has no name: {', '.join(others)}")
     return lines + stop_report.unreached(halts, workspace.now())
+
+
+def stop_key_trial(workspace: Workspace) -> str:
+    """Ask for Ctrl+X where the console may swallow it. Return why nothing that can move a drive is sent until then."""
+    why = "this console may swallow Ctrl+X, so nothing that can move a drive is sent"
+    workspace.notify(f"press Ctrl+X once, as a trial: {why} until it comes", warning=True)
+
+    def still() -> None:
+        if workspace.doubted:
+            workspace.notify(f"Ctrl+X did not come. `/stop` Enter stops. {AGREED}", warning=True)
+
+    asyncio.get_running_loop().call_later(TRIAL, still)
+    return why

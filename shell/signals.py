@@ -6,10 +6,16 @@ import contextlib
 import signal
 import sys
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from types import FrameType
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from asyncio import AbstractEventLoop
+
+if sys.platform == "win32":
+    from multidrop.shell.console import end_with_console
 
 
 def _existing(*names: str) -> tuple[signal.Signals, ...]:
@@ -17,8 +23,8 @@ def _existing(*names: str) -> tuple[signal.Signals, ...]:
     return tuple(signal.Signals[name] for name in names if hasattr(signal, name))
 
 
-FROM_TERMINAL = _existing("SIGINT", "SIGHUP", "SIGQUIT")
-"""A terminal sends these to all processes of a job."""
+FROM_TERMINAL = _existing("SIGINT", "SIGHUP", "SIGQUIT", "SIGBREAK")
+"""A terminal sends these to all processes of a job. SIGBREAK is the end of a console of Windows, too."""
 SIGNALS = (*FROM_TERMINAL, *_existing("SIGTERM", "SIGALRM", "SIGUSR1", "SIGUSR2", "SIGXCPU"))
 """All but SIGPIPE: see `early_ends`."""
 
@@ -26,6 +32,8 @@ SIGNALS = (*FROM_TERMINAL, *_existing("SIGTERM", "SIGALRM", "SIGUSR1", "SIGUSR2"
 @contextlib.contextmanager
 def early_ends() -> Iterator[None]:
     """Within this block SIGNALS may be given handlers; on Linux, SIGPIPE counts as SIGTERM."""
+    if sys.platform == "win32":
+        end_with_console()
     before = {each: signal.getsignal(each) for each in SIGNALS}
     with _pipe_taken():
         try:
@@ -61,6 +69,16 @@ def _pipe_taken() -> Iterator[None]:
         signal.pthread_kill(taker.ident or 0, signal.SIGPIPE)
         taker.join()
         signal.pthread_sigmask(signal.SIG_SETMASK, mask)
+
+
+def in_loop(loop: AbstractEventLoop, number: int, callback: Callable[[], object]) -> Callable[[], object]:
+    """Call a function in an event loop for each signal of a number; call what is returned to end that."""
+    if sys.platform != "win32":
+        loop.add_signal_handler(number, callback)
+        return lambda: loop.remove_signal_handler(number)
+    # The loop there takes no signals, but one wakes it.
+    before = signal.signal(number, lambda *_: loop.call_soon_threadsafe(callback))
+    return lambda: signal.signal(number, before)
 
 
 class Interruption:

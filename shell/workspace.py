@@ -120,6 +120,8 @@ class Workspace(Channel):
         """The macros that play; a macro follows the one that plays it."""
         self.dropped: list[str] = []
         """The macros whose `on_stop` lines a stop dropped; `/resume` says so."""
+        self.doubted = ""
+        """Why nothing that can move a drive is sent yet: the stop key may be swallowed. Empty: it is not doubted."""
         self.quitting = False
         """After `/quit`: front ends end, scripts too."""
         self.reconnections = Reconnections(lambda bus, text: self.notify(text, bus=bus, warning=True), reconnect)
@@ -298,6 +300,7 @@ class Workspace(Channel):
         for name, bus in list(self.buses.items()):
             with isolated(f"the stop of {name}"):
                 bus.stop_ahead()
+        self.doubted = ""  # the key comes
 
     def stop(self, why: str = "stop", follows: bool = True) -> None:
         """Stop every drive and everything that runs, and latch. Synchronous; at any time, any number of times.
@@ -333,8 +336,8 @@ class Workspace(Channel):
             self.changed()
 
     def resume(self) -> None:
-        """Let automation run again."""
-        self.latched = False
+        """Let automation run again. A person who types it agrees to a stop key that did not come."""
+        self.latched, self.doubted = False, ""
         self.changed()
 
     def tally(self) -> stop_report.Tally:

@@ -12,13 +12,15 @@ writes the stop. The loop then writes nothing until it has taken note of the sto
 
 `ThreadedPipe` is over a blocking device, with one thread that reads and one that writes. It serves what the loop cannot
 watch: every port and socket on Windows. Writes wait in a queue and go out in small pieces, so that most of them can be
-taken back.
+taken back. A stop of another thread takes the place of the queue, and the writing thread writes it. A close that the
+driver holds up is given up, in a thread of its own: neither the loop nor the end of the process waits for it.
 """
 
 from __future__ import annotations
 
 import asyncio
 import threading
+import time
 from abc import abstractmethod
 from collections import deque
 from collections.abc import Callable
@@ -296,8 +298,12 @@ def _begun(chunk: memoryview) -> bool:
     return chunk.nbytes < memoryview(chunk.obj).nbytes
 
 
-_JOIN = 2.0
-"""Seconds that closing waits for a thread that a driver holds up; then the thread is abandoned."""
+_JOIN = 0.9
+"""Seconds that closing waits for the threads that a driver holds up; then they are abandoned."""
+_GIVEN_UP = 1.0
+"""Seconds after which a close that a driver holds up is given up."""
+closing: set[str] = set()
+"""The names of the devices whose close has not returned."""
 
 
 class Device(Protocol):
@@ -344,14 +350,17 @@ class ThreadedPipe(Pipe):
         self._purge = self._busy = self._ending = False
         self._begun = False
         """The head of the queue is the rest of a write."""
+        self._preempted = 0
+        """The number of stops of other threads that the loop has not taken note of."""
         self._threads: list[threading.Thread] = []
         self._spawn(self._write_all, "writer")
 
     def write(self, data: bytes) -> bool:
-        """Queue bytes for the writing thread; False on a broken pipe."""
         if not data or not self._usable:
             return not data
         with self._turn:
+            if self._preempted:
+                return False
             self._queue.append(bytes(data))
             self._turn.notify()
         return True
@@ -362,19 +371,33 @@ class ThreadedPipe(Pipe):
             return sum(map(len, self._queue))
 
     def discard(self, whole: bool = False) -> int:
-        """Drop what is queued and what this machine holds, and ask the other end to do the same if it can.
-
-        With `whole`, drop only what has not begun to leave.
-        """
+        """Drop what is queued and what is held here, at the other end too if it can; `whole`: what has not begun."""
         if not self._usable:
             return 0
         with self._turn:
-            begun = [self._queue[0]] if whole and self._begun else []
-            dropped = sum(map(len, self._queue)) - sum(map(len, begun))
-            self._queue = deque(begun)
-            self._purge = self._purge or not whole
-            self._turn.notify()
+            return self._drop(whole)
+
+    def _drop(self, whole: bool) -> int:
+        begun = [self._queue[0]] if whole and self._begun and self._queue else []
+        dropped = sum(map(len, self._queue)) - sum(map(len, begun))
+        self._queue, self._begun = deque(begun), bool(begun)
+        self._purge = self._purge or not whole
+        self._turn.notify()
         return dropped + (0 if whole else self._device.abort())
+
+    def preempt(self, whole: bool, make: Callable[[int], bytes]) -> bool:
+        with self._turn:
+            if not self._usable or self._ending:
+                return False
+            self._preempted += 1
+            dropped = self._drop(whole)
+            self._queue.append(bytes(make(dropped)))
+        return True
+
+    def yielded(self) -> bool:
+        with self._turn:
+            self._preempted = max(0, self._preempted - 1)
+        return not self._preempted
 
     def _spawn(self, work: Callable[[], None], what: str) -> None:
         thread = threading.Thread(target=work, name=f"{self.name} {what}", daemon=True)
@@ -443,11 +466,32 @@ class ThreadedPipe(Pipe):
         with self._turn:
             return not self._queue and not self._busy
 
+    def _let_go(self) -> asyncio.Future[None]:
+        """Release the device once, in a thread that nothing waits for: a driver may hold up the close for ever."""
+        if self._released is None:
+            self._released = released = self._loop.create_future()
+
+            def settle(_: None) -> None:
+                if not released.done():
+                    released.set_result(None)
+
+            def release() -> None:
+                self._release()
+                self._post(settle, None)
+
+            closing.add(self.name)
+            self._spawn(release, "close")
+            self._loop.call_later(_GIVEN_UP, settle, None)
+        return self._released
+
     def _release(self) -> None:
+        until = time.monotonic() + _JOIN
         self._device.cancel()
         for thread in self._threads:
-            thread.join(_JOIN)
+            if thread is not threading.current_thread():
+                thread.join(max(0.0, until - time.monotonic()))
         self._device.close()
+        closing.discard(self.name)
 
     def _explain(self, error: OSError | None) -> str:
         return self._device.explain(error)

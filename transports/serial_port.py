@@ -9,6 +9,7 @@ from __future__ import annotations
 import contextlib
 import errno
 import os
+import re
 import shlex
 import sys
 from collections.abc import Callable
@@ -18,7 +19,7 @@ from typing import TypeVar
 import serial
 
 from multidrop.transports import PortControl, Transport, Unreachable
-from multidrop.transports.serial_ports import holder
+from multidrop.transports.serial_ports import com_name, holder, present
 
 if sys.platform != "win32":
     import fcntl
@@ -34,6 +35,8 @@ T = TypeVar("T")
 _PIECE = 256
 _PATIENCE = 0.5
 """Seconds after which a waiting read checks for its end: a cancel between two reads would be lost."""
+_STUCK = 10.0
+"""Seconds after which a port that takes no byte is lost, where a write waits: 256 bytes at 300 baud take 8.5 s."""
 _READ = 4096
 _GONE = "the port is gone (unplugged, or its other side closed it); plug it in"
 
@@ -42,9 +45,12 @@ async def open_serial(port: str, baud: int = 9600) -> Transport:
     """Open a port by its name or path, at `baud` bits/s, and drop stale input. Raises Unreachable."""
     if baud < 1:
         raise Unreachable(f"{port}: invalid baud rate {baud}; give one such as 9600")
-    from multidrop.transports.pipe import DescriptorPipe, ThreadedPipe, in_thread
+    from multidrop.transports.pipe import DescriptorPipe, ThreadedPipe, closing, in_thread
 
     if sys.platform == "win32":
+        if com_name(port) in closing:
+            why = "is still being closed: its driver does not return; unplug it, or end multidrop"
+            raise Unreachable(f"{port} {why}")
         device = await in_thread(lambda: opened(SerialDevice, port, baud), SerialDevice.close)
         return ThreadedPipe(device, device.control)
     else:
@@ -81,11 +87,21 @@ def _why(port: str, error: OSError) -> str:
     return f"{port} could not be opened: {os.strerror(number)}" if number else ""
 
 
+_WINDOWS = {
+    **dict.fromkeys((2, 3, 433, 1167), ""),
+    **dict.fromkeys((5, 32), "is in use by another program; close it there"),
+    **dict.fromkeys((22, 31, 1117), "does not work (its driver says so); plug it out and in"),
+    121: "does not answer: the device at its other end is off, or out of reach (Bluetooth)",
+    87: "is not a serial port, or refuses a setting; see `multidrop ports`",
+}
+"""The reasons by error number of Windows; empty: the port is not there."""
+
+
 def _why_on_windows(port: str, text: str) -> str:
-    """Reason on Windows, where pyserial gives no number but only the text of the error."""
-    if "PermissionError" in text:
-        return f"{port} is in use by another program; close it there"
-    return _nothing(port) if "FileNotFoundError" in text else ""
+    """Reason on Windows, where pyserial gives the error's number only in its text: `(13, 'in words', None, 5)`."""
+    number = re.search(r"None, ([0-9]+)\)", text)
+    why = _WINDOWS.get(int(number[1])) if number else None
+    return "" if why is None else f"{port} {why}" if why else _nothing(port)
 
 
 def _nothing(port: str) -> str:
@@ -134,16 +150,22 @@ class SerialDevice:
     piece = _PIECE
 
     def __init__(self, port: str, baud: int) -> None:
-        self.name = port
-        self._port = serial.Serial(port, baud, timeout=_PATIENCE, exclusive=True)
+        self.name = com_name(present(port) or port)
+        self._port = serial.Serial(self.name, baud, timeout=_PATIENCE, write_timeout=_STUCK, exclusive=True)
         self.control = SerialControl(self._port)
 
     def read(self) -> bytes | None:
         """Wait for the first byte, then take all that arrived."""
-        return self._port.read(1) + self._port.read(self._port.in_waiting)
+        try:
+            return self._port.read(1) + self._port.read(self._port.in_waiting)
+        except TypeError as error:  # a close took away what pyserial waits with
+            raise OSError(*error.args) from error
 
     def write(self, data: bytes) -> None:
-        self._port.write(data)
+        try:
+            self._port.write(data)
+        except TypeError as error:
+            raise OSError(*error.args) from error
 
     def purge(self) -> None:
         """Do nothing: the other end has no command for it."""
@@ -162,6 +184,8 @@ class SerialDevice:
             self._port.cancel_write()
 
     def explain(self, error: OSError | None) -> str:
+        if isinstance(error, serial.SerialTimeoutException):
+            return f"it has taken no byte for {_STUCK:g} s (does its adapter hang?); plug it out and in"
         why = f" ({error})" if error else ""
         return f"the port is gone (unplugged?); plug it in{why}"
 

@@ -6,9 +6,13 @@ import contextlib
 import os
 import re
 import sys
+from collections import Counter
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Protocol
 
+_COM = re.compile(r"(?:\\\\[.?]\\)?(COM[0-9]+)", re.IGNORECASE)
 _LINKS = ("dev/serial/by-id", "dev/serial/by-path")
 
 
@@ -18,22 +22,35 @@ class PortInfo:
 
     device: str
     stable_name: str = ""
-    """A link that follows the adapter, or else the socket that it is plugged into; empty if there is none."""
+    """A name that follows the adapter, or else the socket that it is plugged into; empty if there is none.
+
+    On Windows it is made of the adapter's USB serial number.
+    """
     description: str = ""
+
+
+class UsbPort(Protocol):
+    """A port as pyserial lists it."""
+
+    device: str
+    vid: int | None
+    pid: int | None
+    serial_number: str | None
 
 
 def list_ports(root: Path = Path("/")) -> list[PortInfo]:
     """List the ports in the order of their numbers. `root` is the folder of `dev` and `sys`."""
     from serial.tools import list_ports as pyserial
 
-    stable = _stable_names(root)
+    listed = pyserial.comports()
+    stable = usb_names(listed) if sys.platform == "win32" else _stable_names(root)
     found = [
         PortInfo(
             port.device,
-            stable.get(os.path.realpath(port.device), ""),
+            stable.get(port.device if sys.platform == "win32" else os.path.realpath(port.device), ""),
             "" if port.description in (None, "n/a") else str(port.description),
         )
-        for port in pyserial.comports()
+        for port in listed
         if _has_hardware(port.device, root)
     ]
     return sorted(found, key=lambda port: natural(port.device))
@@ -41,7 +58,42 @@ def list_ports(root: Path = Path("/")) -> list[PortInfo]:
 
 def stable_name(device: str, root: Path = Path("/")) -> str:
     """Return the stable name of a port, or the given one if it has none."""
+    if sys.platform == "win32":
+        from serial.tools import list_ports as pyserial
+
+        return usb_names(pyserial.comports()).get(com_name(device), com_name(device))
     return _stable_names(root).get(os.path.realpath(device), os.path.abspath(device) if "/" in device else device)
+
+
+def present(name: str) -> str:
+    """Return the port that a name leads to now; empty: it is not there. It may take a while on Windows."""
+    if sys.platform == "win32":
+        import ctypes
+
+        if not name.startswith("usb-"):
+            target = ctypes.create_unicode_buffer(1024)
+            return name if ctypes.windll.kernel32.QueryDosDeviceW(com_name(name), target, 1024) else ""
+        from serial.tools import list_ports as pyserial
+
+        return next((port for port, stable in usb_names(pyserial.comports()).items() if stable == name), "")
+    return name if os.path.exists(name) else ""
+
+
+def com_name(port: str) -> str:
+    r"""Return the one form of a COM port's name: `COM10` for `com10` and `\\.\COM10`; other names as they are."""
+    found = _COM.fullmatch(port)
+    return found[1].upper() if found else port
+
+
+def usb_names(ports: Iterable[UsbPort]) -> dict[str, str]:
+    """Return the name by USB serial number of each port that has one to itself, as in `usb-0403-6001-A5069RR4`."""
+    names = {
+        port.device: f"usb-{port.vid:04x}-{port.pid:04x}-{port.serial_number}"
+        for port in ports
+        if port.vid is not None and port.pid is not None and re.fullmatch(r"\w+", port.serial_number or "")
+    }
+    ports_of = Counter(names.values())
+    return {device: name for device, name in names.items() if ports_of[name] == 1}
 
 
 def natural(name: str) -> list[tuple[int, str]]:

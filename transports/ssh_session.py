@@ -68,6 +68,8 @@ _HINTS = (
     ("inappropriate ioctl", "it is not a serial port"),
 )
 """What to do, by a part of the last line of ssh or of socat."""
+_WINDOWS = ("operable program or batch file", "cmdlet", "commandnotfoundexception")
+"""Parts of what cmd.exe and PowerShell say of a command for another shell."""
 
 
 def arguments(far: FarPort, baud: int, way: str = "") -> list[str]:
@@ -115,6 +117,9 @@ def reason(far: FarPort, status: int | None, words: str, way: str = "") -> str:
         return f"{lacking} installed on {far.host}{also}; install {way or RELAY} there"
     found = next((hint for part, hint in _HINTS if part in words.lower()), "")
     hint = f"; {found.format(login=far.login)}" if found else ""
+    if any(part in words.lower() for part in _WINDOWS):
+        there = f"there `multidrop share {far.path[1:]} --rfc2217 2217`, here `ssh -L 2217:127.0.0.1:2217 {far.login}`"
+        return f"its shell is one of Windows, where the relay does not run; {there} and rfc2217://127.0.0.1:2217"
     if status in (255, None):
         return f"not reached: {words or 'ssh ended without a word'}{hint}"
     if status < 0:

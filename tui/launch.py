@@ -13,9 +13,11 @@ from textual.driver import Driver
 
 from multidrop.dialects import Diagnostic
 from multidrop.dialects.on_demand import importing
+from multidrop.shell.automation import stop_key_trial
 from multidrop.shell.configuration import Settings
+from multidrop.shell.console import swallows
 from multidrop.shell.session import Session
-from multidrop.shell.signals import SIGNALS, early_ends
+from multidrop.shell.signals import SIGNALS, early_ends, in_loop
 from multidrop.tui.app import MultidropApp
 from multidrop.tui.assist import Assist
 
@@ -49,6 +51,8 @@ async def _run(urls: Sequence[str], settings: Settings, reconnect: bool, raw: bo
         with collected_at_rest(partial(at_rest, session)):
             app = MultidropApp(session, urls, Assist(session, settings), driver(), settings.look)
             begin(session)
+            if swallows():
+                session.doubted = stop_key_trial(session)
             return await show(app)
     finally:
         await _leave(session)
@@ -82,23 +86,20 @@ async def _leave(session: Session) -> None:
 async def show(app: MultidropApp) -> int:
     """Run an app until it ends; return its exit code, 1 if it crashed."""
     # On a hang-up, or another signal that ends a process, stop what automation moves, then end the app.
+    loop = asyncio.get_running_loop()
+    for number in SIGNALS:
+        in_loop(loop, number, app.interrupted)
     if sys.platform != "win32":
-        loop = asyncio.get_running_loop()
-        for number in SIGNALS:
-            loop.add_signal_handler(number, app.interrupted)
         loop.add_signal_handler(signal.SIGHUP, _hung_up, app)
     await app.run_async()
     return 1 if app.return_value is None else app.return_value
 
 
-def driver() -> type[Driver] | None:
-    """Return the driver that finds the stop in the bytes; None if the platform has only Textual's own drivers."""
-    if sys.platform == "win32":
-        return None
-    else:
-        from multidrop.tui.terminal.driver import Terminal
+def driver() -> type[Driver]:
+    """Return the driver that finds the stop in the bytes."""
+    from multidrop.tui.terminal.driver import Terminal
 
-        return Terminal
+    return Terminal
 
 
 def _hung_up(app: MultidropApp) -> None:

@@ -187,6 +187,10 @@ def _terminal() -> Iterator[str]:
     columns, rows = shutil.get_terminal_size()
     streams = [name for name in ("stdin", "stdout", "stderr") if getattr(sys, name).isatty()]
     yield f"terminals: {', '.join(streams) or 'none'}; {columns}x{rows}; encoding {sys.stdout.encoding}"
+    if sys.platform == "win32":
+        from multidrop.shell.console import facts
+
+        yield from facts()
     for name in TERMINAL:
         if name in os.environ:
             yield f"{name}={os.environ[name]}"

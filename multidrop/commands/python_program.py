@@ -31,7 +31,7 @@ from multidrop.dialects.files import bytes_of
 from multidrop.shell.batch.report import Report
 from multidrop.shell.events import FAILURES, Entered, Output, Printed, SessionEvent
 from multidrop.shell.exit_codes import INTERRUPTED, exit_code
-from multidrop.shell.prompt.keyboard import on_stop_key
+from multidrop.shell.prompt.keyboard import on_stop_key, terminal
 from multidrop.shell.scripts.model import Result, ScriptLine
 from multidrop.shell.signals import SIGNALS, early_ends
 from multidrop.shell.streams.stdout import lost_reader, why_interrupted, work_done, write
@@ -257,7 +257,7 @@ class _Execution:
 
         keys = on_stop_key(shell.stop_ahead, stop, _interrupt, after_continue)
         session._thread.enter(keys, session._leaving)
-        if self._on_continue:
+        if self._on_continue or (sys.platform == "win32" and terminal() is not None):
             session._leaving.enter_context(replaced("stdin", _NoInput()))
 
     # The program
@@ -300,7 +300,10 @@ def _say(text: str, warning: bool) -> None:
 
 
 def _interrupt() -> None:
-    os.kill(os.getpid(), signal.SIGINT)
+    if sys.platform == "win32":
+        signal.raise_signal(signal.SIGINT)  # `os.kill` there ends the process
+    else:
+        os.kill(os.getpid(), signal.SIGINT)
 
 
 class _NoInput(io.TextIOBase):

@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 import argparse
+import re
 import signal
 import sys
 from types import FrameType
@@ -102,8 +103,12 @@ def _relay(chosen: argparse.Namespace) -> int:
             raise Diagnostic(
                 "is no serial port of this machine", url_without_secrets(chosen.port), "as in /dev/ttyUSB0"
             )
+        from multidrop.transports import Unreachable
         from multidrop.transports.relay import serve
         from multidrop.transports.serial_port import SerialEndpoint, opened
+
+        if re.fullmatch("/?COM[0-9]+", chosen.port, re.IGNORECASE):
+            raise Unreachable(f"{chosen.port.strip('/')} is a port of Windows, and this is none; see `multidrop ports`")
 
         def ended(number: int, _: FrameType | None) -> None:
             sys.exit(128 + number)  # closes the port

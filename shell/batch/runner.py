@@ -13,8 +13,9 @@ from contextlib import nullcontext
 from functools import partial
 
 from multidrop.shell import configuration, stop_report
-from multidrop.shell.automation import outcome, settled
+from multidrop.shell.automation import outcome, settled, stop_key_trial
 from multidrop.shell.channel import SILENCE, Front
+from multidrop.shell.console import swallows
 from multidrop.shell.events import FAILURES, SessionEvent, StateChanged
 from multidrop.shell.exit_codes import INTERRUPTED, exit_code
 from multidrop.shell.log.writer import begin as begin_log
@@ -95,6 +96,8 @@ async def _run(
         keys = on_stop_key(session.stop_ahead, stop, host.interrupt) if watch_keys else nullcontext()
         ticking = asyncio.create_task(_tick(session, printer)) if sys.stderr.isatty() else None
         with on_signals(host.interrupt), keys as keyboard:
+            if keyboard is not None and swallows() and not session.questions.agreed:
+                session.doubted = stop_key_trial(session)
             ask = asker(keyboard) if asks else None
             session.front = Front(ask, ready=streams.ready, beforehand="--yes agrees beforehand")
             try:

@@ -13,6 +13,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import os
+import sys
 from collections.abc import Awaitable, Callable, Collection
 from typing import TYPE_CHECKING
 
@@ -63,8 +64,11 @@ class SerialAgain:
         """The name follows the port: the number of a pseudo-terminal does not."""
 
     async def __call__(self, old: Transport) -> Transport:
+        from multidrop.transports.serial_ports import present
+
         await old.close()
-        if not os.path.exists(self._name) or (self._before and _terminal(self._name) == self._before):
+        there = await asyncio.to_thread(present, self._name) if sys.platform == "win32" else present(self._name)
+        if not there or (self._before and _terminal(self._name) == self._before):
             raise Absent(f"{self._name} is not there")
         opened = await self._open(self._name)
         self._before = _terminal(self._name)

@@ -18,10 +18,14 @@ import sys
 import threading
 from codecs import getincrementaldecoder
 from collections.abc import Callable, Iterator
+from functools import partial
 
 from multidrop.shell.signals import SIGNALS, early_ends
+from multidrop.shell.signals import in_loop as on_signal
 
-if sys.platform != "win32":
+if sys.platform == "win32":
+    from multidrop.shell.console import Console, is_console
+else:
     from multidrop.shell.prompt.raw_terminal import hold, in_foreground, in_loop
 
 STOP_KEY = b"\x18"
@@ -65,16 +69,18 @@ class Keyboard:
         self._held = contextlib.ExitStack()
 
     def __enter__(self) -> Keyboard:
-        if sys.platform != "win32":  # where `terminal` returns None, and no thread holds the keys
+        sys.setswitchinterval(SWITCH)
+        if sys.platform == "win32":
+            self._held.enter_context(Console(self.descriptor, self._came, lambda: None, self._signals))
+        else:
             held = hold(self.descriptor, self._signals, self.continued or in_loop)
             self._early = self._held.enter_context(held)
-        over, end = os.pipe()
-        self._held.callback(os.close, over)
-        reader = threading.Thread(target=self._run, args=(over,), daemon=True, name="keyboard")
-        self._held.callback(reader.join)
-        self._held.callback(os.close, end)
-        sys.setswitchinterval(SWITCH)
-        reader.start()
+            over, end = os.pipe()
+            self._held.callback(os.close, over)
+            reader = threading.Thread(target=self._run, args=(over,), daemon=True, name="keyboard")
+            self._held.callback(reader.join)
+            self._held.callback(os.close, end)
+            reader.start()
         return self
 
     def __exit__(self, *_: object) -> None:
@@ -115,6 +121,13 @@ class Keyboard:
         if self._listener is not None and (self._typed or self.closed):
             self._listener()
 
+    def _came(self, data: bytes) -> None:
+        """Take bytes of a console, in its reading thread."""
+        if STOP_KEY in data:
+            self.stop_ahead()
+        with contextlib.suppress(RuntimeError):  # the loop has ended
+            self._loop.call_soon_threadsafe(self._read, data)
+
     def _run(self, over: int) -> None:
         """Read until the end, or until the terminal is gone. In a thread: the loop cannot delay it."""
         while over not in select.select([self.descriptor, over], [], [])[0]:
@@ -145,20 +158,23 @@ class Keyboard:
 
 
 def terminal() -> int | None:
-    """The descriptor of standard input if that is a terminal (on POSIX); else None."""
+    """The descriptor of standard input if that is a terminal, or a console of Windows; else None."""
     try:
         descriptor = sys.stdin.fileno()
     except (AttributeError, OSError, ValueError):
         return None
-    return descriptor if sys.platform != "win32" and os.isatty(descriptor) else None
+    if sys.platform == "win32":
+        return descriptor if is_console(descriptor) else None
+    return descriptor if os.isatty(descriptor) else None
 
 
 def foreground_terminal() -> int | None:
     """The same where this process is in the foreground of the terminal; else None."""
     descriptor = terminal()
-    if sys.platform != "win32" and descriptor is not None and in_foreground(descriptor):
+    if sys.platform == "win32":
         return descriptor
-    return None
+    else:
+        return descriptor if descriptor is not None and in_foreground(descriptor) else None
 
 
 @contextlib.contextmanager
@@ -168,7 +184,7 @@ def on_signals(callback: Callable[[], None]) -> Iterator[None]:
     A terminal that hangs up may send its signal twice. The second one must not cut off the end of the process.
     """
     loop = asyncio.get_running_loop()
-    handled: list[int] = []
+    handled: list[Callable[[], object]] = []
     came: set[int] = set()
 
     def call(number: int) -> None:
@@ -178,13 +194,12 @@ def on_signals(callback: Callable[[], None]) -> Iterator[None]:
     with early_ends():
         for each in SIGNALS:
             with contextlib.suppress(NotImplementedError):  # a loop without signals: KeyboardInterrupt ends it
-                loop.add_signal_handler(each, call, each)
-                handled.append(each)
+                handled.append(on_signal(loop, each, partial(call, each)))
         try:
             yield
         finally:
-            for number in handled:
-                loop.remove_signal_handler(number)
+            for undo in handled:
+                undo()
         if sys.platform != "win32" and signal.SIGHUP in came:
             signal.signal(signal.SIGHUP, signal.SIG_IGN)
 

@@ -4,8 +4,8 @@ At the prompt lines run one after the other; a macro runs beside them, and the s
 holds back the rest of its burst, and a stop drops everything before it: those lines are shown, and never sent.
 
 The history is a text file, kept between runs. Several processes may write it at once. A line is appended in one write,
-under a lock where one is free. To cut the file, a process replaces it by a new one; another process that waited for the
-lock then opens the new file.
+under a lock where one is free; on Windows that is of a file beside. To cut the file, a process replaces it by a new
+one; another process that waited for the lock then opens the new file.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ import contextlib
 import os
 import re
 import sys
+import time
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -26,7 +27,9 @@ from multidrop.macros.atomic import write_atomically
 from multidrop.shell.events import FAILURES
 from multidrop.shell.line_syntax import NOWHERE, DriveLine, Place, TypedLine, VerbLine, parse
 
-if sys.platform != "win32":
+if sys.platform == "win32":
+    import msvcrt
+else:
     import fcntl
 
 from multidrop.shell.session import Session
@@ -35,6 +38,8 @@ KEPT = 5000
 """The number of lines read back; a file of twice as many is cut to that number."""
 PRIVATE = 0o600
 TRIES = 3
+MOMENT = 0.2
+"""The longest wait for another process that writes, s."""
 TORN = "\0"
 """The last character of a line of which only a part was written: it is not offered again."""
 
@@ -67,12 +72,21 @@ class History:
 
     def _cut(self) -> None:
         """Cut the file to its last lines, unless another process writes it now."""
+
+        def write_last(data: bytes) -> None:
+            lines = [line for line in data.split(b"\n")[:-1] if _whole(line.decode("utf-8", "replace"))]
+            write_atomically(self.path, b"".join(line + b"\n" for line in lines[-KEPT:]), PRIVATE)
+
+        if sys.platform == "win32":  # where an open file is not replaced
+            with contextlib.suppress(OSError), self._alone() as locked:
+                if locked:
+                    write_last(self.path.read_bytes())
+            return
         with contextlib.suppress(OSError), self._opened() as (descriptor, locked):
             if not locked:
                 return
             with open(descriptor, "rb", closefd=False) as old:
-                lines = [line for line in old.read().split(b"\n")[:-1] if _whole(line.decode("utf-8", "replace"))]
-                write_atomically(self.path, b"".join(line + b"\n" for line in lines[-KEPT:]), PRIVATE)
+                write_last(old.read())
                 late = old.read()  # from a process that had the file open, and no lock
             with open(self.path, "ab") as new:
                 new.write(late)
@@ -80,6 +94,14 @@ class History:
     @contextlib.contextmanager
     def _opened(self) -> Iterator[tuple[int, bool]]:
         """The file to append to, and whether this process has locked it. Raises OSError."""
+        if sys.platform == "win32":
+            with self._alone() as locked:
+                descriptor = os.open(self.path, os.O_RDWR | os.O_APPEND | os.O_CREAT | os.O_BINARY, PRIVATE)
+                try:
+                    yield descriptor, locked
+                finally:
+                    os.close(descriptor)
+            return
         for tried in range(TRIES):
             descriptor = os.open(self.path, os.O_RDWR | os.O_APPEND | os.O_CREAT, PRIVATE)
             try:
@@ -90,17 +112,38 @@ class History:
             finally:
                 os.close(descriptor)
 
+    if sys.platform == "win32":
+
+        @contextlib.contextmanager
+        def _alone(self) -> Iterator[bool]:
+            """Lock a file beside, for the processes that write, append and cut; whether it is locked. Raises OSError.
+
+            An append is not one step there. So a process waits a moment for another one.
+            """
+            lock = os.open(f"{self.path}.lock", os.O_RDWR | os.O_CREAT, PRIVATE)
+            until, locked = time.monotonic() + MOMENT, False
+            try:
+                while not locked and time.monotonic() < until:
+                    try:
+                        msvcrt.locking(lock, msvcrt.LK_NBLCK, 1)
+                        locked = True
+                    except OSError:
+                        time.sleep(0.002)
+                yield locked
+                if locked:
+                    msvcrt.locking(lock, msvcrt.LK_UNLCK, 1)
+            finally:
+                os.close(lock)
+
 
 def _lock(descriptor: int) -> bool:
     """Try to lock the file without waiting. Closing it unlocks it."""
-    if sys.platform == "win32":
-        return True  # an open file cannot be replaced there
-    else:
+    if sys.platform != "win32":
         try:
             fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except OSError:
             return False
-        return True
+    return True
 
 
 def _is_at(descriptor: int, path: Path) -> bool:

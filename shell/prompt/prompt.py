@@ -3,7 +3,7 @@
 The prompt is always visible. Lines run in the background one after the other (`shell.prompt.line_queue`), with macros
 and plots beside them: a line typed while a macro plays is sent at once, and the lines of a paste keep their order.
 
-On a POSIX terminal the keys are held from the beginning, before anything is opened (`shell.prompt.keyboard`). So the
+At a terminal the keys are held from the beginning, before anything is opened (`shell.prompt.keyboard`). So the
 stop key is found whatever was typed before it.
 """
 
@@ -26,7 +26,8 @@ from prompt_toolkit.filters import Condition, is_searching
 from prompt_toolkit.formatted_text import StyleAndTextTuples
 from prompt_toolkit.key_binding import KeyBindings, KeyPressEvent
 from prompt_toolkit.keys import Keys
-from prompt_toolkit.output import ColorDepth, create_output
+from prompt_toolkit.output import ColorDepth, Output, create_output
+from prompt_toolkit.output.vt100 import Vt100_Output
 from prompt_toolkit.search import stop_search
 from prompt_toolkit.styles import Style
 from prompt_toolkit.utils import is_dumb_terminal
@@ -34,8 +35,9 @@ from prompt_toolkit.utils import is_dumb_terminal
 from multidrop.dialects import Diagnostic
 from multidrop.dialects.files import lines_of
 from multidrop.shell import configuration
-from multidrop.shell.automation import outcome, settled
+from multidrop.shell.automation import outcome, settled, stop_key_trial
 from multidrop.shell.channel import Front
+from multidrop.shell.console import swallows
 from multidrop.shell.events import FAILURES, Progressed, SessionEvent, StateChanged
 from multidrop.shell.exit_codes import INTERRUPTED, exit_code
 from multidrop.shell.log.writer import begin as begin_log
@@ -97,15 +99,22 @@ async def _run(make: Callable[[], Session], urls: Sequence[str], agreed: bool, b
             keyboard = Keyboard(descriptor, signals=False)
             keyboard.stop_ahead = session.stop_ahead
             input_ = KeyboardInput(stack.enter_context(keyboard))
-        output = PlainOutput() if is_dumb_terminal() else create_output(always_prefer_tty=True)
-        stack.enter_context(create_app_session(input=input_, output=output))
+        stack.enter_context(create_app_session(input=input_, output=_output()))
         prompt = Prompt(session, input_)
         stack.enter_context(on_signals(prompt.interrupt))
+        if swallows() and not agreed:
+            session.doubted = stop_key_trial(session)
         try:
             return await prompt.run(urls)
         finally:
             await session.close()
             await finish(streams, lambda: True)
+
+
+def _output() -> Output:
+    if sys.platform == "win32" and terminal() is not None:  # sequences, through our writer, which waits for no reader
+        return Vt100_Output.from_pty(sys.stdout if sys.stdout.isatty() else sys.stderr)
+    return PlainOutput() if is_dumb_terminal() else create_output(always_prefer_tty=True)
 
 
 class Prompt:

@@ -143,21 +143,6 @@ async def at_keyboard(keyboard: Keyboard, question: str) -> bool:
         keyboard.listen(before)
 
 
-def at_lines(lines: AsyncIterator[str]) -> Ask:
-    """Return how to ask on standard error, and take whole lines: where the keys of a terminal cannot be held."""
-
-    async def ask(question: str) -> bool:
-        loop = asyncio.get_running_loop()
-        write(sys.stderr, f"{question}. {GO_ON}")
-        counts_at = loop.time() + PAUSE
-        async for line in lines:
-            if loop.time() >= counts_at:
-                return line.strip() in YES
-        return False
-
-    return ask
-
-
 async def ask_outside_a_session(question: str) -> bool | None:
     """Ask at the terminal of a command that has no session; None where there is none. The stop key is a no."""
     answering: list[asyncio.Future[bool]] = []
@@ -179,11 +164,7 @@ def asker(keyboard: Keyboard | None) -> Ask | None:
     """Return how to ask at the terminal of a command; None where there is none, or where the question is not seen."""
     if not sys.stderr.isatty():
         return None
-    if keyboard is not None:
-        return partial(at_keyboard, keyboard)
-    if sys.platform == "win32" and sys.stdin.isatty():
-        return at_lines(stream_lines(sys.stdin.fileno()))
-    return None
+    return None if keyboard is None else partial(at_keyboard, keyboard)
 
 
 NEEDED = "a value is needed; Ctrl+C gives up"

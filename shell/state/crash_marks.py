@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import os
+import re
 import sys
 from collections.abc import Iterable, Iterator
 from datetime import datetime
@@ -11,7 +12,11 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import quote
 
+from multidrop.macros.atomic import safe_name
 from multidrop.shell.state.store import Store
+
+if sys.platform == "win32":
+    from multidrop.shell.console import runs
 
 
 @contextlib.contextmanager
@@ -22,7 +27,9 @@ def marked(state: Path, port: str, address: str, file: str, backup: Path) -> Ite
         f"{who}the download of {file} was cut off with its session; the program may be incomplete; "
         f"what was in the drive before is in {backup}"
     )
-    with _mark(state, port, quote(address, safe="") or "-", text):
+    # Some disks take `a` and `A` for one name, and they are two drives.
+    name = re.sub("[A-Z]", lambda found: f"%{ord(found[0]):02X}", safe_name(address))
+    with _mark(state, port, name or "-", text):
         yield
 
 
@@ -72,13 +79,17 @@ def left(state: Path, port: str) -> list[str]:
 
 
 def _marks(state: Path, port: str) -> Store:
-    return Store(state / "unfinished" / quote(port, safe="")[:100])
+    folder = state / "unfinished"
+    earlier = folder / quote(port, safe="")[:100]
+    return Store(
+        earlier if sys.platform != "win32" and earlier.is_dir() else folder / safe_name(port)[:100].rstrip(".")
+    )
 
 
 def _runs(pid: int) -> bool:
     """True if a process runs, as far as the system shows."""
     if sys.platform == "win32":
-        return False
+        return runs(pid) and pid != os.getpid()
     try:
         os.kill(pid, 0)
     except ProcessLookupError:

@@ -25,7 +25,7 @@ from urllib.parse import quote
 from multidrop.dialects import DriveState, Owed
 from multidrop.dialects.state import Remembered
 from multidrop.drives.port_journal import Keeper
-from multidrop.macros.atomic import make_folder, sync_folder
+from multidrop.macros.atomic import make_folder, safe_name, sync_folder
 from multidrop.shell.state.store import Damaged, Store, digest
 
 if sys.platform == "win32":
@@ -109,7 +109,7 @@ class PortState(Keeper):
         self.remarks: list[str] = []
         self.notify: Callable[[str], None] = self.remarks.append
         self._port, self._baud = port, baud
-        self._store, self._name = Store(folder / "ports"), _file_name(port)
+        self._store, self._name = Store(folder / "ports"), _file_name(folder, port)
         self._line = -1
         self._shared = False
         """Another session has the port open, too, and keeps its record."""
@@ -196,7 +196,7 @@ class PortState(Keeper):
         Raises BlockingIOError if another process holds it, OSError.
         """
         make_folder(self._store.folder)  # a record in it is to survive a power cut
-        flags = os.O_RDWR | os.O_CREAT | getattr(os, "O_CLOEXEC", 0)
+        flags = os.O_RDWR | os.O_CREAT | getattr(os, "O_CLOEXEC", 0) | getattr(os, "O_BINARY", 0)
         line = os.open(self._store.folder / f"{self._name}.line", flags, 0o600)
         try:
             if sys.platform == "win32":
@@ -244,7 +244,7 @@ class PortState(Keeper):
 
 def memory_of(folder: Path, port: str) -> tuple[PortMemory, float]:
     """The memory of a port in the state folder, and when it was written (s since 1970; 0: never). Changes nothing."""
-    path = folder / "ports" / f"{_file_name(port)}.drives"
+    path = folder / "ports" / f"{_file_name(folder, port)}.drives"
     try:
         at = path.stat().st_mtime
     except OSError:
@@ -252,9 +252,14 @@ def memory_of(folder: Path, port: str) -> tuple[PortMemory, float]:
     return PortMemory(path), at
 
 
-def _file_name(port: str) -> str:
-    name = quote(port, safe="")
-    return name if len(name) <= LONGEST_NAME else f"{name[:LONGEST_NAME]}-{digest(port, 12)}"
+def _file_name(folder: Path, port: str) -> str:
+    """The name of a port's files: a safe one, or that of an earlier version where it has left some."""
+    safe, earlier = (
+        name if len(name) <= LONGEST_NAME else f"{name[:LONGEST_NAME]}-{digest(port, 12)}"
+        for name in (safe_name(port), quote(port, safe=""))
+    )
+    kept = safe != earlier and sys.platform != "win32" and any((folder / "ports").glob(f"{earlier}.*"))
+    return earlier if kept else safe
 
 
 def _write_at_start(descriptor: int, data: bytes) -> None:

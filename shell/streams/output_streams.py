@@ -21,6 +21,9 @@ from typing import TextIO
 
 from multidrop.shell.threads import CHUNK, LIMIT, BoundedWriter, Loss
 
+if sys.platform == "win32":
+    from multidrop.shell.console import writer as console_writer
+
 PIPE_TIMEOUT = 60.0
 """The time without progress, s, after which a pipe's reader is given up at the end."""
 SHORT_TIMEOUT = 1.0
@@ -36,16 +39,19 @@ def descriptor_writer(
 ) -> BoundedWriter:
     """Make the writer of a descriptor. `failed` is called, from its thread, once that can no longer be written."""
 
+    def ended(problem: OSError | None) -> None:
+        if problem is not None:
+            failed(problem)
+
+    if sys.platform == "win32" and (console := console_writer(descriptor, CHUNK)) is not None:
+        return BoundedWriter(console, notice, ended, limit)
+
     def write(data: bytes) -> int:
         try:
             return os.write(descriptor, data[:CHUNK])
         except BlockingIOError:  # another process that shares the descriptor made it non-blocking
             select.select([], [descriptor], [])
             return 0
-
-    def ended(problem: OSError | None) -> None:
-        if problem is not None:
-            failed(problem)
 
     return BoundedWriter(write, notice, ended, limit)
 

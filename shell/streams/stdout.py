@@ -25,6 +25,9 @@ from multidrop.shell.exit_codes import INTERRUPTED, READER_GONE
 from multidrop.shell.streams import output_streams
 from multidrop.shell.streams.output_streams import Outlet
 
+if sys.platform == "win32":
+    from multidrop.shell.console import reader_gone
+
 LONGEST = 800
 """The longest message, in characters: it may quote a typed text of any length."""
 
@@ -112,8 +115,8 @@ class ReaderWatch:
     """Interrupts this process once the reader of its standard output is gone, whether or not anything is printed.
 
     A thread polls the descriptor. A pipe and a socket have a reader, and so has a terminal beside another standard
-    input; one that is standard input, too, sends SIGHUP. A file and the null device have none. Windows has no such
-    poll: there the next line that is printed says it.
+    input; one that is standard input, too, sends SIGHUP. A file and the null device have none. On Windows pipes
+    say it; a console sends SIGBREAK, and of a socket the next line that is printed says it.
     """
 
     LOOK = 250
@@ -133,7 +136,7 @@ class ReaderWatch:
             self._descriptor = sys.stdout.fileno()
 
     def begin(self) -> None:
-        if sys.platform != "win32" and self._has_reader():
+        if self._has_reader():
             threading.Thread(target=self._run, daemon=True, name=WATCHER).start()
 
     def _has_reader(self) -> bool:
@@ -161,7 +164,8 @@ class ReaderWatch:
     def is_gone(self, wait: int = 0) -> bool:
         """Whether the reader is gone, or goes within `wait` ms."""
         if sys.platform == "win32":
-            return False
+            time.sleep(wait / 1000)
+            return reader_gone(self._descriptor)
         poll = select.poll()
         poll.register(self._descriptor, 0)
         return any(event & (select.POLLERR | select.POLLHUP) for _, event in poll.poll(wait))
@@ -173,9 +177,7 @@ class ReaderWatch:
             return
         number = signal.SIGTERM if signal.getsignal(self._number) is signal.SIG_IGN else self._number
         if sys.platform == "win32":
-            import _thread
-
-            _thread.interrupt_main(number)
+            signal.raise_signal(number)
         elif (main := threading.main_thread().ident) is not None:
             signal.pthread_kill(main, number)
 

@@ -6,7 +6,7 @@ import pytest
 
 from multidrop.dialects import Diagnostic, Stopped
 from multidrop.shell.configuration import Settings
-from multidrop.shell.prompt.terminal_input import PAUSE, Answer, at_lines
+from multidrop.shell.prompt.terminal_input import PAUSE, Answer
 from multidrop.shell.session import Session
 
 pytestmark = pytest.mark.virtual
@@ -89,24 +89,3 @@ def test_only_a_key_after_a_pause_answers():
         assert Answer(0.0).key(key, PAUSE * 0.9) is None
     answer = Answer(0.0)
     assert [answer.key(key, PAUSE * at) for key, at in (("y", 0.9), ("y", 1.8), ("y", 2.9))] == [None, None, True]
-
-
-async def test_where_keys_cannot_be_held_a_line_answers_that_comes_after_the_question(capsys):
-    typed = asyncio.Queue()
-
-    async def lines():
-        while (line := await typed.get()) is not None:
-            yield line
-
-    ask = at_lines(lines())
-    for early, late, expected in (("y", "n", False), ("n", " y ", True), ("y", "", False)):
-        asked = asyncio.create_task(ask("FD erases the drive"))
-        await asyncio.sleep(0.1)
-        typed.put_nowait(early)
-        await asyncio.sleep(PAUSE)
-        assert not asked.done()
-        typed.put_nowait(late)
-        assert await asked is expected
-    typed.put_nowait(None)
-    assert await ask("FD erases the drive") is False
-    assert capsys.readouterr().err == "FD erases the drive. Go on? [y/N]\n" * 4

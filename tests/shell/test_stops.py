@@ -5,11 +5,11 @@ from dataclasses import replace
 
 import pytest
 
-from multidrop.dialects import DriveError, Motion, Stopped
+from multidrop.dialects import Diagnostic, DriveError, Motion, Stopped
 from multidrop.drives.drive import confirmed_motion
 from multidrop.drives.stopping import Fate
 from multidrop.shell import stop_report
-from multidrop.shell.automation import outcome
+from multidrop.shell.automation import TRIAL, outcome, stop_key_trial
 from multidrop.shell.events import OnBus
 from multidrop.transports import TransportLost
 from tests.support.cell_session import ETHERNET, CellSession, bus, party, pmx
@@ -337,3 +337,25 @@ async def test_a_line_that_a_stop_cuts_off_is_reported_as_it_is_and_no_later_lin
             assert f"MR {30000 + moment}" in executed
             assert shop.moving()
             await session.run("/wait stopped 20")
+
+
+@pytest.mark.parametrize("by", ["the key", "/resume"])
+async def test_where_the_stop_key_may_be_swallowed_nothing_moves_before_it_came_or_a_person_agreed(by, tmp_path):
+    async with CellSession(tmp_path, *FLOOR) as shop:
+        shop.session.doubted = stop_key_trial(shop.session)
+        for line in ALL[0], "@stages:00 JX+":
+            with pytest.raises(Diagnostic, match="this console may swallow Ctrl\\+X, so nothing that can move a drive"):
+                await shop.session.run(line)
+        await shop.session.run("@press:a PR P")
+        await shop.session.run("/stop")
+        with pytest.raises(Diagnostic, match="press Ctrl\\+X once"):
+            await shop.session.run(ALL[0])
+        await asyncio.sleep(TRIAL)
+        assert [line for line in shop.told() if "did not come" in line and "`/stop` Enter stops" in line]
+        if by == "/resume":
+            await shop.session.run("/resume")
+        else:
+            shop.session.stop_ahead()
+            shop.session.stop("Ctrl+X")
+        await shop.session.run(ALL[0])
+        assert shop.moving() == {"press:a"}

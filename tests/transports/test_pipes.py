@@ -152,7 +152,7 @@ async def test_a_large_write_over_rfc2217_counts_as_several() -> None:
         assert arrived == b"x" * (1_000_000 - dropped) + b"!"
 
 
-@pytest.mark.parametrize("kind", ["serial", "tcp", "udp", "relay", "rfc2217"])
+@pytest.mark.parametrize("kind", KINDS)
 async def test_a_thread_writes_its_stop_while_the_loop_is_held_up_and_nothing_follows_until_the_loop_knows(kind: str):
     async with rig(kind) as each:
         each.start()
@@ -178,7 +178,7 @@ async def test_a_thread_writes_its_stop_while_the_loop_is_held_up_and_nothing_fo
         assert await each.far.receive(5) == b"after"
 
 
-@pytest.mark.parametrize("kind", ["serial", "tcp", "relay"])
+@pytest.mark.parametrize("kind", ["serial", "tcp", "tcp by threads", "relay"])
 @pytest.mark.parametrize("whole", [False, True])
 async def test_what_preempts_the_loop_drops_what_is_unsent_and_follows_what_has_begun(kind: str, whole: bool):
     large = 1_000_000

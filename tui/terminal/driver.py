@@ -14,16 +14,14 @@ event loop never waits for the terminal.
 
 from __future__ import annotations
 
-import fcntl
 import os
 import re
 import select
 import selectors
+import shutil
 import struct
 import sys
-import termios
 import time
-import tty
 from contextlib import suppress
 from functools import partial
 from typing import Any, Protocol, cast
@@ -31,16 +29,27 @@ from typing import Any, Protocol, cast
 from rich.color import ColorSystem
 from textual import events
 from textual._compositor import ChopsUpdate, LayoutUpdate
-from textual.drivers.linux_driver import LinuxDriver
 from textual.geometry import Offset, Size
 from textual.message import Message
 
-from multidrop.shell.prompt import raw_terminal
 from multidrop.shell.streams.output_streams import descriptor_writer
 from multidrop.shell.threads import Loss
 from multidrop.tui.frame_scheduler import Pace
 from multidrop.tui.terminal.canvas import Canvas, pieces_of
 from multidrop.tui.terminal.keystream import STOP, KeyStream
+
+if sys.platform == "win32":
+    from textual.drivers.windows_driver import WindowsDriver as PlatformDriver
+
+    from multidrop.shell.console import Console
+else:
+    import fcntl
+    import termios
+    import tty
+
+    from textual.drivers.linux_driver import LinuxDriver as PlatformDriver
+
+    from multidrop.shell.prompt import raw_terminal
 
 CURSOR_QUERY = "\x1b[6n"
 KEYBOARD_PROTOCOL = re.compile("\x1b\\[[<>][0-9]*u")
@@ -49,7 +58,6 @@ COLOURS = {"standard": ColorSystem.STANDARD, "256": ColorSystem.EIGHT_BIT, "true
 """Ranges of colours, by the name that rich gives a terminal's."""
 AT_THE_END = 1.0
 """Seconds that the terminal gets at the end to take its output."""
-assert sys.platform != "win32"
 FULL_SCREEN = "\x1b[?1049h\x1b[?1004h"
 """Switch to the alternate screen, and report changes of the focus."""
 
@@ -76,8 +84,8 @@ class Owner(Protocol):
         """Paint what waits for the terminal, which has swallowed the last frame."""
 
 
-class Terminal(LinuxDriver):
-    """A terminal on POSIX. Its `write` never waits; `pace` gets the terminal's replies."""
+class Terminal(PlatformDriver):
+    """A terminal, or a console of Windows. Its `write` never waits; `pace` gets the terminal's replies."""
 
     def __init__(self, *arguments: Any, **named: Any) -> None:
         super().__init__(*arguments, **named)
@@ -95,7 +103,16 @@ class Terminal(LinuxDriver):
         self._leaving = False
         self._mouse_on = True
         self._canvas = Canvas(COLOURS.get(self._app.console.color_system or ""))
-        super().start_application_mode()  # type: ignore[no-untyped-call]
+        if sys.platform == "win32":
+            self._console = Console(sys.__stdin__.fileno(), self._came, self._sized, signals=False)  # type: ignore[union-attr]
+            self._console.__enter__()
+            self.write(f"{FULL_SCREEN}{HIDDEN_CURSOR}")
+            self._disable_line_wrap()
+            self._enable_mouse_support()
+            self._enable_bracketed_paste()
+            self._sized()
+        else:
+            super().start_application_mode()  # type: ignore[no-untyped-call]
 
     def stop_application_mode(self) -> None:
         self._leaving = True
@@ -107,6 +124,8 @@ class Terminal(LinuxDriver):
         while not self._out.idle and time.monotonic() < until:
             time.sleep(0.005)
         self._out.give_up()
+        if sys.platform == "win32":
+            self._console.__exit__(None, None, None)
 
     def write(self, data: str) -> None:
         """Queue output, or drop it if the terminal takes none.
@@ -150,8 +169,9 @@ class Terminal(LinuxDriver):
         """True if the system has taken all output, and a serial line has sent it."""
         if not self._out.idle:
             return False
-        with suppress(OSError):  # else it is not a serial terminal
-            return not struct.unpack("i", fcntl.ioctl(self._descriptor, termios.TIOCOUTQ, b"\0" * 4))[0]
+        if sys.platform != "win32":
+            with suppress(OSError):  # else it is not a serial terminal
+                return not struct.unpack("i", fcntl.ioctl(self._descriptor, termios.TIOCOUTQ, b"\0" * 4))[0]
         return True
 
     def _takes_again(self, loss: Loss) -> bytes:
@@ -171,66 +191,99 @@ class Terminal(LinuxDriver):
 
     # Input
 
-    def _sigcont_application(self, *_: object) -> None:
-        """Handle SIGCONT in the loop: a signal handler may run while the writer's lock is held."""
-        with suppress(RuntimeError):  # the loop has ended
-            self._loop.call_soon_threadsafe(self._continued)
+    if sys.platform == "win32":
 
-    def _continued(self) -> None:
-        """Take the terminal back from the shell, whose settings would delay the stop key until Enter.
+        def disable_input(self) -> None:
+            """End the reading thread."""
+            self._disable_mouse_support()
+            self._enable_line_wrap()
+            self._console.end()
 
-        Reader and writer still run, unless this driver has released the terminal before. Textual would start them
-        again: then two threads would read by turns, and keys would overtake each other.
-        """
-        if not self._auto_restart:
-            return
-        if self._must_signal_resume:
-            self.resume_application_mode()
-        elif raw_terminal.in_foreground(self.fileno):
-            self._take_again()
+        def _enable_line_wrap(self) -> None:
+            self.write("\x1b[?7h")
 
-    def _take_again(self) -> None:
-        with suppress(termios.error):  # it has hung up, which the reader reports
-            held = termios.tcgetattr(self.fileno)
-            held[tty.LFLAG] = self._patch_lflag(held[tty.LFLAG])
-            held[tty.IFLAG] = self._patch_iflag(held[tty.IFLAG])
-            held[tty.CC][termios.VMIN] = 1
-            termios.tcsetattr(self.fileno, termios.TCSANOW, held)
-        self.write(FULL_SCREEN)
-        self._disable_line_wrap()
-        self.repaint()
+        def _disable_line_wrap(self) -> None:
+            self.write("\x1b[?7l")
 
-    def run_input_thread(self) -> None:
-        """Read until the app ends, and look for the stop. Runs in a thread of its own; the loop does the rest."""
-        app = cast(Owner, self._app)
-        with selectors.SelectSelector() as selector:
-            selector.register(self.fileno, selectors.EVENT_READ)
-            while not self.exit_event.is_set():
-                if not selector.select(0.1):
-                    continue
-                try:
-                    data = os.read(self.fileno, 4096)
-                except OSError:
-                    data = b""
-                if not data:
-                    self._loop.call_soon_threadsafe(app.interrupted)
-                    return
-                if STOP in data:
-                    app.stop_ahead()
-                self._loop.call_soon_threadsafe(self._take, data)
+        def _came(self, data: bytes) -> None:
+            """Take what the console's reading thread has read; the loop does the rest."""
+            app = cast(Owner, self._app)
+            if STOP in data:
+                app.stop_ahead()
+            with suppress(RuntimeError):  # the loop has ended
+                self._loop.call_soon_threadsafe(*((self._take, data) if data else (app.interrupted,)))
+
+        def _sized(self) -> None:
+            size = Size(*shutil.get_terminal_size())
+            with suppress(RuntimeError):
+                self._loop.call_soon_threadsafe(self._app.post_message, events.Resize(size, size))
+
+        def _more(self) -> bool:
+            """True if the console has keys that were not read yet."""
+            return self._console.more()
+
+    else:
+
+        def _sigcont_application(self, *_: object) -> None:
+            """Handle SIGCONT in the loop: a signal handler may run while the writer's lock is held."""
+            with suppress(RuntimeError):  # the loop has ended
+                self._loop.call_soon_threadsafe(self._continued)
+
+        def _continued(self) -> None:
+            """Take the terminal back from the shell, whose settings would delay the stop key until Enter.
+
+            Reader and writer still run, unless this driver has released the terminal before. Textual would start them
+            again: then two threads would read by turns, and keys would overtake each other.
+            """
+            if not self._auto_restart:
+                return
+            if self._must_signal_resume:
+                self.resume_application_mode()
+            elif raw_terminal.in_foreground(self.fileno):
+                self._take_again()
+
+        def _take_again(self) -> None:
+            with suppress(termios.error):  # it has hung up, which the reader reports
+                held = termios.tcgetattr(self.fileno)
+                held[tty.LFLAG] = self._patch_lflag(held[tty.LFLAG])
+                held[tty.IFLAG] = self._patch_iflag(held[tty.IFLAG])
+                held[tty.CC][termios.VMIN] = 1
+                termios.tcsetattr(self.fileno, termios.TCSANOW, held)
+            self.write(FULL_SCREEN)
+            self._disable_line_wrap()
+            self.repaint()
+
+        def run_input_thread(self) -> None:
+            """Read until the app ends, and look for the stop. Runs in a thread of its own; the loop does the rest."""
+            app = cast(Owner, self._app)
+            with selectors.SelectSelector() as selector:
+                selector.register(self.fileno, selectors.EVENT_READ)
+                while not self.exit_event.is_set():
+                    if not selector.select(0.1):
+                        continue
+                    try:
+                        data = os.read(self.fileno, 4096)
+                    except OSError:
+                        data = b""
+                    if not data:
+                        self._loop.call_soon_threadsafe(app.interrupted)
+                        return
+                    if STOP in data:
+                        app.stop_ahead()
+                    self._loop.call_soon_threadsafe(self._take, data)
+
+        def _more(self) -> bool:
+            """True if the terminal has sent bytes that were not read yet."""
+            try:
+                return bool(select.select([self.fileno], [], [], 0)[0])
+            except (OSError, ValueError):
+                return False  # it is gone, which the reader reports
 
     def _take(self, data: bytes) -> None:
         """Take bytes that were read: first a stop in them, then the rest."""
         if STOP in data:
             cast(Owner, self._app).stop_all()
         self.keys.take(data)
-
-    def _more(self) -> bool:
-        """True if the terminal has sent bytes that were not read yet."""
-        try:
-            return bool(select.select([self.fileno], [], [], 0)[0])
-        except (OSError, ValueError):
-            return False  # it is gone, which the reader reports
 
     def send_message(self, message: Message) -> None:
         """Hand a message to the app, whose loop runs this."""

@@ -7,6 +7,7 @@ one of the same width. So a new sign is added to the tables here, and no other m
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Mapping
 from enum import Enum
 from functools import lru_cache
@@ -124,7 +125,9 @@ def signs_for(wanted: str, environment: Mapping[str, str]) -> Signs:
     locale = environment.get("LC_ALL") or environment.get("LC_CTYPE") or environment.get("LANG") or ""
     if locale and "utf8" not in locale.lower().replace("-", ""):
         return Signs.ASCII
-    return Signs.BOXES if environment.get("TERM") == "linux" else Signs.FULL
+    # The fonts of both have no braille; a terminal names itself on Windows, too.
+    console = sys.platform == "win32" and not environment.keys() & {"WT_SESSION", "SSH_CONNECTION", "TERM_PROGRAM"}
+    return Signs.BOXES if console or environment.get("TERM") == "linux" else Signs.FULL
 
 
 @lru_cache(4096)

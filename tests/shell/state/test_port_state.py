@@ -4,6 +4,7 @@ import asyncio
 import json
 import os
 from dataclasses import asdict, replace
+from urllib.parse import unquote
 
 import pytest
 from hypothesis import given
@@ -332,3 +333,32 @@ def test_the_folder_of_a_record_survives_a_power_cut(tmp_path, monkeypatch):
     for _ in range(2):
         PortState(tmp_path / "state", "port").close()
     assert synced == [tmp_path / "state", tmp_path], "once, as they are made"
+
+
+def test_no_file_of_a_port_has_the_name_of_a_device(tmp_path):
+    names = ("COM5", "com5", "CON", "nul", "LPT1", "aux.example.com:503", "COM10", "usb-0403-6001-A5069RR4", "end.")
+    for port in names:
+        state = PortState(tmp_path, port)
+        assert state.remarks == []
+        state.close()
+    found = sorted(path.name for path in (tmp_path / "ports").iterdir())
+    assert {unquote(name.removesuffix(".line")) for name in found} == set(names)
+    assert not any(atomic.reserved(name) for name in found)
+    assert "%43OM5.line" in found and "COM10.line" in found and "end%2E.line" in found
+
+
+def test_what_an_earlier_version_has_left_is_found_under_its_name(tmp_path):
+    (tmp_path / "ports").mkdir()
+    (earlier := tmp_path / "ports" / "aux.example.com%3A503.line").write_bytes(b"aMR 5".ljust(128, b"\0"))
+    state = PortState(tmp_path, "aux.example.com:503")
+    assert state.cut == "aMR 5"
+    state.close()
+    assert list((tmp_path / "ports").iterdir()) == [earlier]
+
+
+@given(st.text(max_size=20))
+def test_a_safe_name_stands_for_one_text_and_is_no_path(text):
+    name = atomic.safe_name(text)
+    assert unquote(name, errors="surrogatepass") == text
+    assert not set(name) & set('<>:"/\\|?* ') and name.isascii() and not name.endswith(".")
+    assert not atomic.reserved(name) and not atomic.reserved(f"{name}.json")
