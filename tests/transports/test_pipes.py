@@ -186,6 +186,7 @@ async def test_what_preempts_the_loop_drops_what_is_unsent_and_follows_what_has_
         each.start()
         each.transport.write(b"x" * large)
         each.transport.write(b"y" * large)
+        arrived = await each.far.receive_some()  # a write has begun
         dropped: list[int] = []
 
         def stop(unsent: int) -> bytes:
@@ -195,7 +196,6 @@ async def test_what_preempts_the_loop_drops_what_is_unsent_and_follows_what_has_
         thread = threading.Thread(target=each.transport.preempt, args=(whole, stop))
         thread.start()
         thread.join(PATIENCE)
-        arrived = b""
         while b"!" not in arrived:
             arrived += await each.far.receive_some()
         assert arrived.strip(b"x") == b"!"
