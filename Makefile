@@ -9,7 +9,7 @@ WORKERS := $(shell $(PYTHON) -c 'import os; print((os.cpu_count() or 1) + 1)')
 PYTEST = $(BIN)/python -m pytest --dist worksteal -n $(WORKERS)
 PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check
 
-.PHONY: demo test quick nightly check format lint types types-here types-darwin types-win32 contracts measured coverage bench readme shipped pictures docs package fuzz soak simulate snapshots windows clean
+.PHONY: demo test quick nightly check format lint types types-here types-darwin types-win32 contracts measured coverage bench readme shipped pictures docs package release fuzz soak simulate snapshots windows clean
 
 demo: $(VENV)/.run
 	$(BIN)/multidrop demo
@@ -89,6 +89,11 @@ $(DOCS)/.done: packaging/docs-requirements.txt
 package: $(VENV)/.dev
 	$(BIN)/python -m build --outdir dist .
 
+# Wheel and source distribution with their checks, in dist: one version in all places, a clean tree, and a smoke test in bare
+# environments of each Python that is here. Nothing is published.
+release: $(VENV)/.dev
+	$(BIN)/python packaging/release.py
+
 # Coverage-guided fuzzing of every decoder, parser and simulated port, SECONDS each; atheris has a Python of its own.
 SECONDS ?= 20
 FUZZ := $(VENV)/fuzz
@@ -122,7 +127,8 @@ $(VENV)/bin/python:
 	$(PYTHON) -m venv $(VENV)
 
 $(VENV)/.run: pyproject.toml constraints.txt | $(VENV)/bin/python
-	$(PIP) -c constraints.txt -e .
+	@echo "installing multidrop into $(VENV), with plots to rerun: 840 MB on disk, one to two minutes"
+	$(BIN)/python -m pip install --disable-pip-version-check --progress-bar on -c constraints.txt -e '.[rerun]'
 	touch $@
 
 $(VENV)/.dev: pyproject.toml constraints.txt requirements-dev.txt | $(VENV)/bin/python
