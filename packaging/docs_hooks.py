@@ -1,4 +1,4 @@
-"""For mkdocs: the version in the title; a link that leaves the folder of the pages leads to a file that the site lacks."""
+"""For mkdocs: the version in the title; words in place of links that leave the folder of the pages."""
 
 from __future__ import annotations
 

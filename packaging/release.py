@@ -22,7 +22,7 @@ PYTHONS = ("3.11", "3.12", "3.13", "3.14")
 """The versions to try; one that this machine lacks is named as not tried."""
 PLACES = {
     "multidrop/__init__.py": r'^__version__ = "(.+)"$',
-    "CHANGELOG.md": r"^## (\d\S*)",
+    "CHANGELOG.md": r"^## (\d[\w.]*)",
     "CITATION.cff": r"^version: (\S+)$",
     "multidrop/shipped/multidrop.1": r'^\.TH .*"multidrop (\S+)"',
 }
@@ -116,6 +116,7 @@ def _run(*command: object, cwd: Path | None = None, env: Mapping[str, str] | Non
 
 
 def main() -> int:
+    """Make a release; return the exit code."""
     try:
         version = checked_version()
         print(f"multidrop {version}: building", flush=True)
