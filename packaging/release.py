@@ -138,7 +138,7 @@ def main() -> int:
         return 1
     print(f"dist has multidrop {version}; works with Python {', '.join(tried)}", end="")
     print(f"; not tried: {', '.join(missing)} (not on this machine)" if missing else "")
-    print(f"next: git tag v{version}; the workflow .ci/release.yml builds the same from the tag")
+    print(f"next: git tag v{version}; the workflow packaging/release.yml builds the same from the tag")
     return 0
 
 

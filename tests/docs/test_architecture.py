@@ -51,3 +51,8 @@ def test_the_index_leads_to_every_page():
     index = (ROOT / "docs" / "README.md").read_text(encoding="utf-8")
     linked = set(re.findall(r"\]\(([a-z-]+\.md)", index))
     assert linked == {page.name for page in (ROOT / "docs").glob("*.md")} - {"README.md"}
+
+
+def test_the_site_has_every_page():
+    listed = set(re.findall(r": ([a-z-]+\.md)$", (ROOT / "packaging" / "mkdocs.yml").read_text(encoding="utf-8"), re.M))
+    assert listed == {page.name for page in (ROOT / "docs").glob("*.md")} - {"README.md"}

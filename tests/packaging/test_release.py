@@ -46,5 +46,5 @@ def test_a_tree_with_changes_is_no_release(release: ModuleType, monkeypatch: pyt
 
 
 def test_the_workflow_makes_what_make_release_makes() -> None:
-    text = (ROOT / ".ci" / "release.yml").read_text()
+    text = (ROOT / "packaging" / "release.yml").read_text()
     assert "make release" in text and "bash .ci/run" in text
