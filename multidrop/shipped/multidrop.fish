@@ -86,8 +86,8 @@ function _shtab_multidrop_using
   test "$_shtab_multidrop_cmdpath" = "$argv"
 end
 
-set -g _shtab_multidrop_commands demo tui shell send run sim program 'program check' 'program test' 'program sweep' 'program convert' 'program list' 'program diff' 'program upload' 'program download' params 'params backup' 'params diff' 'params restore' macro 'macro list' 'macro show' 'macro play' 'macro edit' 'macro describe' 'macro rename' 'macro copy' 'macro delete' 'macro key' 'macro import' 'macro export' plot poll publish share snapshot ports relay scan rescue log 'log show' 'log follow' 'log grep' 'log judge' 'log replay' config 'config path' 'config show' 'config check' help lsp report completion
-set -g _shtab_multidrop_opts_with_value --against --allow --baud --break --cell --cluster --dialect --drive --every --expect --jobs --junit --language --on --other --output --page --personality --random --rate --rfc2217 --role --rows --run --save --seed --serve --set --speed --tcp --times --to --until --vary --watch --with -o
+set -g _shtab_multidrop_commands demo tui shell send run sim program 'program check' 'program test' 'program sweep' 'program convert' 'program list' 'program diff' 'program upload' 'program download' params 'params backup' 'params diff' 'params restore' macro 'macro list' 'macro show' 'macro play' 'macro edit' 'macro describe' 'macro rename' 'macro copy' 'macro delete' 'macro key' 'macro import' 'macro export' plot poll publish share snapshot certify ports relay scan rescue log 'log show' 'log follow' 'log grep' 'log judge' 'log replay' config 'config path' 'config show' 'config check' help lsp report completion
+set -g _shtab_multidrop_opts_with_value --against --allow --baud --break --cell --cluster --compare --dialect --drive --every --expect --jobs --junit --language --on --other --output --page --personality --random --rate --rfc2217 --role --rows --run --save --seed --serve --set --speed --tcp --times --to --until --vary --watch --with -o
 
 complete -c multidrop -e
 complete -c multidrop -f
@@ -309,6 +309,13 @@ complete -c multidrop -n '_shtab_multidrop_using; and test $_shtab_multidrop_npo
 complete -c multidrop -n '_shtab_multidrop_using snapshot' -s h -l help -d 'show this help message and exit'
 complete -c multidrop -n '_shtab_multidrop_using snapshot' -s o -l output -xka "(__fish_complete_path (commandline -ct))" -d 'the new file; -: standard output'
 complete -c multidrop -n '_shtab_multidrop_using snapshot; and test $_shtab_multidrop_npos -ge 0' -ka "(_multidrop_url)" -d 'what to open'
+complete -c multidrop -n '_shtab_multidrop_using; and test $_shtab_multidrop_npos -eq 0' -a certify -d 'Ask a drive the questions that our rulings leave open, for a report; or compare a drive with a report.'
+complete -c multidrop -n '_shtab_multidrop_using certify' -s h -l help -d 'show this help message and exit'
+complete -c multidrop -n '_shtab_multidrop_using certify' -l drive -xka "(_multidrop_drive)" -d 'the drive (default: the first); may be repeated'
+complete -c multidrop -n '_shtab_multidrop_using certify' -s o -l output -xka "(__fish_complete_path (commandline -ct))" -d 'the new report; -: standard output'
+complete -c multidrop -n '_shtab_multidrop_using certify' -l compare -xka "(__fish_complete_path (commandline -ct))" -d 'print where the answers differ from this report; exit code 0: nowhere, 1: somewhere'
+complete -c multidrop -n '_shtab_multidrop_using certify' -l yes -d 'agree to small moves beforehand; without, a terminal is asked'
+complete -c multidrop -n '_shtab_multidrop_using certify; and test $_shtab_multidrop_npos -eq 0' -ka "(_multidrop_url)" -d 'what to open'
 complete -c multidrop -n '_shtab_multidrop_using; and test $_shtab_multidrop_npos -eq 0' -a ports -d 'List the serial ports of this machine, with their stable names.'
 complete -c multidrop -n '_shtab_multidrop_using ports' -s h -l help -d 'show this help message and exit'
 complete -c multidrop -n '_shtab_multidrop_using ports' -l json -d 'print one JSON object a line'
