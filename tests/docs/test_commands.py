@@ -12,6 +12,7 @@ import io
 import os
 import re
 import shlex
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -20,7 +21,8 @@ from unittest import mock
 import pytest
 
 from multidrop.__main__ import main
-from tests.support.pages import PAGES, blocks
+from tests.support.pages import EXAMPLES, PAGES, blocks
+from tests.support.paths import ROOT
 from tests.support.processes import environment
 from tests.support.until import PATIENCE
 from tests.support.virtual import VirtualLoop
@@ -63,6 +65,8 @@ def commands(page: str) -> list[tuple[str, str]]:
 
 @pytest.mark.parametrize("page", [page for page in PAGES if commands(page)])
 def test_the_commands_of_a_page_print_what_it_says(page: str, tmp_path: Path) -> None:
+    if (ROOT / page).is_relative_to(EXAMPLES):
+        shutil.copytree((ROOT / page).parent, tmp_path, dirs_exist_ok=True)
     for block in blocks(page):
         if block.file:
             (tmp_path / block.file).write_text(block.text, encoding="utf-8")

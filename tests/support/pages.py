@@ -7,9 +7,10 @@ from typing import NamedTuple
 
 from tests.support.paths import ROOT
 
+EXAMPLES = ROOT / "examples"
 PAGES = {
     str(path.relative_to(ROOT)): path.read_text(encoding="utf-8")
-    for path in (ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md")))
+    for path in (ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md")), *sorted(EXAMPLES.glob("*/README.md")))
 }
 _BLOCK = re.compile(r"(?:^<!-- not run: (.+?) -->\n)?^```(\w*)\n(.*?)^```\n(?:\n```text\n(.*?)^```)?", re.S | re.M)
 _FILE = re.compile(r"(?:[#';]|//) ([\w-]+\.\w+)\n")
