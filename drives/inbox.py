@@ -353,7 +353,7 @@ class Inbox:
             return False
         request, received = self._cut_off
         found = request.codec.decode(request, self.buffer)
-        if found is None and self.awaits_tail(now):
+        if found is None and self.awaits_tail(now) and len(self.buffer) <= LONGEST_TAIL:
             return True
         self._cut_off = None
         if found is not None:

@@ -10,7 +10,7 @@ import re
 from collections import Counter, deque
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
-from datetime import datetime
+from datetime import datetime, timedelta
 from typing import NamedTuple
 
 from multidrop.dialects import Diagnostic
@@ -32,6 +32,8 @@ KEPT = 20
 REPEATS = 3
 """How often a command that was rejected as damaged is sent again."""
 READINGS = 2
+MOMENT = timedelta(seconds=0.1)
+"""The time after a stop in which the confirmation of an earlier one may still be said."""
 NAK = "\x15"
 MBAP, FRAME = 7, 9
 """The bytes of the head of a Modbus/TCP message, and those of a TMCL frame."""
@@ -90,6 +92,8 @@ class _Session:
         """By bus, the drive that was asked last and has not replied."""
         self._replies: Counter[Place] = Counter()
         """Replies of drives since a stop after which they got no command."""
+        self._earlier: Counter[Place] = Counter()
+        """Those before the last stop, which an earlier one may be confirmed by in this moment."""
         self._commanded: set[Place] = set()
 
     def take(self, entry: Entry) -> Iterator[tuple[str, str]]:
@@ -104,6 +108,7 @@ class _Session:
             yield from self._line_typed(entry)
         elif entry.kind == "stop":
             self._stops, self._stop, self._due = self._stops + 1, entry.time, set(self._buses)
+            self._earlier = Counter(self._replies) if self._stops > 1 else Counter()
             for bus, drive in [*self._replies]:
                 if self._stops == 1 or self._commanded & {(bus, drive), *((bus, each) for each in EVERYONE)}:
                     del self._replies[bus, drive]
@@ -203,10 +208,11 @@ class _Session:
             if entry.kind == "failed" and typed is not None and typed.sent:
                 yield "not sent", f"{text!r} was sent"
             self._unsent.add((bus, drive, text))
-        if entry.kind == "notice" and self._stops and STOPPED.match(entry.text):
+        if entry.kind == "notice" and self._stop is not None and STOPPED.match(entry.text):
             drive = entry.text.removeprefix(f"{entry.bus}: ").rpartition("stopped, ")[0].removesuffix(": ")
-            if self._replies[entry.bus, drive] < READINGS:
-                yield "stopped", f"{entry.text!r}, after {self._replies[entry.bus, drive]} replies"
+            earlier = self._earlier[entry.bus, drive] * (entry.time - self._stop < MOMENT)
+            if (replies := max(self._replies[entry.bus, drive], earlier)) < READINGS:
+                yield "stopped", f"{entry.text!r}, after {replies} replies"
 
 
 def _text(typed: str) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Collection
 from dataclasses import dataclass, field
 from random import Random
@@ -54,6 +55,8 @@ class Climate:
 
     seed: int
     chances: dict[str, float] = field(default_factory=dict)
+    happened: Counter[str] = field(default_factory=Counter, compare=False)
+    """How often each kind has happened, but for those of the wire: the history has what they changed."""
 
     @classmethod
     def drawn(cls, seed: int, without: Collection[str] = ()) -> Climate:
@@ -72,6 +75,13 @@ class Climate:
         """The probability of a kind."""
         assert kind in FAULTS, kind
         return self.chances.get(kind, 0.0)
+
+    def happens(self, kind: str, rng: Random) -> bool:
+        """Draw whether a fault of this kind happens now."""
+        found = rng.random() < self.chances.get(kind, 0.0)
+        if found:
+            self.happened[kind] += 1
+        return found
 
     @property
     def wire(self) -> Faults:

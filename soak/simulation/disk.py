@@ -137,12 +137,12 @@ class Disk:
         return PROCESS.get() is not None and isinstance(path, str | os.PathLike) and f"{path}/".startswith(self.root)
 
     def _fault(self, kind: str, number: int) -> None:
-        if self.climate[kind] and self.rng.random() < self.climate[kind]:
+        if self.climate[kind] and self.climate.happens(kind, self.rng):
             self.noted("fault", kind)
             raise OSError(number, os.strerror(number))
 
     def _operate(self, what: str, path: str, work: Callable[[], Any], part: Callable[[], object] | None = None) -> Any:
-        if self.climate["slow disk"] and self.rng.random() < self.climate["slow disk"]:
+        if self.climate["slow disk"] and self.climate.happens("slow disk", self.rng):
             self.loop.now += self.rng.random() ** 4 * SLOW
 
         def noted() -> Any:

@@ -42,6 +42,8 @@ def _first(world: World) -> Iterator[str | Granted]:
                     yield Granted(FULL, words) if full else words
             else:
                 begun = b"".join(data for at, data in after if at <= stop.at + SOON)
+                if len(begun) <= rest:  # nothing of what follows the message has left so soon
+                    begun = b"".join(data for _, data in after)
                 begins = [begun, *filter(None, [begun[rest:]])]
                 if not any(form.startswith(each) or each.startswith(form) for form in forms for each in begins):
                     yield f"{line}: stop at {stop.at:.6f}, {begun!r} left at {after[0][0]:.6f}"

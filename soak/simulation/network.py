@@ -48,7 +48,7 @@ class Network:
 
     def drawn(self, kind: str) -> bool:
         """Whether a fault of this kind happens now."""
-        return self.climate[kind] > 0 and self.rng.random() < self.climate[kind]
+        return self.climate[kind] > 0 and self.climate.happens(kind, self.rng)
 
     def delay(self, kind: str = "net late") -> float:
         """The time that bytes are on their way, s."""

@@ -7,7 +7,7 @@ damaged that line in the time of that command; with a checksum only where the no
 from __future__ import annotations
 
 import re
-from bisect import bisect_left
+from bisect import bisect_left, bisect_right
 from collections.abc import Iterator
 from math import inf
 
@@ -33,6 +33,7 @@ OTHERS_REPLY = Grant("a reply to another client's stop", "The reply to another c
 BARE_REFUSAL = Grant("a refusal of noise, without a checksum", "A refusal without a checksum")
 BARE_COMMAND = Grant("a damaged command without a checksum", "Noise on the line")
 NO_SIGN = Grant("a mode without a sign of execution", "0010")
+RUNS = Grant("a program that runs in the drive", "What a report means")
 BARE_VALUE = Grant("a damaged value without a checksum", "Noise on the line")
 
 
@@ -57,7 +58,7 @@ def _damage(history: History, line: str, since: float, until: float) -> list[Dam
     """What noise changed on a line in a time."""
     found = history.damage.get(line, [])
     begin = bisect_left(found, since, key=lambda each: each.at)
-    return found[begin : bisect_left(found, until, key=lambda each: each.at)]
+    return found[begin : bisect_right(found, until, key=lambda each: each.at)]
 
 
 def _made(history: History, command: Command, byte: bytes) -> bool:
@@ -159,7 +160,9 @@ def _unknown(world: World) -> Iterator[str | Granted]:
         switched = [at for (line, _), times in world.cut.items() if line == command.line for at in times]
         if any(command.began - OUTAGE <= at <= command.ended for at in (*stops, *switched)):
             continue
-        yield Granted(NO_SIGN, words) if world.place(command.line).em == 2 else words
+        runs = command.ended >= history.told.programs.get(command.line, inf)
+        grant = NO_SIGN if world.place(command.line).em == 2 else RUNS if runs else None
+        yield Granted(grant, words) if grant else words
 
 
 def _half(world: World) -> Iterator[str | Granted]:
@@ -201,7 +204,9 @@ def _credited(world: World) -> Iterator[str | Granted]:
 def _origin(shown: Shown, numbers: dict[str, Held]) -> str:
     """Say whose value was shown, if it is another drive's, an older one, or a program's."""
     for number in re.findall(NUMBER, shown.text):
-        if (held := numbers.get(number)) is not None:
+        held = numbers.get(number)
+        own = held is not None and (held.line, held.drive) == (shown.line, shown.drive) and held.until > shown.began
+        if held is not None and not own:
             return f"{held.line}:{held.drive} held it from {held.at:.3f} to {held.until:.3f}"
         if TICKS <= int(number) < TICKS + 1_000_000:
             return "a program printed it"
@@ -260,7 +265,7 @@ OUTCOMES = (
         "Without faults a command is not known only where a stop, a kill or a power-off cut it.",
         "What a report means",
         _unknown,
-        (NO_SIGN,),
+        (NO_SIGN, RUNS),
     ),
     Rule("half", "No part of a line is executed.", "What a stop promises", _half, (SEVEN_BITS, BARE_COMMAND)),
     Rule(

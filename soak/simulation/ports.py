@@ -51,7 +51,7 @@ class Descriptor:
     def piece(self, arrived: bytearray, most: int) -> bytes:
         """Take a piece of the bytes that have come."""
         size = min(len(arrived), most)
-        if size > 1 and self.rng.random() < self.climate["split"]:
+        if size > 1 and self.climate.happens("split", self.rng):
             size = self.rng.randrange(1, size)
         data = bytes(arrived[:size])
         del arrived[:size]
@@ -60,12 +60,12 @@ class Descriptor:
 
     def taken(self, data: bytes | memoryview, room: int, busy: bool = True) -> int:
         """The number of bytes of a write that are taken now; all or a part unless `busy`. Raises BlockingIOError."""
-        if room <= 0 or (busy and self.rng.random() < self.climate["full"]):
+        if room <= 0 or (busy and self.climate.happens("full", self.rng)):
             self.loop.call_later(0.001 + self.rng.random() * 0.01, self.loop.writable, self._descriptor)
             self.trace("=", b"")
             raise BlockingIOError(errno.EAGAIN, "no room")
         size = min(len(data), room)
-        if size > (1 if busy else FEW) and self.rng.random() < self.climate["part"]:
+        if size > (1 if busy else FEW) and self.climate.happens("part", self.rng):
             size = self.rng.randrange(1, size)
         if size < len(data):
             self.loop.call_later(0.001 + self.rng.random() * 0.01, self.loop.writable, self._descriptor)
@@ -78,7 +78,7 @@ class Descriptor:
         if self._waiting:
             return
         self._waiting = True
-        if self.rng.random() < self.climate["late read"]:
+        if self.climate.happens("late read", self.rng):
             self.loop.call_later(self.rng.random() * 0.02, self._readable)
         else:
             self.loop.call_soon(self._readable)

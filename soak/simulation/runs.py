@@ -18,6 +18,7 @@ from pathlib import Path
 from typing import TextIO
 
 from multidrop import __version__
+from soak.simulation.climate import FAULTS
 from soak.simulation.judge import judged
 from soak.simulation.shrinking import Life
 from soak.simulation.world import World
@@ -64,7 +65,7 @@ def result(life: Life) -> Result:
         history.exchanges,
         world.loop.now,
         time.process_time() - began,
-        history.counts | found.granted,
+        history.counts | world.climate.happened | found.granted,
     )
 
 
@@ -124,12 +125,15 @@ class Figures:
     def __init__(self) -> None:
         self.broken = 0
         self.counts: Counter[str] = Counter()
+        self.findings: Counter[str] = Counter()
+        """By rule, the seeds that broke it."""
         self._rows: list[tuple[int, int, float, float]] = []
 
     def add(self, each: Result) -> None:
         """Add a result."""
         self.broken += bool(each.breaches)
         self.counts.update(each.counts)
+        self.findings.update({name for name, _ in each.breaches})
         self._rows.append((each.commands, each.exchanges, each.virtual, each.took))
 
     def rows(self) -> Iterator[str]:
@@ -139,7 +143,13 @@ class Figures:
             f"{len(took)} seeds, {self.broken} broke a rule; {sum(commands)} commands, {sum(exchanges)} exchanges, "
             f"{sum(virtual) / 3600:.1f} virtual hours"
         )
-        yield ", ".join(f"{number} {name}" for name, number in sorted(self.counts.items()))
+        yield "broken rules: " + (
+            ", ".join(f"{number} {name}" for name, number in sorted(self.findings.items())) or "none"
+        )
+        faults = {name: self.counts[name] for name in FAULTS if name in self.counts}
+        for what, found in (("faults", faults), ("acts and exceptions", self.counts.keys() - faults)):
+            text = ", ".join(f"{self.counts[name]} {name}" for name in sorted(found))
+            yield f"{sum(self.counts[name] for name in found)} {what}: {text}"
         yield (
             f"{sum(exchanges) / sum(took):.0f} exchanges a second of one core; "
             f"a median seed has {statistics.median(commands):.0f} commands and takes {statistics.median(took):.3f} s"

@@ -19,6 +19,13 @@ FIXED = {
     10177: "a value of a drive that was without power, set while the question ran (of the simulation itself)",
     14645666: "a backup in a state folder whose own name was not synced, lost in a power cut",
     13622070: "a folder that a power cut took away, with the echo mode that was owed to a drive",
+    87: "a print without an end, kept while the rest of a reply that a stop had cut off was awaited",
+    282: "an earlier stop, confirmed as another one came, which `log judge` took for one after too few replies",
+    101: "a value that noise changed in the moment in which it was shown (of the simulation itself)",
+    191: "lines of program mode while a stop was being confirmed (of the simulation itself)",
+    268: "a command beside a running program, without a sign that it was executed (of the simulation itself)",
+    299: "a value with the reply to a stop behind it, whose CR noise had taken (of the simulation itself)",
+    380: "the rest of a stop that left later than the next two stops (of the simulation itself)",
     12175655: "the K of another client's OK, which was shown as a value",
 }
 DERIVED = 12

@@ -78,6 +78,8 @@ class Told:
     guarded: list[Guarded] = field(default_factory=list)
     yes: list[float] = field(default_factory=list)
     """When a yes was typed."""
+    programs: dict[str, float] = field(default_factory=dict)
+    """When the first program of a line was started that prints."""
     latches: list[tuple[float, bool]] = field(default_factory=list)
     """When a stop came, and when `/resume` or the next session let automation run again."""
     halts: list[float] = field(default_factory=list)

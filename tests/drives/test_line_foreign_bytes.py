@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from multidrop.dialects import End, Kind, Priority, Request, StopPiece
 from multidrop.dialects.mcode.host.codec import MCode
 from multidrop.drives.events import Unsolicited
-from multidrop.drives.inbox import LATE
+from multidrop.drives.inbox import LATE, LONGEST_TAIL
 from multidrop.drives.line import LONGEST_LIST, NEVER_QUIET, Finished, Line, Write
 from tests.support.examples import examples
 from tests.support.line_run import LineRun
@@ -155,6 +155,20 @@ def test_what_comes_after_a_stop_that_cut_off_an_answer_is_shown_where_that_neve
     line.stop(0.02)
     line.receive(b"Log\r\n", 0.03)
     assert [event for event in line.events(0.2) if isinstance(event, Unsolicited)] == [Unsolicited(0.2, ("Log",))]
+
+
+def test_what_comes_without_an_end_after_a_stop_that_cut_off_an_answer_is_not_kept():
+    line = Line(PARTY)
+    line.ask(request('PR P,"a ",V', PARTY, "a", expect=r"(-?\d+)a (-?\d+)"))
+    line.events(0.0)
+    line.stop(0.02)
+    shown = 0
+    for number in range(200):
+        line.receive(b"U" * 64, 0.03 + number / 1000)
+        events = line.events(0.03 + number / 1000)
+        shown += sum(len("".join(each.lines)) for each in events if isinstance(each, Unsolicited))
+        assert len(line.inbox.buffer) <= LONGEST_TAIL
+    assert shown + len(line.inbox.buffer) == 200 * 64
 
 
 def test_what_was_under_way_when_a_stop_came_is_outstanding():

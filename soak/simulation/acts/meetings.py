@@ -94,6 +94,7 @@ def prints(world: World, rng: Random) -> None:
     if witness.device.programming is None:
         LANGUAGES[place.language].print_on(witness, world.floor.now())
         world.floor.floor.wires[place.name].look_again()
+        world.history.told.programs.setdefault(place.name, world.loop.now)
     _several(world, rng, place)
 
 

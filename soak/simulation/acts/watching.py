@@ -76,7 +76,10 @@ class WatchedPath(LinePath):
                 return put
             drive = session.drive(bus.name, parsed.address)
             waits = drive in transfers._under_way or bus._stopping.tasks  # for the end of program mode
-            if drive.programming and not waits and (command := history.commands.pop(typed, None)) is not None:
+            if drive.programming and (command := history.commands.pop(typed, None)) is not None:
+                if waits:  # it may be stored or executed, once
+                    history.told.repeated[command.line, command.drive, command.text] = 1
+                    return None
                 put = Put(session.now(), command.line, command.drive, command.text)
                 history.told.stored.append(put)
                 return put

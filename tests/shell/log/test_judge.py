@@ -65,9 +65,10 @@ GOOD: Rows = [
 ]
 
 
-def found(rows: Rows, tmp_path: Path) -> list[tuple[str, int]]:
+def found(rows: Rows, tmp_path: Path, apart: float = 1.0) -> list[tuple[str, int]]:
     path = tmp_path / "day.jsonl"
-    path.write_bytes(b"".join(line_of(Entry(datetime.fromtimestamp(at, UTC), **row)) for at, row in enumerate(rows)))
+    entries = (Entry(datetime.fromtimestamp(at * apart, UTC), **row) for at, row in enumerate(rows))
+    path.write_bytes(b"".join(map(line_of, entries)))
     return [(each.rule, each.line.number) for each in judged(files.whole(path)).breaches]
 
 
@@ -194,6 +195,16 @@ def test_a_reply_to_what_was_typed_before_the_log_began_is_not_judged(tmp_path: 
 def test_what_another_origin_types_meanwhile_is_no_silence(tmp_path: Path) -> None:
     rows = [*HEAD, typed("MR 1", by="macro"), command("MR 1")[0], typed("MR 2"), said("a does not reply", "failed")]
     assert found([*rows, typed("MR 3", by="macro")], tmp_path) == []
+
+
+@pytest.mark.parametrize(("readings", "breaches"), [(1, ["stopped"]), (2, [])])
+def test_an_earlier_stop_may_be_confirmed_as_another_one_comes(
+    readings: int, breaches: list[str], tmp_path: Path
+) -> None:
+    first = [STOP, ESC, typed("R2=1"), command("R2=1")[0], said("a: late", "failed")]
+    rows = [*HEAD, *first, *asked("BY,P", "0512") * readings, STOP, said("l: a: stopped, velocity 0 at 512"), ESC]
+    assert [rule for rule, _ in found(rows, tmp_path, apart=0.01)] == breaches
+    assert [rule for rule, _ in found(rows, tmp_path)] == ["stopped"]
 
 
 @pytest.mark.parametrize(("by", "breaches"), [("operator", ["silence"]), ("macro", []), ("script", [])])
