@@ -7,6 +7,7 @@ from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 
+from multidrop.transports.relay import Kind, frame
 from soak.simulation.bounds import beyond
 from soak.simulation.departures import DEPARTURES
 from soak.simulation.history import Stop
@@ -19,6 +20,7 @@ SOON = 0.05
 """The time, s, in which the kernel takes a stop: a line that takes nothing meanwhile is lost, or flooded."""
 
 
+DROP = frame(Kind.DROP)
 FULL = Grant("a port that takes nothing", "A port that takes nothing")
 
 
@@ -44,9 +46,16 @@ def _first(world: World) -> Iterator[str | Granted]:
                 begun = b"".join(data for at, data in after if at <= stop.at + SOON)
                 if len(begun) <= rest:  # nothing of what follows the message has left so soon
                     begun = b"".join(data for _, data in after)
-                begins = [begun, *filter(None, [begun[rest:]])]
+                begins = [begun, *filter(None, [begun[rest:]]), *_behind_a_drop(world, line, first, begun)]
                 if not any(form.startswith(each) or each.startswith(form) for form in forms for each in begins):
                     yield f"{line}: stop at {stop.at:.6f}, {begun!r} left at {after[0][0]:.6f}"
+
+
+def _behind_a_drop(world: World, line: str, first: int, begun: bytes) -> Iterator[bytes]:
+    """What leaves behind a drop of the stop before, of which nothing else has left: one drop is enough for both."""
+    last = next((data for _, port, data in reversed(world.history.written[:first]) if port == line), b"")
+    if world.place(line[:2]).kind == "ssh" and last.endswith(DROP):
+        yield DROP + begun
 
 
 def _lost(world: World, line: str, stop: Stop) -> bool:

@@ -26,6 +26,7 @@ FIXED = {
     268: "a command beside a running program, without a sign that it was executed (of the simulation itself)",
     299: "a value with the reply to a stop behind it, whose CR noise had taken (of the simulation itself)",
     380: "the rest of a stop that left later than the next two stops (of the simulation itself)",
+    479: "a stop behind the drop of the stop before, whose bytes had not left (of the simulation itself)",
     12175655: "the K of another client's OK, which was shown as a value",
 }
 DERIVED = 12
