@@ -22,6 +22,7 @@ from multidrop.api.telemetry import RATE, AsyncTelemetry, Sample
 from multidrop.api.threads import LoopThread, Notices
 from multidrop.dialects import Diagnostic
 from multidrop.drives.telemetry import PERIOD
+from multidrop.shell.events import FAILURES
 
 P = ParamSpec("P")
 T = TypeVar("T")
@@ -32,6 +33,7 @@ def blocking(method: Callable[Concatenate[Any, P], Coroutine[Any, Any, T]]) -> C
     """Make the blocking form of an awaited method, for an object with `awaited` and `call`."""
 
     def call(self: Any, /, *arguments: P.args, **named: P.kwargs) -> T:
+        __tracebackhide__ = True
         found: T = self._call(lambda: method(self._awaited, *arguments, **named))
         return found
 
@@ -113,12 +115,15 @@ class Session:
 
     def _call(self, work: Callable[[], Coroutine[Any, Any, T]]) -> T:
         """Await work in the session's thread. An interruption while waiting stops what the session started."""
+        __tracebackhide__ = True
         if not self._thread.alive:
             raise Diagnostic(*CLOSED)
         future = None
         try:
             future = self._thread.begin(work())
             return future.result()
+        except FAILURES as error:
+            raise error.with_traceback(None) from None
         except (KeyboardInterrupt, SystemExit):  # of this thread: no call raises them
             if future is None or not future.done():
                 with contextlib.suppress(Diagnostic):

@@ -21,7 +21,7 @@ from multidrop.dialects import Diagnostic, Stopped
 from multidrop.drives.drive import Drive
 from multidrop.shell import stop_report
 from multidrop.shell.automation import ENDING, outcome, settled
-from multidrop.shell.events import Output, Printed, SessionEvent
+from multidrop.shell.events import FAILURES, Output, Printed, SessionEvent
 from multidrop.shell.session import Session
 from multidrop.transports import TransportLost, Unreachable
 
@@ -159,8 +159,8 @@ class Calls:
         task.add_done_callback(self._tasks.discard)
         try:
             return await task
-        except TransportLost as error:
-            raise lost(error) from None
+        except FAILURES as error:  # without the way that it came: a person reads the line
+            raise (lost(error) if isinstance(error, TransportLost) else error).with_traceback(None) from None
         except asyncio.CancelledError:
             caller = asyncio.current_task()
             if caller is not None and caller.cancelling():

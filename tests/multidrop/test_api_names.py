@@ -1,0 +1,66 @@
+"""The names that Tab shows are the public ones, each on the page; an error is one line after a short traceback."""
+
+from __future__ import annotations
+
+import traceback
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+import multidrop
+from multidrop import Session, connect
+from multidrop.api import threads
+from tests.support.cell_session import bus, party
+from tests.support.paths import ROOT
+from tests.support.virtual import VirtualLoop
+
+PAGE = (ROOT / "docs" / "api.md").read_text(encoding="utf-8")
+
+
+@pytest.fixture
+def session(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Session]:
+    """An open session with the drives a and b."""
+    monkeypatch.setattr(threads, "new_loop", VirtualLoop)
+    (tmp_path / "cell.toml").write_text(bus("press", party("a"), party("b"), baud=0))
+    with connect(f"sim:{tmp_path / 'cell.toml'}") as opened:
+        yield opened
+
+
+def public(thing: object) -> set[str]:
+    return {name for name in dir(thing) if not name.startswith("_")}
+
+
+def test_the_module_shows_its_public_names_only() -> None:
+    assert public(multidrop) == set(multidrop.__all__)
+    assert not {"os", "importlib", "TYPE_CHECKING", "annotations", "api", "dialects", "shell"} & set(dir(multidrop))
+
+
+def test_what_tab_shows_is_on_the_page_and_awaited_by_the_same_name(session: Session) -> None:
+    a = session.drive("a")
+    for each in (session, a, a.programs, a.parameters, session.telemetry(), session.events()):
+        assert {name for name in public(each) if name not in PAGE} == set()
+    assert public(a) == public(a._awaited) and public(session) == public(session._awaited)
+
+
+def test_a_session_and_a_drive_say_what_they_are(session: Session) -> None:
+    assert repr(session) == "<multidrop: press: a, b>"
+    assert repr(session.drive("b")) == "<drive b: LMDCM 6.002, Hw: 3.2>"
+    session.close()
+    assert repr(session) == "<multidrop: a closed session>"
+
+
+@pytest.mark.parametrize("name", [each for each in multidrop.__all__ if each[0].isupper()])
+def test_an_error_has_its_public_name(name: str) -> None:
+    kind = getattr(multidrop, name)
+    if issubclass(kind, Exception):
+        assert traceback.format_exception_only(kind("text")) == [f"multidrop.{name}: text\n"]
+
+
+def test_a_wrong_url_is_one_line_after_a_short_traceback(session: Session) -> None:
+    for call in (lambda: connect("nope"), lambda: session.drive("a").write("VM", 5), lambda: session.send("/nope")):
+        with pytest.raises((multidrop.Diagnostic, multidrop.Refused)) as failed:
+            call()
+        frames = traceback.extract_tb(failed.value.__traceback__)
+        assert len(frames) <= 5 and all("multidrop/api/blocking" in each.filename for each in frames[2:])
+        assert "\n" not in str(failed.value) and failed.value.__suppress_context__
