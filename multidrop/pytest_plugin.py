@@ -1,11 +1,14 @@
 """pytest fixtures for programs that talk to drives: a simulated cell, a session with it, a drive.
 
+A fault of the cell is an error of the test in one line, with the line of the cell.
+
 Installed with `multidrop[pytest]`. pytest loads this file in every run, so it imports nothing until a fixture is used.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -43,12 +46,24 @@ def multidrop_folders(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path
 
 
+@contextmanager
+def _faults_named() -> Iterator[None]:
+    from multidrop.dialects.errors import Diagnostic
+
+    try:
+        yield
+    except Diagnostic as fault:
+        pytest.fail(str(fault), pytrace=False)
+
+
 @pytest.fixture
 def multidrop_cell(multidrop_cell_text: str) -> Iterator[SimulatedCell]:
     """The cell, served: `.url()`, `.url("line", "pty")`, `.world("input a 1 0")`."""
     from multidrop.api.simulated import simulate
 
-    with simulate(text=multidrop_cell_text) as cell:
+    with _faults_named():
+        cell = simulate(text=multidrop_cell_text)
+    with cell:
         yield cell
 
 
@@ -59,7 +74,9 @@ def multidrop_session(multidrop_cell_text: str, multidrop_folders: Path) -> Iter
 
     file = multidrop_folders / "multidrop-cell.toml"
     file.write_text(multidrop_cell_text, encoding="utf-8")
-    with connect(f"sim:{file}") as session:
+    with _faults_named():
+        session = connect(f"sim:{file}")
+    with session:
         yield session
 
 

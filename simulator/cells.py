@@ -63,7 +63,7 @@ class Reader:
 
         They stay in that folder, or in what is `allow`ed by the person who opens the cell.
         """
-        table = Table(toml_of(text, where), where)
+        table = Table(toml_of(text, where), where, Source(text, where))
         table.only("seed", "own_units", "bus")
         own = table.texts("own_units")
         table = Table(table.values, where, Source(text, where, own))

@@ -84,11 +84,11 @@ class Table:
         """Refuse any other key."""
         for key in self.values:
             if key not in keys:
-                raise Diagnostic(f"unknown key {quoted(key)}", self.where, nearest(key, keys))
+                raise Diagnostic(f"unknown key {quoted(key)}", self.at_line(key), nearest(key, keys))
 
     def wrong(self, key: str, message: str, hint: str = "") -> Diagnostic:
         """Make the error about the value of a key, to be raised."""
-        return Diagnostic(f"{key} {message}", self.where, hint)
+        return Diagnostic(f"{key} {message}", self.at_line(key), hint)
 
     def text(self, key: str, default: str | None = None) -> str:
         """Read a string; without a default it must exist."""
@@ -206,8 +206,9 @@ class Table:
 
 
 def line_of(text: str, way: Way, key: str) -> int:
-    """The number of the line with a key of a table, or with the inline table that has it; 0: not found."""
+    """The number of the line with a key of a table, with the inline table that has it, or of its head; 0: not found."""
     counts: dict[str, int] = {}
+    head = 0
     here: Way = ()
     for number, line in enumerate(text.splitlines(), 1):
         if header := re.match(r"\s*\[(\[?)\s*([^\]]+?)\s*\]", line):
@@ -217,11 +218,12 @@ def line_of(text: str, way: Way, key: str) -> int:
                 counts = {each: n for each, n in counts.items() if not each.startswith(f"{place}.")}
                 counts[place] = counts.get(place, 0) + 1
             here = tuple((name, counts.get(".".join(names[: n + 1]), 0)) for n, name in enumerate(names))
+            head = number if here == way else head
         elif pair := re.match(r"\s*([^=#]+?)\s*=", line):
             within = (*here, *((each.strip().strip("\"'"), 0) for each in pair[1].split(".")))
             if within == (*way, (key, 0)) or (len(within) > len(here) and within == way[: len(within)]):
                 return number
-    return 0
+    return head
 
 
 def nearest(word: str, valid: Sequence[str]) -> str:

@@ -67,6 +67,41 @@ def test_the_fixtures_work_and_cost_nothing_where_they_are_not_used(
     done.assert_outcomes(passed=4)
 
 
+BROKEN = """
+import pytest
+
+
+@pytest.fixture
+def multidrop_cell_text():
+    return '[[bus]]\\nname = "y"\\n[[bus.drive]]\\npersonality = "LMDCE"\\nnme = "a"\\n'
+
+
+def test_it(multidrop_cell):
+    raise AssertionError
+
+
+def test_another(multidrop_drive):
+    raise AssertionError
+"""
+
+
+@pytest.mark.process
+def test_folders_of_a_persons_own_and_a_fault_of_a_cell(
+    pytester: pytest.Pytester, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for name, value in environment(pytester.path).items():
+        monkeypatch.setenv(name, value)
+    for room in ("drives", "shell", "simulator", "dialects", "macros", "transports", "tui"):
+        pytester.mkpydir(room).joinpath("__init__.py").write_text("raise ImportError('of a person')")
+    pytester.makepyfile(test_with_drives=TESTS, test_broken=BROKEN)
+    monkeypatch.setenv("PYTEST_DISABLE_PLUGIN_AUTOLOAD", "1")
+    done = pytester.runpytest_subprocess("-p", "multidrop.pytest_plugin", "-p", "no:cacheprovider")
+    done.assert_outcomes(passed=3, errors=2)
+    fault = '[[bus]] "y": [[bus.drive]] 1: unknown key "nme"; did you mean "name"?'
+    done.stdout.fnmatch_lines([f"cell:5: {fault}".replace("[", "[[]"), f"*.toml:5: {fault}".replace("[", "[[]")])
+    assert "Traceback" not in done.stdout.str() and "cells.py" not in done.stdout.str()
+
+
 def test_pytest_loads_the_plugin_where_multidrop_is_installed() -> None:
     with open(ROOT / "pyproject.toml", "rb") as file:
         project = tomllib.load(file)["project"]
