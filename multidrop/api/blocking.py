@@ -15,6 +15,7 @@ from multidrop.api import endings
 from multidrop.api.calls import CLOSED, StopReport
 from multidrop.api.drives import AsyncDrive, DriveFacts
 from multidrop.api.events import Event
+from multidrop.api.notebook import Live, on_interrupt
 from multidrop.api.programs import AsyncParameters, AsyncPrograms
 from multidrop.api.sessions import AsyncSession, Notice, log
 from multidrop.api.streams import AsyncStream
@@ -78,6 +79,7 @@ class Session:
             self._notices.end()
             raise
         endings.opened(self, self._end_early)
+        self._leave_notebook = on_interrupt(self._break_off)
 
     # Beginning and end
 
@@ -105,6 +107,7 @@ class Session:
     def _close(self, stop: bool) -> None:
         endings.closing(self)
         if self._thread.alive:
+            self._leave_notebook()
             try:
                 self._call(lambda: self._awaited.close(stop=stop))
             finally:
@@ -126,9 +129,13 @@ class Session:
             raise error.with_traceback(None) from None
         except (KeyboardInterrupt, SystemExit):  # of this thread: no call raises them
             if future is None or not future.done():
-                with contextlib.suppress(Diagnostic):
-                    self._thread.begin(self._awaited._break_off()).result()
+                self._break_off()
             raise
+
+    def _break_off(self) -> None:
+        """Stop what this session started; it stays open."""
+        with contextlib.suppress(Diagnostic):
+            self._thread.begin(self._awaited._break_off()).result()
 
     def _run_there(self, function: Callable[[], T]) -> T:
         """Call a function in the session's thread."""
@@ -163,6 +170,13 @@ class Session:
         A rate of `math.inf` is as fast as the line allows.
         """
         return Telemetry(self, self._run_there(lambda: self._awaited.telemetry(*addresses, rate=rate)))
+
+    def live(self, *addresses: str, rate: float = 10.0) -> Live:
+        """Show a table and plots of drives (all without an address) below the cell of a notebook, kept up to date.
+
+        `rate`: samples of each drive a second. Raises Diagnostic outside a notebook.
+        """
+        return Live(self.telemetry(*addresses, rate=rate))
 
     def events(self, *addresses: str, every: float = PERIOD) -> Events:
         """Iterate over what happens to drives (all without an address) and their lines: see `Event`.
