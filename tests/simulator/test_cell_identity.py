@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -150,8 +152,9 @@ def test_a_wrong_key_is_one_line(lines, personality, expected):
     with pytest.raises(Diagnostic) as raised:
         cell.read(drive(lines, personality), "cell.toml")
     assert "\n" not in str(raised.value)
-    assert str(raised.value).startswith(WHERE)
-    assert expected in (None, str(raised.value))
+    text = re.sub(r"^cell\.toml:\d+: ", "cell.toml: ", str(raised.value))
+    assert text.startswith(WHERE)
+    assert expected in (None, text)
 
 
 @for_each(
