@@ -136,4 +136,4 @@ $(VENV)/.dev: pyproject.toml constraints.txt requirements-dev.txt | $(VENV)/bin/
 	touch $@ $(VENV)/.run
 
 clean:
-	rm -rf $(VENV) .pytest_cache .mypy_cache .ruff_cache .hypothesis .coverage
+	rm -rf $(VENV) .site .pytest_cache .mypy_cache .ruff_cache .hypothesis .coverage

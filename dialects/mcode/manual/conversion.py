@@ -40,7 +40,7 @@ CALCULATED: Mapping[str, Callable[[int], object]] = {
 }
 """What a row calculates from a number: `counts(512)`. A reading above 512 of 10 bits is one above 2051 of 12.
 
-`outputs(13)` leaves the bits of outputs that the file sets up, of 1 to 3 where it sets up none.
+`outputs(13)` leaves the bits of outputs that the file sets up.
 """
 _CALCULATION = re.compile(r"([a-z]+)\((\d+)\)")
 PLACES = dict.fromkeys(("BP", "BR", "CL", "CP", "EX", "L", "OE", "TC"), 0) | dict.fromkeys(("TI", "TP", "TR", "TT"), 1)
@@ -83,7 +83,7 @@ class _Converter:
             if re.fullmatch(r"S[1-4]=(1[6-9]|2\d).*", spelled(statement, names))
         }
         """The points that the program makes outputs."""
-        mask = sum(1 << n - 1 for n in self.outputs) or 7
+        mask = sum(1 << n - 1 for n in self.outputs)
         self.calculated: Mapping[str, Callable[[int], object]] = {**CALCULATED, "outputs": lambda bits: bits & mask}
         sizes = [
             int(each.value)
@@ -142,6 +142,10 @@ class _Converter:
     def _by_form(self, line: ProgramLine, statement: Statement) -> tuple[str | None, Sequence[str]]:
         """Apply the first row whose form fits: the new statement; None: it is refused; empty: no row fits."""
         canonical = spelled(statement, self.names)
+        if statement.word in ("OL", "OT") and not self.outputs and canonical[2:] != "=0":
+            why = "set up the outputs in the file (S1=16,<active>), so that it is known which points they are"
+            self._refuse(line, f"{line.text} cannot be converted", why)
+            return None, ()
         for row in TABLE:
             found = re.fullmatch(row["form"], canonical) if row["form"] else None
             if found is None:

@@ -29,8 +29,7 @@ def converted(line: str, product: str = "LMDCM") -> tuple[str, list[str], list[s
         ("S3=17,1,0", "OS=3,17,1"),
         ("S5=9", "IS=5,9,0"),
         ("S5=10,1", "IS=5,10,1"),
-        ("OL 13", "OT=5"),
-        ("OL=R1", "OT=R1"),
+        ("OL 0", "OT=0"),
         ("H 0", "H"),
         ("CP 1", "CP"),
         ("DN=65", 'DN="A"'),
@@ -78,6 +77,8 @@ def test_a_threshold_of_the_analog_input_means_the_same_reading(count: int) -> N
         ("BR SU,I5=5", "read it into a variable"),
         ("TI=9,SU", "inputs 1 to 4"),
         ("UG 2956102", "upgrade"),
+        ("OL 13", "set up the outputs in the file"),
+        ("OT=R2", "set up the outputs in the file"),
         ("CR=1.5", "no LMDCM has CR"),
         ("A=1500000000", "66 to 1100000000"),
         ("VM=3000000", "MS*10000, here 2560000"),
@@ -94,7 +95,7 @@ def test_what_cannot_be_converted_is_refused_and_stays(line: str, why: str) -> N
 
 @for_each(
     "line",
-    ["HT=0", "MT=50", "DE=0", "OT=R2", "BR SU,IN=5", "PR C2", "BR SU,MP=1", "PR VR", "BR SU,ER=20"],
+    ["HT=0", "MT=50", "DE=0", "BR SU,IN=5", "PR C2", "BR SU,MP=1", "PR VR", "BR SU,ER=20"],
 )
 def test_what_stays_and_differs_is_named(line: str) -> None:
     text, [change], refused = converted(line)
@@ -112,8 +113,9 @@ def test_a_drive_without_an_encoder_or_a_serial_port_lacks_their_words() -> None
 
 
 def test_outputs_that_the_file_does_not_set_up_are_not_switched() -> None:
-    found = convert("S3=16,1,0\nOL=13" + BEHIND, "LMDCM")
-    assert found.text.splitlines()[:2] == ["OS=3,16,1", "OT=4"]
+    found = convert("S3=16,1,0\nOL=13\nOL=R1" + BEHIND, "LMDCM")
+    assert found.text.splitlines()[:3] == ["OS=3,16,1", "OT=4", "OT=R1"] and found.refused == []
+    assert "the bit of an input of the MDrivePlus switches an output" in found.changes[2].hint
 
 
 def test_a_bare_number_needs_ne_before_the_program() -> None:
