@@ -185,7 +185,7 @@ class Asking:
         """Ask a person, unless --yes has agreed; the reason why the motor must not be moved."""
         questions, stops = self._session.questions, self._drive.stops
         names = ", ".join(each.name for each in moving)
-        what = f"{self._who}: {len(moving)} more questions move the motor by 2000 steps at most, and back ({names})"
+        what = f"{self._who}: {len(moving)} more questions move the motor by 400 steps at most, and back ({names})"
         agreed = questions.agreed or await questions.agrees(what)
         if self._drive.stops != stops:
             raise Stopped(f"{self._who}: a stop came before the answer")
