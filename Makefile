@@ -127,7 +127,7 @@ $(VENV)/bin/python:
 	$(PYTHON) -m venv $(VENV)
 
 $(VENV)/.run: pyproject.toml constraints.txt | $(VENV)/bin/python
-	@echo "installing multidrop into $(VENV), with plots to rerun: 840 MB on disk, one to two minutes"
+	@echo "installing multidrop into $(VENV), with plots to rerun: 840 MB on disk, one to four minutes"
 	$(BIN)/python -m pip install --disable-pip-version-check --progress-bar on -c constraints.txt -e '.[rerun]'
 	touch $@
 
