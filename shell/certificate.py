@@ -114,7 +114,8 @@ async def compare(session: Session, drive: Drive, file: str) -> bool:
     """
     theirs, who = load(file), session.display_name(drive)
     if theirs.drive["family"] != drive.family.name:
-        raise Diagnostic(f"has answers of the family {theirs.drive['family']}; {who} is of {drive.family.name}", file)
+        family = _shown([theirs.drive["family"]])
+        raise Diagnostic(f"has answers of the family {family}; {who} is of {drive.family.name}", file)
     asking = Asking(session, drive)
     try:
         await asking.all(theirs.answers)
@@ -125,9 +126,9 @@ async def compare(session: Session, drive: Drive, file: str) -> bool:
             same += own == there
             if own is None:
                 why = here.unasked.get(name, f"no question to {drive.product}")
-                session.output(f"{name}: not compared: {why}")
+                session.output(f"{_shown([name])}: not compared: {why}")
             elif own != there:
-                session.output(f"{name}: here {_shown(own)}; in {file} {_shown(there)}")
+                session.output(f"{_shown([name])}: here {_shown(own)}; in {file} {_shown(there)}")
         session.notify(f"{who}: {same} of {len(theirs.answers)} answers of {file} are the same", outcome=True)
     return same != len(theirs.answers)
 
@@ -145,6 +146,8 @@ class Asking:
         if found is None:
             raise Diagnostic(f"no questions are known for drives of {drive.family.name}", self._who)
         self._table, state = found, drive.state
+        if not state.product:  # what is owed to a drive is kept by what the drive is
+            raise NoAnswer(f"{self._who} was not found on this line; check its name, or give drives=NAMES in the URL")
         known = {"family": drive.family.name, "product": state.product, "version": state.version, "part": state.part}
         known["traits"] = " ".join(sorted(found.traits(state)))
         self.report = Report({key: text for key, text in known.items() if text})
@@ -196,7 +199,13 @@ class Asking:
         if reason:
             self.report.unasked[question.name] = reason
             return
-        table, state = self._table, self._drive.state
+        table, state, family = self._table, self._drive.state, self._drive.family
+        sent = [line for line in question.lines if not line.startswith("/")]
+        if guarded := "; ".join(
+            filter(None, (self._session.settings.guards.what(family, state, each) for each in sent))
+        ):
+            self.report.unasked[question.name] = f"the configuration guards a line of it: {guarded}"
+            return
         words = dict.fromkeys(found[1] for line in (*question.lines, question.ruled) for found in _VALUE.finditer(line))
         try:
             values = {word: await self._value(word) for word in words}
@@ -204,6 +213,8 @@ class Asking:
         except Refused as refusal:
             self.report.unasked[question.name] = f"a value that it needs was refused (error {refusal.code})"
             return
+        if kept and state.restore is not None:
+            raise Refused(f"{self._who} is still owed other settings from before; open it again")
         if kept:
             state.owes(owed(state, kept[::-1]))
         try:

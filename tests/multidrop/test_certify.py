@@ -41,7 +41,7 @@ def test_a_report_is_written_whole_and_compared(certify, tmp_path):
         (("sim:cell.toml", "-o", "cell.toml"), 2, "cell.toml: exists already"),
         (("sim:cell.toml", "-o", "no/r.toml"), 2, "its folder does not exist"),
         (("sim:cell.toml", "-o", "r.toml", "--drive", "all"), 2, "a report is of one drive"),
-        (("sim:cell.toml", "-o", "r.toml", "--drive", "07"), 1, "07 does not reply"),
+        (("sim:cell.toml", "-o", "r.toml", "--drive", "07"), 1, "07 was not found"),
         (("--compare", "r.toml", "sim:cell.toml"), 2, "r.toml: cannot be read"),
         (("--compare", "cell.toml", "sim:cell.toml"), 2, "is not a report with answers"),
         (("tcp://127.0.0.1:1", "-o", "r.toml"), 3, "nothing listens there"),

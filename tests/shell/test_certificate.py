@@ -6,18 +6,19 @@ import asyncio
 import contextlib
 import json
 from contextlib import AsyncExitStack
+from dataclasses import replace
 from unittest import mock
 
 import pytest
 
 from multidrop.dialects import Diagnostic, NoAnswer, Refused, Stopped
-from multidrop.dialects.certifying import BYTES, ERROR, FITS, MODE, MOVES, NOTHING
+from multidrop.dialects.certifying import BYTES, ERROR, FITS, MODE, MOVES, NOTHING, owed
 from multidrop.dialects.families import FAMILIES
 from multidrop.dialects.tmcl.manual import commands
 from multidrop.dialects.tmcl.manual.commands import Status
 from multidrop.shell.certificate import SLEEP, WAIT, Asking, certify, compare, load
 from multidrop.shell.channel import Front
-from multidrop.shell.configuration import Settings
+from multidrop.shell.configuration import Guarding, Settings
 from multidrop.shell.session import Session
 from multidrop.simulator.cells import read
 from multidrop.simulator.floor import Floor
@@ -132,7 +133,7 @@ def other_bytes(question):
 @pytest.mark.virtual
 @pytest.mark.parametrize(("family", "question"), PLANTS, ids=lambda each: getattr(each, "name", each))
 async def test_a_planted_deviation_is_found_by_its_question(tmp_path, family, question):
-    async with CellSession(tmp_path, DRIVES[family]) as cell:
+    async with CellSession(tmp_path, DRIVES[family].replace("baud = 9600", "baud = 0")) as cell:
         drive, file = cell.session.drive("w"), str(tmp_path / "r.toml")
         planted = Planted(cell, family, question)
         before = await asked(cell, question.name)
@@ -345,11 +346,35 @@ async def test_a_report_has_no_serial_number_and_no_name_and_is_compared(cell, t
     text = (tmp_path / "r.toml").read_text()
     assert session.drive("w", "a").state.serial and session.drive("w", "a").state.serial not in text
     assert not any(name in text for name in ('"a"', str(tmp_path), "cell"))
-    assert await compare(session, session.drive("w", "a"), file) is False
+    few = load(file)
+    few.answers = {name: few.answers[name] for name in ("echo-full", "checksum-echo", "division")}
+    (tmp_path / "r.toml").write_text(few.text())
     assert await compare(session, session.drive("w", "b"), file) is False
-    (tmp_path / "r.toml").write_text(text.replace('division = ["ok", "-3"]', 'division = ["ok", "-4"]'))
+    (tmp_path / "r.toml").write_text(few.text().replace('division = ["ok", "-3"]', 'division = ["ok", "-4"]'))
     assert await compare(session, session.drive("w", "b"), file) is True
     assert cell.printed()[-1] == f"division: here ok // -3; in {file} ok // -4"
+
+
+@pytest.mark.virtual
+@on(DRIVES["lexium"])
+async def test_a_guarded_line_is_no_question_and_what_is_owed_from_before_is_not_forgotten(cell):
+    session = cell.session
+    session.settings = replace(session.settings, guards=Guarding(also=frozenset({"R1"})))
+    report = await asked(cell, "bits", "inverted", "unknown-word")
+    assert {*report.answers} == {"unknown-word"} and all(
+        "[guards] also has R1" in why for why in report.unasked.values()
+    )
+    session.drive("w").state.owes(before := owed(session.drive("w").state, ["EM=1"]))
+    with pytest.raises(Refused, match="still owed other settings"):
+        await asked(cell, "echo-late")
+    assert session.drive("w").state.restore is before
+
+
+@pytest.mark.virtual
+@on(bus("w", party("a")))
+async def test_a_drive_that_was_not_found_is_not_asked(cell):
+    with pytest.raises(NoAnswer, match="z was not found on this line"):
+        Asking(cell.session, cell.session.drive("w", "z"))
 
 
 @pytest.mark.virtual
