@@ -112,7 +112,8 @@ def explain(error: OSError | None) -> str:
     if isinstance(error, socket.gaierror):
         return "unknown host name; check the spelling, or give its address"
     number = _WINDOWS.get(getattr(error, "winerror", 0) or 0, error.errno or 0)
-    return _WHY.get(number) or (os.strerror(number) if number else str(error))
+    known = number < 10000  # greater ones are of Windows' sockets, which `os.strerror` does not know
+    return _WHY.get(number) or (os.strerror(number) if number and known else error.strerror or str(error))
 
 
 async def connected(

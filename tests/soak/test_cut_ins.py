@@ -15,6 +15,8 @@ from soak.simulation.living import lived
 from soak.simulation.story import ACTS, stop_cuts_in
 from tests.support.paths import ROOT
 
+pytestmark = pytest.mark.fork
+
 LIST = ROOT / "tests" / "soak" / "points.txt"
 
 

@@ -15,6 +15,8 @@ from soak.simulation.judge import RULES
 from soak.simulation.mutants import Caught, applied, caught, head, names
 from tests.support.paths import ROOT
 
+pytestmark = pytest.mark.fork
+
 NAMES = {rule.name for rule in RULES}
 SEEDS = range(1, 2001)
 

@@ -13,6 +13,8 @@ from soak.simulation.living import lived
 from soak.simulation.story import ACTS
 from soak.simulation.world import World
 
+pytestmark = pytest.mark.fork
+
 Live = Callable[..., World]
 
 

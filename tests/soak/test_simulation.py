@@ -28,6 +28,8 @@ from soak.simulation.trace import readable
 from tests.support.paths import ROOT
 from tests.support.until import PATIENCE
 
+pytestmark = pytest.mark.fork
+
 SAFETY = (ROOT / "docs" / "safety.md").read_text()
 
 

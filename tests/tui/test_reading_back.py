@@ -149,7 +149,7 @@ async def test_the_shown_lines_are_saved_with_their_times_and_replace_no_file(tm
         session.now = lambda: asyncio.get_running_loop() and session.time  # type: ignore[method-assign]
         shelf.choose(Filter(errors=True))
         assert await shelf.save(str(file)) == f"2 lines, only errors, in {file}"
-        assert file.read_text().split("\n")[0] == "2026-11-21 12:41:04.000  b   › @b PR VX"
+        assert file.read_text(encoding="utf-8").split("\n")[0] == "2026-11-21 12:41:04.000  b   › @b PR VX"
         with pytest.raises(Diagnostic, match="exists already"):
             await shelf.save(str(file))
 

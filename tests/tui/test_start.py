@@ -130,6 +130,7 @@ def test_what_was_opened_last_is_kept_newest_first(tmp_path: Path) -> None:
     assert [each.url for each in store.lately(tmp_path)] == ["b"]
 
 
+@pytest.mark.fork
 def test_the_holder_of_a_port_is_found_by_its_lock_file_or_its_open_file(tmp_path: Path) -> None:
     port = tmp_path / "dev/ttyUSB7"
     for folder in ("dev", "proc/41/fd", "proc/42/fd", "var/lock"):

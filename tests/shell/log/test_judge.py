@@ -231,7 +231,7 @@ def test_frames_name_the_drive_that_replied(tmp_path: Path) -> None:
 
 
 def test_the_page_lists_the_rules() -> None:
-    page = (Path(__file__).parents[3] / "docs" / "log.md").read_text()
+    page = (Path(__file__).parents[3] / "docs" / "log.md").read_text(encoding="utf-8")
     for rule, sentence in RULES.items():
         assert f"| `{rule}` | {sentence} |" in page
 

@@ -45,7 +45,7 @@ async def test_a_renamed_macro_keeps_key_and_remarks(session: Session, folder: P
         f"macro m is other now, in {folder / 'other.toml'}",
         "macro n, step 1, plays m, which is gone",
     ]
-    assert (folder / "other.toml").read_text() == HAND.replace("'m'", '"other"')
+    assert (folder / "other.toml").read_text(encoding="utf-8") == HAND.replace("'m'", '"other"')
     assert not (folder / "m.toml").exists()
 
 
@@ -58,21 +58,21 @@ async def test_a_recording_replaces_no_file_that_cannot_be_read(session: Session
 
 async def test_a_copy_is_on_no_key(session: Session, folder: Path) -> None:
     await run(session, "/macro copy m n")
-    assert (folder / "n.toml").read_text() == HAND.replace("'m'", '"n"').replace("'F3'", '""')
+    assert (folder / "n.toml").read_text(encoding="utf-8") == HAND.replace("'m'", '"n"').replace("'F3'", '""')
     for line in ("/macro copy m n", "/macro rename m n"):
         with pytest.raises(Diagnostic, match=r"n\.toml: the file exists already"):
             await session.run(line)
-    assert (folder / "m.toml").read_text() == HAND
+    assert (folder / "m.toml").read_text(encoding="utf-8") == HAND
 
 
 async def test_a_note_is_changed_and_nothing_else(session: Session, folder: Path) -> None:
     await run(session, """/macro describe m it's "the press" ä""".replace("it's", "its"))
-    assert (folder / "m.toml").read_text() == HAND.replace("'to and fro'", '"its the press ä"')
+    assert (folder / "m.toml").read_text(encoding="utf-8") == HAND.replace("'to and fro'", '"its the press ä"')
 
 
 async def test_a_macro_beside_the_project_hides_the_users(session: Session, folder: Path) -> None:
     await run(session, "/macro copy m m --project", "/macro describe m here")
-    assert (folder / "m.toml").read_text() == HAND
+    assert (folder / "m.toml").read_text(encoding="utf-8") == HAND
     told = await run(session, "/macros")
     assert told == [
         "m                -    1 line  here  [macros]",
@@ -80,7 +80,7 @@ async def test_a_macro_beside_the_project_hides_the_users(session: Session, fold
     ]
     assert f"macro m: the one in macros is played, not that in {folder}" in await run(session, "/play m")
     await run(session, "/key F5 m")
-    assert session.macros.load("m").key == "F5" and "F3" in (folder / "m.toml").read_text()
+    assert session.macros.load("m").key == "F5" and "F3" in (folder / "m.toml").read_text(encoding="utf-8")
 
 
 async def test_a_folder_that_cannot_be_made_is_told(session: Session, folder: Path) -> None:
@@ -112,7 +112,7 @@ async def test_a_macro_changes_no_macros(session: Session, folder: Path) -> None
     for line in ("/macro delete m", "/macro describe m x", "/macro import x"):
         with pytest.raises(Diagnostic, match="a macro does not change macros"):
             await run(session, line, by=By.MACRO)
-    assert (folder / "m.toml").read_text() == HAND
+    assert (folder / "m.toml").read_text(encoding="utf-8") == HAND
 
 
 @pytest.mark.parametrize(
@@ -165,7 +165,7 @@ def test_an_import_is_whole_or_not_at_all(folder: Path, capsys: pytest.CaptureFi
     assert told[1] == "macro f3: F3 plays another macro already, so it is on no key"
     assert told[3].endswith("after which no line runs; /stop stops every drive")
     assert main(["macro", "export", "out.txt", "f3", "f4"]) == 0
-    assert Path("out.txt").read_text() == "F3 MR 1^M^pPR P^M ; there\nF4 ^f3^[\n"
+    assert Path("out.txt").read_text(encoding="utf-8") == "F3 MR 1^M^pPR P^M ; there\nF4 ^f3^[\n"
 
 
 def test_a_file_that_cannot_be_read_is_never_replaced(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -173,7 +173,9 @@ def test_a_file_that_cannot_be_read_is_never_replaced(folder: Path, capsys: pyte
     (folder / "f5.toml").write_text("name = 'f5'\ncolour = 1\n")
     assert main(["macro", "import", "keys.txt", "--force"]) == 2
     assert "f5.toml:2: unknown key 'colour'" in capsys.readouterr().err
-    assert (folder / "f5.toml").read_text() == "name = 'f5'\ncolour = 1\n" and not (folder / "f4.toml").exists()
+    assert (folder / "f5.toml").read_text(encoding="utf-8") == "name = 'f5'\ncolour = 1\n" and not (
+        folder / "f4.toml"
+    ).exists()
 
 
 def test_an_import_that_cannot_be_written_puts_everything_back(
@@ -198,7 +200,7 @@ def test_an_export_replaces_no_file(folder: Path, capsys: pytest.CaptureFixture[
     assert "macro m: a macro that does nothing has no counterpart" in capsys.readouterr().err
     (folder / "m.toml").write_text(HAND.replace("/sleep 0", "MR 1"))
     assert main(["macro", "export", "out.txt"]) == 0
-    assert Path("out.txt").read_text() == "F3 MR 1^M ; to and fro\n"
+    assert Path("out.txt").read_text(encoding="utf-8") == "F3 MR 1^M ; to and fro\n"
     assert main(["macro", "export", "out.txt"]) == 2
     assert "out.txt: exists already" in capsys.readouterr().err
 
@@ -230,11 +232,11 @@ def test_an_editor_changes_a_macro(
 ) -> None:
     editing(monkeypatch, "text = open(path).read(); open(path, 'w').write(text.replace('fro', 'there'))")
     assert main(["macro", "edit", "m"]) == 0
-    assert (folder / "m.toml").read_text() == HAND.replace("fro", "there")
+    assert (folder / "m.toml").read_text(encoding="utf-8") == HAND.replace("fro", "there")
     editing(monkeypatch, "open(path, 'a').write('x'); sys.exit(3)")
     assert main(["macro", "edit", "m"]) == 2
     assert "the editor ended with 3; m is as it was; your text is in" in capsys.readouterr().err
-    assert (folder / "m.toml").read_text() == HAND.replace("fro", "there")
+    assert (folder / "m.toml").read_text(encoding="utf-8") == HAND.replace("fro", "there")
 
 
 def test_without_a_terminal_no_editor_is_guessed(
@@ -244,7 +246,7 @@ def test_without_a_terminal_no_editor_is_guessed(
     monkeypatch.setenv("EDITOR", " ")
     assert main(["macro", "edit", "m"]) == 2
     assert capsys.readouterr().err == "no editor is known; set VISUAL or EDITOR to its command\n"
-    assert (folder / "m.toml").read_text() == HAND
+    assert (folder / "m.toml").read_text(encoding="utf-8") == HAND
 
 
 @pytest.mark.process

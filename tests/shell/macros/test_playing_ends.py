@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import json
+import os
 from pathlib import Path
 
 import pytest
@@ -24,7 +25,7 @@ pytestmark = pytest.mark.virtual
 
 def short(texts: list[str], shop: Shop) -> list[str]:
     """Without the folder of the macros."""
-    return [text.replace(f"{shop.session.macros.folder}/", "") for text in texts]
+    return [text.replace(f"{shop.session.macros.folder}{os.sep}", "") for text in texts]
 
 
 async def test_a_failure_names_macro_step_and_file_and_the_report_what_was_sent_and_where_drives_stand(
@@ -33,7 +34,7 @@ async def test_a_failure_names_macro_step_and_file_and_the_report_what_was_sent_
     macro = shop.save("m", "@a MA 500", "/wait stopped", "@a PR P", "@press:b SL 3000", "@b QQ 1", "@a MR 9000")
     with pytest.raises(Refused) as caught:
         await shop.play(macro, times=2)
-    assert report(caught.value).replace(f"{shop.session.macros.folder}/", "") == (
+    assert report(caught.value).replace(f"{shop.session.macros.folder}{os.sep}", "") == (
         "macro m, step 5 (m.toml:24): press: b refused 'QQ 1': error 60: unknown command (check the spelling; "
         "/help NAME explains a word)"
     )
@@ -245,7 +246,7 @@ async def test_a_connection_that_is_lost_while_no_line_uses_it_ends_it_at_once(
         shop.world("/sim unplug gantry")
         with pytest.raises(TransportLost, match="gantry was lost") as caught:
             await asyncio.wait_for(playing, 9)
-        place = "macro m, step 3 (m.toml:17)" if kind == "macro" else f"{tmp_path}/s.txt:3"
+        place = "macro m, step 3 (m.toml:17)" if kind == "macro" else f"{tmp_path}{os.sep}s.txt:3"
         assert short(caught.value.__notes__, shop) == [place]
         assert shop.moving() == set() and shop.printed() == ["0"] + ["2"] * (kind == "macro")
 
@@ -275,7 +276,7 @@ async def test_a_script_that_plays_a_macro_runs_its_on_stop_and_reports_both(tmp
             await run_script(shop.session, script, shop.executed)
     assert [note.partition(" (")[0] for note in caught.value.__notes__] == [
         "macro m, step 2",
-        f"{tmp_path}/s.txt:2",
+        f"{tmp_path}{os.sep}s.txt:2",
     ]
     assert shop.moving() == set() and shop.printed() == ["after"]
     assert [(each.line.macro, each.ok) for each in shop.results] == [

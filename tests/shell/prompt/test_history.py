@@ -64,6 +64,7 @@ def test_a_file_made_anew_is_for_its_user_only(tmp_path, three_kept):
     assert len(kept.path.read_text().splitlines()) <= 6
 
 
+@pytest.mark.fork
 def test_a_link_stays_a_link_and_the_file_behind_it_is_cut(tmp_path, three_kept):
     (tmp_path / "state").mkdir()
     filled(tmp_path / "elsewhere")

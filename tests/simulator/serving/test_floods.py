@@ -121,6 +121,7 @@ def flood(client: socket.socket, data: bytes = FLOOD) -> None:
             sent += client.send(data[sent : sent + 65536])
 
 
+@pytest.mark.pty
 @pytest.mark.usefixtures("impatient")
 async def test_a_client_that_floods_a_paced_bus_over_tcp_is_read_no_faster_than_the_wire(serve: Serve) -> None:
     floor, served, told = await serve()
@@ -143,6 +144,7 @@ async def test_a_client_that_floods_a_paced_bus_over_tcp_is_read_no_faster_than_
     assert waiting(floor) <= MOST
 
 
+@pytest.mark.pty
 @pytest.mark.usefixtures("impatient")
 async def test_after_short_commands_with_long_answers_the_bus_answers_others_once_the_client_has_gone(
     serve: Serve,
@@ -158,6 +160,7 @@ async def test_after_short_commands_with_long_answers_the_bus_answers_others_onc
     await answers(served["press tcp"])
 
 
+@pytest.mark.pty
 async def test_everything_of_a_client_that_waits_for_its_answers_is_carried(serve: Serve) -> None:
     """More than is held, written at once."""
     floor, served, _ = await serve(baud=115200, speed=100.0)
@@ -170,6 +173,7 @@ async def test_everything_of_a_client_that_waits_for_its_answers_is_carried(serv
     await writer.wait_closed()
 
 
+@pytest.mark.pty
 @pytest.mark.usefixtures("impatient")
 async def test_a_client_that_floods_a_paced_bus_through_a_pty_waits_in_the_pty(serve: Serve) -> None:
     floor, served, told = await serve()
@@ -188,6 +192,7 @@ async def test_a_client_that_floods_a_paced_bus_through_a_pty_waits_in_the_pty(s
     await answers(served["press tcp"])
 
 
+@pytest.mark.pty
 async def test_what_was_written_too_fast_can_be_taken_back_all_the_same(serve: Serve) -> None:
     floor, served, _ = await serve()
     client = os.open(served["press pty"].removeprefix("pty:"), os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
@@ -207,6 +212,7 @@ async def test_what_was_written_too_fast_can_be_taken_back_all_the_same(serve: S
     os.close(client)
 
 
+@pytest.mark.pty
 async def test_what_a_short_lived_client_wrote_is_carried_whole(serve: Serve) -> None:
     floor, served, told = await serve(baud=115200)
     path = served["press pty"].removeprefix("pty:")
@@ -224,6 +230,7 @@ async def test_what_a_short_lived_client_wrote_is_carried_whole(serve: Serve) ->
     assert told == []
 
 
+@pytest.mark.pty
 async def test_datagrams_that_come_faster_than_the_wire_are_dropped_and_counted(serve: Serve) -> None:
     floor, served, told = await serve()
     client = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
@@ -239,6 +246,7 @@ async def test_datagrams_that_come_faster_than_the_wire_are_dropped_and_counted(
     await answers(served["press tcp"])
 
 
+@pytest.mark.pty
 async def test_an_unpaced_bus_is_flooded_in_pieces_and_the_others_are_served_between_them(serve: Serve) -> None:
     floor, served, _ = await serve(baud=0)
     turns: list[int] = []
@@ -258,6 +266,7 @@ async def test_an_unpaced_bus_is_flooded_in_pieces_and_the_others_are_served_bet
     await answers(served["press tcp"])
 
 
+@pytest.mark.pty
 async def test_a_client_that_never_reads_is_let_go(serve: Serve) -> None:
     floor, served, _ = await serve(baud=0)
     client = socket.create_connection(port(served["press tcp"]))
@@ -277,6 +286,7 @@ async def test_a_client_that_never_reads_is_let_go(serve: Serve) -> None:
     client.close()
 
 
+@pytest.mark.pty
 async def test_modbus_answers_that_are_held_back_are_bounded(serve: Serve) -> None:
     floor, served, _ = await serve(delay=3600.0)
     client = socket.create_connection(port(served["eth modbus"]))
