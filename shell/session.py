@@ -53,6 +53,13 @@ _published: ContextVar[list[BaseException] | None] = ContextVar("published", def
 """The failures published in this task's outermost `run`."""
 BARE_WORDS = {"exit": "/quit", "quit": "/quit", "help": "/help", "?": "/help"}
 TRAVEL = "multidrop.shell.travel:ask"
+
+
+def bare(word: str) -> Diagnostic:
+    """The refusal of a bare word where nobody types."""
+    return Diagnostic(f"'{word}' is no command of a drive, nothing was sent", hint=f"{BARE_WORDS[word]} is the verb")
+
+
 CALL = "multidrop.shell.verbs.call:Call"
 """One use of a verb; it knows this class, so this module has only its name."""
 
@@ -246,7 +253,7 @@ class LinePath:
             return parsed
         if by is By.OPERATOR and session.front.before_quit is not None:
             return VerbLine(BARE_WORDS[word], "", parsed.typed)
-        raise Diagnostic(f"'{word}' is no command of a drive, nothing was sent", hint=f"{BARE_WORDS[word]} is the verb")
+        raise bare(word)
 
     async def verb(self, parsed: VerbLine, by: By) -> None:
         """Run a verb, as a task that a stop ends."""

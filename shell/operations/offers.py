@@ -89,6 +89,9 @@ def offered(workspace: Workspace, placeholder: str, word: str) -> Found:
         case "URL":
             yield from ((name, each.url) for name, each in workspace.settings.connections.items())
             yield from ((form.prefix, form.meaning) for form in URL_FORMS.values())
+            if word.startswith("sim:"):
+                cells = (f"sim:{name}" for name, _ in _files(word[4:]))
+                yield from ((name, "a cell") for name in cells if name.endswith((".toml", "/")))
         case "WORD":
             yield from ((verb.name, verb.lines[0]) for verb in VERBS.values())
             language, product = spoken(workspace, DriveLine(""))

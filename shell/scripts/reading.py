@@ -7,6 +7,7 @@ on where every way through the blocks sets it; the check takes it as 0.
 from __future__ import annotations
 
 import os
+import re
 import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
@@ -22,6 +23,7 @@ from multidrop.shell.operations.table import find
 from multidrop.shell.scripts import words
 from multidrop.shell.scripts.expression import evaluate, unknowns
 from multidrop.shell.scripts.model import CallFile, CallMacro, If, MacroScript, Node, Repeat, Script, ScriptLine, Step
+from multidrop.shell.session import BARE_WORDS, bare
 
 LOOPS = ("/repeat", "/while", "/until")
 UNKNOWN = "0"
@@ -191,6 +193,8 @@ class _Checker:
         self._lines: Iterator[ScriptLine] = iter(lines)
         self._chain = chain
         self._depth = 0
+        self._takes_any = any(line.word == "/raw" or re.search(r"\bPG\b", line.text, re.I) for line in lines)
+        """Program mode or raw mode may take a word as it is."""
         changing = {name for line in lines if line.word == "/set" for name in line.text.split()[1:2]}
         self._names: dict[str, str | None] = {n: None if n in changing else v for n, v in values.items()}
 
@@ -280,6 +284,8 @@ class _Checker:
                 verb = find(parsed.name)
                 if not self._unknown(line.text):
                     verb.check(parsed.rest)
+            elif not self._takes_any and (word := text.strip().lower()) in BARE_WORDS:
+                raise bare(word)
 
     def _call(self, line: ScriptLine, text: str) -> Node:
         target, given = words.call(text)
