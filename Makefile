@@ -1,4 +1,4 @@
-# The two commands of the README: `make demo` and `make test`. Each sets up what it needs in .venv.
+# `make demo` and `make test` set up what they need in .venv.
 # `make bench` measures side by side with peers; ONLY=stop,line some of it, FULL=1 the long cases, KEEP=1 as reference.
 # `make quick` leaves out processes, the app, wide products and slow tests; `make nightly` takes the whole of every product.
 PYTHON ?= python3
