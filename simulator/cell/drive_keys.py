@@ -71,14 +71,14 @@ def check_inside(place: Path, name: str, key: str, table: Table, folder: Folder)
         raise table.wrong(key, f"{quoted(name)} leaves the folder of the cell file", hint)
 
 
-def read_settings(table: Table, check: Check) -> Mapping[str, Value]:
-    """Read `set`, what non-volatile memory holds, with its words in capitals.
+def read_settings(table: Table, check: Check, spelled: Callable[[str], str] = str.upper) -> Mapping[str, Value]:
+    """Read `set`, what non-volatile memory holds, with its words as they are `spelled` in the drive.
 
     A list of texts, or of lists of numbers, gives several lines.
     """
     found: dict[str, Value] = {}
     for word, value in table.values.items():
-        name = word.upper()
+        name = spelled(word)
         if name in found:
             raise table.wrong(quoted(word), "is given twice")
         if not isinstance(value, list):

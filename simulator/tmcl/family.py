@@ -16,7 +16,7 @@ from multidrop.dialects.family import Motion
 from multidrop.dialects.files import split_lines
 from multidrop.dialects.program_files import errors
 from multidrop.dialects.tmcl.manual import program_file
-from multidrop.dialects.tmcl.manual.commands import Axis, Global
+from multidrop.dialects.tmcl.manual.commands import Axis, Global, setting_name
 from multidrop.dialects.tmcl.manual.instructions import spelled
 from multidrop.dialects.tmcl.manual.modules import (
     BAUDS,
@@ -73,7 +73,7 @@ def read_drive(table: Table, folder: Folder) -> DriveSpec:
         raise table.wrong("party", "is for MCode drives", "leave it out: a module always has an address")
     common["personality"] = _canonical(common["personality"])
     module = module_of(common["personality"])
-    settings = read_settings(table.table("set", "set"), partial(_check_setting, module))
+    settings = read_settings(table.table("set", "set"), partial(_check_setting, module), setting_name)
     names = _names(module)
     scales = read_units(table, names if module.motors > 1 else ("",))
     geared = {
@@ -126,7 +126,7 @@ def inputs_of(module: Module) -> tuple[int, ...]:
 
 
 def _check_setting(module: Module, table: Table, word: str, value: Setting) -> None:
-    row = _parameter(module, word.upper())
+    row = _parameter(module, setting_name(word))
     if row is None:
         hint = (
             "valid: axis parameters by number, such as 4 = 51200 (4_1: motor 1); global ones with a G, such as G75 = 5"

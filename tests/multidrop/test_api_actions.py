@@ -206,6 +206,18 @@ async def test_parameters_of_tmcl_have_one_meaning_however_they_are_spelled(tmp_
             await a.write("address", 3)
 
 
+async def test_a_cell_has_the_same_spellings_of_parameters(tmp_path: Path) -> None:
+    spelled = "set = { AP4 = 1500, maximum_velocity_1 = 700, pause = 5 }"
+    (tmp_path / "cell.toml").write_text(bus("line", drive("TMCM-3110", "1", spelled), baud=0))
+    async with connect_async(f"sim:{tmp_path / 'cell.toml'}") as session:
+        a = session.drive("1")
+        assert [await a.read(name) for name in ("4", "4_1", "G75")] == [1500, 700, 5]
+    (tmp_path / "cell.toml").write_text(bus("line", drive("TMCM-3110", "1", "set = { AP4 = 1, 4_0 = 2 }"), baud=0))
+    with pytest.raises(Diagnostic, match='"4_0" is given twice'):
+        async with connect_async(f"sim:{tmp_path / 'cell.toml'}"):
+            pass
+
+
 async def test_a_quantity_runs_where_the_family_has_a_sign(tmp_path: Path) -> None:
     (tmp_path / "cell.toml").write_text(
         bus("line", drive("LMDCM", "a", 'units = "5 mm/turn"', party=True)) + bus("pmx", pmx("00"))

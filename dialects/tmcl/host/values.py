@@ -16,7 +16,15 @@ from multidrop.dialects.program_files import Held
 from multidrop.dialects.tmcl.host.codec import TmclState
 from multidrop.dialects.tmcl.host.operations import busy, motors, moving, perform, read, who
 from multidrop.dialects.tmcl.host.programs import read_held
-from multidrop.dialects.tmcl.manual.commands import STARTING_PARAMETERS, Axis, Call, Command, Global, parameter
+from multidrop.dialects.tmcl.manual.commands import (
+    STARTING_PARAMETERS,
+    Axis,
+    Call,
+    Command,
+    Global,
+    parameter,
+    setting_name,
+)
 from multidrop.dialects.tmcl.manual.modules import BAUDS, MODULES, RELATIVE_FROM, Module, Parameter, module_of
 from multidrop.dialects.values import (
     BY,
@@ -94,8 +102,10 @@ def plan(state: TmclState, present: Readings, wanted: Mapping[str, Value], allow
     """Order the steps to the wanted values. Raises Diagnostic for a value that the module refuses."""
     module = module_of(state.product)
     now, names = present.values, setting_names(module, state.motors or 1)
-    changed = {_own(name): value for name, value in wanted.items() if not same(value, now.get(_own(name)))}
-    allowed = replace(allowed, named=frozenset(map(_own, allowed.named)))
+    changed = {
+        setting_name(name): value for name, value in wanted.items() if not same(value, now.get(setting_name(name)))
+    }
+    allowed = replace(allowed, named=frozenset(map(setting_name, allowed.named)))
     withheld = {name: reason for name in changed if (reason := _risk(name, changed[name], now, allowed))}
     goal = {name: _checked(name, value, names, module) for name, value in changed.items() if name not in withheld}
     order = [name for name in names if name in goal]
@@ -108,12 +118,6 @@ def _parts(name: str) -> tuple[bool, int, int]:
     """Divide a name: whether it is a global parameter, the number, the motor."""
     found = parameter(name)
     return (found.command == Command.GGP, found.type, found.motor) if found is not None else (False, -1, 0)
-
-
-def _own(name: str) -> str:
-    """The name of a setting as files have it, `4`, `4_1` or `G75`, however a person spells it."""
-    of_module, number, motor = _parts(name)
-    return name.upper() if number < 0 else f"{GLOBAL_PREFIX if of_module else ''}{number}{f'_{motor}' if motor else ''}"
 
 
 def _checked(name: str, value: Value, names: Collection[str], module: Module) -> int:

@@ -389,6 +389,14 @@ def parameter(name: str) -> Call | None:
     return Call(Command.GGP if of_module else Command.GAP, int(number), int(found[4] or 0))
 
 
+def setting_name(name: str) -> str:
+    """The name of a setting as files have it, `4`, `4_1` or `G75`, however a person spells it."""
+    call = parameter(name)
+    if call is None:
+        return name.upper()
+    return f"{'G' if call.command == Command.GGP else ''}{call.type}{f'_{call.motor}' if call.motor else ''}"
+
+
 def asked(name: str) -> str | None:
     """The line that prints a parameter; None for none, and for one that reading changes."""
     call = parameter(name)
