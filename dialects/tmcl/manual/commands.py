@@ -370,7 +370,7 @@ class Global(IntEnum):
 
 
 _NAMES: Mapping[str, Axis | Global] = {each.name.replace("_", ""): each for each in (*Global, *Axis)}
-_PARAMETER = re.compile(r"(?:(AP|G)?(\d{1,3})|([A-Z]\w*?[A-Z]))(?:[_/](\d))?", re.ASCII)
+_PARAMETER = re.compile(r"(?:(AP|G)?(0|[1-9]\d{0,2})|([A-Z]\w*?[A-Z]))(?:[_/](\d))?", re.ASCII)
 
 
 def parameter(name: str) -> Call | None:
