@@ -178,6 +178,8 @@ class Stopping:
         self._link = roster.link
         self._ahead: tuple[StopForms, bytes, bool] | None = None
         """The stop that another thread has written and the loop has not yet taken over."""
+        self._missed = False
+        """Another thread's stop found the link lost, and the loop has not taken that over."""
         self._unconfirmed: list[Halt] = []
         """Stops that are not confirmed yet, or that a loss kept from the drives or from being confirmed."""
         self._tasks: set[asyncio.Task[None]] = set()
@@ -197,6 +199,7 @@ class Stopping:
         """
         link = self._link
         if link.lost:
+            self._missed = True
             return
         forms = stop_forms(self._roster)
         now = link.now()
@@ -217,6 +220,7 @@ class Stopping:
         halt = Halt(self._link, self._link.now(), self._link.stops, only is None, drives)
         if halt.whole:
             self.last = halt
+            self._missed = self._missed and not follows
             self._unconfirmed.clear()
         self._unconfirmed.append(halt)
         self._write(halt, follows)
@@ -291,9 +295,9 @@ class Stopping:
         open_, self._unconfirmed = self._unconfirmed, []
         drives = {drive: None for halt in open_ for drive in halt.not_started}
         whole = any(halt.whole and len(halt.not_started) == len(halt.affected) for halt in open_)
-        if not (drives or whole or self._link.cut):
+        whole = whole or bool(self._link.cut) or self._missed
+        if not (drives or whole):
             return None
-        whole = whole or bool(self._link.cut)
         self._roster.settings_may_have_changed(self._roster.all_drives if whole else drives)
         halt = self.halt(None if whole else drives, follows=False)
         self._publish(halt)

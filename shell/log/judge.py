@@ -92,6 +92,8 @@ class _Session:
         """By bus, the drive that was asked last and has not replied."""
         self._replies: Counter[Place] = Counter()
         """Replies of drives since a stop after which they got no command."""
+        self._begun = False
+        """Its beginning is in the log."""
         self._earlier: Counter[Place] = Counter()
         """Those before the last stop, which an earlier one may be confirmed by in this moment."""
         self._commanded: set[Place] = set()
@@ -99,7 +101,7 @@ class _Session:
     def take(self, entry: Entry) -> Iterator[tuple[str, str]]:
         """Take an entry, where commands and stops are marked; yield each rule that it breaks, and how."""
         if entry.kind == "log":
-            self.marked = entry.marks
+            self.marked, self._begun = entry.marks, self._begun or entry.text.startswith(BEGIN)
         elif not self.marked:
             return
         elif entry.kind == "bus":
@@ -210,7 +212,10 @@ class _Session:
             self._unsent.add((bus, drive, text))
         if entry.kind == "notice" and self._stop is not None and STOPPED.match(entry.text):
             drive = entry.text.removeprefix(f"{entry.bus}: ").rpartition("stopped, ")[0].removesuffix(": ")
-            earlier = self._earlier[entry.bus, drive] * (entry.time - self._stop < MOMENT)
+            moment = entry.time - self._stop < MOMENT
+            if moment and self._stops == 1 and not self._begun:
+                return  # of a stop before this log
+            earlier = self._earlier[entry.bus, drive] * moment
             if (replies := max(self._replies[entry.bus, drive], earlier)) < READINGS:
                 yield "stopped", f"{entry.text!r}, after {replies} replies"
 

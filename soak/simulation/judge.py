@@ -43,7 +43,10 @@ def _first(world: World) -> Iterator[str | Granted]:
                     full = any(name == line and stop.at <= at <= stop.at + SOON for at, name in history.full)
                     yield Granted(FULL, words) if full else words
             else:
-                begun = b"".join(data for at, data in after if at <= stop.at + SOON)
+                following = (other.own[line][0] for other in history.stops if line in other.own and other.at > stop.at)
+                ends = next((at for at in following if at > first), None)  # where the next stop drops the rest of it
+                own = [(at, data) for at, port, data in history.written[first:ends] if port == line]
+                begun = b"".join(data for at, data in own if at <= stop.at + SOON)
                 if len(begun) <= rest:  # nothing of what follows the message has left so soon
                     begun = b"".join(data for _, data in after)
                 begins = [begun, *filter(None, [begun[rest:]]), *_behind_a_drop(world, line, first, begun)]

@@ -27,6 +27,9 @@ FIXED = {
     299: "a value with the reply to a stop behind it, whose CR noise had taken (of the simulation itself)",
     380: "the rest of a stop that left later than the next two stops (of the simulation itself)",
     479: "a stop behind the drop of the stop before, whose bytes had not left (of the simulation itself)",
+    622: "a stop whose thread came to a lost line only as it was back (of the simulation itself)",
+    691: "a stop whose rest the next stop dropped (of the simulation itself)",
+    1155: "a stop that the port refused first (of the simulation itself)",
     12175655: "the K of another client's OK, which was shown as a value",
 }
 DERIVED = 12

@@ -142,9 +142,9 @@ class World:
 
         def trace(way: str, data: bytes) -> None:
             self.history.note(self.loop.now, f"{way} {name}", data.hex())
+            if way in ">=" and (stop := self.stopping.get(threading.get_ident())) is not None:
+                stop.own.setdefault(name, (len(self.history.written), self.kernel.rest(name)))
             if way == ">":
-                if (stop := self.stopping.get(threading.get_ident())) is not None:
-                    stop.own.setdefault(name, (len(self.history.written), self.kernel.rest(name)))
                 self.history.written.append((self.loop.now, name, data))
                 if not who:
                     wrote(self, line, data)

@@ -146,6 +146,17 @@ async def test_a_stop_during_the_loss_is_the_first_to_leave(shop: CellSession) -
     assert "line: the stop of a, b was sent first (the loss kept it from the drives)" in shop.warned()
 
 
+async def test_a_stop_key_during_the_loss_is_the_first_to_leave_before_the_loop_has_seen_it(shop: CellSession) -> None:
+    await lost(shop)
+    shop.session.stop_ahead()
+    shop.events.clear()
+    shop.world("/sim plug line")
+    await until(lambda: shop.written("line"))
+    assert shop.written("line").startswith(b"\x1b")
+    shop.session.stop()
+    await back(shop)
+
+
 async def test_the_stop_on_return_is_for_drives_as_they_were_saved_too(tmp_path: Path) -> None:
     """A power cycle during the loss gives a drive its saved ES and name again."""
     async with opened(tmp_path, bus("line", party("a", ES=1), party("b", ES=3))) as shop:

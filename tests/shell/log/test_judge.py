@@ -207,6 +207,15 @@ def test_an_earlier_stop_may_be_confirmed_as_another_one_comes(
     assert [rule for rule, _ in found(rows, tmp_path)] == ["stopped"]
 
 
+@pytest.mark.parametrize(("of", "breaches"), [("session", ["stopped"]), ("part", [])])
+def test_a_log_that_begins_in_the_middle_may_have_the_end_of_a_stop_before_it(
+    of: str, breaches: list[str], tmp_path: Path
+) -> None:
+    rows = [{**HEAD[0], "text": f"{of} of process 7"}, HEAD[1], STOP, ESC, said("l: a: stopped, velocity 0 at 512")]
+    assert [rule for rule, _ in found(rows, tmp_path, apart=0.01)] == breaches
+    assert [rule for rule, _ in found(rows, tmp_path)] == ["stopped"]
+
+
 @pytest.mark.parametrize(("by", "breaches"), [("operator", ["silence"]), ("macro", []), ("script", [])])
 def test_of_several_macros_or_scripts_that_run_at_once_one_may_wait_for_its_reply(
     by: str, breaches: list[str], tmp_path: Path
