@@ -235,6 +235,7 @@ class Kernel:
         seams: tuple[tuple[Any, str, Any], ...] = (
             (reconnect, "os", system),
             (serial_ports, "_stable_names", self.stable_names),
+            (serial_ports, "present", lambda name: name if self.exists(name) else ""),
             (serial_port, "os", system),
             (serial_port, "serial", SimpleNamespace(Serial=self.serial, SerialBase=object)),
             (serial_port, "termios", tty),
