@@ -184,7 +184,8 @@ def outlets(failed: Callable[[TextIO, OSError], None]) -> Iterator[Streams]:
 def _place(stream: TextIO) -> tuple[int, int, int]:
     facts = os.fstat(stream.fileno())
     if sys.platform == "win32":
-        return facts.st_dev, facts.st_ino, 0
+        numbered = facts.st_ino or stream.isatty()  # all pipes are number 0 there
+        return facts.st_dev, facts.st_ino, 0 if numbered else stream.fileno()
     return facts.st_dev, facts.st_ino, facts.st_rdev
 
 

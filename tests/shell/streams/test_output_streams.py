@@ -121,6 +121,23 @@ def taken(reader):
     return got
 
 
+def test_two_pipes_are_two_destinations(monkeypatch):
+    ends = [os.pipe(), os.pipe()]
+    pipes = [open(writer, "w", encoding="utf-8") for _, writer in ends]
+    monkeypatch.setattr("sys.stdout", pipes[0])
+    monkeypatch.setattr("sys.stderr", pipes[1])
+    with output_streams.outlets(lambda stream, problem: None) as made:
+        print("a reply")
+        print("a warning", file=sys.stderr)
+        asyncio.run(made.finish(lambda: False))
+    for pipe in pipes:
+        pipe.close()
+    said = [os.read(reader, 100) for reader, _ in ends]
+    for reader, _ in ends:
+        os.close(reader)
+    assert said == [b"a reply\n", b"a warning\n"]
+
+
 def test_the_standard_streams_are_replaced_and_put_back(monkeypatch):
     reader, writer = os.pipe()
     with os.fdopen(writer, "w") as file:
