@@ -123,7 +123,7 @@ def taken(reader):
 
 def test_two_pipes_are_two_destinations(monkeypatch):
     ends = [os.pipe(), os.pipe()]
-    pipes = [open(writer, "w", encoding="utf-8") for _, writer in ends]
+    pipes = [os.fdopen(writer, "w") for _, writer in ends]
     monkeypatch.setattr("sys.stdout", pipes[0])
     monkeypatch.setattr("sys.stderr", pipes[1])
     with output_streams.outlets(lambda stream, problem: None) as made:
