@@ -108,7 +108,10 @@ if sys.platform == "win32":
     _kernel = ctypes.WinDLL("kernel32", use_last_error=True)
     _kernel.CreateEventW.restype = wintypes.HANDLE
     _kernel.OpenProcess.restype = wintypes.HANDLE
-    INFINITE, FIRST = 0xFFFFFFFF, 0
+    FIRST, NOTHING = 0, 0x102
+    """What a wait returns for the first handle, and for none in time."""
+    LOOK = 500
+    """The time between two looks for a console that is gone without a word, ms."""
     RECORDS = 512
     """The records of one read."""
     KEY, SIZE = 1, 4
@@ -195,7 +198,9 @@ if sys.platform == "win32":
             console, keys = _handle(self._descriptor), KeyBytes()
             both = (wintypes.HANDLE * 2)(self._over, console)
             records, count = (_Record * RECORDS)(), wintypes.DWORD()
-            while (ready := _kernel.WaitForMultipleObjects(2, both, False, INFINITE)) != FIRST:
+            while (ready := _kernel.WaitForMultipleObjects(2, both, False, LOOK)) != FIRST:
+                if ready == NOTHING and _kernel.GetNumberOfConsoleInputEvents(console, ctypes.byref(count)):
+                    continue  # it is there
                 if ready != FIRST + 1 or not _kernel.ReadConsoleInputW(console, records, RECORDS, ctypes.byref(count)):
                     self._came(b"")
                     return

@@ -28,7 +28,7 @@ from multidrop.transports.usbip import PORT
 INPUT = "standard input"
 LONGEST = 64 * 1024
 """Bytes of a line of it."""
-SIGNALS = (signal.SIGINT, signal.SIGTERM, getattr(signal, "SIGHUP", signal.SIGTERM))
+SIGNALS = (signal.SIGINT, signal.SIGTERM, *(getattr(signal, each, signal.SIGTERM) for each in ("SIGHUP", "SIGBREAK")))
 
 
 async def serve(
@@ -120,18 +120,16 @@ def _carry_out(floor: RunningFloor, line: str) -> None:
 
 
 def _on_signals(loop: asyncio.AbstractEventLoop, end: Callable[[], None]) -> Callable[[], None]:
-    """Let signals end it if the loop can take them; call what is returned to undo that."""
-    taken = []
+    """Let signals end it where they can be taken; call what is returned to undo that."""
+    undo = contextlib.ExitStack()
     for each in dict.fromkeys(SIGNALS):
         with contextlib.suppress(NotImplementedError, RuntimeError, ValueError):
-            loop.add_signal_handler(each, end)
-            taken.append(each)
-
-    def undo() -> None:
-        for each in taken:
-            loop.remove_signal_handler(each)
-
-    return undo
+            if sys.platform == "win32":  # the loop there takes none, but one wakes it
+                undo.callback(signal.signal, each, signal.signal(each, lambda *_: loop.call_soon_threadsafe(end)))
+            else:
+                loop.add_signal_handler(each, end)
+                undo.callback(loop.remove_signal_handler, each)
+    return undo.close
 
 
 def read_lines(loop: asyncio.AbstractEventLoop, stdin: TextIO, take: Callable[[str], None]) -> Callable[[], None]:
