@@ -94,7 +94,7 @@ def may_swallow(build: int, environment: Mapping[str, str]) -> bool:
 
 def swallows() -> bool:
     """True if the console of this process is reported to swallow Ctrl+X."""
-    return sys.platform == "win32" and may_swallow(sys.getwindowsversion().build, os.environ)
+    return sys.platform == "win32" and may_swallow(sys.getwindowsversion().platform_version[2], os.environ)
 
 
 if sys.platform == "win32":
@@ -256,10 +256,10 @@ if sys.platform == "win32":
 
     def facts() -> list[str]:
         """What a report names: the build of Windows, the host of the console, and its code pages."""
-        version = sys.getwindowsversion()
+        version = ".".join(map(str, sys.getwindowsversion().platform_version))
         host = "Windows Terminal" if "WT_SESSION" in os.environ else "console"
         host = f"{host}, made by OpenSSH" if "SSH_CONNECTION" in os.environ else host
         pages = (
             f"code pages {_kernel.GetConsoleCP()} in, {_kernel.GetConsoleOutputCP()} out, {_kernel.GetACP()} of files"
         )
-        return [f"Windows {version.major}.{version.minor} build {version.build}; {host}; {pages}"]
+        return [f"Windows {version}; {host}; {pages}"]
