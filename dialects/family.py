@@ -199,6 +199,8 @@ class Guards(Generic[S]):
     """The word of a typed line by which the configuration guards others."""
     only_ends: Callable[[str], bool]
     """Whether a line is a command of motion that can only end it: a velocity of 0."""
+    only_reads: Callable[[str], bool]
+    """Whether a line only asks for a value, and asking changes nothing; False where that is not certain."""
 
 
 @dataclass(frozen=True)

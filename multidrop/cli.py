@@ -11,6 +11,7 @@ import argparse
 import os
 import sys
 from collections.abc import Callable, Sequence
+from contextvars import copy_context
 from importlib.machinery import PathFinder
 from typing import TYPE_CHECKING, Any, NoReturn
 
@@ -82,6 +83,7 @@ class Parser(argparse.ArgumentParser):
         named = given[:1] and given[0] in own
         if self.operation.run and not named:
             add_arguments(self, self.operation.arguments)
+            _add_no_config(self)
             self.set_defaults(run_by=self.operation.run, command=self.operation.command)
         if own and (named or not self.operation.run):
             self.add_commands(own, given, "|".join(own), required=True)
@@ -134,6 +136,11 @@ class _Version(argparse.Action):
         parser.exit()
 
 
+def _add_no_config(parser: Parser) -> None:
+    suppressed = argparse.SUPPRESS  # a default of the command would replace what stood before the command
+    parser.add_argument("--no-config", action="store_true", default=suppressed, help="read no configuration file")
+
+
 def parse(given: Sequence[str]) -> argparse.Namespace:
     """Parse the command line. Raises SystemExit: 2 for wrong usage, 0 for --help and --version."""
     return build(given).parse_args(given)
@@ -146,8 +153,11 @@ def run(chosen: argparse.Namespace) -> int:
     from multidrop.commands import fail
     from multidrop.dialects.errors import Diagnostic
 
+    context = copy_context()
+    if hasattr(chosen, "no_config"):
+        context.run(imported("multidrop.commands.machine:ignore"))
     try:
-        return command(chosen)
+        return context.run(command, chosen)
     except Diagnostic as problem:
         return fail(problem)
 
@@ -165,6 +175,7 @@ def build(given: Sequence[str] = ()) -> Parser:
     """Make the parser of the command that is asked for, or of all commands."""
     parser = Parser(prog="multidrop", description=DESCRIPTION, epilog=EPILOG, formatter_class=Formatter)
     parser.add_argument("--version", action=_Version, nargs=0, help="show the version and exit")
+    _add_no_config(parser)
     parser.set_defaults(run_by="lines.start")
     if given[:1] != ["--version"]:
         from multidrop.shell.operations.table import parts

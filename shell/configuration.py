@@ -40,14 +40,16 @@ from __future__ import annotations
 import os
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from contextvars import ContextVar
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from multidrop.dialects import Diagnostic
-from multidrop.dialects.files import opened, split_lines, text_of, toml_of, utf8_of, why
+from multidrop.dialects.files import opened, text_of, toml_of, utf8_of, why
 from multidrop.dialects.text import visible
 from multidrop.macros.atomic import write_atomically
+from multidrop.shell.broken_configuration import TABLES, WrongConfiguration, salvage
 from multidrop.shell.roles import TIMES
 
 if TYPE_CHECKING:
@@ -58,9 +60,10 @@ MEGABYTE = 1_000_000
 CHOICES = {"signs": ("auto", "full", "boxes", "ascii"), "times": tuple(TIMES)}
 """The settings that have one of a few words."""
 MQTT_FILES = ("password_file", "ca", "cert", "key")
-TABLES = ("connections", "guards", "keys", "log", "mqtt", "own_units", "screen", "simulator", "sweep")
 TRAVEL = "TRAVEL"
 """The guard on moves that leave the travel of their axis, which no family knows."""
+IGNORED: ContextVar[bool] = ContextVar("ignored", default=False)
+"""The configuration file does not count (`--no-config`)."""
 
 
 @dataclass(frozen=True)
@@ -161,6 +164,10 @@ class Settings:
     """The addresses of the schedulers that may run code here, in `sweep.clusters`."""
     own_units: tuple[str, ...] = ()
     """Units beside those that every session knows."""
+    problems: tuple[Diagnostic, ...] = ()
+    """The errors of the file, of which only what is right counts."""
+    in_doubt: Mapping[str, str] = field(default_factory=dict)
+    """The errors that take names, units or guards from a saved connection; an empty name: from every line."""
 
     @property
     def macros(self) -> Path:
@@ -205,57 +212,36 @@ def config_file() -> Path:
     return config_folder() / "multidrop.toml"
 
 
-def load() -> Settings:
-    """Read the configuration; a missing file counts as empty. Raises Diagnostic with file and key."""
+def load(lenient: bool = False) -> Settings:
+    """Read the configuration; a missing file counts as empty, as every file does with --no-config.
+
+    `lenient`: what is right in a file with errors counts. Raises Diagnostic with file and key, and all `problems`.
+    """
     path = config_file()
+    if IGNORED.get():
+        return Settings()
     try:
-        return parse(utf8_of(path), str(path))
+        text = utf8_of(path)
     except Diagnostic as problem:
         if isinstance(problem.__cause__, FileNotFoundError):
             return Settings()
         raise
+    return parse(text, str(path), lenient)
 
 
-def parse(text: str, where: str) -> Settings:
-    """Parse a configuration file. Raises Diagnostic with file, line and key."""
-    document = toml_of(text, where)
+def parse(text: str, where: str, lenient: bool = False) -> Settings:
+    """Parse a configuration file. Raises Diagnostic with file, line and key; its `problems` are all errors."""
     try:
-        return _read(document, where)
-    except Diagnostic as failure:
-        raise placed(failure.message, text, where, failure.hint) from None
-
-
-def placed(message: str, text: str, where: str, hint: str = "") -> Diagnostic:
-    """A Diagnostic with the line of the key that the message begins with: `no key screen.x`, `log.files is not ...`."""
-    key = re.match(r"(?:no key )?([\w.-]+)", message)
-    line = line_of(text, key[1].rstrip(".").split(".")) if key else 0
-    return Diagnostic(message, f"{where}:{line}" if line else where, hint)
-
-
-def line_of(text: str, key: Sequence[str]) -> int:
-    """The number of the line with a key, given with its tables (`screen`, `theme`), or the nearest table's; 0: none."""
-    table: tuple[str, ...] = ()
-    best = depth = 0
-    for number, line in enumerate(split_lines(text), 1):
-        if header := re.match(r"\s*\[\[?([^\]]+)\]", line):
-            table = _parts(header[1])
-            found = table
-        elif pair := re.match(r"\s*([^=#]+?)\s*=", line):
-            found = (*table, *_parts(pair[1]))
-        else:
-            continue
-        if found == tuple(key):
-            return number
-        if len(found) > depth and found == tuple(key[: len(found)]):
-            best, depth = number, len(found)
-    return best
-
-
-def _parts(dotted: str) -> tuple[str, ...]:
-    return tuple(part.strip().strip("\"'") for part in dotted.split("."))
+        return _read(toml_of(text, where), where)
+    except Diagnostic:
+        found, problems, doubts = salvage(text, where, _read)
+        if lenient:
+            return replace(found, problems=problems, in_doubt=doubts)
+        raise WrongConfiguration(problems) from None
 
 
 def _read(document: Mapping[str, Any], where: str) -> Settings:
+    """Check a parsed file. Raises Diagnostic, whose message begins with the key."""
     _table(document, "", TABLES, where, "")
     tables = document.get("connections", {})
     if not isinstance(tables, dict):

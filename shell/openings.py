@@ -220,7 +220,10 @@ class _Opening:
                 failing.push_async_callback(workspace.forget, each.bus)
             for each in found:
                 in_cell = self.bases.get(each.bus.name, each.bus.name)
-                workspace.adopt(replace(each, warnings=()) if raw else each, self.place, connection, in_cell)
+                record = workspace.adopt(replace(each, warnings=()) if raw else each, self.place, connection, in_cell)
+                if connection.scheme != SIMULATED:
+                    doubts = workspace.settings.in_doubt
+                    record.doubt = doubts.get(connection.name, "") or doubts.get("", "")
                 if each.limits:
                     workspace.notify(f"{each.bus.name}: {each.limits}", bus=each.bus.name, warning=True)
             late: list[tuple[Bus, Halt]] = []

@@ -262,6 +262,8 @@ class LinePath:
         verb = find(parsed.name)
         call = imported(CALL)(session, verb, parsed.rest, by)
         self._allow(by)
+        if verb.changes is not None and (not verb.changes or [*parsed.rest.split(), ""][0] in verb.changes):
+            await self._undoubted([*session.buses.values()], by)
         if verb.recorded and by is not By.MACRO:
             session.recorder.record(call.recorded(), session.now())
         work = call.work()
@@ -277,6 +279,8 @@ class LinePath:
         session.publish(Entered(session.now(), parsed.typed.strip(), by, bus.name, drive.address))
         self._allow(by)
         text, check, values, stops = parsed.text, None, "", drive.stops
+        if session.of(bus).doubt and not _only_reads(drive, text):
+            await self._undoubted([bus], by)
         if session.scaled or _MAYBE_QUANTITY.search(text):
             line = await session.units.line(drive, text)
             text, check, values = Command(line.text), line.check, line.values
@@ -324,6 +328,7 @@ class LinePath:
             raise Diagnostic(f"{name} is raw: it has no address {parsed.address}", typed, hint)
         session.publish(Entered(session.now(), typed, by, name))
         self._allow(by)
+        await self._undoubted([raw.bus], by)
         await self.guard(raw.bus.at(""), parsed.text, by)
         starts = raw.bus.roster.family.codec.starts_motion(parsed.text)
         await self.send_bytes(raw.bus, raw.encoded(parsed.text), by, starts)
@@ -349,6 +354,16 @@ class LinePath:
         if what:
             await self._session.questions.confirm(what, self._session.display_name(drive), by=by)
 
+    async def _undoubted(self, buses: Sequence[Bus], by: By) -> None:
+        """Ask once for each line that lacks names, units or guards. Raises Diagnostic where that is not agreed to."""
+        for record in map(self._session.of, buses):
+            if record.doubt:
+                what = (
+                    f"it is read only, as names, units or guards are not in force: {record.doubt}; go on all the same"
+                )
+                await self._session.questions.confirm(what, record.bus.name, by=by)
+                record.doubt = ""
+
     def starting(self, drive: Drive) -> None:
         """Note that the next request can start motion or a program of a drive."""
         drive.check_start()
@@ -359,6 +374,11 @@ class LinePath:
     def _allow(self, by: By) -> None:
         if self._session.latched and by is not By.OPERATOR:
             raise Stopped(LATCHED)
+
+
+def _only_reads(drive: Drive, text: str) -> bool:
+    guards = drive.family.guards
+    return guards is not None and not drive.programming and (guards.only_reads(text) or guards.only_ends(text))
 
 
 def _raw_line(workspace: Workspace, line: str | TypedLine) -> DriveLine | None:

@@ -63,6 +63,8 @@ class OpenBus:
     place: float
     """Its place among the others."""
     unwatch: Callable[[], None]
+    doubt: str = ""
+    """The error of the configuration that took its names, units or guards; it is read only until a person agrees."""
     port: str = ""
     """The name of its port, the same in every session; empty for a simulated one."""
     selected: Drive | None = None

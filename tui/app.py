@@ -133,7 +133,8 @@ class MultidropApp(App[int]):
         self.model.look.ink = ink_of(self._signs.font)
         self._set_actions()
         self.set_keymap(self.keymap.changed)
-        self._troubles = [f"{look.where}: {trouble}" for trouble in [*self.keymap.troubles, *wrong_theme(look.theme)]]
+        self._troubles = [*map(str, session.settings.problems)]
+        self._troubles += [f"{look.where}: {trouble}" for trouble in [*self.keymap.troubles, *wrong_theme(look.theme)]]
 
     def _set_actions(self) -> None:
         """Make what keys, the palette and the session ask of the screen."""

@@ -36,7 +36,7 @@ def run(urls: Sequence[str], reconnect: bool = True, raw: bool = False, twin: bo
         raise Diagnostic("the screen needs a terminal", "tui", "multidrop shell reads lines from standard input")
     sys.setswitchinterval(SWITCH)
     with early_ends():
-        return asyncio.run(_run(urls, load(), reconnect, raw, twin))
+        return asyncio.run(_run(urls, load(lenient=True), reconnect, raw, twin))
 
 
 async def _run(urls: Sequence[str], settings: Settings, reconnect: bool, raw: bool, twin: bool) -> int:

@@ -56,7 +56,7 @@ MODBUS = Family(
         write_coil=operations.write_coil,
         device=operations.device,
     ),
-    guards=Guards(guards.NAMES, guarded, guards.word_of, guards.only_ends),
+    guards=Guards(guards.NAMES, guarded, guards.word_of, guards.only_ends, guards.only_reads),
     protection=CYBER_SECURITY,
     prepare=pdu_codec,
     certifying_at="multidrop.dialects.modbus.host.operations:CERTIFYING",

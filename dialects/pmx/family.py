@@ -82,7 +82,7 @@ PMX = Family(
     move_to=move_to,
     assign="{}={}".format,
     programs_at="multidrop.dialects.pmx.host.programs:PROGRAM_FILES",
-    guards=Guards(GUARDS, lambda state, text: guarded(text, state.address), word_of, only_ends),
+    guards=Guards(GUARDS, lambda state, text: guarded(text, state.address), word_of, only_ends, reads),
     scan_at="multidrop.dialects.pmx.host.operations:SCAN",
     debugging_at="multidrop.dialects.pmx.host.programs:DEBUGGING",
     certifying_at="multidrop.dialects.pmx.host.operations:CERTIFYING",

@@ -94,6 +94,11 @@ def word_of(text: str) -> str:
     return text.strip().partition(" ")[0].upper()
 
 
+def only_reads(text: str) -> bool:
+    """Whether a line only asks for a value."""
+    return word_of(text) in (Command.GAP.name, Command.GGP.name, Command.GIO.name)
+
+
 TMCL = Family(
     name=Tmcl.family,
     codec=Tmcl(),
@@ -113,7 +118,7 @@ TMCL = Family(
     move=move,
     move_to=move_to,
     assign=commands.assigned,
-    guards=Guards(GUARDS, lambda state, text: guarded(text, state.address), word_of, only_ends),
+    guards=Guards(GUARDS, lambda state, text: guarded(text, state.address), word_of, only_ends, only_reads),
     programs_at="multidrop.dialects.tmcl.host.programs:PROGRAM_FILES",
     debugging_at="multidrop.dialects.tmcl.host.programs:DEBUGGING",
     repairs=True,

@@ -14,13 +14,12 @@ if TYPE_CHECKING:
 
 
 def fail(failure: BaseException) -> int:
-    """Print one line about a failure; return its exit code."""
-    write(sys.stderr, report(failure))
+    """Print one line about a failure, or about each of its problems; return its exit code."""
+    write(sys.stderr, *map(report, getattr(failure, "problems", (failure,))))
     return exit_code(failure)
 
 
 def refused(reports: Report, failure: Diagnostic) -> int:
     """Report a script that is not executed, with each of its errors; return the exit code."""
-    problems: tuple[Diagnostic, ...] = getattr(failure, "problems", (failure,))
-    reports.wrong(problems)
-    return max(map(fail, problems))
+    reports.wrong(getattr(failure, "problems", (failure,)))
+    return fail(failure)

@@ -28,6 +28,25 @@ WRONG = 2
 """The exit code of a configuration that cannot be used as it is."""
 
 
+def ignore() -> None:
+    """Let the configuration file not count from now on, and say on standard error what is not in force."""
+    if text := not_in_force(configuration.load(lenient=True)):
+        write(sys.stderr, f"--no-config: not in force: {text}")
+    configuration.IGNORED.set(True)
+
+
+def not_in_force(found: Settings) -> str:
+    """What a session without the configuration lacks, for a person: guards, names and units; empty: nothing."""
+    guards = found.guards
+    parts = [f"the guards on {', '.join(sorted(guards.also))}"] if guards.also else []
+    parts += [f"'off' of the guards {', '.join(sorted(guards.off))}"] if guards.off else []
+    for name, each in found.connections.items():
+        parts += [f"the names of {name}"] if each.names else []
+        parts += [f"the units of {name}"] if each.units else []
+    parts += [f"what has errors in the file: {len(found.problems)}"] if found.problems else []
+    return ", ".join(parts)
+
+
 def path(chosen: argparse.Namespace) -> int:
     write(sys.stdout, str(configuration.config_file()))
     return 0
@@ -76,8 +95,9 @@ def shown(found: Settings, keys: dict[str, str], text: str) -> list[str]:
 
 def check(chosen: argparse.Namespace) -> int:
     """Report what is wrong; exit code 0 if nothing is."""
-    found = configuration.load()
+    found = configuration.load(lenient=True)
     text = _text(configuration.config_file())
+    from multidrop.shell.broken_configuration import placed
     from multidrop.tui.app import bindings
     from multidrop.tui.keymap import keymap
     from multidrop.tui.widgets.theme import wrong_theme
@@ -85,12 +105,12 @@ def check(chosen: argparse.Namespace) -> int:
     # The screen knows keys and themes.
     look = found.look
     troubles = [*keymap(bindings(), look.keys).troubles, *wrong_theme(look.theme), *found.mqtt.unreadable()]
-    for trouble in troubles:
-        write(sys.stderr, str(configuration.placed(trouble, text, str(configuration.config_file()))))
-    if not troubles:
+    placed_troubles = [placed(trouble, text, str(configuration.config_file())) for trouble in troubles]
+    write(sys.stderr, *map(str, (*found.problems, *placed_troubles)))
+    if not (troubles or found.problems):
         state = "is right" if text else "does not exist: all settings are the defaults"
         write(sys.stdout, f"{configuration.config_file()} {state}")
-    return WRONG if troubles else 0
+    return WRONG if troubles or found.problems else 0
 
 
 def _keys(found: Settings) -> dict[str, str]:
@@ -204,7 +224,7 @@ def _configuration() -> Iterator[str]:
     yield str(path)
     yield from _contents(path)
     try:
-        configuration.load()
+        yield from (f"problem: {problem}" for problem in configuration.load(lenient=True).problems)
     except Diagnostic as problem:
         yield f"problem: {problem}"
 

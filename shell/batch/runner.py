@@ -59,7 +59,7 @@ def run(
     try:
         found = configuration.load()
     except FAILURES as failure:
-        write(sys.stderr, report(failure))
+        write(sys.stderr, *map(report, getattr(failure, "problems", (failure,))))
         return exit_code(failure)
     try:
         create = partial(Session, found, lazy=lazy, reconnect=reconnect, raw=raw, tried=tried)

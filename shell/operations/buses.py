@@ -229,6 +229,7 @@ RAW = Operation(
     serial port, rfc2217:// or ssh://. MS is 250 unless given.
     """,
     work="buses:raw",
+    changes=("on",),
     words={
         "on": "typed text goes to the port as it is, and every byte is shown",
         "off": "find the drives, and talk to them again",
@@ -265,6 +266,7 @@ BYTES = Operation(
     or a text in quotation marks.
     """,
     work="buses:bytes_",
+    changes=(),
     fits=is_raw,
 )
 RENAME = Operation(

@@ -27,6 +27,7 @@ PARAMS = Operation(
     leaves alone what can move the motor, unless --with names it.
     """,
     work="drives:params",
+    changes=("restore", "save"),
     words={
         "read": "read all settings, which /page parameters shows",
         "save": "keep the present settings over power-off, after a question",
@@ -257,6 +258,7 @@ REGISTER = Operation(
     registers of its value, low word first; =LOW,HIGH writes two words. It transfers at most two registers.
     """,
     work="drives:register",
+    changes=(),
     recorded="typed",
     fits=has_registers,
 )
@@ -264,6 +266,7 @@ COIL = Operation(
     usage="/coil N [0|1]",
     help="Read or switch output N of the selected drive; N is the number in O1, O2, O3.",
     work="drives:coil",
+    changes=(),
     recorded="typed",
     fits=has_registers,
 )

@@ -47,6 +47,8 @@ class Operation(NamedTuple):
     """`MODULE:FUNCTION` for more lines of its help, from the table that the verb uses."""
     fits: Callable[[Workspace], bool] | None = None
     """The condition under which the verb is offered."""
+    changes: Sequence[str] | None = None
+    """The first words with which the verb changes a drive, or lets it run; none: with any. None: it never does."""
     immediate: bool = False
     """The verb is done at once, so a stop has nothing to end."""
     concurrent: bool = False

@@ -172,6 +172,7 @@ DOWNLOAD = Operation(
     The program that it replaces is cleared (CP); a program at another address stays.
     """,
     work="programs:download",
+    changes=(),
     words={
         "--save": "save it with S",
         "--only-changed": "send nothing where the drive holds it already",
@@ -202,6 +203,7 @@ TRACE = Operation(
     its break point. For a PMX, LABEL is the number of a program; the lines are those at which the program was seen.
     """,
     work="programs:trace",
+    changes=(),
     recorded="programs:debugger_recorded",
     concurrent=True,
 )
@@ -213,12 +215,14 @@ STEP = Operation(
     with a checksum. The line may start a motion. A stop ends program and single step.
     """,
     work="programs:step",
+    changes=(),
     recorded="programs:debugger_recorded",
 )
 CONTINUE = Operation(
     usage="/continue [ADDR]",
     help="Let a program that waits run on at normal speed.",
     work="programs:continue_",
+    changes=(),
     recorded="programs:debugger_recorded",
 )
 BREAK = Operation(
@@ -228,6 +232,7 @@ BREAK = Operation(
     A drive has one break point. Without arguments, show it.
     """,
     work="programs:break_",
+    changes=(),
     words={"off": "remove the break point", "now": "break the running program where it is"},
     recorded="programs:debugger_recorded",
 )

@@ -76,10 +76,11 @@ def run(
     too. `raw`: the URLs are opened in raw mode. `twin`: each drive gets a twin.
     """
     try:
-        found = configuration.load()
+        found = configuration.load(lenient=True)
     except FAILURES as failure:
         write(sys.stderr, report(failure))
         return exit_code(failure)
+    write(sys.stderr, *map(str, found.problems))
     try:
         with early_ends():  # before the log has its thread
             return asyncio.run(_run(partial(Session, found, reconnect=reconnect, raw=raw), urls, agreed, beyond, twin))

@@ -1,5 +1,6 @@
 """`multidrop config`: path, show and check."""
 
+import os
 import re
 import signal
 import sys
@@ -8,7 +9,7 @@ import pytest
 import tomlkit
 
 from multidrop.__main__ import main
-from tests.support.front_door import command
+from tests.support.front_door import command, read_to_end
 from tests.support.paths import ROOT
 from tests.support.processes import Running
 
@@ -80,14 +81,18 @@ def test_a_right_configuration_is_said_to_be_right(file, capsys):
     assert capsys.readouterr().out.endswith(f"{file} is right\n")
 
 
-@pytest.mark.parametrize("text", ["[screen]\ntimes = 5\n", "theme = 1\n", "[screen\n"])
-def test_the_screen_names_what_is_wrong_in_one_line(text, file, monkeypatch, capsys):
-    file.write_text(text)
-    for stream in (sys.stdin, sys.stdout):
-        monkeypatch.setattr(stream, "isatty", lambda: True, raising=False)
-    assert main(["demo"]) == 2
-    told = capsys.readouterr().err.splitlines()
-    assert len(told) == 1 and told[0].startswith(f"{file}:")
+@pytest.mark.process
+@pytest.mark.skipif(os.name != "posix", reason="pseudo-terminals")
+@pytest.mark.parametrize("front", ["demo", "shell"])
+def test_the_screen_and_the_prompt_start_and_tell_all_that_is_wrong(front, home):
+    (home.folder / "conf").mkdir(exist_ok=True)
+    (home.folder / "conf" / "multidrop.toml").write_text("[guards]\nalso = [\n[screen]\ntimes = 5\n[log]\nfiles = 0\n")
+    child = home.terminal(*([front] if front == "demo" else [front, "sim:"]), columns=160)
+    child.expect("multidrop.toml:2: not TOML")
+    child.expect("multidrop.toml:4: screen.times is not text")
+    child.expect("multidrop.toml:6: log.files is not a number")
+    child.send("/quit\r")
+    assert read_to_end(child) == 0
 
 
 def test_the_example_of_the_page_is_right(file, capsys):
@@ -144,3 +149,19 @@ def test_a_list_of_the_configuration_that_is_none_is_one_line(file, capsys):
         assert main(["config", "check"]) == 2
         [line] = capsys.readouterr().err.splitlines()
         assert re.search(r"multidrop.toml:\d: .*(simulator|sweep)", line)
+
+
+def test_a_command_goes_on_without_the_file_and_names_what_is_not_in_force(file, capsys):
+    file.write_text(
+        '[guards]\nalso = ["EX"]\n[connections.a]\nurl = "sim:"\nnames = { a = "left" }\n[log]\nfiles = 0\n'
+    )
+    assert main(["config", "show"]) == 2
+    assert capsys.readouterr().err == (
+        f"{file}:7: log.files is not a number from 1 to 1000; --no-config goes on without the file\n"
+    )
+    for given in (["config", "show", "--no-config"], ["--no-config", "config", "show"]):
+        assert main(given) == 0
+        shown = capsys.readouterr()
+        assert '"left"' not in shown.out and len(shown.err.splitlines()) == 1
+        assert "the guards on EX" in shown.err and "the names of a" in shown.err
+    assert main(["config", "show"]) == 2

@@ -4,6 +4,8 @@ import json
 from pathlib import Path
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from multidrop.dialects import Diagnostic
 from multidrop.shell import configuration
@@ -50,6 +52,79 @@ def test_a_mistake_is_told_with_the_file_and_the_key(folder, text, named):
         configuration.load()
     assert str(caught.value).startswith(str(folder / "multidrop.toml"))
     assert named in str(caught.value)
+
+
+WRONG = """[connections.press]
+url = "tcp://127.0.0.1:9"
+names = { a = "x y" }
+[connections.eth]
+url = 5
+[connections.stage]
+url = "tcp://127.0.0.1:8"
+unit = { a = "5 mm/turn" }
+[guards]
+off = ["NONE"]
+[log]
+files = "x"
+megabytes = 3
+"""
+
+
+def test_all_errors_are_told_at_once_and_the_last_one_names_the_way_past_them(folder):
+    (folder / "multidrop.toml").write_text(WRONG)
+    with pytest.raises(Diagnostic) as caught:
+        configuration.load()
+    told = [str(problem).removeprefix(f"{folder / 'multidrop.toml'}:") for problem in caught.value.problems]
+    assert [each.partition(":")[0] for each in told] == ["3", "5", "8", "10", "12"]
+    assert told[-1].endswith("; --no-config goes on without the file")
+    assert str(caught.value) == str(caught.value.problems[0])
+
+
+def test_what_is_right_in_a_file_with_errors_counts_and_what_drives_lack_is_in_doubt(folder):
+    (folder / "multidrop.toml").write_text(WRONG)
+    found = configuration.load(lenient=True)
+    assert (found.log.size, found.log.files) == (3_000_000, 8)
+    assert [(name, each.names) for name, each in found.connections.items()] == [("press", {}), ("stage", {})]
+    assert set(found.in_doubt) == {"press", "eth", "stage"} and len(found.problems) == 5
+
+
+@pytest.mark.parametrize(
+    ("text", "in_doubt"),
+    [
+        ('[log]\nalways = \n[connections.a]\nurl = "sim:"', set()),
+        ('[guards]\nalso = [\n[connections.a]\nurl = "sim:"', {""}),
+        ('[connections.b]\nurl = "sim:"\nunits = { a = }\n[connections.a]\nurl = "sim:"', {"b"}),
+        ('[guard]\nalso = ["EX"]\n[connections.a]\nurl = "sim:"', {""}),
+        ('[guards]\nalso = ["EX", 5]\n[connections.a]\nurl = "sim:"', {""}),
+        ('[guards]\noff = 5\n[connections.a]\nurl = "sim:"', set()),
+        ('connections.b = 5\n[connections.a]\nurl = "sim:"', {"b"}),
+        ('x = \n[connections.a]\nurl = "sim:"', {""}),
+        ('[log]\nalways = true\n[log]\n[connections.a]\nurl = "sim:"', {""}),
+    ],
+)
+def test_a_broken_section_takes_no_other_with_it(folder, text, in_doubt):
+    found = configuration.parse(text, "multidrop.toml", lenient=True)
+    assert "a" in found.connections and set(found.in_doubt) == in_doubt and found.problems
+
+
+@given(
+    st.lists(
+        st.sampled_from([*WRONG.splitlines(True), "[", "= 1\n", "\n", "[[log]]\n", '"""\n', "log = 1\n"]), max_size=9
+    )
+)
+def test_any_file_is_read_or_told(lines):
+    found = configuration.parse("".join(lines), "multidrop.toml", lenient=True)
+    assert all(str(problem).startswith("multidrop.toml") for problem in found.problems)
+    assert found.problems or not found.in_doubt
+
+
+def test_no_config_reads_nothing(folder):
+    (folder / "multidrop.toml").write_text(WRONG)
+    token = configuration.IGNORED.set(True)
+    try:
+        assert configuration.load() == configuration.Settings()
+    finally:
+        configuration.IGNORED.reset(token)
 
 
 def test_a_file_that_cannot_be_read_is_named(folder):

@@ -150,3 +150,49 @@ def test_send_and_run_refuse_with_2_before_a_byte_is_sent(multidrop, tmp_path):
         assert (done.returncode, done.stdout) == (2, "")
         assert done.stderr.count("\n") == 1 and "erases the program" in done.stderr and "--yes" in done.stderr
     assert multidrop("send", "sim:#press", "@a CP", "--yes").returncode == 0
+
+
+READS, CHANGES = ("@a PR P", "@stages:00 PX", "@a SL 0"), ("@a VM=5000", "@stages:00 EO=1", "@a PR ER", "@b EX G1")
+
+
+@asynccontextmanager
+async def doubted(folder):
+    async with opened(folder) as shop:
+        for each in shop.session.buses.values():
+            shop.session.of(each).doubt = "multidrop.toml:9: guards.also: no drive has a word NOPE"
+        yield shop
+
+
+async def test_a_line_that_lacks_its_guards_is_read_only_without_anybody_to_ask(tmp_path):
+    async with doubted(tmp_path) as shop:
+        for line in CHANGES:
+            with pytest.raises(Diagnostic, match="read only.*multidrop.toml:9.*nothing was sent"):
+                await shop.session.run(line)
+        with pytest.raises(Diagnostic, match="read only"):
+            await shop.session.run("/download nothing.mxt a")
+        assert silent(shop)
+        for line in READS:
+            await shop.session.run(line)
+        assert not silent(shop)
+
+
+async def test_one_yes_takes_the_doubt_from_a_line_and_a_no_leaves_it(tmp_path):
+    async with doubted(tmp_path) as shop:
+        person = Person(shop, False)
+        with pytest.raises(Diagnostic, match="the answer was no"):
+            await shop.session.run("@a VM=5000")
+        assert silent(shop)
+        person.answer = True
+        await shop.session.run("@a VM=5000")
+        await shop.session.run("@b VM=5000")
+        assert len(person.asked) == 2 and b"VM=5000" in shop.written("press")
+        await shop.session.run("@stages:00 HSPD=500")
+        assert len(person.asked) == 3
+
+
+async def test_neither_a_macro_nor_a_script_can_agree_to_it(tmp_path):
+    async with doubted(tmp_path) as shop:
+        Person(shop, True)
+        with pytest.raises(Diagnostic, match="a macro cannot ask, nothing was sent"):
+            await shop.session.run("@a VM=5000", By.MACRO)
+        assert silent(shop)

@@ -87,6 +87,12 @@ def only_ends(text: str) -> bool:
     return word in VELOCITIES and value == 0
 
 
+def only_reads(text: str) -> bool:
+    """Whether a line only asks for values. Asking for ER clears it (section 5.1.41)."""
+    word = _head(bare(text), "")[1]
+    return word == "PR" and not re.search(r"\bER\b", text.upper())
+
+
 def _head(line: str, product: str) -> tuple[str, str, int | str]:
     """Read the head of a line: a drive's name where one is typed, the word, and the value.
 
