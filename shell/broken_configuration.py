@@ -42,12 +42,12 @@ def salvage(text: str, where: str, read: Callable[[dict[str, Any], str], T]) -> 
     document, problems, lost = _sections(text, where)
     while True:
         try:
-            return read(document, where), tuple(problems), dict(reversed([*_doubts(lost)]))
+            told = sorted(problems, key=lambda each: int(each.where.rpartition(":")[2]) if each.where != where else 0)
+            return read(document, where), tuple(told), dict(reversed([*_doubts(lost)]))
         except Diagnostic as problem:
             path = _path(document, problem.message)
-            told = placed(problem.message, text, where, problem.hint)
-            lost.append((path, told))
-            problems.append(told)
+            problems.append(placed(problem.message, text, where, problem.hint))
+            lost.append((path, problems[-1]))
             _leave_out(document, path[:2] if path[2:] == ("url",) else path)
 
 
@@ -65,8 +65,9 @@ def _sections(text: str, where: str) -> tuple[dict[str, Any], list[Diagnostic], 
         try:
             _join(document, toml_of("\n" * start + "\n".join(lines[start:end]), where))
         except Diagnostic as problem:
-            header = _HEADER.match(lines[start])
-            lost.append((tuple(_parts(header[1])) if header else (), problem))
+            header = _HEADER.match(lines[start]) if lines else None
+            at = f"{where}:{start + 1}" if problem.where == where else problem.where
+            lost.append((tuple(_parts(header[1])) if header else (), Diagnostic(problem.message, at, problem.hint)))
     lost = lost or [((), whole)]  # a section that is there twice
     return document, [problem for _, problem in lost], lost
 
