@@ -88,8 +88,9 @@ def _owed(world: World) -> Iterator[str]:
         death = bisect_left(history.deaths, stop.at)
         until = history.deaths[death] if death < len(history.deaths) and not stop.who else float("inf")
         for line in stop.lost:
-            begins = stop.own.get(line, (stop.written, 0))[0]  # its thread may come to it once it is back
-            since = _connections(world, begins)  # one that was just being made may carry it
+            if line in stop.own:
+                continue  # it was back as its thread came to it, which wrote the stop
+            since = _connections(world, stop.written)  # one that was just being made may carry it
             first = next((each for each in since if each.line == line and each.at <= until and each.data), None)
             form = re.compile(LANGUAGES[world.place(line[:2]).language].stop)
             if first is not None and len(first.data) >= WHOLE and not form.match(first.data):
