@@ -30,7 +30,15 @@ EPILOG = (
     "Without a command: the screen, with saved connections, serial ports and the demo cell. "
     "multidrop COMMAND --help shows its arguments."
 )
-EXTRAS = {"cluster": "distributed", "lsp": "pygls", "mqtt": "paho", "pytest": "pytest", "rerun": "rerun", "usb": "usb1"}
+EXTRAS = {
+    "cluster": "distributed",
+    "lsp": "pygls",
+    "mqtt": "paho",
+    "notebook": "ipykernel",
+    "pytest": "pytest",
+    "rerun": "rerun",
+    "usb": "usb1",
+}
 """The modules of the extras in pyproject.toml, by extra."""
 
 

@@ -152,7 +152,7 @@ def test_the_version_says_which_extras_are_installed(monkeypatch):
         (["EX", "--dialect", "pmx"], "E: encoder's position", ""),
         (["5"], "status 5: the EEPROM is locked", ""),
         (["/plot"], "/plot ", ""),
-        ([], "/open URL [NAME]", ""),
+        ([], "Stop and end:\n", ""),
     ],
 )
 def test_words_and_numbers_are_explained_without_a_connection(multidrop, arguments, begins, ends):

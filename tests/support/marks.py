@@ -170,10 +170,21 @@ def nightly(pytestconfig: pytest.Config) -> bool:
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     """Leave out what only the nightly run takes, and spread what waits."""
     _leave_out(config, items)
+    for item in _repeating(items):
+        item.add_marker("no_cover")
+    items[:] = _spread(items)
+
+
+def _repeating(items: list[pytest.Item]) -> Iterator[pytest.Item]:
+    """The tests that go ways of others again: those marked so, and the cases of a test between its first and last two."""
+    cases: dict[str, list[pytest.Item]] = {}
     for item in items:
         if any(item.get_closest_marker(name) for name in REPEATING):
-            item.add_marker("no_cover")
-    items[:] = _spread(items)
+            yield item
+        else:
+            cases.setdefault(item.nodeid.partition("[")[0], []).append(item)
+    for each in cases.values():
+        yield from each[2:-2]
 
 
 def _spread(items: list[pytest.Item]) -> list[pytest.Item]:
