@@ -176,7 +176,7 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
 
 
 def _repeating(items: list[pytest.Item]) -> Iterator[pytest.Item]:
-    """The tests that go ways of others again: those marked so, and the cases of a test between its first and last two."""
+    """The tests that go ways of others again: those marked so, and the cases of a test but its first and last two."""
     cases: dict[str, list[pytest.Item]] = {}
     for item in items:
         if any(item.get_closest_marker(name) for name in REPEATING):
