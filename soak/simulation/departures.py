@@ -33,8 +33,12 @@ def _connections(world: World, since: int = 0) -> Iterator[Connection]:
     places = {each.name: each for each in world.places}
     for number, (at, line, begins) in enumerate(history.opened):
         ends = next((index for _, other, index in history.opened[number + 1 :] if other == line), None)
-        left = b"".join(data for _, port, data in history.written[max(begins, since) : ends] if port == line)
-        yield Connection(at, line, _for_drives(places[line[:2]].kind, left))
+        left = history.written[begins:ends]
+        whole, before = (  # a message may have begun to leave
+            _for_drives(places[line[:2]].kind, b"".join(data for _, port, data in part if port == line))
+            for part in (left, left[: max(0, since - begins)])
+        )
+        yield Connection(at, line, whole[len(before) :])
 
 
 def _for_drives(kind: str, left: bytes) -> bytes:
