@@ -46,8 +46,8 @@ def shortened(text: str) -> str:
     return f"{text[:half]} ... ({len(text) - 2 * half} characters) ... {text[-half:]}"
 
 
-GONE = (errno.EPIPE, errno.EIO, errno.EBADF, errno.ECONNRESET)
-"""The errors of a reader that went away."""
+GONE = (errno.EPIPE, errno.EIO, errno.EBADF, errno.ECONNRESET, *((errno.EINVAL,) if sys.platform == "win32" else ()))
+"""The errors of a reader that went away; Windows gives EINVAL for a pipe."""
 dropped: list[str] = []
 """The reasons why lines were lost although a reader waits for them, such as a full disk."""
 
