@@ -45,8 +45,8 @@ class SshProgram:
         self._words, self._status = "", -1
         self._near = kernel.socket(None, None)
         self._theirs = kernel.socket(None, None)
+        self._theirs.traced = lambda host: lambda way, data: None  # what it does is noted at the near end
         host = kernel.network.pair(self._near, self._theirs, far.host)
-        self._theirs.trace = lambda way, data: None
         wait = max(0.0, host.dark - kernel.loop.now) + kernel.rng.random() * LOGIN
         kernel.loop.call_later(min(wait, 5.0), self._log_in)
 

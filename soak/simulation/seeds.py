@@ -30,6 +30,7 @@ FIXED = {
     622: "a stop whose thread came to a lost line only as it was back (of the simulation itself)",
     691: "a stop whose rest the next stop dropped (of the simulation itself)",
     1155: "a stop that the port refused first (of the simulation itself)",
+    1315: "the rest of a message to a relay, of which the judge asked the other end (of the simulation itself)",
     12175655: "the K of another client's OK, which was shown as a value",
 }
 DERIVED = 12
