@@ -167,11 +167,16 @@ KEYS = {"y": "y", "Y": "y", "n": "n", "N": "n", "enter": "n", "c-j": "n", "escap
 """The answer of each key, by its name in prompt_toolkit. Ctrl+C is the prompt's own: it may be a stop."""
 
 
+STOP_LINE = "/stop"
+
+
 class PromptQuestion:
     """The question of one prompt. `begin` drops the line that is being typed, before keys answer."""
 
-    def __init__(self, app: Application[str], begin: Callable[[], None]) -> None:
-        self._app, self._begin = app, begin
+    def __init__(self, app: Application[str], begin: Callable[[], None], stop: Callable[[], None]) -> None:
+        self._app, self._begin, self._stop = app, begin, stop
+        self._typed = ""
+        """What was typed on the question's line: `/stop` and Enter stop there, too, where Ctrl+X may not come."""
         self._answer: Answer | None = None
         self._given: asyncio.Future[bool] | None = None
         self.shown = ""
@@ -205,7 +210,7 @@ class PromptQuestion:
     async def _quiet(self, shown: str) -> None:
         """Show a question, and wait until keys pause."""
         loop = asyncio.get_running_loop()
-        self.shown, self._answer = shown, Answer(loop.time())
+        self.shown, self._typed, self._answer = shown, "", Answer(loop.time())
         self._draw()
         while (left := self._answer.quiet_at() - loop.time()) > 0:
             await asyncio.sleep(left)
@@ -224,7 +229,7 @@ class PromptQuestion:
 
     def takes(self, line: str) -> bool:
         """Take a line that was entered, if it is an answer."""
-        if self._text is None or self._text.done():
+        if self._text is None or self._text.done() or line.strip() == STOP_LINE:
             return False
         self._text.set_result(line)
         return True
@@ -232,8 +237,8 @@ class PromptQuestion:
     def bind(self, bindings: KeyBindings) -> None:
         """Bind the keys of the answer, ahead of the line's own. A key that answers nothing does nothing."""
         for name, key in KEYS.items():
-            bindings.add(name, filter=self.open, eager=True)(lambda event, key=key: self._key(key))
-        bindings.add(Keys.Any, filter=self.open, eager=True)(lambda event: self._key(""))
+            bindings.add(name, filter=self.open, eager=True)(lambda event, key=key: self._key(key, event.data))
+        bindings.add(Keys.Any, filter=self.open, eager=True)(lambda event: self._key("", event.data))
         for name in ("c-d", "escape"):
             bindings.add(name, filter=self.taking, eager=True)(lambda event: self.no())
         for each in load_cpr_bindings().bindings:  # the terminal's cursor reports are no keys
@@ -244,8 +249,13 @@ class PromptQuestion:
         if self._answer is not None and self._given is None:
             self._answer.key("", asyncio.get_running_loop().time())
 
-    def _key(self, key: str) -> None:
+    def _key(self, key: str, text: str) -> None:
         if self._answer is None or self._given is None or self._given.done():
+            return
+        ends, before = text in ("\r", "\n"), self._typed
+        self._typed = "" if ends else before + text
+        if ends and before == STOP_LINE:
+            self._stop()
             return
         found = self._answer.key(key, asyncio.get_running_loop().time())
         if found is not None:

@@ -144,7 +144,7 @@ class Prompt:
         self._naming: asyncio.Task[None] | None = None
         """Reads which drives move, after Ctrl+C."""
         self._toolbar = Toolbar(session, self._lines, self._prompt)
-        self._question = PromptQuestion(self._prompt.app, self._ask_alone)
+        self._question = PromptQuestion(self._prompt.app, self._ask_alone, partial(self._stop, "/stop"))
         self._prompt.key_bindings = self._bindings()
         fill = partial(filled, self._question.ask_text, partial(session.notify, warning=True))
         session.front = Front(

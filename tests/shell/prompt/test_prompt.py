@@ -255,6 +255,19 @@ async def test_what_was_typed_ahead_answers_nothing(tmp_path):
         await question
 
 
+@pytest.mark.parametrize("pause", [0, LONG])
+async def test_stop_and_enter_stop_while_a_question_is_open(tmp_path, pause):
+    """Where a console swallows Ctrl+X these keys are the stop, typed fast or slowly."""
+    async with asked(tmp_path) as (typist, question):
+        await asyncio.sleep(LONG)
+        typist.send("/stop")
+        await asyncio.sleep(pause)
+        assert not typist.session.latched
+        typist.send("\r")
+        await asyncio.sleep(LONG)
+        assert typist.session.latched and question.done() and typist.entered == []
+
+
 async def test_keys_that_edit_a_line_do_nothing_while_a_question_is_open(tmp_path):
     async with asked(tmp_path) as (typist, question):
         await asyncio.sleep(LONG)
