@@ -1,6 +1,5 @@
 """`multidrop config`: path, show and check."""
 
-import os
 import re
 import signal
 
@@ -81,7 +80,7 @@ def test_a_right_configuration_is_said_to_be_right(file, capsys):
 
 
 @pytest.mark.process
-@pytest.mark.skipif(os.name != "posix", reason="pseudo-terminals")
+@pytest.mark.pty
 @pytest.mark.parametrize("front", ["demo", "shell"])
 def test_the_screen_and_the_prompt_start_and_tell_all_that_is_wrong(front, home):
     (home.folder / "conf").mkdir(exist_ok=True)
