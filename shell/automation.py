@@ -34,7 +34,7 @@ POLL = 0.02
 """The time between two looks for the end of automations, s."""
 TRIAL = 10.0
 """The time for the trial of the stop key, s."""
-AGREED = "/resume agrees to that, and lets drives move (send, run: --yes)"
+AGREED = "/resume agrees to that (send, run: --yes)"
 Claim = tuple["Link", str]
 """A link and an address on it; a global address is all of the link."""
 _current: ContextVar[Automation | None] = ContextVar("automation", default=None)
@@ -266,8 +266,8 @@ def outcome(workspace: Workspace, halts: list[Halt]) -> list[str]:
 
 
 def stop_key_trial(workspace: Workspace) -> str:
-    """Ask for Ctrl+X where the console may swallow it. Return why nothing that can move a drive is sent until then."""
-    why = "this console may swallow Ctrl+X, so nothing that can move a drive is sent"
+    """Ask for Ctrl+X where the console may swallow it. Return why drives are read only until then."""
+    why = "this console may swallow Ctrl+X, so drives are read only"
     workspace.notify(f"press Ctrl+X once, as a trial: {why} until it comes", warning=True)
 
     def still() -> None:

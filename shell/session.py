@@ -21,7 +21,7 @@ from multidrop.dialects.on_demand import imported
 from multidrop.drives.bus import Bus
 from multidrop.drives.drive import Drive
 from multidrop.drives.events import BusEvent, Changed
-from multidrop.shell.automation import ENDING, Automations, only_ends
+from multidrop.shell.automation import AGREED, ENDING, Automations, only_ends
 from multidrop.shell.configuration import Settings
 from multidrop.shell.connect.opening import Opener, open_buses
 from multidrop.shell.events import FAILURES, By, Entered, Failed, Printed
@@ -279,7 +279,7 @@ class LinePath:
         session.publish(Entered(session.now(), parsed.typed.strip(), by, bus.name, drive.address))
         self._allow(by)
         text, check, values, stops = parsed.text, None, "", drive.stops
-        if session.of(bus).doubt and not _only_reads(drive, text):
+        if (session.doubted or session.of(bus).doubt) and not _only_reads(drive, text):
             await self._undoubted([bus], by)
         if session.scaled or _MAYBE_QUANTITY.search(text):
             line = await session.units.line(drive, text)
@@ -355,7 +355,12 @@ class LinePath:
             await self._session.questions.confirm(what, self._session.display_name(drive), by=by)
 
     async def _undoubted(self, buses: Sequence[Bus], by: By) -> None:
-        """Ask once for each line that lacks names, units or guards. Raises Diagnostic where that is not agreed to."""
+        """Ask once for each line that lacks names, units or guards. Raises Diagnostic where that is not agreed to.
+
+        Also raises it while the stop key is doubted.
+        """
+        if self._session.doubted:
+            raise Diagnostic(self._session.doubted, hint=f"press Ctrl+X once; {AGREED}")
         for record in map(self._session.of, buses):
             if record.doubt:
                 what = (

@@ -123,7 +123,7 @@ class Workspace(Channel):
         self.dropped: list[str] = []
         """The macros whose `on_stop` lines a stop dropped; `/resume` says so."""
         self.doubted = ""
-        """Why nothing that can move a drive is sent yet: the stop key may be swallowed. Empty: it is not doubted."""
+        """Why drives are read only: the stop key may be swallowed. Empty: it is not doubted."""
         self.quitting = False
         """After `/quit`: front ends end, scripts too."""
         self.reconnections = Reconnections(lambda bus, text: self.notify(text, bus=bus, warning=True), reconnect)

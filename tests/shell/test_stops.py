@@ -343,8 +343,8 @@ async def test_a_line_that_a_stop_cuts_off_is_reported_as_it_is_and_no_later_lin
 async def test_where_the_stop_key_may_be_swallowed_nothing_moves_before_it_came_or_a_person_agreed(by, tmp_path):
     async with CellSession(tmp_path, *FLOOR) as shop:
         shop.session.doubted = stop_key_trial(shop.session)
-        for line in ALL[0], "@stages:00 JX+":
-            with pytest.raises(Diagnostic, match="this console may swallow Ctrl\\+X, so nothing that can move a drive"):
+        for line in ALL[0], "@stages:00 JX+", "@press:a VM=5000", "/raw on":
+            with pytest.raises(Diagnostic, match="this console may swallow Ctrl\\+X, so drives are read only"):
                 await shop.session.run(line)
         await shop.session.run("@press:a PR P")
         await shop.session.run("/stop")
