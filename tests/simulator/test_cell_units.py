@@ -101,7 +101,7 @@ def test_each_axis_has_its_own_scale() -> None:
         ),
         (
             'units = "5 mm/turn"\nworld = { home = ["5 mm", "-5 mm"] }',
-            'cell.toml: [[bus]] "b": [[bus.drive]] 1: [bus.drive.world]: home must go up, not from 51200 to -51200',
+            'cell.toml:6: [[bus]] "b": [[bus.drive]] 1: [bus.drive.world]: home must go up, not from 51200 to -51200',
         ),
         (
             'units = "0 mm/turn"',

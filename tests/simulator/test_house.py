@@ -32,7 +32,7 @@ DRIVE = Whole(
     LEXIUM / "device.py",
     frozenset({"MCodeDevice", "Device", "Drive", "SimulatedDrive"}),
     frozenset({"device", "_device", "unit"}),
-    95,
+    97,
 )
 MOTOR = Whole(LEXIUM / "motion" / "motor.py", frozenset({"Motor"}), frozenset({"motor", "_motor"}), 104)
 

@@ -26,6 +26,7 @@ from multidrop.drives.events import Conditioned, Sample, Silent, Unsolicited
 from multidrop.drives.stopping import Fate
 from multidrop.drives.telemetry import Value
 from multidrop.shell.channel import Front
+from multidrop.shell.configuration import Settings
 from multidrop.shell.events import By, Entered, Failed, Notified, OnBus, Printed, SessionEvent, StateChanged
 from multidrop.shell.line_syntax import Place, TypedLine
 from multidrop.shell.prompt.complete import Completion
@@ -160,6 +161,7 @@ class FakeSession:
         self.reconnections = SimpleNamespace(trying=[])
         self.units = FakeUnits()
         self.scaled = True
+        self.settings = Settings()
         self.raw: set[str] = set()
         self.latched = False
         self.recording = ""
