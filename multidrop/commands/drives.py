@@ -80,12 +80,16 @@ def upload(chosen: argparse.Namespace) -> int:
 def download(chosen: argparse.Namespace) -> int:
     """Send a file to the drive; report a wrong file before anything is opened."""
     _check(chosen.file)
-    wanted = transfers.Wanted(not chosen.no_verify, chosen.save, chosen.only_changed, chosen.run)
+    later = is_several(chosen.drive)
+    wanted = transfers.Wanted(not chosen.no_verify, chosen.save, chosen.only_changed, chosen.run, later)
 
-    async def put(session: Session, drive: Drive) -> None:
-        await transfers.download(session, drive, chosen.file, wanted)
+    async def put(session: Session) -> None:
+        drives = targets(session, chosen.drive, "programs")
+        await each(session, drives, lambda drive: transfers.download(session, drive, chosen.file, wanted))
+        if later and chosen.run:
+            await each(session, drives, lambda drive: transfers.start(session, drive, chosen.file, wanted))
 
-    return _with_drive(chosen, put, agreed=chosen.yes)
+    return runner.run([chosen.url], put, agreed=chosen.yes, tried=chosen.drive.split(","))
 
 
 def _check(file: str) -> None:
@@ -98,13 +102,12 @@ def _check(file: str) -> None:
 def _with_drive(
     chosen: argparse.Namespace,
     body: Callable[[Session, Drive], Awaitable[None]],
-    agreed: bool = False,
     unsolicited: bool = True,
 ) -> int:
     async def work(session: Session) -> None:
         await each(session, targets(session, chosen.drive, "programs"), lambda drive: body(session, drive))
 
-    return runner.run([chosen.url], work, agreed=agreed, unsolicited=unsolicited, tried=chosen.drive.split(","))
+    return runner.run([chosen.url], work, unsolicited=unsolicited, tried=chosen.drive.split(","))
 
 
 """The exit code of a comparison where something differs, as where a drive did not reply or refused."""

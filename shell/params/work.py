@@ -37,6 +37,7 @@ from multidrop.shell.workspace import Workspace
 from multidrop.transports import TransportLost
 
 ALL = ("all", "*")
+OTHERS = "?drives=a,b in the URL names others of its line"
 Work = Callable[["Drive"], Awaitable[None]]
 Difference = tuple[str, Value | None, Value | None]
 """A name, the value here, and the value there; None where one side has none."""
@@ -61,6 +62,8 @@ def targets(workspace: Workspace, target: str, having: str = "parameters") -> li
         if not able:
             raise Diagnostic(f"no drive with {having} has replied", target)
         found |= dict.fromkeys(able)
+        if len(drives) == 1 and drives[0].address:  # perhaps only the last session's choice
+            workspace.notify(f"{target} is {drives[0].address} alone; {OTHERS}", bus=drives[0].link.name, outcome=True)
     return list(found)
 
 
@@ -270,12 +273,12 @@ async def restore(session: Session, drive: Drive, file: files.SettingsFile, opti
     _show(session, who, plan, wanted)
     if not plan.changes:
         left = wanted.withheld or plan.withheld or plan.impossible
-        session.notify(f"{who}: nothing {'else ' if left else ''}differs from {file.path}")
+        session.notify(f"{who}: nothing {'else ' if left else ''}differs from {file.path}", outcome=True)
         _check_complete(wanted, who)
         return
     await check_ready(drive)
     if options.dry_run:
-        session.notify(f"{who}: {len(plan)} steps; nothing was sent (--dry-run)")
+        session.notify(f"{who}: {len(plan)} steps; nothing was sent (--dry-run)", outcome=True)
         return
     await _agree(session, drive, present, plan, file)
     aside = {*wanted.withheld, *dict(plan.withheld), *dict(plan.impossible)}

@@ -46,6 +46,8 @@ class Wanted:
     only_changed: bool = False
     run: str = ""
     """The label of the program to execute at the end; empty: none."""
+    later: bool = False
+    """It is executed by `start`, once all drives of the line have their programs: what one prints meets no download."""
 
 
 # Checking
@@ -112,6 +114,13 @@ async def download(
         _under_way.discard(drive)
 
 
+async def start(session: Session, drive: Drive, file: str, wanted: Wanted) -> None:
+    """Execute the program of a download whose start was left for `later`. Raises the drive's failures."""
+    _, lines = await checked(session, drive, file)
+    async with session.automations.run(f"the start of {file}"):
+        await _Download(session, drive, file, wanted).start(drive.programs.start(lines, wanted.run))
+
+
 class _Download:
     """One download: a drive, a file, and what is wanted of it."""
 
@@ -129,6 +138,7 @@ class _Download:
                 start = programs.start(lines, wanted.run)
             except Diagnostic as problem:
                 raise Diagnostic(f"{problem.message} (nothing was sent)", self._file, problem.hint) from None
+        start = "" if wanted.later else start
         ends_program = programs.size(lines) > 0
         if ends_program and not wanted.only_changed:  # one that prints without a pause lets nothing be listed
             await self._end_program()
@@ -144,7 +154,7 @@ class _Download:
                 if wanted.save:
                     await self._save(())
                 if start:
-                    await self._start(start)
+                    await self.start(start)
                 return
         backup = await self._back_up(lines, held)
         port = self._session.of(self._session.buses[self._drive.link.name]).port
@@ -160,7 +170,7 @@ class _Download:
             self._say(f"what was in it before is in {backup}", warning=True)
             raise
         if start:
-            await self._start(start)
+            await self.start(start)
 
     def _say(self, text: str, warning: bool = False) -> None:
         self._session.notify(f"{self._name}: {text}", bus=self._drive.link.name, warning=warning, outcome=True)
@@ -273,7 +283,7 @@ class _Download:
             at = workspace.wall(workspace.now()).isoformat(" ", "seconds")
             Sources(workspace.settings.state).keep(held, Copy(self._file, text, at))
 
-    async def _start(self, line: str) -> None:
+    async def start(self, line: str) -> None:
         drive, workspace = self._drive, self._session
         workspace.path.starting(drive)
         for text in await drive.send(line):

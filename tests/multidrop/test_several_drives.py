@@ -27,6 +27,23 @@ def test_a_download_goes_to_each_drive_that_is_named(run, drives, meant):
     assert [name for name in "abc" if f"{name}: verified" in done.stderr] == list(meant)
 
 
+def test_no_program_is_started_before_all_drives_have_theirs(run, tmp_path):
+    (tmp_path / "f.mxt").write_text("PG 1\nLB G1\nPR P\nBR G1\nE\nPG\n")  # it prints without a pause
+    done = run("program", "download", URL, "f.mxt", "--drive", "all", "--run", "G1", "--yes")
+    said = re.findall(r"([abc]): (verified|started)", done.stderr)
+    assert [what for _, what in said] == ["verified"] * 3 + ["started"] * 3, done.stderr
+    wrong = run("program", "download", URL, "f.mxt", "--drive", "all", "--run", "ZZ")
+    assert wrong.returncode == 2 and "started" not in wrong.stderr
+
+
+def test_all_that_is_one_drive_is_said(run, tmp_path):
+    (tmp_path / "cell.toml").write_text('[[bus]]\nname = "line"\n' + DRIVE.format("a"))
+    done = run("params", "backup", URL, "kept", "--drive", "all")
+    assert done.returncode == 0 and "all is a alone; ?drives=a,b in the URL names others" in done.stderr
+    done = run("params", "restore", URL, "kept", "--drive", "all", "--dry-run")
+    assert done.returncode == 0 and "nothing differs" in done.stderr
+
+
 def test_commands_that_read_take_several_drives(run, tmp_path):
     named = ("--drive", "a", "--drive", "c")
     assert run("params", "backup", URL, "kept", *named).returncode == 0
