@@ -29,9 +29,9 @@ from tests.support.virtual import VirtualLoop
 STARTS = frozenset({"subprocess.Popen", "os.fork", "os.forkpty", "os.posix_spawn", "os.system"})
 """Audit events of the interpreter, each of which is the start of a process."""
 
-REPEATING = ("wide", "nightly", "slow")
+REPEATING = ("wide", "nightly", "slow", "hypothesis")
 """Markers of products of parameters, floods and generated cases, which go the same ways again. Coverage is not measured
-in them: measuring makes the product two to three times slower."""
+in them: measuring makes the product two to three times slower. So the share that is measured is a lower bound."""
 
 _running: list[pytest.Item] = []
 """The test that runs, its fixtures included."""
@@ -176,7 +176,7 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
 
 
 def _repeating(items: list[pytest.Item]) -> Iterator[pytest.Item]:
-    """The tests that go ways of others again: those marked so, and the cases of a test but its first and last two."""
+    """The tests that go ways of others again: those marked so, and the cases of a test but its first one."""
     cases: dict[str, list[pytest.Item]] = {}
     for item in items:
         if any(item.get_closest_marker(name) for name in REPEATING):
@@ -184,7 +184,7 @@ def _repeating(items: list[pytest.Item]) -> Iterator[pytest.Item]:
         else:
             cases.setdefault(item.nodeid.partition("[")[0], []).append(item)
     for each in cases.values():
-        yield from each[2:-2]
+        yield from each[1:]
 
 
 def _spread(items: list[pytest.Item]) -> list[pytest.Item]:
