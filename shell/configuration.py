@@ -461,9 +461,9 @@ def _with_connection(name: str, url: str) -> str:
     """Return the text of the file with a new connection. Raises Diagnostic."""
     import tomlkit
 
-    if name in load().connections:
+    document = _document()  # not what is in force: --no-config leaves out what the file has
+    if name in document.get("connections", {}):
         raise Diagnostic(f"a connection {name} exists already", str(config_file()), "give another name")
-    document = _document()
     if "connections" not in document:
         document["connections"] = tomlkit.table(is_super_table=True)
     table = tomlkit.table()

@@ -361,6 +361,7 @@ class LinePath:
         """
         if self._session.doubted:
             raise Diagnostic(self._session.doubted, hint=f"press Ctrl+X once; {AGREED}")
+        stops = self._session.stops
         for record in map(self._session.of, buses):
             if record.doubt:
                 what = (
@@ -368,6 +369,8 @@ class LinePath:
                 )
                 await self._session.questions.confirm(what, record.bus.name, by=by)
                 record.doubt = ""
+        if stops != self._session.stops:
+            raise Stopped("a stop came before the answer counted; nothing was sent")
 
     def starting(self, drive: Drive) -> None:
         """Note that the next request can start motion or a program of a drive."""

@@ -70,6 +70,9 @@ megabytes = 3
 """
 
 
+KEPT = '[connections.kept]\nurl = "sim:"\n'
+
+
 def test_all_errors_are_told_at_once_and_the_last_one_names_the_way_past_them(folder):
     (folder / "multidrop.toml").write_text(WRONG)
     with pytest.raises(Diagnostic) as caught:
@@ -119,10 +122,13 @@ def test_any_file_is_read_or_told(lines):
 
 
 def test_no_config_reads_nothing(folder):
-    (folder / "multidrop.toml").write_text(WRONG)
+    (folder / "multidrop.toml").write_text(WRONG + KEPT)
     token = configuration.IGNORED.set(True)
     try:
         assert configuration.load() == configuration.Settings()
+        with pytest.raises(Diagnostic, match="a connection kept exists already"):
+            configuration.save("kept", "sim:")
+        assert (folder / "multidrop.toml").read_text() == WRONG + KEPT
     finally:
         configuration.IGNORED.reset(token)
 

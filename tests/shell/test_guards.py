@@ -190,6 +190,20 @@ async def test_one_yes_takes_the_doubt_from_a_line_and_a_no_leaves_it(tmp_path):
         assert len(person.asked) == 3
 
 
+@pytest.mark.parametrize("line", ["@a VM=5000", "/download nothing.mxt a"])
+async def test_a_stop_together_with_the_yes_sends_nothing(line, tmp_path):
+    async with doubted(tmp_path) as shop:
+
+        async def yes(_):
+            asyncio.get_running_loop().call_soon(shop.session.stop)  # after the answer, before the line goes on
+            return True
+
+        shop.session.front.ask = yes
+        with pytest.raises(Stopped):
+            await shop.session.run(line)
+        assert b"VM=5000" not in shop.written("press")
+
+
 async def test_neither_a_macro_nor_a_script_can_agree_to_it(tmp_path):
     async with doubted(tmp_path) as shop:
         Person(shop, True)
