@@ -22,8 +22,8 @@ quick: $(VENV)/.dev
 	$(BIN)/python -m pytest --dist worksteal -n $(shell $(PYTHON) -c 'import os; print(os.cpu_count() or 1)') -m "not process and not tui and not wide and not slow" --hypothesis-profile=quick
 
 nightly: $(VENV)/.dev
-	$(MAKE) windows
 	MULTIDROP_KILLS=12 $(PYTEST) --nightly --hypothesis-profile=search
+	$(MAKE) windows
 
 # The tests for Windows, under Wine, with a CPython for Windows in .venv/windows; TESTS="-x tests/macros": some of them.
 windows: $(VENV)/.dev

@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from multidrop.shell.session import Session
 
 DIFFERS = 1
+"""The exit code of a comparison where something differs, as where a drive did not reply or refused."""
 
 
 def list_(chosen: argparse.Namespace) -> int:
@@ -108,9 +109,6 @@ def _with_drive(
         await each(session, targets(session, chosen.drive, "programs"), lambda drive: body(session, drive))
 
     return runner.run([chosen.url], work, unsolicited=unsolicited, tried=chosen.drive.split(","))
-
-
-"""The exit code of a comparison where something differs, as where a drive did not reply or refused."""
 
 
 def params_backup(chosen: argparse.Namespace) -> int:
