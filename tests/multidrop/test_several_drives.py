@@ -28,7 +28,7 @@ def test_a_download_goes_to_each_drive_that_is_named(run, drives, meant):
 
 
 def test_no_program_is_started_before_all_drives_have_theirs(run, tmp_path):
-    (tmp_path / "f.mxt").write_text("PG 1\nLB G1\nPR P\nBR G1\nE\nPG\n")  # it prints without a pause
+    (tmp_path / "f.mxt").write_text("PG 1\nLB G1\nPR P\nH 50\nBR G1\nE\nPG\n")  # it prints without an end
     done = run("program", "download", URL, "f.mxt", "--drive", "all", "--run", "G1", "--yes")
     said = re.findall(r"([abc]): (verified|started)", done.stderr)
     assert [what for _, what in said] == ["verified"] * 3 + ["started"] * 3, done.stderr
