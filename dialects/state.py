@@ -6,6 +6,7 @@ know extends the class (`mcode.host.state.MCodeState`). No other module assigns 
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 
@@ -66,6 +67,10 @@ class DriveState:
     """In program mode: the drive stores every line."""
     error: bool = False
     """The drive's error flag is set from before, or may be; the next refusal must be distinguished from it."""
+    last_error: int = 0
+    """The number of the last error that was read of it, which cleared it; 0: none was read."""
+    last_error_at: float = -math.inf
+    """When that was, s; infinite until the conversation that has read it goes on."""
     reply_pending: bool = False
     """A reply is outstanding and may arrive late; the next reply must be distinguished from it."""
     settings_unknown: bool = False
@@ -146,6 +151,16 @@ class DriveState:
     def error_flag_read(self, flag: bool) -> None:
         self.error = flag
 
+    def error_read(self, code: int) -> None:
+        """Record the number of its error, which the drive cleared as it was read; 0: none was set."""
+        self.error_flag_read(False)
+        if code:
+            self.last_error, self.last_error_at = code, math.inf
+
+    def date_error(self, now: float) -> None:
+        """Give an error that was just read its time: a conversation has no clock."""
+        self.last_error_at = min(self.last_error_at, now)
+
     # Reference
 
     def reference_lost(self, axes: Iterable[str]) -> None:
@@ -155,6 +170,7 @@ class DriveState:
     def follows(self, before: DriveState) -> None:
         """Take over what is known of the same drive from before a lost connection."""
         self.reference_lost(before.unreferenced)
+        self.last_error, self.last_error_at = before.last_error, before.last_error_at
 
     def referenced(self, *axes: str) -> None:
         """Record that a homing of these axes has ended, or that their position was set; none: of all axes."""

@@ -9,6 +9,7 @@ interrupts that.
 from __future__ import annotations
 
 import asyncio
+import math
 from collections import deque
 from collections.abc import Callable, Iterable
 from dataclasses import replace
@@ -115,6 +116,8 @@ class Conversations:
 
     def publish_notes(self, state: DriveState) -> None:
         """Publish what conversations have noted about a drive."""
+        if state.last_error_at == math.inf:
+            state.date_error(self.link.now())
         if not (state.notes or state.remarks):
             return
         notes, remarks = state.take_messages()

@@ -98,12 +98,13 @@ def groups(view: View) -> list[Group]:
     """The plotted lines by chart: velocities, positions, then values by their words. A twin's follow their drive's."""
     found: dict[tuple[str, str], list[Line]] = {}
     numbers: dict[tuple[str, str, str], int] = {}
-    for bus, address, word in plotted(view.session):
+    chosen = view.only or plotted(view.session)
+    for bus, address, word in chosen:
         axes = view.model.traces.axes(bus, address) if word in ("", DIFFERENCE) else []
         for axis in axes or [""]:
             number = numbers.setdefault((bus, address, axis), len(numbers)) % len(SERIES)
             drive = view.session.buses[bus].drives[address]
-            several = len({each.bus for each in plotted(view.session)}) > 1
+            several = len({each.bus for each in chosen}) > 1
             where = ":".join(filter(None, (bus if several or not address else "", address)))
             name = " ".join(filter(None, (where, drive.label, axis)))
             for each in [word] if word else PLOTTED:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from functools import partial
 
 from multidrop.drives.bus import Bus
+from multidrop.shell.roles import Series
 from multidrop.shell.session import Session
 from multidrop.tui.figures import NATIVE, Figures, figures_of
 from multidrop.tui.readout import READ, Readout, State
@@ -118,6 +119,8 @@ class View:
     now: float
     polling: bool
     """False while the person has switched polling off."""
+    only: tuple[Series, ...] = ()
+    """The series that are plotted in place of those that the person chose."""
 
     @property
     def chosen(self) -> Glance | None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Awaitable, Sequence
 from string import ascii_letters, digits
 from typing import ClassVar, NamedTuple
 
@@ -68,8 +68,12 @@ class Place(NamedTuple):
     @property
     def urgency(self) -> tuple[bool, int]:
         """Orders drives, the worst first."""
-        state = self.glance.state()
-        return not (self.alarm() and state is not State.LOST) and state not in URGENCY[:2], URGENCY.index(state)
+        return not self.in_trouble, URGENCY.index(self.glance.state())
+
+    @property
+    def in_trouble(self) -> bool:
+        """True if there is a reason to ask why: an error, a limit, a twin that differs, silence, a loss."""
+        return self.glance.state() in URGENCY[:2] or bool(self.alarm())
 
 
 def worst_first(view: View, filtered: str) -> list[Place]:
@@ -129,7 +133,7 @@ def summary(places: Sequence[Place]) -> str:
 
 
 class AllDrives(AskingPage):
-    """All drives. Enter selects one and goes back; what is typed filters."""
+    """All drives. Enter selects one; what is typed filters."""
 
     AUTO_FOCUS = ""
     BINDINGS: ClassVar[list[BindingType]] = [
@@ -141,7 +145,7 @@ class AllDrives(AskingPage):
         *(Binding(each, f"filter('{each}')", show=False) for each in ascii_letters + digits),
         Binding("enter", "take", show=False),
     ]
-    KEYS = (("↑↓", "choose"), ("Enter", "select"), ("/", "filter"))
+    KEYS = (("↑↓", "choose"), ("Enter", "select, why"), ("/", "filter"))
     WANTS = frozenset({"motion", "conditions"})
     PARTS = {"heading": None, "filter": None, "columns": None, "drives": "1fr"}
     FIELD = "filter"
@@ -180,8 +184,8 @@ class AllDrives(AskingPage):
         self.ask_for(self.field.value + typed, "filter")
         self.field.cursor_position = len(self.field.value)
 
-    def typed(self, text: str) -> None:
-        self.action_take()
+    def typed(self, text: str) -> Awaitable[None]:
+        return self.action_take()
 
     def edited(self, text: str) -> None:
         """Narrow the list at once: Enter may follow in the same read. An address that is typed is the chosen drive."""
@@ -201,11 +205,15 @@ class AllDrives(AskingPage):
             return
         super().action_leave()
 
-    def action_take(self) -> None:
+    async def action_take(self) -> None:
+        """Select the drive; one in trouble is shown with the reason, any other on the main screen."""
         if self._places:
             place = self._places[self._at()]
-            self.dismiss(None)
             self.host.select(place.glance.address, place.bus)
+            if place.in_trouble:
+                await self.run_action("act.page('why')")
+            else:
+                self.dismiss(None)
 
 
 _NOTHING: Row = ((" no drive", "dim"),)

@@ -8,7 +8,7 @@ message.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Awaitable, Callable, Sequence
 from string import ascii_letters
 from typing import ClassVar, Generic, NamedTuple, TypeVar
 
@@ -33,7 +33,7 @@ class Field(Input):
 
     def __init__(
         self,
-        entered: Callable[[str], None],
+        entered: Callable[[str], Awaitable[None] | None],
         value: str = "",
         *,
         edited: Callable[[str], None] | None = None,
@@ -49,7 +49,8 @@ class Field(Input):
             self._edited(value)
 
     async def action_submit(self) -> None:
-        self._entered(self.value.strip())
+        if (done := self._entered(self.value.strip())) is not None:
+            await done
 
 
 class Options(OptionList):

@@ -6,7 +6,7 @@ that the transcript shows what was sent.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Awaitable, Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import ClassVar, NamedTuple
 
@@ -140,7 +140,7 @@ class AskingPage(Page):
 
     def __init__(self, host: Host) -> None:
         super().__init__(host)
-        self.field = Field(self.typed, edited=self.edited, id=self.FIELD)
+        self.field = Field(self.typed, edited=self.edited, id=self.FIELD or None)
         self.said: Span = ("", "dim")
 
     def content(self) -> ComposeResult:
@@ -152,8 +152,9 @@ class AskingPage(Page):
             else:
                 yield part
 
-    def typed(self, text: str) -> None:
+    def typed(self, text: str) -> Awaitable[None] | None:
         """Take what was typed, on Enter."""
+        return None
 
     def edited(self, text: str) -> None:
         """Take each change of it."""
@@ -205,6 +206,7 @@ PAGES: tuple[PageEntry, ...] = (
     PageEntry("program", "Program", "edit, check, download, run, trace and step", "program:ProgramPage", "ctrl+e"),
     PageEntry("parameters", "Parameters", "every setting: search, compare, edit, save", "parameters:ParametersPage"),
     PageEntry("controls", "Controls", "jog by steps, move, home, stop, enable", "controls:ControlsPage", "ctrl+n"),
+    PageEntry("why", "Why", "what is wrong with the selected drive, and three keys that help", "why:WhyPage"),
     PageEntry("traffic", "Traffic", "the bytes of the line, both ways, with times", "traffic:TrafficPage"),
 )
 

@@ -217,6 +217,12 @@ def print_form(text: str) -> str | None:
     return "".join(out)
 
 
+def reads_error(text: str) -> bool:
+    """Whether a line prints ER and nothing else, which clears the error."""
+    statement = _printing(text)
+    return statement is not None and [getattr(each, "word", "") for each in statement.arguments] == ["ER"]
+
+
 def with_item(text: str, item: str) -> str | None:
     """Append an item to the values of a PR; None where it prints no value, or is not a PR of one line."""
     statement = _printing(text)

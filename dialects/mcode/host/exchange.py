@@ -296,8 +296,9 @@ def _read_error(state: MCodeState) -> Procedure[tuple[int | None, bool]]:
         if reply.end is End.NAK and not reply.detail:
             continue
         if reply.end is End.DONE:
-            state.error_flag_read(False)
-            return int(value(state, reply)), late
+            code = int(value(state, reply))
+            state.error_read(code)
+            return code, late
         state.reply_lost()
         return None, late
     return None, late

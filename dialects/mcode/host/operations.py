@@ -31,7 +31,7 @@ from multidrop.dialects.mcode.host.exchange import (
     value,
 )
 from multidrop.dialects.mcode.host.identity import set_wire
-from multidrop.dialects.mcode.host.state import MCodeState, refuse_in_program, who
+from multidrop.dialects.mcode.host.state import MCodeState, refuse_in_program, report_error, who
 from multidrop.dialects.mcode.manual import grammar
 from multidrop.dialects.mcode.manual.grammar import Number, Unary, parsed
 from multidrop.dialects.mcode.manual.mnemonic import EXPANDED
@@ -362,7 +362,10 @@ def _print(state: MCodeState, request: Request) -> Procedure[tuple[str, ...]]:
         if not classify.may_be_blank(request.text, request.expect):
             raise NoAnswer(f"{who(state)} printed nothing for '{request.text}', and has no error")
     own = sign(state).shown if request.signed else ""
-    return tuple(line.removesuffix(own) for line in reply.lines)
+    lines = tuple(line.removesuffix(own) for line in reply.lines)
+    if classify.reads_error(request.text) and lines and lines[-1].strip().isdecimal():
+        report_error(state, int(lines[-1]))
+    return lines
 
 
 def listing(state: MCodeState, start: str) -> Procedure[tuple[str, ...]]:

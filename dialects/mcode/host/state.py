@@ -175,6 +175,12 @@ def unknown(state: DriveState, request: Request) -> str:
     return f"{who(state)} does not reply: it is not known whether '{request.text}' was executed; it was sent once"
 
 
+def report_error(state: DriveState, code: int) -> None:
+    """Record an error that a person has read, and say what its number means."""
+    state.error_read(code)
+    state.remark(described(code, state) + (", now cleared" if code else ""))
+
+
 def described(code: int, state: DriveState) -> str:
     advice = errors.hint(code, state.product)
     return f"error {code}: {errors.text(code, state.product)}" + (f" ({advice})" if advice else "")

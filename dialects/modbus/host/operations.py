@@ -13,7 +13,7 @@ from multidrop.dialects.codec import End, Kind, Priority, Procedure, Reply, Requ
 from multidrop.dialects.errors import Inexpressible, NoAnswer, Refused
 from multidrop.dialects.exchange import unanswered
 from multidrop.dialects.family import Hints, Motion
-from multidrop.dialects.mcode.host.state import described, who
+from multidrop.dialects.mcode.host.state import described, report_error, who
 from multidrop.dialects.mcode.manual import grammar
 from multidrop.dialects.mcode.manual.points import STATUS, in_words
 from multidrop.dialects.modbus.host import framing, mapping
@@ -101,8 +101,8 @@ def error_number(state: ModbusState) -> Procedure[int | None]:
         state.error_flag_read(False)  # a device that refuses to read the flag has none
     if reply.end is not End.DONE or not state.error:
         return None
-    number = yield from _quietly(state, "ER")
-    state.error_flag_read(number is None)
+    if (number := (yield from _quietly(state, "ER"))) is not None:
+        state.error_read(number)
     return number
 
 
@@ -175,7 +175,7 @@ def _printed(state: ModbusState, statement: grammar.Statement) -> Procedure[tupl
         answer = yield from answered(state, request(state, f"PR {word}", reading.pdu))
         pieces.append(shown(state, word, reading, answer))
         if word == "ER":
-            state.error_flag_read(False)
+            report_error(state, int(pieces[-1]))
         elif word == "EF":
             state.error_flag_read(pieces[-1] == "1")
     return tuple("".join(pieces).replace("\r", "").split("\n"))

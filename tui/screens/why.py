@@ -1,0 +1,204 @@
+"""The page that says why a drive is in trouble: its state, its error, its program, what was sent to it, its curves.
+
+It shows what was read, and what the family reports; it guesses nothing. Three keys below help. The one that reads the
+error's number clears it in the drive, so the line is shown first and Enter sends it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from typing import ClassVar
+
+from textual.binding import Binding, BindingType
+
+from multidrop.dialects import Diagnostic
+from multidrop.drives.drive import Drive
+from multidrop.shell.roles import Series
+from multidrop.tui.panels.drive import LIMITS, drive_rows
+from multidrop.tui.panels.plot import plot_rows
+from multidrop.tui.panels.program import listing_rows, spot_of, state_words
+from multidrop.tui.panels.view import NOT_REFERENCED, Glance, View, name_of
+from multidrop.tui.readout import Readout
+from multidrop.tui.screens.page import AskingPage, Begun, Host
+from multidrop.tui.screens.program_rows import news_rows, rule
+from multidrop.tui.text import at_words
+from multidrop.tui.widgets.lines import Row, spread, width_of
+
+WIDE = 110
+"""Width from which the curves are beside the facts."""
+LABEL = 10
+SENT, LOOKED = 4, 400
+"""Lines that are shown of what was sent and came back, and records that are searched for them."""
+LINES = 3
+"""Lines of the program around the one that it executes."""
+HELPS = 3
+LEAST = 3
+"""Least rows of the curves below the facts."""
+MARKS = frozenset({">", "»", "", "x"})
+"""Marks of the lines of a drive, of their replies and of their failures."""
+
+
+class WhyPage(AskingPage):
+    """Why the selected drive is in trouble."""
+
+    AUTO_FOCUS = ""
+    BINDINGS: ClassVar[list[BindingType]] = [
+        Binding("r", "read_error", show=False),
+        Binding("t", "act.page('traffic')", show=False),
+        Binding("enter", "go", show=False),
+    ]
+    KEYS = (("r", "read the error"), ("t", "traffic"), ("page-controls", "controls"), ("page-program", "program"))
+    WANTS = frozenset({"motion", "conditions"})
+    PARTS = {"heading": None, "why": "1fr", "helps": HELPS + 1, "said": 1}
+
+    def __init__(self, host: Host) -> None:
+        super().__init__(host)
+        self._begun: Begun | None = None
+        """The line that Enter would send."""
+        self._painted = False
+        """That line was shown, and no key waited then that was typed before."""
+
+    def show(self, view: View) -> None:
+        """Paint the facts, the curves beside or below them, and the keys that help."""
+        if self._begun is not None and self.overtaken(self._begun):
+            self._begun = None
+            self.say("nothing was sent: a stop or another drive came in between")
+        drive, glance, width = view.session.selected, view.chosen, self.size.width
+        name = f"{view.session.selected_bus}:{name_of(glance)}" if glance is not None else "no drive: ^O chooses one"
+        sign = [glance.sign(view.now)] if glance is not None else []
+        self.lines("heading").put([spread([(" WHY   ", "strong"), (name, "accent")], sign, width)])
+        if drive is not None and glance is not None:
+            self.lines("why").put(self._rows(view, glance, drive))
+            helps = helping(glance, drive)
+            self.lines("helps").put(
+                [rule("what helps", width), *(((f" {key:<4}", "key"), (text, "text")) for key, text in helps)]
+            )
+        self.lines("said").put([((f" {self.said[0]}", self.said[1]),)])
+        self._painted = self._begun is not None and (self._painted or self.host.keyboard.idle)
+
+    def _rows(self, view: View, glance: Glance, drive: Drive) -> list[Row]:
+        width, height = self.lines("why").size
+        wide = width >= WIDE
+        room = width // 2 if wide else width
+        rows = [*drive_rows(view, room, height), *self._facts(view, glance, drive, room)]
+        one = replace(view, only=(Series(view.session.selected_bus, glance.address),))
+        if not wide:
+            left = max(LEAST, height - len(rows) - 1)
+            return [*rows[: height - left - 1], rule("last 20 s", width), *plot_rows(one, width, left)]
+        curves = [rule("last 20 s", width - room - 1), *plot_rows(one, width - room - 1, height - 1)]
+        rows += [()] * (len(curves) - len(rows))
+        curves += [()] * (len(rows) - len(curves))
+        return [
+            (*row, (" " * (room - width_of(row)), "text"), ("│", "rule"), *curve)
+            for row, curve in zip(rows, curves, strict=True)
+        ][:height]
+
+    def _facts(self, view: View, glance: Glance, drive: Drive, width: int) -> Iterator[Row]:
+        """What is known beside the panel of the drive: the error's meaning, the program, what was sent last."""
+        session = view.session
+        for label, text, role in facts(view, glance, drive):
+            for number, row in enumerate(at_words(text, width - LABEL - 1)):
+                yield (f" {'' if number else label:<{LABEL}}", "dim"), (row, role)
+        if glance.readout.program.lines and spot_of(glance.readout) is not None:
+            yield from listing_rows(glance.readout, width, LINES)
+        own = [
+            each
+            for each in self.host.last_records(LOOKED)
+            if each.mark in MARKS and each.address == glance.address and not each.text.startswith("/")
+        ]
+        yield rule("sent to it last", width)
+        yield from news_rows(own[-SENT:], lambda at: f"{session.wall(at):%H:%M:%S}", width)
+
+    # Keys
+
+    def action_read_error(self) -> None:
+        """Show the line that reads or clears the error; Enter sends it."""
+        drive = self.host.session.selected
+        lines = error_lines(drive, self.host.model.bus("").readout(drive.address).axes) if drive is not None else ()
+        self._begun = self.begin("error", lines=lines) if lines else None
+        self._painted = False
+        what = f"Enter sends {lines[0]}: {CLEARS}   Esc: nothing" if lines else "no error is set that a line reads"
+        self.say(what)
+
+    def action_go(self) -> None:
+        """Send the line that was begun."""
+        begun = self._begun
+        if begun is None or not self._painted:
+            return  # an Enter that was typed before the line was seen
+        self._begun = None
+        if self.overtaken(begun):
+            self.say("nothing was sent: a stop or another drive came in between")
+            return
+        self.host.outbox.type(begun.lines[0])
+        self.say(f"sent: {begun.lines[0]}", "dim")
+
+    def action_leave(self) -> None:
+        """Drop the line that waits for Enter, else leave the page."""
+        if self._begun is None:
+            super().action_leave()
+            return
+        self._begun = None
+        self.say("nothing was sent")
+
+
+CLEARS = "the drive then has no error, and a program in it that waits for one goes on in another way"
+SILENT = "no reply since {}; check its power, the wiring, its name and its baud rate"
+
+
+def error_lines(drive: Drive, axes: Sequence[Readout]) -> tuple[str, ...]:
+    """The line that reads the number of a drive's error, or clears the error; none where no error is set."""
+    actions = drive.family.values.actions
+    for axis in axes:
+        if axis.conditions is not None and axis.conditions.error:
+            if actions.error:
+                return (drive.family.question(actions.error) or "",)
+            return (actions.clear(axis.axis),) if actions.clear is not None else ()
+    return ()
+
+
+def facts(view: View, glance: Glance, drive: Drive) -> Iterator[tuple[str, str, str]]:
+    """What is known besides the conditions: a label, a text and its role."""
+    readout, state, wall = glance.readout, drive.state, view.session.wall
+    bus = view.session.buses[view.session.selected_bus]
+    if bus.lost is not None:
+        yield "lost", str(bus.lost), "error"
+    elif readout.silent_since is not None:
+        yield "silent", SILENT.format(f"{wall(readout.silent_since):%H:%M:%S}"), "error"
+    lines, actions = error_lines(drive, readout.axes), drive.family.values.actions
+    if lines and actions.error:
+        yield "EF=1", f"an error is set; its number is not read: {lines[0]} clears it, {CLEARS}", "strong"
+    if state.last_error:
+        yield "last error", f"{wall(state.last_error_at):%H:%M:%S}: {meaning(drive, state.last_error)}", "text"
+    elif actions.no_error and not lines:
+        yield "error", actions.no_error.partition(";")[0], "dim"
+    if glance.unreferenced:
+        yield "position", NOT_REFERENCED, "strong"
+    words = state_words(glance, view.now)
+    if words and readout.program.runs and spot_of(readout) is None:
+        words += "; its line is not reported"
+    yield "program", words or "not known", "text" if words else "dim"
+
+
+def meaning(drive: Drive, code: int) -> str:
+    """The meaning of an error number and what to do, in one line."""
+    try:
+        lines = drive.family.language.describe_error(code, drive.product)
+    except Diagnostic:
+        return f"error {code}, which the manual does not explain"
+    return "; ".join(" ".join(each.split()) for each in lines)
+
+
+def helping(glance: Glance, drive: Drive) -> list[tuple[str, str]]:
+    """Three keys that help, each with what it does."""
+    axes = glance.readout.axes
+    lamps = [lamp for axis in axes if axis.conditions is not None for lamp in axis.conditions.lamps]
+    found = [("r", f"{line}, then Enter: {CLEARS}") for line in error_lines(drive, axes)]
+    if any(lamp.on and lamp.function in LIMITS for lamp in lamps):
+        found.append(("^N", "controls: jog away from the limit"))
+    elif any(axis.no_current for axis in axes):
+        found.append(("^N", "controls: current in the motor"))
+    if glance.lost or glance.readout.silent_since is not None:
+        found.append(("t", "traffic: what is sent and received on the line"))
+    found += [("^E", "its program: list, trace, step"), ("^N", "controls: jog, stop, home"), ("^G", "its curves")]
+    return list(dict(reversed(found)).items())[::-1][:HELPS]
