@@ -148,12 +148,9 @@ class DriveState:
         """Record that the drive replies in the known form."""
         self.settings_unknown = False
 
-    def error_flag_read(self, flag: bool) -> None:
+    def error_flag_read(self, flag: bool, code: int = 0) -> None:
+        """Record the error flag. `code`: the number of the error, which the drive cleared as it was read."""
         self.error = flag
-
-    def error_read(self, code: int) -> None:
-        """Record the number of its error, which the drive cleared as it was read; 0: none was set."""
-        self.error_flag_read(False)
         if code:
             self.last_error, self.last_error_at = code, math.inf
 

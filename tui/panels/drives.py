@@ -6,7 +6,8 @@ Columns are fixed and numbers are right-aligned, so that nothing jumps while val
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from operator import attrgetter
 
 from multidrop.tui.curves.raster import BRAILLE, Curve, Frame, Raster, Scale
 from multidrop.tui.curves.samples import Columns, Trace
@@ -25,18 +26,18 @@ from multidrop.tui.panels.drive import (
     trouble_of,
 )
 from multidrop.tui.panels.view import NOT_REFERENCED, Glance, View
-from multidrop.tui.readout import READ, SPAN, Readout, State
+from multidrop.tui.readout import READ, SPAN, Point, Readout, State
 from multidrop.tui.text import age, fit
 from multidrop.tui.widgets.lines import Row, Span, spread, width_of
 
 
-def spark(readout: Readout, now: float, width: int) -> str:
-    """Draw the first axis; a resting drive is a line at the foot, and what was not read stays empty."""
+def spark(readout: Readout, now: float, width: int, value: Callable[[Point], int] = attrgetter("position")) -> str:
+    """Draw a value of the first axis; a resting drive is a line at the foot, and what was not read stays empty."""
     if not readout.points or width < 1:
         return " " * max(0, width)
     trace = Trace()
     for point in readout.points:
-        trace.add(point.at, point.position)
+        trace.add(point.at, value(point))
     low, high = min(trace.values), max(trace.values)
     if readout.silent_since is None and now - trace.at[-1] < 3 * max(readout.period, 1.0):
         trace.add(now, trace.values[-1])

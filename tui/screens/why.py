@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from operator import attrgetter
 from typing import ClassVar
 
 from textual.binding import Binding, BindingType
@@ -16,6 +17,7 @@ from multidrop.dialects import Diagnostic
 from multidrop.drives.drive import Drive
 from multidrop.shell.roles import Series
 from multidrop.tui.panels.drive import LIMITS, drive_rows
+from multidrop.tui.panels.drives import spark
 from multidrop.tui.panels.plot import plot_rows
 from multidrop.tui.panels.program import listing_rows, spot_of, state_words
 from multidrop.tui.panels.view import NOT_REFERENCED, Glance, View, name_of
@@ -27,14 +29,14 @@ from multidrop.tui.widgets.lines import Row, spread, width_of
 
 WIDE = 110
 """Width from which the curves are beside the facts."""
-LABEL = 10
-SENT, LOOKED = 4, 400
-"""Lines that are shown of what was sent and came back, and records that are searched for them."""
+LABEL = 11
+SENT, MOST_SENT, LOOKED = 2, 6, 400
+"""Lines of what was sent and came back: the fewest, the most above curves, and the records that are searched."""
 LINES = 3
 """Lines of the program around the one that it executes."""
 HELPS = 3
-LEAST = 3
-"""Least rows of the curves below the facts."""
+LEAST, LOW, CHART = 6, 3, 9
+"""Least rows of the drive and of the curves, and most rows of curves that are no charts."""
 MARKS = frozenset({">", "»", "", "x"})
 """Marks of the lines of a drive, of their replies and of their failures."""
 
@@ -50,7 +52,7 @@ class WhyPage(AskingPage):
     ]
     KEYS = (("r", "read the error"), ("t", "traffic"), ("page-controls", "controls"), ("page-program", "program"))
     WANTS = frozenset({"motion", "conditions"})
-    PARTS = {"heading": None, "why": "1fr", "helps": HELPS + 1, "said": 1}
+    PARTS = {"heading": None, "why": "1fr", "helps": HELPS + 1}
 
     def __init__(self, host: Host) -> None:
         super().__init__(host)
@@ -66,27 +68,32 @@ class WhyPage(AskingPage):
             self.say("nothing was sent: a stop or another drive came in between")
         drive, glance, width = view.session.selected, view.chosen, self.size.width
         name = f"{view.session.selected_bus}:{name_of(glance)}" if glance is not None else "no drive: ^O chooses one"
-        sign = [glance.sign(view.now)] if glance is not None else []
-        self.lines("heading").put([spread([(" WHY   ", "strong"), (name, "accent")], sign, width)])
+        text, role = glance.sign(view.now) if glance is not None else ("", "dim")
+        self.lines("heading").put(
+            [spread([(" WHY   ", "strong"), (name, "accent")], [(f"{text.strip()} ", role)], width)]
+        )
         if drive is not None and glance is not None:
             self.lines("why").put(self._rows(view, glance, drive))
             helps = helping(glance, drive)
-            self.lines("helps").put(
-                [rule("what helps", width), *(((f" {key:<4}", "key"), (text, "text")) for key, text in helps)]
-            )
-        self.lines("said").put([((f" {self.said[0]}", self.said[1]),)])
+            said: Row = ((f" {self.said[0]}", self.said[1]),) if self.said[0] else rule("what helps", width)
+            self.lines("helps").put([said, *(((f" {key:<4}", "key"), (text, "text")) for key, text in helps)])
         self._painted = self._begun is not None and (self._painted or self.host.keyboard.idle)
 
     def _rows(self, view: View, glance: Glance, drive: Drive) -> list[Row]:
         width, height = self.lines("why").size
         wide = width >= WIDE
-        room = width // 2 if wide else width
-        rows = [*drive_rows(view, room, height), *self._facts(view, glance, drive, room)]
-        one = replace(view, only=(Series(view.session.selected_bus, glance.address),))
+        room, one = (
+            width // 2 if wide else width,
+            replace(view, only=(Series(view.session.selected_bus, glance.address),)),
+        )
+        known = [*self._facts(view, glance, drive, room)]
+        spare = height - len(known) - SENT - 1 - (0 if wide else LOW)
+        rows = [*drive_rows(view, room, max(LEAST, spare)), *known]
+        sent = height - len(rows) if wide else min(MOST_SENT, height - len(rows) - LOW)
+        rows += self._sent(view, glance, room, max(SENT, sent - 1))
         if not wide:
-            left = max(LEAST, height - len(rows) - 1)
-            return [*rows[: height - left - 1], rule("last 20 s", width), *plot_rows(one, width, left)]
-        curves = [rule("last 20 s", width - room - 1), *plot_rows(one, width - room - 1, height - 1)]
+            return [*rows[: height - LOW], *self._curves(one, glance, width, height - min(len(rows), height - LOW))]
+        curves = self._curves(one, glance, width - room - 1, height)
         rows += [()] * (len(curves) - len(rows))
         curves += [()] * (len(rows) - len(curves))
         return [
@@ -94,21 +101,34 @@ class WhyPage(AskingPage):
             for row, curve in zip(rows, curves, strict=True)
         ][:height]
 
+    def _curves(self, view: View, glance: Glance, width: int, height: int) -> list[Row]:
+        """The last seconds as charts, or as a row each where there is no room for a chart."""
+        head = rule("last 20 s", width)
+        if height > CHART:
+            return [head, *plot_rows(view, width, height - 1)]
+        rows: list[Row] = [head]
+        for name in ("position", "velocity"):
+            drawn = spark(glance.readout, view.now, width - LABEL - 1, attrgetter(name))
+            rows.append(((f" {name:<{LABEL}}", "dim"), (drawn, "accent")))
+        return rows
+
     def _facts(self, view: View, glance: Glance, drive: Drive, width: int) -> Iterator[Row]:
-        """What is known beside the panel of the drive: the error's meaning, the program, what was sent last."""
-        session = view.session
+        """What is known beside the panel of the drive: the error's meaning, and the program with its lines."""
         for label, text, role in facts(view, glance, drive):
             for number, row in enumerate(at_words(text, width - LABEL - 1)):
                 yield (f" {'' if number else label:<{LABEL}}", "dim"), (row, role)
         if glance.readout.program.lines and spot_of(glance.readout) is not None:
             yield from listing_rows(glance.readout, width, LINES)
+
+    def _sent(self, view: View, glance: Glance, width: int, most: int) -> list[Row]:
+        """The last lines that were sent to the drive, and what came back."""
         own = [
             each
             for each in self.host.last_records(LOOKED)
             if each.mark in MARKS and each.address == glance.address and not each.text.startswith("/")
         ]
-        yield rule("sent to it last", width)
-        yield from news_rows(own[-SENT:], lambda at: f"{session.wall(at):%H:%M:%S}", width)
+        clock = view.session.wall
+        return [rule("sent to it last", width), *news_rows(own[-most:], lambda at: f"{clock(at):%H:%M:%S}", width)]
 
     # Keys
 
@@ -142,7 +162,7 @@ class WhyPage(AskingPage):
         self.say("nothing was sent")
 
 
-CLEARS = "the drive then has no error, and a program in it that waits for one goes on in another way"
+CLEARS = "clears it; a program that checks it acts otherwise"
 SILENT = "no reply since {}; check its power, the wiring, its name and its baud rate"
 
 
@@ -167,7 +187,7 @@ def facts(view: View, glance: Glance, drive: Drive) -> Iterator[tuple[str, str, 
         yield "silent", SILENT.format(f"{wall(readout.silent_since):%H:%M:%S}"), "error"
     lines, actions = error_lines(drive, readout.axes), drive.family.values.actions
     if lines and actions.error:
-        yield "EF=1", f"an error is set; its number is not read: {lines[0]} clears it, {CLEARS}", "strong"
+        yield "EF=1", "an error is set; its number is not read, as that clears it", "strong"
     if state.last_error:
         yield "last error", f"{wall(state.last_error_at):%H:%M:%S}: {meaning(drive, state.last_error)}", "text"
     elif actions.no_error and not lines:
@@ -186,7 +206,7 @@ def meaning(drive: Drive, code: int) -> str:
         lines = drive.family.language.describe_error(code, drive.product)
     except Diagnostic:
         return f"error {code}, which the manual does not explain"
-    return "; ".join(" ".join(each.split()) for each in lines)
+    return "; ".join(" ".join(each.split()).removeprefix("do ") for each in lines)
 
 
 def helping(glance: Glance, drive: Drive) -> list[tuple[str, str]]:
@@ -201,4 +221,7 @@ def helping(glance: Glance, drive: Drive) -> list[tuple[str, str]]:
     if glance.lost or glance.readout.silent_since is not None:
         found.append(("t", "traffic: what is sent and received on the line"))
     found += [("^E", "its program: list, trace, step"), ("^N", "controls: jog, stop, home"), ("^G", "its curves")]
-    return list(dict(reversed(found)).items())[::-1][:HELPS]
+    kept: dict[str, str] = {}
+    for key, text in found:
+        kept.setdefault(key, text)
+    return list(kept.items())[:HELPS]

@@ -297,7 +297,7 @@ def _read_error(state: MCodeState) -> Procedure[tuple[int | None, bool]]:
             continue
         if reply.end is End.DONE:
             code = int(value(state, reply))
-            state.error_read(code)
+            state.error_flag_read(False, code)
             return code, late
         state.reply_lost()
         return None, late

@@ -177,7 +177,7 @@ def unknown(state: DriveState, request: Request) -> str:
 
 def report_error(state: DriveState, code: int) -> None:
     """Record an error that a person has read, and say what its number means."""
-    state.error_read(code)
+    state.error_flag_read(False, code)
     state.remark(described(code, state) + (", now cleared" if code else ""))
 
 

@@ -102,7 +102,7 @@ def error_number(state: ModbusState) -> Procedure[int | None]:
     if reply.end is not End.DONE or not state.error:
         return None
     if (number := (yield from _quietly(state, "ER"))) is not None:
-        state.error_read(number)
+        state.error_flag_read(False, number)
     return number
 
 
