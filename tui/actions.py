@@ -20,8 +20,8 @@ from multidrop.tui.panels.view import glances_of
 from multidrop.tui.polling import Polling
 from multidrop.tui.screens.dialogs import Search
 from multidrop.tui.screens.main_screen import MainScreen
-from multidrop.tui.screens.page import Framed, Host, Page, page_entry
-from multidrop.tui.screens.questions import Questions
+from multidrop.tui.screens.page import Host, Page, page_entry
+from multidrop.tui.screens.questions import HELP, Questions
 from multidrop.tui.screens.start import Opener
 from multidrop.tui.tour import Tour
 from multidrop.tui.typist import Selection
@@ -106,8 +106,10 @@ class Actions:
 
     async def action_help(self) -> None:
         parts = self._parts
-        shown = [each for each in parts.app.screen_stack if isinstance(each, Framed)]
-        found = entries(shown[-1], parts.keymap, parts.macros.bound)
+        sheet = getattr(parts.app.screen, "SHEET", "main")
+        if getattr(parts.app.screen, "heading", "") == HELP:
+            return
+        found = entries(sheet, parts.keymap, parts.macros.bound)
         width = min(PALETTE, parts.app.size.width) - PADDING
         await parts.questions.help(lambda typed: help_on(found, typed, width))
 
@@ -257,6 +259,14 @@ class Actions:
             entry.action_home()
             return
         await self.action_page(name)
+
+    async def action_start_of_line(self) -> None:
+        """Go to the start of the line on Home; there show all drives, as Ctrl+A does, which screen takes."""
+        field = self._parts.app.focused
+        if isinstance(field, Input) and (field.cursor_position or field is not self._parts.main.entry):
+            field.action_home()
+        else:
+            await self.action_page("drives")
 
     async def action_page(self, name: str) -> None:
         """Show a page in front of the main screen; one page at a time. Raises Diagnostic."""

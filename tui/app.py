@@ -21,7 +21,7 @@ from rich.console import RenderableType
 from textual import events
 from textual._compositor import ChopsUpdate, LayoutUpdate
 from textual.app import App
-from textual.binding import Binding, BindingType
+from textual.binding import BindingType
 from textual.driver import Driver
 from textual.filter import LineFilter
 from textual.geometry import Size
@@ -35,7 +35,8 @@ from multidrop.shell.session import Session
 from multidrop.tui.actions import Actions, Parts
 from multidrop.tui.assist import Assist
 from multidrop.tui.frame_scheduler import AGEING, Frames
-from multidrop.tui.keymap import FunctionKeys, keymap, named_key
+from multidrop.tui.key_table import bound
+from multidrop.tui.keymap import FunctionKeys, keymap
 from multidrop.tui.outbox import Outbox
 from multidrop.tui.panels.view import figures_at
 from multidrop.tui.polling import Polling
@@ -43,7 +44,7 @@ from multidrop.tui.presenter import Presenter
 from multidrop.tui.screen_model import Record, ScreenModel
 from multidrop.tui.screens.dialogs import LEAST, Over, TooSmall
 from multidrop.tui.screens.main_screen import MainScreen
-from multidrop.tui.screens.page import PAGES, Framed, Page
+from multidrop.tui.screens.page import Framed, Page
 from multidrop.tui.screens.questions import Questions
 from multidrop.tui.screens.start import Opener, Start
 from multidrop.tui.session_hooks import Hooks
@@ -76,14 +77,7 @@ class MultidropApp(App[int]):
     TITLE = "multidrop"
     ENABLE_COMMAND_PALETTE = False
     """Textual's own palette; ours is a `Search`, in which keys keep their order."""
-    BINDINGS: ClassVar[list[BindingType]] = [
-        named_key("quit", "ctrl+q", "quit", "quit; asks if something moves"),
-        Binding("ctrl+c", "act.explain", show=False, priority=True),
-        *(
-            named_key(f"page-{page.name}", page.key, f"act.page_key('{page.name}')", f"page: {page.about}")
-            for page in PAGES
-        ),
-    ]
+    BINDINGS: ClassVar[list[BindingType]] = bound("app")
 
     def __init__(
         self,

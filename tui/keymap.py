@@ -1,6 +1,6 @@
 """The keys by the names under which the configuration sets them, `[keys]` in the settings, and the macros on F2 to F12.
 
-A key that can be set is a Textual binding with an id, made by `named_key`; Textual's own keymap puts the person's key
+A key that can be set is a Textual binding with an id, from `tui.key_table`; Textual's own keymap puts the person's key
 in its place. The stop is none of them: it is found below every binding, and no other function gets its key. The macros
 on the function keys are in pages, read again when something changed.
 """
@@ -20,24 +20,15 @@ from multidrop.dialects import Diagnostic
 from multidrop.dialects.text import visible
 from multidrop.macros import Macro, MacroStore
 from multidrop.macros.model import FIRST_PAGE, KEYS, describe_clash, page_order
+from multidrop.tui.sheets import NONE
 from multidrop.tui.text import key_words
 
 FIXED = {"escape", "enter", "tab", "space", "up", "down", "left", "right", "backspace", "delete"}
 FIXED |= {"ctrl+h", "ctrl+i", "ctrl+j", "ctrl+m", "ctrl+z"}
 """Keys that no function can have, as every line and every list needs them, or as they are the same bytes."""
-NONE = "no-key-"
-"""The head of the placeholder for a function without a key."""
 _MODIFIERS = ("ctrl", "alt", "shift")
 _KNOWN = {each.value for each in Keys} | {"f" + str(number) for number in range(1, 25)}
 _OTHER_WORDS = {"pgup": "pageup", "pgdn": "pagedown", "pgdown": "pagedown", "esc": "escape", "return": "enter"}
-
-
-def named_key(name: str, keys: str, action: str, about: str) -> Binding:
-    """Bind a key before any widget: text typed right after a key that opens a dialog is for that dialog.
-
-    A function without a key of its own can be given one.
-    """
-    return Binding(keys or f"{NONE}{name}", action, about, show=False, priority=True, id=name)
 
 
 def read_key(text: str) -> str:

@@ -9,10 +9,11 @@ from rich.text import Text
 from textual.fuzzy import Matcher
 
 from multidrop.shell.session import Session
+from multidrop.tui.key_table import SHEETS, all_groups
 from multidrop.tui.keymap import FunctionKeys, Keymap
 from multidrop.tui.panels.table import PANELS
 from multidrop.tui.screens.dialogs import Match
-from multidrop.tui.screens.page import PAGES, Framed, Page
+from multidrop.tui.screens.page import PAGES
 from multidrop.tui.text import at_words, fit, visible
 
 PALETTE, PADDING = 90, 7
@@ -192,6 +193,7 @@ Entry = tuple[str, str]
 KEY = 15
 """Width of keys, lines and signs."""
 STOP: Sequence[Entry] = (
+    ("The stop", ""),
     ("^X", "STOP ALL: drives, macros, scripts; from anywhere"),
     ("/resume", "after a stop: macros and scripts may run again"),
 )
@@ -220,14 +222,20 @@ SIGNS: Sequence[Entry] = (
 )
 
 
-def entries(screen: Framed, keys: Keymap, macros: Iterable[Entry]) -> list[Entry]:
-    """All help for a screen: its own keys first."""
-    page = [("This page", ""), ("Esc", "go back"), *screen.KEYS] if isinstance(screen, Page) else []
-    named = [(keys.shown(name), keys.about[name]) for name in keys.keys if not name.startswith(("play-", "tab-"))]
-    jumps = [(f"{keys.shown('tab-before')} {keys.shown('tab-after')}", "the other lines; also Alt+1 .. Alt+9")]
-    played = [(key, f"plays {name}") for key, name in macros] or [("F2 .. F12", "play the macro that is on the key")]
-    everywhere = [("Keys", ""), *STOP, *((key, what) for key, what in named if key), *jumps, *played]
-    return [*page, *everywhere, *TYPING, *SIGNS]
+def entries(sheet: str, keys: Keymap, macros: Iterable[Entry]) -> list[Entry]:
+    """All help for a page or a box: what it is for, its keys in groups, the pages that are near, and the rest."""
+    found: list[Entry] = [(SHEETS[sheet].title.capitalize(), ""), ("", SHEETS[sheet].about)]
+    groups = all_groups(sheet)
+    near = groups.pop("Pages", [])
+    for group, of_group in groups.items():
+        shown = [(keys.shown(each.name) if each.name else each.shown, each.about) for each in of_group]
+        found += [(group, ""), *(each for each in shown if each[0])]
+    if near:
+        here = f"page-{sheet}"
+        found.append(("Near", ""))
+        found += [(keys.shown(each.name) or f"/page {each.name[5:]}", each.about) for each in near if each.name != here]
+    played = [("Macros on keys", ""), *((key, f"plays {name}") for key, name in macros)]
+    return [*found, *STOP, *(played if len(played) > 1 else ()), *TYPING, *SIGNS]
 
 
 def found(entries: Sequence[Entry], typed: str, width: int) -> list[Match]:
@@ -241,8 +249,11 @@ def found(entries: Sequence[Entry], typed: str, width: int) -> list[Match]:
 
 
 def _wrapped(key: str, what: str, width: int) -> Text:
+    """A heading, a key with its meaning, or sentences without a key."""
     if not what:
         return Text(key, "bold underline")
+    if not key:
+        return Text("\n".join(at_words(what, width)))
     first, *more = at_words(what, max(20, width - KEY))
     text = Text.assemble((f"{key:<{KEY - 1}} ", "bold"), first)
     for row in more:

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 from multidrop.drives.bus import Bus
 from multidrop.shell.session import Session
+from multidrop.tui.key_table import footer
 from multidrop.tui.keymap import FunctionKeys, Keymap
 from multidrop.tui.panels.drive import trouble_of
 from multidrop.tui.panels.drives import narrow_rows
@@ -113,9 +114,8 @@ class Presenter:
         playing = " ".join(each.short for each in self.session.playing)
         row = top_row(self.tabs(now), self.session.recording, clock, width, self.session.log is not None, playing)
         screen.lines("top").put([row])
-        page = screen if isinstance(screen, Page) else None
-        keys = [("Esc", "back"), *page.KEYS, ("palette", "everything")] if page is not None else screen.FOOTER
-        shown = [(self.keymap.shown(name) if name in self.keymap.keys else name, word) for name, word in keys]
+        keys = footer(screen.SHEET)
+        shown = [(self.keymap.shown(key.name) if key.name else key.shown, key.word) for key in keys]
         macros = [(self._play_key(key), name) for key, name in self.macros.shown] if screen.PLAYS else []
         page_of_keys = (
             [(self.keymap.shown("macro-page"), self.macros.place)] if screen.PLAYS and self.macros.place else []

@@ -70,8 +70,6 @@ class Panel(NamedTuple):
     wants: frozenset[str]
     about: str
     """One line for the palette."""
-    key: str = ""
-    """The key that shows and hides it, as Textual spells it."""
     first: bool = True
     """Shown on a wide screen until a person hides it."""
 
@@ -96,7 +94,7 @@ PANELS: tuple[Panel, ...] = (
         frozenset({MOTION, CONDITIONS}),
         "the lines around the current one",
     ),
-    Panel("plot", plot_title, plot_rows, 8, 60, frozenset({MOTION, PLOT}), "velocity and position", "ctrl+t"),
+    Panel("plot", plot_title, plot_rows, 8, 60, frozenset({MOTION, PLOT}), "velocity and position"),
     Panel("traffic", traffic_title, traffic_rows, 3, 40, frozenset(), "the bytes of the line, both ways", first=False),
     Panel(
         "log",

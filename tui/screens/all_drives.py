@@ -10,6 +10,7 @@ from typing import ClassVar, NamedTuple
 from textual.binding import Binding, BindingType
 
 from multidrop.dialects.text import visible
+from multidrop.tui.key_table import bound
 from multidrop.tui.panels.drive import SIGN, alarm_words, program_words, trouble_of
 from multidrop.tui.panels.drives import STATE, short_words, spark
 from multidrop.tui.panels.view import NOT_REFERENCED, Glance, View, glances_of
@@ -136,16 +137,12 @@ class AllDrives(AskingPage):
     """All drives. Enter selects one; what is typed filters."""
 
     AUTO_FOCUS = ""
+    SHEET = "drives"
     BINDINGS: ClassVar[list[BindingType]] = [
-        Binding("up", "step(-1)", show=False, priority=True),
-        Binding("down", "step(1)", show=False, priority=True),
-        Binding("pageup", "step(-10)", show=False, priority=True),
-        Binding("pagedown", "step(10)", show=False, priority=True),
+        *bound("drives"),
         Binding("slash", "filter('')", show=False),
         *(Binding(each, f"filter('{each}')", show=False) for each in ascii_letters + digits),
-        Binding("enter", "take", show=False),
     ]
-    KEYS = (("↑↓", "choose"), ("Enter", "select, why"), ("/", "filter"))
     WANTS = frozenset({"motion", "conditions"})
     PARTS = {"heading": None, "filter": None, "columns": None, "drives": "1fr"}
     FIELD = "filter"

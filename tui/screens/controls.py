@@ -19,6 +19,7 @@ from typing import ClassVar
 from textual.binding import Binding, BindingType
 
 from multidrop.dialects.values import BY, DISABLE, ENABLE, HIGH, HOME_MINUS, HOME_PLUS, LOW, STOP, TO, Control, Controls
+from multidrop.tui.key_table import bound
 from multidrop.tui.panels.drive import drive_rows, unit_of
 from multidrop.tui.panels.view import Glance, View, name_of
 from multidrop.tui.readout import READ, Readout, State
@@ -78,11 +79,11 @@ class Jog:
 STEPS = tuple(10**n for n in range(8))
 """The sizes of a step that keys choose."""
 FIRST_STEP = 100
-NUMBERED = {"m": (TO, "position"), "b": (BY, "distance"), "s": ("", "step")}
+NUMBERED = {"m": (TO, "position"), "b": (BY, "distance"), "l": ("", "step")}
 """Keys that ask for a number: the control that takes it, and what it is. An empty name sets the step."""
 SPACE = "space"
-KEYED = {"h": HOME_MINUS, "H": HOME_PLUS, SPACE: STOP, "e": ENABLE, "d": DISABLE}
-"""Keys of controls. Enter sends them, apart from the stop."""
+KEYED = {"-": HOME_MINUS, "+": HOME_PLUS, SPACE: STOP, "e": ENABLE, "d": DISABLE}
+"""Keys of controls. Enter sends them, apart from the stop; a direction counts after `h`."""
 WORDS = {
     TO: "move to",
     BY: "move by",
@@ -103,18 +104,11 @@ class ControlsPage(AskingPage):
     """Controls of the selected drive."""
 
     AUTO_FOCUS = ""
+    SHEET = "controls"
     BINDINGS: ClassVar[list[BindingType]] = [
-        Binding("left", "jog(-1)", show=False),
-        Binding("right", "jog(1)", show=False),
-        Binding("up", "step(1)", show=False),
-        Binding("down", "step(-1)", show=False),
-        Binding("tab", "axis", show=False, priority=True),
-        *(Binding(key, f"ask('{key}')", show=False) for key in NUMBERED),
-        *(Binding(key, f"do('{key}')", show=False) for key in KEYED),
-        Binding("enter", "go", show=False),
-        *(Binding(each, "drop", show=False) for each in ascii_letters + digits if each not in {*NUMBERED, *KEYED}),
+        *bound("controls"),
+        *(Binding(each, "drop", show=False) for each in ascii_letters + digits if each not in "lmbhed"),
     ]
-    KEYS = (("←→", "jog"), ("↑↓", "step"), ("Space", "stop"))
     WANTS = frozenset({"motion", "conditions"})
     PARTS = {"heading": None, "drive": "auto", "controls": "1fr", "number": None, "said": None}
     FIELD = "number"
@@ -127,6 +121,8 @@ class ControlsPage(AskingPage):
         self._asked: Begun | None = None
         self._begun: Begun | None = None
         """The control that Enter would send."""
+        self._homing = False
+        """The next key may be the direction of a homing."""
         self._painted = False
         """The line of that control was shown, and no key waited then that was typed before."""
         self._place = host.session.place
@@ -187,7 +183,7 @@ class ControlsPage(AskingPage):
         jog = controls[BY]
         minus, plus = (self._shown(jog, axis, sign * self.step) for sign in (-1, 1))
         ready = self._jog.obstacle(glance.readout, axis, glance.state(), view.now)
-        head.append((f"   ↑↓ choose the step, s types it{other} ", "dim"))
+        head.append((f"   ↑↓ choose the step, l types it{other} ", "dim"))
         rows: list[Row] = [
             (*head, ("─" * max(0, width - width_of(head)), "rule")),
             ((f" {fit('←', KEY)}", "key"), (fit(minus, WORD + LINE), "text"), (f"→  {plus}", "text")),
@@ -265,7 +261,7 @@ class ControlsPage(AskingPage):
         """Stop at once; every other control waits for Enter, as a letter alone neither moves nor lets go."""
         name = KEYED[key]
         control = self._controls().get(name)
-        self._begun = None
+        self._begun, self._homing = None, False
         if name == STOP and control is not None and not control.absent:
             self.host.outbox.at_once(control.filled())
             self._tell(control.filled())
@@ -295,10 +291,20 @@ class ControlsPage(AskingPage):
         elif (control := self._controls().get(name)) is not None:
             self._send(control.filled())
 
+    def action_home(self) -> None:
+        """Ask for the direction of a homing: one letter begins none."""
+        self.action_drop()
+        self._homing = True
+        self.say("home: - or + is the direction   Esc: nothing")
+
+    def action_toward(self, sign: str) -> None:
+        if self._homing:
+            self.action_do(sign)
+
     def action_drop(self) -> None:
         """Drop the control that waits for Enter: a key that means nothing here is part of a word, such as `halt`."""
-        if self._begun is not None:
-            self._begun = None
+        if self._begun is not None or self._homing:
+            self._begun, self._homing = None, False
             self.say("nothing was sent")
 
     def action_ask(self, key: str) -> None:
@@ -366,7 +372,7 @@ class ControlsPage(AskingPage):
 
     def action_leave(self) -> None:
         """Leave the number or the control that waits for Enter, then the page."""
-        if self._begun is not None:
+        if self._begun is not None or self._homing:
             self.action_drop()
             return
         if self._asked is not None:
@@ -389,7 +395,7 @@ def axis_state(glance: Glance, axis: Readout) -> State:
 
 def _control_row(key: str, name: str, control: Control, number: str, width: int) -> Row:
     """Key, word, lines and meaning of a control; an absent one has its reason."""
-    shown = "Space" if key == SPACE else key if number else f"{key} Enter"
+    shown = "Space" if key == SPACE else key if number else f"{'h' if key in '+-' else ''}{key} Enter"
     if control.absent:
         text = fit(f"not here: {control.absent}", max(0, width - KEY - WORD - 3))
         return ((f" {fit('', KEY)}", "dim"), (f"{fit(WORDS[name], WORD)} ", "dim"), (text, "dim"))

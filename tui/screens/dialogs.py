@@ -22,10 +22,14 @@ from textual.widgets.option_list import Option
 
 from multidrop.dialects.text import visible
 from multidrop.shell.channel import Field as Wanted
-from multidrop.tui.keymap import named_key
+from multidrop.tui.key_table import bound, hint
 from multidrop.tui.widgets.bars import StopSign
 
 T = TypeVar("T")
+
+
+REFUSED = Binding(",".join(f"f{number}" for number in range(2, 13)), "refuse", show=False, priority=True)
+"""Function keys, which play no macro in front of a question."""
 
 
 class Field(Input):
@@ -69,10 +73,8 @@ class Options(OptionList):
 class Over(ModalScreen[T], Generic[T]):
     """A screen over the main one, with the app's keys that work everywhere."""
 
-    BINDINGS: ClassVar[list[BindingType]] = [
-        named_key("quit", "ctrl+q", "app.quit", "quit; asks if something moves"),
-        Binding("ctrl+c", "act.explain", show=False, priority=True),
-    ]
+    SHEET: ClassVar[str] = "box"
+    BINDINGS: ClassVar[list[BindingType]] = bound("box")
 
     def on_mount(self) -> None:
         if self.is_attached:  # else it is closed already, as the app ends
@@ -82,8 +84,6 @@ class Over(ModalScreen[T], Generic[T]):
 class Dialog(Over[T], Generic[T]):
     """A dialog: Escape closes it with None."""
 
-    BINDINGS: ClassVar[list[BindingType]] = [Binding("escape", "leave", show=False)]
-
     def action_leave(self) -> None:
         """Close without an answer."""
         self.dismiss(None)
@@ -92,9 +92,13 @@ class Dialog(Over[T], Generic[T]):
 class Ask(Dialog[str]):
     """Ask for one line."""
 
-    def __init__(self, title: str, value: str = "", hint: str = "Enter take   Esc close") -> None:
+    SHEET = "line"
+
+    def __init__(self, title: str, value: str = "", about: str = "") -> None:
+        """Make it; `about` is what is asked for."""
         super().__init__()
-        self.heading, self.value, self.hint = title, value, hint
+        self.heading, self.value = title, value
+        self.hint = "   ".join(filter(None, (about, hint("line"))))
 
     def compose(self) -> ComposeResult:
         with Vertical(classes="box"):
@@ -115,6 +119,7 @@ class Confirm(Dialog[str]):
     A letter highlights the next answer that begins with it. One that begins none leaves nothing to take.
     """
 
+    SHEET = "answers"
     BINDINGS: ClassVar[list[BindingType]] = [
         Binding(letter, f"begin('{letter.lower()}')", show=False) for letter in ascii_letters
     ]
@@ -128,7 +133,7 @@ class Confirm(Dialog[str]):
             yield Static(self.heading, classes="title", markup=False)
             yield Static("\n".join(self.lines), classes="about", markup=False)
             yield Options([text for _, text in self.answers], self._taken)
-            yield Static("↑↓ or a letter choose   Enter take   Esc close", classes="keys")
+            yield Static(hint("answers"), classes="keys")
 
     def on_mount(self) -> None:
         self.query_one(Options).highlighted = 0
@@ -152,13 +157,8 @@ LOW = 22
 class GoOn(Dialog[bool]):
     """A question before a step that needs a yes: y is yes; n, Enter, Escape and a stop are no."""
 
-    BINDINGS: ClassVar[list[BindingType]] = [
-        Binding("y,Y", "answer(True)", show=False),
-        Binding("n,N", "answer(False)", show=False),
-        Binding("pageup", "read(-1)", show=False, priority=True),
-        Binding("pagedown", "read(1)", show=False, priority=True),
-        Binding(",".join(f"f{number}" for number in range(2, 13)), "refuse", show=False),
-    ]
+    SHEET = "question"
+    BINDINGS: ClassVar[list[BindingType]] = [*bound("question"), REFUSED]
 
     def __init__(self, question: str, before: Sequence[str] = ()) -> None:
         """Make the question. `before`: the lines that lead to it, which the dialog would cover."""
@@ -177,7 +177,7 @@ class GoOn(Dialog[bool]):
             yield Static(self.question, classes="about", markup=False)
             yield Options(["No, send nothing", "Yes, go on"], self._taken)
             read = "PgDn read on   " if self.before else ""
-            yield Static(f"y yes   n no   ↑↓ choose   {read}Enter take   Esc no", classes="keys")
+            yield Static(f"{read}{hint('question', escape='no')}", classes="keys")
 
     def on_mount(self) -> None:
         self.query_one(Options).highlighted = 0
@@ -209,16 +209,13 @@ class Match(NamedTuple):
 class Search(Dialog[str]):
     """Type to narrow a list; returns the key of the chosen result. The key that opened it steps to the next one."""
 
-    BINDINGS: ClassVar[list[BindingType]] = [
-        Binding("up", "step(-1)", show=False, priority=True),
-        Binding("down,ctrl+r", "step(1)", show=False, priority=True),
-        Binding("pageup", "step(-10)", show=False, priority=True),
-        Binding("pagedown", "step(10)", show=False, priority=True),
-    ]
+    SHEET = "list"
+    BINDINGS: ClassVar[list[BindingType]] = bound("list")
 
-    def __init__(self, title: str, find: Callable[[str], Sequence[Match]], hint: str) -> None:
+    def __init__(self, title: str, find: Callable[[str], Sequence[Match]], take: str = "take") -> None:
+        """Make it; `take` is what Enter does."""
         super().__init__()
-        self.heading, self.hint = title, hint
+        self.heading, self.hint = title, f"type to narrow   {hint('list', enter=take)}"
         self._find = find
         self.found: Sequence[Match] = ()
 
@@ -266,8 +263,7 @@ class Choose(Search):
     """Choose one of a list, which narrows as its words are typed; returns its key. `current` is highlighted first."""
 
     def __init__(self, title: str, offers: Sequence[Offer], current: str = "") -> None:
-        hint = "type to narrow   ↑↓ choose   Enter take   Esc close"
-        super().__init__(title, lambda typed: offers_like(offers, typed), hint)
+        super().__init__(title, lambda typed: offers_like(offers, typed))
         self._current = current
 
     def _narrow(self, text: str) -> None:
@@ -316,11 +312,8 @@ NEEDED = "a value is needed"
 class Form(Dialog[dict[str, str]]):
     """Asks for values; returns them by name. Enter takes a value and goes to the next, at the end it takes all."""
 
-    BINDINGS: ClassVar[list[BindingType]] = [
-        Binding("down,tab", "step(1)", show=False, priority=True),
-        Binding("up,shift+tab", "step(-1)", show=False, priority=True),
-        Binding(",".join(f"f{number}" for number in range(2, 13)), "refuse", show=False, priority=True),
-    ]
+    SHEET = "form"
+    BINDINGS: ClassVar[list[BindingType]] = [*bound("form"), REFUSED]
 
     def __init__(self, title: str, wanted: Sequence[Wanted]) -> None:
         super().__init__()
@@ -336,7 +329,7 @@ class Form(Dialog[dict[str, str]]):
                     yield Static(f"{each.name}: {visible(each.valid)}", classes="about", markup=False)
                     yield Field(self._entered, each.default or "", id=f"value-{number}")
             yield Static("", id="wrong", markup=False)
-            yield Static("Enter next, at the end go on   ↑↓ another value   Esc play nothing", classes="keys")
+            yield Static(hint("form"), classes="keys")
 
     def on_mount(self) -> None:
         super().on_mount()

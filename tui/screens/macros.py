@@ -12,6 +12,7 @@ from textual.binding import Binding, BindingType
 from multidrop.dialects import Diagnostic
 from multidrop.macros import Macro, MacroStore
 from multidrop.shell.playing import Playing
+from multidrop.tui.key_table import bound
 from multidrop.tui.panels.view import View
 from multidrop.tui.screens.dialogs import Ask, Confirm
 from multidrop.tui.screens.page import Host, Page
@@ -102,20 +103,11 @@ class MacrosPage(Page):
     """
 
     AUTO_FOCUS = ""
+    SHEET = "macros"
     BINDINGS: ClassVar[list[BindingType]] = [
-        Binding("up", "step(-1)", show=False, priority=True),
-        Binding("down", "step(1)", show=False, priority=True),
-        Binding("pageup", "step(-10)", show=False, priority=True),
-        Binding("pagedown", "step(10)", show=False, priority=True),
-        Binding("enter", "play", show=False),
-        Binding("e", "edit", show=False),
-        Binding("k", "key", show=False),
-        Binding("n", "act.record", show=False),
-        Binding("s", "end", show=False),
-        Binding("delete", "delete", show=False),
+        *bound("macros"),
         *(Binding(each, "unchoose", show=False) for each in ascii_letters + digits if each not in "ekns"),
     ]
-    KEYS = (("Enter", "play"), ("s", "end it"), ("n", "record"), ("e", "edit"), ("k", "key"), ("Del", "delete"))
     WANTS = frozenset({"motion"})
     PARTS = {"heading": None, "macros": "1fr", "steps": None, "news": NEWS + 1}
 
@@ -225,8 +217,8 @@ class MacrosPage(Page):
             if key:
                 self._type("/key", key, chosen.name, *(["--page", page] if page else []))
 
-        hint = "F2 to F12, or F3.2 for a page of keys   Enter take   Esc close"
-        await self.app.push_screen(Ask(f"Key of {chosen.name}", chosen.place.strip("-"), hint), named)
+        about = "F2 to F12, or F3.2 for a page of keys"
+        await self.app.push_screen(Ask(f"Key of {chosen.name}", chosen.place.strip("-"), about), named)
 
     async def action_delete(self) -> None:
         """Ask before the chosen macro is deleted."""

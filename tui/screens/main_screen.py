@@ -13,10 +13,11 @@ from textual.containers import Horizontal, Vertical
 from textual.geometry import Size
 
 from multidrop.shell.roles import Filter
-from multidrop.tui.keymap import named_key
+from multidrop.tui.key_table import bound
 from multidrop.tui.panels.table import CONDITIONS, MOTION, PANELS, Panel, Shown, divided, fitting
 from multidrop.tui.screen_model import Record
 from multidrop.tui.screens.page import Framed
+from multidrop.tui.sheets import NONE
 from multidrop.tui.text import fit, shorter
 from multidrop.tui.widgets.bars import Banner, rule_row
 from multidrop.tui.widgets.entry import Complete, Draft, Entry, Menu, Typed
@@ -95,51 +96,16 @@ class MainScreen(Framed):
 
     AUTO_FOCUS = "#entry"
     PLAYS = True
-    FOOTER = (
-        ("palette", "everything"),
-        ("drive", "drive"),
-        ("page-drives", "all drives"),
-        ("panel-plot", "plot"),
-        ("find", "find"),
-        ("history", "history"),
-        ("quit", "quit"),
-        ("twin", "twin"),
-    )
+    SHEET = "main"
     BINDINGS: ClassVar[list[BindingType]] = [
-        named_key("look-back", "pageup", "look(-1)", "look back in the transcript"),
-        named_key("look-on", "pagedown", "look(1)", "look on in the transcript"),
-        named_key("oldest", "ctrl+home", "look_end(False)", "the beginning of the transcript"),
-        named_key("newest", "ctrl+end", "look_end(True)", "follow the transcript again"),
-        named_key("find", "ctrl+f", "find", "search the transcript"),
-        named_key("pause", "ctrl+s", "pause", "stop the scrolling, or let it go on"),
-        named_key("pick", "ctrl+y", "pick(0)", "pick lines of the transcript to copy; also Shift+Up"),
-        named_key("times", "", "act.run_line('/times')", "times of the lines in another form"),
-        named_key("filter-mine", "", "act.run_line('/filter mine')", "show only what you typed, and its replies"),
-        named_key("filter-off", "", "act.run_line('/filter off')", "show all lines"),
-        named_key("hex", "", "act.run_line('/hex')", "the bytes of the selected line beside its lines, or not"),
-        Binding("shift+up", "pick(-1)", show=False, priority=True),
-        Binding("shift+down", "pick(1)", show=False, priority=True),
-        Binding("escape", "act.end_tour", show=False, priority=True),
-        named_key("help", "f1", "act.help", "help for where you are"),
-        named_key("palette", "ctrl+p", "act.palette", "everything by name: type some letters of it"),
-        named_key("drive", "ctrl+o", "act.choose_drive", "choose the drive that plain text goes to"),
-        named_key("log", "", "act.log", "begin the session log, or end it"),
-        named_key("twin", "ctrl+f2", "act.twin", "a twin beside each drive of the line, or none"),
-        named_key("units", "ctrl+f4", "act.units", "positions in units, or in the drives' own numbers"),
-        named_key("history", "ctrl+r", "act.search_history", "search the lines typed before; again: older"),
+        *bound("screen"),
+        *bound("main"),
         *(
-            named_key(f"panel-{each.name}", each.key, f"act.panel('{each.name}')", f"panel: {each.about}")
+            Binding(
+                f"{NONE}panel-{each.name}", f"act.panel('{each.name}')", f"panel: {each.about}", id=f"panel-{each.name}"
+            )
             for each in PANELS
         ),
-        *(named_key(f"play-f{n}", f"f{n}", f"act.play('F{n}')", "play the macro on the key") for n in range(2, 13)),
-        named_key("macro-page", "ctrl+k", "act.macro_page", "the next page of macros on F2 .. F12"),
-        named_key("repaint", "", "act.repaint", "paint the whole screen again"),
-        named_key("split", "ctrl+l", "act.split", "split the screen; then: type to the other half"),
-        named_key("tab-before", "ctrl+pageup", "act.bus(-1)", "the line before"),
-        named_key("tab-after", "ctrl+pagedown", "act.bus(1)", "the next line"),
-        named_key("tab-left", "ctrl+shift+pageup", "act.run_line('/tab left')", "this tab to the left"),
-        named_key("tab-right", "ctrl+shift+pagedown", "act.run_line('/tab right')", "this tab to the right"),
-        *(named_key(f"tab-{n}", f"alt+{n},ctrl+{n}", f"act.bus_number({n})", f"line {n}") for n in range(1, 10)),
     ]
 
     def __init__(

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from typing import ClassVar, NamedTuple
 
 from textual.app import ComposeResult
-from textual.binding import Binding, BindingType
+from textual.binding import BindingType
 from textual.containers import Vertical
 from textual.screen import Screen
 
@@ -20,7 +20,8 @@ from multidrop.dialects.on_demand import imported
 from multidrop.shell.line_syntax import Place
 from multidrop.shell.session import Session
 from multidrop.tui.frame_scheduler import Frames
-from multidrop.tui.keymap import FunctionKeys, named_key
+from multidrop.tui.key_table import bound
+from multidrop.tui.keymap import FunctionKeys
 from multidrop.tui.outbox import Outbox
 from multidrop.tui.panels.view import View
 from multidrop.tui.screen_model import Record, ScreenModel
@@ -37,8 +38,8 @@ class Framed(Screen[None]):
 
     PLAYS: ClassVar[bool] = False
     """True if function keys play macros on this screen."""
-    FOOTER: ClassVar[Sequence[tuple[str, str]]] = ()
-    """Names of functions in `tui.keymap`, or keys as shown, with a word on each, the most useful ones first."""
+    SHEET: ClassVar[str]
+    """Its keys, in `tui.key_table`."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -82,15 +83,7 @@ class Begun(NamedTuple):
 class Page(Framed):
     """The base of all pages. `content` makes the widgets, `show` paints them when something has happened."""
 
-    BINDINGS: ClassVar[list[BindingType]] = [
-        Binding("escape", "leave", show=False),
-        named_key("help", "f1", "act.help", "help for where you are"),
-        Binding("ctrl+o", "act.choose_drive", show=False, priority=True),
-        named_key("palette", "ctrl+p", "act.palette", "everything by name: type some letters of it"),
-        named_key("units", "ctrl+f4", "act.units", "positions in units, or in the drives' own numbers"),
-    ]
-    KEYS: ClassVar[Sequence[tuple[str, str]]] = ()
-    """The keys of this page with their meanings."""
+    BINDINGS: ClassVar[list[BindingType]] = [*bound("screen"), *bound("page")]
     WANTS: ClassVar[frozenset[str]] = frozenset()
     """The readings that it needs while it is shown, in the words of `tui.panels.table`."""
 
@@ -191,8 +184,6 @@ class PageEntry(NamedTuple):
     """One line for the palette."""
     place: str
     """Module and class in `tui.screens`."""
-    key: str = ""
-    """The key that opens it, as Textual spells it."""
 
     def page(self) -> type[Page]:
         found: type[Page] = imported(f"multidrop.tui.screens.{self.place}")
@@ -200,12 +191,12 @@ class PageEntry(NamedTuple):
 
 
 PAGES: tuple[PageEntry, ...] = (
-    PageEntry("drives", "All drives", "every drive of every line, the worst first", "all_drives:AllDrives", "ctrl+a"),
-    PageEntry("plot", "Plots", "position, velocity and values over time", "plot_page:PlotPage", "ctrl+g"),
+    PageEntry("drives", "All drives", "every drive of every line, the worst first", "all_drives:AllDrives"),
+    PageEntry("plot", "Plots", "position, velocity and values over time", "plot_page:PlotPage"),
     PageEntry("macros", "Macros", "play, record, edit and put on keys", "macros:MacrosPage"),
-    PageEntry("program", "Program", "edit, check, download, run, trace and step", "program:ProgramPage", "ctrl+e"),
+    PageEntry("program", "Program", "edit, check, download, run, trace and step", "program:ProgramPage"),
     PageEntry("parameters", "Parameters", "every setting: search, compare, edit, save", "parameters:ParametersPage"),
-    PageEntry("controls", "Controls", "jog by steps, move, home, stop, enable", "controls:ControlsPage", "ctrl+n"),
+    PageEntry("controls", "Controls", "jog by steps, move, home, stop, enable", "controls:ControlsPage"),
     PageEntry("why", "Why", "what is wrong with the selected drive, and three keys that help", "why:WhyPage"),
     PageEntry("traffic", "Traffic", "the bytes of the line, both ways, with times", "traffic:TrafficPage"),
 )

@@ -10,7 +10,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import ClassVar
 
-from textual.binding import Binding, BindingType
+from textual.binding import BindingType
 
 from multidrop.dialects import Diagnostic
 from multidrop.dialects.values import VARIABLES, Readings, Value
@@ -19,6 +19,7 @@ from multidrop.shell import setting_units
 from multidrop.shell.params import file as files
 from multidrop.shell.params.page import Edit, edit, found_in, meanings_of, parsed, rows
 from multidrop.shell.params.page import Row as Setting
+from multidrop.tui.key_table import bound
 from multidrop.tui.panels.view import Glance, View, name_of
 from multidrop.tui.screens.page import AskingPage, Begun, Host
 from multidrop.tui.text import age, fit
@@ -140,28 +141,8 @@ class ParametersPage(AskingPage):
     """All settings of the selected drive."""
 
     AUTO_FOCUS = ""
-    BINDINGS: ClassVar[list[BindingType]] = [
-        *(Binding(key, f"step({by})", show=False) for key, by in (("up", -1), ("down", 1))),
-        *(Binding(key, f"step({by})", show=False) for key, by in (("pageup", -10), ("pagedown", 10))),
-        Binding("slash", f"ask('{SEARCH}')", show=False),
-        Binding("f", f"ask('{FILE}')", show=False),
-        Binding("a", f"ask('{DRIVE}')", show=False),
-        Binding("enter", "enter", show=False),
-        Binding("d", "defaults", show=False),
-        Binding("equals_sign", "differing", show=False),
-        Binding("v", "variables", show=False),
-        Binding("r", "read", show=False),
-        Binding("S", "save", show=False),
-    ]
-    KEYS = (
-        ("r", "read"),
-        ("/", "search"),
-        ("Enter", "edit"),
-        ("d f a", "compare"),
-        ("=", "only diff"),
-        ("v", "variables"),
-        ("S", "save"),
-    )
+    SHEET = "parameters"
+    BINDINGS: ClassVar[list[BindingType]] = bound("parameters")
     WANTS = frozenset({"motion"})
     PARTS = {"heading": None, "columns": None, "table": "1fr", "meaning": None, "asked": None, "said": None}
     FIELD = "asked"

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from typing import ClassVar
 
-from textual.binding import Binding, BindingType
+from textual.binding import BindingType
 
 from multidrop.shell.roles import DIFFERENCE
 from multidrop.tui.curves.chart import Look
+from multidrop.tui.key_table import bound
 from multidrop.tui.panels.plot import PLOTTED, columns_of, cursor_row, plot_rows, plot_title
 from multidrop.tui.panels.view import View
 from multidrop.tui.polling import plotted
@@ -21,40 +22,8 @@ PORT = 9876
 class PlotPage(Page):
     """Plots. Keys change how a person looks at them; what is plotted changes by lines that a person could type."""
 
-    BINDINGS: ClassVar[list[BindingType]] = [
-        Binding("space", "pause", show=False),
-        Binding("left", "cursor(-1)", show=False),
-        Binding("right", "cursor(1)", show=False),
-        Binding("pageup", "cursor(-20)", show=False),
-        Binding("pagedown", "cursor(20)", show=False),
-        Binding("plus,equals_sign", "shorter(1)", show=False),
-        Binding("minus", "shorter(-1)", show=False),
-        Binding("up", "closer(1)", show=False),
-        Binding("down", "closer(-1)", show=False),
-        Binding("0", "automatic", show=False),
-        Binding("s", "apart", show=False),
-        Binding("v", "hide('velocity')", show=False),
-        Binding("p", "hide('position')", show=False),
-        *(Binding(str(n), f"drive({n})", show=False) for n in range(1, 10)),
-        Binding("a", "all_drives", show=False),
-        Binding("d", "difference", show=False),
-        Binding("r", "stream", show=False),
-        Binding("c", "copy", show=False),
-    ]
-    KEYS = (
-        ("Space", "pause"),
-        ("←→", "cursor"),
-        ("+-", "time"),
-        ("↑↓", "values"),
-        ("1-9", "drive"),
-        ("S", "split"),
-        ("R", "rerun"),
-        ("V", "velocity"),
-        ("P", "position"),
-        ("A", "all"),
-        ("D", "difference"),
-        ("0", "reset"),
-    )
+    SHEET = "plot"
+    BINDINGS: ClassVar[list[BindingType]] = bound("plot")
     WANTS = frozenset({"motion", "plot", "samples"})
     PARTS = {"heading": None, "charts": "1fr", "below": None}
 
@@ -86,7 +55,7 @@ class PlotPage(Page):
             return (
                 (" at your desk: ", "dim"),
                 (served[0].desk, "strong"),
-                ("   C copies it; then: ", "dim"),
+                ("   c copies it; then: ", "dim"),
                 (f"rerun {served[0].where}", "strong"),
             )
         others = [each.where for each in view.session.plots]
@@ -114,6 +83,11 @@ class PlotPage(Page):
     def action_automatic(self) -> None:
         self._look.automatic()
         self._look.go_on()
+
+    async def action_beside(self) -> None:
+        """Show the plot beside the transcript, or hide it, and go there."""
+        self.dismiss(None)
+        await self.app.run_action("act.panel('plot')")
 
     def action_apart(self) -> None:
         """Give each drive charts of its own, or put all into one."""

@@ -15,7 +15,7 @@ from functools import partial
 from typing import ClassVar
 
 from textual.app import ComposeResult
-from textual.binding import Binding, BindingType
+from textual.binding import BindingType
 from textual.containers import Horizontal, Vertical
 
 from multidrop.dialects import Diagnostic
@@ -24,6 +24,7 @@ from multidrop.shell.programs.checking import ending_of
 from multidrop.shell.programs.edited_file import ChangedMeanwhile
 from multidrop.shell.programs.program_text import ProgramGrammar
 from multidrop.tui.editor import Editor, Grammar, grammar_of
+from multidrop.tui.key_table import bound
 from multidrop.tui.panels.program import SIGNS, index_of, spot_of, state_words
 from multidrop.tui.panels.table import column_rows, panel
 from multidrop.tui.panels.view import View
@@ -64,25 +65,8 @@ class ProgramPage(Page):
     """The editor, the file in it, what the check of its text found, and what the program in the drive does."""
 
     AUTO_FOCUS = "#editor"
-    BINDINGS: ClassVar[list[BindingType]] = [
-        Binding("ctrl+s", "save", show=False, priority=True),
-        Binding("ctrl+e", "open", show=False, priority=True),
-        Binding("ctrl+l", "next_problem", show=False, priority=True),
-        Binding("ctrl+d", "download", show=False, priority=True),
-        Binding("ctrl+r", "run", show=False, priority=True),
-        Binding("ctrl+t", "step", show=False, priority=True),
-        Binding("ctrl+b", "break", show=False, priority=True),
-    ]
-    KEYS = (
-        ("^S", "save"),
-        ("^D", "download"),
-        ("^R", "run"),
-        ("^T", "step"),
-        ("^B", "break"),
-        ("^L", "next error"),
-        ("^E", "open"),
-        ("^O", "drive"),
-    )
+    SHEET = "program"
+    BINDINGS: ClassVar[list[BindingType]] = bound("program")
     WANTS = frozenset({"motion", "conditions"})
 
     def __init__(self, host: Host) -> None:
@@ -247,10 +231,8 @@ class ProgramPage(Page):
         selected = self.host.session.selected
         drive = "" if selected is None else target_of(self.host.session) or selected.product
         find = Finder(found, self.host.texts.unsaved(), drive, folder)
-        hint = "type a name, with / a folder   ↑↓ choose   Enter open   Esc close"
-        await self.app.push_screen(
-            Search(f"Program file in {folder}" if folder else "Program file", find, hint), self._open
-        )
+        heading = f"Program file in {folder}" if folder else "Program file; with / a folder"
+        await self.app.push_screen(Search(heading, find, "open"), self._open)
 
     async def _open(self, name: str | None) -> None:
         if name == UPLOAD:
@@ -418,9 +400,8 @@ class ProgramPage(Page):
             if key is not None:
                 self._start(found[int(key)].line)
 
-        hint = "type to narrow   ↑↓ choose   Enter do it   Esc close"
         offers = [Offer(str(number), f"{each.title:<30}  {each.line}") for number, each in enumerate(found)]
-        await self.app.push_screen(Search(heading, partial(offers_like, offers), hint), taken)
+        await self.app.push_screen(Search(heading, partial(offers_like, offers), "do it"), taken)
 
     async def action_step(self) -> None:
         """Execute one line of a program that waits; else choose where to begin. One press is one line at most."""

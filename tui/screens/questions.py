@@ -19,6 +19,8 @@ from multidrop.tui.text import visible
 from multidrop.tui.widgets.theme import THEMES, Signs
 
 T = TypeVar("T")
+HELP = "Help"
+"""The heading of the help."""
 Answers = list[tuple[str, str]]
 """(key, text) of each answer."""
 PREVIEW = 6
@@ -87,19 +89,16 @@ class Questions:
             if name:
                 await record(name)
 
-        hint = "Enter begins   /record stop ends it   Esc close"
-        await self._open(Ask("Record what is typed as a macro named", hint=hint), named)
+        await self._open(Ask("Record what is typed as a macro named", about="/record stop ends it"), named)
 
     async def history(self, lines: Sequence[str], take: Callable[[str], None]) -> None:
         """Search the lines typed before, oldest first in `lines`."""
         kept = list(dict.fromkeys(reversed(lines)))
-        hint = "type to narrow   ^R ↓ older   Enter into the line   Esc close"
-        await self._open(Search("Lines typed before", lambda text: lines_like(kept, text), hint), take)
+        await self._open(Search("Lines typed before", lambda text: lines_like(kept, text), "into the line"), take)
 
     async def palette(self, find: Callable[[str], list[Match]], run: Callable[[int], Awaitable[object]]) -> None:
         """Search all commands; `run` is given the number of the one that was taken."""
-        hint = "type to narrow   ↑↓ choose   Enter do it   Esc close"
-        await self._open(Search("Everything", find, hint), lambda key: run(int(key)))
+        await self._open(Search("Everything", find, "do it"), lambda key: run(int(key)))
 
     async def drive(self, glances: Callable[[Bus], list[Glance]], select: Callable[[str, str], None]) -> None:
         options, current = drive_choices(self._session, glances)
@@ -159,7 +158,7 @@ class Questions:
         await app.push_screen(Confirm("Quit?", lines, answers), answered)
 
     async def help(self, find: Callable[[str], list[Match]]) -> None:
-        await self._app.push_screen(Search("Help", find, "type to search   ↑↓ PgUp PgDn read   Esc close"))
+        await self._app.push_screen(Search(HELP, find, "close"))
 
 
 def _place_of(key: str) -> tuple[str, str]:

@@ -11,7 +11,7 @@ from typing import ClassVar
 
 from rich.text import Text
 from textual.app import App, ComposeResult
-from textual.binding import Binding, BindingType
+from textual.binding import BindingType
 from textual.containers import Vertical
 from textual.widgets import Static
 from textual.widgets.option_list import Option
@@ -20,7 +20,7 @@ from multidrop.dialects.text import visible
 from multidrop.shell.events import FAILURES
 from multidrop.shell.session import Session
 from multidrop.tui.assist import Assist, StartEntry
-from multidrop.tui.keymap import named_key
+from multidrop.tui.key_table import bound, hint
 from multidrop.tui.screens.dialogs import Field, Options, Over
 from multidrop.tui.terminal.keyboard import Keyboard
 from multidrop.tui.widgets.bars import Banner
@@ -44,16 +44,8 @@ class Start(Over[None]):
     Keys wait while a connection opens, as their meaning is unknown until then.
     """
 
-    BINDINGS: ClassVar[list[BindingType]] = [
-        Binding("escape", "leave", show=False),
-        Binding("up,shift+tab", "step(-1)", show=False, priority=True),
-        Binding("down,tab", "step(1)", show=False, priority=True),
-        Binding("ctrl+l", "look_again", show=False, priority=True),
-        Binding("ctrl+r", "raw", show=False, priority=True),
-        Binding("ctrl+s", "scan", show=False, priority=True),
-        Binding("ctrl+e", "edit", show=False, priority=True),
-        named_key("palette", "ctrl+p", "act.palette", "everything by name: type some letters of it"),
-    ]
+    SHEET = "start"
+    BINDINGS: ClassVar[list[BindingType]] = bound("start")
 
     def __init__(self, connect: Connect, assist: Assist, keyboard: Keyboard, *, only: bool, trouble: str = "") -> None:
         super().__init__()
@@ -69,15 +61,13 @@ class Start(Over[None]):
         with Vertical(id="start"):
             yield Static("multidrop", classes="title")
             yield Static("a terminal for motion drives on a shared line", classes="about")
-            hint = "type to narrow, or a URL: /dev/ttyUSB0?baud=19200, tcp://HOST:503"
-            yield Field(self._entered, edited=lambda text: self._fill(), placeholder=hint, id="url")
+            about = "type to narrow, or a URL: /dev/ttyUSB0?baud=19200, tcp://HOST:503"
+            yield Field(self._entered, edited=lambda text: self._fill(), placeholder=about, id="url")
             yield Static("", id="outcome", markup=False)
             options = Options((), self._taken, id="places")
             options.can_focus = False
             yield options
-            leave = "^Q quit" if self.only else "Esc close"
-            keys = f"↑↓   Enter open   ^R raw   ^S scan   ^E edit   ^L look again   {leave}"
-            yield Static(keys, classes="keys", markup=False)
+            yield Static(f"{hint('start')}   {'^Q quit' if self.only else ''}", classes="keys", markup=False)
 
     def on_mount(self) -> None:
         """Show what is known at once; add the ports when they are found."""

@@ -5,8 +5,9 @@ from __future__ import annotations
 from itertools import islice
 from typing import ClassVar
 
-from textual.binding import Binding, BindingType
+from textual.binding import BindingType
 
+from multidrop.tui.key_table import bound
 from multidrop.tui.panels.traffic import piece_rows
 from multidrop.tui.panels.view import View
 from multidrop.tui.screen_model import TrafficStore
@@ -21,18 +22,8 @@ class TrafficPage(Page):
     """The bytes. The view is anchored at its last piece, which is the newest one unless the reader went up."""
 
     AUTO_FOCUS = ""
-    BINDINGS: ClassVar[list[BindingType]] = [
-        Binding("up", "look(-1)", show=False, priority=True),
-        Binding("down", "look(1)", show=False, priority=True),
-        Binding("pageup", "page(-1)", show=False, priority=True),
-        Binding("pagedown", "page(1)", show=False, priority=True),
-        Binding("home,ctrl+home", "look(-1000000)", show=False, priority=True),
-        Binding("end,ctrl+end", "follow", show=False, priority=True),
-        Binding("space", "pause", show=False),
-        Binding("p", "polls", show=False),
-        Binding("h", "hex", show=False),
-    ]
-    KEYS = (("Space", "pause"), ("↑↓", "look back"), ("End", "follow"), ("p", "polls"), ("h", "hex"))
+    SHEET = "traffic"
+    BINDINGS: ClassVar[list[BindingType]] = bound("traffic")
     WANTS = frozenset({"motion"})
     PARTS = {"heading": None, "traffic": "1fr"}
 

@@ -11,11 +11,12 @@ from dataclasses import replace
 from operator import attrgetter
 from typing import ClassVar
 
-from textual.binding import Binding, BindingType
+from textual.binding import BindingType
 
 from multidrop.dialects import Diagnostic
 from multidrop.drives.drive import Drive
 from multidrop.shell.roles import Series
+from multidrop.tui.key_table import bound
 from multidrop.tui.panels.drive import LIMITS, drive_rows
 from multidrop.tui.panels.drives import spark
 from multidrop.tui.panels.plot import plot_rows
@@ -45,12 +46,8 @@ class WhyPage(AskingPage):
     """Why the selected drive is in trouble."""
 
     AUTO_FOCUS = ""
-    BINDINGS: ClassVar[list[BindingType]] = [
-        Binding("r", "read_error", show=False),
-        Binding("t", "act.page('traffic')", show=False),
-        Binding("enter", "go", show=False),
-    ]
-    KEYS = (("r", "read the error"), ("t", "traffic"), ("page-controls", "controls"), ("page-program", "program"))
+    SHEET = "why"
+    BINDINGS: ClassVar[list[BindingType]] = bound("why")
     WANTS = frozenset({"motion", "conditions"})
     PARTS = {"heading": None, "why": "1fr", "helps": HELPS + 1}
 

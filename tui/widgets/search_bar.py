@@ -10,12 +10,13 @@ from collections.abc import Callable
 from typing import ClassVar
 
 from textual.app import ComposeResult
-from textual.binding import Binding, BindingType
+from textual.binding import BindingType
 from textual.containers import Horizontal
 from textual.geometry import Size
 from textual.reactive import Reactive
 from textual.widgets import Input
 
+from multidrop.tui.key_table import bound, hint
 from multidrop.tui.widgets.lines import Lines, Row, spread, width_of
 from multidrop.tui.widgets.transcript import Transcript
 from multidrop.tui.widgets.viewport import Picked, Search
@@ -29,19 +30,14 @@ COUNTS = 17
 """Width of `50000 of 50000`."""
 LEAST = 22
 """Width of the searched text and its label at least."""
-PICK_KEYS = ("Shift+↑↓ or Space more   Enter copy   Esc close ", "Enter copy   Esc close ", "Enter ")
-KEYS = ("   ↑↓ step   Tab only these   Esc close ", "   Esc close ", "")
+PICK_KEYS = (f"{hint('pick')} ", "Enter copy   Esc close ", "Enter ")
+KEYS = (f"   {hint('find')} ", "   Esc close ", "")
 
 
 class FindField(Input):
     """The searched text. `edited` takes each change, `act` the keys."""
 
-    BINDINGS: ClassVar[list[BindingType]] = [
-        Binding("up,enter,ctrl+f", "act('older')", show=False),
-        Binding("down,shift+enter", "act('newer')", show=False),
-        Binding("tab", "act('only')", show=False),
-        Binding("escape", "act('close')", show=False),
-    ]
+    BINDINGS: ClassVar[list[BindingType]] = bound("find")
     virtual_size = Reactive(Size(0, 0))
     """As of the input line: a longer text changes no layout."""
 
@@ -60,13 +56,7 @@ class FindField(Input):
 class PickBar(Lines, can_focus=True):
     """The keys while lines are picked. `move` takes lines and whether to extend, `act` the other keys."""
 
-    BINDINGS: ClassVar[list[BindingType]] = [
-        *(Binding(key, f"move({by}, False)", show=False) for key, by in (("up", -1), ("down", 1))),
-        *(Binding(f"shift+{key}", f"move({by}, True)", show=False) for key, by in (("up", -1), ("down", 1))),
-        Binding("space", "act('extend')", show=False),
-        Binding("enter,c,y,ctrl+y", "act('copy')", show=False),
-        Binding("escape,q", "act('close')", show=False),
-    ]
+    BINDINGS: ClassVar[list[BindingType]] = bound("pick")
 
     def __init__(self, move: Callable[[int, bool], None], act: Callable[[str], None]) -> None:
         super().__init__(id="pick")
