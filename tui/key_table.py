@@ -32,17 +32,23 @@ SHEETS: dict[str, Sheet] = {
                 Key(
                     "ctrl+a",
                     "act.page_key('drives')",
-                    "page: every drive of every line, the worst first; in a text: its start",
+                    "every drive of every line, the worst first; in a line: its start",
                     "all drives",
                     "page-drives",
                 ),
-                Key("ctrl+g", "act.page_key('plot')", "page: curves over time", "plots", "page-plot"),
-                Key("ctrl+n", "act.page_key('controls')", "page: jog, move, home, stop", "controls", "page-controls"),
-                Key("ctrl+l", "act.page_key('parameters')", "page: every setting", "parameters", "page-parameters"),
-                Key("ctrl+e", "act.page_key('program')", "page: edit, check, download, run", "edit", "page-program"),
-                Key("", "act.page_key('macros')", "page: play, record, put on keys", "", "page-macros"),
+                Key("ctrl+g", "act.page_key('plot')", "curves over time", "plots", "page-plot"),
+                Key("ctrl+n", "act.page_key('controls')", "jog, move, home, stop", "controls", "page-controls"),
+                Key("ctrl+l", "act.page_key('parameters')", "every setting", "parameters", "page-parameters"),
+                Key(
+                    "ctrl+e",
+                    "act.page_key('program')",
+                    "edit, check, download and run a program",
+                    "edit",
+                    "page-program",
+                ),
+                Key("", "act.page_key('macros')", "play, record, put on keys", "", "page-macros"),
                 Key("", "act.page_key('why')", "what is wrong with the selected drive", "", "page-why"),
-                Key("", "act.page_key('traffic')", "page: the bytes of the line", "", "page-traffic"),
+                Key("", "act.page_key('traffic')", "the bytes of the line", "", "page-traffic"),
             ),
         },
     ),
@@ -113,15 +119,15 @@ SHEETS: dict[str, Sheet] = {
         "all drives",
         "Every drive of every line has a row, and the worst comes first. A drive that is lost, silent or in error is "
         "above those that move, and those are above the ones at rest. What you type keeps only the rows that have it: "
-        "a bus, an address, a name, a state. Enter selects the drive and goes back, or shows what is known of its trouble.",
+        "a bus, an address, a name, a state. Enter selects the drive and goes back, or shows why it is in trouble.",
         {"Rows": (_STEP, _LEAP, Key("enter", "take", "select the drive; of one in trouble: show why", "select"))},
         ("page",),
     ),
     "why": Sheet(
         "why",
         "What is known of the trouble of the selected drive: its state, its error with its meaning, its program, what "
-        "was sent to it last, and its last 20 s. Nothing is read for it that a reading would clear. The keys below help "
-        "further, and the page shows a line before it is sent.",
+        "was sent to it last, and its last 20 s. Nothing is read for it that a reading would clear. The keys below "
+        "help further, and the page shows a line before it is sent.",
         {
             "What helps": (
                 Key("r", "read_error", "read the number of the error, which clears it: Enter sends it", "read"),

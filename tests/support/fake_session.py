@@ -11,6 +11,7 @@ from contextlib import asynccontextmanager
 from dataclasses import dataclass, field, replace
 from datetime import datetime, timedelta
 from fractions import Fraction
+from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
@@ -130,6 +131,9 @@ class FakeMacros:
         if name not in self.kept:
             raise Diagnostic(f"no macro {name}")
         return self.kept[name]
+
+    def path(self, name: str) -> Path:
+        return Path("/nowhere") / f"{name}.toml"
 
 
 class FakeUnits(Units):

@@ -174,17 +174,17 @@ async def test_keys_and_numbers_switch_buses() -> None:
         assert found == ["eth", "pmx", "press", "pmx", "eth"]
 
 
-@pytest.mark.parametrize(("key", "picked"), [("ctrl+o", "b"), ("ctrl+l", "b")])
-async def test_a_picker_narrows_and_a_letter_that_matches_nothing_takes_nothing(key: str, picked: str) -> None:
+@pytest.mark.parametrize("keys", [("ctrl+o",), ("ctrl+p", *"split the", "enter")], ids=["drive", "half"])
+async def test_a_picker_narrows_and_a_letter_that_matches_nothing_takes_nothing(keys: tuple[str, ...]) -> None:
     async with on_screen() as (pilot, app, session):
-        await press(pilot, key, "q", "enter")
+        await press(pilot, *keys, "q", "enter")
         assert isinstance(app.screen, Choose)
         assert app.main.beside.bus == ""
         assert session.selected is not None and session.selected.address == "a"
-        await press(pilot, "backspace", picked, "enter")
+        await press(pilot, "backspace", "b", "enter")
         assert app.screen is app.main
-        taken = session.selected.address if key == "ctrl+o" else app.main.beside.address
-        assert taken == picked
+        taken = session.selected.address if len(keys) == 1 else app.main.beside.address
+        assert taken == "b"
 
 
 def test_a_picker_takes_the_drive_of_that_address_and_no_part_of_a_word() -> None:
@@ -245,10 +245,10 @@ async def test_only_what_is_shown_is_polled_and_only_while_it_is() -> None:
         await settle(pilot)
         assert press.polled == {"a": REST, "b": OTHERS, "c": OTHERS}
         assert (eth.polled, pmx.polled) == ({"": OTHERS}, {}), "a lost bus is not polled"
-        await pilot.press("ctrl+t")
+        await pilot.press("ctrl+g", "ctrl+g")
         await emit(pilot, OnBus("press", Sample(session.time, "a", 5, 7)))
         assert press.polled["a"] == PLOT
-        await pilot.press("ctrl+t")
+        await pilot.press("ctrl+g", "ctrl+g")
         await settle(pilot)
         assert press.polled["a"] == STATUS
         app.act.action_polling()

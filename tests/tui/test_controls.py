@@ -139,7 +139,7 @@ async def test_nothing_is_sent_while_it_moves_is_silent_or_a_line_runs() -> None
         assert "a press is dropped now: it moves" in page.lines("controls").plain
         await emit(pilot, OnBus("press", Silent(session.time, "a")))
         session.time += 0.5
-        for key in ("right", "h", "enter"):
+        for key in ("right", "h", "-", "enter"):
             await press(pilot, key)
         assert session.sent == []
         assert "not sent: " in page.lines("said").plain
@@ -148,16 +148,18 @@ async def test_nothing_is_sent_while_it_moves_is_silent_or_a_line_runs() -> None
 WALK: tuple[tuple[tuple[str, ...], list[str]], ...] = (
     (("m", *"-250", "enter"), ["press:a MA -250"]),
     (("b", *"70", "enter"), ["press:a MR 70"]),
-    (("s", *"12", "enter", "right"), ["press:a MR 12"]),
-    (("h", "enter"), ["press:a HM 1"]),
-    (("H", "enter"), ["press:a HM 3"]),
+    (("l", *"12", "enter", "right"), ["press:a MR 12"]),
+    (("h", "-", "enter"), ["press:a HM 1"]),
+    (("h", "+", "enter"), ["press:a HM 3"]),
+    (("h", "enter"), []),
+    (("h", "a", "+", "enter"), []),
     (("space",), ["press:a SL 0"]),
     (("d", "enter", "enter", "e", "enter"), ["press:a DE=0", "press:a DE=1"]),
     (("h", "escape"), []),
     (("d", "space"), ["press:a SL 0"]),
     (("m", *"12x", "enter"), []),
     (("escape", "m", *"99999999999", "enter"), []),
-    (("escape", "s", "0", "enter"), []),
+    (("escape", "l", "0", "enter"), []),
     (("escape", "m", *"5", "escape"), []),
 )
 
@@ -180,9 +182,9 @@ async def test_a_control_sends_its_line_and_a_wrong_number_sends_nothing() -> No
 async def test_a_letter_alone_neither_moves_nor_lets_go_and_a_stop_or_another_drive_drops_it() -> None:
     async with on_screen() as (pilot, _, session):
         page = await opened(pilot, session)
-        for letter in "hHde":
+        for letter in ("h-", "h+", "d", "e"):
             for after in ((), ("up", "enter"), ("ctrl+x", "enter"), ("escape", "enter")):
-                await press(pilot, letter, *after)
+                await press(pilot, *letter, *after)
                 assert session.sent == [], (letter, after)
                 if not after:
                     assert "Enter sends" in page.lines("said").plain
@@ -194,7 +196,7 @@ async def test_a_letter_alone_neither_moves_nor_lets_go_and_a_stop_or_another_dr
             await pilot.press("x")
         await press(pilot, "ctrl+o", "escape")
         assert pilot.app.screen is page
-        for key in ("h", "a", "enter"):
+        for key in ("h", "-", "a", "enter"):
             await press(pilot, key)
         assert session.sent == [] and "nothing was sent" in page.lines("said").plain
         await pilot.press("d")

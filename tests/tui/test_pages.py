@@ -12,6 +12,7 @@ from multidrop.tui.widgets.lines import width_of
 from tests.support.fake_session import a_move, a_talk, demo_session, emit, make_app, on_screen, press, settle, toasts
 
 pytestmark = pytest.mark.tui
+SPLIT = ("ctrl+p", *"split the", "enter")
 
 
 def rows(app: MultidropApp) -> list[str]:
@@ -74,7 +75,7 @@ async def test_a_key_shows_and_hides_a_panel_at_every_size(size: tuple[int, int]
         await settle(pilot)
         shown = "plot" in app.main.wants()
         assert shown is (size[0] >= 110)
-        await press(pilot, "ctrl+t")
+        await press(pilot, "ctrl+g", "ctrl+g")
         assert ("plot" in app.main.wants()) is not shown
         parts = [app.main.lines(name) for name, _ in app.main.columns()]
         assert any("last 20 s" in part.plain for part in parts) is not shown
@@ -123,7 +124,7 @@ async def test_the_other_half_shows_one_drive_and_a_key_types_to_it(size: tuple[
     app = make_app(session)
     async with app.run_test(size=size) as pilot:
         await emit(pilot, *a_talk(session))
-        await press(pilot, "ctrl+l", "down", "enter")
+        await press(pilot, *SPLIT, "down", "enter")
         beside = app.main.beside
         assert (beside.bus, beside.address) == ("press", "b")
         assert "@b PR VX" in beside.transcript.plain and "512000" not in beside.transcript.plain
@@ -132,7 +133,7 @@ async def test_the_other_half_shows_one_drive_and_a_key_types_to_it(size: tuple[
         await emit(pilot, Printed(session.time, "press", "b", "4711"), Printed(session.time, "press", "a", "4712"))
         assert "4711" in beside.transcript.plain and "4712" not in beside.transcript.plain
         assert app.main.lines("label").plain == " press:a ▸ "
-        await press(pilot, "ctrl+l")
+        await press(pilot, *SPLIT)
         assert app.main.lines("label").plain == " press:b ▸ " and (beside.bus, beside.address) == ("press", "a")
         await press(pilot, *"PR P", "enter")
         assert session.sent == ["press:b PR P"]
@@ -147,6 +148,6 @@ async def test_the_other_half_of_a_closed_line_goes_and_the_palette_ends_the_spl
         app.model.changed = True
         await settle(pilot)
         assert not app.main.beside.display
-        await press(pilot, "ctrl+l", "down", "enter")
+        await press(pilot, *SPLIT, "down", "enter")
         await press(pilot, "ctrl+p", *"one half", "enter")
         assert not app.main.beside.display

@@ -113,7 +113,7 @@ async def test_an_error_is_found_marked_and_gone_to(folder: Path) -> None:
         await settle(pilot)
         assert "✗ 1 error" in shown_heading(pilot) and "4:2" in shown(pilot).lines("below").plain
         assert "✗" in shown(pilot).editor.render_line(3).text
-        typed(pilot, "ctrl+home", "ctrl+l")
+        typed(pilot, "ctrl+home", "ctrl+f")
         await until(pilot, lambda: shown(pilot).editor.cursor_location == (3, 1))
         typed(pilot, "end", "backspace", "backspace")
         await until(pilot, lambda: not shown(pilot).findings.problems and not shown(pilot).findings.pending)

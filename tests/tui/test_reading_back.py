@@ -105,7 +105,7 @@ async def test_a_paused_view_says_so_and_a_typed_line_ends_the_pause() -> None:
     async with on_screen() as (pilot, app, session):
         await begun(pilot, session)
         await emit(pilot, *(Printed(session.time, "press", "a", f"{n}") for n in range(20)))
-        await pilot.press("ctrl+s")
+        await pilot.press("ctrl+b")
         await emit(pilot, *(Printed(session.time, "press", "a", f"{n}") for n in range(40)))
         assert "PAUSED   40 new below   Ctrl+S: go on" in plain(app)
         await press(pilot, *"PR P", "enter")
@@ -124,7 +124,7 @@ async def test_lines_are_picked_and_copied_by_keys_alone() -> None:
         assert sum(row.startswith("▌") for row in plain(app).split("\n")) == 3
         await pilot.press("enter")
         assert copied == ["at home\x06\n@* SL 0\nno drive answers a global command"]
-        await pilot.press("ctrl+y", "up", "space", "up", "escape")
+        await pilot.press("shift+up", "up", "space", "up", "escape")
         assert len(copied) == 1 and app.focused is app.main.entry
 
 

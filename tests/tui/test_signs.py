@@ -48,7 +48,7 @@ def test_the_signs_are_those_set_or_those_of_the_terminal(
 
 
 @pytest.mark.tui
-@pytest.mark.parametrize("keys", [("ctrl+t",), ("ctrl+x", "ctrl+p")])
+@pytest.mark.parametrize("keys", [("ctrl+g", "ctrl+g"), ("ctrl+x", "ctrl+p")])
 async def test_nothing_but_ascii_reaches_a_terminal_of_ascii(keys: tuple[str, ...]) -> None:
     session = demo_session()
     app = make_app(session)

@@ -79,7 +79,7 @@ def after(*keys: str, later: float = 0.0) -> Act:
 
 KEYS = {
     "main": (),
-    "plot": ("ctrl+t",),
+    "plot": ("ctrl+g", "ctrl+g"),
     "stopped": ("ctrl+x",),
     "completing": ("M", "tab"),
     "selector": ("ctrl+o",),
@@ -87,7 +87,7 @@ KEYS = {
     "lost": ("alt+3",),
     "drives": ("ctrl+a",),
     "palette": ("ctrl+p",),
-    "split": ("ctrl+l", "down", "enter"),
+    "split": ("ctrl+p", *"split the", "enter", "down", "enter"),
 }
 
 
@@ -118,14 +118,14 @@ def test_snapshot_of_a_stop_that_a_program_survives(snap_compare: Compare, size:
     assert drawn(snap_compare, size, act)
 
 
-@pytest.mark.parametrize("keys", ["", "ctrl+t", "ctrl+a"], ids=["main", "plot", "drives"])
+@pytest.mark.parametrize("keys", [(), ("ctrl+g", "ctrl+g"), ("ctrl+a",)], ids=["main", "plot", "drives"])
 @pytest.mark.parametrize("size", BOTH)
-def test_snapshot_in_units(snap_compare: Compare, size: str, keys: str) -> None:
+def test_snapshot_in_units(snap_compare: Compare, size: str, keys: tuple[str, ...]) -> None:
     """`a` has a scale and a travel, `b` one that is not confirmed, `c` none."""
     session = demo_session()
     session.units.give("a", {"scale": "5 mm/turn", "zero": "-20 mm", "travel": "-50..600 mm"})
     session.units.give("b", "-360 deg/turn").sure = False
-    assert drawn(snap_compare, size, after(*filter(None, [keys])), session=session)
+    assert drawn(snap_compare, size, after(*keys), session=session)
 
 
 def test_snapshot_of_values_that_have_grown_old(snap_compare: Compare) -> None:
@@ -169,7 +169,7 @@ def test_snapshot_of_many_lines_in_ascii(snap_compare: Compare) -> None:
 
     async def act(pilot: Pilot[int], session: FakeSession) -> None:
         pilot.app.act.show_signs(Signs.ASCII)  # type: ignore[attr-defined]
-        await after("ctrl+t")(pilot, session)
+        await after("ctrl+g", "ctrl+g")(pilot, session)
 
     assert drawn(snap_compare, "80x24", act, session=FakeSession(*buses))
 
@@ -197,7 +197,7 @@ SCREENS: dict[str, tuple[Callable[[FakeSession], None] | None, Sequence[str]]] =
     "find": (None, ("ctrl+f", *"pr")),
     "pick": (None, ("shift+up", "shift+up", "shift+up")),
     "errors": (only_errors, ()),
-    "paused": (a_flood, ("ctrl+s", "pageup")),
+    "paused": (a_flood, ("ctrl+b", "pageup")),
     "bytes": (the_bytes, ()),
 }
 

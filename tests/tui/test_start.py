@@ -78,7 +78,7 @@ async def test_a_port_is_opened_raw_on_its_key() -> None:
     app, session = made("/dev/ttyUSB0")
     async with app.run_test(size=(80, 24)) as pilot:
         await settle(pilot)
-        await press(pilot, "down", "down", "ctrl+r")
+        await press(pilot, "down", "down", "ctrl+b")
         assert session.raw == {"bus0"}
 
 
@@ -87,7 +87,7 @@ async def test_a_search_puts_the_url_of_what_it_finds_into_the_line() -> None:
     app, session = made("serial:/dev/ttyUSB0?baud=19200&drives=a")
     async with app.run_test(size=(80, 24)) as pilot:
         await settle(pilot)
-        await press(pilot, "down", "down", "ctrl+s")
+        await press(pilot, "down", "down", "ctrl+f")
         assert "found 1; Enter opens what is in the line" in outcome(app)
         await press(pilot, "enter")
         assert list(session.buses) == ["bus0"]
@@ -97,10 +97,10 @@ async def test_a_search_puts_the_url_of_what_it_finds_into_the_line() -> None:
 async def test_a_search_that_finds_nothing_says_so_and_a_stop_leaves_the_page_usable() -> None:
     app, session = made("sim:")
     async with app.run_test(size=(80, 24)) as pilot:
-        await press(pilot, *"/dev/gone", "ctrl+s")
+        await press(pilot, *"/dev/gone", "ctrl+f")
         assert "✗ /dev/gone: no drive replies" in outcome(app)
         app.screen.query_one("#url").value = "/dev/slow"  # type: ignore[attr-defined]
-        await press(pilot, "ctrl+s", "ctrl+x")
+        await press(pilot, "ctrl+f", "ctrl+x")
         assert isinstance(app.screen, Start) and session.stops == 1
         assert outcome(app) == "✗ stopped; the search has ended"
         app.screen.query_one("#url").value = "sim:"  # type: ignore[attr-defined]
@@ -113,7 +113,7 @@ async def test_the_url_of_a_port_can_be_edited() -> None:
     app, _ = made()
     async with app.run_test(size=(80, 24)) as pilot:
         await settle(pilot)
-        await pilot.press("down", "down", "ctrl+e")
+        await pilot.press("down", "down", "tab")
         assert app.screen.query_one("#url").value == "/dev/ttyUSB0?baud=9600"  # type: ignore[attr-defined]
         assert listed(app)[1].startswith("/dev/ttyUSB0?baud=9600")
 

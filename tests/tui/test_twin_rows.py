@@ -240,13 +240,13 @@ async def test_a_key_begins_and_ends_the_twins_of_the_line_as_typed_lines_do() -
 
 
 @pytest.mark.tui
-async def test_d_plots_the_difference_and_plots_it_no_longer() -> None:
+async def test_w_plots_the_difference_and_plots_it_no_longer() -> None:
     async with on_screen(width=100, height=30) as (pilot, _, session):
-        await press(pilot, "ctrl+g", "d")
+        await press(pilot, "ctrl+g", "w")
         session.plotted = (Series("press", "a"), Series("press", "a", DIFFERENCE), Series("press", "b", "VM"))
-        await pilot.press("d")
+        await pilot.press("w")
         session.plotted = (Series("press", "a", DIFFERENCE),)
-        await press(pilot, "d")
+        await press(pilot, "w")
         assert session.lines == [
             ("/plot press:a press:a.difference", By.OPERATOR),
             ("/plot press:a press:b.VM", By.OPERATOR),

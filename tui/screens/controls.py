@@ -279,6 +279,9 @@ class ControlsPage(AskingPage):
         """Send the control that was begun, unless a stop or another drive came in between."""
         if self._begun is not None and not self._painted:
             return  # an Enter that was typed before the line was seen
+        if self._homing:
+            self.action_drop()
+            return
         begun, self._begun = self._begun, None
         if begun is None:
             return
@@ -294,8 +297,8 @@ class ControlsPage(AskingPage):
     def action_home(self) -> None:
         """Ask for the direction of a homing: one letter begins none."""
         self.action_drop()
-        self._homing = True
-        self.say("home: - or + is the direction   Esc: nothing")
+        self._homing = not self._nothing()
+        self.say(self._nothing() or "home: - or + is the direction   Esc: nothing")
 
     def action_toward(self, sign: str) -> None:
         if self._homing:

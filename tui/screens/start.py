@@ -34,6 +34,8 @@ KINDS = (
     ("port", "Serial ports"),
     ("demo", "Without hardware"),
 )
+AGAIN = 3.0
+"""Seconds after which ports are looked for again."""
 Connect = Callable[[str, bool], Awaitable[str]]
 """Opens a URL, raw or not; returns an empty string, or one line with the reason of the failure."""
 
@@ -73,18 +75,17 @@ class Start(Over[None]):
         """Show what is known at once; add the ports when they are found."""
         self._fill()
         self.set_focus(self.query_one(Field))
-        self.action_look_again()
+        self.run_worker(self._look())
+        self.set_interval(AGAIN, self._look)
         if self._trouble:
             self.show(f"✗ {self._trouble}", bad=True)
 
-    def action_look_again(self) -> None:
-        self._found = None
-        self._fill()
-        self.run_worker(self._look(), exclusive=True, group="ports")
-
     async def _look(self) -> None:
-        self._found = await self._assist.ports()
-        self._fill()
+        """Look for ports, unless one is in use now: a search or an opening has it."""
+        found = self._found if self._opening else await self._assist.ports()
+        if found != self._found:
+            self._found = found
+            self._fill()
 
     def _listed(self, typed: str) -> list[StartEntry]:
         """The offers that contain the typed words, and the typed text itself as a URL."""

@@ -1,0 +1,121 @@
+"""The one table of keys: every key that is shown does something, and means the same wherever it works."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Iterable
+from pathlib import Path
+
+import pytest
+from textual import events
+from textual.pilot import Pilot
+
+from multidrop.tui.app import MultidropApp
+from multidrop.tui.key_table import SHEETS, all_groups
+from multidrop.tui.screens.dialogs import Field
+from multidrop.tui.screens.page import PAGES
+from tests.support import key_docs
+from tests.support.fake_session import FakeSession, a_move, a_talk, demo_session, make_app, settle
+
+SIZES = [(80, 24), (120, 40), (200, 50)]
+
+
+def single_keys(name: str) -> list[tuple[str, str]]:
+    """(key, action) of every key of a sheet, each alternative by itself."""
+    return [
+        (key, action) for each in SHEETS[name].keys for keys, action, _ in each.single for key in keys.split(",") if key
+    ]
+
+
+def test_the_table_in_the_documentation_is_the_table_of_the_program() -> None:
+    page = key_docs.PAGE.read_text(encoding="utf-8")
+    assert key_docs.written(page) == page, "python -m tests.support.key_docs writes it anew"
+
+
+def test_the_prefixes_of_screen_and_tmux_have_an_alternative() -> None:
+    for prefix, other in (("ctrl+a", "home"), ("ctrl+b", "insert")):
+        on = [name for name in SHEETS if any(key == prefix for key, _ in single_keys(name))]
+        assert on
+        for name in on:
+            beside = "main" if name == "app" else name
+            assert any(key == other for key, _ in single_keys(beside)), (prefix, name)
+
+
+def test_no_function_key_but_those_of_macros_moves_and_none_is_a_stop() -> None:
+    keys = {key: action for name in SHEETS for key, action in single_keys(name) if key[0] == "f" and key[1:].isdigit()}
+    assert keys.pop("f1") == "act.help"
+    assert set(keys.values()) == {f"act.play('F{n}')" for n in range(2, 13)}
+
+
+@pytest.mark.parametrize("name", SHEETS)
+def test_a_sheet_says_what_it_is_for_in_six_sentences_at_most(name: str) -> None:
+    sheet = SHEETS[name]
+    assert bool(sheet.about) is (sheet.title not in ("everywhere", "boxes"))
+    assert sheet.about.count(". ") + 1 <= 6
+    assert all(len(sentence.split()) <= 24 for sentence in sheet.about.split(". "))
+
+
+def noticed(app: MultidropApp, key: str) -> bool:
+    """True if a key has a function now that exists, or is a character for the part with the focus."""
+    found = app.keyboard._binding(key)
+    if found is None:
+        return False
+    target, name, _ = app._parse_action(found[0].action, found[1])
+    return hasattr(target, f"action_{name}") or hasattr(target, f"_action_{name}")
+
+
+def shown_keys(name: str) -> list[str]:
+    """Every key that footer and F1 show on a page, each alternative by itself, those that leave it last."""
+    keys = [
+        key
+        for of_group in all_groups(name).values()
+        for each in of_group
+        for keys, _, _ in each.single
+        for key in keys.split(",")
+        if key
+    ]
+    return list(dict.fromkeys(keys))
+
+
+async def walked(pilot: Pilot[int], session: FakeSession, name: str, keys: Iterable[str]) -> None:
+    """Press every key on a page: each is noticed, and after each the stop works."""
+    app = pilot.app
+    assert isinstance(app, MultidropApp)
+
+    screen = app.screen
+    for key in keys:
+        while app.screen is not app.main and getattr(app.screen, "SHEET", "") != name:
+            app.screen.dismiss(None)
+            await pilot.pause()
+        if name != "main" and app.screen is app.main:
+            await app.run_action(f"act.page('{name}')")
+        if name != "main" and isinstance(app.focused, Field) or app.screen is not screen:
+            await settle(pilot)  # a field that the stop has closed, or another page
+            screen = app.screen
+        assert noticed(app, key), f"{key} on {name}"
+        stops = session.stops
+        for each in (key, "ctrl+x"):
+            app.post_message(events.Key(each, each if len(each) == 1 else None))
+            while not app.keyboard.idle:
+                await asyncio.sleep(0)
+        assert session.stops == stops + 1, f"the stop after {key} on {name}"
+        app.tick()
+        assert app._exception is None, f"{key} on {name}"
+
+
+@pytest.mark.tui
+@pytest.mark.parametrize("size", SIZES, ids=lambda size: "x".join(map(str, size)))
+@pytest.mark.parametrize("name", ["main", *(page.name for page in PAGES)])
+async def test_every_key_that_is_shown_is_noticed_and_the_stop_works_after_it(
+    name: str, size: tuple[int, int], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("a.mxt").write_text("PG 1\nLB G1\nH 100\nE\nPG\n")
+    session = demo_session()
+    session.moves = ["a moves"]  # else ^Q ends the program without a question
+    app = make_app(session)
+    async with app.run_test(size=size) as pilot:
+        session.emit(*a_talk(session), *a_move(session))
+        app.texts.open("a.mxt")
+        await settle(pilot)
+        await walked(pilot, session, name, shown_keys(name))
