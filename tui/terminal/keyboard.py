@@ -150,7 +150,7 @@ class Keyboard:
         elif isinstance(field, TextArea) and not field.read_only and _plain(key):
             field.replace(self._run(key), *field.selection, maintain_selection_offset=False)
         else:
-            found = self._binding(key.key)
+            found = self._binding(key.key) or (self._binding(key.key.lower()) if len(key.key) == 1 else None)
             if found is not None:
                 binding, node, enabled = found
                 if enabled:

@@ -285,7 +285,7 @@ class Transcript(Lines, can_focus=False):
             left = [(f" {self.records.dropped} older lines were dropped", "dim")]
         right: list[Span] = []
         if sight.paused:
-            right = [(f" PAUSED   {sight.below} new below   Ctrl+S: go on ", "focus")]
+            right = [(f" PAUSED   {sight.below} new below   Ctrl+B: go on ", "focus")]
         elif not sight.following and sight.below:
             right = [(f" ▼ {sight.below} more below   Ctrl+End: follow ", "focus")]
         if not left and not right:
