@@ -107,7 +107,7 @@ async def test_a_paused_view_says_so_and_a_typed_line_ends_the_pause() -> None:
         await emit(pilot, *(Printed(session.time, "press", "a", f"{n}") for n in range(20)))
         await pilot.press("ctrl+b")
         await emit(pilot, *(Printed(session.time, "press", "a", f"{n}") for n in range(40)))
-        assert "PAUSED   40 new below   Ctrl+S: go on" in plain(app)
+        assert "PAUSED   40 new below   Ctrl+B: go on" in plain(app)
         await press(pilot, *"PR P", "enter")
         assert "PAUSED" not in plain(app) and "› PR P" in plain(app)
 
