@@ -125,9 +125,9 @@ SHEETS: dict[str, Sheet] = {
     ),
     "why": Sheet(
         "why",
-        "What is known of the trouble of the selected drive: its state, its error with its meaning, its program, what "
-        "was sent to it last, and its last 20 s. Nothing is read for it that a reading would clear. The keys below "
-        "help further, and the page shows a line before it is sent.",
+        "What is known of the trouble of the selected drive. It shows the error with its meaning, the program, what "
+        "was sent last, and the last 20 s. Nothing is read for it that a reading would clear. The keys below help "
+        "further, and the page shows a line before it is sent.",
         {
             "What helps": (
                 Key("r", "read_error", "read the number of the error, which clears it: Enter sends it", "read"),
