@@ -355,11 +355,11 @@ class Stopping:
         tries, until = 0, link.now() + RAMP
         while unconfirmed and link.now() < until:
             found = {drive: await _read(drive, halt) for drive in unconfirmed if not halt.started_since(drive)}
+            if self.last is not None and self.last.number > halt.number and not link.lost:
+                return  # a later stop of the whole link confirms it, by what is read after that
             for drive, each in found.items():  # whether this reading or a poll after it has confirmed that
                 if each.places and each.none and halt.fate(drive) is Fate.STANDING:
                     link.notify(f"{drive.shown}: stopped, velocity 0 at {each.places}")
-            if self.last is not None and self.last.number > halt.number and not link.lost:
-                return  # a later stop of the whole link confirms it
             active = {drive: each for drive, each in found.items() if not each.none and not halt.started_since(drive)}
             slow_down = all(each.lessens(before.get(drive)) for drive, each in active.items())
             before = found

@@ -12,6 +12,7 @@ from multidrop.shell.events import Failed, Notified, OnBus, Output, Printed
 from multidrop.shell.session import Session
 from multidrop.transports import telnet
 from multidrop.transports.relay import Kind, frame
+from multidrop.transports.relay_pipe import RelayPipe
 from soak.simulation.acts.phrases import STOP
 from soak.simulation.history import Shown, Stop
 from soak.simulation.watched_session import ASKED
@@ -69,6 +70,12 @@ def typed(world: World, data: bytes, session: Session, who: str = "") -> None:
         buses = {name: bus for name, bus in session.buses.items() if not bus.link.lost}
         forms = {f"{name}{who}": _forms(world, bus) for name, bus in buses.items()}
         trying = session.reconnections.trying
+        for name, bus in buses.items():
+            pipe = bus.link.transport
+            if (
+                isinstance(pipe, RelayPipe) and pipe._relay.room <= 0
+            ):  # the far side has taken nothing of the last stops
+                world.history.full.append((world.loop.now, f"{name}{who}"))
         lost = tuple(name + who for name, bus in session.buses.items() if bus.link.lost and name in trying)
         world.history.stops.append(Stop(world.loop.now, forms, who, len(world.history.written), lost=lost))
 

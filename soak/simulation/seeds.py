@@ -32,6 +32,10 @@ FIXED = {
     1155: "a stop that the port refused first (of the simulation itself)",
     1315: "the rest of a message to a relay, of which the judge asked the other end (of the simulation itself)",
     12175655: "the K of another client's OK, which was shown as a value",
+    1164: "an earlier stop, confirmed as another one came by what was read before that",
+    1406: "a stop behind 28 others that the far end of a relay had not taken (of the simulation itself)",
+    1499: "what noise left of two OKs, which was shown as a value",
+    1502: "a stored line that was typed before a stop, too (of the simulation itself)",
 }
 DERIVED = 12
 """The number of seeds that follow from the commit."""

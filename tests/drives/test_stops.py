@@ -287,6 +287,29 @@ async def test_many_stops_in_a_row_are_confirmed_by_the_last():
     assert "not known" not in shop.said
 
 
+async def test_what_was_read_before_a_stop_confirms_no_drive_after_it():
+    """A second stop comes between the second reading of the first drive, by a poll, and the words about it."""
+    shop = await SimulatedBus(*(party(name) for name in "abc")).open(*"abc")
+    a = shop.bus.drives["a"]
+
+    async def polls():
+        while True:
+            await a.motion(Priority.USER)
+            await asyncio.sleep(0.001)
+
+    first = len(shop.sent)
+    shop.bus.stop()
+    task = asyncio.create_task(polls())
+    await until(lambda: shop.sent[-1].startswith(b"cPR") and b"".join(shop.sent[first:]).count(b"aPR") > 1)
+    assert "stopped" not in shop.said
+    task.cancel()
+    second = len(shop.sent)
+    shop.bus.stop()
+    await until(lambda: "a: stopped" in shop.said)
+    assert any(data.startswith(b"aPR") for data in shop.sent[second:]), shop.said
+    await shop.bus.stopped()
+
+
 async def test_a_drive_that_was_only_spoken_to_is_stopped_too():
     shop = await SimulatedBus(party("a", ES=3, CK=0), party("q", EM=0, ES=2, CK=0)).open("a")
     await shop.bus.at("q").send("SL 50000")

@@ -23,9 +23,9 @@ GAP = 0.03
 """Seconds of quiet after a command of a stop, so that its reply does not collide with the next command."""
 FACTORY = "00"
 """The device number of a new unit."""
-DONE, VALUE = "OK", "(?!O?K$).*"
+DONE, VALUE = "OK", "(?![OK]+$).*"
 """The reply to a command that reads nothing, and to one that reads (manual 9). A late one of the other kind is none.
-Neither is the rest of an `OK` that began before the request."""
+Neither is what is left of several: no value has these letters alone."""
 WRITES_FLASH = re.compile(r"STORE|SA\d+=", re.ASCII)
 MARKED = re.compile(r"\?Q(\d\d)?\d{3}", re.ASCII)
 """The reply to a sync mark (`exchange`)."""

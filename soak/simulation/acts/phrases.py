@@ -61,7 +61,7 @@ PHRASES = {
         "R2={}",
         ("IP", "CP", "BD=19"),
         ("FD", 'DN="z"', "LK=1", "AS=3", "UG"),
-        "PG 300\nLB K{label}\nR2={value}\nMR {label}\nH\nE\nPG\n",
+        "PG 300\nLB K{label}\nR2={value}\nMR {value}\nH\nE\nPG\n",
         "SL {}\n",
         ".mxt",
         ("PG 500", "LB H{label}", "R2={value}", "MR {value}", "E", "PG"),

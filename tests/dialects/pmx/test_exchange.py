@@ -101,7 +101,13 @@ def test_an_answer_is_the_same_whole_and_byte_by_byte(text, data):
 
 @pytest.mark.parametrize(
     ("text", "heard", "found"),
-    [("V2=5", b"0\rOK\r", "OK"), ("X1000", b"1\rOK\r", "OK"), ("V1", b"OK\r7\r", "7"), ("V1", b"K\r7\r", "7")],
+    [
+        ("V2=5", b"0\rOK\r", "OK"),
+        ("X1000", b"1\rOK\r", "OK"),
+        ("V1", b"OK\r7\r", "7"),
+        ("V1", b"K\r7\r", "7"),
+        ("V1", b"OOK\r7\r", "7"),
+    ],
 )
 def test_a_late_answer_of_the_other_kind_is_none(text, heard, found):
     codec = Pmx()
