@@ -27,6 +27,8 @@ from multidrop.tui.tour import Tour
 from multidrop.tui.typist import Selection
 from multidrop.tui.widgets.theme import SignFilter, Signs, ink_of
 
+WATCHED = ("drives", "plot")
+"""The pages that a watcher has."""
 CTRL_C = "Ctrl+Q quits, Ctrl+X stops all drives"
 
 
@@ -272,6 +274,9 @@ class Actions:
         """Show a page in front of the main screen; one page at a time. Raises Diagnostic."""
         parts, app = self._parts, self._parts.app
         page = page_entry(name).page()
+        if parts.session.watching and name not in WATCHED:
+            parts.show_line(f"the page of {name} is at the host; a watcher has {' and '.join(WATCHED)}", "x")
+            return
         shown = next((each for each in app.screen_stack if isinstance(each, Page)), None)
         if shown is None:
             await app.push_screen(page(parts))

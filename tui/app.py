@@ -86,11 +86,14 @@ class MultidropApp(App[int]):
         assist: Assist,
         driver: type[Driver] | None = None,
         look: Look = DEFAULT_LOOK,
+        model: ScreenModel | None = None,
     ) -> None:
         # With NO_COLOR, only this makes Textual take colours away altogether; else it makes greys of them.
         super().__init__(driver_class=driver, ansi_color=True if "NO_COLOR" in os.environ else None)
         self.session, self.urls, self.assist = session, list(urls), assist
-        self.model = ScreenModel(lambda: session.selected_bus, lambda: session.buses, partial(figures_at, session))
+        self.model = model or ScreenModel(
+            lambda: session.selected_bus, lambda: session.buses, partial(figures_at, session)
+        )
         self.polling, self.macros = Polling(), FunctionKeys()
         self.keymap = keymap(bindings(), look.keys)
         self.presenter = Presenter(session, self.model, self.polling, self.macros, self.keymap)
@@ -244,6 +247,8 @@ class MultidropApp(App[int]):
         if self.urls:
             self.frames.first()
             self.call_after_refresh(self._begin)  # the first frame is shown before anything is opened
+        elif self.session.watching:
+            self.run_worker(self.session.open_all(()))
         elif not self.session.buses:
             await self.opener.ask()
             self.run_worker(self.assist.prepare())
@@ -386,7 +391,7 @@ class MultidropApp(App[int]):
 
     def show_line(self, text: str, mark: str = ".") -> None:
         """Append a line of the app's own to the transcript that is shown."""
-        self.model.page("").append(Record(self.session.now(), "", mark, text))
+        self.model.page("").append(Record(self.session.now(), "", mark, text, private=True))
         self.frames.wake()
 
     def _warn(self, text: str) -> None:

@@ -7,6 +7,7 @@ import os
 import signal
 import sys
 from collections.abc import Sequence
+from contextlib import AbstractContextManager, nullcontext
 from functools import partial
 
 from textual.driver import Driver
@@ -21,11 +22,16 @@ from multidrop.shell.signals import SIGNALS, early_ends, in_loop
 from multidrop.tui.app import MultidropApp
 from multidrop.tui.assist import Assist
 
+SCREENS = "screens"
+"""The folder of the sockets of shared screens, in the state folder."""
+READ_ONLY = "read only; Ctrl+X stops everything there, Ctrl+Q leaves"
 
-def run(urls: Sequence[str], reconnect: bool = True, raw: bool = False, twin: bool = False) -> int:
+
+def run(urls: Sequence[str], reconnect: bool = True, raw: bool = False, twin: bool = False, share: bool = False) -> int:
     """Show the URLs, a tab for each bus; without URLs, show the start page. Return the exit code.
 
     `reconnect`: lost buses are tried again. `raw`: the URLs are opened in raw mode. `twin`: each drive gets a twin.
+    `share`: others of this account may watch.
 
     Raises Diagnostic if there is no terminal, or if the configuration is wrong.
     """
@@ -36,10 +42,42 @@ def run(urls: Sequence[str], reconnect: bool = True, raw: bool = False, twin: bo
         raise Diagnostic("the screen needs a terminal", "tui", "multidrop shell reads lines from standard input")
     sys.setswitchinterval(SWITCH)
     with early_ends():
-        return asyncio.run(_run(urls, load(lenient=True), reconnect, raw, twin))
+        return asyncio.run(_run(urls, load(lenient=True), reconnect, raw, twin, share))
 
 
-async def _run(urls: Sequence[str], settings: Settings, reconnect: bool, raw: bool, twin: bool) -> int:
+def join(where: str) -> int:
+    """Watch a screen that this account shares, as `shell.watching.join.joined` finds it. Raises Diagnostic."""
+    if sys.platform == "win32":
+        raise Diagnostic("watching together is not there on Windows", "tui --join", "watch on Linux or macOS")
+    else:
+        from multidrop.shell.configuration import load
+        from multidrop.shell.prompt.keyboard import SWITCH
+        from multidrop.shell.watching.join import joined
+
+        settings = load(lenient=True)
+        connection, name, early = joined(where, settings.state / SCREENS)
+        if not (sys.stdin.isatty() and sys.stdout.isatty()):
+            connection.close(False)
+            raise Diagnostic("the screen needs a terminal", "tui --join")
+        sys.setswitchinterval(SWITCH)
+
+        async def body() -> int:
+            from multidrop.tui.watching import watch
+
+            app = watch(connection, early, settings, driver())
+            app.show_line(f"you watch the screen of {name}: {READ_ONLY}")
+            try:
+                return await show(app)
+            finally:
+                await app.session.close()
+
+        try:
+            return asyncio.run(body())
+        finally:
+            connection.close(False)
+
+
+async def _run(urls: Sequence[str], settings: Settings, reconnect: bool, raw: bool, twin: bool, share: bool) -> int:
     with importing():
         from multidrop.shell.log.writer import begin
         from multidrop.shell.prompt.collector import at_rest, collected_at_rest
@@ -53,10 +91,20 @@ async def _run(urls: Sequence[str], settings: Settings, reconnect: bool, raw: bo
             begin(session)
             if swallows():
                 session.doubted = stop_key_trial(session)
-            return await show(app)
+            with _sharing(app, settings) if share else nullcontext():
+                return await show(app)
     finally:
         await _leave(session)
         await session.close()
+
+
+def _sharing(app: MultidropApp, settings: Settings) -> AbstractContextManager[None]:
+    if sys.platform == "win32":
+        raise Diagnostic("watching together is not there on Windows", "tui --share", "share on Linux or macOS")
+    else:
+        from multidrop.tui.sharing import sharing
+
+        return sharing(app, settings.state / SCREENS)
 
 
 async def _leave(session: Session) -> None:

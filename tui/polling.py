@@ -55,6 +55,8 @@ class Polling:
 
     def update(self, session: Session, model: ScreenModel, wants: Container[str]) -> None:
         """Subscribe to what is shown, and end all other subscriptions. `wants`: as panels name it."""
+        if session.watching:
+            return
         chosen = plotted(session) if "plot" in wants else []
         drives = _drives(session, model, chosen, PLOT if "samples" in wants else REST) if self.on else {}
         watches = _watches(session) if self.on and "conditions" in wants else {}

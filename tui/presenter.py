@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 from multidrop.drives.bus import Bus
 from multidrop.shell.session import Session
@@ -14,7 +14,7 @@ from multidrop.tui.panels.table import column_rows
 from multidrop.tui.panels.view import View, glances_of
 from multidrop.tui.polling import Polling
 from multidrop.tui.readout import State
-from multidrop.tui.screen_model import BusFacts, ScreenModel, bus_old, bus_state
+from multidrop.tui.screen_model import BusFacts, Record, ScreenModel, bus_old, bus_state
 from multidrop.tui.screens.main_screen import MainScreen
 from multidrop.tui.screens.page import Framed, Page
 from multidrop.tui.widgets.bars import Tab, banner_row, footer_row, top_row
@@ -37,6 +37,10 @@ class Presenter:
         self._flooded = False
         self.behind = False
         """Records wait for the next paint of a transcript."""
+        self.on_records: Callable[[str, Sequence[Record]], None] = lambda bus, records: None
+        """Called with the new records of a bus."""
+        self.watchers: Sequence[str] = ()
+        """Who watches the screen."""
 
     def view(self, now: float) -> View:
         bus = self.session.buses.get(self.session.selected_bus)
@@ -81,6 +85,7 @@ class Presenter:
             if facts.fresh and (main.current or not name):  # else the page of no bus is about to become its page
                 main.page(name).take(facts.fresh)
                 main.beside.take(name, facts.fresh)
+                self.on_records(name, facts.fresh)
                 facts.fresh.clear()
 
     def _show_records(self, main: MainScreen, now: float) -> None:
@@ -97,12 +102,12 @@ class Presenter:
     def banner(self, width: int) -> Row:
         """The red line: what is known since a stop that is latched, and why a bus is lost."""
         bus = self.session.buses.get(self.session.selected_bus)
-        lost = self._loss(bus) if bus is not None else ""
+        lost = self.loss(bus) if bus is not None else ""
         if self.session.latched and not lost:
-            lost = next(filter(None, map(self._loss, self.session.buses.values())), "")
+            lost = next(filter(None, map(self.loss, self.session.buses.values())), "")
         return banner_row(self.session.tally() if self.session.latched else None, lost, width)
 
-    def _loss(self, bus: Bus) -> str:
+    def loss(self, bus: Bus) -> str:
         """The reason of a loss, and whether the bus is being tried again; empty while it is not lost."""
         if bus.lost is None:
             return ""
@@ -112,7 +117,8 @@ class Presenter:
         width = screen.size.width
         clock = f"{self.session.wall(now):%H:%M:%S}"
         playing = " ".join(each.short for each in self.session.playing)
-        row = top_row(self.tabs(now), self.session.recording, clock, width, self.session.log is not None, playing)
+        log = self.session.log is not None
+        row = top_row(self.tabs(now), self.session.recording, clock, width, log, playing, self.watchers)
         screen.lines("top").put([row])
         keys = footer(screen.SHEET)
         shown = [(self.keymap.shown(key.name) if key.name else key.shown, key.word) for key in keys]
@@ -133,6 +139,8 @@ class Presenter:
 
         In raw mode it is the bus.
         """
+        if self.session.watching:
+            return ((f" {self.session.watching} {':'.join(filter(None, self.session.place))} ▸ ", "motion"),)
         if self.session.selected_bus in self.session.raw:
             return ((f" {self.session.selected_bus} raw, /raw off ends ▸ ", "motion"),)
         drive = self.session.selected

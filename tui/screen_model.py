@@ -206,6 +206,8 @@ class Record(NamedTuple):
     """A person typed the line, or the one that it answers."""
     help: str = ""
     """The line that explains it: `/help 35`."""
+    private: bool = False
+    """A remark of this screen to its person, which watchers do not get."""
 
 
 @dataclass

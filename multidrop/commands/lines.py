@@ -9,7 +9,7 @@ from functools import partial
 from shlex import quote
 from typing import TYPE_CHECKING
 
-from multidrop.commands import refused
+from multidrop.commands import fail, refused
 from multidrop.dialects import Diagnostic
 from multidrop.dialects.on_demand import importing
 
@@ -115,16 +115,26 @@ def demo(chosen: argparse.Namespace) -> int:
 
 
 def tui(chosen: argparse.Namespace) -> int:
-    return _screen(chosen.urls, not chosen.no_reconnect, chosen.raw, chosen.twin)
+    if chosen.join is None:
+        return _screen(chosen.urls, not chosen.no_reconnect, chosen.raw, chosen.twin, chosen.share)
+    if chosen.urls or chosen.share or chosen.raw or chosen.twin:
+        raise Diagnostic("a watcher opens nothing itself", "tui --join", "give --join alone, or with ssh://HOST")
+    from multidrop.transports import TransportLost
+    from multidrop.tui.launch import join
+
+    try:
+        return join(chosen.join)
+    except TransportLost as problem:
+        return fail(problem)
 
 
-def _screen(urls: list[str], reconnect: bool = True, raw: bool = False, twin: bool = False) -> int:
+def _screen(urls: list[str], reconnect: bool = True, raw: bool = False, twin: bool = False, share: bool = False) -> int:
     if not (sys.stdin.isatty() and sys.stdout.isatty()):
         raise Diagnostic("the screen needs a terminal", hint="multidrop shell reads lines from anywhere")
     with importing():
         from multidrop.tui.launch import run
 
-    return run(urls, reconnect, raw, twin)
+    return run(urls, reconnect, raw, twin, share)
 
 
 def help_(chosen: argparse.Namespace) -> int:

@@ -97,6 +97,12 @@ def _relay(chosen: argparse.Namespace) -> int:
                 "multidrop relay",
                 f"open ssh://THIS-HOST{chosen.port} on the other machine",
             )
+        if chosen.port.startswith("screen:"):
+            from multidrop.shell.configuration import state_folder
+            from multidrop.shell.watching.join import connect, splice
+
+            splice(connect(chosen.port.partition(":")[2], state_folder() / "screens"))
+            return 0
         if "://" in chosen.port:
             from multidrop.shell.secrets import url_without_secrets
 

@@ -75,8 +75,18 @@ TUI = Operation(
     command="tui",
     meaning="show the screen, with a tab for each bus",
     run="lines.tui",
-    examples=["tui sim:", "tui press eth"],
-    arguments={**SHOWN},
+    examples=["tui sim:", "tui press eth", "tui press --share", "tui --join", "tui --join ssh://shop-floor"],
+    arguments={
+        **SHOWN,
+        "--share": "let others of this account watch, and stop, with --join",
+        "--join WHERE": typed(
+            "watch a shared screen: the only one here, its number, or ssh://HOST[/NUMBER]",
+            nargs="?",
+            const="",
+            default=None,
+            metavar="SCREEN",
+        ),
+    },
 )
 SHELL = Operation(
     command="shell",
@@ -335,7 +345,7 @@ RELAY = Operation(
     run="serving.relay",
     examples=["relay /dev/ttyUSB0", "relay /dev/ttyUSB0 --baud 115200"],
     arguments={
-        "PORT": "a serial port of this machine",
+        "PORT": "a serial port of this machine; screen: is the screen that it shares",
         "--baud N": typed("bits/s (default: 9600)", default=9600, type=any_baud),
     },
 )

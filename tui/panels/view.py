@@ -82,7 +82,7 @@ def glances_of(session: Session, model: ScreenModel, bus: Bus) -> list[Glance]:
     """The drives of a bus, as they are shown."""
     facts = model.bus(bus.name)
     for address in bus.drives:
-        facts.readout(address).show_in(partial(figures_at, session, bus.name, address))
+        facts.readout(address).show_in(partial(model.figures, bus.name, address))
     chosen = session.selected if bus.name == session.selected_bus else None
     return [
         Glance(

@@ -234,13 +234,24 @@ def tabs_row(tabs: Sequence[Tab], room: int) -> list[Span]:
     return _counted(tabs, room)
 
 
-def top_row(tabs: Sequence[Tab], recording: str, clock: str, width: int, log: bool = False, playing: str = "") -> Row:
-    """The whole line: tabs at the left; the macro that plays, recording, log and clock at the right."""
+def top_row(
+    tabs: Sequence[Tab],
+    recording: str,
+    clock: str,
+    width: int,
+    log: bool = False,
+    playing: str = "",
+    watchers: Sequence[str] = (),
+) -> Row:
+    """The whole line: tabs at the left; the macro that plays, recording, watchers, log and clock at the right."""
     right: list[Span] = []
     if playing:
         right.append((f" ▶ {fit(playing, 20).rstrip()} ", "motion"))
     if recording:
         right.append((f" ● rec {recording[:16]} ", "error"))
+    if watchers:
+        who = watchers[0] if len(watchers) == 1 and width >= 100 else str(len(watchers))
+        right.append((f" watched by {who[:24]} ", "accent"))
     if log:
         right.append((" ● log ", "text"))
     right.append((f" {clock} ", "dim"))

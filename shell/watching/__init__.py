@@ -1,0 +1,1 @@
+"""Watching together: a shared screen, its watchers, and the wire between them."""

@@ -1,0 +1,195 @@
+"""The wire between a shared screen and a watcher: JSON lines there, one byte back.
+
+Each end first sends a greeting with its version. Then the host sends lines. Each is a list of items, and an item is
+the name of a type, a bus, and the value: named tuples and dataclasses as lists of their fields, enumerations by name.
+A watcher sends nothing but the stop, 0x18, which the host confirms at once with `Heard`.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import getpass
+import json
+import socket
+from collections.abc import Callable, Iterable, Mapping
+from enum import Enum
+from functools import cache
+from types import NoneType, UnionType
+from typing import Any, NamedTuple, get_args, get_origin, get_type_hints
+
+import multidrop
+from multidrop.dialects.text import visible
+from multidrop.shell.secrets import without_secrets
+
+WORD = "multidrop-screen"
+STOP = b"\x18"
+LONGEST = 4 * 1024 * 1024
+"""The greatest length of a line, bytes."""
+LONGEST_GREETING = 200
+NAME = 40
+"""The greatest length of a watcher's name."""
+
+
+class Garbled(ValueError):
+    """The bytes are not those of a shared screen."""
+
+
+class Heard(NamedTuple):
+    """The host has written the stop that a watcher sent, once for each of its stops so far."""
+
+    stops: int
+
+
+class Dropped(NamedTuple):
+    """A watcher was not read in time: so many items were dropped, and the state follows anew."""
+
+    items: int
+
+
+class Now(NamedTuple):
+    """The time of the host's clock, s: a sign of life, once a second."""
+
+    at: float
+
+
+class Item(NamedTuple):
+    """A value for a bus; an empty name is none."""
+
+    value: Any
+    bus: str = ""
+
+
+def greeting() -> bytes:
+    name = f"{getpass.getuser()}@{socket.gethostname()}"
+    return f"{WORD} {multidrop.__version__} {visible(name)[:NAME]}\n".encode()
+
+
+def greeted(line: bytes) -> tuple[str, str]:
+    """The version and the name in a greeting. Raises Garbled."""
+    word, _, rest = line.decode(errors="replace").strip().partition(" ")
+    version, _, name = rest.partition(" ")
+    if word != WORD or not version or len(line) > LONGEST_GREETING:
+        raise Garbled("no greeting of a shared screen")
+    return visible(version), visible(name)[:NAME] or "a watcher"
+
+
+def other_version(version: str, there: str) -> str:
+    """The refusal of another version; empty for the own one."""
+    own = multidrop.__version__
+    return "" if version == own else f"{there} is multidrop {version}, this is {own}; install one version on both sides"
+
+
+def line(items: Iterable[Item]) -> bytes:
+    """One line of items; it has no secrets of URLs and keys."""
+    rows = [[type(value).__name__, bus, _plain(value)] for value, bus in items]
+    return json.dumps(rows, separators=(",", ":")).encode() + b"\n"
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, str):
+        return without_secrets(value)
+    if isinstance(value, Enum):
+        return value.name
+    if isinstance(value, tuple | frozenset):
+        return [_plain(each) for each in value]
+    if dataclasses.is_dataclass(value):
+        return [_plain(getattr(value, each.name)) for each in dataclasses.fields(value)]
+    return value
+
+
+class Items:
+    """The items of the lines that arrive, whatever pieces they come in. `types`: the types of values that are known."""
+
+    def __init__(self, types: Iterable[type]) -> None:
+        self._types: Mapping[str, type] = {each.__name__: each for each in types}
+        self._held = b""
+
+    def take(self, data: bytes) -> list[Item]:
+        """Take bytes; return the items of the lines that are complete. Raises Garbled."""
+        *lines, self._held = (self._held + data).split(b"\n")
+        if len(self._held) > LONGEST:
+            raise Garbled(f"a line of more than {LONGEST} bytes")
+        return [item for each in lines for item in self._items(each)]
+
+    def _items(self, line: bytes) -> list[Item]:
+        try:
+            rows = json.loads(line)
+        except (ValueError, RecursionError):
+            raise Garbled("a line that is not JSON") from None
+        if not isinstance(rows, list):
+            raise Garbled("a line that is not a list")
+        return [self._item(row) for row in rows]
+
+    def _item(self, row: Any) -> Item:
+        match row:
+            case [str(name), str(bus), value] if name in self._types:
+                return Item(_reader(self._types[name])(value), bus)
+        raise Garbled("an item of no known type")
+
+
+Reader = Callable[[Any], Any]
+
+
+@cache
+def _reader(kind: Any) -> Reader:
+    """The function that makes a value of a type from JSON. It raises Garbled for any other value."""
+    origin, arguments = get_origin(kind), get_args(kind)
+    if origin is UnionType:
+        return _optional(_reader(next(each for each in arguments if each is not NoneType)))
+    if origin is tuple and arguments[1:] == (...,):
+        return _several(_reader(arguments[0]))
+    if origin is tuple:
+        return _fields(tuple, [_reader(each) for each in arguments], lambda *values: values)
+    if issubclass(kind, Enum):
+        return _member(kind)
+    if kind in (str, bool, int, float):
+        return _scalar(kind)
+    hints = get_type_hints(kind)
+    names = kind._fields if issubclass(kind, tuple) else [each.name for each in dataclasses.fields(kind)]
+    return _fields(kind, [_reader(hints[name]) for name in names], kind)
+
+
+def _wrong(kind: type, value: Any) -> Garbled:
+    return Garbled(f"{str(value)[:NAME]!r} is no {kind.__name__}")
+
+
+def _scalar(kind: type) -> Reader:
+    valid: tuple[type, ...] = (float, int) if kind is float else (kind,)
+
+    def read(value: Any) -> Any:
+        if isinstance(value, valid) and (kind is bool or not isinstance(value, bool)):
+            return value
+        raise _wrong(kind, value)
+
+    return read
+
+
+def _member(kind: type[Enum]) -> Reader:
+    def read(value: Any) -> Any:
+        if isinstance(value, str) and value in kind.__members__:
+            return kind[value]
+        raise _wrong(kind, value)
+
+    return read
+
+
+def _optional(inner: Reader) -> Reader:
+    return lambda value: None if value is None else inner(value)
+
+
+def _several(inner: Reader) -> Reader:
+    def read(value: Any) -> Any:
+        if isinstance(value, list):
+            return tuple(map(inner, value))
+        raise _wrong(tuple, value)
+
+    return read
+
+
+def _fields(kind: type, inner: list[Reader], make: Callable[..., Any]) -> Reader:
+    def read(value: Any) -> Any:
+        if isinstance(value, list) and len(value) == len(inner):
+            return make(*(each(field) for each, field in zip(inner, value, strict=True)))
+        raise _wrong(kind, value)
+
+    return read

@@ -1,0 +1,284 @@
+"""The feed of a shared screen: what its watchers get of transcripts, values and the state of the session.
+
+Records go as the transcript shows them, values as the events that the screen model takes. They are gathered, and
+encoded once for all watchers, twenty times a second. While nobody watches only the last values are kept.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import sys
+from collections import deque
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import NamedTuple
+
+from multidrop.drives.events import Conditioned, Sample, Silent, Valued
+from multidrop.shell.events import (
+    Agreed,
+    Diverged,
+    Entered,
+    OnBus,
+    Predicted,
+    ProgramRead,
+    ProgramSeen,
+    Progressed,
+    SessionEvent,
+    StateChanged,
+    TwinEnded,
+)
+from multidrop.shell.roles import Series
+from multidrop.shell.stop_report import Found
+from multidrop.shell.watching.host import Calls, Gate, Watcher
+from multidrop.shell.watching.wire import Dropped, Heard, Item, Now, line
+from multidrop.tui.app import MultidropApp
+from multidrop.tui.figures import Figures
+from multidrop.tui.screen_model import Record
+
+assert sys.platform != "win32"
+
+BEAT = 0.05
+"""Seconds between two lines to the watchers."""
+LOOKS = 5
+"""Beats between two looks at the state."""
+SIGNS = 20
+"""Beats between two signs of life."""
+HISTORY = 2000
+"""Records of each transcript for a watcher that comes."""
+SAMPLES = 1000
+"""Samples of each axis for his plots."""
+AT_ONCE = 250
+"""Items of a line to him."""
+SERIES = (Sample, Valued, Predicted)
+"""Values of which a plot shows many."""
+ON_BUS = (*SERIES, Silent, Conditioned, Diverged, Agreed, TwinEnded)
+"""Values that are events of a bus."""
+LASTING = (*ON_BUS, ProgramRead, ProgramSeen)
+"""Events of which a watcher that comes needs the last."""
+VALUES = (*LASTING, Entered, Progressed)
+
+
+class SharedDrive(NamedTuple):
+    """A drive as it is shown."""
+
+    address: str
+    label: str
+    family: str
+    product: str
+    version: str
+    programming: bool
+    unreferenced: tuple[str, ...]
+
+
+class SharedBus(NamedTuple):
+    """An open bus. `number` tells it from others whatever its name; `lost` is the reason, empty while it is there."""
+
+    number: int
+    name: str
+    port: str
+    lost: str
+    drives: tuple[SharedDrive, ...]
+
+
+class SharedReadout(NamedTuple):
+    """How a drive is read, s between two polls and between two readings of conditions, and the figures of its axes."""
+
+    bus: str
+    address: str
+    period: float
+    watched: float
+    figures: tuple[tuple[str, Figures], ...]
+
+
+class SharedMacro(NamedTuple):
+    """A macro that plays."""
+
+    name: str
+    key: str
+    step: int
+    steps: int
+
+
+class Shared(NamedTuple):
+    """The state of a session, as far as a screen shows it. `found` and `vain`: the tally of the last stop."""
+
+    stops: int = -1
+    stopped_at: float = 0.0
+    latched: bool = False
+    found: tuple[Found, ...] = ()
+    vain: bool = False
+    selected: tuple[str, str] = ("", "")
+    recording: str = ""
+    log: str = ""
+    macros: tuple[SharedMacro, ...] = ()
+    plotted: tuple[Series, ...] = ()
+    buses: tuple[SharedBus, ...] = ()
+    readouts: tuple[SharedReadout, ...] = ()
+    watchers: tuple[str, ...] = ()
+
+
+TYPES = (Shared, Record, Now, Heard, Dropped, *VALUES)
+"""The values on the wire."""
+
+
+def shared(app: MultidropApp) -> Shared:
+    """The state of an app's session."""
+    session, presenter = app.session, app.presenter
+    buses, readouts = list[SharedBus](), list[SharedReadout]()
+    for bus in session.buses.values():
+        drives = tuple(
+            SharedDrive(
+                each.address,
+                each.label,
+                each.family.name,
+                each.product,
+                each.version,
+                each.programming,
+                tuple(sorted(each.state.unreferenced)),
+            )
+            for each in bus.drives.values()
+        )
+        buses.append(SharedBus(id(bus), bus.name, bus.link.transport.name, presenter.loss(bus), drives))
+        for address in bus.drives:
+            found = app.model.bus(bus.name).readout(address)
+            figures = tuple((axis.axis, axis.figures) for axis in found.axes)
+            readouts.append(SharedReadout(bus.name, address, found.period, found.watched, figures))
+    tally = session.tally() if session.latched else None
+    return Shared(
+        session.stops,
+        max(session.stopped_at, 0.0),
+        session.latched,
+        tally.found if tally is not None else (),
+        tally is not None and tally.vain,
+        (session.place.bus, session.place.address),
+        session.recording,
+        str(session.log.path) if session.log is not None else "",
+        tuple(SharedMacro(each.name, each.key, each.step, each.steps) for each in session.playing),
+        tuple(session.plotted),
+        tuple(buses),
+        tuple(readouts),
+        tuple(presenter.watchers),
+    )
+
+
+class Feed:
+    """Feeds the watchers of one app, and stops for them. Raises Diagnostic where the screen cannot be shared."""
+
+    def __init__(self, app: MultidropApp, folder: Path) -> None:
+        self._app, self._loop = app, asyncio.get_running_loop()
+        calls = Calls(app.stop_ahead, self._stop, self._joined, self._catch_up, self._left, self._refused)
+        self.gate = Gate(folder, self._loop, calls)
+        self._pending: list[Item] = []
+        self._last: dict[tuple[str, ...], deque[Item]] = {}
+        """The last values, by type, bus, address, and axis or word."""
+        self._state = Shared()
+        """The state as the watchers have it."""
+        self._changed = False
+        self._beats = 0
+        self._timer: asyncio.TimerHandle | None = None
+        self._unsubscribe = app.session.subscribe(self._take)
+        app.presenter.on_records = self._records
+
+    def close(self) -> None:
+        self._unsubscribe()
+        if self._timer is not None:
+            self._timer.cancel()
+        self.gate.close()
+
+    # What happens in the session
+
+    def _take(self, event: SessionEvent) -> None:
+        if isinstance(event, StateChanged):
+            self._changed = True
+            return
+        value, bus = (event.event, event.bus) if isinstance(event, OnBus) else (event, getattr(event, "bus", ""))
+        if not isinstance(value, VALUES):
+            return
+        item = Item(value, bus)
+        if isinstance(value, LASTING):
+            part = getattr(value, "axis", "") or getattr(value, "word", "")
+            key = (type(value).__name__, bus, value.address, part)
+            if (kept := self._last.get(key)) is None:
+                kept = self._last[key] = deque(maxlen=SAMPLES if isinstance(value, SERIES) else 1)
+            kept.append(item)
+        if self.gate.watchers:
+            self._pending.append(item)
+
+    def _records(self, bus: str, records: Sequence[Record]) -> None:
+        if self.gate.watchers:
+            self._pending += [Item(each, bus) for each in records if not each.private]
+
+    # To the watchers
+
+    def _beat(self) -> None:
+        self._timer = self._loop.call_later(BEAT, self._beat) if self.gate.watchers else None
+        self._beats += 1
+        if self._beats % SIGNS == 0:
+            self._pending.append(Item(Now(self._app.session.now())))
+        if self._changed or self._beats % LOOKS == 0:
+            self._changed = False
+            if (state := shared(self._app)) != self._state:
+                self._state = state
+                self._pending.append(Item(state))
+        self._flush()
+
+    def _flush(self) -> None:
+        items, self._pending = self._pending, []
+        data = line(items) if items and self.gate.watchers else b""
+        for each in self.gate.watchers if data else ():
+            each.put(data, len(items))
+
+    def _catch_up(self, watcher: Watcher, most: int = 1) -> None:
+        """Send the state and the last values, as many of each as `most`."""
+        buses = self._app.session.buses
+        self._last = {key: kept for key, kept in self._last.items() if key[1] in buses}
+        values = [item for kept in self._last.values() for item in list(kept)[-most:]]
+        values.sort(key=lambda item: item.value.at)
+        self._state = shared(self._app)
+        _put(watcher, [Item(Now(self._app.session.now())), Item(self._state), *values])
+
+    # Watchers
+
+    def _joined(self, watcher: Watcher) -> None:
+        self._flush()
+        app, watchers = self._app, self.gate.watchers
+        watchers.append(watcher)
+        app.presenter.watchers = [each.name for each in watchers]
+        self._catch_up(watcher, SAMPLES)
+        for bus, page in app.main.pages.items():
+            kept = page.records
+            numbers = range(max(kept.first, kept.taken - HISTORY), kept.taken)
+            _put(watcher, [Item(kept[each], bus) for each in numbers if not kept[each].private])
+        app.session.notify(f"{watcher.name} watches this screen", outcome=True)
+        if self._timer is None:
+            self._beat()
+
+    def _left(self, watcher: Watcher) -> None:
+        if watcher in self.gate.watchers:
+            self.gate.watchers.remove(watcher)
+            self._app.presenter.watchers = [each.name for each in self.gate.watchers]
+            self._app.session.notify(f"{watcher.name} no longer watches this screen", outcome=True)
+
+    def _refused(self, why: str) -> None:
+        self._app.session.notify(why, warning=True)
+
+    def _stop(self, name: str) -> None:
+        self._app.session.stop(f"stop by {name}, who watches")
+
+
+def _put(watcher: Watcher, items: Sequence[Item]) -> None:
+    for begin in range(0, len(items), AT_ONCE):
+        part = items[begin : begin + AT_ONCE]
+        watcher.put(line(part), len(part), keep=True)
+
+
+@contextmanager
+def sharing(app: MultidropApp, folder: Path) -> Iterator[None]:
+    """Share an app's screen with watchers of the same account. Raises Diagnostic where that cannot be."""
+    feed = Feed(app, folder)
+    app.session.notify("this screen is shared: `multidrop tui --join` watches it; elsewhere, --join ssh://THIS-HOST")
+    try:
+        yield
+    finally:
+        feed.close()
