@@ -127,7 +127,7 @@ class Presenter:
             [(self.keymap.shown("macro-page"), self.macros.place)] if screen.PLAYS and self.macros.place else []
         )
         first = [(self.keymap.shown("help"), "help"), *page_of_keys, *macros]
-        recording, latched = bool(self.session.recording), self.session.latched
+        recording, latched = bool(self.session.recording), self.session.latched and not self.session.watching
         screen.lines("footer").put([footer_row([*first, *shown], recording, latched, width, self.model.progress)])
 
     def _play_key(self, key: str) -> str:

@@ -382,6 +382,8 @@ def _add(bus: Bus, drive: SharedDrive) -> None:
     bus.drives[drive.address].label = drive.label
 
 
-def watch(connection: Connection, early: bytes, settings: Settings, driver: type[Driver]) -> MultidropApp:
+def watch(
+    connection: Connection, early: bytes, settings: Settings, driver: type[Driver] | None = None
+) -> MultidropApp:
     """Make the app of a watcher."""
     return Receiver(connection, Host(Stops(connection)), early).app(settings, driver)

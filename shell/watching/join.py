@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import os
+import re
 import select
 import socket
 import sys
@@ -12,7 +13,6 @@ import threading
 import time
 from pathlib import Path
 from typing import Protocol
-from urllib.parse import urlsplit
 
 from multidrop.dialects import Diagnostic
 from multidrop.shell.watching.host import peer
@@ -33,6 +33,7 @@ assert sys.platform != "win32"
 
 SCREEN = "screen:"
 """The port of `multidrop relay` that is a shared screen; a number may follow."""
+_FAR = re.compile(r"ssh://(?:([^@:/?#\s]+)@)?([^@:/?#\[\]\s]+|\[[0-9A-Fa-f:.]+\])(?::([0-9]{1,5}))?(?:/([0-9]*))?")
 _READ = 64 * 1024
 
 
@@ -93,19 +94,13 @@ def joined(where: str, folder: Path) -> tuple[Connection, str, bytes]:
 
 
 def _far(where: str) -> FarPort:
-    try:
-        parts = urlsplit(where)
-        port, number = parts.port or 0, parts.path.strip("/")
-    except ValueError:
-        port, number = 0, "?"
-    host = parts.hostname or "" if number != "?" else ""
-    wrong = number and not number.isdecimal()
-    if parts.scheme != "ssh" or not host or parts.password or parts.query or parts.fragment or wrong:
+    if (found := _FAR.fullmatch(where)) is None:
         from multidrop.shell.secrets import url_without_secrets
 
         hint = "as in --join ssh://HOST, or --join ssh://USER@HOST:22/NUMBER"
         raise Diagnostic("is no screen to join", url_without_secrets(where), hint)
-    return FarPort(host, SCREEN + number, parts.username or "", port)
+    user, host, port, number = found.groups("")
+    return FarPort(host.strip("[]"), SCREEN + number, user, int(port or 0))
 
 
 def _greet(connection: Connection, there: str, far: FarPort | None) -> tuple[str, bytes]:
