@@ -98,7 +98,7 @@ async def _run(urls: Sequence[str], settings: Settings, reconnect: bool, raw: bo
         await session.close()
 
 
-def _sharing(app: MultidropApp, settings: Settings) -> AbstractContextManager[None]:
+def _sharing(app: MultidropApp, settings: Settings) -> AbstractContextManager[object]:
     if sys.platform == "win32":
         raise Diagnostic("watching together is not there on Windows", "tui --share", "share on Linux or macOS")
     else:

@@ -274,11 +274,11 @@ def _put(watcher: Watcher, items: Sequence[Item]) -> None:
 
 
 @contextmanager
-def sharing(app: MultidropApp, folder: Path) -> Iterator[None]:
+def sharing(app: MultidropApp, folder: Path) -> Iterator[Feed]:
     """Share an app's screen with watchers of the same account. Raises Diagnostic where that cannot be."""
     feed = Feed(app, folder)
     app.session.notify("this screen is shared: `multidrop tui --join` watches it; elsewhere, --join ssh://THIS-HOST")
     try:
-        yield
+        yield feed
     finally:
         feed.close()
