@@ -24,7 +24,6 @@ from multidrop.tui.assist import Assist
 
 SCREENS = "screens"
 """The folder of the sockets of shared screens, in the state folder."""
-READ_ONLY = "read only; Ctrl+X stops everything there, Ctrl+Q leaves"
 
 
 def run(urls: Sequence[str], reconnect: bool = True, raw: bool = False, twin: bool = False, share: bool = False) -> int:
@@ -64,8 +63,7 @@ def join(where: str) -> int:
         async def body() -> int:
             from multidrop.tui.watching import watch
 
-            app = watch(connection, early, settings, driver())
-            app.show_line(f"you watch the screen of {name}: {READ_ONLY}")
+            app = watch(connection, name, early, settings, driver())
             try:
                 return await show(app)
             finally:

@@ -48,6 +48,7 @@ SILENCE = 3.0
 """Seconds without a sign of life that are said."""
 OWN = ("/help", "/page", "/clear", "/quit", "/use", "/times", "/filter")
 """The verbs that change only what this screen shows."""
+READ_ONLY = "read only; Ctrl+X stops everything there, Ctrl+Q leaves"
 REFUSED = "this screen only watches: Ctrl+X stops everything, and all other lines are typed at the host"
 
 
@@ -259,8 +260,9 @@ class MirrorModel(ScreenModel):
 class Receiver:
     """Takes what the host sends into the app and its session."""
 
-    def __init__(self, connection: Connection, host: Host, early: bytes) -> None:
-        self._connection, self._host, self._early = connection, host, early
+    def __init__(self, connection: Connection, host: Host, name: str, early: bytes) -> None:
+        """`name`: of the host; `early`: what it has sent already."""
+        self._connection, self._host, self._name, self._early = connection, host, name, early
         self._shared: dict[Bus, SharedBus] = {}
         """The mirrored buses, as they are."""
 
@@ -306,7 +308,10 @@ class Receiver:
     async def _take(self, item: Item) -> None:
         match item.value:
             case Shared() as state:
+                first = self._host.shared.stops < 0
                 await self._apply(state)
+                if first:
+                    self._app.show_line(f"you watch the screen of {self._name}: {READ_ONLY}")
             case Record() as record:
                 self._model.page(item.bus).append(record)
                 if record.mark in ("!", "x"):
@@ -383,7 +388,7 @@ def _add(bus: Bus, drive: SharedDrive) -> None:
 
 
 def watch(
-    connection: Connection, early: bytes, settings: Settings, driver: type[Driver] | None = None
+    connection: Connection, name: str, early: bytes, settings: Settings, driver: type[Driver] | None = None
 ) -> MultidropApp:
-    """Make the app of a watcher."""
-    return Receiver(connection, Host(Stops(connection)), early).app(settings, driver)
+    """Make the app of a watcher. `name`: of the host; `early`: what it has sent already."""
+    return Receiver(connection, Host(Stops(connection)), name, early).app(settings, driver)

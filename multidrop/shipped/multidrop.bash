@@ -13,7 +13,7 @@ _shtab_multidrop_config_subparsers=(path show check)
 _shtab_multidrop_subparsers=(demo tui shell send run sim program params macro plot poll publish share snapshot certify ports relay scan rescue log config help lsp report completion)
 
 _shtab_multidrop_demo_option_strings=(-h --help --no-config)
-_shtab_multidrop_tui_option_strings=(-h --help --raw --twin --no-reconnect --no-config)
+_shtab_multidrop_tui_option_strings=(-h --help --raw --twin --no-reconnect --share --join --no-config)
 _shtab_multidrop_shell_option_strings=(-h --help --raw --twin --no-reconnect --yes --beyond --no-config)
 _shtab_multidrop_send_option_strings=(-h --help --json --yes --beyond --no-config)
 _shtab_multidrop_run_option_strings=(-h --help --on --set --role --json --junit --yes --beyond --no-config)
@@ -176,6 +176,8 @@ _shtab_multidrop_tui___help_nargs=0
 _shtab_multidrop_tui___raw_nargs=0
 _shtab_multidrop_tui___twin_nargs=0
 _shtab_multidrop_tui___no_reconnect_nargs=0
+_shtab_multidrop_tui___share_nargs=0
+_shtab_multidrop_tui___join_nargs='?'
 _shtab_multidrop_tui___no_config_nargs=0
 _shtab_multidrop_shell_pos_0_nargs='*'
 _shtab_multidrop_shell__h_nargs=0

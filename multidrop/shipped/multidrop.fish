@@ -87,7 +87,7 @@ function _shtab_multidrop_using
 end
 
 set -g _shtab_multidrop_commands demo tui shell send run sim program 'program check' 'program test' 'program sweep' 'program convert' 'program list' 'program diff' 'program upload' 'program download' params 'params backup' 'params diff' 'params restore' macro 'macro list' 'macro show' 'macro play' 'macro edit' 'macro describe' 'macro rename' 'macro copy' 'macro delete' 'macro key' 'macro import' 'macro export' plot poll publish share snapshot certify ports relay scan rescue log 'log show' 'log follow' 'log grep' 'log judge' 'log replay' config 'config path' 'config show' 'config check' help lsp report completion
-set -g _shtab_multidrop_opts_with_value --against --allow --baud --break --cell --cluster --compare --dialect --drive --every --expect --jobs --junit --language --on --other --output --page --personality --random --rate --rfc2217 --role --rows --run --save --seed --serve --set --speed --tcp --times --to --until --vary --watch --with -o
+set -g _shtab_multidrop_opts_with_value --against --allow --baud --break --cell --cluster --compare --dialect --drive --every --expect --jobs --join --junit --language --on --other --output --page --personality --random --rate --rfc2217 --role --rows --run --save --seed --serve --set --speed --tcp --times --to --until --vary --watch --with -o
 
 complete -c multidrop -e
 complete -c multidrop -f
@@ -103,6 +103,8 @@ complete -c multidrop -n '_shtab_multidrop_using tui' -s h -l help -d 'show this
 complete -c multidrop -n '_shtab_multidrop_using tui' -l raw -d 'look for no drives: bytes both ways, with times and in hex'
 complete -c multidrop -n '_shtab_multidrop_using tui' -l twin -d 'run a simulated twin beside each drive; warn of differences'
 complete -c multidrop -n '_shtab_multidrop_using tui' -l no-reconnect -d 'give up a lost connection, and do not try again'
+complete -c multidrop -n '_shtab_multidrop_using tui' -l share -d 'let others of this account watch, and stop, with --join'
+complete -c multidrop -n '_shtab_multidrop_using tui' -l join -x -d 'watch a shared screen: the only one here, its number, or ssh://HOST[/NUMBER]'
 complete -c multidrop -n '_shtab_multidrop_using tui' -l no-config -d 'read no configuration file'
 complete -c multidrop -n '_shtab_multidrop_using tui; and test $_shtab_multidrop_npos -ge 0' -ka "(_multidrop_url)" -d 'what to open'
 complete -c multidrop -n '_shtab_multidrop_using; and test $_shtab_multidrop_npos -eq 0' -a shell -d 'Show the prompt; read lines from standard input if that is not a terminal.'

@@ -67,8 +67,8 @@ async def watched(url: str = "sim:#press", size: tuple[int, int] = (80, 24)) -> 
                 while host.session.selected is None:
                     await at_host.pause(0.01)
             with sharing(host, folder / "screens") as feed:
-                connection, _, early = await asyncio.to_thread(joined, "", folder / "screens")
-                watcher = watch(connection, early, Settings(folder=folder / "other", state=folder / "others"))
+                connection, name, early = await asyncio.to_thread(joined, "", folder / "screens")
+                watcher = watch(connection, name, early, Settings(folder=folder / "other", state=folder / "others"))
                 async with watcher.run_test(size=size) as pilot:
                     pair = Pair(host, at_host, watcher, pilot, connection, feed)
                     await pair.until(lambda: watcher.session.buses and host.presenter.watchers)
@@ -86,7 +86,8 @@ def texts(app: MultidropApp) -> list[str]:
 
 
 def remarks(app: MultidropApp) -> list[str]:
-    return [each.text for each in app.last_records(100) if each.private or each.mark == "x"]
+    kept = [each.text for each in app.last_records(100) if each.private or each.mark == "x"]
+    return [each for each in kept if not each.startswith("you watch the screen of ")]
 
 
 def shown(app: MultidropApp) -> str:
@@ -180,7 +181,9 @@ class Wire:
 async def fed(folder: Path, *values: object) -> AsyncIterator[tuple[Wire, MultidropApp, Pilot[int]]]:
     """A watcher to which the test sends values; the first is the state."""
     wire = Wire()
-    app = watch(wire, line(Item(each) for each in (STATE, *values)), Settings(folder=folder, state=folder / "state"))
+    app = watch(
+        wire, "anna@pc", line(Item(each) for each in (STATE, *values)), Settings(folder=folder, state=folder / "state")
+    )
     async with app.run_test(size=(80, 24)) as pilot:
         await until(lambda: app.session.selected_bus)
         await pilot.pause()
@@ -286,7 +289,7 @@ async def test_a_stop_that_cannot_be_delivered_is_not_reached(tmp_path: Path) ->
 @pytest.mark.virtual
 async def test_a_stop_that_the_host_does_not_confirm_in_time_is_not_reached(tmp_path: Path) -> None:
     wire = Wire()
-    session = watch(wire, b"", Settings(folder=tmp_path, state=tmp_path / "state")).session
+    session = watch(wire, "anna@pc", b"", Settings(folder=tmp_path, state=tmp_path / "state")).session
     session.stop()
     assert (wire.sent, [each.fate for each in session.tally().found], session.latched) == (b"\x18", [Fate.SENT], True)
     await asyncio.sleep(1.1)
