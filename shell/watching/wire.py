@@ -17,7 +17,7 @@ from functools import cache
 from types import NoneType, UnionType
 from typing import Any, NamedTuple, get_args, get_origin, get_type_hints
 
-import multidrop
+from multidrop.dialects.on_demand import imported
 from multidrop.dialects.text import visible
 from multidrop.shell.secrets import without_secrets
 
@@ -59,9 +59,14 @@ class Item(NamedTuple):
     bus: str = ""
 
 
+def own_version() -> str:
+    version: str = imported("multidrop:__version__")
+    return version
+
+
 def greeting() -> bytes:
     name = f"{getpass.getuser()}@{socket.gethostname()}"
-    return f"{WORD} {multidrop.__version__} {visible(name)[:NAME]}\n".encode()
+    return f"{WORD} {own_version()} {visible(name)[:NAME]}\n".encode()
 
 
 def greeted(line: bytes) -> tuple[str, str]:
@@ -75,7 +80,7 @@ def greeted(line: bytes) -> tuple[str, str]:
 
 def other_version(version: str, there: str) -> str:
     """The refusal of another version; empty for the own one."""
-    own = multidrop.__version__
+    own = own_version()
     return "" if version == own else f"{there} is multidrop {version}, this is {own}; install one version on both sides"
 
 
