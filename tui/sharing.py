@@ -172,6 +172,7 @@ class Feed:
         self._pending: list[Item] = []
         self._last: dict[tuple[str, ...], deque[Item]] = {}
         """The last values, by type, bus, address, and axis or word."""
+        self._of_no_bus: list[Record] = []
         self._state = Shared()
         """The state as the watchers have it."""
         self._changed = False
@@ -206,8 +207,11 @@ class Feed:
             self._pending.append(item)
 
     def _records(self, bus: str, records: Sequence[Record]) -> None:
+        """Take new records; those of the page of no bus come again once that becomes the page of the first bus."""
+        news = [each for each in records if not (each.private or any(each is other for other in self._of_no_bus))]
+        self._of_no_bus = [] if bus else [*self._of_no_bus, *news]
         if self.gate.watchers:
-            self._pending += [Item(each, bus) for each in records if not each.private]
+            self._pending += [Item(each, bus) for each in news]
 
     # To the watchers
 
