@@ -104,6 +104,16 @@ def plotted(session: Session) -> Sequence[Series]:
     return [Series(session.selected_bus, session.selected.address)]
 
 
+def moved_lately(session: Session, model: ScreenModel, since: float) -> Sequence[Series]:
+    """The drives of all lines that were read in motion since a time."""
+    return [
+        Series(bus.name, address)
+        for bus in session.buses.values()
+        for address in bus.drives
+        if model.bus(bus.name).readout(address).moved_at >= since
+    ]
+
+
 def _open(session: Session) -> list[Bus]:
     return [bus for bus in session.buses.values() if bus.lost is None]
 

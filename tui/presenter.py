@@ -45,7 +45,7 @@ class Presenter:
     def view(self, now: float) -> View:
         bus = self.session.buses.get(self.session.selected_bus)
         glances = [] if bus is None else glances_of(self.session, self.model, bus)
-        return View(self.session, self.model, glances, now, self.polling.on)
+        return View(self.session, self.model, glances, now, self.polling.on, keys=self.keymap, macros=self.macros)
 
     def tabs(self, now: float) -> list[Tab]:
         return [
@@ -152,9 +152,16 @@ class Presenter:
 
     def _paint_panels(self, main: MainScreen, view: View) -> None:
         """Paint the columns beside the transcript, or the panel and the status lines below it."""
-        for name, panels in main.columns():
+        joined: list[int] = []
+        for name, places in main.columns():
             size = main.size_of(name)
-            main.lines(name).put(column_rows(panels, view, size.width, size.height, border=main.wide))
+            rows = column_rows(places, view, size.width, size.height, border=name != "panel")
+            for y in joined if name != "panel" else ():  # titles at the left join the border
+                (edge, role), *rest = rows[y]
+                rows[y] = (("┤" if edge == "│" else "┼", role), *rest)
+            top = main.size_of("side").height - size.height
+            joined = [y + top for y, row in enumerate(rows) if row[:1] and row[0][0] in ("─", "├", "┼")]
+            main.lines(name).put(rows)
         if not main.wide:
             main.put_status(narrow_rows(view, main.size.width))
 

@@ -162,6 +162,12 @@ class Readout:
     """Time when a line was last sent to the drive: earlier values may be outdated."""
     failed_at: float = -math.inf
     """Time when a line for the drive last failed: its error is known."""
+    failure: tuple[str, float] | None = None
+    """The last error that the drive gave with its number, and when."""
+    sent: tuple[str, float] | None = None
+    """The last line for this drive alone, and when."""
+    moved_at: float = -math.inf
+    """Time at which an axis was last read in motion."""
     period: float = 0.0
     """Seconds between the requested polls; 0: as fast as the wire allows."""
     points: deque[Point] = field(default_factory=lambda: deque(maxlen=4096))
@@ -200,6 +206,8 @@ class Readout:
         """Take the reply to a poll. The axis of the first sample becomes the first axis."""
         if self.last is None:
             self.axis = sample.axis
+        if sample.velocity:
+            self.moved_at = sample.at
         if sample.program is not None:
             for program in (each.program for each in self.axes):
                 program.name = (program.name or "running") if sample.program else ""

@@ -261,6 +261,8 @@ class ScreenModel:
             case Entered():
                 if event.bus:
                     self._touch(self.bus(event.bus), event.address, event.at)
+                    if event.address not in EVERYONE and not event.line.startswith("/"):
+                        self.bus(event.bus).readout(event.address).sent = event.line, event.at
                 mine = event.by is By.OPERATOR
                 record = Record(event.at, event.address, ">" if mine else "»", event.line, mine=mine)
                 self.page(event.bus).append(record)
@@ -276,7 +278,10 @@ class ScreenModel:
             case Failed():
                 self.trouble = event.text
                 if event.bus and event.address:
-                    self.bus(event.bus).readout(event.address).failed_at = event.at
+                    readout = self.bus(event.bus).readout(event.address)
+                    readout.failed_at = event.at
+                    if event.code is not None:
+                        readout.failure = event.text[max(0, event.text.find("error ")) :], event.at
                 explained = "" if event.code is None else f"/help {event.code}"
                 mine = event.by is By.OPERATOR
                 record = Record(event.at, event.address, "x", event.text, mine=mine, help=explained)

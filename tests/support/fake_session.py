@@ -163,6 +163,7 @@ class FakeSession:
         self.selected_bus = buses[0].name if buses else ""
         self.addresses = {bus.name: next(iter(bus.drives), "") for bus in buses}
         self.reconnections = SimpleNamespace(trying=[])
+        self.openings = SimpleNamespace(url_of=lambda bus: f"sim:#{bus.name}")
         self.units = FakeUnits()
         self.scaled = True
         self.settings = Settings()

@@ -118,7 +118,7 @@ def test_a_row_fits_and_shows_the_trouble_at_every_width(width: int) -> None:
 # The split screen
 
 
-@pytest.mark.parametrize("size", [(80, 24), (200, 50)])
+@pytest.mark.parametrize("size", [(80, 24), (260, 50)])
 async def test_the_other_half_shows_one_drive_and_a_key_types_to_it(size: tuple[int, int]) -> None:
     session = demo_session()
     app = make_app(session)

@@ -12,6 +12,7 @@ from multidrop.drives.events import Sample
 from multidrop.drives.stopping import Fate
 from multidrop.shell.events import OnBus, StateChanged
 from multidrop.shell.stop_report import Found, Tally
+from multidrop.tui.panels.drive import drive_rows
 from multidrop.tui.panels.drives import narrow_rows
 from multidrop.tui.panels.table import PANELS, Panel, column_rows
 from multidrop.tui.panels.view import Glance, View, firmware_of
@@ -71,7 +72,7 @@ def test_columns_do_not_jump_when_values_change() -> None:
     for now in (1.0, 9.0):
         one, other = view(*small, now=now), view(*large, now=now)
         for left, right in zip(
-            column_rows(PANELS, one, 39, 14, True), column_rows(PANELS, other, 39, 14, True), strict=True
+            column_rows([PANELS[:1]], one, 39, 14, True), column_rows([PANELS[:1]], other, 39, 14, True), strict=True
         ):
             assert plain(left).rstrip().rfind("steps") == plain(right).rstrip().rfind("steps")
         rows = [narrow_rows(each, 80)[0] for each in (one, other)]
@@ -109,7 +110,7 @@ def test_a_column_takes_exactly_its_room_and_names_what_finds_none(
     others: int, height: int, border: bool, panels: list[Panel]
 ) -> None:
     drives = [glance("a", (1.0, 5, 5), selected=True), *(glance(str(n)) for n in range(others))]
-    rows = column_rows(panels, view(*drives), 39, height, border)
+    rows = column_rows([[each] for each in panels], view(*drives), 39, height, border)
     assert len(rows) == height
     assert all(width_of(row) <= 39 for row in rows)
     assert not border or all(plain(row)[0] in "│├" for row in rows)
@@ -177,7 +178,7 @@ def two_axes(width: int = 60) -> Glance:
 
 def test_both_axes_of_a_drive_are_shown_with_what_is_wrong_with_each() -> None:
     shown = two_axes()
-    wide = "\n".join(plain(row) for row in column_rows(PANELS, view(shown, now=10.0), 44, 30, True))
+    wide = "\n".join(plain(row) for row in drive_rows(view(shown, now=10.0), 44, 30))
     assert wide.index(" x ■ stopped") < wide.index("x ✗ minus limit error") < wide.index("1234")
     assert wide.index("1234") < wide.index(" y ▶ moving") < wide.index("-77")
     first, second, _ = (plain(row) for row in narrow_rows(view(shown, now=10.0), 120))

@@ -212,8 +212,8 @@ def test_snapshot_of_reading_back(snap_compare: Compare, name: str, size: str) -
 
     async def act(pilot: Pilot[int], session: FakeSession) -> None:
         main = pilot.app.main  # type: ignore[attr-defined]
-        for panel in main.panels.panels(main.wide):
-            main.toggle_panel(panel.name)  # they have pictures of their own
+        for name in [place[0].name for _, places in main.columns() for place in places]:
+            main.toggle_panel(name)  # they have pictures of their own
         await emit(pilot, *a_talk(session), *a_move(session))
         if prepare is not None:
             prepare(session)

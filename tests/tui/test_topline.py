@@ -94,5 +94,5 @@ def test_a_click_finds_the_tab_and_nothing_beside_the_tabs() -> None:
 
 
 def test_a_rule_joins_the_side_panel() -> None:
-    assert plain(rule_row(10, 4, "┬")) == "────┬─────"
-    assert plain(rule_row(10, None, "┬")) == "─" * 10
+    assert plain(rule_row(10, (4,), "┬")) == "────┬─────"
+    assert plain(rule_row(10, (), "┬")) == "─" * 10

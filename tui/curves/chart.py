@@ -131,6 +131,8 @@ class Look:
         """The words whose plots are hidden."""
         self.charts: dict[tuple[str, str, int], Chart] = {}
         """The charts that were drawn, by word, drive and width."""
+        self.numbers: dict[tuple[str, str, str], int] = {}
+        """The number of the colour of each axis that is plotted."""
 
     @property
     def span(self) -> float:

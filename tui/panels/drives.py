@@ -7,8 +7,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from operator import attrgetter
 
+from multidrop.shell.line_syntax import join_target
 from multidrop.tui.curves.raster import BRAILLE, Curve, Frame, Raster, Scale
 from multidrop.tui.curves.samples import Columns, Trace
 from multidrop.tui.panels.drive import (
@@ -25,7 +27,7 @@ from multidrop.tui.panels.drive import (
     to_go_words,
     trouble_of,
 )
-from multidrop.tui.panels.view import NOT_REFERENCED, Glance, View
+from multidrop.tui.panels.view import NOT_REFERENCED, Glance, View, glances_of
 from multidrop.tui.readout import READ, SPAN, Point, Readout, State
 from multidrop.tui.text import age, fit
 from multidrop.tui.widgets.lines import Row, Span, spread, width_of
@@ -151,11 +153,21 @@ def _besides(glance: Glance, axis: Readout, now: float, room: int, *, live: bool
 
 
 def drives_rows(view: View, width: int, height: int) -> list[Row]:
-    """A row for each drive of the selected bus, with its position over the last seconds."""
+    """A row for each drive of the selected bus, with its position over the last seconds; then those of other lines."""
     shown = kept(view.glances, height if len(view.glances) <= height else height - 1)
     rows = [_panel_row(glance, view.now, width) for glance in shown]
-    if others := len(view.glances) - len(shown):
-        rows.append(((f"   {others} more; ^A shows all drives", "dim"),))
+    left = len(view.glances) - len(shown)
+    for bus in view.session.buses.values():
+        if bus.name == view.session.selected_bus:
+            continue
+        if left or len(rows) + len(bus.drives) > height:
+            left += len(bus.drives)
+            continue
+        for each in glances_of(view.session, view.model, bus):
+            named = replace(each, address=join_target(bus.name, each.address).removesuffix(":"), label="")
+            rows.append(_panel_row(named, view.now, width))
+    if left and len(rows) < height:
+        rows.append(((f"   {left} more; ^A shows all drives", "dim"),))
     return rows
 
 

@@ -7,16 +7,17 @@ the same columns, so what happens at one time is in one column.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from itertools import count, zip_longest
 from typing import NamedTuple
 
 from multidrop.dialects.values import Conditions
-from multidrop.shell.roles import DIFFERENCE
+from multidrop.shell.roles import DIFFERENCE, Series
 from multidrop.tui.curves.chart import Chart, Extent, Look, Window
 from multidrop.tui.curves.raster import CURSOR, EMPTY, TWINS, Ink, Scale, row_of, ticks, with_cursor
 from multidrop.tui.curves.samples import PREDICTED, Quantity
 from multidrop.tui.figures import NATIVE, Conversion, Figures
 from multidrop.tui.panels.view import View
-from multidrop.tui.polling import plotted
+from multidrop.tui.polling import moved_lately, plotted
 from multidrop.tui.readout import Readout
 from multidrop.tui.text import age, digits, fit, short
 from multidrop.tui.widgets.lines import SERIES, Row, Span, width_of
@@ -94,17 +95,49 @@ class Group(NamedTuple):
         return f"{self.word} {names.pop()}" if len(names) == 1 else self.word
 
 
+def shown_series(view: View) -> Sequence[Series]:
+    """What is plotted: what was named; else the selected drive, and each one that moved in the time that is shown."""
+    named = view.only or plotted(view.session)
+    if view.only or view.session.plotted:
+        return named
+    look = view.model.look
+    since = (view.now if look.paused_at is None else look.paused_at) - look.span
+    return list(dict.fromkeys([*named, *moved_lately(view.session, view.model, since)]))
+
+
+def plot_shows(view: View) -> bool:
+    """True while there is a curve: something was named, or moved in the time that is shown, or the plot is paused."""
+    look = view.model.look
+    moved = moved_lately(view.session, view.model, view.now - look.span)
+    return bool(view.session.plotted or moved) or look.paused_at is not None
+
+
+def _numbers(view: View, drawn: Sequence[Series]) -> dict[tuple[str, str, str], int]:
+    """The number of the colour of each axis: it stays while the axis is plotted, whatever else moves."""
+    axes = [(*each[:2], axis) for each in drawn for axis in _axes(view, each)]
+    held = view.model.look.numbers
+    for gone in held.keys() - set(axes):
+        del held[gone]
+    for each in axes:
+        held.setdefault(each, next(number for number in count() if number not in held.values()))
+    return held
+
+
+def _axes(view: View, series: Series) -> list[str]:
+    return (view.model.traces.axes(*series[:2]) if series.of_motion else []) or [""]
+
+
 def groups(view: View) -> list[Group]:
     """The plotted lines by chart: velocities, positions, then values by their words. A twin's follow their drive's."""
     found: dict[tuple[str, str], list[Line]] = {}
-    numbers: dict[tuple[str, str, str], int] = {}
-    chosen = view.only or plotted(view.session)
-    for bus, address, word in chosen:
-        axes = view.model.traces.axes(bus, address) if word in ("", DIFFERENCE) else []
-        for axis in axes or [""]:
-            number = numbers.setdefault((bus, address, axis), len(numbers)) % len(SERIES)
+    drawn = shown_series(view)
+    numbers = _numbers(view, drawn)
+    several = len({each.bus for each in drawn}) > 1
+    for each_drawn in drawn:
+        bus, address, word = each_drawn
+        for axis in _axes(view, each_drawn):
+            number = numbers[bus, address, axis] % len(SERIES)
             drive = view.session.buses[bus].drives[address]
-            several = len({each.bus for each in chosen}) > 1
             where = ":".join(filter(None, (bus if several or not address else "", address)))
             name = " ".join(filter(None, (where, drive.label, axis)))
             for each in [word] if word else PLOTTED:
@@ -300,6 +333,8 @@ SAID = 8
 LOW = 3
 """Least rows of a chart."""
 ROOM = AXIS + 8
+HALF, HIGH = 36, 6
+"""Least width of one of two columns of charts; the rows below which charts are in two."""
 
 
 def plot_title(view: View) -> Row:
@@ -310,11 +345,13 @@ def plot_title(view: View) -> Row:
     return ((" plot ", "strong"), (f"{_span_words(look)} {rate_words(view)} {hidden}{zoomed}", "dim"))
 
 
-def _legend(ink: Ink, group: Group) -> list[Span]:
-    """Pieces of the lines with their names; under a title that names the only drive: `drive` and `twin`."""
-    own = [line for line in group.lines if not line.twin]
-    twins = [line for line in group.lines if line.twin]
-    names = [line.name for line in own] if len(own) > 1 else ["drive"]
+def _legend(ink: Ink, lines: Sequence[Line], alone: bool, room: int) -> list[Span]:
+    """Pieces of the lines with their names, short ones where there is little room; `drive` and `twin` of one drive."""
+    own = [line for line in lines if not line.twin]
+    twins = [line for line in lines if line.twin]
+    names = ["drive"] if alone else [line.name for line in own]
+    if not alone and sum(map(len, names)) + 4 * len(names) > room:
+        names = [line.short for line in own]
     row = [(f"{ink.sample(line.stroke)} {name} ", role_of(line.number)) for line, name in zip(own, names, strict=True)]
     if twins:
         samples = " ".join(dict.fromkeys(ink.sample(line.stroke) for line in twins))
@@ -340,9 +377,25 @@ def rate_words(view: View) -> str:
     return f"{high:.0f} Hz" if high - low < 2 else f"{low:.0f}-{high:.0f} Hz"
 
 
+def panel_rows(view: View, width: int, height: int) -> list[Row]:
+    """The charts of the panel: velocities beside positions where they would be low, one below the other."""
+    found = groups(view)
+    if len(found) > 2 and width >= 2 * HALF and height < HIGH * len(found):
+        half = width // 2
+        speeds = [each for each in found if each.word == PLOTTED[0]]
+        left = _charts(view, speeds, half - 1, height)
+        right = _charts(view, [each for each in found if each not in speeds], width - half, height)
+        both = zip_longest(left, right, fillvalue=())
+        return [(*one, (" " * (half - width_of(one)), "text"), *other) for one, other in both]
+    return plot_rows(view, width, height)
+
+
 def plot_rows(view: View, width: int, height: int) -> list[Row]:
     """The charts one below the other, in at most `height` rows; fewer where nothing moves."""
-    found = groups(view)
+    return _charts(view, groups(view), width, height)
+
+
+def _charts(view: View, found: Sequence[Group], width: int, height: int) -> list[Row]:
     if not found:
         return [((fit(" nothing to plot: no drive is selected", width), "dim"),)]
     if width < ROOM or height < 1:
@@ -435,7 +488,9 @@ def _stacked(view: View, shown: Sequence[Shown], window: Window, width: int, hei
             unit = each.group.lines[0].unit
             title: list[Span] = [(f" {each.group.title} ", "strong"), (f"{unit} " if unit else "", "dim")]
             if len(each.group.lines) > 1 and not gutter(width):  # else the names end the lines
-                title += _legend(view.model.look.ink, each.group)
+                alone = len({line.name for line in each.group.lines}) == 1
+                lines = each.group.lines if alone else tuple(each.moving)
+                title += _legend(view.model.look.ink, lines, alone, width - width_of(title))
             while width_of(title) > width and len(title) > 1:
                 title.pop()
             rows.append(tuple(title))

@@ -73,6 +73,14 @@ def program_title(view: View) -> Row:
     )
 
 
+def program_shows(view: View) -> bool:
+    """True if the program of the selected drive was read, or runs."""
+    if (chosen := view.chosen) is None:
+        return False
+    program = chosen.readout.program
+    return bool(program.lines or program.name) or program.line is not None or chosen.storing
+
+
 def program_rows(view: View, width: int, height: int) -> list[Row]:
     """The lines around the current one; a hint where the host has not read them."""
     chosen = view.chosen
@@ -85,7 +93,10 @@ def program_rows(view: View, width: int, height: int) -> list[Row]:
         return [((fit(" the drive holds no program", width), "dim"),)]
     read = f"read {view.session.wall(facts.read_at):%H:%M:%S}"
     if spot is None:
-        return [((fit(f" {len(facts.lines)} lines, {read}", width), "dim"),)]
+        return [
+            ((fit(f" {len(facts.lines)} lines, {read}", width), "dim"),),
+            *listing_rows(chosen.readout, width, height - 1),
+        ]
     return listing_rows(chosen.readout, width, height)
 
 

@@ -1,8 +1,9 @@
 """The panels by name: what each shows, how much room it takes, what must be polled for it, and its key.
 
-The order is that of the screen, from top to bottom. On a wide screen several are shown, one above the other in a
-column; on a narrow one a single one, below the transcript. A panel gets between its least and its most rows. Room that
-one does not use goes to those below it, and then to those above it that can use more.
+On a wide screen several are shown, in places: below the transcript, and in columns beside it. Where the places are
+rests on the size of the screen and on the panels that a person has hidden, never on what they show. Panels that share a
+place have it in turn: one that has nothing to show leaves it to the next one, and so does the room that it does not
+use. On a narrow screen there is a single panel, below the transcript.
 """
 
 from __future__ import annotations
@@ -10,10 +11,11 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
-from multidrop.tui.panels.drive import drive_rows, drive_title
+from multidrop.tui.panels.drive import drive_title
 from multidrop.tui.panels.drives import drives_rows
-from multidrop.tui.panels.plot import plot_rows, plot_title
-from multidrop.tui.panels.program import program_rows, program_title
+from multidrop.tui.panels.facts import cards_rows, next_rows, selected_rows
+from multidrop.tui.panels.plot import panel_rows, plot_shows, plot_title
+from multidrop.tui.panels.program import program_rows, program_shows, program_title
 from multidrop.tui.panels.traffic import traffic_rows, traffic_title
 from multidrop.tui.panels.view import View
 from multidrop.tui.text import fit, visible
@@ -72,15 +74,17 @@ class Panel(NamedTuple):
     """One line for the palette."""
     first: bool = True
     """Shown on a wide screen until a person hides it."""
+    shows: Callable[[View], bool] = lambda view: True
+    """Whether it has something to show; if not, the next one in its place is shown."""
 
 
 PANELS: tuple[Panel, ...] = (
     Panel(
         "drive",
         drive_title,
-        drive_rows,
+        selected_rows,
         9,
-        20,
+        14,
         frozenset({MOTION, CONDITIONS}),
         "position, travel, state, lamps, error and program",
     ),
@@ -89,12 +93,24 @@ PANELS: tuple[Panel, ...] = (
         "program",
         program_title,
         program_rows,
-        1,
-        9,
+        3,
+        60,
         frozenset({MOTION, CONDITIONS}),
         "the lines around the current one",
+        shows=program_shows,
     ),
-    Panel("plot", plot_title, plot_rows, 8, 60, frozenset({MOTION, PLOT}), "velocity and position"),
+    Panel("next", "what to press", next_rows, 3, 60, frozenset(), "keys, macros and lines that go on from here"),
+    Panel(
+        "plot",
+        plot_title,
+        panel_rows,
+        8,
+        60,
+        frozenset({MOTION, PLOT}),
+        "velocity and position of what moves",
+        shows=plot_shows,
+    ),
+    Panel("cards", "lines and drives", cards_rows, 3, 60, frozenset(), "what every line and drive is"),
     Panel("traffic", traffic_title, traffic_rows, 3, 40, frozenset(), "the bytes of the line, both ways", first=False),
     Panel(
         "log",
@@ -109,6 +125,24 @@ PANELS: tuple[Panel, ...] = (
 )
 
 
+Place = Sequence[Panel]
+"""Panels that share a place."""
+Places = tuple[tuple[str, ...], ...]
+_PLOT, _PROGRAM = ("plot", "cards"), ("program", "next")
+_ASKED_FOR: Places = (("traffic",), ("log",))
+LAYOUTS: dict[tuple[bool, bool], dict[str, Places]] = {
+    (False, False): {"side": (("drive",), ("drives",), _PROGRAM, _PLOT, *_ASKED_FOR)},
+    (False, True): {"panel": (_PLOT,), "side": (("drive",), ("drives",), _PROGRAM, *_ASKED_FOR)},
+    (True, False): {"far": (("drive",), _PLOT), "side": (("drives",), _PROGRAM, *_ASKED_FOR)},
+    (True, True): {
+        "panel": (_PLOT,),
+        "far": (("drive",), ("program", "traffic")),
+        "side": (("drives",), ("next",), ("log",)),
+    },
+}
+"""The places in each part of a wide screen, from top to bottom, by two columns or one, and by room below."""
+
+
 def panel(name: str) -> Panel:
     return next(each for each in PANELS if each.name == name)
 
@@ -121,61 +155,85 @@ class Shown:
         self._alone = ""
         """The panel of a narrow screen."""
 
-    def panels(self, wide: bool) -> list[Panel]:
-        """The panels to show, from top to bottom."""
-        if not wide:
-            return [panel for panel in PANELS if panel.name == self._alone]
-        return [panel for panel in PANELS if self._by_hand.get(panel.name, panel.first)]
+    def alone(self) -> list[Place]:
+        """The places of a narrow screen."""
+        return [[panel(self._alone)]] if self._alone else []
 
-    def toggle(self, name: str, wide: bool) -> bool:
-        """Show a panel, or hide it; return whether it is shown now."""
-        on = name not in [panel.name for panel in self.panels(wide)]
+    def places(self, wanted: Places) -> list[Place]:
+        """These places of a wide screen with the panels in them. One is there while its first panel is shown."""
+        return [
+            [panel(name) for name in place if self._by_hand.get(name, True)]
+            for place in wanted
+            if self._by_hand.get(place[0], panel(place[0]).first)
+        ]
+
+    def switch(self, name: str, on: bool, wide: bool) -> None:
+        """Show a panel, or hide it."""
         if wide:
             self._by_hand[name] = on
         if not wide or on:
             self._alone = name if on else ""
-        return on
 
 
 HEAD = 1
 """Rows of a title."""
 
 
-def fitting(panels: Sequence[Panel], height: int) -> list[Panel]:
-    """The panels that find room, first come, first served."""
-    shown: list[Panel] = []
-    for panel in panels:
-        if sum(each.least + HEAD for each in [*shown, panel]) <= height:
-            shown.append(panel)
+def side_width(width: int) -> int:
+    """The width of a column of panels on a screen."""
+    return min(max(width * 3 // 8, 39), 60)
+
+
+def fitting(places: Sequence[Place], height: int) -> list[Place]:
+    """The places that find room, first come, first served."""
+    shown: list[Place] = []
+    for place in places:
+        if sum(each[0].least + HEAD for each in [*shown, place]) <= height:
+            shown.append(place)
     return shown
 
 
-def divided(panels: Sequence[Panel]) -> tuple[list[Panel], list[Panel]]:
-    """The panels in two columns of about equal need, in their order."""
-    needs = [panel.least + HEAD for panel in panels]
-    cuts = range(min(1, len(panels)), len(panels) + 1)
-    cut = min(cuts, key=lambda n: abs(sum(needs[:n]) - sum(needs[n:])))
-    return list(panels[:cut]), list(panels[cut:])
+def heights(places: Sequence[Place], height: int) -> list[int]:
+    """The rows of each place with its title; the last one takes what the others cannot use."""
+    room = height - sum(place[0].least + HEAD for place in places)
+    given: list[int] = []
+    for number, (first, *_) in enumerate(places):
+        spare = -(-room // (len(places) - number))
+        more = spare if number == len(places) - 1 else min(first.most - first.least, spare)
+        given.append(first.least + HEAD + more)
+        room -= more
+    return given
 
 
-def column_rows(panels: Sequence[Panel], view: View, width: int, height: int, border: bool) -> list[Row]:
+def column_rows(places: Sequence[Place], view: View, width: int, height: int, border: bool) -> list[Row]:
     """Exactly `height` rows of `width` cells with these panels, with a border at the left if there is one."""
-    shown = fitting(panels, height)
-    left_out = [panel.name for panel in panels if panel not in shown]
+    shown = fitting(places, height)
+    left_out = [place[0].name for place in places if place not in shown]
     if left_out:
         height -= 1
         shown = fitting(shown, height)
-        left_out = [panel.name for panel in panels if panel not in shown]
+        left_out = [place[0].name for place in places if place not in shown]
     side: Row = (("│", "rule"),) if border else ()
     rows: list[Row] = []
-    for panel, body in zip(shown, _bodies(shown, view, width - len(side), height), strict=True):
-        rows.append(title_row(panel, view, width, "├" if border else "─"))
-        rows += [(*side, *row) for row in body]
+    for place, given in zip(shown, heights(shown, height), strict=True):
+        rows += _place_rows(place, view, width, given, side)
     rows += [side] * (height - len(rows))
     if left_out:
         text = fit(f" no room: {', '.join(left_out)}", width - len(side))
         rows.append((*side, (text, "dim")))
     return rows
+
+
+def _place_rows(place: Place, view: View, width: int, height: int, side: Row) -> list[Row]:
+    """The rows of a place: its panels that have something to show, each in the rows that those before it leave."""
+    rows: list[Row] = []
+    for each in [panel for panel in place if panel.shows(view)] or place[:1]:
+        room = height - len(rows) - HEAD
+        if room < (each.least if rows else 0):
+            break
+        rows.append(title_row(each, view, width, "├" if side else "─"))
+        rows += [(*side, *row) for row in each.rows(view, width - len(side), room)[:room]]
+    return [*rows, *[side] * (height - len(rows))]
 
 
 def title_row(panel: Panel, view: View, width: int, edge: str) -> Row:
@@ -185,22 +243,3 @@ def title_row(panel: Panel, view: View, width: int, edge: str) -> Row:
         room = width - width_of(kept)
         kept.append((text if width_of([(text, role)]) <= room else fit(text, room), role))
     return (*kept, ("─" * max(0, width - width_of(kept)), "rule"))
-
-
-def _bodies(panels: Sequence[Panel], view: View, width: int, height: int) -> list[list[Row]]:
-    room = height - sum(panel.least + HEAD for panel in panels)
-    bodies: list[list[Row]] = []
-    given: list[int] = []
-    for number, panel in enumerate(panels):
-        spare = -(-room // (len(panels) - number))
-        given.append(min(panel.most, panel.least + spare))
-        body = panel.rows(view, width, given[-1])[: given[-1]]
-        room -= len(body) - panel.least
-        bodies.append(body)
-    for number, panel in enumerate(panels):
-        more = min(panel.most - len(bodies[number]), room)
-        if more > 0 and len(bodies[number]) == given[number]:
-            body = panel.rows(view, width, given[number] + more)[: given[number] + more]
-            room -= len(body) - len(bodies[number])
-            bodies[number] = body
-    return bodies

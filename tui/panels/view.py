@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import partial
 
 from multidrop.drives.bus import Bus
 from multidrop.shell.roles import Series
 from multidrop.shell.session import Session
 from multidrop.tui.figures import NATIVE, Figures, figures_of
+from multidrop.tui.keymap import FunctionKeys, Keymap
 from multidrop.tui.readout import READ, Readout, State
 from multidrop.tui.screen_model import ScreenModel
 from multidrop.tui.text import fit
@@ -121,6 +122,8 @@ class View:
     """False while the person has switched polling off."""
     only: tuple[Series, ...] = ()
     """The series that are plotted in place of those that the person chose."""
+    keys: Keymap = field(default_factory=Keymap)
+    macros: FunctionKeys = field(default_factory=FunctionKeys)
 
     @property
     def chosen(self) -> Glance | None:

@@ -14,7 +14,7 @@ from textual.geometry import Size
 
 from multidrop.shell.roles import Filter
 from multidrop.tui.key_table import bound
-from multidrop.tui.panels.table import CONDITIONS, MOTION, PANELS, Panel, Shown, divided, fitting
+from multidrop.tui.panels.table import CONDITIONS, LAYOUTS, MOTION, PANELS, Place, Shown, fitting, side_width
 from multidrop.tui.screen_model import Record
 from multidrop.tui.screens.page import Framed
 from multidrop.tui.sheets import NONE
@@ -36,9 +36,10 @@ class Half(Transcript):
 class Beside(Vertical):
     """A heading and a transcript that copies what another one takes in. Hidden while it shows nothing."""
 
-    def __init__(self, clock: Callable[[float], str]) -> None:
+    def __init__(self, clock: Callable[[float], str], changed: Callable[[], None]) -> None:
         super().__init__(id="beside")
         self.display = False
+        self._changed = changed
         self.bus, self.address = "", ""
         """The line that it shows, and the one drive on it; an empty address is all of the line."""
         self._heading = Lines(id="beside-head")
@@ -56,11 +57,13 @@ class Beside(Vertical):
         self.transcript.set_times(of.clocks.form)
         self.transcript.choose(Filter(address=address))
         self.transcript.extend(of.records)
+        self._changed()
 
     def hide(self) -> None:
         self.bus = self.address = ""
         self.display = False
         self.transcript.clear()
+        self._changed()
 
     def take(self, bus: str, records: Iterable[Record]) -> None:
         if self.display and bus == self.bus:
@@ -79,10 +82,10 @@ class Beside(Vertical):
 
 WIDE = (110, 24)
 """Smallest width and height with a column of panels."""
+TALL = 32
+"""Smallest height with panels below the transcript, too."""
 VERY_WIDE = 200
-"""Smallest width with two of them."""
-SIDE = (39, 60)
-"""Least and greatest width of a column."""
+"""Smallest width with two columns."""
 HALF = 60
 """Width from which the halves of a split screen are side by side; else they are one above the other."""
 PLAIN = ("rule-above", "panel", "side", "far", "rule-below", "tour", "status", "label", "hint")
@@ -130,7 +133,7 @@ class MainScreen(Framed):
         self.entry = Entry(complete, history, typed, pasted, id="entry")
         self.menu = Menu(id="menu")
         self._stack = Vertical(id="pages")
-        self.beside = Beside(clock)
+        self.beside = Beside(clock, self.make_room)
         self._halves = Vertical(self.beside, self._stack, id="halves")
         # Stored, not looked up: they are painted thirty times a second, and also while the app ends.
         self._parts |= {name: Lines(id=name) for name in PLAIN}
@@ -163,35 +166,36 @@ class MainScreen(Framed):
     def wide(self) -> bool:
         return self.size.width >= WIDE[0] and self.size.height >= WIDE[1]
 
-    def columns(self) -> list[tuple[str, list[Panel]]]:
-        """The parts that hold panels, and the panels of each, from top to bottom."""
-        panels = self.panels.panels(self.wide)
+    def columns(self) -> list[tuple[str, list[Place]]]:
+        """The parts that hold panels, and the places in each, from top to bottom.
+
+        A split screen needs the room below the transcript.
+        """
         if not self.wide:
-            return [("panel", panels)]
-        if self.size.width < VERY_WIDE:
-            return [("side", panels)]
-        left, right = divided(panels)
-        return [("far", left), ("side", right)]
+            return [("panel", self.panels.alone())]
+        layout = LAYOUTS[self.size.width >= VERY_WIDE, self.size.height >= TALL and not self.beside.display]
+        return [(name, self.panels.places(places)) for name, places in layout.items()]
 
     def wants(self) -> frozenset[str]:
-        shown = [panel for name, panels in self.columns() for panel in fitting(panels, self.size_of(name).height)]
+        shown = [place for name, places in self.columns() for place in fitting(places, self.size_of(name).height)]
         below = frozenset[str]() if self.wide else frozenset({MOTION, CONDITIONS})
-        return below.union(*(panel.wants for panel in shown))
+        return below.union(*(panel.wants for place in shown for panel in place))
 
     def make_room(self) -> None:
         wide, width = self.wide, self.size.width
         columns = dict(self.columns())
         for name in ("panel", "far", "side"):
             self.lines(name).display = bool(columns.get(name))
-        side = min(max(width * 3 // 8, SIDE[0]), SIDE[1])
+        side = side_width(width)
         self.lines("side").styles.width = self.lines("far").styles.width = side
         self.lines("status").display = not wide
         share = int((self.size.height - 7) * PANEL_SHARE)
-        self.lines("panel").styles.height = max([share, *(panel.least + 1 for panel in columns.get("panel", []))])
-        junction = width - side if wide and columns["side"] else None
-        self.lines("rule-above").put([rule_row(width, junction, "┬")])
-        self.lines("rule-below").put([rule_row(width, junction, "┴")])
-        self._halves.set_class(width - (side if wide and columns["side"] else 0) >= 2 * HALF, "side-by-side")
+        self.lines("panel").styles.height = max([share, *(place[0].least + 1 for place in columns.get("panel", []))])
+        beside = sum(side for name in ("far", "side") if columns.get(name))
+        junctions = range(width - beside, width, side)
+        self.lines("rule-above").put([rule_row(width, junctions, "┬")])
+        self.lines("rule-below").put([rule_row(width, junctions, "┴")])
+        self._halves.set_class(width - beside >= 2 * HALF, "side-by-side")
         self.show_menu()
         self._fit_hint()
 
@@ -204,7 +208,8 @@ class MainScreen(Framed):
         tour.put(rows)
 
     def toggle_panel(self, name: str) -> None:
-        self.panels.toggle(name, self.wide)
+        shown = [panel.name for _, places in self.columns() for place in places for panel in place]
+        self.panels.switch(name, name not in shown, self.wide)
         self.make_room()
 
     def on_resize(self) -> None:

@@ -26,7 +26,7 @@ from multidrop.shell.programs.program_text import ProgramGrammar
 from multidrop.tui.editor import Editor, Grammar, grammar_of
 from multidrop.tui.key_table import bound
 from multidrop.tui.panels.program import SIGNS, index_of, spot_of, state_words
-from multidrop.tui.panels.table import column_rows, panel
+from multidrop.tui.panels.table import column_rows, panel, side_width
 from multidrop.tui.panels.view import View
 from multidrop.tui.readout import ProgramFacts
 from multidrop.tui.screens.dialogs import Ask, Confirm, Offer, Search, offers_like
@@ -56,8 +56,8 @@ from multidrop.tui.texts import OpenText
 PAUSE = 0.4
 """Seconds without an edit after which a text is checked, and its copy is kept."""
 WIDE = 110
-NEWS = 3
-"""Lines of the transcript below the editor."""
+NEWS = 3, 8
+"""Least lines of the transcript below the editor; the rows of a screen for each, where there are more."""
 NO_FACTS = ProgramFacts()
 
 
@@ -111,7 +111,9 @@ class ProgramPage(Page):
 
     def on_resize(self) -> None:
         """Give the panels their column where there is room."""
-        self.lines("program-side").display = self.size.width >= WIDE
+        side = self.lines("program-side")
+        side.display = self.size.width >= WIDE
+        side.styles.width = side_width(self.size.width)
 
     # Painting
 
@@ -127,7 +129,9 @@ class ProgramPage(Page):
         rows = problem_rows(self.findings.problems, self.editor.cursor_location[0] + 1, width)
         rows = [rule(self.findings.words[0].strip(), width), *rows] if rows else []
         rows.append(rule("transcript", width, self.state_words()))
-        rows += news_rows(self.host.last_records(NEWS), lambda at: f"{clock(at):%H:%M:%S}", width)
+        rows += news_rows(
+            self.host.last_records(max(NEWS[0], self.size.height // NEWS[1])), lambda at: f"{clock(at):%H:%M:%S}", width
+        )
         below = self.lines("below")
         if below.styles.height is None or below.styles.height.value != len(rows):
             below.styles.height = len(rows)
@@ -145,8 +149,8 @@ class ProgramPage(Page):
         self.editor.show_marks(marks, line)
         side = self.lines("program-side")
         if side.display:
-            panels = [panel(name) for name in ("drive", "program")]
-            side.put(column_rows(panels, view, side.size.width, side.size.height, border=True))
+            places = [[panel("drive")], [panel(name) for name in ("program", "plot", "cards")]]
+            side.put(column_rows(places, view, side.size.width, side.size.height, border=True))
 
     @property
     def program(self) -> ProgramFacts:

@@ -8,7 +8,7 @@ stop always comes first; the rest gives way from the right.
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Container, Sequence
 from dataclasses import dataclass
 
 from textual import events
@@ -264,11 +264,9 @@ def top_row(
     return (*left, (" " * gap, "text"), *right)
 
 
-def rule_row(width: int, junction: int | None, sign: str) -> Row:
-    """A rule, with a junction (`┬`, `┴`) at a column if one is given."""
-    if junction is None or not 0 <= junction < width:
-        return (("─" * width, "rule"),)
-    return (("─" * junction + sign + "─" * (width - junction - 1), "rule"),)
+def rule_row(width: int, junctions: Container[int], sign: str) -> Row:
+    """A rule, with a junction (`┬`, `┴`) at some columns."""
+    return (("".join(sign if x in junctions else "─" for x in range(width)), "rule"),)
 
 
 def tab_at(row: Row, x: int) -> int | None:
